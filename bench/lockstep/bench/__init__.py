@@ -1,1 +1,1 @@
-"""What Lockstep's figures are, measured: `python -m bench`."""
+"""Measures Lockstep's figures: `python -m bench`."""

@@ -1,4 +1,4 @@
-"""Plain aiortc at addresses of one's choice: aioice never gathers loopback, and has no setting for addresses."""
+"""Lets plain aiortc use chosen addresses: aioice never gathers loopback, and has no setting for addresses."""
 
 from collections.abc import Sequence
 

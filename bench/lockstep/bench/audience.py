@@ -1,8 +1,8 @@
-"""Many observers in a process of their own, which count RTP and decode nothing.
+"""Many observers in a separate process, which count RTP and decode nothing.
 
-`python -m lockstep.bench.audience LINK COUNT [plain]`: connects them, says so in a JSON line on standard output, then
-answers each line on standard input with what each observer has received so far. It ends at the end of its input. With
-`plain` the link is a `lockstep.bench.baseline_server`.
+`python -m lockstep.bench.audience LINK COUNT [plain]` connects them, prints a JSON line, then answers each line on
+standard input with each observer's counts so far. It ends at the end of its input. With `plain` the link is a
+`lockstep.bench.baseline_server`.
 """
 
 import asyncio
@@ -23,7 +23,7 @@ from lockstep.client.transport.webrtc_peer import Peer
 
 __all__ = ["main"]
 
-AT_ONCE = 4  # that connect at the same time
+AT_ONCE = 4  # connecting at the same time
 CONNECT_SECONDS = 60.0
 Counts = dict[str, list[int]]  # per stream: frames, packets lost
 
@@ -65,7 +65,7 @@ async def _observer(link: str) -> AsyncIterator[Callable[[], Counts]]:
 
 @asynccontextmanager
 async def _plain(link: str) -> AsyncIterator[Callable[[], Counts]]:
-    """The same on a server that knows nothing of Lockstep; it opens the data channels and leaves them silent."""
+    """Do the same on a server that knows nothing of Lockstep; open the data channels and leave them silent."""
     counter = RtpCounter(None, lambda _: None)
     peer = Peer(
         parse_link(f"{link}/#token=none"),

@@ -1,9 +1,9 @@
-"""The baseline: a server that takes an afternoon with aiortc.
+"""The baseline: a server that takes an afternoon to write with aiortc.
 
 `python -m lockstep.bench.baseline_server tcp://HOST:PORT [HOST]`
 
-The same pictures of the same robot bridge, from its robot link; each peer has a `VideoStreamTrack` of its own that
-gives out the newest picture as soon as there is one, and aiortc encodes it for each peer alone. No stamps, no
+It serves the same pictures of the same robot bridge, from its robot link; each peer has its own `VideoStreamTrack`,
+which gives out the newest picture as soon as there is one, and aiortc encodes it for each peer alone. No stamps, no
 playout-delay, VP8 as aiortc sets it up. It runs on uvloop, as the console does, and speaks just enough WHEP.
 """
 
@@ -60,10 +60,10 @@ class NewestPictureTrack(VideoStreamTrack):
 
 
 class BaselineServer:
-    """`run` until a signal."""
+    """The server. `run` runs until a signal."""
 
     def __init__(self, address: str, host: str = "127.0.0.1") -> None:
-        """`host`: where it is found."""
+        """`host`: the address to listen on and to offer."""
         self._host = host
         parts = urlsplit(address)
         self._link = RobotLink(parts.hostname or "", parts.port or 0, "media", name="baseline")

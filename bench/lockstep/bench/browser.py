@@ -1,4 +1,4 @@
-"""Pages in Chromium with a measurement's scripts."""
+"""Opens pages in Chromium with a measurement's scripts."""
 
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
@@ -13,7 +13,7 @@ DRAW_PROBE = Path(__file__).with_name("draw_probe.js")
 
 @asynccontextmanager
 async def open_probed_page(browser: Browser, link: str, *scripts: Path) -> AsyncIterator[Page]:
-    """A page with nothing cached, after `scripts` ran in it."""
+    """Open a page with nothing cached, after `scripts` ran in it."""
     context = await browser.new_context(viewport={"width": 1280, "height": 800})
     try:
         for script in scripts:

@@ -1,4 +1,4 @@
-"""`python -m bench [--json FILE|-] [--markdown FILE] [--quick] [SECTION ...]`"""
+"""`python -m bench [--json FILE|-] [--markdown FILE] [--quick] [SECTION ...]`: measures Lockstep on this machine."""
 
 import asyncio
 import json
@@ -35,8 +35,8 @@ SECTIONS = (
     "recording",
     "datagrams",
 )
-BUSY_PERCENT = 8.0  # of the machine, by others, above which the figures say more about them
-LOOK_SECONDS = 1.5  # at the neighbours before each section
+BUSY_PERCENT = 8.0  # of the machine, used by other processes, above which the figures say more about them
+LOOK_SECONDS = 1.5  # of looking at other processes before each section
 
 
 def main() -> None:
@@ -86,12 +86,12 @@ def _publish(report: dict[str, Any], table: str, json_to: str) -> None:
 @dataclass
 class Measured:
     results: list[Result] = field(default_factory=list)
-    failed: dict[str, str] = field(default_factory=dict)  # by section, why
-    busy_percent: dict[str, float] = field(default_factory=dict)  # by section, of the machine, by others before it
+    failed: dict[str, str] = field(default_factory=dict)  # reason by section
+    busy_percent: dict[str, float] = field(default_factory=dict)  # by section: used by other processes before it
 
 
 async def measure(sections: list[str], quick: bool) -> Measured:
-    """One section that fails does not keep the others from being measured."""
+    """Measure the sections; one that fails does not keep the others from being measured."""
     context = Context(quick, await available_robots(), _say)
     measured = Measured()
     for name in sections:
@@ -107,7 +107,7 @@ async def measure(sections: list[str], quick: bool) -> Measured:
 
 
 def _reason(error: BaseException) -> str:
-    """The first cause; task groups wrap what went wrong."""
+    """Describe the first cause of an error, since task groups wrap it."""
     while isinstance(error, BaseExceptionGroup):
         error = error.exceptions[0]
     return f"{type(error).__name__}: {error}"

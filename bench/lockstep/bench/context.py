@@ -1,4 +1,4 @@
-"""What every section is given."""
+"""The context that every section is given."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -9,9 +9,9 @@ __all__ = ["Context"]
 @dataclass(frozen=True)
 class Context:
     quick: bool  # fewer samples: to see that it works, not to quote
-    robots: list[str]  # that start on this machine, the default one first
+    robots: list[str]  # robots that start on this machine, the default one first
     say: Callable[[str], None]  # progress, for people
 
     def scale(self, count: int, quick: int) -> int:
-        """How many samples to take."""
+        """Return the number of samples to take."""
         return quick if self.quick else count

@@ -1,4 +1,4 @@
-"""Events, one by one: sent, executed by the robot, answered."""
+"""Drives events one by one: sent, executed by the robot, answered."""
 
 import asyncio
 import math
@@ -17,8 +17,8 @@ __all__ = ["Pause", "Trip", "console_trips", "drive_on", "link_trips", "round_an
 
 SPEEDS = {"base.vx": 0.15, "base.wz": 0.6, "tool.vz": 0.03}  # the base drives a circle of 0.25 m; the tool nods
 TICK = 0.004  # s, the robot's control tick
-TIMER = 0.0015  # s, how exact a sleep is
-ARMINGS = 5  # one after another, of a robot that a busy machine holds up
+TIMER = 0.0015  # s, accuracy of a sleep
+ARMINGS = 5  # attempts in a row to arm a robot that a busy machine holds up
 MARGIN = 0.0005  # s on top of the shortest interval between two events
 
 
@@ -35,7 +35,7 @@ class Trip(NamedTuple):
 
 
 def round_and_round(description: RobotDescription) -> Callable[[float], list[float]]:
-    """Values of each axis at a time; a robot that follows them stays where it is."""
+    """Return a function from a time to the values of each axis; a robot that follows them stays where it is."""
 
     def values(now: float) -> list[float]:
         nod = math.cos(now)
@@ -46,11 +46,11 @@ def round_and_round(description: RobotDescription) -> Callable[[float], list[flo
 
 
 class Pause:
-    """Between two commands: the interval of the event rate, and up to a tick more.
+    """The pause between two commands: the interval of the event rate, and up to a tick more.
 
-    Without that the commands would all meet the control tick at the same phase. The last of it is not slept: timers
-    keep to the clock's milliseconds, on which the ticks lie too, and a tenth of a millisecond in the path would then
-    decide whether every command waits a quarter of a tick less or more.
+    Without the addition all commands would meet the control tick at the same phase. The end of the pause is not slept:
+    timers keep to the clock's milliseconds, on which the ticks lie too, and a tenth of a millisecond in the path would
+    then decide whether every command waits a quarter of a tick less or more.
     """
 
     def __init__(self, description: RobotDescription, seed: int) -> None:
@@ -67,7 +67,7 @@ class Pause:
 async def drive_on(console: Console, values: Mapping[str, float] | Sequence[float]) -> Feedback:
     """Drive, and arm first whenever the robot asks for it: a simulated robot endangers no person.
 
-    A machine that is busy may hold the robot up again between the two.
+    A busy machine may hold the robot up again between the two.
 
     Raises:
         NotArmed: the robot asked for it every time.
@@ -85,9 +85,9 @@ async def drive_on(console: Console, values: Mapping[str, float] | Sequence[floa
 async def console_trips(console: Console, count: int, *, seconds: float = 60.0, seed: int = 1) -> list[Trip]:
     """Drive `count` events, or for `seconds`, as fast as the robot's highest event rate allows.
 
-    Each command is asked for only when the gate is open, so that waiting for the event rate is no part of the trip:
-    it is sent by the call itself. The very first, which may meet a gate that is still shut, is not counted; nor is
-    one that the robot wants a neutral command before, which a busy machine has held up.
+    Each command is asked for only when the gate is open, so that waiting for the event rate is no part of the trip: it
+    is sent by the call itself. The first command, which may meet a gate that is still shut, is not counted; nor is one
+    before which the robot wants a neutral command because a busy machine has held it up.
     """
     values, pause = round_and_round(console.description), Pause(console.description, seed)
     await drive_on(console, values(time.monotonic()))
@@ -106,9 +106,9 @@ async def console_trips(console: Console, count: int, *, seconds: float = 60.0, 
 
 
 async def link_trips(link: RobotLink, description: RobotDescription, count: int, *, seed: int = 1) -> list[Trip]:
-    """The same straight to the bridge, without a console between.
+    """Drive the same straight to the bridge, without a console between.
 
-    A busy machine may hold the robot up for so long that it wants a neutral command first; that is no trip.
+    A busy machine may hold the robot up for so long that it wants a neutral command first; that is not counted.
     """
     values, pause = round_and_round(description), Pause(description, seed)
     rest = [axis.rest for axis in description.axes]

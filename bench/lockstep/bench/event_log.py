@@ -1,4 +1,4 @@
-"""Reading the bridge's own record of what happened when, on the machine's monotonic clock."""
+"""Reads the bridge's own record of events, with times on the machine's monotonic clock."""
 
 import json
 from collections.abc import Iterator
@@ -9,7 +9,7 @@ __all__ = ["capture_times", "robot_times"]
 
 
 def robot_times(log: Path) -> dict[int, float]:
-    """Seconds from executing a command to issuing its feedback: the robot's own share, by event."""
+    """Return the seconds from executing a command to issuing its feedback, the robot's own share, by event."""
     executed: dict[int, float] = {}
     taken: dict[int, float] = {}
     for record in _records(log):
@@ -22,12 +22,12 @@ def robot_times(log: Path) -> dict[int, float]:
 
 
 def capture_times(log: Path, stream: str) -> list[float]:
-    """When each picture of a stream was captured, in order."""
+    """Return the time of capture of each picture of a stream, in order."""
     return [record["captured"] for record in _records(log) if record["kind"] == "media" and record["stream"] == stream]
 
 
 def _records(log: Path) -> Iterator[dict[str, Any]]:
-    """Whole lines: the last one may still be being written."""
+    """Yield the whole lines: the last one may still be being written."""
     text = log.read_text()
     for line in text[: text.rfind("\n") + 1].splitlines():
         yield json.loads(line)

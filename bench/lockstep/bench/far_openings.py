@@ -1,4 +1,4 @@
-"""Openings of a page behind an emulated network with the kernel's own TCP: two network namespaces, root only."""
+"""Opens pages behind an emulated network with the kernel's own TCP, in two network namespaces; for root only."""
 
 import asyncio
 import json
@@ -21,7 +21,7 @@ OPENING_SECONDS = 120.0
 
 @asynccontextmanager
 async def far_console(profile: Profile | str, robot: str) -> AsyncIterator[tuple[Namespaces, str]]:
-    """A console and its robot on the far side; and the operator's link.
+    """Start a console and its robot on the far side; yield the network and the operator's link.
 
     Raises:
         NamespacesUnavailable: names the missing part.
@@ -36,18 +36,18 @@ async def far_console(profile: Profile | str, robot: str) -> AsyncIterator[tuple
 
 @asynccontextmanager
 async def far_baseline(profile: Profile | str, robot: str) -> AsyncIterator[tuple[Namespaces, str]]:
-    """The same pictures from plain aiortc, and the link of a bare page."""
+    """Serve the same pictures from plain aiortc; yield the network and the link of a bare page."""
     with tempfile.TemporaryDirectory() as state:
         bridge = (sys.executable, "-m", "lockstep.robot_bridge", robot, "--port", "0", "--json", "--state-dir", state)
         async with Namespaces(profile) as network:
-            # Both are of one network; the link between them passes nothing of it.
+            # Both are in one network; the link between them does not pass the emulated path.
             found = await _started(network, bridge)
             server = (sys.executable, "-m", "lockstep.bench.baseline_server", found["robot"], ROBOT_ADDRESS)
             yield network, (await _started(network, server))["console"]
 
 
 async def open_far(network: Namespaces, link: str, expression: str, count: int) -> list[dict[str, Any]]:
-    """What `lockstep.bench.openings` found on the operator's side."""
+    """Run `lockstep.bench.openings` on the operator's side, and return its results."""
     command = (sys.executable, "-m", "lockstep.bench.openings", link, expression, str(count))
     process = await network.start("operator", command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE)
     assert process.stdout is not None

@@ -1,4 +1,4 @@
-"""A port for a server that cannot be asked which one it has got."""
+"""Finds a port for a server that cannot report which one it has got."""
 
 import random
 import socket
@@ -12,10 +12,10 @@ TRIES = 100
 
 
 def free_port() -> int:
-    """Free for TCP and UDP, on all addresses, just now.
+    """Return a port that is free for TCP and UDP, on all addresses, just now.
 
     Raises:
-        OSError: none of those that were tried.
+        OSError: none of the tried ports is free.
     """
     for port in random.SystemRandom().sample(PORTS, TRIES):
         with (

@@ -1,4 +1,4 @@
-"""Hundreds of observers on this machine that take no time from the measurement."""
+"""Runs hundreds of observers on this machine that take no time from the measurement."""
 
 import shutil
 import sys
@@ -18,7 +18,7 @@ IDLE = ("chrt", "--idle", "0") if shutil.which("chrt") else ("nice", "-n", "19")
 
 @asynccontextmanager
 async def idle_crowd(link: str, count: int, context: Context) -> AsyncIterator[list[Running]]:
-    """`count` observers (`bench/lockstep/bench/audience.py`), in processes that run when no other process wants to."""
+    """Connect observers (`bench/lockstep/bench/audience.py`) in processes that run when no other process wants to."""
     async with AsyncExitStack() as stack:
         audiences: list[Running] = []
         for size in [min(AT_MOST, count - first) for first in range(0, count, AT_MOST)]:

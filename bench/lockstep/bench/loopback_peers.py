@@ -1,4 +1,4 @@
-"""Two plain aiortc peers in this process, connected through a relay."""
+"""Connects two plain aiortc peers in this process through a relay."""
 
 import asyncio
 
@@ -13,7 +13,7 @@ CONNECT_SECONDS = 20.0  # lost handshake packets are repeated after a second and
 
 
 async def connect_through(route: Route, asking: RTCPeerConnection, answering: RTCPeerConnection) -> None:
-    """Offer, answer, and wait until they are connected. `asking` has its data channel already."""
+    """Exchange offer and answer, and wait until the peers are connected. `asking` has its data channel already."""
     connected = asyncio.Event()
 
     @asking.on("connectionstatechange")

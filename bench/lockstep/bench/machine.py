@@ -1,4 +1,4 @@
-"""The machine of the measurements."""
+"""Describes the machine of the measurements."""
 
 import asyncio
 import os
@@ -15,7 +15,7 @@ PACKAGES = ("lockstep-console", "aiortc", "av", "fastapi", "mujoco", "uvloop", "
 
 
 def machine_facts() -> dict[str, Any]:
-    """Cores, processor, memory, versions."""
+    """Return cores, processor, memory and versions."""
     return {
         "cores": os.cpu_count(),
         "cpu": _cpu_model(),
@@ -28,7 +28,7 @@ def machine_facts() -> dict[str, Any]:
 
 
 async def busy_percent(seconds: float) -> float:
-    """The used share of the whole machine's processor time while this process waits (proc(5), /proc/stat)."""
+    """Return the used share of the machine's processor time, in %, while this process waits (proc(5), /proc/stat)."""
     total, idle = _processor_time()
     await asyncio.sleep(seconds)
     later, later_idle = _processor_time()
@@ -36,7 +36,7 @@ async def busy_percent(seconds: float) -> float:
 
 
 def _processor_time() -> tuple[int, int]:
-    """In ticks since boot: all of it, and the part that was idle or waited for a disk."""
+    """Return the ticks since boot: all of them, and those that were idle or waited for a disk."""
     first, _, _ = Path("/proc/stat").read_text().partition("\n")
     fields = [int(field) for field in first.split()[1:9]]  # guests are counted in the user time already
     return sum(fields), fields[3] + fields[4]

@@ -1,7 +1,7 @@
-"""Finds out which captured picture each shown one is. No I/O.
+"""Finds the captured picture of each shown one. No I/O.
 
 RTP timestamps of a picture stream follow its capture times from an unknown start, at 90 kHz and to a tick exactly.
-Capture times are never evenly spaced, so that only one start fits all pictures: the one that most agree on.
+Capture times are never evenly spaced, so only one start fits all pictures: the one that most agree on.
 """
 
 from collections import Counter
@@ -17,12 +17,14 @@ MIN_SHARE = 0.5  # of the shown pictures that must agree on the start
 
 
 class Joined(NamedTuple):
-    captured: list[float | None]  # s; by shown picture, None: not one of the captured
+    captured: list[float | None]  # s, by shown picture; None: not one of the captured
     matched: int
 
 
 def join_pictures(shown: Sequence[int], captured: Sequence[float]) -> Joined:
-    """`shown`: RTP timestamps in order; `captured`: capture times in s.
+    """Join shown and captured pictures.
+
+    `shown`: RTP timestamps in order; `captured`: capture times in s.
 
     Raises:
         ValueError: too few of them agree on a start; they do not belong together.
@@ -41,7 +43,7 @@ def join_pictures(shown: Sequence[int], captured: Sequence[float]) -> Joined:
 
 
 def _unwrapped(timestamps: Sequence[int]) -> list[int]:
-    """Without the wrap of 32 bits."""
+    """Return the timestamps without the wrap of 32 bits."""
     found = [timestamps[0]]
     for timestamp in timestamps[1:]:
         ahead = (timestamp - found[-1]) % WRAP
@@ -50,7 +52,7 @@ def _unwrapped(timestamps: Sequence[int]) -> list[int]:
 
 
 def _agreed_start(timeline: Sequence[int], ticks: Sequence[int]) -> int:
-    """Every pair of a shown and a captured picture votes for the start that would make them one."""
+    """Return the start with the most votes: each pair of a shown and a captured picture votes for the one that fits."""
     votes = Counter(timestamp - tick for timestamp in timeline for tick in ticks)
     near = Counter({start: sum(votes[start + slack] for slack in (-1, 0, 1)) for start in votes})
     return near.most_common(1)[0][0]

@@ -1,9 +1,9 @@
-"""Opens a page again and again, each time with nothing cached.
+"""Opens a page repeatedly, each time with nothing cached.
 
 `python -m lockstep.bench.openings LINK EXPRESSION COUNT`
 
-One JSON line for each opening: when the first picture was there by EXPRESSION, when each step before it was done (ms
-since the navigation began), and how many bytes were asked for until then.
+It prints one JSON line for each opening: the time of the first picture by EXPRESSION, the times of the steps before it
+(ms since the navigation began), and the number of bytes asked for until then.
 """
 
 import asyncio

@@ -1,4 +1,4 @@
-"""A page's clock against this machine's monotonic clock."""
+"""Relates a page's clock to this machine's monotonic clock."""
 
 import time
 from collections.abc import Sequence
@@ -22,9 +22,10 @@ class PageClock(NamedTuple):
 
 
 def clock_between(looks: Sequence[tuple[float, float, float]]) -> PageClock:
-    """From (monotonic before, page's clock, monotonic after), all in s: the page was read between the two.
+    """Compute the clock from looks (monotonic before, page's clock, monotonic after), all in s.
 
-    Each look bounds the offset from both sides; all together they bound it more narrowly than any one.
+    The page was read between the two. Each look bounds the offset from both sides; all together bound it more narrowly
+    than any one.
     """
     latest = min(after - page for _, page, after in looks)
     earliest = max(before - page for before, page, _ in looks)
@@ -32,7 +33,7 @@ def clock_between(looks: Sequence[tuple[float, float, float]]) -> PageClock:
 
 
 async def read_page_clock(page: Page) -> PageClock:
-    """Ask the page for its time again and again."""
+    """Ask the page for its time repeatedly, and return its clock."""
     looks = []
     for _ in range(LOOKS):
         before = time.monotonic()

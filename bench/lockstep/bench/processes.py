@@ -1,4 +1,4 @@
-"""Processes that a measurement needs: started, ready, measured, ended."""
+"""Starts, measures and ends the processes of a measurement."""
 
 import asyncio
 import json
@@ -20,7 +20,7 @@ TICKS = os.sysconf("SC_CLK_TCK")
 
 
 class ProcessFailed(Exception):
-    """A process ended, or said nothing in time; its last lines of output say why."""
+    """A process ended, or was silent for too long; its last lines of output say why."""
 
     def __init__(self, command: Sequence[str], output: Sequence[str]) -> None:
         super().__init__(command, output)
@@ -44,12 +44,12 @@ class Running:
         return self._process.pid
 
     def cpu_seconds(self) -> float:
-        """Processor time used so far, all threads, user and system (proc(5), fields 14 and 15)."""
+        """Return the processor time used so far, all threads, user and system (proc(5), fields 14 and 15)."""
         fields = Path(f"/proc/{self.pid}/stat").read_text().rpartition(")")[2].split()
         return (int(fields[11]) + int(fields[12])) / TICKS
 
     def thread_seconds(self) -> dict[str, float]:
-        """The same of each name of threads; the main thread is called "main". Ended threads are not in it.
+        """Return the same by name of threads, without ended threads; the main thread is called "main".
 
         From the scheduler's own account, which is finer than the ticks in `stat`.
         """
@@ -62,7 +62,7 @@ class Running:
         return found
 
     async def read(self, seconds: float) -> dict[str, Any]:
-        """The next line of its output.
+        """Return the next line of its output.
 
         Raises:
             ProcessFailed: it ended, or `seconds` passed.
@@ -81,26 +81,30 @@ class Running:
         return found
 
     async def ask(self, question: str, seconds: float) -> dict[str, Any]:
-        """Write a line, read one; raises as `read`."""
+        """Write a line and return the answer.
+
+        Raises:
+            ProcessFailed: as for `read`.
+        """
         if self._process.stdin is not None:
             self._process.stdin.write(question.encode() + b"\n")
         return await self.read(seconds)
 
     def pause(self) -> None:
-        """Stop it where it is."""
+        """Stop the process where it is (SIGSTOP)."""
         self._signal(signal.SIGSTOP)
 
     def go_on(self) -> None:
-        """After `pause`."""
+        """Let the process go on after `pause`."""
         self._signal(signal.SIGCONT)
 
     async def kill(self) -> None:
-        """End it as a crash does."""
+        """Kill the process, as a crash does."""
         self._signal(signal.SIGKILL)
         await self._process.wait()
 
     def resident_bytes(self) -> int:
-        """Memory in use (proc(5), statm field 2)."""
+        """Return its memory in use (proc(5), statm field 2)."""
         return int(Path(f"/proc/{self.pid}/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE")
 
     async def keep_output(self) -> None:
@@ -123,7 +127,7 @@ class Running:
             await self._process.wait()
 
     def _signal(self, number: signal.Signals) -> None:
-        """Past the process object: its `send_signal` may reap the child, which its watcher then misses."""
+        """Send a signal past the process object, whose `send_signal` may reap the child before its watcher does."""
         if self._process.returncode is None:
             with suppress(ProcessLookupError):
                 os.kill(self.pid, number)
@@ -133,7 +137,9 @@ class Running:
 async def running_process(
     *command: str, ready_seconds: float = READY_SECONDS, environment: Mapping[str, str] | None = None
 ) -> AsyncIterator[tuple[Running, dict[str, Any]]]:
-    """The process and the line with which it says that it is ready. Ended on leaving, and when we are killed.
+    """Start a process; yield it and the line with which it reports that it is ready.
+
+    It is ended on leaving, and when this process is killed.
 
     Raises:
         ProcessFailed: it did not become ready.

@@ -1,4 +1,4 @@
-"""One measured figure, and whether it is good enough."""
+"""A measured figure, and whether it meets its target."""
 
 from dataclasses import asdict, dataclass
 from typing import Any, Literal
@@ -17,7 +17,7 @@ class Result:
     value: float | None
     unit: str  # "ms"
     target: float | None = None  # None: reported only
-    bound: Bound = "at most"  # on which side of the target is good
+    bound: Bound = "at most"  # the side of the target that is good
     baseline: float | None = None  # the same figure of `baseline_name`, from the same run
     baseline_name: str = ""  # "reliable data channel"
     samples: int = 0
@@ -25,7 +25,7 @@ class Result:
 
     @property
     def met(self) -> bool | None:
-        """None without a target."""
+        """True if the figure meets its target; None without a target."""
         if self.target is None:
             return None
         if self.value is None:
@@ -45,5 +45,5 @@ class Result:
         return f"make bench ARGS={self.section}"
 
     def fields(self) -> dict[str, Any]:
-        """For JSON."""
+        """Return the fields for JSON."""
         return asdict(self) | {"met": self.met, "ratio": self.ratio, "command": self.command}

@@ -7,10 +7,10 @@ __all__ = ["median", "quantile"]
 
 
 def quantile(samples: Sequence[float], share: float) -> float:
-    """The nearest-rank quantile: the least sample that at least `share` of all are not above.
+    """Return the nearest-rank quantile: the least sample that at least `share` of all are not above.
 
     Raises:
-        ValueError: no samples, or `share` is not between 0 and 1.
+        ValueError: there are no samples, or `share` is not between 0 and 1.
     """
     if not samples:
         raise ValueError("no samples")
@@ -22,5 +22,9 @@ def quantile(samples: Sequence[float], share: float) -> float:
 
 
 def median(samples: Sequence[float]) -> float:
-    """The nearest-rank median; raises as `quantile`."""
+    """Return the nearest-rank median.
+
+    Raises:
+        ValueError: there are no samples.
+    """
     return quantile(samples, 0.5)

@@ -1,8 +1,8 @@
-"""Viewers of the 3D scene in a process of their own, which read everything and draw nothing.
+"""Viewers of the 3D scene in a separate process, which read everything and draw nothing.
 
-`python -m lockstep.bench.scene_viewers LINK COUNT`: says so in a JSON line on standard output once they all get
-something, then answers each line on standard input with how many bytes they have received. It ends at the end of its
-input. The process steps back for others, as a viewer's own computer would not be the operator's.
+`python -m lockstep.bench.scene_viewers LINK COUNT` prints a JSON line once all viewers receive something, then answers
+each line on standard input with the number of bytes that they have received. It ends at the end of its input. The
+process runs at a low priority, because a viewer's own computer would not be the operator's.
 """
 
 import asyncio
@@ -26,7 +26,7 @@ VERSION = Subprotocol(f"viser-v{viser.__version__}")
 
 
 class Viewer:
-    """One WebSocket to the scene, through the console's proxy and its access check."""
+    """A WebSocket to the scene, through the console's proxy and its access check."""
 
     def __init__(self, websocket: ClientConnection) -> None:
         self.received = 0  # bytes
@@ -52,7 +52,7 @@ async def watch(link: str, count: int) -> None:
 
 
 async def _opened(link: str) -> connect:
-    """A ticket, as the page asks for it, and the address in it."""
+    """Ask for a ticket as the page does, and connect to the address in it."""
     console = parse_link(link)
     async with httpx.AsyncClient(trust_env=False) as http:
         answer = await http.post(f"{console.base}/api/scene", headers={"Authorization": f"Bearer {console.token}"})

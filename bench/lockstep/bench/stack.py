@@ -1,4 +1,4 @@
-"""A robot bridge and a console, each a process of its own, so that the time of each can be told."""
+"""Starts a robot bridge and a console, each in a separate process, so that the time of each can be told."""
 
 import asyncio
 import datetime
@@ -22,7 +22,7 @@ __all__ = ["DEFAULT_ROBOT", "Bridge", "Metrics", "Stack", "available_robots", "r
 DEFAULT_ROBOT = "mobile-manipulator"
 ROBOTS = (DEFAULT_ROBOT, "planar")
 HTTP_SECONDS = 30.0
-TRIES = 30  # for the counters, a Retry-After apart
+TRIES = 30  # for the counters, each after a Retry-After
 MAX_PEERS = 300  # more than any section needs
 
 
@@ -31,8 +31,8 @@ class Bridge:
     robot: str
     process: Running
     address: str  # "tcp://127.0.0.1:5600"
-    event_log: Path  # not there unless it was asked for
-    settings: Mapping[str, str]  # by which a console reaches it, LOCKSTEP_…
+    event_log: Path  # exists only if it was asked for
+    settings: Mapping[str, str]  # for a console that connects to it, LOCKSTEP_…
 
     @property
     def port(self) -> int:
@@ -48,7 +48,7 @@ class Stack:
     observer: str
 
     async def metrics(self) -> "Metrics":
-        """The console's counters now; asks again where others at this address have used up its requests."""
+        """Return the console's counters now; ask again if others at this address have used up its requests."""
         async with httpx.AsyncClient(trust_env=False, timeout=HTTP_SECONDS) as http:
             for _ in range(TRIES):
                 answer = await http.get(f"{self.url}/metrics")
@@ -65,7 +65,7 @@ class Metrics:
         self._samples = [sample for family in text_string_to_metric_families(text) for sample in family.samples]
 
     def values(self, name: str, by: str, **where: str) -> dict[str, float]:
-        """One counter: a value for each value of the label `by`, other labels as in `where`."""
+        """Return a counter: a value for each value of the label `by`, with the other labels as in `where`."""
         return {
             sample.labels[by]: sample.value
             for sample in self._samples
@@ -75,11 +75,13 @@ class Metrics:
 
 @asynccontextmanager
 async def running_bridge(robot: str, *, is_logged: bool = True, is_secured: bool = False) -> AsyncIterator[Bridge]:
-    """`is_logged`: whether the bridge writes its event log, which costs it some processor time. `is_secured`: its link
-    speaks TLS and asks for a secret.
+    """Start a bridge.
+
+    `is_logged`: it writes its event log, which costs some processor time. `is_secured`: its link speaks TLS and asks
+    for a secret.
 
     Raises:
-        ProcessFailed: the robot lacks something here.
+        ProcessFailed: something that the robot needs is missing here.
     """
     with TemporaryDirectory(prefix="lockstep-bench-") as directory:
         log = Path(directory) / "events.jsonl"
@@ -92,7 +94,7 @@ async def running_bridge(robot: str, *, is_logged: bool = True, is_secured: bool
 
 
 def _security(folder: Path) -> tuple[tuple[str, ...], dict[str, str]]:
-    """Options of a bridge, and what both it and its console have in their environment."""
+    """Return the options of a bridge, and the environment of both it and its console."""
     made = self_signed(folder, {"127.0.0.1"}, datetime.datetime.now(datetime.UTC))
     settings = {"LOCKSTEP_LINK_SECRET": secrets.token_hex(16), "LOCKSTEP_LINK_TLS_CA": str(made.chain)}
     return ("--link-tls-cert", str(made.chain), "--link-tls-key", str(made.key)), settings
@@ -102,7 +104,7 @@ def _security(folder: Path) -> tuple[tuple[str, ...], dict[str, str]]:
 async def running_stack(
     robot: str, *, is_logged: bool = True, is_secured: bool = False, **more: str
 ) -> AsyncIterator[Stack]:
-    """As `running_bridge`, and a console. `more`: settings of the console besides, LOCKSTEP_…"""
+    """Start a bridge, as `running_bridge` does, and a console. `more`: further settings of the console, LOCKSTEP_…"""
     async with running_bridge(robot, is_logged=is_logged, is_secured=is_secured) as bridge:
         lockstep = str(Path(sys.executable).with_name("lockstep"))
         command = (lockstep, "serve", "--robot", bridge.address, "--port", "0", "--json", "--quiet")
@@ -112,7 +114,7 @@ async def running_stack(
 
 
 async def available_robots() -> list[str]:
-    """Those that start here: the default robot needs OpenGL."""
+    """Return the robots that start here: the default robot needs OpenGL."""
     found = []
     for robot in ROBOTS:
         try:

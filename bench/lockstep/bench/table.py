@@ -1,4 +1,4 @@
-"""Results as tables for people: plain text, and Markdown for docs/performance.md."""
+"""Formats results as tables for people: plain text, and Markdown for docs/performance.md."""
 
 from collections.abc import Iterable, Sequence
 from itertools import groupby
@@ -11,7 +11,7 @@ HEADINGS = ("", "value", "target", "", "baseline", "ratio")
 
 
 def render_table(results: Sequence[Result]) -> str:
-    """Columns are as wide as needed; under each section the conditions that its figures share."""
+    """Return a table with columns as wide as needed; under each section the conditions that its figures share."""
     rows = [_cells(result) for result in results]
     widths = [max(len(row[column]) for row in [HEADINGS, *rows]) for column in range(len(HEADINGS))]
     lines = [_line(HEADINGS, widths)]
@@ -25,7 +25,7 @@ def render_table(results: Sequence[Result]) -> str:
 
 
 def render_markdown(results: Sequence[Result]) -> str:
-    """A table for each section, its conditions, and the command that repeats it."""
+    """Return a table for each section, its conditions, and the command that repeats it."""
     lines: list[str] = []
     for section, group in groupby(results, key=lambda result: result.section):
         members = list(group)
@@ -54,7 +54,7 @@ def _cells(result: Result) -> tuple[str, ...]:
 
 
 def _number(value: float) -> str:
-    """Three significant digits, without an exponent."""
+    """Return three significant digits, without an exponent."""
     size = abs(value)
     if value == int(value) and size < 1e6 or size >= 100:
         return f"{value:.0f}"

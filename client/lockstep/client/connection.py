@@ -1,4 +1,4 @@
-"""A connected console: messages in and out, seat, stop, heartbeat. `Console` is its public face."""
+"""The connection to a console: messages in and out, seat, stop, heartbeat. `Console` is its public interface."""
 
 import asyncio
 import secrets
@@ -44,13 +44,13 @@ from lockstep.protocol.messages import Feedback, Ping, Pong, Refusal, Stop, Stop
 __all__ = ["Connection", "ConnectionOptions"]
 
 HEARTBEAT = 0.5  # s between two reports, and between two pings
-OBSERVER_HEARTBEAT = 1.0  # s, of a peer that cannot drive; there may be hundreds
-RELAYED_HEARTBEAT = 5.0  # s, of an observer, whose answers delay no command
-LINE_HEARTBEAT = 15.0  # s, of an observer on a WebSocket, which loses nothing
-EARLY_PINGS = 5  # to know the path before the first command
+OBSERVER_HEARTBEAT = 1.0  # s, for a peer that cannot drive; there may be hundreds
+RELAYED_HEARTBEAT = 5.0  # s, for an observer, whose answers delay no command
+LINE_HEARTBEAT = 15.0  # s, for an observer on a WebSocket, which loses nothing
+EARLY_PINGS = 5  # pings that measure the path before the first command
 EARLY_PING = 0.05  # s between them
-STOP_SECONDS = 0.3  # for a channel to confirm a stop, before HTTP is tried as well or after HTTP has failed
-RETRY_SECONDS = 1.0  # while the robot is not reached yet; as the console's Retry-After
+STOP_SECONDS = 0.3  # time for a channel to confirm a stop, before HTTP is tried as well or after HTTP has failed
+RETRY_SECONDS = 1.0  # between two tries while the console does not reach its robot; as in its Retry-After
 
 
 @dataclass(frozen=True)
@@ -78,8 +78,8 @@ class ConnectionOptions:
 
 
 class Connection:
-    """`open`, use, `close`. After a connection that was not closed here has ended, `lost` has the reason and every wait
-    raises it."""
+    """The connection to a console, from `open` to `close`. If it ends without `close`, `lost` has the reason and every
+    wait raises it."""
 
     def __init__(self, options: ConnectionOptions) -> None:
         self.options = options
@@ -92,13 +92,13 @@ class Connection:
         self._changed = asyncio.Event()  # a message came, or the connection ended
         self._robot: RobotState | None = None
         self._driver: Driver | None = None
-        self._early_feedback: Feedback | None = None  # came before the robot's description
+        self._early_feedback: Feedback | None = None  # arrived before the robot's description
         self._event_rate = EventRate()
         self._pings = PingLedger()
         self._heard_at = self._loop.time()
         self._running: asyncio.Task[None] | None = None
         self._relay: RelayMedia | None = None
-        self._beside = ""  # the relay that it was sent to
+        self._beside = ""  # the relay that the console sent this observer to
         self._peer: Peer | ObserverWebSocket = self._new_peer()
         self.session = Session(lambda channel, message: self._peer.send(channel, message), self._until)
 
@@ -118,10 +118,10 @@ class Connection:
             sound_codec=options.sound_codec,
         )
 
-    # Its life
+    # Open and close
 
     async def open(self) -> None:
-        """Connect; returns when the robot is known. Raises SignallingRefused or ConnectFailed."""
+        """Connect and wait until the robot is known. Raises SignallingRefused or ConnectFailed."""
         deadline = self._loop.time() + self.options.connect_seconds
         where = await self._peer.relay_ticket() if self.options.through_relay else None
         wanted = {"video": self.options.video, "audio": int(self.options.audio)}
@@ -145,7 +145,7 @@ class Connection:
             raise ConnectFailed(error.detail) from error
 
     async def _go_beside(self, where: RelayTicket) -> None:
-        """Media and feedback come from a relay; everything else goes by a line to the console."""
+        """Switch to a WebSocket for everything but media and feedback, which come from a relay."""
         self._beside = where.relay
         self.options = options = replace(self.options, video=0, audio=False, carrier="trailer")
         self.media = MediaReceiver("trailer", options.tolerance, options.gate, self._rendered)
@@ -155,7 +155,7 @@ class Connection:
         )
 
     async def _watch_through(self, wanted: dict[str, int], deadline: float) -> None:
-        """The console gives the relay's key only to a connected observer."""
+        """Subscribe at the relay once connected: the console gives the relay's key only to a connected observer."""
         try:
             async with asyncio.timeout_at(deadline):
                 await self._until(lambda: self.session.welcome is not None)
@@ -170,7 +170,7 @@ class Connection:
         await relay.connect()
 
     async def _negotiate(self, deadline: float) -> list[Section]:
-        """Try again while the console does not reach its robot, and without a line where no WebSocket passes."""
+        """Negotiate; retry while the console does not reach its robot, and without the WebSocket where none passes."""
         while True:
             try:
                 return await self._peer.negotiate()
@@ -185,7 +185,7 @@ class Connection:
             self._peer = self._new_peer(self._beside)
 
     async def _run(self) -> None:
-        """The session: returns when the connection ended or was closed."""
+        """Run the session until the connection ends or is closed."""
         try:
             async with asyncio.TaskGroup() as group:
                 tasks = [group.create_task(self.media.run()), group.create_task(self._heartbeat())]
@@ -406,11 +406,11 @@ class Connection:
     # Requests to the console
 
     async def restart_ice(self) -> None:
-        """Raises SignallingRefused or ConnectFailed."""
+        """Look for a new path to the console. Raises SignallingRefused or ConnectFailed."""
         await self._peer.restart_ice(self.options.connect_seconds)
 
     async def stop(self, reason: str) -> StopState:
-        """Raises StopUnconfirmed when neither the data channel nor HTTP brought the robot's answer."""
+        """Latch the stop. Raises StopUnconfirmed if neither the data channel nor HTTP brought the robot's answer."""
         press = secrets.token_hex(16)
         self._peer.send("stop", Stop(by=self.options.name, reason=reason, press=press))
         # An observer's message on a channel may wait behind those of a crowd; a stop by HTTP waits for no other

@@ -25,32 +25,38 @@ from lockstep.protocol.messages import Feedback, StopState
 
 __all__ = ["Console"]
 
-LEAVE_SECONDS = 1.5  # for the robot to come to rest before the connection is closed
+LEAVE_SECONDS = 1.5  # time for the robot to come to rest before the connection is closed
 
 
 class Console:
-    """One connection to a Lockstep console; an async context manager. Do not use a lost one again: make another.
+    """One connection to a Lockstep console, as an async context manager. After ConsoleLost make a new Console.
 
     Args:
-        link: as `lockstep up` prints it: "http://host:port/#token=…"
+        link: the link that `lockstep up` prints: "http://host:port/#token=…"
         pacing: "feedback": the next command waits for the feedback of the last; "media": also for its picture
         tolerance: largest gap of a rendered picture, in events
         audio_tolerance: the same for sound
         gate: "event": the rule. "off": renders everything. "age": renders media that are at most 0.5 s old by
-        synchronised clocks, as other consoles do; needs the carrier "capture-time" or "trailer". The last two are for
-        comparison carrier: how the event reference travels with media; no other carrier is offered video: how many
-        cameras at most; True: four, False: none audio: whether to receive sound
-        decode: False only counts RTP packets and frames: no pictures, no sound, next to no cost
+            synchronised clocks, as other consoles do; needs the carrier "capture-time" or "trailer". The last two are
+            for comparison
+        carrier: the way in which the event reference travels with media; no other carrier is offered
+        video: number of cameras, at most; True: four, False: none
+        audio: True to receive sound
+        decode: False only counts RTP packets and frames: no pictures, no sound, hardly any cost
         codec: "VP8" or "H264"; None: the console's first choice
-        sound_codec: "opus" or "PCMU"; None: the same
-        event_rate: most events per second; None: the rate of the robot's description. Never more than that
-        name: what other participants see
-        connect_seconds: allowed for connecting, waiting for the robot included
-        silence_seconds: without any message from the console after which it counts as lost
-        tls_ca: file with a certificate to trust instead of the system's, as a console's own (tls-cert.pem)
-        relay_only: through the console's TURN server or not at all
+        sound_codec: "opus" or "PCMU"; None: the console's first choice
+        event_rate: events per second, at most; None: the rate of the robot's description, which is never exceeded
+        name: the name that other participants see
+        connect_seconds: time allowed for connecting, including the wait for the robot
+        silence_seconds: time without a message from the console after which the connection counts as lost
+        tls_ca: file with a certificate to trust instead of the system's, such as a console's own (tls-cert.pem)
+        relay_only: connect through the console's TURN server or not at all
         through_relay: an observer watches through a relay (docs/relay.md) if the console has one for it
         route: passes the connection through a relay; for measurements
+
+    Raises:
+        LinkFormatError: the link is not one that `lockstep up` prints.
+        ValueError: pacing by media without decoded pictures, or the gate "age" with a carrier without capture times.
     """
 
     def __init__(
@@ -106,8 +112,8 @@ class Console:
         """Connect.
 
         Raises:
-            SignallingRefused: the console refused, as with an old link.
-            ConnectFailed: no console, no robot or no way there within `connect_seconds`.
+            SignallingRefused: the console refused the connection, for example because the link is old.
+            ConnectFailed: no console, robot or network path was found within `connect_seconds`.
         """
         connection = Connection(self._options)
         try:
@@ -121,7 +127,7 @@ class Console:
     async def __aexit__(
         self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
     ) -> None:
-        """Let go of the robot and the seat, then close."""
+        """Bring the robot to rest, release the seat, and close."""
         connection = self._live()
         try:
             if connection.session.holds_seat and connection.lost is None:
@@ -138,27 +144,27 @@ class Console:
 
     @property
     def description(self) -> RobotDescription:
-        """The robot: its axes, sensors, cameras."""
+        """The description of the robot: its axes, sensors and cameras."""
         return self._live().robot.description
 
     @property
     def epoch(self) -> str:
-        """The run of the robot bridge; event references of two epochs are not comparable."""
+        """The id of the robot bridge's run; event references of two epochs are not comparable."""
         return self._live().robot.epoch
 
     @property
     def feedback(self) -> Feedback | None:
-        """The newest one; None before the first."""
+        """The newest feedback; None before the first."""
         return self._live().driver.sender.newest
 
     @property
     def gate_state(self) -> GateState:
-        """Whether a command could leave now, and if not, why."""
+        """The state of the gate: "open" if a command may leave now, otherwise the reason against it."""
         return self._live().driver.sender.gate.state(asyncio.get_running_loop().time())
 
     @property
     def seat(self) -> Seat:
-        """Who may drive."""
+        """The control seat: its holder and the requests for it."""
         return self._live().session.seat
 
     @property
@@ -168,7 +174,7 @@ class Console:
 
     @property
     def relay(self) -> str:
-        """The relay that media come through, as the console counts them: "0"; "": they come from the console."""
+        """The relay that media come through, as the console counts them ("0", …); "" if media come from the console."""
         return self._live().relay
 
     @property
@@ -178,56 +184,57 @@ class Console:
 
     @property
     def participants(self) -> list[Participant]:
-        """Everyone who is connected, this connection included."""
+        """All connected participants, this connection included."""
         return list(self._live().session.participants.participants)
 
     @property
     def notes(self) -> list[SharedNote]:
-        """The notes to everyone, oldest first; the last hundred."""
+        """The last hundred notes to everyone, oldest first."""
         return list(self._live().session.notes)
 
     def stats(self) -> ConsoleStatistics:
-        """Figures since the connection began."""
+        """Return the figures since the connection began."""
         return self._live().statistics()
 
     def rendered(self, stream: str) -> list[Rendering]:
-        """The last thousand renderings of a camera or microphone, oldest first."""
+        """Return the last thousand renderings of a camera or microphone, oldest first."""
         return self._live().media.log(stream)
 
     def feedback_log(self) -> list[FeedbackArrival]:
-        """The last thousand feedbacks and when they came, oldest first."""
+        """Return the last thousand feedbacks and their arrival times (s, the loop's clock), oldest first."""
         return list(self._live().feedback_log)
 
     async def restart_ice(self) -> None:
-        """Look for a new path to the console, as after a change of networks; the connection lives on meanwhile. Only
-        packets on their way are lost, and the seat is kept. A path that was gone for longer than the console waits for
-        a sign of life (20 s) takes a new `Console`.
+        """Look for a new path to the console, as after a change of networks; the connection lives on meanwhile.
+
+        Only packets under way are lost, and the seat is kept. If the path was gone for longer than the console waits
+        for a sign of life (20 s), make a new `Console`.
 
         Raises:
             SignallingRefused: the console has given up this connection.
-            ConnectFailed: no new path was found in time; the old one is as it was. An observer's line beside a relay
-                is TCP and has no other path.
+            ConnectFailed: no new path was found in time; the old one stays. An observer's WebSocket beside a relay is
+                TCP and has no other path.
         """
         await self._live().restart_ice()
 
     # Driving
 
     async def take_seat(self) -> None:
-        """Take the control seat: an operator when it is free, a supervisor from any holder; and `arm`.
+        """Take the control seat, an operator when it is free, a supervisor from any holder; then `arm`.
 
-        While the robot is stopped or away the seat is taken, and `arm` is left to you.
+        While the robot is stopped or away, only the seat is taken; call `arm` later.
 
         Raises:
-            SeatRefused: another peer holds it, or this link is an observer's.
+            SeatRefused: another peer holds the seat, or this link is an observer's.
         """
         connection = self._live()
         await connection.session.take_seat()
         await self._arm_if_possible(connection)
 
     async def request_seat(self, seconds: float = 65.0) -> None:
-        """Ask the holder of the control seat for it; returns when it is granted, or at once when it is free.
+        """Ask the holder for the control seat and wait until it is granted; a free seat is granted at once.
 
-        `seconds` covers the 60 s after which the console counts no answer as no. Cancelled, the request is withdrawn.
+        `seconds` covers the 60 s after which the console counts no answer as no. Cancellation withdraws the request.
 
         Raises:
             SeatRefused: the holder declined or did not answer, or this link is an observer's.
@@ -244,7 +251,7 @@ class Console:
             await connection.driver.arm()
 
     async def arm(self) -> Feedback:
-        """Let the robot move again, by one neutral command; the feedback that answers it.
+        """Let the robot move again: send one neutral command and return the feedback that answers it.
 
         Needed after a stop and its reset, a lost robot link, and whenever the robot says so; taking the seat arms too.
         Call it when the responsible person wants the robot to move on, never as an answer to `NotArmed` alone.
@@ -264,20 +271,20 @@ class Console:
         self._live().session.answer(peer, grant=False)
 
     def release_seat(self) -> None:
-        """Give the control seat back, or take a request for it back."""
+        """Release the control seat, or withdraw a request for it."""
         self._live().session.release_seat()
 
     async def drive(self, values: Mapping[str, float] | Sequence[float]) -> Feedback:
-        """Send one command as soon as the gate is open; the feedback that answers it.
+        """Send one command as soon as the gate is open; return the feedback that answers it.
 
-        `values` has one value per axis in the description's order, or names axes; those not named get their value
-        at rest. The first call arms: from then on, whenever 200 ms pass without another call, the console sends
+        `values` has one value per axis in the description's order, or maps axis names to values; other axes get their
+        value at rest. The first call arms: from then on, whenever 200 ms pass without another call, the console sends
         neutral values, five times a second, until `rest`. A lost command is repeated; a command that arrived too late
         is tried again on fresh feedback.
 
         Raises:
-            CommandError: an unknown axis, or a value that is not finite.
-            NotArmed: after a stop, a reset, a lost robot link or a new seat `arm` comes first.
+            CommandError: an unknown axis, a wrong number of values, or a value that is not finite.
+            NotArmed: after a stop, a reset, a lost robot link or a new seat, `arm` comes first.
             CommandRefused: the robot is stopped, this console does not hold the seat, …
             ConsoleLost: the connection ended.
         """
@@ -306,41 +313,42 @@ class Console:
         return command
 
     async def rest(self) -> None:
-        """Let go: past the gate, at once, repeated until the robot is proven to be at rest. Disarms."""
+        """Send a rest at once, past the gate, and repeat it until the robot is proven to be at rest. Disarms."""
         await self._live().driver.rest()
 
     async def stop(self, reason: str = "") -> StopState:
         """Latch the stop, from any role, at any time; over HTTP as well when the data channel does not confirm it.
 
-        Returns when the robot has confirmed this very press, with the number that it got.
+        Return the stop, with its number, when the robot has confirmed this very press.
 
         Raises:
-            StopUnconfirmed: the robot has not; the console keeps it if it was reached.
+            StopUnconfirmed: the robot has not confirmed it; the console keeps the stop if it was reached.
         """
         return await self._live().stop(reason)
 
     async def reset(self, number: int | None = None) -> StopState:
-        """Release stop `number`, or the newest that this connection knows; moves nothing, and `arm` comes next.
+        """Release stop `number`, or the newest that this connection knows. Moves nothing; `arm` comes next.
 
         Raises:
-            CommandRefused: neither holder of the seat nor supervisor, a newer stop (`stale_reset`), less than a second
-                after the stop (`too_soon`), a person at the robot keeps the stop (`locked_out`), …
+            CommandRefused: this connection neither holds the seat nor is a supervisor's, there is a newer stop
+                (`stale_reset`), the stop is less than a second old (`too_soon`), a person at the robot keeps the stop
+                (`locked_out`), …
         """
         session = self._live().session
         return await session.reset(self._live().options.name, session.newest_stop if number is None else number)
 
     async def note(self, text: str) -> SharedNote:
-        """Write a note to everyone; it keeps the event reference of that moment.
+        """Write a note to everyone and return it; it keeps the event reference of that moment.
 
         Raises:
-            CommandRefused: too many notes, or nothing in it can be printed.
+            CommandRefused: there are too many notes, or nothing in this one can be printed.
         """
         return await self._live().session.note(text)
 
     # Watching
 
     async def feedbacks(self) -> AsyncGenerator[Feedback]:
-        """Every new feedback, the newest first if the reader is slow. Raises ConsoleLost when the connection ends."""
+        """Yield every new feedback; a slow reader gets only the newest. Raises ConsoleLost when the connection ends."""
         connection = self._live()
         queue: NewestQueue[Feedback] = NewestQueue(1)
         connection.feedback_readers.append(queue)
@@ -355,16 +363,17 @@ class Console:
             connection.feedback_readers.remove(queue)
 
     async def pictures(self, camera: str = "", *, keep: int = 2) -> AsyncGenerator[Picture]:
-        """Pictures of a camera ("" is the main one) that passed the gate, each judged once more when it is taken.
+        """Yield the pictures of a camera ("" is the main one) that pass the gate; each is checked again when taken.
 
-        A reader that is slow loses the oldest: at most `keep` wait. Raises ConsoleLost when the connection ends.
+        A slow reader loses the oldest pictures: at most `keep` wait. Raises ConsoleLost when the connection ends, and
+        NoSuchStream for a camera that is not received.
         """
         connection = self._live()
         async for stream, medium in self._media(connection, connection.media.stream("video", camera), keep):
             yield Picture(stream.name, medium.stamp, stream.check(medium)[1], medium.frame)
 
     async def sounds(self, microphone: str = "", *, keep: int = 50) -> AsyncGenerator[Sound]:
-        """Segments of a microphone ("" is the first) that passed the gate; as `pictures`."""
+        """Yield the segments of a microphone ("" is the first) that pass the gate, as `pictures` does."""
         connection = self._live()
         async for stream, medium in self._media(connection, connection.media.stream("audio", microphone), keep):
             yield Sound(stream.name, medium.stamp, stream.check(medium)[1], medium.frame)

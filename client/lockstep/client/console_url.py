@@ -1,4 +1,4 @@
-"""The link that `lockstep up` prints: where the console is, and the token that opens it."""
+"""Parses the link that `lockstep up` prints: the console's address, and the token that opens it."""
 
 import ipaddress
 from typing import NamedTuple
@@ -10,9 +10,9 @@ __all__ = ["ConsoleLink", "parse_link"]
 
 
 class ConsoleLink(NamedTuple):
-    base: str  # "http://127.0.0.1:8000", of one robot of a fleet "http://127.0.0.1:8000/robots/left"
+    base: str  # "http://127.0.0.1:8000"; for one robot of a fleet "http://127.0.0.1:8000/robots/left"
     token: str
-    loopback: bool  # the console is on this machine
+    loopback: bool  # True if the console is on this machine
 
     @property
     def secure(self) -> bool:
@@ -20,10 +20,10 @@ class ConsoleLink(NamedTuple):
 
 
 def parse_link(link: str) -> ConsoleLink:
-    """The parts of `http://host:port/#token=…`, or of `http://host:port/robots/NAME/#token=…` in a fleet.
+    """Return the parts of `http://host:port/#token=…`, or of `http://host:port/robots/NAME/#token=…` in a fleet.
 
     Raises:
-        LinkFormatError: it is not such a link.
+        LinkFormatError: the link has neither form.
     """
     try:
         parts = urlsplit(link)

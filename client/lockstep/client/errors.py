@@ -55,7 +55,7 @@ class LinkFormatError(ConsoleError):
 
 
 class CommandError(ConsoleError):
-    """An axis that the robot does not have, or a value that is not a number."""
+    """The values name an axis that the robot does not have, are of a wrong number, or are not finite."""
 
 
 class NoSuchStream(ConsoleError):
@@ -82,7 +82,7 @@ class SignallingRefused(ConsoleError):
 
 
 class ConnectFailed(ConsoleError):
-    """No connection within the time allowed."""
+    """No connection was made within the time allowed."""
 
 
 class ConsoleLost(ConsoleError):
@@ -90,7 +90,7 @@ class ConsoleLost(ConsoleError):
 
 
 class Refused(ConsoleError):
-    """A refusal.
+    """The console or the robot refused a request.
 
     Attributes:
         reason: one of `lockstep.protocol.messages.RefusalReason`
@@ -117,10 +117,10 @@ class NotArmed(CommandRefused):
 
 
 class StopUnconfirmed(ConsoleError):
-    """A stop that the robot has not confirmed. The console keeps it, if the stop reached it; use the hardware stop.
+    """The robot has not confirmed a stop. The console keeps it, if the stop reached it; use the hardware stop.
 
     Attributes:
-        press: its id; the same press may be sent again
+        press: the id of the press; the same press may be sent again
     """
 
     def __init__(self, press: str, detail: str) -> None:
@@ -129,4 +129,4 @@ class StopUnconfirmed(ConsoleError):
 
 
 class SeatRefused(Refused):
-    """The control seat was not given."""
+    """The control seat was refused."""

@@ -1,4 +1,4 @@
-"""The people on a connection: the control seat, participants, notes, and the requests that get an answer."""
+"""The control seat, participants and notes of a connection, and the requests that get an answer."""
 
 import asyncio
 from collections import deque
@@ -24,12 +24,13 @@ from lockstep.protocol.messages import Refusal, Reset, StopState, StopTaken
 __all__ = ["Session"]
 
 RESET_AGAIN = 0.5  # s between two tries while the stop is too new
-ANSWER_SECONDS = 5.0  # for the console to answer a request
+ANSWER_SECONDS = 5.0  # time for the console to answer a request
 KEPT_NOTES = 100
 
 
 class Session:
-    """Give it every message with `hear`; the requests wait with `until` for a message that answers them.
+    """The shared state of a connection, and its requests. Pass every message to `hear`; the requests wait with `until`
+    for a message that answers them.
 
     Attributes:
         welcome: this connection's id and role; None before the console sent it
@@ -83,35 +84,35 @@ class Session:
                     self.unseated()
 
     def stop_shown(self, stop: StopState) -> None:
-        """The robot's present stop state."""
+        """Take the robot's present stop state."""
         self.stop_state = stop
         self.newest_stop = max(self.newest_stop, stop.number)
 
     def stop_taken(self, taken: StopTaken) -> None:
-        """The robot's answer to a press."""
+        """Take the robot's answer to a press."""
         if len(self.taken) >= KEPT_NOTES:
             del self.taken[next(iter(self.taken))]
         self.taken[taken.press] = taken
         self.newest_stop = max(self.newest_stop, taken.number)
 
     def confirmed(self, press: str) -> StopState | None:
-        """The stop that `press` became; None as long as no message about this press names it."""
+        """Return the stop that `press` became; None as long as no message about this press names it."""
         taken, shown = self.taken.get(press), self.stop_state
         if shown.press == press:
             return shown
         return None if taken is None else StopState(stopped=True, number=taken.number, press=press, kept=taken.kept)
 
     def refused(self, refusal: Refusal) -> None:
-        """A refusal that names no event."""
+        """Take a refusal that names no event."""
         self._refusals.append(refusal)
 
     async def take_seat(self) -> None:
-        """Raises SeatRefused."""
+        """Take the control seat. Raises SeatRefused."""
         takes = self.welcome is not None and self.welcome.role == "supervisor"
         await self._seat(SeatTake() if takes else SeatRequest(only_if_free=True), ANSWER_SECONDS)
 
     async def request_seat(self, seconds: float) -> None:
-        """Raises SeatRefused, also without an answer within `seconds`; the claim is withdrawn then."""
+        """Ask for the control seat; withdraw the request unless granted. Raises SeatRefused, also after `seconds`."""
         try:
             await self._seat(SeatRequest(), seconds)
         except ConsoleLost:
@@ -129,7 +130,7 @@ class Session:
         self._send("session", SeatGrant(peer=peer) if grant else SeatDecline(peer=peer))
 
     async def note(self, text: str) -> SharedNote:
-        """Raises CommandRefused: too many, or nothing in it can be printed."""
+        """Write a note and return it. Raises CommandRefused: too many notes, or nothing in this one can be printed."""
         newest = self.notes[-1].id if self.notes else 0
 
         def mine() -> SharedNote | None:
@@ -142,7 +143,7 @@ class Session:
         return note
 
     async def reset(self, by: str, number: int) -> StopState:
-        """Release stop `number`, and no later one; waits where it is too soon. Raises CommandRefused."""
+        """Release stop `number`, and no later one; wait while it is too soon. Raises CommandRefused."""
         reset = Reset(by=by, number=number)
         loop = asyncio.get_running_loop()
         until = loop.time() + ANSWER_SECONDS
@@ -167,7 +168,7 @@ class Session:
     async def _ask(
         self, granted: Callable[[], bool], channel: ChannelName, message: ClientMessage, seconds: float
     ) -> Refusal | None:
-        """Send a request; None when it was granted, else the refusal."""
+        """Send a request; return None if it was granted, otherwise the refusal."""
         self._refusals.clear()
         self._send(channel, message)
         try:

@@ -1,4 +1,4 @@
-"""Waiting for the end of tasks and awaitables."""
+"""Waits for the end of tasks and awaitables."""
 
 import asyncio
 from collections.abc import Coroutine, Iterable
@@ -10,9 +10,8 @@ ASK_AGAIN = 1.0  # s
 
 
 async def finish(coroutine: Coroutine[Any, Any, None]) -> None:
-    """Await it; a cancellation meanwhile takes effect at its end. A coroutine that closes several things, one after the
-    other, would leave the others open if it were cancelled itself.
-    """
+    """Await a coroutine; a cancellation meanwhile takes effect at its end. A coroutine that closes several things, one
+    after the other, would leave the others open if it were cancelled itself."""
     task = asyncio.ensure_future(coroutine)
     cancelled: asyncio.CancelledError | None = None
     while not task.done():
@@ -28,7 +27,7 @@ async def finish(coroutine: Coroutine[Any, Any, None]) -> None:
 
 
 async def cancel_all(tasks: Iterable[asyncio.Task[None]]) -> None:
-    """Cancel them, and wait until all have ended.
+    """Cancel tasks, and wait until all have ended.
 
     A task may swallow the cancellation: `asyncio.wait_for` before Python 3.12 does so when its result arrives at the
     same moment. So a task that goes on is cancelled again.

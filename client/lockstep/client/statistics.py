@@ -14,11 +14,11 @@ from lockstep.protocol.serial import event_gap
 __all__ = ["ConsoleStatistics", "EventRate", "Percentiles", "PictureDelay", "StreamStatistics", "percentiles"]
 
 RATE_WINDOW = 5.0  # s
-FORGOTTEN = 3.0  # s after which a picture says nothing about the delay of now
+FORGOTTEN = 3.0  # s after which a picture says nothing about the present delay
 
 
 class Percentiles(msgspec.Struct, frozen=True, kw_only=True):
-    """Of the last samples; None without any."""
+    """Percentiles of the last samples; None without samples."""
 
     count: int = 0
     median: float | None = None
@@ -28,7 +28,7 @@ class Percentiles(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class StreamStatistics(msgspec.Struct, frozen=True, kw_only=True):
-    """One stream since the connection began."""
+    """The figures of one stream since the connection began."""
 
     stream: str
     kind: str  # "video" or "audio"
@@ -53,7 +53,7 @@ class StreamStatistics(msgspec.Struct, frozen=True, kw_only=True):
     dropped: int = 0  # frames that no reader took in time, and encoded ones that the decoder was too slow for
 
     def report(self) -> StreamReport:
-        """The part that the server wants to know."""
+        """Return the figures that go to the console."""
         return StreamReport(
             stream=self.stream,
             carrier=self.carrier,
@@ -71,7 +71,7 @@ class StreamStatistics(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class ConsoleStatistics(msgspec.Struct, frozen=True, kw_only=True):
-    """Everything that `Console.stats()` says. Times in ms. `msgspec.to_builtins` makes a dict of it."""
+    """The figures of `Console.stats()`. Times in ms. `msgspec.to_builtins` makes a dict of them."""
 
     peer: str = ""  # this connection's id
     epoch: str = ""  # run of the robot bridge
@@ -86,13 +86,13 @@ class ConsoleStatistics(msgspec.Struct, frozen=True, kw_only=True):
     round_trip_ms: float | None = None  # of the last ping
     command_to_feedback_ms: Percentiles = Percentiles()
     event_rate: float = 0.0  # Hz
-    bad_messages: int = 0  # from the console, that could not be read
+    bad_messages: int = 0  # messages from the console that could not be read
     repeats: int = 0  # commands sent again because no answer arrived
     echoes: int = 0  # copies of commands because the path loses packets
 
 
 def percentiles(samples: Iterable[float], scale: float = 1.0) -> Percentiles:
-    """Nearest-rank percentiles of `samples`, each multiplied by `scale`."""
+    """Return the nearest-rank percentiles of `samples`, each multiplied by `scale`."""
     ordered = sorted(samples)
     if not ordered:
         return Percentiles()
@@ -104,13 +104,13 @@ def percentiles(samples: Iterable[float], scale: float = 1.0) -> Percentiles:
 
 
 class EventRate:
-    """Events per second over the last `RATE_WINDOW`."""
+    """Measures events per second over the last `RATE_WINDOW`."""
 
     def __init__(self) -> None:
         self._seen: deque[tuple[float, int]] = deque(maxlen=512)
 
     def event(self, event: int, now: float) -> None:
-        """The newest event, at every feedback."""
+        """Take the newest event, at every feedback."""
         if not self._seen or self._seen[-1][1] != event:
             self._seen.append((now, event))
 
@@ -124,8 +124,8 @@ class EventRate:
 
 
 class PictureDelay:
-    """Command to picture, on the operator's clock alone: from sending command `s` until the first picture stamped
-    `s` or newer is shown."""
+    """Measures command to picture, on the operator's clock alone: from sending command `s` until the first picture
+    stamped `s` or newer is shown."""
 
     def __init__(self) -> None:
         self.samples: deque[float] = deque(maxlen=1024)  # s
@@ -133,18 +133,18 @@ class PictureDelay:
         self._shown_at = float("-inf")
 
     def sent(self, event: int, now: float) -> None:
-        """Command `event` left for the first time."""
+        """Note that command `event` left for the first time."""
         self._waiting.append((event, now))
 
     def shown(self, stamp: int, now: float) -> None:
-        """A picture stamped `stamp` is on screen."""
+        """Note that a picture stamped `stamp` is on screen."""
         while self._waiting and event_gap(stamp, self._waiting[0][0]) >= 0:
             _, sent_at = self._waiting.popleft()
             self.samples.append(now - sent_at)
             self._shown_at = now
 
     def known(self, now: float) -> float | None:
-        """s, as it is now; None when nothing tells. The wait for a picture that does not come counts too."""
+        """Return the present delay in s; None if unknown. The wait for a picture that does not come counts too."""
         if now - self._shown_at > FORGOTTEN:
             return None
         waited = now - self._waiting[0][1] if self._waiting else 0.0

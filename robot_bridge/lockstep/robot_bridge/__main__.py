@@ -1,4 +1,4 @@
-"""`python -m robot_bridge` is `lockstep robot`."""
+"""Runs `lockstep robot` as `python -m lockstep.robot_bridge`."""
 
 from lockstep.robot_bridge.cli import main
 

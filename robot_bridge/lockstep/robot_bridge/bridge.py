@@ -1,4 +1,4 @@
-"""Puts the bridge together: link server, event core, axis shaper, robot, media sources, event log."""
+"""Assembles the bridge: link server, event core, axis shaper, robot, media sources, event log."""
 
 import asyncio
 import atexit
@@ -42,14 +42,17 @@ __all__ = ["Bridge"]
 
 REST_MARGIN = 0.5  # s on top of hold for the robot to come to rest when the bridge closes
 ADDRESSES_FILE = "addresses.txt"  # in the state directory
-MAX_FAULT = 500  # characters, of one
+MAX_FAULT = 500  # characters in one fault
 MAX_CATCH_UP = 3  # ticks made good after the loop was blocked; the rest are skipped
 
 _logger = logging.getLogger(__name__)
 
 
 def _marker(settings: BridgeSettings) -> Callable[[Media], Media]:
-    """Draws the event into pictures, for measurements. That needs numpy, which a robot's own bridge may not have."""
+    """Return the function that draws the event into pictures, for measurements.
+
+    Drawing needs numpy, which a robot's own bridge may not have.
+    """
     if not settings.event_strip:
         return lambda media: media
     from lockstep.robot_bridge.robots.event_strip import with_event_strip
@@ -58,19 +61,20 @@ def _marker(settings: BridgeSettings) -> Callable[[Media], Media]:
 
 
 class Bridge:
-    """One run of a robot: one epoch. `start` returns when it listens; `close` leaves the robot at rest."""
+    """One run of a robot: one epoch. `start` returns when the bridge listens; `close` leaves the robot at rest."""
 
     def __init__(
         self, robot: Robot, settings: BridgeSettings, now: clock.Clock = clock.now, *, liveness: Liveness | None = None
     ) -> None:
         """`now`: the clock that bounds motion; it counts suspended time.
 
-        `liveness`: ends the process when it hangs, which has to be the bridge's alone; None: nothing does.
+        `liveness`: ends the process when the bridge hangs; the process must be the bridge's alone. None: nothing does.
 
         Raises:
             DescriptionError: the robot's description contradicts itself.
             InsecureLink: any client that reaches the address could drive, and the settings do not say that this is
-            wanted. SecretError: the TLS files are no good.
+            wanted.
+            SecretError: the TLS files cannot be used.
         """
         check_link(settings)
         self.description = robot.describe()
@@ -89,7 +93,7 @@ class Bridge:
             start_warning=self.description.start_warning,
         )
         self._keeper = StopKeeper(settings.state_dir, settings.older_state_dirs)
-        self._resetting: tuple[LinkPeer, Reset] | None = None  # links that wait for a reset to be on the disk
+        self._resetting: tuple[LinkPeer, Reset] | None = None  # the link whose reset waits for the disk
         self._lockout = None if settings.lockout_file is None else LockoutFile(settings.lockout_file)
         self._signal = StartSignal(self.description)
         self._limits = MotionLimits(self.description, robot, robot.tick_seconds)
@@ -114,12 +118,12 @@ class Bridge:
         self._last_known = LastKnown(self.description)
         self._mark = _marker(settings)
         self._acting: frozenset[str] = frozenset()  # limits that slowed the robot in the last tick
-        self._blind: frozenset[str] = frozenset()  # those that did because the position was unknown
-        self._acted: set[str] = set()  # and since the last feedback
+        self._blind: frozenset[str] = frozenset()  # those among them that did because the position was unknown
+        self._acted: set[str] = set()  # limits that slowed it since the last feedback
         self._source_faults: list[str] = []  # "camera overview: ..."
         self._running: asyncio.Task[None] | None = None
         self._at_rest = asyncio.Event()  # nothing is driven
-        self._rested = True  # at the last tick
+        self._rested = True  # nothing was driven at the last tick
         self._robot_error: BaseException | None = None
         self._stop_due = False  # the robot's own stop follows when the axes are at rest
         self._failure = ""  # why the run has ended, "robot failed: OSError: ..."; "" while it goes on
@@ -132,21 +136,21 @@ class Bridge:
 
     @property
     def links(self) -> int:
-        """Open connections."""
+        """The number of open connections."""
         return self._links.links
 
     @property
     def drops(self) -> Counter[str]:
-        """What slow links have missed, by message kind or stream."""
+        """The messages that slow links have missed, by message kind or stream."""
         return self._links.drops()
 
     async def start(self) -> None:
-        """Returns when listening.
+        """Start the bridge; returns when it listens.
 
         Raises:
             ListenError: the address cannot be had.
             RobotUnavailable: the robot's watchdog process cannot be had.
-            StateDirInUse, StateDirUnusable: the stop cannot be kept where the settings say.
+            StateDirInUse, StateDirUnusable: the stop cannot be kept in the directory of the settings.
             OSError: the event log cannot be opened.
         """
         try:
@@ -171,7 +175,7 @@ class Bridge:
         self._running = asyncio.get_running_loop().create_task(self._run(), name="bridge")
 
     async def wait(self) -> None:
-        """Until closed.
+        """Wait until the bridge is closed.
 
         Raises:
             RobotFailed: the robot adapter or a part of the bridge raised; the robot rests and the bridge has ended.
@@ -209,7 +213,7 @@ class Bridge:
                 self._liveness.close()
 
     async def _end_run(self) -> None:
-        """The ticks end with the rest values and the robot's own stop, however they end."""
+        """End the ticks, which always apply the rest values and call the robot's own stop."""
         if self._running is None:
             return
         self._running.cancel()
@@ -219,13 +223,13 @@ class Bridge:
         atexit.unregister(self._rest_at_exit)
 
     def _rest_at_exit(self) -> None:
-        """The process ends without `close`: the bridge's loop is gone."""
+        """Bring the robot to rest when the process ends without `close`: the bridge's loop is gone."""
         leaving = self._coming_to_rest()
         leaving.at_once()
         leaving.stop()
 
     async def _come_to_rest(self, running: asyncio.Task[None]) -> None:
-        """Let the ticks go on until nothing is driven; gives up when they ended or take too long."""
+        """Let the ticks go on until nothing is driven; give up if they have ended or take too long."""
         self._shaper.rest()
         running.add_done_callback(lambda _: self._at_rest.set())
         with contextlib.suppress(TimeoutError):
@@ -295,7 +299,7 @@ class Bridge:
         self._keeper.answer(peer, stop.press, given.number)
 
     def _note_stop(self, given: StopGiven, by: str, reason: str, press: str = "") -> None:
-        """The robot rests first, before any other effect of a stop."""
+        """Bring the axes to rest first, before any other effect of a stop."""
         if not given.is_new:
             return
         self._shaper.rest()
@@ -317,7 +321,7 @@ class Bridge:
             self._refuse_reset(peer, outcome)
 
     def _written(self, version: int, error: str) -> None:
-        """The latch was written to the disk, or could not be."""
+        """Tell the core that the latch was written to the disk, or could not be, and answer a waiting reset."""
         outcome = self._core.written(version, error)
         if outcome is None or self._resetting is None:
             return
@@ -331,18 +335,18 @@ class Bridge:
         self._refuse(peer, self._core.refusal(0, refused.reason, refused.detail, stop=refused.number))
 
     def _released(self, reset: ResetTaken, by: str) -> None:
-        if not self._stop_due:  # else the robot has not been told yet
+        if not self._stop_due:  # else the robot has not been told to stop yet
             self._call_robot(self._robot.reset)
         self._stop_due = False
         self._record("reset", self._core.current, by=by, number=reset.number)
 
     def _need_neutral(self) -> None:
-        """Whatever moved comes to rest, and moves on only after a neutral command."""
+        """Bring the axes to rest; they move on only after a neutral command."""
         self._shaper.rest()
         self._core.need_neutral()
 
     def _call_robot(self, call: Callable[[], None]) -> None:
-        """An adapter that raises ends the bridge at the next tick, not the link that happened to ask."""
+        """Call the adapter; if it raises, the bridge ends at the next tick, not the link that led to the call."""
         try:
             call()
         except BaseException as error:
@@ -367,7 +371,7 @@ class Bridge:
             raise error if isinstance(error, RobotFailed) else RobotFailed(named(error)) from error
 
     async def _run_ticks(self) -> None:
-        """However the ticks end, the robot is brought to rest and stopped before this does."""
+        """Run the ticks. However they end, this brings the robot to rest and stops it before it ends itself."""
         try:
             await self._tick_on()
         except GeneratorExit:  # the loop is gone: nothing can be awaited any more
@@ -401,7 +405,7 @@ class Bridge:
                 self._record("at_rest", self._core.current)
 
     def _tell_watchdogs(self) -> None:
-        """Also on the way to rest a call may hang."""
+        """Tell the watchdogs of a tick on the way to rest, where a call may hang too."""
         try:
             self._watchdogs.ticked(self._now(), not self._shaper.at_rest)
         except RobotUnavailable as error:
@@ -422,7 +426,7 @@ class Bridge:
         """Feed back the new state, with the last measured values if the robot cannot be measured any more."""
         try:
             measured = self._robot.measure()
-        except BaseException:  # the robot is not to be trusted with anything any more
+        except BaseException:  # the robot is not to be trusted any more
             axes, joints = ([math.nan] * len(each) for each in (self.description.axes, self.description.joints))
             measured = Measurement(axes=axes, joints=joints, wrench=[], ranges=[], at_rest=False, faults=[])
         try:
@@ -438,7 +442,7 @@ class Bridge:
             try:
                 self._tick(self._now())
                 self._liveness.ticked()
-            except BaseException as error:  # an adapter may raise what would end the loop, or cancel the task
+            except BaseException as error:  # an adapter may raise one that ends the loop or cancels the task
                 raise RobotFailed(named(error)) from error
 
     def _tick(self, now: float) -> None:
@@ -469,7 +473,7 @@ class Bridge:
             self._issue()
 
     def _look_at_lockout(self, now: float) -> None:
-        """The switch file, or the robot's own input: a person at the robot comes before a remote one."""
+        """Check the lock-out file and the robot's own input: a person at the robot comes before a remote one."""
         file = "" if self._lockout is None else self._lockout.reason
         reason = " · ".join(filter(None, (file, self._robot.locked_out())))[:500]
         if reason == self._core.stop_state.locked_out:
@@ -483,7 +487,7 @@ class Bridge:
             self._note_stop(given, "at the robot", reason)
 
     def _held_up(self, held: Held) -> None:
-        """No tick came for too long: the robot's motion meanwhile is unknown, and the operator has to begin anew."""
+        """Make the operator begin anew after too long without a tick: the robot's motion meanwhile is unknown."""
         self._shaper.cut()
         self._core.need_neutral()
         self.counters.stalls += 1
@@ -499,7 +503,7 @@ class Bridge:
         self._issue_measured(self._robot.measure(), taken)
 
     def _issue_measured(self, measured: Measurement, taken: float) -> None:
-        """`taken`: when, on the clock of capture times."""
+        """Issue a feedback. `taken`: time of the measurement on the clock of capture times."""
         measured, unknown = self._last_known.settle(measured)
         if self._source_faults or self._rested_why:
             rested = [self._rested_why] if self._rested_why else []
@@ -518,14 +522,17 @@ class Bridge:
         self._links.publish_feedback(feedback)
 
     def _note_limits(self, acting: frozenset[str]) -> None:
-        """Counted once for each spell, recorded at its beginning and its end."""
+        """Count each spell of a limit once, and record its beginning and its end."""
         self.counters.limits.update(acting - self._acting)
         self._acted |= acting | self._acting
         self._acting = acting
         self._record("limit", self._core.current, acting=sorted(acting))
 
     def _note_blind(self, blind: frozenset[str]) -> None:
-        """A deadman that is held until the position is known again must not start the robot."""
+        """Bring the axes to rest if a position is unknown.
+
+        A deadman that is held until the position is known again must not start the robot.
+        """
         begun, self._blind = blind - self._blind, blind
         if begun:
             self._need_neutral()
@@ -543,7 +550,7 @@ class Bridge:
             group.create_task(self._run_source(source))
 
     async def _run_source(self, source: MediaSource) -> None:
-        """A source that breaks is a fault of the robot, not the end of the bridge."""
+        """Run a media source; its failure is a fault of the robot, and does not end the bridge."""
         try:
             await source.run(_Stamper(self._core, self._times), self._emit)
         except GeneratorExit:
@@ -572,7 +579,7 @@ class Bridge:
             self.report()
 
     def report(self) -> None:
-        """One log line with the counters."""
+        """Log one line with the counters."""
         counters = self.counters
         _logger.info(
             "event %d, executed %d, issued %d, media %d, skipped ticks %d, stalls %d, limits %s, refusals %s, "
@@ -613,12 +620,12 @@ class _Stamper:
 
 
 def first_cause(error: BaseException) -> BaseException:
-    """The first that a group of tasks ended with."""
+    """Return the first exception that ended a group of tasks."""
     while isinstance(error, BaseExceptionGroup):
         error = error.exceptions[0]
     return error
 
 
 def named(error: BaseException) -> str:
-    """As "OSError: no such device"; what a RobotFailed names already."""
+    """Return the error as "OSError: no such device"; the detail of a RobotFailed, which has that form already."""
     return error.detail if isinstance(error, RobotFailed) else f"{type(error).__name__}: {error}"

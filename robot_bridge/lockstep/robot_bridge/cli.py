@@ -1,4 +1,4 @@
-"""`lockstep robot`: run a bridge."""
+"""`lockstep robot`: runs a robot and its bridge."""
 
 import asyncio
 import contextlib
@@ -44,7 +44,7 @@ __all__ = ["main", "robot_app", "run"]
 SECRET_VARIABLE = "LOCKSTEP_LINK_SECRET"
 EXIT_FAILED = 1
 EXIT_USAGE = 2
-# Another try cannot mend these errors; the others may end, as a robot that is not switched on yet.
+# A retry does not help against these errors; it may against the others, such as a robot that is not switched on yet.
 CANNOT_BE_MEANT = (UnknownRobot, BadRobot, SettingsError, ModelError, DescriptionError, InsecureLink, SecretError)
 
 _logger = logging.getLogger(__name__)
@@ -143,7 +143,7 @@ def run(
 
 
 def _write(name: str | None) -> None:
-    """The folder of a new robot."""
+    """Write the folder of a new robot."""
     if name is None:
         raise typer.BadParameter("`new` needs a name: lockstep robot new my_arm")
     try:
@@ -155,14 +155,14 @@ def _write(name: str | None) -> None:
 
 
 def _warn_of_state(directory: Path) -> None:
-    """Where a latched stop does not last."""
+    """Warn if a latched stop would be lost when the machine is switched off."""
     there = next(each for each in (directory, *directory.parents) if each.exists())
     if is_in_memory(there):
         _logger.warning("a latched STOP is lost when this machine is switched off: %s is in memory", directory)
 
 
 def _secret(path: Path | None) -> LinkSecret | None:
-    """The file's, or the environment's: an argument would be seen by everybody on the machine."""
+    """Read the link secret from the file or the environment; everybody on the machine could see an argument."""
     if path is not None:
         return LinkSecret.read(path)
     text = os.environ.get(SECRET_VARIABLE, "")
@@ -176,7 +176,7 @@ def _tls(certificate: Path | None, key: Path | None, authority: Path | None) -> 
 
 
 def _choice(name: str, ros2: Path | None, mjcf: Path | None) -> tuple[str, Callable[[], Robot]]:
-    """What is announced, and what makes the robot."""
+    """Return the name to announce and the function that makes the robot."""
     if ros2 is not None and mjcf is not None:
         raise typer.BadParameter("--ros2 and --mjcf are two robots; a bridge has one")
     if ros2 is not None:
@@ -185,7 +185,7 @@ def _choice(name: str, ros2: Path | None, mjcf: Path | None) -> tuple[str, Calla
 
 
 def _ros2(path: Path) -> Robot:
-    """Imported only when asked for, as all robots are."""
+    """Import the module only when it is needed, as for all robots."""
     from lockstep.robot_bridge.robots.ros2 import create
 
     return create(path)
@@ -200,7 +200,7 @@ def _mjcf(path: Path) -> Robot:
 async def _serve(name: str, make: Callable[[], Robot], settings: BridgeSettings, as_json: bool) -> None:
     stopping = asyncio.Event()
     loop = asyncio.get_running_loop()
-    # SIGHUP: its terminal was closed; SIGQUIT: Ctrl-\ there.
+    # SIGHUP: the terminal was closed; SIGQUIT: Ctrl-\ in the terminal.
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT):
         loop.add_signal_handler(number, stopping.set)
     liveness = Liveness(LIMIT, ServiceManager(os.environ))
@@ -228,6 +228,6 @@ def _announce(name: str, bridge: Bridge, scheme: str, as_json: bool) -> None:
 
 
 def main() -> None:
-    """The robot's own entry point, without the console."""
-    faulthandler.enable()  # a crash in native code, as of a GL driver, says where every thread was
+    """Run `lockstep robot` as a separate program, without the console."""
+    faulthandler.enable()  # a crash in native code, such as a GL driver, prints the stack of every thread
     robot_app(prog_name="lockstep robot")

@@ -1,4 +1,4 @@
-"""Where the command `lockstep` begins: the console's commands where the console is installed, else a robot's alone."""
+"""The entry point of the command `lockstep`: the console's commands if that is installed, else a robot's alone."""
 
 import gc
 from importlib import import_module
@@ -10,7 +10,7 @@ CONSOLE = "lockstep.server"  # another distribution; nothing else here knows of 
 
 
 def main() -> None:
-    """Run it. Looking for garbage among what is being imported would take a sixth of the start, and find none."""
+    """Run the command. Collecting garbage during the imports would take a sixth of the start, and find none."""
     gc.disable()
     installed = find_spec(CONSOLE) is not None
     commands = import_module(f"{CONSOLE}.cli.main" if installed else "lockstep.robot_bridge.commands")

@@ -1,9 +1,9 @@
-"""What can go wrong in the bridge itself; the link's errors are in `lockstep.protocol.errors`.
+"""Errors of the bridge itself; the link's errors are in `lockstep.protocol.errors`.
 
 BridgeError
 ├── RobotUnavailable        something that the robot needs is missing on this machine
-├── UnknownRobot            no robot of that name
-├── BadRobot                a class that was named makes no robot
+├── UnknownRobot            no robot has that name
+├── BadRobot                the named class does not make a robot
 ├── SettingsError           a settings file cannot be used; names its line and key
 ├── ModelError              a MuJoCo model cannot be driven
 ├── DescriptionError        the robot's description contradicts itself

@@ -1,6 +1,6 @@
-"""A file of all that happened to events, one JSON line each: the truth that tests compare against.
+"""Writes a file of everything that happens to events, one JSON line each: tests compare against it.
 
-Lines are written by a thread of its own from a bounded queue, never on the loop; what does not fit is counted.
+A separate thread writes the lines from a bounded queue, so the loop never blocks; lines that do not fit are counted.
 """
 
 import logging
@@ -41,14 +41,16 @@ _logger = logging.getLogger(__name__)
 
 
 class EventLog:
-    """`record` may be called from the loop at any rate; `close` writes the waiting lines and blocks until they are
-    written."""
+    """Writes records to a file in a thread.
+
+    `record` may be called from the loop at any rate; `close` writes the waiting lines and blocks until that is done.
+    """
 
     def __init__(self, path: Path) -> None:
-        """Appends to `path`.
+        """Append to the file at `path`.
 
         Raises:
-            OSError: it cannot be opened.
+            OSError: the file cannot be opened.
         """
         self.dropped = 0
         self._waiting: queue.Queue[dict[str, Field] | None] = queue.Queue(MAX_WAITING)
@@ -57,14 +59,14 @@ class EventLog:
         self._writer.start()
 
     def record(self, kind: EventKind, time: float, event: int, **fields: Field) -> None:
-        """`time` is the bridge's monotonic clock, as in feedback and media."""
+        """Add a line; `time` is on the bridge's monotonic clock, as in feedback and media."""
         try:
             self._waiting.put_nowait({"kind": kind, "time": time, "event": event, **fields})
         except queue.Full:
             self.dropped += 1
 
     def close(self) -> None:
-        """Call from a thread, or when blocking does not matter. May be called again."""
+        """Write the waiting lines and close the file. Blocks; call it from a thread if that matters. Idempotent."""
         if self._writer.is_alive():
             self._waiting.put(None)
             self._writer.join()

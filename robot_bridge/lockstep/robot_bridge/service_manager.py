@@ -1,4 +1,4 @@
-"""Tells the service manager that started this process how it goes: sd_notify(3), a datagram for each state."""
+"""Reports the state of this process to the service manager that started it: sd_notify(3), a datagram for each state."""
 
 import logging
 import os
@@ -12,14 +12,14 @@ _logger = logging.getLogger(__name__)
 
 
 class ServiceManager:
-    """Sends nothing without a listener.
+    """Sends states to the service manager, if there is one.
 
     Attributes:
         watchdog_seconds: it restarts a process that is not `alive` for that long; None: no watchdog
     """
 
     def __init__(self, environment: Mapping[str, str]) -> None:
-        """`environment`: NOTIFY_SOCKET, and of sd_watchdog_enabled(3) WATCHDOG_USEC and WATCHDOG_PID."""
+        """`environment`: has NOTIFY_SOCKET and, for sd_watchdog_enabled(3), WATCHDOG_USEC and WATCHDOG_PID."""
         self._address = _address(environment.get("NOTIFY_SOCKET", ""))
         self._socket: socket.socket | None = None
         self._failed = False
@@ -29,7 +29,7 @@ class ServiceManager:
         self._say(b"READY=1")
 
     def alive(self) -> None:
-        """More often than every `watchdog_seconds`."""
+        """Report a sign of life; call it more often than every `watchdog_seconds`."""
         if self.watchdog_seconds is not None:
             self._say(b"WATCHDOG=1")
 
@@ -37,13 +37,13 @@ class ServiceManager:
         self._say(b"STOPPING=1")
 
     def close(self) -> None:
-        """May be called again."""
+        """Close the socket. May be called again."""
         if self._socket is not None:
             self._socket.close()
             self._socket = None
 
     def _say(self, state: bytes) -> None:
-        """Never blocks: a message that the manager does not take now is lost."""
+        """Send a state without blocking: a message that the manager does not take now is lost."""
         if not self._address:
             return
         try:
@@ -58,7 +58,7 @@ class ServiceManager:
 
 
 def _address(name: str) -> bytes:
-    """A path, or after "@" an abstract name; b"" for anything else."""
+    """Return a path, or an abstract name for a name after "@"; b"" for anything else."""
     if name.startswith("@"):
         return b"\0" + os.fsencode(name[1:])
     return os.fsencode(name) if name.startswith("/") else b""

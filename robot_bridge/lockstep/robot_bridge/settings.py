@@ -1,4 +1,4 @@
-"""Settings of a bridge. What belongs to the robot (hold, ages, limits) is in its description."""
+"""Settings of a bridge. The robot's own settings (hold, ages, limits) are in its description."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,18 +14,18 @@ __all__ = ["BridgeSettings"]
 class BridgeSettings:
     host: str = "127.0.0.1"
     port: int = 5600  # 0: any free one
-    event_log: Path | None = None  # JSON lines of all that happened to events; None writes nothing
+    event_log: Path | None = None  # JSON lines of everything that happens to events; None writes nothing
     state_dir: Path | None = None  # keeps the latched stop over restarts; None: in memory only, and feedback says so
-    older_state_dirs: tuple[Path, ...] = ()  # the state in these holds where `state_dir` is new
+    older_state_dirs: tuple[Path, ...] = ()  # their state is used if `state_dir` is new
     lockout_file: Path | None = None  # while it exists, the robot is locked; None: no switch file
     first_event: int = FIRST_EVENT  # tests start near the wrap
-    max_links: int = 32  # admitted ones
+    max_links: int = 32  # admitted links
     max_strangers: int = (
         128  # connections in each stage before admission; of more, the busiest address loses its oldest
     )
     operator_grace: float = 10.0  # s that a broken operator link is kept for the client of the same name
-    secret: LinkSecret | None = None  # that clients have to know
+    secret: LinkSecret | None = None  # the secret that clients have to know
     tls: LinkTls | None = None
     insecure: bool = False  # listen beyond loopback although any client could drive
-    event_strip: bool = False  # draw the stamp into raw pictures, for tests and measurements
+    event_strip: bool = False  # draw each picture's event into raw pictures, for tests and measurements
     log_interval: float = 60.0  # s between log lines with the counters

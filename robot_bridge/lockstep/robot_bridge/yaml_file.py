@@ -1,4 +1,4 @@
-"""Reading a YAML file into typed settings, with errors that name the file, the line and the key."""
+"""Reads a YAML file into typed settings, with errors that name the file, the line and the key."""
 
 import re
 from pathlib import Path
@@ -21,7 +21,7 @@ _UNKNOWN = re.compile(r"^Object contains unknown field `(.*)`$", re.DOTALL)
 
 
 class SettingsPlace(ValueError):
-    """A value contradicts others: raised by the code that knows its meaning, and located by `YamlFile.error`."""
+    """A value that contradicts others: raised by the code that knows its meaning, and located by `YamlFile.error`."""
 
     def __init__(self, keys: tuple[Key, ...], detail: str) -> None:
         super().__init__(keys, detail)
@@ -33,9 +33,11 @@ class YamlFile:
     """One document of plain maps, lists and scalars, and the line of each of its keys."""
 
     def __init__(self, path: Path) -> None:
-        """Raises:
-        SettingsError: it cannot be read, is not YAML, or is not one map.
-        RobotUnavailable: PyYAML is missing.
+        """Read the file.
+
+        Raises:
+            SettingsError: the file cannot be read, is not YAML, or is not one map.
+            RobotUnavailable: PyYAML is missing.
         """
         self._path = path
         self._lines: dict[tuple[Key, ...], int] = {}
@@ -48,7 +50,7 @@ class YamlFile:
         self._data = self._load(text)
 
     def convert(self, kind: type[Settings]) -> Settings:
-        """The whole document as `kind`.
+        """Return the whole document as `kind`.
 
         Raises:
             SettingsError: something is missing, unknown or of the wrong type or range.
@@ -66,7 +68,7 @@ class YamlFile:
             raise self.error(SettingsPlace(keys, detail.removeprefix("Object "))) from error
 
     def error(self, place: SettingsPlace) -> SettingsError:
-        """The same, with file, line and key."""
+        """Return the error with file, line and key."""
         keys = place.keys
         while keys and keys not in self._lines:  # a default has no line: its map's is the nearest
             keys = keys[:-1]
@@ -95,7 +97,7 @@ class YamlFile:
 
 
 class _Reader:
-    """Turns nodes into plain data and notes where they stand."""
+    """Turns nodes into plain data and notes their lines."""
 
     def __init__(self, loader: Any, lines: dict[tuple[Key, ...], int]) -> None:
         self._loader = loader
@@ -112,7 +114,7 @@ class _Reader:
         if node.id == "sequence":
             return [self.plain(item, (*keys, index), depth + 1) for index, item in enumerate(node.value)]
         value = self._loader.construct_object(node)
-        # YAML 1.1 takes 1e-3 for text because it has no dot; the writer never means text.
+        # YAML 1.1 takes 1e-3 for text because it has no dot; the author of a file never means text.
         return float(value) if isinstance(value, str) and node.style is None and _is_number(value) else value
 
     def _map(self, node: Any, keys: tuple[Key, ...], depth: int) -> dict[str, Any]:

@@ -9,10 +9,10 @@ clock, and the caller passes in randomness, so that a test repeats exactly. All 
     core.handle_timer(now)                  # call when `timer()` is due
     core.datagrams_to_send()                # send these; drained
     core.events()                           # frozen dataclasses; drained
-    core.timer()                            # when `handle_timer` is due next; None: never
+    core.timer()                            # the time at which `handle_timer` is due next; None: never
 
 `DtlsConnection` and `DataChannels` lie inside one path and are given no address. OpenSSL reads its own clock.
 
-After each `receive_datagram`, `handle_timer` or call of yours, drain the other two and ask for the timer again.
+After each `receive_datagram`, `handle_timer` or other call, drain the other two and ask for the timer again.
 This package imports nothing else of this repository.
 """

@@ -1,4 +1,4 @@
-"""Where datagrams come from and go to."""
+"""Addresses and paths of datagrams."""
 
 from typing import Literal, NamedTuple
 
@@ -9,7 +9,7 @@ Transport = Literal["udp", "tcp"]  # tcp: datagrams framed as in RFC 4571 on one
 
 
 class Path(NamedTuple):
-    """One way between a local address and an address of a peer. An answer takes the path of the question."""
+    """A local and a remote address, and the transport between them. An answer takes the path of its request."""
 
     local: Address
     remote: Address

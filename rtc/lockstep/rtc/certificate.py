@@ -11,7 +11,7 @@ from lockstep.rtc.fingerprint import Fingerprint, fingerprint_of
 
 __all__ = ["Certificate"]
 
-VALID_DAYS = 30  # RFC 8827 4.3.2.3 is of browsers, which generate one for as long
+VALID_DAYS = 30  # RFC 8827 4.3.2.3 is about browsers, whose certificates are valid for as long
 SKEW_DAYS = 1  # clocks of peers may be behind this one
 
 
@@ -24,13 +24,13 @@ class Certificate:
 
     @classmethod
     def generate(cls) -> "Certificate":
-        """A new ECDSA certificate on P-256, which every WebRTC peer takes (RFC 8827 6.5)."""
+        """Return a new ECDSA certificate on P-256, which every WebRTC peer takes (RFC 8827 6.5)."""
         return cls.for_key(ec.generate_private_key(ec.SECP256R1()))
 
     @classmethod
     def for_key(cls, key: ec.EllipticCurvePrivateKey | rsa.RSAPrivateKey) -> "Certificate":
-        """A new certificate for `key`. It has no name, so that no observer can tell that two sessions belong to one
-        person."""
+        """Return a new certificate for `key`. It has no name, so that no observer can tell that two sessions belong to
+        one person."""
         name = x509.Name([x509.NameAttribute(x509.NameOID.COMMON_NAME, "WebRTC")])
         now = datetime.datetime.now(tz=datetime.UTC)
         builder = (
@@ -46,5 +46,5 @@ class Certificate:
 
     @property
     def fingerprint(self) -> Fingerprint:
-        """With SHA-256, for the session description."""
+        """The SHA-256 fingerprint, for the session description."""
         return fingerprint_of(self.certificate)

@@ -51,7 +51,7 @@ class TooManyChannels(Exception):
 
 @dataclass(frozen=True, slots=True)
 class ChannelOpened:
-    """A channel is open at both ends. `channel` is its stream, by which it is named from here on."""
+    """A channel is open at both ends. `channel` is the number of its stream, which names it from here on."""
 
     channel: int
     label: str
@@ -61,7 +61,7 @@ class ChannelOpened:
 
 
 class ChannelMessage(NamedTuple):
-    """A message: text or bytes, as it was sent. A tuple for the sake of speed, as `MessageReceived` is."""
+    """A message: text or bytes, as it was sent. A tuple for the sake of speed, like `MessageReceived`."""
 
     channel: int
     data: str | bytes
@@ -76,7 +76,7 @@ class ChannelWritable:
 
 @dataclass(frozen=True, slots=True)
 class ChannelClosed:
-    """Both ends have closed it, or the association has ended. The number may be used again."""
+    """Both ends have closed the channel, or the association has ended. The number may be used again."""
 
     channel: int
 
@@ -101,7 +101,7 @@ class _Channel:
 
 
 class DataChannels:
-    """Named, typed messages. The interface is `Association`'s, with channels in the place of streams.
+    """Named, typed messages. The interface is that of `Association`, with channels in the place of streams.
 
     `client` is the DTLS role, which decides whose streams are even (RFC 8832 6). Channels may be opened and written to
     before the association is up, and before the peer has answered: the first messages travel with the handshake.
@@ -116,32 +116,32 @@ class DataChannels:
         peer_port: int | None = None,
         peer_max_message: int | None = None,
     ) -> None:
-        """`random_bytes`, `peer_port` and `peer_max_message` are `Association`'s."""
+        """`random_bytes`, `peer_port` and `peer_max_message` are as in `Association`."""
         self.association = Association(settings, random_bytes, peer_port=peer_port, peer_max_message=peer_max_message)
         self.counts: Counter[str] = self.association.counts
         self.is_client = client
-        self.closed: Closed | None = None  # why the association has ended; None: it has not
+        self.closed: Closed | None = None  # the reason that the association has ended; None: it has not
         self._parity = 0 if client else 1
         self._streams = settings.max_streams
         self._is_up = False
         self._channels: dict[int, _Channel] = {}
-        self._closing: set[int] = set()  # whose streams are to be reset when nothing waits on them
+        self._closing: set[int] = set()  # channels whose streams are to be reset when nothing waits on them
         self._full: set[int] = set()
-        self._watched: set[int] = set()  # of which the owner is told when nothing waits on them
+        self._watched: set[int] = set()  # channels whose owner is told when nothing waits on them
         self._half_full = settings.send_queue // 2
         self._events: list[ChannelEvent] = []
 
-    # What the owner does
+    # Methods for the owner
 
     def start(self, now: float) -> None:
         """Begin the handshake."""
         self.association.start(now)
 
     def open(self, label: str, now: float, *, protocol: str = "", reliability: Reliability | None = None) -> int:
-        """Open a channel and say so to the peer. `ChannelOpened` follows; messages may be sent at once.
+        """Open a channel, tell the peer, and return its number. `ChannelOpened` follows; messages may be sent at once.
 
         Raises:
-            TooManyChannels: no stream of this end is left.
+            TooManyChannels: there are 64, or no stream of this end is left.
             ValueError: the label or the protocol is longer than 1,024 bytes.
             AssociationClosed: the association has ended.
         """
@@ -157,7 +157,7 @@ class DataChannels:
     def open_negotiated(
         self, channel: int, label: str = "", *, protocol: str = "", reliability: Reliability | None = None
     ) -> None:
-        """Have a channel that both ends have agreed upon otherwise. It is open when the association is up.
+        """Add a channel that both ends have agreed upon by other means. It is open when the association is up.
 
         Raises:
             ValueError: the number is taken, or not below `max_streams`.
@@ -205,21 +205,21 @@ class DataChannels:
             raise
 
     def buffered(self, channel: int) -> int:
-        """Bytes that wait on a channel, newest-wins messages apart."""
+        """Return the number of bytes that wait on a channel, without newest-wins messages."""
         return self.association.buffered(channel)
 
     def has_waiting(self, channel: int) -> bool:
-        """Whether a message, or a part of one, has not left yet."""
+        """True if a message, or a part of one, has not left yet."""
         return self.association.has_waiting(channel)
 
     def tell_when_empty(self, channel: int) -> None:
-        """`ChannelWritable` follows when nothing waits on it; once."""
+        """Tell once, with `ChannelWritable`, when nothing waits on the channel."""
         if channel in self._channels:
             self._watched.add(channel)
 
     def close(self, channel: int, now: float) -> None:
-        """Close it when its waiting messages have left. `ChannelClosed` follows. No effect on a channel that does not
-        exist."""
+        """Close a channel when its waiting messages have left; `ChannelClosed` follows. No effect on a channel that
+        does not exist."""
         target = self._channels.get(channel)
         if target is None or target.state is _State.CLOSING:
             return
@@ -227,15 +227,15 @@ class DataChannels:
         self._closing.add(channel)
         self._reset_closing(now)
 
-    # What every core has
+    # The interface of every core
 
     def receive_packet(self, data: bytes, now: float) -> None:
-        """What DTLS delivered."""
+        """Take a packet that DTLS delivered."""
         self.association.receive_packet(data, now)
         self._take_events(now)
 
     def packets_to_send(self) -> list[bytes]:
-        """Everything that is due, as of the last `now`."""
+        """Return every due packet, as of the last `now`."""
         packets = self.association.packets_to_send()
         if self._closing and self._reset_closing(self.association.now):
             packets += self.association.packets_to_send()
@@ -244,7 +244,7 @@ class DataChannels:
         return packets
 
     def timer(self) -> float | None:
-        """When `handle_timer` is due."""
+        """Return the time at which `handle_timer` is due; None: never."""
         return self.association.timer()
 
     def handle_timer(self, now: float) -> None:
@@ -264,11 +264,11 @@ class DataChannels:
 
     @property
     def has_events(self) -> bool:
-        """Whether `events` has something."""
+        """True if `events` has something."""
         return bool(self._events)
 
     def events(self) -> list[ChannelEvent]:
-        """What has happened; drained."""
+        """Return the events since the last call."""
         events, self._events = self._events, []
         return events
 
@@ -362,7 +362,7 @@ class DataChannels:
         self._opened(channel)
 
     def _refuse(self, stream: int, why: str, now: float) -> None:
-        """RFC 8832 6: close it, and do not answer."""
+        """Close the channel, and do not answer (RFC 8832 6)."""
         self.counts[why] += 1
         if stream in self._channels:
             self.close(stream, now)
@@ -379,7 +379,7 @@ class DataChannels:
             self._close_when_reset(channel)
 
     def _reset_closing(self, now: float) -> bool:
-        """Reset what closes and has nothing waiting. Whether there was something."""
+        """Reset the closing channels on which nothing waits. Return True if there were any."""
         ready = tuple(stream for stream in self._closing if not self.association.has_waiting(stream))
         self._closing.difference_update(ready)
         if ready and not self.association.reset_streams(ready, now):
@@ -407,9 +407,10 @@ class DataChannels:
 
 
 def _content(message: MessageReceived) -> str | bytes | None:
-    """
+    """Return the content of a message; None for an unknown PPID.
+
     Raises:
-        UnicodeDecodeError: text that is no UTF-8.
+        UnicodeDecodeError: text that is not UTF-8.
     """
     if message.protocol == STRING:
         return message.payload.decode()

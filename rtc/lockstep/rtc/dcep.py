@@ -16,12 +16,12 @@ _open = Struct("!BBHLHH")
 
 
 class DcepError(ValueError):
-    """The message is not a valid DATA_CHANNEL_OPEN. Raised by the parser, and nothing else is."""
+    """The message is not a valid DATA_CHANNEL_OPEN. The only error that the parser raises."""
 
 
 @dataclass(frozen=True, slots=True)
 class Reliability:
-    """How hard a channel tries. At most one of the limits; None, None: until it arrives."""
+    """The reliability of a channel: at most one of the limits; None, None: a message is repeated until it arrives."""
 
     ordered: bool = True
     max_retransmits: int | None = None
@@ -45,7 +45,8 @@ class Open:
     reliability: Reliability = Reliability()
 
     def encode(self) -> bytes:
-        """
+        """Return the message.
+
         Raises:
             ValueError: the label or the protocol is longer than 1,024 bytes.
         """
@@ -63,9 +64,10 @@ class Open:
 
 
 def decode_open(data: bytes) -> Open:
-    """
+    """Return the content of a DATA_CHANNEL_OPEN.
+
     Raises:
-        DcepError: too short, an unknown type, text that is no UTF-8 or too long.
+        DcepError: too short, an unknown type, text that is not UTF-8 or too long.
     """
     if len(data) < _open.size:
         raise DcepError("too short")

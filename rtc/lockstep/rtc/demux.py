@@ -1,4 +1,4 @@
-"""Which protocol a datagram of a WebRTC path is of, told by its first bytes (RFC 7983 7, RFC 5761 4)."""
+"""Tells the protocol of a datagram on a WebRTC path by its first bytes (RFC 7983 7, RFC 5761 4)."""
 
 from enum import Enum
 
@@ -10,7 +10,7 @@ class DatagramKind(Enum):
     DTLS = "dtls"
     RTP = "rtp"
     RTCP = "rtcp"
-    UNKNOWN = "unknown"  # ZRTP, TURN channels, or nothing that is spoken here: drop and count it
+    UNKNOWN = "unknown"  # ZRTP, TURN channels, or nothing that this package reads: drop and count it
 
 
 def datagram_kind(data: bytes) -> DatagramKind:

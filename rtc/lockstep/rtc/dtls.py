@@ -43,7 +43,7 @@ DtlsRole = Literal["client", "server"]
 DtlsFailure = Literal["protocol", "fingerprint", "timeout", "too_much_handshake"]
 
 DTLS_1_2 = 0xFEFD  # RFC 6347 4.1; RFC 8827 6.5 asks for at least this
-# ECDSA is what everybody has (RFC 8827 6.5). The certificate of GStreamer is RSA: as its client we need those as well.
+# Every peer has ECDSA (RFC 8827 6.5). The certificate of GStreamer is RSA, which its clients need as well.
 # CBC is for peers that have no AEAD.
 CIPHERS = b":".join(
     b"ECDHE-%s-%s" % (kind, cipher)
@@ -52,7 +52,7 @@ CIPHERS = b":".join(
 )
 SRTP_LABEL = b"EXTRACTOR-dtls_srtp"  # RFC 5764 4.2
 FIRST_BYTES = range(20, 64)  # RFC 7983 7
-HEADER = 13  # bytes of a record's (RFC 6347 4.1)
+HEADER = 13  # bytes of a record's header (RFC 6347 4.1)
 MAX_PLAINTEXT = 1 << 14  # bytes of one record (RFC 6347 4.1.1 and RFC 5246 6.2.1)
 APPLICATION_DATA = 23
 READ_SIZE = 1 << 16
@@ -89,15 +89,15 @@ class DtlsData:
 
 @dataclass(frozen=True, slots=True)
 class DtlsClosed:
-    """The peer said close_notify."""
+    """The peer sent close_notify."""
 
 
 @dataclass(frozen=True, slots=True)
 class DtlsFailed:
-    """The end, and nothing that was encrypted with a wrong peer came through."""
+    """The connection has failed. Nothing that was encrypted with a wrong peer came through."""
 
     reason: DtlsFailure
-    detail: str  # OpenSSL's words; for logs
+    detail: str  # OpenSSL's reasons; for logs
 
 
 DtlsEvent = DtlsConnected | DtlsData | DtlsClosed | DtlsFailed
@@ -118,14 +118,14 @@ class DtlsMessageTooLong(ValueError):
 
 
 def dtls_context(certificate: Certificate) -> SSL.Context:
-    """What all connections with one certificate share."""
+    """Return the OpenSSL context that all connections with one certificate share."""
     context = SSL.Context(SSL.DTLS_METHOD)
     context.set_min_proto_version(DTLS_1_2)
     context.set_max_proto_version(
         DTLS_1_2
     )  # OpenSSL 4.0 has no DTLS 1.3, and `records` would have to learn its headers
     context.set_options(SSL.OP_NO_TICKET | SSL.OP_NO_RENEGOTIATION | SSL.OP_NO_QUERY_MTU)
-    # No authority signed it: what counts is its fingerprint, which is checked when the handshake is done.
+    # No authority signed it: its fingerprint counts, which is checked when the handshake is done.
     context.set_verify(SSL.VERIFY_PEER | SSL.VERIFY_FAIL_IF_NO_PEER_CERT, lambda *arguments: True)
     context.use_certificate(certificate.certificate)
     context.use_privatekey(certificate.key)
@@ -144,7 +144,7 @@ class DtlsConnection:
         fingerprints: Sequence[Fingerprint],
         settings: DtlsSettings | None = None,
     ) -> None:
-        """`fingerprints`: of the certificates that the peer may have; from its session description."""
+        """`fingerprints`: those of the certificates that the peer may have; from its session description."""
         self.role = role
         self.counts: Counter[str] = Counter()
         self._settings = settings or DtlsSettings()
@@ -175,7 +175,7 @@ class DtlsConnection:
         self._advance(now)
 
     def receive_datagram(self, data: bytes, now: float) -> None:
-        """A datagram with one or more records,."""
+        """Take a datagram with one or more records."""
         if self._state is DtlsState.NEW:
             self.counts["not_started"] += 1
         elif self._state in (DtlsState.CLOSED, DtlsState.FAILED):
@@ -189,12 +189,12 @@ class DtlsConnection:
             self._advance(now)
 
     def handle_timer(self, now: float) -> None:
-        """Repeat the flight that was not answered (RFC 6347 4.2.4), if OpenSSL finds that it is due."""
+        """Repeat the unanswered flight (RFC 6347 4.2.4), if OpenSSL finds that it is due."""
         if self._state not in (DtlsState.CONNECTING, DtlsState.CONNECTED):
             return
         try:
             self._ssl.DTLSv1_handle_timeout()
-        except SSL.Error as error:  # after twelve times
+        except SSL.Error as error:  # after twelve repeats
             self._fail("timeout", _words(error))
         self._written(now)
 
@@ -203,7 +203,7 @@ class DtlsConnection:
 
         Raises:
             DtlsNotConnected: before DtlsConnected, or after the end.
-            DtlsMessageTooLong: it does not fit a record.
+            DtlsMessageTooLong: `data` does not fit a record.
         """
         if self._state is not DtlsState.CONNECTED:
             raise DtlsNotConnected(f"DTLS is {self._state.value}")
@@ -218,7 +218,7 @@ class DtlsConnection:
         self._written(now)
 
     def close(self, now: float) -> None:
-        """Say close_notify (RFC 5246 7.2.1). Idempotent; there is no event."""
+        """Send close_notify (RFC 5246 7.2.1). Idempotent; there is no event."""
         if self._state in (DtlsState.CONNECTING, DtlsState.CONNECTED):
             self._shut_down()
             self._written(now)
@@ -237,7 +237,7 @@ class DtlsConnection:
         return events
 
     def timer(self) -> float | None:
-        """When `handle_timer` is due: a little late rather than early, because OpenSSL has its own clock."""
+        """Return the time of `handle_timer`: a little late rather than early, because OpenSSL has its own clock."""
         return self._timer
 
     # OpenSSL
@@ -309,7 +309,7 @@ class DtlsConnection:
 
 
 def records(data: bytes) -> Iterator[bytes]:
-    """The records in `data`, which is whole."""
+    """Yield the records in `data`, which has only whole ones."""
     start = 0
     while start < len(data):
         end = start + HEADER + int.from_bytes(data[start + 11 : start + HEADER], "big")
@@ -318,9 +318,9 @@ def records(data: bytes) -> Iterator[bytes]:
 
 
 def _datagrams(written: bytes, mtu: int) -> Iterator[bytes]:
-    """OpenSSL writes to memory, where the borders of its datagrams are lost: records fill datagrams again.
+    """Yield datagrams filled with records: OpenSSL writes to memory, where the borders of its datagrams are lost.
 
-    Records of application data go alone: there are peers that read the first of a datagram only.
+    Records of application data go alone: some peers read only the first of a datagram.
     """
     datagram = b""
     for record in records(written):
@@ -336,6 +336,6 @@ def _datagrams(written: bytes, mtu: int) -> Iterator[bytes]:
 
 
 def _words(error: SSL.Error) -> str:
-    """OpenSSL's reasons, without the names of its libraries."""
+    """Return OpenSSL's reasons, without the names of its libraries."""
     reasons = error.args[0] if error.args and isinstance(error.args[0], list) else [error.args]
     return "; ".join(str(each[-1]) for each in reasons if each)[:200] or type(error).__name__

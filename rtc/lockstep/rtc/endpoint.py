@@ -7,8 +7,8 @@
         async for event in connection:
             ...
 
-With `udp_socket`, `tcp_port` and `server_links`, this is the only file of the package that has sockets, a
-clock and timers. It decides nothing.
+This module, `udp_socket`, `tcp_port` and `server_links` are the only ones of the package with sockets, a
+clock and timers. They decide nothing.
 """
 
 import asyncio
@@ -41,9 +41,9 @@ from lockstep.rtc.udp_socket import UdpSocket
 __all__ = ["Connection", "Endpoint", "EndpointSettings", "TooManyPeers", "Turns"]
 
 Listener = Callable[[PeerEvent], None]
-CLOCK_RESOLUTION = 0.001  # s, by which a loop may call too early
+CLOCK_RESOLUTION = 0.001  # s; a loop may call too early by so much
 SLOWEST = 4  # times as long as STUN over UDP: an address by TCP and TLS takes five round trips
-UNSENT = 64 * 1024  # bytes on a TCP path, above which pictures had better wait where newer ones replace them
+UNSENT = 64 * 1024  # bytes on a TCP path; above that pictures should wait, where newer ones replace them
 PORT_TRIES = 8  # a free port of one address may be taken at another
 
 
@@ -52,13 +52,13 @@ class TooManyPeers(RuntimeError):
 
 
 class Turns(Protocol):
-    """Gives connections their turns: the packets of their peers are handled then, and delay no other connection."""
+    """Gives connections their turns: the packets of their peers are handled in turn, and delay no other connection."""
 
     def may_go_at_once(self) -> bool:
-        """Whether one datagram more need not wait. Asked only where none waits."""
+        """True if one datagram more need not wait. Asked only where none waits."""
 
     def add(self, connection: "Connection") -> None:
-        """Call its `handle_next` until that returns False. It may be waiting already."""
+        """Give `connection` turns: call its `handle_next` until that returns False. It may be waiting already."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,18 +66,18 @@ class EndpointSettings:
     peer: PeerSettings = field(default_factory=PeerSettings)
     port: PortSettings = field(default_factory=PortSettings)
     tcp: TcpPortSettings = field(default_factory=TcpPortSettings)
-    peers: int = 1024  # at a time; each has half a megabyte of buffers at the most
+    peers: int = 1024  # at a time; each has at most half a megabyte of buffers
     waiting_packets: int = 4096  # media packets that an application has not read; more are dropped and counted
-    ask_seconds: float = 3.0  # for which STUN and TURN servers are waited for
-    ask_margin: float = 0.2  # s, at least, that the slower servers have when the first has answered
+    ask_seconds: float = 3.0  # time to wait for STUN and TURN servers
+    ask_margin: float = 0.2  # s, at least, for the slower servers after the first has answered
     waiting_datagrams: int = 1024  # of a connection that has turns; more are dropped and counted
-    waiting_events: int = 16_384  # of all kinds; an application that lets more wait does not live: the peer is closed
+    waiting_events: int = 16_384  # of all kinds; an application that lets more wait counts as dead: the peer is closed
 
 
 class Connection:
     """One peer: `lockstep.rtc.peer.Peer` with a clock and a socket.
 
-    Its events come by `async for`, once; or a listener hears each as it happens, and nothing waits.
+    Read its events with `async for`, once; or pass a listener, which gets each event as it happens.
     """
 
     def __init__(
@@ -89,7 +89,7 @@ class Connection:
         turns: Turns | None = None,
     ) -> None:
         self.peer = peer
-        self.urgent = False  # whether its datagrams leave before those of others
+        self.urgent = False  # True: its datagrams leave before those of others
         self.counts: Counter[str] = Counter()
         self._endpoint = endpoint
         self._settings = settings
@@ -97,15 +97,15 @@ class Connection:
         self._timer: asyncio.TimerHandle | None = None
         self._timer_at = 0.0
         self._listener = listener
-        self._telling = False  # the listener, which may use this connection meanwhile
+        self._telling = False  # True while the listener is called, which may use this connection
         self._turns = turns
         self._later: deque[tuple[bytes, Path]] = deque()  # datagrams that wait for their turn
-        self.fault: Exception | None = None  # what serving it has raised, after PeerEnded("failed")
+        self.fault: Exception | None = None  # the exception that serving it raised, after PeerEnded("failed")
         self._waiting: deque[PeerEvent] = deque()
         self._arrived = asyncio.Event()
         self._ended = False  # PeerEnded waits, or was read
 
-    # Negotiation: as of `Peer`
+    # Negotiation, as in `Peer`
 
     def answer(self, offer: SessionDescription, media: Mapping[str, LocalMedia]) -> SessionDescription:
         answer = self.peer.answer(offer, media, self._loop.time())
@@ -124,13 +124,13 @@ class Connection:
         self.flush()
 
     def answer_restart(self, fragment: Fragment) -> Fragment:
-        """With the endpoint's candidates of now."""
+        """Like `Peer.answer_restart`, with the present candidates of the endpoint."""
         answer = self.peer.answer_restart(fragment, self._loop.time(), self._endpoint.candidates)
         self.flush()
         return answer
 
     def restart(self, candidates: Sequence[LocalCandidate] | None = None) -> Fragment:
-        """`candidates`: None: the endpoint's present ones."""
+        """Like `Peer.restart`. `candidates`: None: the present ones of the endpoint."""
         fragment = self.peer.restart(self._loop.time(), self._endpoint.candidates if candidates is None else candidates)
         self.flush()
         return fragment
@@ -143,7 +143,7 @@ class Connection:
         self.peer.cancel_restart()
         self.flush()
 
-    # Sending: as of `Peer`
+    # Sending, as in `Peer`
 
     def open_channel(self, label: str, *, protocol: str = "", reliability: Reliability | None = None) -> int:
         channel = self.peer.open_channel(label, self._loop.time(), protocol=protocol, reliability=reliability)
@@ -181,7 +181,7 @@ class Connection:
 
     @property
     def is_blocked(self) -> bool:
-        """Whether what is sent now would only wait for the network. True too while there is no path."""
+        """True if data sent now would only wait for the network. True too while there is no path."""
         path = self.peer.ice.path
         return path is None or self._endpoint.is_blocked(path)
 
@@ -204,7 +204,7 @@ class Connection:
     # Events
 
     def listen(self, listener: Listener) -> None:
-        """Tell `listener` what happens from now on, and what has happened and nobody has read. Only once."""
+        """Pass all further events to `listener`, after those that nobody has read. Only once."""
         self._listener = listener
         self._tell(listener, ())
 
@@ -222,7 +222,7 @@ class Connection:
     # Turns
 
     def handle_next(self) -> bool:
-        """One of the datagrams that wait. Whether more do."""
+        """Handle one of the datagrams that wait. Return True if more wait."""
         if self._later:
             data, path = self._later.popleft()
             if self.receive(data, path, self._loop.time()):
@@ -234,7 +234,7 @@ class Connection:
     # Inside
 
     def put_off(self, data: bytes, path: Path) -> bool:
-        """Whether this datagram waits for its turn, or was dropped because too many do."""
+        """Let a datagram wait for its turn; drop it if too many wait. Return False if it is to be handled now."""
         if self._turns is None or (not self._later and self._turns.may_go_at_once()):
             return False
         if len(self._later) < self._settings.waiting_datagrams:
@@ -245,7 +245,7 @@ class Connection:
         return True
 
     def receive(self, data: bytes, path: Path, now: float) -> bool:
-        """Call `settle` then, or `hand_out_plain` if this returns False: it was a plain packet."""
+        """Handle a datagram. Call `settle` then, or `hand_out_plain` if this returns False: it was a plain packet."""
         try:
             if self.peer.receive_plain(data):
                 return False
@@ -255,7 +255,7 @@ class Connection:
         return True
 
     def path_closed(self, path: Path) -> None:
-        """The TCP connection of this path has ended."""
+        """Note that the TCP connection of this path has ended."""
         try:
             self.peer.ice.path_closed(path, self._loop.time())
         except Exception as error:
@@ -263,16 +263,16 @@ class Connection:
         self.settle()
 
     def settle(self) -> None:
-        """As `flush`; an exception ends this connection and no other."""
+        """Do as `flush`; an exception ends this connection and no other."""
         try:
             self.flush()
         except Exception as error:
             self._fail(error)
 
     def _fail(self, error: Exception) -> None:
-        """A peer has sent something unexpected: a fault of this package, which other peers must not feel.
+        """End this connection after unexpected input: a fault of this package, which other peers must not feel.
 
-        A listener finds it in `fault`; without a listener, the loop's exception handler is told.
+        A listener finds the exception in `fault`; without a listener, the loop's exception handler is told.
         """
         if self.fault is not None:
             return
@@ -288,7 +288,7 @@ class Connection:
         self._endpoint.forget(self)
 
     def flush(self) -> None:
-        """Send the due datagrams, hand out the events, and set the timer anew. Call it after you used `peer` itself."""
+        """Send the due datagrams, hand out the events, and set the timer anew. Call it after using `peer` directly."""
         if self.fault is not None:
             return
         self._hand_out(self.peer.events())
@@ -302,7 +302,7 @@ class Connection:
             self._endpoint.forget(self)
 
     def hand_out_plain(self) -> None:
-        """In place of `flush` where only `Peer.receive_plain` was called."""
+        """Hand out plain packets, in place of `flush` where only `Peer.receive_plain` was called."""
         self._hand_out(self.peer.plain_packets())
 
     def _hand_out(self, events: Sequence[PeerEvent]) -> None:
@@ -313,7 +313,7 @@ class Connection:
             self._keep(event)
 
     def _tell(self, listener: Listener, events: Sequence[PeerEvent]) -> None:
-        """In order, also when the listener causes further events. An exception is the listener's own fault."""
+        """Call the listener in order, also when it causes further events. An exception is the listener's fault."""
         self._waiting.extend(events)
         if self._telling:
             return
@@ -344,7 +344,8 @@ class Connection:
         self._arrived.set()
 
     def _set_timer(self) -> None:
-        """A timer that fires too early is left: the next datagram puts off most of them, and no code waits for them."""
+        """Set the timer anew. One that fires too early is left: the next datagram puts off most of them, and no code
+        waits for them."""
         due = self.peer.timer()
         if due is None and self._timer is not None:
             self._timer.cancel()
@@ -352,7 +353,7 @@ class Connection:
         self._set_timer_by(due)
 
     def _set_timer_by(self, due: float | None) -> None:
-        """At the latest then."""
+        """Let the timer fire at `due` at the latest."""
         if due is None or (self._timer is not None and self._timer_at <= due):
             return
         if self._timer is not None:
@@ -385,14 +386,15 @@ class Endpoint:
         advertised: Sequence[Advertised] = (),
         settings: EndpointSettings | None = None,
     ) -> None:
-        """
+        """Bind the sockets.
+
         Args:
-            hosts: addresses of this machine, those to prefer first; all have the same port. None at all: the peer
-                reaches us through TURN servers only (`ask`).
+            hosts: addresses of this machine, the preferred ones first; all have the same port. None at all: peers reach
+                this endpoint through TURN servers only (`ask`).
             port: 0: a free one.
-            tcp: whether peers may connect by TCP as well (RFC 6544), to the port of the same number.
+            tcp: True: peers may connect by TCP as well (RFC 6544), to the port of the same number.
             certificate: None: a new one.
-            advertised: addresses of a 1:1 NAT in front of us.
+            advertised: addresses of a 1:1 NAT in front of this machine.
 
         Raises:
             OSError: the port cannot be bound.
@@ -406,15 +408,15 @@ class Endpoint:
         self._sockets: dict[Address, UdpSocket] = {}
         self._tcp: TcpPort | None = None
         self._flush_is_due = False
-        self._dropped_before: Counter[str] = Counter()  # by connections that have ended
+        self._dropped_before: Counter[str] = Counter()  # of connections that have ended
         self._connections: dict[Agent, Connection] = {}
         self._hosts = list(hosts)
         self._number = port
         self._advertised = tuple(advertised)
-        self._told: list[LocalCandidate] = []  # by servers
+        self._told: list[LocalCandidate] = []  # candidates from servers
         self._relays: list[RelayLink] = []
         self._probes: dict[Path, MappedAddress] = {}
-        self._probed = asyncio.Event()  # one of them has heard something
+        self._probed = asyncio.Event()  # one of the probes has received something
         if tcp:
             self._tcp = TcpPort(self._receive_stream, self._stream_closed, self._is_used, self.settings.tcp)
         for left in reversed(range(PORT_TRIES)):
@@ -441,32 +443,32 @@ class Endpoint:
 
     @property
     def connections(self) -> int:
-        """Those that have not ended."""
+        """The number of connections that have not ended."""
         return len(self._connections)
 
     @property
     def dropped(self) -> Counter[str]:
-        """What came and was not used, by reason, since the start: here, and of every connection."""
+        """Counts of unused input since the start, by reason: here, and of every connection."""
         found = Counter(self.counts) + self._dropped_before
         for connection in self._connections.values():
             found += connection.peer.dropped + connection.counts
         return found
 
-    # Where peers reach us
+    # Addresses for peers
 
     @property
     def sockets(self) -> list[UdpSocket]:
-        """For an application that wants to know when something has come, by `fileno`."""
+        """The UDP sockets, for an application that wants to know when something has come, by `fileno`."""
         return list(self._sockets.values())
 
     @property
     def candidates(self) -> list[LocalCandidate]:
-        """Of the local addresses, and of those that servers reported."""
+        """The candidates of the local addresses, and those that servers reported."""
         tcp = self._number if self._tcp is not None else None
         return [*gather(self._hosts, self._number, tcp, self._advertised), *self._told]
 
     def use_hosts(self, hosts: Sequence[str]) -> None:
-        """After a change of the network: these are our addresses now. Those that cannot be bound are left out.
+        """Use these local addresses after a change of the network. Those that cannot be bound are left out.
 
         A socket of an address that is gone stays, for it costs nothing and the address may come back.
         """
@@ -482,7 +484,8 @@ class Endpoint:
 
     async def ask(self, servers: Sequence[IceServer]) -> list[RelayRefused | OSError]:
         """Ask STUN servers for the mapped address, and TURN servers for relayed ones; `candidates` has the answers.
-        Earlier relayed addresses that carry no data are given back. Returns the reasons of servers without an answer.
+
+        Earlier relayed addresses that carry no data are given back. Return the errors of servers without an answer.
         """
         self._give_back_unused()
         uris = server_uris(servers, self.counts)
@@ -531,7 +534,7 @@ class Endpoint:
         ]
 
     async def _until_answered(self, probes: Sequence[MappedAddress]) -> None:
-        """As soon as one is, which is enough: sockets on other addresses may have no way there."""
+        """Wait until one probe is answered, which is enough: other sockets may have no way to the server."""
         while not any(each.mapped is not None for each in probes) and not all(each.done for each in probes):
             due = min((each for each in (probe.timer() for probe in probes) if each is not None), default=None)
             self._probed.clear()
@@ -551,7 +554,7 @@ class Endpoint:
         in_use = set[Address]()
         for each in self._connections.values():
             path = each.peer.ice.path
-            # One that looks for its path may find it through any of them.
+            # A connection that looks for its path may find it through any of them.
             in_use.update([path.local] if path is not None else [x.base for x in each.peer.ice.local_candidates])
         for link in [each for each in self._relays if each.relayed not in in_use]:
             link.close()
@@ -565,12 +568,12 @@ class Endpoint:
         listener: Listener | None = None,
         turns: Turns | None = None,
     ) -> Connection:
-        """A connection that is to be negotiated. Raises TooManyPeers.
+        """Return a connection that is to be negotiated. Raises TooManyPeers.
 
         Args:
-            controlling: as of `Peer`
-            listener: hears its events as they happen; it may use the connection, and closes nothing else
-            turns: when to handle what its peer sends; None: at once
+            controlling: as in `Peer`
+            listener: gets its events as they happen; it may use the connection, and closes nothing else
+            turns: decides when to handle the peer's datagrams; None: at once
         """
         if len(self._connections) >= self.settings.peers:
             raise TooManyPeers(f"{len(self._connections)} peers")
@@ -614,7 +617,7 @@ class Endpoint:
     # For connections
 
     def send(self, datagrams: Sequence[Datagram], *, urgent: bool) -> None:
-        """They leave with all others of this turn of the loop; urgent ones now."""
+        """Send datagrams with all others of this turn of the loop; urgent ones now."""
         for datagram in datagrams:
             if self._tcp is not None and datagram.path.transport == "tcp":
                 self._tcp.send(datagram, urgent=urgent)
@@ -631,7 +634,7 @@ class Endpoint:
             self._loop.call_soon(self._flush_later)
 
     def is_blocked(self, path: Path) -> bool:
-        """Whether what is sent on this path now would only wait for the network."""
+        """True if data sent on this path now would only wait for the network."""
         if path.transport == "tcp":
             return self._tcp is not None and self._tcp.unsent(path) > UNSENT
         found = self._sockets.get(path.local)
@@ -658,7 +661,7 @@ class Endpoint:
 
     def _receive(self, datagrams: Iterable[tuple[bytes, Path]]) -> None:
         now = self._loop.time()
-        heard: dict[Connection, bool] = {}  # in order; whether more than plain packets came
+        heard: dict[Connection, bool] = {}  # in order; True: more than plain packets came
         for data, path in datagrams:
             if self._probes and path in self._probes:
                 self._probes[path].receive(data, now)

@@ -12,7 +12,7 @@ __all__ = ["SUPPORTED_HASHES", "Fingerprint", "fingerprint_of", "is_expected"]
 _HASHES: dict[str, type[hashes.HashAlgorithm]] = {
     "sha-512": hashes.SHA512,
     "sha-384": hashes.SHA384,
-    "sha-256": hashes.SHA256,  # RFC 8122 5: everybody has this one
+    "sha-256": hashes.SHA256,  # RFC 8122 5: every peer has this one
 }
 SUPPORTED_HASHES = tuple(_HASHES)  # the strongest first
 HASH_BYTES = {"sha-1": 20, "sha-224": 28, "sha-256": 32, "sha-384": 48, "sha-512": 64}  # RFC 8122 5
@@ -28,7 +28,7 @@ class Fingerprint:
 
     @classmethod
     def parse(cls, text: str) -> "Fingerprint":
-        """From "sha-256 AB:CD:…". Raises ValueError."""
+        """Return the fingerprint in "sha-256 AB:CD:…". Raises ValueError."""
         algorithm, _, value = text.strip().partition(" ")
         algorithm, value = algorithm.lower(), value.strip()
         length = HASH_BYTES.get(algorithm)
@@ -41,13 +41,13 @@ class Fingerprint:
 
 
 def fingerprint_of(certificate: x509.Certificate, algorithm: str = "sha-256") -> Fingerprint:
-    """The fingerprint of `certificate`; `algorithm` is one of SUPPORTED_HASHES."""
+    """Return the fingerprint of `certificate`; `algorithm` is one of SUPPORTED_HASHES."""
     digest = certificate.fingerprint(_HASHES[algorithm]())
     return Fingerprint(algorithm, digest.hex(":").upper())
 
 
 def is_expected(certificate: x509.Certificate, expected: Sequence[Fingerprint]) -> bool:
-    """Whether `certificate` has one of the fingerprints of the strongest hash that `expected` and we have."""
+    """True if `certificate` has one of the `expected` fingerprints of the strongest supported hash among them."""
     for algorithm in SUPPORTED_HASHES:
         of_this = [each for each in expected if each.algorithm == algorithm]
         if of_this:  # RFC 8122 5: weaker hashes are ignored

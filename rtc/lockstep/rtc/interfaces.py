@@ -10,7 +10,7 @@ MAX_ADDRESSES = 16  # each costs a socket and as many checks as the peer has can
 
 
 def own_addresses() -> list[str]:
-    """Those of all interfaces but loopback and link-local ones (RFC 8445 5.1.1.1), IPv4 before IPv6; at most 16."""
+    """Return all addresses but loopback and link-local ones (RFC 8445 5.1.1.1), IPv4 before IPv6; at most 16."""
     found: dict[str, None] = {}
     for adapter in ifaddr.get_adapters():
         for each in adapter.ips:

@@ -64,7 +64,7 @@ from lockstep.rtc.srtp import SrtpPacketTooLong, SrtpReceiver, SrtpSender
 
 __all__ = ["OfferedMedia", "Peer", "PeerNotReady", "PeerSettings"]
 
-DATA_MID = "data"  # of the section for channels in our offers
+DATA_MID = "data"  # mid of the section for channels in an offer of this side
 EXTENSION_IDS = (*range(1, 15), *range(16, 256))  # of header extensions; 15 is reserved (RFC 8285 4.2)
 
 
@@ -74,13 +74,13 @@ class PeerNotReady(RuntimeError):
 
 @dataclass(frozen=True, slots=True)
 class PeerSettings:
-    """What an application may want otherwise."""
+    """The settings of a peer that an application may change."""
 
     ice: IceSettings = field(default_factory=IceSettings)
     dtls: DtlsSettings = field(default_factory=DtlsSettings)
     sctp: SctpSettings = field(default_factory=SctpSettings)
-    # Whether an own answer opens DTLS, where the offer leaves the choice (RFC 8842 5.3). The peer knows first that
-    # ICE has found a path, when it is the one that asks for one.
+    # The DTLS role of an answer, where the offer leaves the choice (RFC 8842 5.3). A peer that asks for a path is the
+    # first to know that ICE has found one.
     setup: Setup = "passive"
     epoch: float = 0.0  # s since 1970 at which the clock of `now` was 0; for sender reports
     held: int = 32  # datagrams of DTLS that overtake the description they need; a handshake has fewer
@@ -88,7 +88,7 @@ class PeerSettings:
 
 @dataclass(frozen=True, slots=True)
 class OfferedMedia:
-    """A section of an own offer."""
+    """A section of an offer of this side."""
 
     mid: str
     kind: str  # "audio" or "video"
@@ -102,7 +102,7 @@ class _Ssrcs:
 
 
 class Peer:
-    """One session with one peer. It ends with PeerEnded; another one is another object."""
+    """One session with one peer. It ends with PeerEnded; make another object for another session."""
 
     def __init__(
         self,
@@ -115,12 +115,16 @@ class Peer:
         directory: Directory | None = None,
         random: Random | None = None,
     ) -> None:
-        """
+        """Begin with nothing negotiated.
+
         Args:
-            context: from `lockstep.rtc.dtls.dtls_context`; `fingerprint` is of its certificate.
-            candidates: the addresses for the peer. controlling: whether this side decides on the path: the offerer
-            does, and a side that answers a lite agent (RFC 8445 6.1.1). directory: of the `ice.port.Port` whose
-            sockets it shares. random: must be unpredictable: a SystemRandom except in tests.
+            context: from `lockstep.rtc.dtls.dtls_context`.
+            fingerprint: that of the context's certificate.
+            candidates: the addresses for the peer.
+            controlling: True if this side decides on the path: the offerer does, and a side that answers a lite agent
+                (RFC 8445 6.1.1).
+            directory: that of the `ice.port.Port` whose sockets this peer shares.
+            random: must be unpredictable: a SystemRandom except in tests.
         """
         self.settings = settings or PeerSettings()
         self.counts: Counter[str] = Counter()
@@ -133,7 +137,7 @@ class Peer:
         self._identity = Identity.new(self._random)
         self._session_id = self._random.getrandbits(62)  # RFC 8829 5.2.1
         self._ssrcs: dict[str, _Ssrcs] = {}  # by mid
-        self._offer: SessionDescription | None = None  # the own offer, until it is answered
+        self._offer: SessionDescription | None = None  # the offer of this side, until it is answered
         self._dtls: DtlsConnection | None = None  # None until both descriptions are known
         self._held: deque[bytes] = deque(maxlen=self.settings.held)
         self.channels: DataChannels | None = None  # None when there are none
@@ -141,10 +145,10 @@ class Peer:
         self._protect: SrtpSender | None = None
         self._unprotect: SrtpReceiver | None = None
         self._plain_packets = False
-        self._tagged: MediaSection | None = None  # whose transport is that of the bundle; None until negotiated
-        # What streams have: most datagrams are about something else, and each stream is a chain of stages.
+        self._tagged: MediaSection | None = None  # section with the transport of the bundle; None until negotiated
+        # True if streams may have news: most datagrams are about something else, and each stream is a chain of stages.
         self._media_unsent = self._media_untold = self._media_untimed = False
-        self._media_due: float | None = None  # when their timer is, as far as that is known
+        self._media_due: float | None = None  # the streams' timer, as far as it is known
         self._out: list[Datagram] = []
         self._events: list[PeerEvent] = []
         self._now = 0.0
@@ -153,10 +157,10 @@ class Peer:
     # Negotiation
 
     def answer(self, offer: SessionDescription, media: Mapping[str, LocalMedia], now: float) -> SessionDescription:
-        """Our answer to a peer's offer. `media`: what we can do, by the offer's mid.
+        """Return the answer to a peer's offer. `media`: the abilities of this side, by the offer's mid.
 
         Raises:
-            SdpError: it cannot be answered; nothing has changed.
+            SdpError: the offer cannot be answered; nothing has changed.
             RuntimeError: this session was negotiated before.
         """
         self._check_new()
@@ -171,7 +175,7 @@ class Peer:
         return answer
 
     def offer(self, media: Sequence[OfferedMedia], *, data: bool = True) -> SessionDescription:
-        """Our offer, with channels if `data`. The peer's answer goes to `accept`. Raises RuntimeError as `answer`."""
+        """Return an offer, with channels if `data`. The answer goes to `accept`. Raises RuntimeError like `answer`."""
         self._check_new()
         uris = dict.fromkeys(uri for each in media for uri in each.media.extensions)
         ids = dict(zip(uris, EXTENSION_IDS, strict=False))
@@ -182,7 +186,7 @@ class Peer:
         return self._offer
 
     def accept(self, answer: SessionDescription, now: float) -> None:
-        """The peer's answer to our offer. Raises SdpError; RuntimeError without an offer that waits for one."""
+        """Take the peer's answer to the offer. Raises SdpError; RuntimeError without an offer that waits for one."""
         if self._offer is None:
             raise RuntimeError("no offer waits for an answer")
         check_answer(self._offer, answer)
@@ -191,7 +195,7 @@ class Peer:
         self._negotiated(answer, answer, ours, now)
 
     def add_candidate(self, line: str) -> None:
-        """One more of the peer's, "candidate:…" (RFC 8838). An unknown candidate is counted and ignored."""
+        """Add a remote candidate, "candidate:…" (RFC 8838). An unknown candidate is counted and ignored."""
         try:
             self.ice.add_remote_candidate(parse_candidate(line))
         except CandidateError:
@@ -207,10 +211,10 @@ class Peer:
         return self._tagged
 
     def restart(self, now: float, candidates: Iterable[LocalCandidate] | None = None) -> Fragment:
-        """Look for another path, for the peer's fragment to go to `accept_restart`; `Restarted` or `RestartFailed`
-        follows. Until then the path is the one before, for as long as the peer consents.
+        """Look for another path. Return the fragment for the peer, whose answer goes to `accept_restart`.
 
-        `candidates`: where the peer may reach us now; None: where it could before. Raises PeerNotReady.
+        `Restarted` or `RestartFailed` follows. Until then the path is the one before, for as long as the peer consents.
+        `candidates`: the addresses for the peer now; None: those of before. Raises PeerNotReady.
         """
         mid = self._check_alive().mid
         credentials = self.ice.restart(now, candidates)
@@ -220,7 +224,7 @@ class Peer:
         return Fragment(credentials.ufrag, credentials.password, found, end_of_candidates=True)
 
     def accept_restart(self, fragment: Fragment, now: float) -> None:
-        """What the peer answers to the fragment of `restart`.
+        """Take the peer's answer to the fragment of `restart`.
 
         Raises:
             SdpError: it has no credentials; the restart waits for a better one.
@@ -237,7 +241,7 @@ class Peer:
     def answer_restart(
         self, fragment: Fragment, now: float, candidates: Iterable[LocalCandidate] | None = None
     ) -> Fragment:
-        """Our fragment for a restart that the peer has begun. Raises SdpError and PeerNotReady."""
+        """Return the answer to the fragment of a restart that the peer has begun. Raises SdpError and PeerNotReady."""
         if not fragment.ufrag or not fragment.password:
             raise SdpError("no ice-ufrag or no ice-pwd")
         answer = self.restart(now, candidates)
@@ -245,12 +249,12 @@ class Peer:
         return answer
 
     def cancel_restart(self) -> None:
-        """The path before it stays. Nothing without one."""
+        """Give up a restart: the path before it stays. No effect without a restart."""
         self.ice.cancel_restart()
 
     @property
     def is_up(self) -> bool:
-        """Whether DTLS is connected and the session has not ended; a path may be missing during a restart."""
+        """True if DTLS is connected and the session has not ended; a path may be missing during a restart."""
         return not self._ended and self._dtls is not None and self._dtls.state is DtlsState.CONNECTED
 
     def _check_alive(self) -> MediaSection:
@@ -275,7 +279,7 @@ class Peer:
         )
 
     def _with_sources(self, mid: str, own: LocalMedia) -> LocalMedia:
-        """With the SSRCs that we send under."""
+        """Return `own` with the SSRCs that this side sends under."""
         ssrcs = self._ssrcs.setdefault(mid, _Ssrcs(self._random.getrandbits(32), self._random.getrandbits(32)))
         names = {"cname": self._identity.cname} | ({"msid": own.msid} if own.msid else {})
         if not any(codec.name.lower() == "rtx" for codec in own.codecs):
@@ -286,7 +290,7 @@ class Peer:
     def _negotiated(
         self, remote: SessionDescription, answer: SessionDescription, ours: Sequence[MediaSection], now: float
     ) -> None:
-        """`ours`: the answer's sections with the own direction."""
+        """Take the result of a negotiation. `ours`: the answer's sections with the direction of this side."""
         self._now = now
         self._tagged = next(iter(answer.accepted), None)
         media = [
@@ -335,8 +339,10 @@ class Peer:
         self._plain_packets = True
 
     def receive_plain(self, data: bytes) -> bool:
-        """The short way of a media datagram on a path of this peer's, after `take_plain_packets`; drain
-        `plain_packets`. False: it is another, for `receive_datagram`. No timer and nothing to send comes of it.
+        """Take a media datagram the short way, after `take_plain_packets`; drain `plain_packets`.
+
+        It came on a path of this peer. Return False for another datagram, which is for `receive_datagram`. This makes
+        no timer and nothing to send.
         """
         if not self._plain_packets or self._unprotect is None or self._ended:
             return False
@@ -348,12 +354,12 @@ class Peer:
         return True
 
     def plain_packets(self) -> list[PeerEvent]:
-        """As `events`, when nothing but `receive_plain` was called since."""
+        """Return the events, when nothing but `receive_plain` was called since the last."""
         events, self._events = self._events, []
         return events
 
     def send_rtcp(self, packet: bytes) -> None:
-        """A compound packet of the application's own. Raises PeerNotReady before media are up, SrtpPacketTooLong."""
+        """Send a compound packet of the application. Raises PeerNotReady before media are up, SrtpPacketTooLong."""
         if self._protect is None or self._ended:
             raise PeerNotReady("media are not up")
         path = self.ice.path
@@ -362,36 +368,36 @@ class Peer:
             self._out.append(Datagram(protected, path))
 
     def note_round_trip(self, seconds: float) -> None:
-        """The application has measured the path: lost packets are asked for accordingly."""
+        """Take a round trip, in s, that the application has measured; lost packets are asked for accordingly."""
         if self.streams is not None:
             self.streams.share.round_trip.measure(seconds)
 
-    # What the application sends
+    # Sending
 
     def open_channel(
         self, label: str, now: float, *, protocol: str = "", reliability: Reliability | None = None
     ) -> int:
-        """As `DataChannels.open`. Raises PeerNotReady as well."""
+        """Like `DataChannels.open`. Raises PeerNotReady as well."""
         self._now = now
         return self._need_channels().open(label, now, protocol=protocol, reliability=reliability)
 
     def send(self, channel: int, data: str | bytes, now: float) -> None:
-        """As `DataChannels.send`. Raises PeerNotReady as well."""
+        """Like `DataChannels.send`. Raises PeerNotReady as well."""
         self._now = now
         self._need_channels().send(channel, data, now)
 
     def open_negotiated_channel(
         self, channel: int, label: str, *, protocol: str = "", reliability: Reliability | None = None
     ) -> None:
-        """As `DataChannels.open_negotiated`. Raises PeerNotReady as well."""
+        """Like `DataChannels.open_negotiated`. Raises PeerNotReady as well."""
         self._need_channels().open_negotiated(channel, label, protocol=protocol, reliability=reliability)
 
     def has_waiting(self, channel: int) -> bool:
-        """As of `DataChannels`; False when there are none."""
+        """Like `DataChannels.has_waiting`; False without channels."""
         return self.channels is not None and self.channels.has_waiting(channel)
 
     def tell_when_empty(self, channel: int) -> None:
-        """As of `DataChannels`."""
+        """Like `DataChannels.tell_when_empty`; no effect without channels."""
         if self.channels is not None:
             self.channels.tell_when_empty(channel)
 
@@ -410,7 +416,8 @@ class Peer:
         values: Mapping[str, bytes] | None = None,
         captured_at: float | None = None,
     ) -> None:
-        """As `OutgoingStream.send`, in section `mid`. Raises PeerNotReady: it is not up, or we do not send there."""
+        """Like `OutgoingStream.send`. Raises PeerNotReady: it is not up, or this side sends nothing in section
+        `mid`."""
         self._now = now
         self._need_outgoing(mid).send(payloads, media_time, now, marker=marker, values=values, captured_at=captured_at)
         self._stir_media()
@@ -426,7 +433,7 @@ class Peer:
         values: Mapping[str, bytes] | None = None,
         captured_at: float | None = None,
     ) -> list[Datagram]:
-        """As `send_frame`, and what is due because of it: nothing else has to be drained. `timer` may be earlier."""
+        """Like `send_frame`, and return the datagrams due by that: nothing else to drain. `timer` may be earlier."""
         stream = self._need_outgoing(mid)
         self._now = now
         stream.send(payloads, media_time, now, marker=marker, values=values, captured_at=captured_at)
@@ -436,7 +443,7 @@ class Peer:
 
     @property
     def media_timer(self) -> float | None:
-        """When `handle_timer` is due for the sake of what we send."""
+        """The time at which `handle_timer` is due for the sake of outgoing media."""
         return None if self._ended else self._media_due
 
     def _drained(self, stream: OutgoingStream) -> list[bytes]:
@@ -454,11 +461,11 @@ class Peer:
         return stream
 
     def _stir_media(self) -> None:
-        """Streams may have something to send and to tell, and another timer."""
+        """Note that streams may have something to send and to tell, and another timer."""
         self._media_unsent = self._media_untold = self._media_untimed = True
 
     def holds_back(self, mid: str) -> bool:
-        """Whether packets of the stream that we send in section `mid` wait for its pacer. `PacketsLeft` follows."""
+        """True if packets of the outgoing stream in section `mid` wait for its pacer. `PacketsLeft` follows."""
         stream = self.streams.outgoing.get(mid) if self.streams is not None else None
         return stream is not None and stream.pacer is not None and stream.pacer.holds
 
@@ -468,19 +475,20 @@ class Peer:
             self.streams.share.bucket.limit(bitrate)
 
     def report_every(self, seconds: float) -> None:
-        """Send reports of what we send as often (RFC 3550 6.2). From the report after the next on."""
+        """Send sender reports every `seconds` (RFC 3550 6.2), from the report after the next on."""
         if self.streams is not None:
             for stream in self.streams.outgoing.values():
                 stream.reports.interval = seconds
 
     def request_keyframe(self, mid: str, now: float) -> None:
-        """Raises PeerNotReady: we do not receive in section `mid`."""
+        """Ask the peer for a keyframe. Raises PeerNotReady: this side does not receive in section `mid`."""
         self._now = now
         self._need_incoming(mid).request_keyframe(now)
         self._stir_media()
 
     def limit(self, mid: str, bitrate: int) -> None:
-        """Ask the peer to send at most so many bit/s in this section (REMB). Raises PeerNotReady likewise."""
+        """Ask the peer to send at most `bitrate` bit/s in this section (REMB). Raises PeerNotReady like
+        `request_keyframe`."""
         self._need_incoming(mid).limit = bitrate
 
     def _need_incoming(self, mid: str) -> IncomingStream:
@@ -491,7 +499,7 @@ class Peer:
 
     @property
     def dropped(self) -> Counter[str]:
-        """What came and was not used, by reason; not what ICE passes over as a matter of course."""
+        """Counts of unused input, by reason; without the input that ICE passes over as a matter of course."""
         dropped = self.counts - Counter(dtls_early=self.counts["dtls_early"])  # those were kept
         if self.streams is not None:
             dropped += self.streams.counts
@@ -500,7 +508,7 @@ class Peer:
         return dropped
 
     def close(self, now: float) -> None:
-        """Say goodbye in every protocol that has a word for it. Idempotent; drain `datagrams_to_send` once more."""
+        """Say goodbye in every protocol that has a message for it. Idempotent; drain `datagrams_to_send` once more."""
         if self._ended:
             return
         self._now = now
@@ -520,10 +528,10 @@ class Peer:
             raise PeerNotReady("there are no data channels")
         return self.channels
 
-    # What every core has
+    # The interface of every core
 
     def receive_datagram(self, data: bytes, path: Path, now: float) -> None:
-        """A datagram from the peer, as far as `ice.port.Port` can say, of any kind."""
+        """Take a datagram of any kind from the peer, as far as `ice.port.Port` can say."""
         self._now = now
         if self._ended:
             self.counts["ended"] += 1
@@ -568,7 +576,7 @@ class Peer:
 
     @property
     def has_events(self) -> bool:
-        """Whether sending has made some: `events` has more."""
+        """True if sending has made events: `events` has more."""
         return bool(self._events) or (self.channels is not None and self.channels.has_events)
 
     def events(self) -> list[PeerEvent]:
@@ -576,11 +584,11 @@ class Peer:
         events, self._events = self._events, []
         return events
 
-    # Inside: the way in
+    # Input
 
     def _receive_dtls(self, data: bytes, now: float) -> None:
         if self._dtls is None or self._dtls.state is DtlsState.NEW:
-            self._held.append(data)  # the peer's answer, or our own look at the path, is on its way
+            self._held.append(data)  # the peer's answer, or the path that ICE has found, is on its way
             self.counts["dtls_early"] += 1
         else:
             self._dtls.receive_datagram(data, now)
@@ -618,7 +626,7 @@ class Peer:
         self._tell()
 
     def _tell(self) -> None:
-        """What channels and streams have for the application; nothing after the end."""
+        """Hand out the events of channels and streams; nothing after the end."""
         if self._ended:
             return
         if self.channels is not None:
@@ -664,7 +672,7 @@ class Peer:
         self.ice.close()
         self._events.append(PeerEnded(reason, detail))
 
-    # Inside: the way out
+    # Output
 
     def _collect(self) -> None:
         """Take the due data from each core, the innermost first."""
@@ -676,7 +684,7 @@ class Peer:
             return
         if self.channels is not None and dtls.state is DtlsState.CONNECTED:
             for packet in self.channels.packets_to_send():
-                if dtls.state is DtlsState.CONNECTED:  # it may end with any of them
+                if dtls.state is DtlsState.CONNECTED:  # any of them may end it
                     dtls.send(packet, self._now)
         sent = dtls.datagrams_to_send()
         if self.streams is not None and self._protect is not None and self._media_unsent:
@@ -690,5 +698,5 @@ class Peer:
         for packet in packets:
             try:
                 yield protect(packet)
-            except SrtpPacketTooLong:  # header extensions of the application's, of hundreds of bytes
+            except SrtpPacketTooLong:  # the application's header extensions have hundreds of bytes
                 self.counts["packet_too_long"] += 1

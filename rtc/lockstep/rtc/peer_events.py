@@ -26,7 +26,7 @@ __all__ = [
 
 @dataclass(frozen=True, slots=True)
 class PathFound:
-    """Datagrams take this way from now on. None: a restart of ICE is to find another."""
+    """The path of datagrams from now on. None: a restart of ICE is to find another."""
 
     path: Path | None
 
@@ -53,14 +53,14 @@ class PlainRtp(NamedTuple):
 
 
 class PlainRtcp(NamedTuple):
-    """The same of a compound RTCP packet."""
+    """A compound RTCP packet, in the same way."""
 
     data: bytes
 
 
 @dataclass(frozen=True, slots=True)
 class MediaEvent:
-    """Something about the stream in section `mid`."""
+    """An event of the stream in section `mid`."""
 
     mid: str
     event: StreamEvent
@@ -70,8 +70,9 @@ class MediaEvent:
 class PeerEnded:
     """Nothing may be sent any more; the last event.
 
-    `reason` is a stable name: "closed" by us, "peer_closed", "no_path" and "consent_expired" of ICE, "dtls_protocol",
-    "dtls_fingerprint", "dtls_timeout", "dtls_too_much_handshake", "failed": serving it has raised what nothing expects.
+    `reason` is a stable name: "closed" by this side, "peer_closed", "no_path" and "consent_expired" of ICE,
+    "dtls_protocol", "dtls_fingerprint", "dtls_timeout", "dtls_too_much_handshake", "failed": serving the peer has
+    raised an unexpected exception.
     """
 
     reason: str

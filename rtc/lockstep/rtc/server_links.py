@@ -1,4 +1,4 @@
-"""Ways to STUN and TURN servers on asyncio: with `endpoint` and `udp_socket` the shells of this package."""
+"""Connections to STUN and TURN servers on asyncio: with `endpoint` and `udp_socket` the shells of this package."""
 
 import asyncio
 import secrets
@@ -40,7 +40,7 @@ class RelayLink(asyncio.Protocol, asyncio.DatagramProtocol):
             server.username or "", server.credential or "", secrets.token_bytes, reliable=self._reliable
         )
         self.counts: Counter[str] = self._core.counts
-        self.mapped: Address | None = None  # the own address, as the server sees it
+        self.mapped: Address | None = None  # the address of this side, as the server sees it
         self.answered: asyncio.Future[None] = self._loop.create_future()
         self._on_data = on_data
         self._stream = TurnStream()
@@ -64,7 +64,7 @@ class RelayLink(asyncio.Protocol, asyncio.DatagramProtocol):
         if not self.answered.done():
             self.answered.cancel()
 
-    # asyncio's side
+    # Callbacks of asyncio
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         self._transport = transport
@@ -135,8 +135,10 @@ class RelayLink(asyncio.Protocol, asyncio.DatagramProtocol):
 
 
 async def open_relay(uri: ServerUri, server: IceServer, on_data: Callable[[bytes, Path], None]) -> RelayLink:
-    """An address on a TURN server. `on_data` gets the datagrams that arrive there, with their path. Raises:
-    RelayRefused: the server refuses, or does not answer.
+    """Return an address on a TURN server. `on_data` gets the datagrams that arrive there, with their path.
+
+    Raises:
+        RelayRefused: the server refuses, or does not answer.
         OSError: it cannot be reached.
     """
     loop = asyncio.get_running_loop()

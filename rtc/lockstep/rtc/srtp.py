@@ -42,7 +42,7 @@ PROFILES = (  # the strongest first
 
 @cache
 def available_profiles() -> tuple[SrtpProfile, ...]:
-    """Those of PROFILES that libsrtp was built with: AES-GCM needs OpenSSL in it."""
+    """Return those of PROFILES that libsrtp was built with: AES-GCM needs OpenSSL in it."""
     return tuple(profile for profile in PROFILES if _is_available(profile))
 
 
@@ -56,15 +56,15 @@ def _is_available(profile: SrtpProfile) -> bool:
 
 @dataclass(frozen=True, slots=True)
 class SrtpKeys:
-    """What a DTLS handshake gives: master key and salt of each direction."""
+    """The keys from a DTLS handshake: master key and salt of each direction."""
 
     profile: SrtpProfile
-    local: bytes = field(repr=False)  # for what we send
+    local: bytes = field(repr=False)  # for outgoing packets
     remote: bytes = field(repr=False)  # for the peer's packets
 
     @classmethod
     def split(cls, profile: SrtpProfile, material: bytes, is_client: bool) -> "SrtpKeys":
-        """From what TLS exported (RFC 5764 4.2): keys of client and server, then their salts."""
+        """Split the key material that TLS exported (RFC 5764 4.2): keys of client and server, then their salts."""
         key, salt = profile.key_length, profile.salt_length
         client = material[:key] + material[2 * key : 2 * key + salt]
         server = material[key : 2 * key] + material[2 * key + salt : 2 * (key + salt)]
@@ -72,7 +72,7 @@ class SrtpKeys:
 
 
 class SrtpPacketTooLong(ValueError):
-    """A packet of more than MAX_PACKET bytes was to be sent."""
+    """A packet to be sent has more than MAX_PACKET bytes."""
 
     def __init__(self, length: int) -> None:
         self.length = length
@@ -82,19 +82,19 @@ class SrtpPacketTooLong(ValueError):
 
 
 class SrtpSender:
-    """Encrypts what we send."""
+    """Encrypts outgoing packets."""
 
     def __init__(self, keys: SrtpKeys) -> None:
         self._session = _session(keys.profile, keys.local, Policy.SSRC_ANY_OUTBOUND)
 
     def protect(self, packet: bytes) -> bytes:
-        """The RTP packet, encrypted. Raises SrtpPacketTooLong."""
+        """Return the RTP packet, encrypted. Raises SrtpPacketTooLong."""
         if len(packet) > MAX_PACKET:
             raise SrtpPacketTooLong(len(packet))
         return self._session.protect(packet)
 
     def protect_rtcp(self, packet: bytes) -> bytes:
-        """The compound RTCP packet, encrypted. Raises SrtpPacketTooLong."""
+        """Return the compound RTCP packet, encrypted. Raises SrtpPacketTooLong."""
         if len(packet) > MAX_PACKET - 4:  # of the index (RFC 3711 3.4)
             raise SrtpPacketTooLong(len(packet))
         return self._session.protect_rtcp(packet)
@@ -113,11 +113,11 @@ class SrtpReceiver:
         self.counts: Counter[str] = Counter()
 
     def unprotect(self, packet: bytes) -> bytes | None:
-        """The RTP packet; None when it was dropped."""
+        """Return the decrypted RTP packet; None when it was dropped."""
         return self._take(packet, 8, self._session.unprotect)
 
     def unprotect_rtcp(self, packet: bytes) -> bytes | None:
-        """The compound RTCP packet; None when it was dropped."""
+        """Return the decrypted compound RTCP packet; None when it was dropped."""
         return self._take(packet, 4, self._session.unprotect_rtcp)
 
     def _take(self, packet: bytes, ssrc_at: int, unprotect: Callable[[bytes], bytes]) -> bytes | None:

@@ -1,7 +1,7 @@
 """STUN messages (RFC 8489) with the attributes that ICE needs (RFC 8445 16.1), and short-term credentials.
 
-`parse` takes bytes of any sender and raises only `StunError`. Whether a message is authentic is another question:
-ask `is_authentic` with the password before trusting its content.
+`parse` takes bytes of any sender and raises only `StunError`. It does not tell if a message is authentic: ask
+`is_authentic` with the password before trusting its content.
 """
 
 import hmac
@@ -64,7 +64,7 @@ FINGERPRINT_MASK = 0x5354554E  # RFC 8489 14.7
 
 
 class StunError(ValueError):
-    """These bytes are no STUN message, or values that no STUN message can hold."""
+    """The bytes are not a STUN message, or a value does not fit into one."""
 
 
 class Kind(IntEnum):
@@ -103,9 +103,10 @@ class Message:
 
 
 def parse(data: bytes) -> Message:
-    """
+    """Return the message in `data`.
+
     Raises:
-        StunError: too long or short, not STUN, a false fingerprint, or an attribute of a form that it cannot have.
+        StunError: too long or short, not STUN, a false fingerprint, or an attribute of an impossible form.
     """
     values = read_attributes(data)
     kind_and_method, _, _, transaction = HEADER.unpack_from(data)
@@ -127,7 +128,7 @@ def parse(data: bytes) -> Message:
 
 
 def read_attributes(data: bytes, most: int = MAX_MESSAGE) -> dict[int, bytes]:
-    """The attributes of a message of at most `most` bytes, by their type; of several of one type the first.
+    """Return the attributes of a message of at most `most` bytes, by their type; of several of one type the first.
 
     Raises:
         StunError: too long or short, not STUN, or a false fingerprint.
@@ -141,7 +142,7 @@ def read_attributes(data: bytes, most: int = MAX_MESSAGE) -> dict[int, bytes]:
 
 
 def serialize(message: Message, password: str | None = None) -> bytes:
-    """The message with MESSAGE-INTEGRITY if there is a password, and with FINGERPRINT always (RFC 8445 7.1).
+    """Return the message with MESSAGE-INTEGRITY if there is a password, and with FINGERPRINT always (RFC 8445 7.1).
 
     Raises:
         StunError: a value of the message does not fit its attribute.
@@ -153,7 +154,7 @@ def serialize(message: Message, password: str | None = None) -> bytes:
 def pack(
     kind: Kind, method: int, transaction: bytes, attributes: Iterable[tuple[int, bytes]], key: bytes | None = None
 ) -> bytes:
-    """A message of any attributes; MESSAGE-INTEGRITY and FINGERPRINT are as `serialize` has them.
+    """Return a message of any attributes; MESSAGE-INTEGRITY and FINGERPRINT are as in `serialize`.
 
     Raises:
         StunError: a transaction or method that fits no header, or more than MAX_MESSAGE bytes.
@@ -170,9 +171,9 @@ def pack(
 
 
 def is_authentic(data: bytes, password: str | bytes) -> bool:
-    """Whether `data`, which `parse` has accepted, has a MESSAGE-INTEGRITY of this password (RFC 8489 14.5).
+    """True if `data`, which `parse` has accepted, has a MESSAGE-INTEGRITY of this password (RFC 8489 14.5).
 
-    As bytes it is the key of a long-term credential (RFC 8489 9.2.2).
+    A password of bytes is the key of a long-term credential (RFC 8489 9.2.2).
     """
     secret = password.encode() if isinstance(password, str) else password
     for kind, start, length in _attributes(data):
@@ -185,16 +186,15 @@ def is_authentic(data: bytes, password: str | bytes) -> bool:
 
 
 def transaction_of(data: bytes) -> tuple[Kind, bytes] | None:
-    """The class and transaction of a datagram that may be STUN, without a further check; None if it cannot be STUN."""
+    """Return the class and transaction of a datagram that may be STUN, without a further check; None if it cannot."""
     if len(data) < HEADER.size or data[0] & 0xC0 or data[4:8] != b"\x21\x12\xa4\x42":
         return None
     return Kind(int.from_bytes(data[:2]) & 0x110), bytes(data[8:20])
 
 
 def username_of(data: bytes) -> str | None:
-    """The USERNAME of a datagram that may be a request, without parsing the rest: cheap for sorting many datagrams.
-    None without a USERNAME, or when malformed.
-    """
+    """Return the USERNAME of a datagram that may be a request, without parsing the rest: cheap for sorting many
+    datagrams. None without a USERNAME, or when malformed."""
     position, end = HEADER.size, min(len(data), MAX_MESSAGE)
     for _ in range(MAX_ATTRIBUTES):
         if position + ATTRIBUTE.size > end:
@@ -211,7 +211,7 @@ def username_of(data: bytes) -> str | None:
 
 
 def _attributes(data: bytes, most: int = MAX_MESSAGE) -> list[tuple[int, int, int]]:
-    """Type, where the value begins, and its length, of every attribute."""
+    """Return the type of every attribute, the place where its value begins, and the value's length."""
     if not HEADER.size <= len(data) <= most:
         raise StunError(f"not between 20 and {most} bytes")
     kind_and_method, length, cookie, _ = HEADER.unpack_from(data)
@@ -243,7 +243,7 @@ def _check_fingerprint(data: bytes, start: int, length: int) -> None:
 
 
 def _method(kind_and_method: int) -> int:
-    """RFC 8489 5, figure 3: the bits of the class stand between those of the method."""
+    """Return the method: the bits of the class stand between those of the method (RFC 8489 5, figure 3)."""
     return kind_and_method & 0xF | (kind_and_method & 0xE0) >> 1 | (kind_and_method & 0x3E00) >> 2
 
 
@@ -284,7 +284,7 @@ def _numbers(value: bytes) -> tuple[int, ...]:
 
 
 def parse_error_code(value: bytes | None) -> StunErrorCode | None:
-    """The value of ERROR-CODE, which may be absent. Raises StunError."""
+    """Return the value of ERROR-CODE, which may be absent. Raises StunError."""
     if value is None:
         return None
     if len(value) < 4 or not 3 <= value[2] & 7 <= 6 or value[3] > 99:
@@ -293,7 +293,7 @@ def parse_error_code(value: bytes | None) -> StunErrorCode | None:
 
 
 def parse_address(value: bytes | None, transaction: bytes) -> Address | None:
-    """The value of an attribute in the form of XOR-MAPPED-ADDRESS, which may be absent. Raises StunError."""
+    """Return the value of an attribute in the form of XOR-MAPPED-ADDRESS, which may be absent. Raises StunError."""
     if value is None:
         return None
     if (len(value), value[1:2]) not in ((8, b"\x01"), (20, b"\x02")):
@@ -346,7 +346,7 @@ def _fixed(number: int, length: int) -> bytes:
 
 
 def pack_address(address: Address, transaction: bytes) -> bytes:
-    """The other way round. Raises StunError."""
+    """Return an address in the form of XOR-MAPPED-ADDRESS. Raises StunError."""
     try:
         host = ipaddress.ip_address(address[0]).packed
     except ValueError as error:

@@ -1,7 +1,7 @@
-"""TCP connections that peers open to us (RFC 6544, passive): the shell for networks that let no UDP out.
+"""TCP connections that peers open to this machine (RFC 6544, passive): the shell for networks that let no UDP out.
 
-A connection is a path as any other: datagrams in frames (RFC 4571 2), checked by ICE. Until a check on it is authentic
-it is a stranger's: they are few at a time, each has a few seconds, and the oldest gives way to the next.
+A connection is a path like any other: datagrams in frames (RFC 4571 2), checked by ICE. Until a check on it is
+authentic it belongs to a stranger: few at a time, each for a few seconds, and the oldest gives way to the next.
 """
 
 import asyncio
@@ -20,7 +20,7 @@ from lockstep.rtc.ice.token_bucket import TokenBuckets
 __all__ = ["TcpPort", "TcpPortSettings"]
 
 BACKLOG = 128
-PAUSE = 0.1  # s, when the system has no descriptor left, or too many connect
+PAUSE = 0.1  # s; the pause when the system has no descriptor left, or too many connect
 TCP_NOTSENT_LOWAT = getattr(socket, "TCP_NOTSENT_LOWAT", 25)  # linux/tcp.h; Python does not name it everywhere
 KERNEL_UNSENT = 32 * 1024  # bytes; further data waits here, where it is counted and bounded
 
@@ -37,7 +37,7 @@ class TcpPortSettings:
 
 
 class TcpPort:
-    """`counts` has dropped and refused ones, by reason."""
+    """Accepts TCP connections of peers. `counts` has dropped datagrams and refused connections, by reason."""
 
     def __init__(
         self,
@@ -46,11 +46,12 @@ class TcpPort:
         is_used: Callable[[Path], bool],
         settings: TcpPortSettings | None = None,
     ) -> None:
-        """
+        """Prepare to listen; `bind` does so.
+
         Args:
-            receive: gets the datagrams that came together.
-            closed: the connection of this path has ended.
-            is_used: whether a session has heard its peer on this path.
+            receive: called with the datagrams that came together, and their path.
+            closed: called when the connection of a path has ended.
+            is_used: returns True if a session has heard its peer on a path.
         """
         self.settings = settings or TcpPortSettings()
         self.counts: Counter[str] = Counter()
@@ -73,7 +74,7 @@ class TcpPort:
         self._loop.add_reader(listener, self._accept, listener)
 
     def send(self, datagram: Datagram, *, urgent: bool) -> None:
-        """Dropped and counted where the connection has ended, or too much waits for it."""
+        """Send a datagram; drop and count it where the connection has ended, or too much waits for it."""
         found = self._connections.get(datagram.path)
         if found is None:
             self.counts["no_connection"] += 1
@@ -81,12 +82,12 @@ class TcpPort:
             self.counts["backlog"] += 1
 
     def unsent(self, path: Path) -> int:
-        """Bytes that wait for the network on this path."""
+        """Return the number of bytes that wait for the network on this path."""
         found = self._connections.get(path)
         return 0 if found is None else found.unsent
 
     def close(self) -> None:
-        """What was sent still leaves. Idempotent."""
+        """Close all connections; data that were sent still leave. Idempotent."""
         for listener in self._listeners.values():
             self._loop.remove_reader(listener)
             listener.close()
@@ -155,7 +156,7 @@ class TcpPort:
 
 
 def _close_if_cancelled(connection: socket.socket, task: asyncio.Task[object]) -> None:
-    """Also where the task was cancelled before its first step."""
+    """Close the connection of a cancelled task, also where it was cancelled before its first step."""
     if task.cancelled():
         connection.close()
 
@@ -173,7 +174,7 @@ class _TcpPath(asyncio.Protocol):
         self._look: asyncio.TimerHandle | None = None
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        self._transport = cast(asyncio.Transport, transport)  # no instance of it with uvloop
+        self._transport = cast(asyncio.Transport, transport)  # uvloop's is not an instance of it
         local, remote = (transport.get_extra_info(name)[:2] for name in ("sockname", "peername"))
         self.path = Path(local, remote, "tcp")
         self._look_later()
@@ -197,7 +198,7 @@ class _TcpPath(asyncio.Protocol):
         return self._transport.get_write_buffer_size()
 
     def send(self, data: bytes, most: int) -> bool:
-        """False: too much waits."""
+        """Send a datagram. Return False if too much waits."""
         if self.unsent > most:
             return False
         self._transport.write(frame(data))
@@ -205,7 +206,7 @@ class _TcpPath(asyncio.Protocol):
 
     def close(self) -> None:
         self._transport.close()
-        self._loop.call_later(self._port.settings.patience, self._transport.abort)  # of who does not read
+        self._loop.call_later(self._port.settings.patience, self._transport.abort)  # for a peer that does not read
 
     def abort(self) -> None:
         self._transport.abort()

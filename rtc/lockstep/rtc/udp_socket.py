@@ -1,6 +1,6 @@
 """One UDP socket that does not block: answers leave from the address that was asked, and frames leave in one call.
 
-The shell around the cores; it decides nothing but the order: urgent datagrams leave before others.
+It is part of the shell around the cores, and decides nothing but the order: urgent datagrams leave before others.
 
 Where the kernel has UDP_SEGMENT (Linux 4.18), datagrams of one size to one address leave as one message that the kernel
 cuts: a quarter of the time for each. `sendmmsg` on top of that saves nothing, and `recvmmsg` 5 to 30 % of what little
@@ -31,7 +31,7 @@ BUFFER_BYTES = 1 << 21  # of the kernel, each way: pictures for hundreds of peer
 SOL_UDP, UDP_SEGMENT = 17, 103  # linux/udp.h; `socket` names neither
 IP_PKTINFO = getattr(socket, "IP_PKTINFO", 8)  # Python 3.11 does not name it
 FULL = (errno.EAGAIN, errno.EWOULDBLOCK, errno.ENOBUFS)
-UNCUT = (errno.EINVAL, errno.EIO, errno.EMSGSIZE)  # the way out cannot cut, or its MTU has become smaller
+UNCUT = (errno.EINVAL, errno.EIO, errno.EMSGSIZE)  # the interface cannot cut, or its MTU has become smaller
 
 Key = TypeVar("Key")
 Value = TypeVar("Value")
@@ -64,13 +64,14 @@ class UdpSocket:
         self._any_address = host in ("0.0.0.0", "::") and _tells_local_addresses(sock)
         self._segments = segments and _supports_segments(sock)
         self.is_full = False  # the kernel took no more, and has not since
-        self._alone = 0  # so many of the next leave uncombined: the kernel has refused to cut them
+        self._alone = 0  # number of the next datagrams that leave uncombined: the kernel has refused to cut them
         self._paths: dict[tuple[object, bytes], Path] = {}  # by sender and packet information
         self._origins: dict[str, list[Ancillary]] = {}  # by the address to leave from
 
     @classmethod
     def bind(cls, host: str, port: int, *, segments: bool = True) -> Self:
-        """
+        """Open a socket.
+
         Args:
             host: An IP address; `0.0.0.0` and `::` are all of their version.
             port: 0: any that is free.
@@ -98,10 +99,10 @@ class UdpSocket:
         self._urgent.clear()
         self._others.clear()
 
-    # In
+    # Input
 
     def receive(self) -> list[tuple[bytes, Path]]:
-        """What has come, at most `MAX_BATCH`. Errors of the socket are counted."""
+        """Return the datagrams that have come, at most `MAX_BATCH`. Errors of the socket are counted."""
         received: list[tuple[bytes, Path]] = []
         while len(received) < MAX_BATCH:
             try:
@@ -120,7 +121,7 @@ class UdpSocket:
         return received
 
     def _local(self, information: bytes) -> Address:
-        """What in_pktinfo or in6_pktinfo says a datagram came to."""
+        """Return the address that a datagram came to, from in_pktinfo or in6_pktinfo."""
         host, port = self.address
         if self._socket.family == socket.AF_INET and len(information) == 12:
             host = socket.inet_ntoa(information[8:])
@@ -128,11 +129,11 @@ class UdpSocket:
             host = socket.inet_ntop(socket.AF_INET6, information[:16])
         return host, port
 
-    # Out
+    # Output
 
     @property
     def wants_write(self) -> bool:
-        """Whether something waits until the kernel has room."""
+        """True if something waits until the kernel has room."""
         return bool(self._urgent or self._others)
 
     def queue(self, datagrams: Iterable[Datagram], *, urgent: bool = False) -> None:
@@ -148,7 +149,7 @@ class UdpSocket:
             pass
 
     def _next_message(self) -> Message:
-        """The next datagram, and others that can leave with it."""
+        """Return the next datagram, and others that can leave with it."""
         waiting = chain(self._urgent, self._others)
         first = next(waiting)
         message = Message([first.data], first.path)
@@ -166,7 +167,7 @@ class UdpSocket:
         return message
 
     def _send(self, message: Message) -> bool:
-        """False: the kernel takes no more."""
+        """Send a message. Return False if the kernel takes no more."""
         datagrams, path = message
         try:
             ancillary = self._origin(path.local[0])
@@ -192,10 +193,10 @@ class UdpSocket:
         return True
 
     def _origin(self, host: str) -> list[Ancillary]:
-        """The packet information that makes a datagram leave from that local address.
+        """Return the packet information that makes a datagram leave from that local address.
 
         Raises:
-            OSError: no IP address of this socket's version.
+            OSError: not an IP address of this socket's version.
         """
         if not self._any_address or host == self.address[0]:
             return []
@@ -216,14 +217,14 @@ class UdpSocket:
 
 
 def _address(sender: tuple[str, int] | tuple[str, int, int, int]) -> Address:
-    """Of IPv6 with the zone, without which a link-local address means nothing."""
+    """Return the address; for IPv6 with the zone, without which a link-local address means nothing."""
     host, port = sender[:2]
     zone = sender[3] if len(sender) == 4 else 0
     return (f"{host}%{zone}" if zone and "%" not in host else host), port
 
 
 def _tells_local_addresses(sock: socket.socket) -> bool:
-    """Ask the kernel for the local address at which each datagram arrived."""
+    """Ask the kernel for the local address at which each datagram arrived. Return False if it has no such option."""
     try:
         if sock.family == socket.AF_INET:
             sock.setsockopt(socket.IPPROTO_IP, IP_PKTINFO, 1)

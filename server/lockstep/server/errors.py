@@ -1,14 +1,14 @@
-"""What can go wrong between the console and those who use it.
+"""Errors between the console and its clients.
 
 ConsoleError
-├── AccessError             who are you
+├── AccessError             the client is unknown, or may not do this
 │   ├── TokenMissing
-│   ├── TokenInvalid        wrong signature, malformed: never said which
-│   ├── LinkExpired         our own signature, too old
-│   ├── LinkOtherRobot      our own signature, good for other robots of the fleet
-│   ├── LinkRevoked         our own signature, called back
-│   ├── NoSeat              only the holder of the control seat may
-│   ├── NotAllowed          the role does not permit it
+│   ├── TokenInvalid        wrong signature or malformed: the answer never says which
+│   ├── LinkExpired         signed by this console, too old
+│   ├── LinkOtherRobot      signed by this console, for other robots of the fleet
+│   ├── LinkRevoked         signed by this console, revoked
+│   ├── NoSeat              only the holder of the control seat may do this
+│   ├── NotAllowed          the role does not permit this
 │   ├── Silenced            a supervisor has silenced the stops of this link
 │   └── OriginRefused       a page of another site
 ├── RequestError            the request is not understood
@@ -21,19 +21,19 @@ ConsoleError
 │   ├── BadSdpFragment
 │   ├── BodyTooLarge
 │   ├── BodyTooSlow
-│   ├── CameraTaken         somebody publishes it
-│   ├── HostRefused         a host name that is not ours
+│   ├── CameraTaken         another client publishes it
+│   ├── HostRefused         a host name that is not the console's
 │   ├── LockedOut           a reset while somebody at the robot keeps it from being driven
-│   ├── NotAcceptable       an offer of which nothing can be taken
+│   ├── NotAcceptable       an offer without anything that the console accepts
 │   ├── NotConnected
 │   ├── NotFound
 │   ├── PreconditionFailed
 │   ├── TooManyInvitations
 │   ├── PreconditionRequired
-│   ├── RecordingUnreadable  what is asked for is damaged, and stays so
+│   ├── RecordingUnreadable  the recording is damaged for good
 │   ├── ResetTooSoon        a reset right after the stop that it names
-│   ├── PressUsed           the stop of this press was reset since
-│   ├── TooFewSections      fewer media sections than streams, of a peer that wants them all
+│   ├── PressUsed           the stop of this press has been reset
+│   ├── TooFewSections      fewer media sections than streams, and the peer wants all of them
 │   ├── StaleReset          a reset that does not name the newest stop
 │   ├── TooManyRequests
 │   └── WrongMediaType
@@ -43,15 +43,15 @@ ConsoleError
 │   ├── Flood
 │   ├── MalformedMessage
 │   ├── MessageTooLarge
-│   ├── TransportRefused    below the channels; each has its own name
+│   ├── TransportRefused    an error below the channels; each has its own name
 │   ├── UnknownChannel
 │   └── WrongChannel
-├── InternalFault           the console failed, not the one who asks
-└── Unavailable             right now it cannot be done
+├── InternalFault           the console failed, not the client
+└── Unavailable             the console cannot do this right now
     ├── LinkDown
-    ├── RecordingFailed     the disk, or what is on it
-    ├── ResetNotKept        the robot's disk does not take it
-    ├── RobotFailed         this console's session of the robot, which is started again
+    ├── RecordingFailed     the disk failed, or a file on it is damaged
+    ├── ResetNotKept        the robot's disk does not store the reset
+    ├── RobotFailed         the console's session of the robot failed and restarts
     ├── RobotUnreachable
     ├── SceneUnavailable
     ├── ShuttingDown
@@ -131,7 +131,7 @@ class ConsoleError(Exception):
     """Base of all named errors of the console.
 
     Attributes:
-        detail: what exactly was wrong, for a person; the name is in `HTTP_ERRORS`, or `ChannelError.name`
+        detail: the exact error, for a person; the name is in `HTTP_ERRORS`, or `ChannelError.name`
     """
 
     def __init__(self, detail: str = "") -> None:
@@ -284,7 +284,7 @@ class WrongMediaType(RequestError):
 
 
 class ChannelError(ConsoleError):
-    """`name` is what /metrics counts."""
+    """An error on a data channel; /metrics counts them by `name`."""
 
     name = "channel"
 
@@ -374,7 +374,7 @@ class Unconfirmed(Unavailable):
 
 
 class HttpError(NamedTuple):
-    """How an error looks over HTTP."""
+    """An error as HTTP sends it."""
 
     status: int
     name: str
@@ -431,5 +431,5 @@ HTTP_ERRORS: dict[type[ConsoleError], HttpError] = {
 
 
 def http_error(error: ConsoleError) -> HttpError:
-    """The entry for `error`; every error that HTTP can raise has one."""
+    """Return the HTTP form of `error`; every error that HTTP can raise has one."""
     return HTTP_ERRORS[type(error)]

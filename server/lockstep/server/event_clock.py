@@ -1,4 +1,4 @@
-"""The event clock: which event reference holds, by what the bridge says. No I/O."""
+"""The event clock: tracks the event reference by the bridge's feedback. No I/O."""
 
 from collections import deque
 from typing import NamedTuple
@@ -8,11 +8,11 @@ from lockstep.protocol.serial import FIRST_EVENT, event_gap
 
 __all__ = ["EventClock"]
 
-HISTORY = 1024  # changes remembered; at 25 events/s that is 40 s, longer than any medium takes to come
+HISTORY = 1024  # changes remembered; at 25 events/s that is 40 s, longer than any medium takes to arrive
 
 
 class Change(NamedTuple):
-    """From `time` on, `event` held."""
+    """A change of the event reference: from `time` on, `event` held."""
 
     time: float
     event: EventReference
@@ -24,7 +24,7 @@ class EventClock:
     def __init__(self) -> None:
         self.epoch = ""
         self.feedback: Feedback | None = None  # newest of this epoch; None before the first
-        self.heard_at = 0.0  # when it came
+        self.heard_at = 0.0  # arrival of `feedback`
         self._changes: deque[Change] = deque(maxlen=HISTORY)
 
     @property
@@ -37,11 +37,11 @@ class EventClock:
 
     @property
     def moving(self) -> bool:
-        """Whether the robot was not at rest when it was last measured."""
+        """True if the robot was not at rest at its last measurement."""
         return self.feedback is not None and not self.feedback.at_rest
 
     def begin(self, epoch: str) -> bool:
-        """The bridge said which epoch it lives in. True when it is another one: everything starts anew."""
+        """Take the bridge's epoch. Return True if it is a new one: everything starts anew."""
         if epoch == self.epoch:
             return False
         self.epoch = epoch
@@ -50,7 +50,7 @@ class EventClock:
         return True
 
     def observe(self, feedback: Feedback, now: float) -> bool:
-        """Take a feedback. False when it is older than what is known, and then nothing changes."""
+        """Take a feedback. Return False if it is older than the known one; then nothing changes."""
         if self.feedback is not None:
             gap = event_gap(feedback.event, self.feedback.event)
             if gap < 0 or (gap == 0 and feedback.issue <= self.feedback.issue):
@@ -61,9 +61,9 @@ class EventClock:
         return True
 
     def reference_at(self, time: float) -> EventReference | None:
-        """The reference that held at `time`: the stamp for a medium captured here. None when too long ago.
+        """Return the reference that held at `time`: the stamp for a medium captured here. None if that is too long ago.
 
-        A change counts from when its feedback came, which is later than it happened: never newer than the truth.
+        A change counts from the arrival of its feedback, later than it happened: a stamp is never newer than the truth.
         """
         for change in reversed(self._changes):
             if change.time <= time:

@@ -28,40 +28,40 @@ MIN_SECRET_BYTES = 32  # RFC 7518 3.2: an HS256 key is at least as long as the h
 
 
 class Settings(NetworkSettings, LimitSettings, SourceSettings, RelaySettings, FleetSettings, BoardSettings):
-    """All that can be set. Times in seconds."""
+    """All settings of the console. Times are in seconds."""
 
     model_config = SettingsConfigDict(env_prefix="LOCKSTEP_", env_nested_delimiter="__", frozen=True, extra="ignore")
 
     host: str = "127.0.0.1"  # address that HTTP listens on
     port: Annotated[int, Field(ge=0, le=65535)] = 8000  # 0: any free port
     robot: str = "tcp://127.0.0.1:5600"  # the robot bridge; tls://host:port where it speaks TLS
-    link_secret: SecretStr | None = None  # that the bridge asks for
-    link_secret_file: Path | None = None  # the same, in a file; comes first
-    link_tls_cert: Path | None = None  # shown to a bridge that asks for a certificate
+    link_secret: SecretStr | None = None  # the secret that the bridge asks for
+    link_secret_file: Path | None = None  # file with the link secret; takes precedence
+    link_tls_cert: Path | None = None  # client certificate, for a bridge that asks for one
     link_tls_key: Path | None = None
-    link_tls_ca: Path | None = None  # signed the bridge's certificate; None: one that this machine trusts
-    ice_hosts: NameList = ()  # of this machine, for media; empty: all interfaces, and loopback when bound to it
+    link_tls_ca: Path | None = None  # CA of the bridge's certificate; None: the CAs that this machine trusts
+    ice_hosts: NameList = ()  # addresses of this machine for media; empty: all interfaces, and loopback if bound to it
     advertise: NameList = ()  # outer addresses of this machine, where it is behind a one-to-one NAT
     media_port: Annotated[int, Field(ge=0, le=65535)] = 0  # UDP, for the media of all peers; 0: any free port
-    media_tcp: bool = False  # peers may come to the same port by TCP too (RFC 6544)
+    media_tcp: bool = False  # peers may also connect to the media port by TCP (RFC 6544)
     allowed_origins: NameList = ()  # other origins whose pages may use the HTTP API, "https://example.org"
     log_format: LogFormat = LogFormat.TEXT
     state_dir: Path | None = None  # signing key, invitations, audit log; None: ~/.local/state/lockstep
-    secret: SecretStr | None = None  # signs the links; None: a key in the state directory
+    secret: SecretStr | None = None  # key that signs the links; None: a key in the state directory
     token_seconds: Annotated[float, Field(gt=0)] = 7 * 24 * 3600.0
 
     observer_feedback_hz: Annotated[float, Field(gt=0, le=100)] = 12.5
-    audit_bytes: Annotated[int, Field(ge=4096)] = 10_000_000  # of one file of the audit log
-    audit_files: Annotated[int, Field(ge=1, le=1000)] = 10  # then the oldest goes
+    audit_bytes: Annotated[int, Field(ge=4096)] = 10_000_000  # size of one file of the audit log
+    audit_files: Annotated[int, Field(ge=1, le=1000)] = 10  # files that are kept; then the oldest is deleted
     audit_anchor: Path | None = None  # folder or file for signed heads of the audit; None: beside the recordings
-    seat_timeout: Annotated[float, Field(gt=0)] = 3.0  # of silence, then the seat is free and the robot rests
-    seat_idle_seconds: Annotated[float, Field(gt=0)] = 300.0  # without an intention to move, then the seat is free
+    seat_timeout: Annotated[float, Field(gt=0)] = 3.0  # silence until the seat is free and the robot rests
+    seat_idle_seconds: Annotated[float, Field(gt=0)] = 300.0  # idle time (no intention to move) until the seat is free
     seat_claim_seconds: Annotated[float, Field(gt=0)] = 60.0  # until a claim on the seat counts as declined
-    speed_cap: SpeedCapMode = "operator"  # whether the speed is capped by the delay of what the operator sees
-    peer_silence: Annotated[float, Field(gt=0)] = 20.0  # a peer with data channels that says nothing is closed
+    speed_cap: SpeedCapMode = "operator"  # cap on the speed by the delay of the operator's view
+    peer_silence: Annotated[float, Field(gt=0)] = 20.0  # silence until a peer with data channels is closed
     peer_connect_timeout: Annotated[float, Field(gt=0)] = 40.0  # from the answer to the connection
     max_peers: Annotated[int, Field(ge=1)] = 200
-    max_message_rate: Annotated[float, Field(gt=0)] = 200.0  # Hz a peer; stop is never limited
+    max_message_rate: Annotated[float, Field(gt=0)] = 200.0  # Hz per peer; a stop is never limited
     max_sdp_bytes: Annotated[int, Field(ge=1024)] = 64 * 1024
     link_backoff: Annotated[float, Field(gt=0)] = 0.1  # first wait before the robot link is tried again
     link_backoff_cap: Annotated[float, Field(gt=0)] = 2.0
@@ -77,7 +77,7 @@ class Settings(NetworkSettings, LimitSettings, SourceSettings, RelaySettings, Fl
     @model_validator(mode="before")
     @classmethod
     def _robot_with_a_name(cls, given: dict[str, object]) -> dict[str, object]:
-        """LOCKSTEP_ROBOT takes what the flag --robot takes: NAME=address is a robot of a fleet."""
+        """Accept the values of the flag --robot in LOCKSTEP_ROBOT: NAME=address is a robot of a fleet."""
         robot = given.get("robot")
         if isinstance(robot, str) and is_named(robot):
             rest = {name: value for name, value in given.items() if name != "robot"}

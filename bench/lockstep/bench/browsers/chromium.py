@@ -1,4 +1,4 @@
-"""Chromium for a test, through Playwright; always the system's own browser with a profile of its own."""
+"""Chromium for a test, through Playwright; always the system's own browser with a new profile."""
 
 import asyncio
 import shutil
@@ -43,8 +43,8 @@ FLAGS = [
 ]
 
 
-ASKED_SECONDS = 5.0  # the page's wait for one answer
-ANSWER_SECONDS = 15.0  # for it to come
+ASKED_SECONDS = 5.0  # in the page, for one answer
+ANSWER_SECONDS = 15.0  # for the answer to come
 
 
 def chromium_program() -> Path:
@@ -58,9 +58,9 @@ def chromium_program() -> Path:
 async def running_chromium(
     environment: dict[str, str] | None = None, flags: Sequence[str] = (), *, executable: Path | None = None
 ) -> AsyncIterator[Browser]:
-    """A headless Chromium, closed on leaving. It makes sound, which Playwright would otherwise mute.
+    """Start a headless Chromium; close it on leaving. It makes sound, which Playwright would otherwise mute.
 
-    `executable`: a program that runs it, as one that enters a network namespace first; None: itself.
+    `executable`: a program that runs it, such as one that first enters a network namespace; None: Chromium itself.
     """
     executable = executable or chromium_program()
     async with async_playwright() as playwright:
@@ -80,7 +80,7 @@ async def running_chromium(
 async def open_page(
     browser: Browser, link: str, *, width: int = 1280, height: int = 800, pad: bool = False, touch: bool = False
 ) -> AsyncIterator[Page]:
-    """A page of its own context on `link`; uncaught errors of the page fail the test on leaving."""
+    """Open `link` in a page with its own context; uncaught errors of the page fail the test on leaving."""
     context: BrowserContext = await browser.new_context(viewport={"width": width, "height": height}, has_touch=touch)
     try:
         if pad:
@@ -97,8 +97,9 @@ async def open_page(
 
 
 async def missed_in_page(page: Page, script: str, seconds: float) -> str | None:
-    """The last value of `script`, a function of milliseconds, while it waits; None once its wait is over. It is asked
-    again every few seconds: an answer is lost where the page turns to another document meanwhile.
+    """Wait with `script`, a function of milliseconds; return its last value, or None once its wait is over.
+
+    It is asked again every few seconds: an answer is lost if the page turns to another document meanwhile.
     """
     end = time.monotonic() + seconds
     while True:

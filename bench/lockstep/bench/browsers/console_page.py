@@ -1,4 +1,4 @@
-"""The page as its user handles it, and its statistics, for tests in Chromium."""
+"""Handles the page as its user does, and reads its statistics, for tests in Chromium."""
 
 import asyncio
 from collections.abc import AsyncIterator, Mapping
@@ -12,14 +12,14 @@ from lockstep.bench.browsers.chromium import missed_in_page, open_page
 
 __all__ = ["FORWARD", "LEFT_X", "LEFT_Y", "RB", "SMALL_WINDOW", "START", "ConsolePage", "open_console"]
 
-# The least that shows all of the page at once: where the processor draws, each pixel of the window costs.
+# The smallest size that shows all of the page at once: where the processor draws, each pixel of the window costs.
 SMALL_WINDOW = (1024, 640)
 START, RB, STOP_BUTTON = 9, 5, 1  # W3C standard mapping
 LEFT_X, LEFT_Y, RIGHT_X = 0, 1, 2
 FORWARD = MappingProxyType({LEFT_Y: -1.0})
 ROUND = MappingProxyType({LEFT_Y: -1.0, RIGHT_X: -1.0})  # the planar robot in a circle of half a metre: it stays near
 ARM_TRIES, ARM_SECONDS = 3, 5.0
-# Why the page says that it has disarmed where a busy machine held up the robot, the console or itself.
+# The page's reasons for disarming after a busy machine held up the robot, the console or the page.
 HELD_UP = (
     "the robot interrupted the motion",
     "the connection was lost",
@@ -28,10 +28,10 @@ HELD_UP = (
     "not connected to the console",
     "get the control seat first",
 )
-HOLD_SECONDS, RESET_SECONDS = 10.0, 60.0  # for one hold of the button to take effect; for all of them
+HOLD_SECONDS, RESET_SECONDS = 10.0, 60.0  # for one hold of the button to take effect; for all holds
 
-# The true event, read out of the strip that the planar robot draws into its pictures (robots/event_strip.py),
-# together with the stamp that the page believes it has. One expression: no picture is drawn in between.
+# The true event, read from the strip that the planar robot draws into its pictures (robots/event_strip.py), together
+# with the stamp that the page believes it has. It is one expression, so no picture is drawn in between.
 READ_STRIP = """(name) => {
   const canvas = document.querySelector(`canvas[data-stream="${name}"]`);
   const rendered = window.lockstep.rendered(name).at(-1);
@@ -65,25 +65,25 @@ STATISTICS = """new Promise((resolve) => {
 
 
 class ConsolePage:
-    """One open page. Waiting is always for something the page says, never for time to pass."""
+    """One open page. Each wait is for something that the page reports, never for time to pass."""
 
     def __init__(self, page: Page) -> None:
         self.page = page
 
     async def stats(self) -> dict[str, Any]:
-        """`window.lockstep.stats()`, as soon as it is there."""
+        """Return `window.lockstep.stats()`, as soon as it is there."""
         statistics: dict[str, Any] = await self.page.evaluate(STATISTICS)
         return statistics
 
     async def until(self, condition: str, seconds: float = 40.0) -> None:
-        """Until `condition`, an expression over `s`, the page's statistics, is true; one that throws is not."""
+        """Wait until `condition`, an expression over `s`, the page's statistics, is true; one that throws is not."""
         missed = await self._missed(condition, seconds)
         if missed is not None:
             shown = " | ".join((await self.page.inner_text("body")).split("\n"))
             raise AssertionError(f"never came true: {condition}\nthe page's statistics: {missed}\nthe page: {shown}")
 
     async def _missed(self, condition: str, seconds: float) -> str | None:
-        """The page's statistics in the end, if the condition did not come true; else None."""
+        """Return the page's statistics at the end if the condition did not come true; else None."""
         holds = f"const s = window.lockstep?.stats(); return Boolean(s && ({condition}));"
         # The condition is part of the script: the page's content security policy forbids evaluating strings.
         waiting = """(limit) => new Promise((resolve) => {
@@ -99,13 +99,13 @@ class ConsolePage:
         return await missed_in_page(self.page, waiting % holds, seconds)
 
     async def until_live(self) -> None:
-        """Connected, and every picture stream was drawn a few times."""
+        """Wait until the page is connected and has drawn every picture stream a few times."""
         videos = "Object.values(s.streams).filter((x) => x.kind === 'video')"
-        # A machine that is just starting other programs may leave a browser without a turn for half a minute.
+        # A machine that is starting other programs may leave a browser without a turn for half a minute.
         await self.until(f"s.connected && {videos}.length > 0 && {videos}.every((x) => x.rendered > 3)", 45)
 
     async def press(self, button: int, pressed: bool = True) -> None:
-        """As a finger does it: no shorter than the page's sampling can see."""
+        """Press as a finger does: no shorter than the page's sampling can see."""
         await self.page.evaluate(
             "([button, pressed]) => { window.testPad.press(button, pressed);"
             " return new Promise((resolve) => setTimeout(resolve, 60)); }",
@@ -116,7 +116,7 @@ class ConsolePage:
         await self.page.evaluate("([axis, value]) => window.testPad.tilt(axis, value)", [axis, value])
 
     async def arm(self) -> None:
-        """With the pad's START, as an operator does: who sees nothing happen lets go and presses again."""
+        """Press the pad's START, as an operator does: let go and press again if nothing happens."""
         await self.until("s.seat && s.seat.mine")
         for _ in range(ARM_TRIES - 1):
             await self.press(START)
@@ -129,7 +129,7 @@ class ConsolePage:
         await self.press(START, False)
 
     async def drive_forward(self, tilts: Mapping[int, float] = FORWARD) -> None:
-        """Hold the deadman and tilt the sticks; armed anew where a busy machine ended that."""
+        """Hold the deadman and tilt the sticks; arm again if a busy machine ended that."""
         for _ in range(ARM_TRIES):
             await self.press(RB)
             for axis, value in tilts.items():
@@ -142,9 +142,9 @@ class ConsolePage:
 
     @asynccontextmanager
     async def driving(self, tilts: Mapping[int, float] = ROUND) -> AsyncIterator[None]:
-        """It is armed and driven inside the block, anew where a busy machine ended that; deadman and sticks stay held.
+        """Arm and drive inside the block, again if a busy machine ended that; deadman and sticks stay held.
 
-        Anything else that ends it, as a stop, lasts.
+        Anything else that ends it, such as a stop, lasts.
         """
         await self.arm()
         await self.drive_forward(tilts)
@@ -171,13 +171,13 @@ class ConsolePage:
         await self.arm()
 
     async def let_go(self) -> None:
-        """Of the deadman and the sticks."""
+        """Let go of the deadman and the sticks."""
         await self.press(RB, False)
         for axis in ROUND:
             await self.tilt(axis, 0)
 
     async def was_held_up(self) -> bool:
-        """Whether it is disarmed because this machine held something up."""
+        """Return whether the page is disarmed because this machine held something up."""
         if await self._missed("!s.armed", 0) is not None:
             return False
         await self._missed("document.querySelector('.arm').dataset.state === 'disarmed'", 5)  # it is drawn later
@@ -185,7 +185,7 @@ class ConsolePage:
         return any(why in words.casefold() for why in HELD_UP)
 
     async def drive_on_until(self, condition: str, seconds: float = 60.0) -> None:
-        """Arm and drive forward until `condition`; again wherever the page has disarmed, as a bad network makes it."""
+        """Arm and drive forward until `condition`; again whenever the page has disarmed, as a bad network makes it."""
         async with asyncio.timeout(seconds):
             while True:
                 await self.arm()
@@ -197,14 +197,14 @@ class ConsolePage:
                 await self.let_go()
 
     async def open_full_scene(self) -> None:
-        """The 3D scene as the large view: where it is not shown, it is asked for first."""
+        """Open the 3D scene as the large view; ask for it first if it is not shown."""
         shown = self.page.get_by_role("button", name="3D scene", exact=True)
         if await shown.get_attribute("aria-pressed") == "false":
             await shown.click()
         await self.page.get_by_role("button", name="Show 3D scene large").click()
 
     async def reset(self) -> None:
-        """Hold the button until the robot says that it is no longer stopped; anew where it slipped away."""
+        """Hold the button until the robot says that it is no longer stopped; again if it slipped away."""
         button = self.page.get_by_role("button", name="Hold to reset")
         async with asyncio.timeout(RESET_SECONDS):
             while await self._missed("!s.stop.stopped", 0) is not None:
@@ -214,7 +214,7 @@ class ConsolePage:
                 await self.page.mouse.up()
 
     async def strip(self, stream: str) -> tuple[int, int | None] | None:
-        """The stamp the page believes its picture has, and the event that is drawn into it; None before the first."""
+        """Return the stamp the page believes its picture has, and the event drawn into it; None before the first."""
         found = await self.page.evaluate(READ_STRIP, stream)
         return None if found is None else (found["stamp"], found["event"])
 

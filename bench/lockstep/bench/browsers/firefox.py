@@ -1,4 +1,4 @@
-"""Firefox for a test or a measurement, through WebDriver BiDi (puppeteer-core in a Node process of its own)."""
+"""Firefox for a test or a measurement, through WebDriver BiDi (puppeteer-core in a separate Node process)."""
 
 import asyncio
 import json
@@ -31,7 +31,11 @@ class Firefox:
         return await self._ask("evaluate", expression=expression)
 
     async def wait(self, expression: str, seconds: float = 20.0) -> None:
-        """Until `expression` is true in the page; raises RuntimeError when it does not come true in time."""
+        """Wait until `expression` is true in the page.
+
+        Raises:
+            RuntimeError: it does not come true in time.
+        """
         await self._ask("wait", expression=expression, timeout=seconds * 1000)
 
     async def key(self, code: str, *, down: bool) -> None:
@@ -44,7 +48,7 @@ class Firefox:
         await self._ask("screenshot", path=str(path))
 
     async def errors(self) -> list[str]:
-        """Uncaught errors of the page so far."""
+        """Return the uncaught errors of the page so far."""
         found: list[str] = await self._ask("errors")
         return found
 
@@ -64,7 +68,7 @@ class Firefox:
 
 @asynccontextmanager
 async def running_firefox(environment: dict[str, str] | None = None) -> AsyncIterator[Firefox]:
-    """A headless Firefox with one empty page and its own profile, closed on leaving."""
+    """Start a headless Firefox with one empty page and its own profile; close it on leaving."""
     executable = shutil.which("firefox-esr") or shutil.which("firefox")
     if executable is None:
         raise RuntimeError("Firefox is not installed: make test installs Debian's firefox-esr")

@@ -1,4 +1,4 @@
-"""A sound card for a test: a PulseAudio server of its own with one silent loudspeaker, and an ear to it."""
+"""A sound card for a test: a separate PulseAudio server with one silent loudspeaker that can be recorded."""
 
 import asyncio
 import os
@@ -17,13 +17,13 @@ WINDOW = SAMPLE_RATE // 20  # samples
 
 
 class SoundCard:
-    """`environment` makes a program use it."""
+    """A sound card; `environment` makes a program use it."""
 
     def __init__(self, socket: Path) -> None:
         self.environment = os.environ | {"PULSE_SERVER": f"unix:{socket}"}
 
     async def record(self, seconds: float) -> npt.NDArray[np.int16]:
-        """What the loudspeaker plays from now on, mono, at `SAMPLE_RATE`."""
+        """Return the sound that the loudspeaker plays from now on, mono, at `SAMPLE_RATE`."""
         process = await asyncio.create_subprocess_exec(
             *("parec", "--device=ears.monitor", "--format=s16le", f"--rate={SAMPLE_RATE}", "--channels=1", "--raw"),
             stdout=asyncio.subprocess.PIPE,
@@ -40,7 +40,7 @@ class SoundCard:
         return np.frombuffer(data, np.int16)
 
     async def hears(self, frequency: float, level: float, within: float = 20.0) -> bool:
-        """Whether the tone is played at `level` for a second on end, some time in the next `within` seconds."""
+        """Return whether the tone is played at `level` for a second on end, some time in the next `within` seconds."""
         for _ in range(int(within)):
             if tone_level(await self.record(1.0), frequency) >= level:
                 return True
@@ -48,7 +48,7 @@ class SoundCard:
 
 
 def tone_level(samples: npt.NDArray[np.int16], frequency: float) -> float:
-    """Amplitude of one tone, 0 to 1 of full scale: the discrete Fourier transform at `frequency`, window by window.
+    """Return the amplitude of one tone, 0 to 1 of full scale: the discrete Fourier transform at `frequency` in windows.
 
     Receivers shift the phase whenever they stretch or conceal sound, so only the windows' amplitudes are averaged.
     """
@@ -59,7 +59,7 @@ def tone_level(samples: npt.NDArray[np.int16], frequency: float) -> float:
 
 @asynccontextmanager
 async def running_sound_card(directory: Path) -> AsyncIterator[SoundCard]:
-    """Starts the server, waits until it answers, and ends it on leaving."""
+    """Start the server, wait until it answers, and end it on leaving."""
     socket = directory / "card.socket"
     process = await asyncio.create_subprocess_exec(
         *("pulseaudio", "-n", "--daemonize=no", "--exit-idle-time=-1", "--use-pid-file=no", "--disable-shm=yes"),

@@ -1,4 +1,4 @@
-"""A network in a box: impairs what passes between a client, the console and the robot. docs/networks.md tells how."""
+"""Emulates a network between a client, the console and the robot. docs/networks.md describes it."""
 
 from lockstep.bench.emulator.errors import BadDescription, EmulatorError, NamespacesUnavailable, ProfileError
 from lockstep.bench.emulator.impairment.delay import Constant, Lognormal, Normal, Pareto, Uniform

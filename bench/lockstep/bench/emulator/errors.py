@@ -1,4 +1,4 @@
-"""What the emulator refuses.
+"""Errors of the emulator.
 
 EmulatorError
 ├── ProfileError            a profile cannot be used; says where and what to write instead
@@ -10,7 +10,7 @@ __all__ = ["BadDescription", "EmulatorError", "NamespacesUnavailable", "ProfileE
 
 
 class EmulatorError(Exception):
-    """Base of all."""
+    """Base of the emulator's errors."""
 
 
 class ProfileError(EmulatorError):

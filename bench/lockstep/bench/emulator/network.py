@@ -1,4 +1,4 @@
-"""A network between real processes on this machine, without root: what experiments and tests use."""
+"""A network between real processes on this machine, without root, for experiments and tests."""
 
 import asyncio
 import socket
@@ -26,7 +26,7 @@ __all__ = ["Network"]
 
 
 class Network:
-    """Clients open its `console_url`; a console connects to its `robot_address`.
+    """An emulated network. Clients open its `console_url`; a console connects to its `robot_address`.
 
     >>> async with Network(load_profile("hong-kong"), console_url="http://127.0.0.1:8000", seed=1) as network:
     ...     browser.open(network.link("http://127.0.0.1:8000/#token=…"))
@@ -34,12 +34,12 @@ class Network:
     The schedule of outages starts with the first packet of the first client; `begin` starts it again.
 
     Args:
-        profile: or the name or file of one
-        console_url: the console; None when `open_console` is called later, or never
+        profile: a profile, or the name or file of one
+        console_url: the console; None if `open_console` is called later, or never
         robot: host and port of a robot bridge; None: the robot link stays direct
-        seed: the same seed meets each client, in the order of their coming, with the same network
-        hosts: own addresses at which clients find the relay; None: loopback and this machine's IPv4 addresses
-        host, port: where the proxy listens
+        seed: the same seed meets each client, in the order of their arrival, with the same network
+        hosts: this machine's addresses at which clients find the relay; None: loopback and the IPv4 addresses
+        host, port: address of the proxy
     """
 
     def __init__(
@@ -108,23 +108,23 @@ class Network:
         return self.console_url
 
     def link(self, link: str) -> str:
-        """The console's link `http://host:port/#token=…`, through this network."""
+        """Return the console's link `http://host:port/#token=…`, through this network."""
         return urlsplit(link)._replace(scheme="http", netloc=urlsplit(self.console_url).netloc).geturl()
 
     def open_relay(self) -> UdpRelay:
-        """A relay of its own between two peers whose descriptions the caller leads through it."""
+        """Open a separate relay between two peers whose descriptions the caller leads through it."""
         relay = self._sessions.open()
         self._sessions.keep(f"own {id(relay)}", relay)
         return relay
 
     def begin(self) -> None:
-        """The schedule of outages starts now."""
+        """Start the schedule of outages now."""
         now = time.monotonic()
         self._client_outages.start(now)
         self._robot_outages.start(now)
 
     def outage(self, seconds: float, *, hold: bool = False, robot: bool = False) -> None:
-        """From now on nothing passes, for so long.
+        """Let nothing pass for `seconds` from now on.
 
         Args:
             hold: packets wait in the network and arrive at its end; else they are lost
@@ -139,7 +139,7 @@ class Network:
             self._relay.cut()
 
     def statistics(self) -> NetworkStatistics:
-        """What has happened to everybody's packets so far."""
+        """Return the statistics of all packets so far."""
         robot = {} if self._relay is None else self._relay.statistics
         return collect(self._sessions.all_paths, self._signalling.statistics, robot, time.monotonic())
 

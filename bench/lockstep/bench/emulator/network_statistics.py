@@ -1,4 +1,4 @@
-"""What a network did, in figures."""
+"""The statistics of a network."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass, field
@@ -13,9 +13,9 @@ __all__ = ["NetworkStatistics", "QueueStatistics", "collect", "count_queue"]
 
 @dataclass
 class QueueStatistics:
-    """Of all clients' bottlenecks in one direction; times in seconds that packets waited to be sent."""
+    """Statistics of all clients' bottlenecks in one direction; times in seconds that packets waited to be sent."""
 
-    now: float = 0.0  # of the client that waits longest
+    now: float = 0.0  # wait now, of the client that waits longest
     mean: float = 0.0
     longest: float = 0.0
     passed: int = 0
@@ -30,7 +30,7 @@ class NetworkStatistics:
     queues: dict[Direction, QueueStatistics] = field(default_factory=dict)  # empty without a bottleneck
 
     def fields(self) -> dict[str, object]:
-        """For JSON."""
+        """Return the fields for JSON."""
         found = asdict(self)
         for name, directions in self.paths.items():
             for direction, statistics in directions.items():

@@ -1,4 +1,4 @@
-"""Commands to a running network, one line each: a person or another process says when the network fails."""
+"""Commands to a running network, one line each, from a person or another process."""
 
 import asyncio
 import json
@@ -27,7 +27,7 @@ class Impaired(Protocol):
 
 
 def carry_out(order: str, network: Impaired) -> str:
-    """Do it; the answer, empty when there is nothing to say."""
+    """Carry out an order, and return the answer; "" without an answer."""
     match order.split():
         case []:
             return ""
@@ -54,12 +54,12 @@ def _seconds(text: str) -> float | None:
 
 
 async def obey(network: Impaired, answer: Callable[[str], None]) -> None:
-    """Until standard input ends."""
+    """Obey orders until standard input ends."""
     loop, source, ended = asyncio.get_running_loop(), sys.stdin.fileno(), asyncio.Event()
     pending = b""
 
     def read() -> None:
-        # Read when there is something, not in non-blocking mode: that would stay with the terminal.
+        # Read only when data is there, not in non-blocking mode: that would stay with the terminal.
         nonlocal pending
         data = os.read(source, READ)
         *lines, pending = (pending + data).split(b"\n")

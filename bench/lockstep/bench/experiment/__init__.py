@@ -1,1 +1,1 @@
-"""The thesis' experiments on emulated networks: `lockstep experiment`."""
+"""Runs the thesis' experiments on emulated networks: `lockstep experiment`."""

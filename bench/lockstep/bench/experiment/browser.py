@@ -1,4 +1,4 @@
-"""The operator as a page in Chromium: a pad follows the script, the page's own figures are read."""
+"""Drives as a page in Chromium: a pad follows the script, and the page's own figures are read."""
 
 import asyncio
 import shutil
@@ -36,7 +36,7 @@ LOOK = """(streams) => ({
 
 
 def pad_axes(layer: ControlLayer, axes: Sequence[Axis], values: Sequence[float]) -> dict[int, float]:
-    """Where the sticks have to be for `values`: -1 to 1 by the number of the pad's axis. Buttons stay untouched."""
+    """Return the sticks' positions for `values`: -1 to 1 by the number of the pad's axis. Buttons stay untouched."""
     by_name = {axis.name: (axis, value) for axis, value in zip(axes, values, strict=True)}
     found: dict[int, float] = {}
     for binding in layer.bindings:
@@ -51,7 +51,7 @@ def pad_axes(layer: ControlLayer, axes: Sequence[Axis], values: Sequence[float])
 
 
 class BrowserClient:
-    """The same verbs as `HeadlessClient`."""
+    """A page with the methods of `HeadlessClient`."""
 
     def __init__(
         self, page: ConsolePage, record: ClientRecord, description: RobotDescription, clock: PageClock
@@ -102,7 +102,7 @@ class BrowserClient:
         )
 
     async def _check_pixels(self) -> None:
-        """Now and then: the canvas shows what its stamp says."""
+        """Check at intervals that the canvas shows the event of its stamp."""
         while True:
             await asyncio.sleep(STRIP_STEP)
             found = await self._page.strip(self._camera)
@@ -114,8 +114,11 @@ class BrowserClient:
             self.record.drawn_wrong += drawn not in (None, stamp)
 
     async def drive(self, script: OperatorScript, seconds: float) -> None:
-        """The sticks follow the script; the page sends as fast as its gate and the robot's event rate allow, and at
-        its idle rate while the deadman is released."""
+        """Let the sticks follow the script.
+
+        The page sends as fast as its gate and the robot's event rate allow, and at its idle rate while the deadman is
+        released.
+        """
         page, axes, layer = self._page.page, self.description.axes, self.description.layers[0]
         began = time.monotonic()
         held = False
@@ -135,7 +138,7 @@ class BrowserClient:
 
 @asynccontextmanager
 async def browser_client(link: str, choices: Choices) -> AsyncIterator[BrowserClient]:
-    """The page, connected, with the choices' gate, pacing and tolerances."""
+    """Open a page, connected, with the choices' gate, pacing and tolerances."""
     async with AsyncExitStack() as stack:
         environment = None
         if shutil.which("pulseaudio") is not None:  # without a sound card the page has no sound to judge

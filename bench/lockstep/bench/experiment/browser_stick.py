@@ -20,7 +20,7 @@ ARMS_SECONDS = 1.0
 
 
 class BrowserStick:
-    """Round and round. A person's eye and finger take longer than this to see that the page is back, and to press."""
+    """Drives in circles. A person takes longer than this to see that the page is back, and to press."""
 
     intentions: list[tuple[float, float]] = []  # the stick does not move, so they are all the same
 
@@ -40,13 +40,13 @@ class BrowserStick:
             await asyncio.sleep(LOOK)
 
     async def _take_seat(self) -> None:
-        """The console frees the seat of an operator who fell silent; the page leaves it to the person to take it."""
+        """Take the seat, which the console frees when its operator falls silent; the page leaves that to the person."""
         button = self._page.page.get_by_role("button", name="Request control")
         if await button.is_visible():
             await button.click()
 
     async def _arm(self) -> None:
-        """Arming needs the deadman seen released first."""
+        """Arm, after the deadman was seen released."""
         await self._page.press(RB, False)
         await self._page.press(START)
         await self._page.press(START, False)

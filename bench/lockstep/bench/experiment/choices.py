@@ -12,7 +12,7 @@ __all__ = ["MODES", "PROFILES", "THESIS_ROBOTS", "Choices", "MediaChoice", "Mode
 Mode = Literal["off", "age", "feedback", "media"]
 MODES: tuple[Mode, ...] = ("off", "age", "feedback", "media")
 
-# The thesis' networks, and of our robots the kind that was driven over each.
+# The thesis' networks, each with the robot here of the kind that was driven over it.
 THESIS_ROBOTS = {
     "macro-lan": "mobile-manipulator",
     "micro-lan": "micromanipulator",
@@ -30,7 +30,7 @@ FITTING_KBPS = 300  # pictures that fit through 512 kbit/s together with sound (
 
 @dataclass(frozen=True)
 class MediaChoice:
-    """How pictures and sound are sent. Sound is G.711 µ-law at 8 kHz, mono, unless the profile says otherwise."""
+    """The settings for pictures and sound. Sound is G.711 µ-law at 8 kHz, mono, unless the profile says otherwise."""
 
     video_kbps: float
     frames_per_second: float
@@ -39,7 +39,7 @@ class MediaChoice:
     adapts: bool = False  # the console's quality controller is on
 
     def environment(self) -> dict[str, str]:
-        """As the console's settings."""
+        """Return the choice as the console's settings."""
         return {
             "LOCKSTEP_MEDIA__VIDEO_BITRATE_BPS": str(round(self.video_kbps * 1000)),
             "LOCKSTEP_MEDIA__VIDEO_FRAMES_PER_SECOND": str(self.frames_per_second),
@@ -49,8 +49,11 @@ class MediaChoice:
 
 
 def media_of(profile: Profile, adapts: bool | None = None) -> MediaChoice:
-    """The thesis' settings for its profiles, fixed as they were there. For others the console's own settings, its
-    quality controller included, unless `adapts` says otherwise."""
+    """Return the thesis' settings for its profiles, fixed as they were there.
+
+    For other profiles return the console's own settings, its quality controller included, unless `adapts` says
+    otherwise.
+    """
     said = profile.experiment
     adapting = said.video_kbps is None if adapts is None else adapts
     bottleneck = profile.bottleneck_to_operator
@@ -65,14 +68,14 @@ def media_of(profile: Profile, adapts: bool | None = None) -> MediaChoice:
 
 
 def round_trip_of(profile: Profile) -> float:
-    """Mean time of a command to the robot and its feedback back, in s, without the time in the programs."""
+    """Return the mean time of a command to the robot and its feedback back, in s, without the time in the programs."""
     paths = (profile.control, profile.robot_control)
     return sum(path.to_operator.delay.mean + path.to_robot.delay.mean for path in paths)
 
 
 @dataclass(frozen=True)
 class Choices:
-    """One run."""
+    """The options of one run."""
 
     profile: str  # a name or a file
     mode: Mode
@@ -81,7 +84,7 @@ class Choices:
     seed: int
     robot: str = "planar"
     browser: bool = False
-    adapts: bool | None = None  # the quality controller; None: as `media_of` says
+    adapts: bool | None = None  # the quality controller; None: as in `media_of`
     watchers: bool = True  # clients in the other gate modes beside the operator, in the same session
 
     @property
@@ -94,6 +97,6 @@ class Choices:
 
     @property
     def watching(self) -> tuple[GateMode, ...]:
-        """Gate modes of the watchers: those that the operator does not have."""
+        """The gate modes of the watchers: those that the operator does not have."""
         every: tuple[GateMode, ...] = ("off", "age", "event")
         return tuple(mode for mode in every if mode != self.gate) if self.watchers else ()

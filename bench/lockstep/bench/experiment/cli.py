@@ -30,14 +30,14 @@ __all__ = ["experiment_command"]
 
 EXIT_BROKEN = 1  # a verdict is false
 EXIT_USAGE = 2
-EXIT_FAILED = 3  # something did not run
+EXIT_FAILED = 3  # a run failed
 GROWTH_PROFILE = "hong-kong"
 OWN_ROBOT = "planar"
 RUN_SECONDS = 25.0
 ENDURANCE_SECONDS = 600.0
 ENDURANCE_NETWORK = "satellite"
 ENDURANCE_WORDS = ("connections", "reconnections", "seat_losses", "pictures", "violations")
-OWN_TOLERANCE = -1  # the profile's
+OWN_TOLERANCE = -1  # the tolerance of the profile
 
 Found = TypeVar("Found")
 
@@ -134,7 +134,7 @@ def _work(session: "_Session", choices: Choices, seconds: float | None, robot: s
 class _Session:
     """Runs one thing after the other; one that fails does not keep the others from being run.
 
-    What was found is written down after each, so that an end before the last loses nothing but the page.
+    The findings are written after each, so that an end before the last loses nothing but the page.
     """
 
     def __init__(self, folder: Path | None) -> None:
@@ -203,7 +203,7 @@ class _Session:
 
 
 def _reason(error: BaseException) -> str:
-    """The first cause; task groups wrap what went wrong."""
+    """Describe the first cause of an error, since task groups wrap it."""
     while isinstance(error, BaseExceptionGroup):
         error = error.exceptions[0]
     return f"{type(error).__name__} {error}".strip()
@@ -218,7 +218,7 @@ def _loaded(network: str) -> Profile:
 
 
 def _fitted(choices: Choices) -> tuple[Profile, Choices]:
-    """The profile, and the choices with its tolerance unless they have one."""
+    """Return the profile, and the choices with its tolerance unless they have their own."""
     profile = _loaded(choices.profile)
     tolerance = media_of(profile).tolerance if choices.tolerance < 0 else choices.tolerance
     return profile, replace(choices, profile=profile.name, tolerance=tolerance)

@@ -1,4 +1,4 @@
-"""Clients without a browser: they watch, check pixels, and drive."""
+"""Clients without a browser, which watch, check pixels, and drive."""
 
 import asyncio
 import time
@@ -22,12 +22,12 @@ from lockstep.robot_bridge.robots.event_strip import read_event_strip
 __all__ = ["HeadlessClient", "headless_client"]
 
 CONNECT_SECONDS = 40.0  # through a bad network
-SILENCE_SECONDS = 15.0  # of an outage that a run is to survive
+SILENCE_SECONDS = 15.0  # of an outage that a run should survive
 TICK = 0.005  # s; the loop's own timers are no finer under load
 
 
 class HeadlessClient:
-    """One client of a run. `observe` around the run; `drive` inside it."""
+    """A client of a run. Enter `observed` around the run, and call `drive` inside it."""
 
     def __init__(self, console: Console, record: ClientRecord, camera: str) -> None:
         self.record = record
@@ -43,7 +43,7 @@ class HeadlessClient:
         await self._console.take_seat()
 
     async def until_picture(self) -> None:
-        """A picture passed the gate."""
+        """Wait until a picture passed the gate."""
         async for _ in self._console.pictures(self._camera):
             return
 
@@ -98,7 +98,7 @@ class HeadlessClient:
 
 
 def _drawn_event(picture: Picture) -> int | None:
-    """Read from the luma plane itself: to convert the picture would cost more than to decode it."""
+    """Read the event from the luma plane itself: converting the picture would cost more than decoding it."""
     plane = picture.frame.planes[0]
     luma = np.frombuffer(memoryview(plane), np.uint8).reshape(-1, plane.line_size)[: plane.height, : plane.width]
     return read_event_strip(luma)
@@ -108,14 +108,17 @@ def _drawn_event(picture: Picture) -> int | None:
 async def headless_client(
     link: str, choices: Choices, name: str, gate: GateMode, pacing: Pacing, *, drives: bool
 ) -> AsyncIterator[HeadlessClient]:
-    """Connected, with the main camera and the first microphone. Raises as `Console`."""
+    """Connect a client with the main camera and the first microphone.
+
+    Raises the errors of `Console`.
+    """
     async with Console(
         link,
         gate=gate,
         pacing=pacing,
         tolerance=choices.tolerance,
         audio_tolerance=choices.tolerance,
-        carrier="capture-time",  # it says when a medium was captured, which every mode is measured by
+        carrier="capture-time",  # has the time of capture of each medium, which every mode is measured by
         video=1,
         name=name,
         connect_seconds=CONNECT_SECONDS,

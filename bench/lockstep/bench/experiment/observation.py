@@ -12,7 +12,7 @@ INTERVAL = 1.0  # s between two looks; logs keep a thousand entries, the fastest
 
 
 class Look(NamedTuple):
-    """What a client says at one moment, times on this machine's monotonic clock."""
+    """The state of a client's logs at one moment, times on this machine's monotonic clock."""
 
     feedbacks: Sequence[Arrival]
     rendered: dict[str, Sequence[Rendered]]
@@ -20,20 +20,20 @@ class Look(NamedTuple):
 
 
 class Observation:
-    """`begin`, then `run` until cancelled, then `end`."""
+    """Reads a client's logs. Call `begin`, then run `run` until cancelled, then call `end`."""
 
     def __init__(self, record: ClientRecord, look: Callable[[], Awaitable[Look]]) -> None:
         self._record = record
         self._look = look
 
     async def begin(self) -> None:
-        """What happened before does not count."""
+        """Begin; earlier entries do not count."""
         look = await self._look()
         self._record.statistics_before = look.statistics
         self._take(look)
-        self._record.feedbacks[:-1] = []  # the newest event is where the run begins
+        self._record.feedbacks[:-1] = []  # the run begins with the newest event
         for entries in self._record.rendered.values():
-            entries[:-1] = []  # the picture on screen as well
+            entries[:-1] = []  # keeps the picture on screen as well
 
     async def run(self) -> None:
         while True:

@@ -11,20 +11,20 @@ __all__ = ["Move", "OperatorScript"]
 
 PHASE_SECONDS = (0.8, 2.5)
 INTERVALS = (0.04, 0.5)  # s between two commands: 25 to 2 a second
-PAUSE_SHARE = 0.15  # of the phases: the stick is let go
+PAUSE_SHARE = 0.15  # of the phases, in which the stick is let go
 REACH = 0.6  # of an axis' limit
 
 
 class Move(NamedTuple):
-    """What the operator does now."""
+    """The operator's move at a time."""
 
     values: list[float]  # one per axis, in its unit
-    interval: float  # s until the next command at the earliest
+    interval: float  # s until the next command, at least
     pause: bool  # the stick is let go
 
 
 class OperatorScript:
-    """Ask `at` with times that do not decrease."""
+    """The moves of a script. Call `at` with times that do not decrease."""
 
     def __init__(self, axes: Sequence[Axis], seed: int) -> None:
         self._axes = tuple(axes)
@@ -33,7 +33,7 @@ class OperatorScript:
         self._move = Move([axis.rest for axis in axes], INTERVALS[1], pause=True)
 
     def at(self, elapsed: float) -> Move:
-        """`elapsed`: s since the script began."""
+        """Return the move `elapsed` s after the script began."""
         while elapsed >= self._until:
             self._until += self._random.uniform(*PHASE_SECONDS)
             self._move = self._next()

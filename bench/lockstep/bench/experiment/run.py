@@ -1,4 +1,4 @@
-"""One run: a robot, a console, a network, an operator who drives, and watchers beside."""
+"""Runs one experiment: a robot, a console, a network, an operator who drives, and watchers."""
 
 import asyncio
 import time
@@ -24,7 +24,7 @@ LOG_DELAY = 0.4  # s until the bridge's log is on disk
 
 
 class RunningClient(Protocol):
-    """What a run needs of a client, with or without a browser."""
+    """The methods of a client that a run needs, with or without a browser."""
 
     record: ClientRecord
 
@@ -38,7 +38,11 @@ class RunningClient(Protocol):
 
 
 async def run_experiment(choices: Choices, profile: Profile, say: Say) -> Run:
-    """Raises ProcessFailed, ConsoleError, TimeoutError."""
+    """Run one experiment.
+
+    Raises:
+        ProcessFailed, ConsoleError, TimeoutError: the run failed.
+    """
     async with (
         running_stage(choices.robot, profile, media_of(profile, choices.adapts), choices.seed) as stage,
         _clients(stage, choices) as clients,
@@ -77,7 +81,7 @@ async def _drive(stage: Stage, choices: Choices, clients: list[RunningClient]) -
 
 @asynccontextmanager
 async def _clients(stage: Stage, choices: Choices) -> AsyncIterator[list[RunningClient]]:
-    """The operator first. They connect one after the other, so that a seed gives each the same network."""
+    """Connect the clients, the operator first. They connect in turn, so that a seed gives each the same network."""
     async with AsyncExitStack() as stack:
         if choices.browser:
             from lockstep.bench.experiment.browser import (

@@ -1,4 +1,4 @@
-"""Robot, console and network of one run: started, connected, ended."""
+"""Starts, connects and ends the robot, console and network of one run."""
 
 import secrets
 import sys
@@ -22,7 +22,7 @@ class Stage:
     bridge: Running
     console: Running
     event_log: Path
-    near_link: str  # an operator's, past the network, from beside the console
+    near_link: str  # an operator's link, past the network, from beside the console
 
     @property
     def link(self) -> str:
@@ -34,7 +34,11 @@ class Stage:
 async def running_stage(
     robot: str, profile: Profile, media: MediaChoice, seed: int, *, robot_link: bool = True
 ) -> AsyncIterator[Stage]:
-    """`robot_link`: whether the robot's link passes the network too. Raises ProcessFailed."""
+    """Start the stage. `robot_link`: whether the robot's link passes the network too.
+
+    Raises:
+        ProcessFailed: a process did not start.
+    """
     lockstep = str(Path(sys.executable).with_name("lockstep"))
     with TemporaryDirectory(prefix="lockstep-experiment-") as directory:
         log = Path(directory) / "events.jsonl"

@@ -1,1 +1,1 @@
-"""Several robots on one console, their bridges killed in turn: what do the others notice?"""
+"""Drives several robots on one console while their bridges are killed in turn, to see how that disturbs the others."""

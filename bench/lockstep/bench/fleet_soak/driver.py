@@ -1,4 +1,4 @@
-"""One operator of one robot: drives all the time, and reports faults while its own bridge lived."""
+"""Drives one robot all the time as its operator, and reports faults while its own bridge lives."""
 
 import asyncio
 import time
@@ -11,8 +11,8 @@ from lockstep.client.errors import CommandRefused, ConsoleError
 
 __all__ = ["FleetDriver", "Trip"]
 
-AGAIN_SECONDS = 0.2  # until a driver that was thrown out comes again
-STUCK_SECONDS = 10.0  # without an answer to a command
+AGAIN_SECONDS = 0.2  # s until a driver that was thrown out connects again
+STUCK_SECONDS = 10.0  # s without an answer to a command
 
 
 class Trip(NamedTuple):
@@ -23,12 +23,12 @@ class Trip(NamedTuple):
 
 
 class FleetDriver:
-    """Run `run` as a task. Tell `bridge_dies` before its bridge does.
+    """Drives one robot. Start `run` as a task, and call `bridge_dies` before its bridge is killed.
 
     Attributes:
         driving: set while it drives a bridge that lives
         trips: of all its commands
-        noticed: what went wrong while its own bridge lived, by name
+        noticed: counts of the faults while its own bridge lived, by name
         slowest_return: s from a death of its bridge until it drove again
     """
 
@@ -41,7 +41,7 @@ class FleetDriver:
         self._link = link
         self._rate = rate
         self._pictures = pictures
-        self._dead_epoch = ""  # that the bridge had when it was killed
+        self._dead_epoch = ""  # epoch of the bridge that was killed
         self._died_at: float | None = None  # None: it lives
         self._epoch = ""
 
@@ -50,7 +50,7 @@ class FleetDriver:
         self.driving.clear()
 
     async def run(self) -> None:
-        """Until cancelled."""
+        """Drive until cancelled."""
         while True:
             try:
                 async with Console(

@@ -1,4 +1,4 @@
-"""Whether a robot's events went on: no number left out, and how long the longest pause was. No I/O."""
+"""Checks that a robot's events go on: counts the left-out numbers and measures the longest pause. No I/O."""
 
 from collections.abc import Iterable
 
@@ -15,7 +15,7 @@ class Progress:
     Attributes:
         skipped: events whose number did not follow the one before
         longest_pause: s between two events of one life
-        pause_ended: when that pause was over, on the clock of the record
+        pause_ended: end of that pause, on the clock of the record
     """
 
     def __init__(self) -> None:

@@ -11,7 +11,7 @@ Record = Mapping[str, Any]
 
 
 def read_records(log: Path) -> list[Record]:
-    """A killed bridge may leave half a line: it is passed over."""
+    """Read the records of a log; half a line, which a killed bridge may leave, is passed over."""
     found: list[Record] = []
     with log.open() as lines:
         for line in lines:

@@ -1,4 +1,4 @@
-"""A fleet's soak: a driver for each robot, and bridges that die in turn."""
+"""Runs a fleet's soak: a driver for each robot, and bridges that are killed in turn."""
 
 import asyncio
 import random
@@ -16,21 +16,21 @@ __all__ = ["FleetPlan", "fleet_soak"]
 
 CALM_SHARE = 0.25  # of the time, at the beginning, without a kill
 LOOK_SECONDS = 0.05
-START_SECONDS = 60.0  # for all to drive
-RETURN_SECONDS = 30.0  # for a robot whose bridge was killed to be driven again
+START_SECONDS = 60.0  # until all robots are driven
+RETURN_SECONDS = 30.0  # until a robot whose bridge was killed is driven again
 
 
 class FleetPlan(NamedTuple):
     robots: int
-    seconds: float  # that it drives
+    seconds: float  # of driving
     kill_every: float  # s
     seed: int
     rate: float  # events a second of each driver
-    picture_rate: float | None  # Hz, of one camera, whose pictures the drivers get; 0: none; None: all that there is
+    picture_rate: float | None  # Hz, of one camera, whose pictures the drivers get; 0: none; None: all cameras
 
 
 async def fleet_soak(plan: FleetPlan, say: Callable[[str], None]) -> dict[str, Any]:
-    """The counts, by name; those of MUST_BE_ZERO must be 0.
+    """Run the soak, and return the counts by name; those of MUST_BE_ZERO must be 0.
 
     Raises:
         ProcessFailed: a bridge or the console did not start.
@@ -83,7 +83,7 @@ class _Soak:
         }
 
     async def _kill_until(self, end: float) -> None:
-        """One bridge after the other; each is driven again before the next dies."""
+        """Kill one bridge after the other; each is driven again before the next is killed."""
         due = time.monotonic()
         for name in self._order():
             if due >= end:
@@ -93,14 +93,14 @@ class _Soak:
             due = max(due + self._plan.kill_every, time.monotonic())
 
     async def _watch_machine(self) -> None:
-        """A machine without time for its processes breaks links; that is not the console's fault."""
+        """Measure delays of this process: a machine without time for its processes breaks links, not the console."""
         while True:
             due = time.monotonic() + LOOK_SECONDS
             await asyncio.sleep(LOOK_SECONDS)
             self._held_up = max(self._held_up, time.monotonic() - due)
 
     def _order(self) -> Iterator[str]:
-        """All in turn, every round in another order."""
+        """Yield all robots in turn, every round in another order."""
         chance = random.Random(self._plan.seed)
         while True:
             yield from chance.sample(self._world.names, len(self._world.names))

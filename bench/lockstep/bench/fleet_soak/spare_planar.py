@@ -1,9 +1,9 @@
-"""A bridge of the planar robot that spares the machine.
+"""A bridge of the planar robot that uses little of the machine.
 
 `python -m lockstep.bench.fleet_soak.spare_planar PORT EVENT_LOG RATE`.
 
-RATE pictures a second of one camera, or none, and no sound. Eight that draw all pictures of both cameras would leave
-two processors no time to measure anything else.
+It sends RATE pictures a second of one camera, or none, and no sound. Eight robots that draw all pictures of both
+cameras would leave two processors no time to measure anything else.
 """
 
 import json
@@ -28,7 +28,7 @@ __all__ = ["SparePlanarRobot"]
 
 class SparePlanarRobot(PlanarRobot):
     def __init__(self, picture_rate: float) -> None:
-        """`picture_rate` in Hz; 0: no camera."""
+        """`picture_rate`: Hz; 0: no camera."""
         super().__init__()
         camera = msgspec.structs.replace(OVERVIEW, frame_rate=picture_rate)
         self._cameras = [camera] if picture_rate else []

@@ -1,4 +1,4 @@
-"""What a fleet's soak found. No I/O."""
+"""Judges a fleet's soak. No I/O."""
 
 from collections.abc import Iterable, Sequence
 from typing import Any, NamedTuple
@@ -16,7 +16,7 @@ MAX_EVENT_AGE, HOLD = 2.0, 0.3  # of the planar robot
 
 
 class Span(NamedTuple):
-    """Some time of the run, on the monotonic clock."""
+    """A part of the run, on the monotonic clock."""
 
     began: float
     ended: float
@@ -46,7 +46,10 @@ def robot_verdict(driver: FleetDriver, records: Sequence[Record]) -> dict[str, A
 def fleet_verdict(
     drivers: Sequence[FleetDriver], robots: dict[str, dict[str, Any]], calm: Span, kills: Sequence[Span]
 ) -> dict[str, Any]:
-    """`calm`: while all bridges lived; `kills`: from each death until that robot was driven again."""
+    """Return the verdict on the fleet.
+
+    `calm`: the part in which all bridges lived; `kills`: from each death until that robot was driven again.
+    """
     calmly = _times(each for driver in drivers for each in driver.trips if _within(each, calm))
     meanwhile = _times(
         each
@@ -77,7 +80,7 @@ def _times(trips: Iterable[Trip]) -> list[float]:
 
 
 def _in_words(times: list[float]) -> dict[str, float | int]:
-    """Command to feedback, ms."""
+    """Return the percentiles of command to feedback, ms."""
     if not times:
         return {"trips": 0}
     shares = {"median_ms": 0.5, "p95_ms": 0.95, "p99_ms": 0.99, "maximum_ms": 1.0}

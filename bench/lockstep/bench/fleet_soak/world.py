@@ -1,4 +1,4 @@
-"""A console with several simulated robots, each bridge a process that can be killed and started again."""
+"""Runs a console with several simulated robots, each bridge a process that can be killed and started again."""
 
 import asyncio
 import sys
@@ -16,7 +16,7 @@ DOWN_SECONDS = 1.0  # between a bridge's death and its next life
 
 
 class _Bridge:
-    """Keeps its port over its lives, so that the console finds it again."""
+    """A bridge that keeps its port over its lives, so that the console finds it again."""
 
     def __init__(self, name: str, folder: Path, picture_rate: float | None) -> None:
         self.name = name
@@ -62,15 +62,15 @@ class _Bridge:
 
 
 class FleetWorld:
-    """Enter it: bridges and console run.
+    """A context manager in which bridges and console run.
 
     Attributes:
-        operator: link to the overview; `link` is that of one robot
+        operator: link to the overview; `link` returns that of one robot
         console: the console's process
     """
 
     def __init__(self, folder: Path, robots: int, picture_rate: float | None) -> None:
-        """`picture_rate` in Hz, of one camera; 0: none; None: both cameras and the microphone as they are."""
+        """`picture_rate`: Hz, of one camera; 0: none; None: both cameras and the microphone as they are."""
         self.names = [f"robot-{number}" for number in range(1, robots + 1)]
         self.operator = ""
         self._folder = folder
@@ -114,16 +114,16 @@ class FleetWorld:
         return self._console
 
     def link(self, name: str) -> str:
-        """The operator's link to that robot."""
+        """Return the operator's link to that robot."""
         base, _, fragment = self.operator.partition("/#")
         return f"{base}/robots/{name}/#{fragment}"
 
     async def kill(self, name: str) -> None:
-        """A crash; the bridge is back a moment later, with a new epoch."""
+        """Kill a bridge as a crash does, and start it again a moment later, with a new epoch."""
         await self._bridges[name].kill()
         await asyncio.sleep(DOWN_SECONDS)
         await self._bridges[name].start()
 
     def records(self, name: str) -> list[Record]:
-        """That bridge's own record of all its lives."""
+        """Return that bridge's own record of all its lives."""
         return read_records(self._bridges[name].event_log)

@@ -1,1 +1,1 @@
-"""A crowd that misbehaves in every way that a console should withstand, and what its operator feels of it."""
+"""A crowd that misbehaves in every way that a console should withstand, and the measured effect on its operator."""

@@ -38,7 +38,7 @@ def hostile_command(
     for one in kinds:
         try:
             found.append(uvloop.run(hostile(peers, seconds, seed, lambda text: typer.echo(text, err=True), one, front)))
-        except ProcessFailed as error:  # the figures of the others are worth having
+        except ProcessFailed as error:  # the figures of the others are still useful
             typer.echo(f"lockstep: {one or 'all kinds'}: {error}", err=True)
             failed = True
         else:
@@ -55,7 +55,7 @@ def hostile_command(
 
 
 def _table(found: list[dict[str, Any]]) -> str:
-    """A row for each kind. The crowd's own processor time shows whether it could do anything at all."""
+    """Return a row for each kind. The crowd's own processor time shows whether it could do anything at all."""
     head = "kind                  attempts  in peace  among them  ratio  p95 among  crowd s"
     return "\n".join([head, *map(_row, found)])
 

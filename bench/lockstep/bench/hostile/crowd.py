@@ -57,13 +57,13 @@ KINDS: tuple[Misbehaviour, ...] = (
 
 
 class Crowd:
-    """Members take the kinds in turn; each attacks again and again until the task is cancelled."""
+    """Members that take the kinds in turn; each attacks again and again until the task is cancelled."""
 
     def __init__(
         self, link: str, operator: str, bridge: str, count: int, seed: int, kinds: tuple[Misbehaviour, ...] = KINDS
     ) -> None:
         self.attempts: Counter[str] = Counter()
-        self.failures: Counter[str] = Counter()  # attempts that ended in an error of their own
+        self.failures: Counter[str] = Counter()  # attempts that ended in an error of the crowd's own
         self.seen: Counter[str] = Counter()
         self._link, self._operator = parse_link(link), parse_link(operator).token
         parts = urlsplit(bridge)
@@ -71,7 +71,7 @@ class Crowd:
         self._members = [(kinds[number % len(kinds)], Random(seed * 1000 + number)) for number in range(count)]
 
     async def run(self) -> None:
-        """Until cancelled."""
+        """Attack until cancelled."""
         limits = httpx.Limits(max_connections=200)
         async with httpx.AsyncClient(
             base_url=self._link.base, trust_env=False, limits=limits, timeout=10, verify=False

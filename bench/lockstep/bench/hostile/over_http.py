@@ -1,4 +1,4 @@
-"""What can be done to a console with TCP and HTTP."""
+"""Attacks on a console by TCP and HTTP."""
 
 import asyncio
 from random import Random
@@ -22,15 +22,15 @@ __all__ = [
     "stop_flood",
 ]
 
-SLOW_SECONDS = 3.0  # that one slow request is held
-HELD_SECONDS = 15.0  # that connections are held which do nothing
-HELD = 20  # of them at a time
+SLOW_SECONDS = 3.0  # for which one slow request is held
+HELD_SECONDS = 15.0  # for which connections are held that do nothing
+HELD = 20  # connections held at a time
 FLOOD = 50  # requests on one connection
 SDP = "application/sdp"
 
 
 async def garbage_bytes(target: Target, random: Random) -> None:
-    """What is no HTTP, or only begins like it."""
+    """Send data that is not HTTP, or only begins like it."""
     reader, writer = await target.connect()
     try:
         beginning = random.choice((b"", b"GET / HTTP/1.1\r\n", b"POST /whep HTTP/1.1\r\nContent-Length: -1\r\n\r\n"))
@@ -43,7 +43,7 @@ async def garbage_bytes(target: Target, random: Random) -> None:
 
 
 async def slow_requests(target: Target, random: Random) -> None:
-    """A head or a body that does not end, a byte at a time."""
+    """Send a head or a body that does not end, a byte at a time."""
     _, writer = await target.connect()
     try:
         writer.write(b"POST /api/stop HTTP/1.1\r\nHost: localhost\r\n")
@@ -57,7 +57,7 @@ async def slow_requests(target: Target, random: Random) -> None:
 
 
 async def forged_tokens(target: Target, random: Random) -> None:
-    """Guessing, and tokens with a part replaced."""
+    """Guess tokens, and send tokens with a part replaced."""
     head, _, rest = target.token.partition(".")
     forged = random.choice((random.randbytes(20).hex(), f"{head}.{rest[::-1]}", target.token[:-2] + "xx", "x" * 5000))
     answer = await target.http.get("/api/session", headers={"Authorization": f"Bearer {forged}"})
@@ -65,13 +65,13 @@ async def forged_tokens(target: Target, random: Random) -> None:
 
 
 async def many_requests(target: Target, random: Random) -> None:
-    """As many as one can ask for at once, of what costs the console something."""
+    """Ask at once, as often as possible, for responses that are costly for the console."""
     paths = [random.choice(("/api/session", "/api/invitations", "/metrics", "/")) for _ in range(20)]
     await asyncio.gather(*(target.ask("GET", path) for path in paths))
 
 
 async def giant_offers(target: Target, random: Random) -> None:
-    """Offers beyond every bound, and some just within."""
+    """Send offers beyond every bound, and some just within."""
     candidate = "a=candidate:1 1 udp 1 192.0.2.1 {} typ host\r\n"
     section = "m=video 9 UDP/TLS/RTP/SAVPF 96\r\na=mid:{}\r\n"
     text = random.choice(
@@ -85,12 +85,12 @@ async def giant_offers(target: Target, random: Random) -> None:
 
 
 async def scene_flood(target: Target, random: Random) -> None:
-    """The 3D scene's page, without a token."""
+    """Ask for the 3D scene's page without a token."""
     await _flood(target, b"GET /scene/x HTTP/1.1\r\nHost: localhost\r\n\r\n")
 
 
 async def stop_flood(target: Target, random: Random) -> None:
-    """STOP, without a token."""
+    """Press STOP without a token."""
     await _flood(target, b"POST /api/stop HTTP/1.1\r\nHost: localhost\r\nContent-Length: 0\r\n\r\n")
 
 
@@ -99,12 +99,12 @@ async def health_flood(target: Target, random: Random) -> None:
 
 
 async def address_flood(target: Target, random: Random) -> None:
-    """Far more than an address may ask, so that most is refused."""
+    """Send far more requests than an address may, so that most are refused."""
     await _flood(target, b"GET /api/session HTTP/1.1\r\nHost: localhost\r\n\r\n")
 
 
 async def _flood(target: Target, request: bytes) -> None:
-    """One request after the other on one connection, until it is closed."""
+    """Send one request after the other on one connection, until it is closed."""
     reader, writer = await target.connect()
     try:
         for _ in range(FLOOD):
@@ -121,18 +121,18 @@ async def _flood(target: Target, request: bytes) -> None:
 
 
 async def body_holders(target: Target, random: Random) -> None:
-    """Answered already, with one byte of the announced body every now and then."""
+    """Send single bytes of the announced body at intervals after the answer has come."""
     await _hold(target, b"POST /api/stop HTTP/1.1\r\nHost: localhost\r\nContent-Length: 1000\r\n\r\n")
 
 
 async def slow_posts(target: Target, random: Random) -> None:
-    """A good token, and a body that does not come. (That of a STOP would not be waited for: it is a stop.)"""
+    """Send a good token, and no body. (That of a STOP would not be waited for: it is a stop.)"""
     head = f"POST /whep HTTP/1.1\r\nHost: localhost\r\nAuthorization: Bearer {target.token}\r\n"
     await _hold(target, head.encode() + f"Content-Type: {SDP}\r\nContent-Length: 1000\r\n\r\n".encode())
 
 
 async def silent_connections(target: Target, random: Random) -> None:
-    """TCP and nothing more: where TLS is spoken, a handshake that does not begin."""
+    """Open TCP connections and send nothing: with TLS, a handshake that does not begin."""
     opened = [await asyncio.open_connection(*target.address) for _ in range(HELD)]
     await _until_closed(target, opened, b"")
 
@@ -159,7 +159,7 @@ async def _hold(target: Target, beginning: bytes) -> None:
 async def _until_closed(
     target: Target, opened: list[tuple[asyncio.StreamReader, asyncio.StreamWriter]], byte: bytes
 ) -> None:
-    """A byte a second on each, for a while."""
+    """Send a byte a second on each connection, for a while."""
     try:
         for _ in range(int(HELD_SECONDS)):
             await asyncio.sleep(1)
@@ -173,6 +173,6 @@ async def _until_closed(
 
 
 async def recordings_reader(target: Target, random: Random) -> None:
-    """The list of recordings with a good token, four at a time."""
+    """Read the list of recordings with a good token, four at a time."""
     request = f"GET /api/recordings HTTP/1.1\r\nHost: localhost\r\nAuthorization: Bearer {target.token}\r\n\r\n"
     await asyncio.gather(*(_flood(target, request.encode()) for _ in range(4)))

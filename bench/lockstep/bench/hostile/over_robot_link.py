@@ -14,7 +14,7 @@ SECONDS = 2.0
 
 
 async def bridge_handshakes(target: Target, random: Random) -> None:
-    """TLS handshakes, one after the other, and nothing behind them."""
+    """Make TLS handshakes, one after the other, and send nothing after them."""
     context = ssl.create_default_context()
     context.check_hostname, context.verify_mode = False, ssl.CERT_NONE
     with suppress(OSError, TimeoutError):
@@ -26,7 +26,7 @@ async def bridge_handshakes(target: Target, random: Random) -> None:
 
 
 async def bridge_silence(target: Target, random: Random) -> None:
-    """Connections that say nothing, or a part of a TLS record."""
+    """Open connections that send nothing, or a part of a TLS record."""
     writers = list[asyncio.StreamWriter]()
     try:
         for _ in range(HELD):

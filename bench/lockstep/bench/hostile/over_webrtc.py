@@ -34,7 +34,7 @@ __all__ = [
 
 SDP = "application/sdp"
 FRAGMENT = "application/trickle-ice-sdpfrag"
-STAY = 5.0  # s; longer than the console bears any of these
+STAY = 5.0  # s; longer than the console tolerates any of these
 CONNECT_SECONDS = 8.0
 BURST = 100
 
@@ -46,13 +46,13 @@ class Peer:
         self.pc = RTCPeerConnection(RTCConfiguration(iceServers=[]))
         self.channels: dict[str, RTCDataChannel] = {}
         self.closed = asyncio.Event()
-        self.event = 1  # the newest feedback's, for forging
+        self.event = 1  # event of the newest feedback, for forging
         self.issue = 1
         self.nonce = 0
         self.location = ""
 
     async def join(self, target: Target, *, video: bool = False, speaks: bool = False) -> bool:
-        """False when the console refuses it. `speaks`: as an operator, with a microphone."""
+        """Connect; False if the console refuses it. `speaks`: as an operator, with a microphone."""
         for label in ("control", "session", "stop"):
             lossy = label == "control"
             channel = self.pc.createDataChannel(label, ordered=not lossy, maxRetransmits=0 if lossy else None)
@@ -94,7 +94,7 @@ async def offer_of(pc: RTCPeerConnection) -> str:
 
 @asynccontextmanager
 async def joined(target: Target, *, video: bool = False, speaks: bool = False) -> AsyncIterator[Peer | None]:
-    """None: the console refused it, which is counted."""
+    """Connect a peer; None if the console refused it, which is counted."""
     peer = Peer()
     try:
         yield peer if await peer.join(target, video=video, speaks=speaks) else None
@@ -112,7 +112,7 @@ async def _until_thrown_out(peer: Peer, target: Target) -> None:
 
 
 async def message_flood(target: Target, random: Random) -> None:
-    """Valid messages, many more than a client needs."""
+    """Send valid messages, many more than a client needs."""
     async with joined(target) as peer:
         if peer is None:
             return
@@ -127,7 +127,7 @@ async def message_flood(target: Target, random: Random) -> None:
 
 
 async def media_flood(target: Target, random: Random) -> None:
-    """Voice many times faster than speech, reports on nothing, and datagrams that only look like SRTP."""
+    """Send voice many times faster than speech, reports on nothing, and datagrams that only look like SRTP."""
     async with joined(target, speaks=True) as peer:
         if peer is None or peer.pc.sctp is None:
             return
@@ -137,7 +137,7 @@ async def media_flood(target: Target, random: Random) -> None:
         for number in range(2500):
             voice = RtpPacket(payload_type=96, ssrc=sender._ssrc, sequence_number=number, timestamp=960 * number)
             voice.payload = random.randbytes(80)
-            with suppress(ConnectionError):  # it was thrown out
+            with suppress(ConnectionError):  # the console ended the connection
                 await dtls._send_rtp(voice.serialize())
                 await dtls._send_rtp(bytes(RtcpRrPacket(random.getrandbits(32), reports)))
                 await dtls.transport._send(b"\x80\x60" + random.randbytes(100))
@@ -149,7 +149,7 @@ async def media_flood(target: Target, random: Random) -> None:
 
 
 async def garbage_messages(target: Target, random: Random) -> None:
-    """What is no message, on channels that exist and channels that do not."""
+    """Send data that is not a message, on channels that exist and channels that do not."""
     async with joined(target) as peer:
         if peer is None:
             return
@@ -165,7 +165,7 @@ async def garbage_messages(target: Target, random: Random) -> None:
 
 
 async def forged_commands(target: Target, random: Random) -> None:
-    """Commands and rests for the newest event, without the seat."""
+    """Send commands and rests for the newest event, without the seat."""
     async with joined(target) as peer:
         if peer is None:
             return
@@ -181,7 +181,7 @@ async def forged_commands(target: Target, random: Random) -> None:
 
 
 async def reset_spam(target: Target, random: Random) -> None:
-    """An observer that wants to release the stop, on the channel and over HTTP."""
+    """Ask as an observer for the release of the stop, on the channel and over HTTP."""
     async with joined(target) as peer:
         if peer is None:
             return
@@ -192,7 +192,7 @@ async def reset_spam(target: Target, random: Random) -> None:
 
 
 async def slow_reader(target: Target, random: Random) -> None:
-    """It asks for pictures and feedback, and takes nothing any more."""
+    """Ask for pictures and feedback, and then read nothing."""
     async with joined(target, video=True) as peer:
         if peer is None or peer.pc.sctp is None:
             return
@@ -202,11 +202,11 @@ async def slow_reader(target: Target, random: Random) -> None:
 
 
 def _ignore(data: bytes, component: int) -> None:
-    """Not read."""
+    """Ignore a datagram."""
 
 
 async def half_open(target: Target, random: Random) -> None:
-    """The same offer again and again, never connected to."""
+    """Send the same offer again and again, and never connect."""
     pc = RTCPeerConnection(RTCConfiguration(iceServers=[]))
     try:
         pc.createDataChannel("control")
@@ -219,7 +219,7 @@ async def half_open(target: Target, random: Random) -> None:
 
 
 async def restart_flood(target: Target, random: Random) -> None:
-    """ICE restarts and candidates without end."""
+    """Send ICE restarts and candidates without end."""
     async with joined(target) as peer:
         if peer is None:
             return
@@ -229,7 +229,7 @@ async def restart_flood(target: Target, random: Random) -> None:
 
 
 async def garbage_datagrams(target: Target, random: Random) -> None:
-    """Random datagrams to the ports that an answer names: noise, and what looks like DTLS, RTP and STUN."""
+    """Send random datagrams to the ports in an answer: noise, and data that looks like DTLS, RTP and STUN."""
     pc = RTCPeerConnection(RTCConfiguration(iceServers=[]))
     try:
         pc.createDataChannel("control")
@@ -259,7 +259,7 @@ async def _shower(ports: list[int], random: Random) -> None:
 
 
 async def many_sections(target: Target, random: Random) -> None:
-    """Whole offers of forty media sections."""
+    """Send complete offers of forty media sections."""
     pc = RTCPeerConnection(RTCConfiguration(iceServers=[]))
     try:
         for _ in range(40):
@@ -270,7 +270,7 @@ async def many_sections(target: Target, random: Random) -> None:
 
 
 async def stun_flood(target: Target, random: Random) -> None:
-    """Connectivity checks with false credentials, to the port of one's own peer."""
+    """Send connectivity checks with false credentials to the port of the attacker's own peer."""
     async with joined(target) as peer:
         if peer is None:
             return

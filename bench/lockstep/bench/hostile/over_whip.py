@@ -17,13 +17,13 @@ __all__ = ["publisher_flood"]
 
 SDP = "application/sdp"
 CONNECT_SECONDS = 8.0
-FLOOD_SECONDS = 10.0  # of one kind of packet, or until the console has ended it
+FLOOD_SECONDS = 10.0  # of one kind of packet, or until the console has ended the session
 BURST = 50  # packets between two looks at the console's answers
 PICTURE = bytes((0x10, 0x90, 0x80)) + bytes(1100)  # the first packet of a VP8 picture
 
 
 async def publisher_flood(target: Target, random: Random) -> None:
-    """One kind of packet as fast as it can be sent: pictures without end, holes, noise, sources, reports."""
+    """Send one kind of packet as fast as possible: endless pictures, holes, noise, sources, reports."""
     pc = RTCPeerConnection(RTCConfiguration(iceServers=[]))
     try:
         transceiver = pc.addTransceiver("video", direction="sendonly")
@@ -50,7 +50,7 @@ async def publisher_flood(target: Target, random: Random) -> None:
 async def _flood(
     transport: Any, make: Callable[[int, RtpPacket, Random], bytes], packet: RtpPacket, random: Random
 ) -> int:
-    """How many packets were sent, each made of `packet`."""
+    """Send packets made from `packet`, and return their number."""
     sent, end = 0, time.monotonic() + FLOOD_SECONDS
     while time.monotonic() < end and transport.state == "connected":
         for _ in range(BURST):
@@ -70,7 +70,7 @@ def _endless_picture(number: int, packet: RtpPacket, random: Random) -> bytes:
 
 
 def _holes(number: int, packet: RtpPacket, random: Random) -> bytes:
-    """Each second packet is missing: all are waited for, and asked for."""
+    """Leave out each second packet: all are waited for, and asked for."""
     return _rtp(packet, 2 * number, PICTURE, 3000 * number)
 
 
@@ -84,6 +84,6 @@ def _sources(number: int, packet: RtpPacket, random: Random) -> bytes:
 
 
 def _reports(number: int, packet: RtpPacket, random: Random) -> bytes:
-    """As full as they can be, each from a new source."""
+    """Make a report as full as it can be, each from a new source."""
     blocks = [RtcpReceiverInfo(random.getrandbits(32), 0, 0, 0, 0, 0, 0) for _ in range(31)]
     return bytes(RtcpRrPacket(random.getrandbits(32), blocks))

@@ -1,4 +1,4 @@
-"""Drive a robot in peace, then among the crowd, then in peace again; compare the operator's times.
+"""Drives a robot undisturbed, then among the crowd, then undisturbed again, and compares the operator's times.
 
 The crowd comes directly, with TLS, or through a real Caddy with deploy/Caddyfile.
 """
@@ -26,19 +26,22 @@ from lockstep.client import Console
 
 __all__ = ["FRONTS", "hostile", "memory_of"]
 
-FRONTS = ("direct", "tls", "caddy")  # how the crowd comes
+FRONTS = ("direct", "tls", "caddy")  # the crowd's ways to the console
 
 WARM_UP = 3.0  # s
 INTERVAL = (0.046, 0.054)  # s between commands: spread over two ticks of the robot, or each waits for its tick alike
 ALLOWED = 1.2  # times the undisturbed median
 CADDYFILE = Path(__file__).resolve().parents[4] / "deploy" / "Caddyfile"
-CROWD_SECONDS = 60.0  # for it to say something
+CROWD_SECONDS = 60.0  # until the crowd has an answer
 
 
 async def hostile(
     peers: int, seconds: float, seed: int, say: Callable[[str], None], kind: str = "", front: str = "direct"
 ) -> dict[str, Any]:
-    """The figures; `say` tells how it goes. `kind`: one of the crowd's alone; "": all of them together."""
+    """Run the comparison and return its figures; `say` reports the progress.
+
+    `kind`: one of the crowd's alone; "": all of them together.
+    """
     before = await busy_percent(1.0)
     settings: dict[str, Any] = {"LOCKSTEP_WHIP": "phone"} | ({"LOCKSTEP_TLS": "self-signed"} if front == "tls" else {})
     async with running_stack("planar", is_secured=True, **settings) as stack, _entry(stack, front) as link:
@@ -91,7 +94,7 @@ async def hostile(
 
 @asynccontextmanager
 async def _entry(stack: Stack, front: str) -> AsyncIterator[str]:
-    """The observer's link by which the crowd comes."""
+    """Yield the observer's link by which the crowd comes."""
     if front != "caddy":
         yield stack.observer
         return
@@ -125,7 +128,7 @@ async def _until_open(port: int) -> None:
 
 
 async def _drive(console: Console, seconds: float) -> list[float]:
-    """Seconds from each command's first sending to its feedback."""
+    """Return the seconds from each command's first sending to its feedback."""
     end, taken = time.monotonic() + seconds, list[float]()
     values, random = [0.0] * len(console.description.axes), Random(1)
     while time.monotonic() < end:
@@ -143,7 +146,7 @@ def _figures(taken: list[float]) -> dict[str, float]:
 
 
 def memory_of(process: Running) -> float:
-    """Resident MiB (proc(5), /proc/pid/status)."""
+    """Return the resident memory in MiB (proc(5), /proc/pid/status)."""
     for line in Path(f"/proc/{process.pid}/status").read_text().splitlines():
         if line.startswith("VmRSS:"):
             return round(int(line.split()[1]) / 1024, 1)
@@ -151,7 +154,7 @@ def memory_of(process: Running) -> float:
 
 
 async def _refused(stack: Stack) -> dict[str, dict[str, float]]:
-    """By name, where; and why peers ended."""
+    """Return the refusals by name and place, and the reasons for ended peers."""
     metrics = await stack.metrics()
     found = {
         where: metrics.values("lockstep_bad_input_total", "reason", where=where)

@@ -1,4 +1,4 @@
-"""Whom the crowd attacks, and how one member of it does that."""
+"""The crowd's target, and the requests by which a member attacks it."""
 
 import asyncio
 import ssl
@@ -19,7 +19,7 @@ class Target(NamedTuple):
     url: str
     token: str  # an observer's
     operator: str  # an operator's, who publishes a camera and speaks
-    bridge: tuple[str, int]  # where the robot's listens, by TLS
+    bridge: tuple[str, int]  # address of the robot's bridge, which listens with TLS
     http: httpx.AsyncClient
     seen: Counter[str]  # the console's answers, by name or status
 
@@ -29,7 +29,7 @@ class Target(NamedTuple):
         return parts.hostname or "", parts.port or (443 if parts.scheme == "https" else 80)
 
     async def connect(self) -> tuple[asyncio.StreamReader, asyncio.StreamWriter]:
-        """TCP, and TLS where the console or the proxy before it speaks that."""
+        """Open a TCP connection, with TLS if the console or the proxy before it speaks that."""
         host, port = self.address
         if not self.url.startswith("https"):
             return await asyncio.open_connection(host, port)

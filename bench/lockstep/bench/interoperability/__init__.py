@@ -1,1 +1,1 @@
-"""Which clients get through which kinds of network: `lockstep interoperability`."""
+"""Checks which clients get through which kinds of network: `lockstep interoperability`."""

@@ -1,6 +1,6 @@
-"""The table of clients and ways: what is run, for how long, and what was found so far. No I/O.
+"""The table of clients and ways: the cells to run, the time for each, and the results so far. No I/O.
 
-A way is how a client's datagrams reach the console. A client that cannot take a way has no cell there.
+A way is the route of a client's datagrams to the console. A client that cannot take a way has no cell there.
 """
 
 from collections.abc import Iterable, Mapping
@@ -15,8 +15,8 @@ __all__ = ["CELLS", "Cell", "Found", "seconds_of", "table_of", "wanted"]
 LONG_SECONDS, SHORT_SECONDS = 1200.0, 60.0
 LEAST_PICTURES = 2.0  # a second, of the first camera
 
-# Plain aiortc has neither ICE-TCP nor, in our example, a TURN server; GStreamer's webrtcbin has no TURN server in ours.
-# A Janus stands at the robot's side, so that only what is between it and the console counts.
+# Plain aiortc has no ICE-TCP; the examples for it and for GStreamer's webrtcbin have no TURN server. A Janus stands at
+# the robot's side, so that only what is between it and the console counts.
 WITHOUT: Mapping[Way, frozenset[Client]] = {
     "udp": frozenset(),
     "tcp": frozenset({"aiortc", "headless", "janus"}),
@@ -37,19 +37,19 @@ class Cell(NamedTuple):
 
 
 class Found(msgspec.Struct, frozen=True, kw_only=True):
-    """What one run of a cell came to."""
+    """The result of one run of a cell."""
 
     seconds: float
     pictures: int = 0
-    events: int = 0  # that the client heard of
-    violations: int = 0  # pictures and sounds beyond the tolerance that were rendered; 0 where the client cannot tell
+    events: int = 0  # events that the client heard of
+    violations: int = 0  # pictures and sounds rendered beyond the tolerance; 0 if the client cannot tell
     reconnections: int = 0
-    trouble: str = ""  # why it did not run to its end
+    trouble: str = ""  # why the run did not come to its end
     commit: str = ""
 
     @property
     def verdict(self) -> str:
-        """ "ok", or what is wrong."""
+        """The verdict: "ok", or the fault."""
         if self.trouble:
             return self.trouble
         if self.pictures < LEAST_PICTURES * self.seconds:
@@ -65,16 +65,16 @@ CELLS = tuple(Cell(client, way) for way in get_args(Way) for client in get_args(
 
 
 def seconds_of(cell: Cell, scale: float = 1.0) -> float:
-    """20 minutes over UDP, one over each other way; `scale` makes all of them shorter or longer."""
+    """Return the time of a run: 20 minutes over UDP, one over each other way; `scale` multiplies all of them."""
     return scale * (LONG_SECONDS if cell.way == "udp" else SHORT_SECONDS)
 
 
 def wanted(
     known: Mapping[str, Found], *, clients: Iterable[str] = (), ways: Iterable[str] = (), again: bool = False
 ) -> list[Cell]:
-    """The cells that are still to be run: all that are not "ok" yet, of these clients and ways (empty: all).
+    """Return the cells that are still to be run: those that are not "ok" yet, of these clients and ways (empty: all).
 
-    `again`: also those that are.
+    `again`: also those that are "ok".
     """
     chosen, along = set(clients), set(ways)
     return [
@@ -87,7 +87,7 @@ def wanted(
 
 
 def table_of(known: Mapping[str, Found]) -> str:
-    """In Markdown: a row for each client, a column for each way."""
+    """Return the table in Markdown: a row for each client, a column for each way."""
     ways = get_args(Way)
     lines = ["| client | " + " | ".join(ways) + " |", "|---|" + "---|" * len(ways)]
     for client in get_args(Client):

@@ -1,4 +1,4 @@
-"""Runs cells, one after the other: a world, a client for its time, and what came of it."""
+"""Runs cells one after the other: starts a world, runs a client for its time, and returns the result."""
 
 import asyncio
 import re
@@ -20,13 +20,17 @@ __all__ = ["run_cell"]
 
 EXAMPLES = Path(__file__).resolve().parents[4] / "docs" / "examples"
 SLACK_SECONDS = 150.0  # for opening, on the longest path, and for the end
-WATCHERS = ("gstreamer", "janus")  # somebody else drives
+WATCHERS = ("gstreamer", "janus")  # a helper drives beside them
 PICTURE = re.compile(r"event (\d+), gap (-?\d+), (shown|left out)")
 TOLERANCE = 4  # events
 
 
 async def run_cell(cell: Cell, seconds: float, say: Callable[[str], None]) -> Found:
-    """Raises FileNotFoundError, NamespacesUnavailable: this machine lacks something."""
+    """Run one cell.
+
+    Raises:
+        FileNotFoundError, NamespacesUnavailable: this machine lacks something.
+    """
     say(f"{cell}: {seconds:g} s")
     try:
         async with running_world(cell.way, cell.client) as world:
@@ -77,8 +81,8 @@ async def _last_json(world: World, command: list[str], seconds: float) -> dict[s
 
 
 async def _gstreamer(world: World, link: str, seconds: float) -> dict[str, Any]:
-    """The example says each picture in a line, until it is interrupted."""
-    python = shutil.which("python3", path="/usr/bin") or "python3"  # Debian's, whose packages it needs
+    """Run the example, which prints a line for each picture, until it is interrupted."""
+    python = shutil.which("python3", path="/usr/bin") or "python3"  # Debian's, whose packages the example needs
     visitor = await world.visit([python, str(EXAMPLES / "gstreamer" / "watch.py"), link])
     await visitor.line(PICTURE.pattern, SLACK_SECONDS)
     shown = violations = newest = 0

@@ -1,8 +1,8 @@
-"""One client of a cell, in a process that may stand in another network namespace.
+"""One client of a cell, in a process that may be in another network namespace.
 
-`python -m lockstep.bench.interoperability.visitor CLIENT LINK SECONDS [DOOR]`: drives for this time and says in one
-JSON line what came. CLIENT is `headless`, `janus`, `chromium` or `firefox`. DOOR is an address host:port that a port of
-loopback leads to, so that a page is at a secure origin although its console speaks HTTP.
+`python -m lockstep.bench.interoperability.visitor CLIENT LINK SECONDS [DOOR]`: drives for this time and prints the
+result as one JSON line. CLIENT is `headless`, `janus`, `chromium` or `firefox`. DOOR is an address host:port to which a
+port of loopback leads, so that a page has a secure origin although its console speaks HTTP.
 """
 
 import asyncio
@@ -37,7 +37,7 @@ async def _pipe(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> N
 
 @asynccontextmanager
 async def _door(address: str) -> AsyncIterator[int]:
-    """A port of loopback that leads to `address`."""
+    """Open a port of loopback that leads to `address`."""
     host, _, port = address.rpartition(":")
 
     async def accept(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:

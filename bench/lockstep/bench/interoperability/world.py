@@ -1,4 +1,4 @@
-"""What a cell needs besides its client: a robot, a console and a way between them, each process in its own network."""
+"""The world of a cell without its client: a robot, a console and a way between them, each in its own network."""
 
 import asyncio
 import json
@@ -22,7 +22,7 @@ from lockstep.bench.relay.stage import FIRST_PORT, ROOM, Process
 
 __all__ = ["World", "running_world"]
 
-CLOUD = "203.0.113.7"  # of the block for documentation (RFC 5737)
+CLOUD = "203.0.113.7"  # from the block for documentation (RFC 5737)
 ONE_WAY = 0.3  # s
 PORT = 8000
 TURN_PORT, TURN_SECRET = 3478, "only between these two namespaces"
@@ -30,7 +30,7 @@ STOP_SECONDS = 5.0
 
 
 class _Starter:
-    """Starts processes in the networks of both sides; in this machine's own where `spaces` is None."""
+    """Starts processes in the networks of both sides; in this machine's own if `spaces` is None."""
 
     def __init__(self, stack: AsyncExitStack, spaces: Namespaces | None) -> None:
         self._stack = stack
@@ -54,18 +54,21 @@ class _Starter:
 
 @dataclass(frozen=True)
 class World:
-    """`links`: of each console: "operator" and "observer" as its client reaches it, "near" from beside the console."""
+    """The running processes, and the `links` to each console.
+
+    The links are "operator" and "observer" as the client reaches the console, and "near" from beside the console.
+    """
 
     links: tuple[dict[str, str], ...]
     doors: tuple[str, ...]  # host:port of each console; "": the link is at loopback
     starter: _Starter
 
     async def visit(self, command: list[str]) -> Process:
-        """The client's process, on its side of the way."""
+        """Start the client's process, on its side of the way."""
         return await self.starter.start("operator", command)
 
     async def drive(self, number: int) -> None:
-        """Somebody drives beside this console, so that events go on for those who only watch."""
+        """Drive beside this console, so that events go on for clients that only watch."""
         command = [sys.executable, "-m", "lockstep.bench.relay.driver", self.links[number]["near"], "0"]
         driver = await self.starter.start("robot", command)
         await driver.line(r'^\{"at"')
@@ -73,7 +76,13 @@ class World:
 
 @asynccontextmanager
 async def running_world(way: Way, client: Client) -> AsyncIterator[World]:
-    """Raises NamespacesUnavailable, FileNotFoundError (a program is missing), RuntimeError (it did not start)."""
+    """Start a world.
+
+    Raises:
+        NamespacesUnavailable: this machine or user cannot have network namespaces.
+        FileNotFoundError: a program is missing.
+        RuntimeError: something did not start.
+    """
     async with AsyncExitStack() as stack:
         folder = Path(stack.enter_context(TemporaryDirectory(prefix="lockstep-interoperability-")))
         spaces = None

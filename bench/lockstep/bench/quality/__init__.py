@@ -1,1 +1,1 @@
-"""What the quality controller and the repair of losses do behind a bad network (`--help`)."""
+"""Measures the quality controller and the repair of losses behind a bad network (`--help`)."""

@@ -1,4 +1,4 @@
-"""Delay and queue over time, as SVG."""
+"""Draws delay and queue over time, as SVG."""
 
 from pathlib import Path
 from typing import Any
@@ -13,7 +13,7 @@ WORDS = {"off": "controller off", "on": "controller on"}
 
 
 def draw(results: dict[str, Any], path: Path) -> None:
-    """One column for each network: command-to-picture delay above, the queue in the network below."""
+    """Draw a column for each network: command-to-picture delay above, the queue in the network below."""
     figure = Figure(figsize=(5.2 * len(results), 5.4), layout="constrained")
     FigureCanvasSVG(figure)
     axes = figure.subplots(2, len(results), sharex="col", squeeze=False)

@@ -1,7 +1,7 @@
-"""Losses and their repair in simulated time: the console's and the client's own cores on either end of a lossy path.
+"""Simulates losses and their repair: the console's and the client's own cores on either end of a lossy path.
 
-What is measured does not depend on how busy the machine is, and a seed repeats it exactly. The pictures are sizes
-only: two packets each, keyframes of six, at 30 Hz, as of 640x480 at about 500 kbit/s.
+Time is simulated, so the results do not depend on the load of the machine, and a seed repeats them exactly. The
+pictures are sizes only: two packets each, keyframes of six, at 30 Hz, like 640x480 at about 500 kbit/s.
 """
 
 import heapq
@@ -39,9 +39,9 @@ PARAMETERS = OutgoingParameters(
 
 @dataclass
 class Repaired:
-    """What came of it."""
+    """The results of a simulation."""
 
-    shown: list[float] = field(default_factory=list)  # s; when each picture was complete
+    shown: list[float] = field(default_factory=list)  # s, at which each picture was complete
     pictures: int = 0  # sent
     keyframes: int = 0
     packets: int = 0  # sent, without the repeated ones
@@ -65,7 +65,7 @@ class Repaired:
 def simulate(
     *, loss: float, round_trip: float, seconds: float, seed: int, burst: float = 1.0, retransmit: bool = True
 ) -> Repaired:
-    """Send pictures for so long; `burst` is how many packets are lost together, on average."""
+    """Simulate `seconds` of pictures; `burst`: packets lost together, on average."""
     simulation = _Simulation(loss, round_trip, random.Random(seed), burst, retransmit)
     return simulation.run(seconds)
 
@@ -103,7 +103,7 @@ class _Simulation:
         heapq.heappush(self._agenda, (when, next(self._order), action))
 
     def _pass(self, direction: str, now: float, action: Callable[[float], None]) -> None:
-        """Over the path, unless it is lost: a two-state chain (Gilbert)."""
+        """Pass a packet over the path unless it is lost, by a two-state chain (Gilbert)."""
         losing = self._losing[direction]
         chance = self._leave if losing else self._enter
         if self._draw.random() < chance:
@@ -123,7 +123,7 @@ class _Simulation:
         self._serve(now)
 
     def _serve(self, now: float) -> None:
-        """What the console's core has to send and to tell."""
+        """Send the packets and handle the events of the console's core."""
         for packet in self._server.packets_to_send():
             self._send(packet, now)
         self._server.controls_to_send()
@@ -170,7 +170,7 @@ class _Simulation:
     def _look_for_losses(self, now: float) -> None:
         due = self._losses.due()
         if due is None or due > now:
-            return  # planned anew when it was put off
+            return  # put off, and planned anew then
         self._losses.handle_timer(now)
         for control in self._sink.drain_controls():
             if isinstance(control, Nack):

@@ -1,4 +1,4 @@
-"""Robot, console, network and a driving client for one measurement."""
+"""Runs robot, console, network and a driving client for one measurement."""
 
 import asyncio
 import sys
@@ -22,7 +22,7 @@ SAMPLE = 0.05  # s between two looks at the screen and the queue
 
 @dataclass(frozen=True)
 class Picture:
-    """One that arrived at the client and was decoded."""
+    """A picture that arrived at the client and was decoded."""
 
     at: float  # s since the drive began
     stamp: int
@@ -32,7 +32,7 @@ class Picture:
 
 @dataclass(frozen=True)
 class Sight:
-    """What the operator has, looked at now and then."""
+    """A sample of the operator's view and of the queue."""
 
     at: float  # s since the drive began
     gap: int | None  # of the newest picture within tolerance; None before the first
@@ -40,14 +40,14 @@ class Sight:
 
 
 class Drive:
-    """What one drive saw."""
+    """The record of one drive."""
 
     def __init__(self, tolerance: int) -> None:
         self.tolerance = tolerance
         self.began = time.monotonic()
         self.pictures: list[Picture] = []
         self.sights: list[Sight] = []
-        self.delays: list[tuple[float, float]] = []  # when, s from a command to the first picture of its event
+        self.delays: list[tuple[float, float]] = []  # since began, from command to the first picture, s
         self.events = 0
         self.lost_at: float | None = None  # s since the drive began, when the console gave the operator up
         self._sent: list[tuple[int, float]] = []
@@ -57,7 +57,7 @@ class Drive:
         self._sent.append((event, at))
 
     def arrived(self, stamp: int, event: int, width: int) -> None:
-        """A picture came while the newest feedback was of `event`."""
+        """Record a picture that came while the newest feedback was of `event`."""
         now = time.monotonic()
         gap = event_gap(event, stamp)
         self.pictures.append(Picture(now - self.began, stamp, gap, width))
@@ -83,7 +83,7 @@ async def running_console(robot: str, quality: bool) -> AsyncIterator[Stack]:
 async def driving(
     stack: Stack, profile: Profile, *, seconds: float, tolerance: int, seed: int, codec: str | None = None
 ) -> Drive:
-    """Drive round and round, as fast as events come, and note all pictures that arrive."""
+    """Drive in circles, as fast as events come, and record all pictures that arrive."""
     async with (
         NetworkProcess(profile, console_url=stack.url, seed=seed) as network,
         Console(
@@ -110,7 +110,7 @@ async def driving(
                     drive.sent(feedback.event, began)
         except TimeoutError:
             pass
-        except ConsoleLost:  # a network that is too full for acknowledgements: it ends there
+        except ConsoleLost:  # a network that is too full for acknowledgements ends the drive
             drive.lost_at = time.monotonic() - drive.began
         drive.events = (console.feedback.event if console.feedback is not None else 0) - first
         for helper in helpers:
@@ -119,7 +119,7 @@ async def driving(
 
 
 async def _watch(console: Console, drive: Drive) -> None:
-    with suppress(ConsoleLost):  # the drive notes it
+    with suppress(ConsoleLost):  # the drive records it
         async for picture in console.pictures(keep=30):
             if picture.stamp is not None and console.feedback is not None:
                 drive.arrived(picture.stamp, console.feedback.event, picture.frame.width)

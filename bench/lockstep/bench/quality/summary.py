@@ -1,4 +1,4 @@
-"""A drive in figures."""
+"""Summarises a drive in figures."""
 
 from collections.abc import Sequence
 
@@ -10,7 +10,7 @@ __all__ = ["summarise", "timeline"]
 
 
 def summarise(drive: Drive, seconds: float) -> dict[str, float | int | None]:
-    """Times in ms, shares in %."""
+    """Return the figures of a drive; times in ms, shares in %."""
     delays = [delay * 1000 for _, delay in drive.delays]
     gaps = [sight.gap for sight in drive.sights if sight.gap is not None]
     queues = [sight.queue * 1000 for sight in drive.sights]
@@ -36,7 +36,7 @@ def summarise(drive: Drive, seconds: float) -> dict[str, float | int | None]:
 
 
 def timeline(drive: Drive, seconds: float, step: float = 0.5) -> dict[str, list[float | None]]:
-    """By intervals of `step`: the longest command-to-picture delay, the longest queue (ms), the widest picture."""
+    """Return, by intervals of `step` s, the longest command-to-picture delay and queue (ms) and the widest picture."""
     count = int(seconds / step)
     delays: list[float | None] = [None] * count
     queues: list[float | None] = [None] * count

@@ -1,7 +1,8 @@
 """Makes a recording of any length without a session: `python -m lockstep.bench.recordings.hour FILE [SECONDS]`.
 
-Records as of a driven robot: 25 events a second with command, feedback and joints, two cameras with 15 pictures a
-second of 4 kB, 50 packets of sound. What is in the pictures does not matter for how fast a file opens and seeks.
+The records are those of a driven robot: 25 events a second with command, feedback and joints, two cameras with 15
+pictures a second of 4 kB, 50 packets of sound. The contents of the pictures do not affect the time to open a file and
+to seek in it.
 """
 
 import os
@@ -31,7 +32,11 @@ KEYFRAME_EVERY = 60  # pictures
 
 
 def make_recording(path: Path, seconds: int) -> None:
-    """Raises DiskTrouble."""
+    """Write a recording of `seconds` to `path`.
+
+    Raises:
+        DiskTrouble: the recording cannot be written.
+    """
     description = create_robot("planar").describe()
     cameras = [camera.name for camera in description.cameras[:2]]
     codecs = {**dict.fromkeys(cameras, "H264"), **{each.name: "opus" for each in description.microphones[:1]}}

@@ -1,1 +1,1 @@
-"""What a relay costs and adds, with a real Janus in a network namespace."""
+"""Measures the cost and the delay of a relay, with a real Janus in a network namespace."""

@@ -1,9 +1,9 @@
 """Many observers behind relays: `python -m lockstep.bench.relay.audience LINK COUNT`.
 
-Each is a whole observer: a line to the console, and the main camera with the feedback from a relay. RTP
-is counted as it comes out of the socket, neither decrypted nor decoded, so that so many fit on the machine they load.
-Once all are connected it says so in a JSON line, and every second afterwards how many packets each has got by then and
-why how many have lost their connection.
+Each is a complete observer: a line to the console, and the main camera with the feedback from a relay. RTP is counted
+as it comes out of the socket, neither decrypted nor decoded, so that so many fit on the machine they load. Once all are
+connected a JSON line is printed, and every second afterwards one with the packets that each has got by then and the
+number of lost connections by reason.
 """
 
 import asyncio
@@ -23,13 +23,13 @@ from lockstep.rtc.demux import DatagramKind, datagram_kind
 
 __all__ = ["main"]
 
-AT_ONCE = 4  # that connect at the same time
+AT_ONCE = 4  # connecting at the same time
 CONNECT_SECONDS = 60.0
 TRIES = 5
 
 
 class _Counter:
-    """Stands before an observer's connection to the relay, and sees each datagram first."""
+    """Takes each datagram before an observer's connection to the relay, and counts RTP."""
 
     def __init__(self, peer: Any) -> None:
         self.packets = 0
@@ -45,7 +45,7 @@ class _Counter:
 
 @asynccontextmanager
 async def _connected(link: str, name: str) -> AsyncIterator[Console]:
-    """Tried again while the machine is too busy to answer."""
+    """Connect; try again while the machine is too busy to answer."""
     async with AsyncExitStack() as stack:
         for left in reversed(range(TRIES)):
             console = Console(

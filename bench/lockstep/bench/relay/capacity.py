@@ -1,8 +1,8 @@
-"""The cost of many observers, from measured figures.
+"""Computes the cost of many observers from measured figures.
 
 `python -m lockstep.bench.relay.capacity [COUNT …] [--gigabits 1]`.
 
-Most figures are those that `python -m bench relay` and `python -m bench observers` measure; assumed ones say so.
+Most figures are those that `python -m bench relay` and `python -m bench observers` measure; assumed ones are marked.
 docs/scale.md has the conditions. Pure arithmetic: no process runs.
 """
 
@@ -20,14 +20,14 @@ Limit = Literal["network", "processor", "none"]
 
 @dataclass(frozen=True)
 class Figures:
-    """Of one observer and one machine. Shares of a core are in %."""
+    """The figures of one observer and one machine. Shares of a core are in %."""
 
     bits_per_second: float  # to one observer: cameras, sound, feedback, headers
     packets_per_second: float  # the same
     direct_share: float  # of a core of the console, for one observer that it serves itself
-    member_share: float  # of a core of the console, for the line of one behind a relay
+    member_share: float  # of a core of the console, for the line of an observer behind a relay
     relay_microseconds: float  # of a core of a Janus, for one packet to one observer
-    hop_milliseconds: float  # that one Janus adds
+    hop_milliseconds: float  # added by one Janus
     network_bits: float  # of each machine
     usable: float = 0.7  # of network and processor; the rest is for bursts
     console_share: float = 50.0  # of the console's one core that observers may take; the operator comes first
@@ -49,19 +49,19 @@ MEASURED = Figures(
 @dataclass(frozen=True)
 class Plan:
     observers: int
-    direct: int  # as many as the console could serve itself
+    direct: int  # number that the console could serve itself
     relays: int  # machines; 0: the console alone
     hops: int  # between the console and an observer
     per_relay: int  # observers that one Janus serves
-    limit: Limit  # what bounds that
-    console_bits: float  # that the console sends
-    first_bits: float  # that the first Janus sends to the others
+    limit: Limit  # bound of that number
+    console_bits: float  # sent by the console
+    first_bits: float  # sent by the first Janus to the others
     added_milliseconds: float
-    members: int  # as many as the console can keep as participants behind relays
+    members: int  # number that the console can keep as participants behind relays
 
 
 def plan(observers: int, figures: Figures) -> Plan:
-    """How many relays, and what bounds them."""
+    """Return the number of relays, and what bounds them."""
     budget = figures.network_bits * figures.usable
     direct = min(int(figures.console_share / figures.direct_share), int(budget / figures.bits_per_second))
     members = min(figures.most_members, int(figures.console_share / figures.member_share))
@@ -91,7 +91,7 @@ def plan(observers: int, figures: Figures) -> Plan:
 
 
 def render(plans: Sequence[Plan]) -> str:
-    """As a table of Markdown."""
+    """Return the plans as a table of Markdown."""
     head = "| observers | relays | each serves at most, by | console sends | first relay sends on | delay added | |"
     lines = [head, "|---|---|---|---|---|---|---|"]
     for each in plans:

@@ -1,8 +1,8 @@
-"""One observer that says how old pictures are when they are rendered.
+"""An observer that reports the age of pictures when they are rendered.
 
 `python -m lockstep.bench.relay.delays LINK direct|relay`.
 
-Every second a JSON line with the ages since capture, in ms. All processes share one machine and so one clock.
+It prints every second a JSON line with the ages since capture, in ms. All processes share one machine and so one clock.
 """
 
 import asyncio

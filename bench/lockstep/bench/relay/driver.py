@@ -1,7 +1,7 @@
-"""An operator in a process of its own: `python -m lockstep.bench.relay.driver LINK SECONDS` drives without end.
+"""An operator in a separate process: `python -m lockstep.bench.relay.driver LINK SECONDS` drives without end.
 
-SECONDS pass between a feedback and the next command. Every second it says in a JSON line how long each command took to
-its feedback, and when that was.
+SECONDS pass between a feedback and the next command. Every second it prints a JSON line with the times from commands to
+their feedback, and the time of the last command.
 """
 
 import asyncio

@@ -1,4 +1,4 @@
-"""A Janus of one's own: its configuration in a directory, started by its command, never as a service."""
+"""Configures a separate Janus in a directory, for a start by its command, never as a service."""
 
 import shutil
 from pathlib import Path
@@ -42,12 +42,12 @@ OTHER_TRANSPORTS = ("http", "mqtt", "nanomsg", "pfunix", "rabbitmq")
 
 
 def janus_command(folder: Path, address: str, port: int, *, number: int = 0, admin_key: str = "") -> list[str]:
-    """Write its configuration into `folder`; the command that runs it until it is killed.
+    """Write the configuration into `folder`, and return the command that runs Janus until it is killed.
 
     Args:
-        number: of several in one network; each has ports of its own for media
-        address: on which it listens; media go over every address but loopback, which Janus leaves out
-        admin_key: that creating a room takes; "": nothing
+        number: of several in one network; each has its own ports for media
+        address: to listen on; media go over every address but loopback, which Janus leaves out
+        admin_key: needed to create a room; "": none is needed
 
     Raises:
         FileNotFoundError: Janus is not installed.

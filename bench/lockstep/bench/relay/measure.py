@@ -1,4 +1,4 @@
-"""What the section `relay` measures: delay per hop, the cost of a crowd, and what happens when a relay is killed."""
+"""Measures for the section `relay`: delay per hop, the cost of a crowd, and the effect of a killed relay."""
 
 import asyncio
 import sys
@@ -16,7 +16,7 @@ __all__ = ["Crowd", "Killing", "crowd", "hop_delays", "killings"]
 ROOMY = {"max_peers": "500", "max_unconnected": "500", "max_offer_burst": "2000", "max_address_connections": "2000"}
 SETTLE = 3.0  # s
 START_SECONDS, TRIES = 30.0, 3  # for a page to watch through a relay
-BACK_SECONDS = 30.0  # that a page may take at most to be measured at all
+BACK_SECONDS = 30.0  # the most that a page may take to be measured at all
 CROWD_SECONDS = 400.0
 CALM = (
     0.3  # s between the crowd's operator's commands: every feedback goes to each observer, on the machine that drives
@@ -25,7 +25,7 @@ NICE = ("nice", "-n", "19")  # observers have their own machines, and take the t
 
 
 async def hop_delays(folder: Path, seconds: float) -> dict[str, list[float]]:
-    """Ages of rendered pictures in ms: "direct", "0" (through one Janus), "1" (through two)."""
+    """Return ages of rendered pictures in ms: "direct", "0" (through one Janus), "1" (through two)."""
     async with relay_stage(folder) as stage:
         await stage.add_janus("robot", 0)
         await stage.add_janus("robot", 1)
@@ -52,17 +52,17 @@ async def _delays(stage: RelayStage, mode: str) -> Process:
 
 @dataclass(frozen=True)
 class Crowd:
-    """Processor time in % of a core, and the operator's command → feedback times in ms, with so many observers."""
+    """Processor time in % of a core, and the operator's command → feedback times in ms, for a number of observers."""
 
     observers: int
     console: float
     janus: tuple[float, ...]
     audience: float
     trips_ms: list[float]
-    packets: float  # a second, that all observers together got
-    least: float  # a second, that the observer with the fewest got
+    packets: float  # a second, of all observers together
+    least: float  # a second, of the observer with the fewest
     connect_seconds: float
-    lost: dict[str, int]  # why how many observers are no longer connected
+    lost: dict[str, int]  # observers that are no longer connected, by reason
 
     @property
     def summary(self) -> str:
@@ -77,7 +77,7 @@ class Crowd:
 
 
 async def crowd(folder: Path, counts: Sequence[int], seconds: float, say: Callable[[str], None]) -> list[Crowd]:
-    """The same session with more and more observers on two Janus; all of it in one network."""
+    """Measure the same session with more and more observers on two Janus, all in one network."""
     async with relay_stage(folder) as stage:
         await stage.add_janus("robot", 0)
         await stage.add_janus("robot", 1)
@@ -133,7 +133,7 @@ async def _look(stage: RelayStage, driver: Process, audience: Process | None, co
 
 @dataclass(frozen=True)
 class Killing:
-    """One relay killed while a page watches through it."""
+    """The killing of one relay while a page watches through it."""
 
     relay: str
     back_seconds: float  # until the page drew a picture that came another way
@@ -142,7 +142,7 @@ class Killing:
 
 
 async def killings(folder: Path, count: int, seconds: float) -> list[Killing]:
-    """Relays killed in turn, each started again before the next one."""
+    """Kill relays in turn, each started again before the next one."""
     found: list[Killing] = []
     async with relay_stage(folder) as stage:
         await stage.add_janus("robot", 0)
@@ -161,7 +161,10 @@ async def killings(folder: Path, count: int, seconds: float) -> list[Killing]:
 
 
 async def _watching(page: ConsolePage) -> None:
-    """It watches through a relay. One that came before any relay carried the session stays direct, and comes again."""
+    """Wait until the page watches through a relay, and reload it if it does not.
+
+    A page that came before any relay carried the session stays direct.
+    """
     for left in reversed(range(TRIES)):
         try:
             await page.until("s.relay !== null && s.streams.overview?.rendered > 3", START_SECONDS)

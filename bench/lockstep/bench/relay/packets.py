@@ -1,7 +1,7 @@
-"""The cost of a Janus for one packet to one observer: `python -m lockstep.bench.relay.packets HOST`.
+"""Measures the cost of a Janus for one packet to one observer: `python -m lockstep.bench.relay.packets HOST`.
 
-HOST is an address of this machine, not loopback. One publisher of noise, 400 packets a second; 1, 6, then 12
-subscribers that count the packets of their sockets. The cost is the slope; the fixed cost of a Janus is not in it.
+HOST is an address of this machine, not loopback. One publisher of noise sends 400 packets a second; 1, 6, then 12
+subscribers count the packets of their sockets. The cost is the slope, without the fixed cost of a Janus.
 """
 
 import asyncio
@@ -41,7 +41,7 @@ def cpu_seconds(pid: int) -> float:
 
 
 async def feed(hub: MediaHub, camera: str) -> None:
-    """Pictures that no encoder can make small."""
+    """Feed pictures that no encoder can make small."""
     noise, began, stamp = np.random.default_rng(1), time.monotonic(), 0
     while True:
         stamp += 1
@@ -72,7 +72,7 @@ async def subscribe(ticket: RelayTicket, counts: list[int]) -> RelayMedia:
 
 
 class _Connect:
-    """What publishing needs of the console's endpoint."""
+    """The part of the console's endpoint that publishing needs."""
 
     def __init__(self, endpoint: Endpoint) -> None:
         self._endpoint = endpoint
@@ -82,7 +82,7 @@ class _Connect:
 
 
 async def measure(host: str, pid: int) -> list[tuple[int, float]]:
-    """Packets and seconds of processor time, for each number of subscribers."""
+    """Return packets and seconds of processor time, for each number of subscribers."""
     camera = Camera(name="noise", label="Noise", width=WIDTH, height=HEIGHT, frame_rate=RATE)
     hub = MediaHub(MediaSettings(), CollectorRegistry())
     hub.configure(RobotDescription(name="noise", label="Noise", axes=(), cameras=(camera,)))

@@ -23,13 +23,13 @@ ROOM = 4711
 START_SECONDS = 60.0
 FIRST_PORT = 8188
 CONSOLE_PORT = 8000
-LINES = 400  # of its log that are kept
+LINES = 400  # lines of its output that are kept
 ADDRESSES: dict[Side, str] = {"robot": ROBOT_ADDRESS, "operator": OPERATOR_ADDRESS}
 
 
 @dataclass
 class Process:
-    """One that runs in a namespace. `lines`: the last ones of its output."""
+    """A process in a namespace. `lines`: the last ones of its output."""
 
     process: asyncio.subprocess.Process
     lines: list[str] = field(default_factory=list)
@@ -41,7 +41,7 @@ class Process:
         return self.process.pid
 
     async def line(self, pattern: str, seconds: float = START_SECONDS) -> str:
-        """The first line that matches, waited for."""
+        """Wait for the first line that matches, and return it."""
         async with asyncio.timeout(seconds):
             while True:
                 for line in self.lines:
@@ -62,12 +62,12 @@ class Process:
         self.grew.set()
 
     def cpu_seconds(self) -> float:
-        """Of the process itself so far, user and system."""
+        """Return the processor time of the process itself so far, user and system."""
         fields = Path(f"/proc/{self.pid}/stat").read_text().rpartition(")")[2].split()
         return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 
     def said(self) -> list[dict[str, Any]]:
-        """Its lines that are JSON, as far as they are kept."""
+        """Return its lines that are JSON, as far as they are kept."""
         return [json.loads(line) for line in self.lines if line.startswith("{")]
 
     async def end(self) -> None:
@@ -75,14 +75,14 @@ class Process:
         await self.process.wait()
 
     async def kill(self) -> None:
-        """As a machine that is switched off."""
+        """Kill the process, like a machine that is switched off."""
         self.process.kill()
         await self.process.wait()
 
 
 @dataclass
 class RelayStage:
-    """Enter `relay_stage` to have one."""
+    """The running processes. Enter `relay_stage` to have one."""
 
     spaces: Namespaces
     folder: Path
@@ -110,14 +110,14 @@ class RelayStage:
         return started
 
     async def restart_janus(self, side: Side, number: int) -> None:
-        """After it was killed; it remembers nothing."""
+        """Start a Janus again after it was killed; it remembers nothing."""
         await self.add_janus(side, number)
         self.janus[number] = self.janus.pop()
 
     async def add_console(
         self, relays: Sequence[tuple[Side, int]], *extra: str, robot: str = "planar", **settings: str
     ) -> None:
-        """`lockstep up` on the robot's side, publishing into these Janus."""
+        """Start `lockstep up` on the robot's side, publishing into these Janus."""
         arguments = [f"--relay=janus:ws://{ADDRESSES[side]}:{FIRST_PORT + number}/{ROOM}" for side, number in relays]
         command = [
             *(str(Path(sys.executable).with_name("lockstep")), "up", "--json", "--robot", robot, "--robot-port", "0"),
@@ -130,7 +130,7 @@ class RelayStage:
 
     @asynccontextmanager
     async def chromium(self, side: Side) -> AsyncIterator[Browser]:
-        """Chromium in that side's network, started through a script that enters it first."""
+        """Start Chromium in that side's network, through a script that enters the network first."""
         anchor = await self.start(side, ["sleep", "infinity"])
         script = self.folder / f"chromium-{side}"
         script.write_text(f'#!/bin/sh\nexec nsenter --net=/proc/{anchor.pid}/ns/net {chromium_program()} "$@"\n')
@@ -141,7 +141,7 @@ class RelayStage:
             yield browser
 
     async def add_driver(self, side: Side = "operator", interval: float = 0.0) -> Process:
-        """An operator that drives from now on; `interval`: seconds between a feedback and the next command."""
+        """Start an operator that drives from now on; `interval`: seconds between a feedback and the next command."""
         command = [sys.executable, "-m", "lockstep.bench.relay.driver", self.links["operator"], str(interval)]
         driver = await self.start(side, command)
         await driver.line(r'^\{"at"')
@@ -157,7 +157,11 @@ async def _end(started: Process) -> None:
 
 @asynccontextmanager
 async def relay_stage(folder: Path, profile: str = "perfect") -> AsyncIterator[RelayStage]:
-    """Raises NamespacesUnavailable where there can be none."""
+    """Start the two namespaces, and yield the stage.
+
+    Raises:
+        NamespacesUnavailable: this machine or user cannot have network namespaces.
+    """
     async with AsyncExitStack() as stack:
         readers = await stack.enter_async_context(AsyncExitStack())  # after the processes have ended
         spaces = await stack.enter_async_context(Namespaces(profile))

@@ -1,1 +1,1 @@
-"""Other consoles, reduced to the compared part: pictures of the same robot bridge, sent in their way."""
+"""Other consoles, reduced to the compared part: they send pictures of the same robot bridge in their own way."""

@@ -1,8 +1,8 @@
-"""Pictures over a WebSocket: `python -m lockstep.bench.rivals.picture_server mjpeg|foxglove tcp://HOST:PORT`
+"""Pictures over a WebSocket: `python -m lockstep.bench.rivals.picture_server mjpeg|foxglove tcp://HOST:PORT`.
 
-`mjpeg` is what ROS' web_video_server does: each picture a JPEG, sent to each viewer as it comes. `foxglove` gives the
+`mjpeg` works like ROS' web_video_server: each picture a JPEG, sent to each viewer as it comes. `foxglove` gives the
 same JPEGs to the Foxglove SDK's own WebSocket server as CompressedImage messages. Both take the newest picture of the
-main camera from the bridge's robot link and pass the time of its capture on, so that the page knows its age.
+main camera from the bridge's robot link and pass on the time of its capture, so that the page knows its age.
 """
 
 import asyncio
@@ -40,7 +40,7 @@ BACKLOG = 2  # messages that the Foxglove server keeps for a slow viewer
 
 
 class PictureServer:
-    """`run` until a signal."""
+    """The server. `run` runs until a signal."""
 
     def __init__(self, kind: Kind, address: str) -> None:
         parts = urlsplit(address)
@@ -77,7 +77,7 @@ class PictureServer:
     def _broadcast(self, captured: int, jpeg: bytes) -> None:
         message = struct.pack(">Q", captured) + jpeg
         for queue in self._viewers:
-            with suppress(asyncio.QueueEmpty):  # the newest picture takes the place of one that still waits
+            with suppress(asyncio.QueueEmpty):  # the newest picture replaces one that still waits
                 queue.get_nowait()
             queue.put_nowait(message)
 

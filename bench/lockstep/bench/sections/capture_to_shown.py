@@ -1,13 +1,13 @@
-"""From the capture of a picture at the bridge to its drawing in Chromium.
+"""Measures the time from the capture of a picture at the bridge to its drawing in Chromium.
 
-The bridge logs when it captured each picture. A probe, put into the page from outside, notes the RTP timestamp and
-the time of each drawing on the main camera's canvas; `bench.media_join` finds the captured picture, and
+The bridge logs the time of capture of each picture. A probe, put into the page from outside, notes the RTP timestamp
+and the time of each drawing on the main camera's canvas; `bench.media_join` finds the captured picture, and
 `bench.page_clock` puts both on one clock. Rendering at the robot and the way over TCP are part of the time.
 
-"Drawn" is when the page has drawn the picture on its canvas. "Shown" is when the browser then begins to compose a
+A picture is "drawn" when the page has drawn it on its canvas. It is "shown" when the browser then begins to compose a
 frame, the same moment at which requestVideoFrameCallback tells a bare page about a picture of its <video>. The
-baselines are that bare page on `bench.baseline_server`, and pictures over WebSockets (`bench.rivals`), one after
-the other in the same run, at the same bridge, without an operator.
+baselines are that bare page on `bench.baseline_server`, and pictures over WebSockets (`bench.rivals`), one after the
+other in the same run, at the same bridge, without an operator.
 """
 
 import asyncio
@@ -50,7 +50,7 @@ TAKE = "() => window.drawProbe.shown.splice(0)"
 
 
 class Delays(NamedTuple):
-    """Of the pictures shown in one spell, in ms."""
+    """Delays of the pictures shown in one spell, in ms."""
 
     drawn: list[float]
     shown: list[float]
@@ -74,7 +74,7 @@ async def run(context: Context) -> list[Result]:
 
 
 async def _lockstep(stack: Stack, seconds: float) -> tuple[Delays, Delays]:
-    """With the operator watching, then driving."""
+    """Measure with the operator watching, then driving."""
     async with running_chromium() as browser, open_probed_page(browser, stack.operator, PAD, DRAW_PROBE) as page:
         await page.evaluate("(stream) => { window.drawProbe.stream = stream; }", CAMERA)
         console = ConsolePage(page)
@@ -90,13 +90,13 @@ async def _lockstep(stack: Stack, seconds: float) -> tuple[Delays, Delays]:
 
 
 async def _sent(stack: Stack) -> float:
-    """Bytes of the camera's pictures to the one peer there is."""
+    """Return the bytes of the camera's pictures sent to the only peer."""
     return sum((await stack.metrics()).values("lockstep_media_bytes_sent_total", "carrier", stream=CAMERA).values())
 
 
 @asynccontextmanager
 async def _driving(console: ConsolePage) -> AsyncIterator[None]:
-    """Round and round with a held stick."""
+    """Drive in circles with a held stick."""
     await console.arm()
     await console.press(RB)
     await console.tilt(LEFT_Y, -0.4)
@@ -145,7 +145,7 @@ async def _rival(bridge: Bridge, kind: str, seconds: float) -> Delays:
 
 
 async def _spell(page: Page, bridge: Bridge, seconds: float) -> Delays:
-    """What is shown within `seconds` from soon on."""
+    """Measure the pictures shown in `seconds`, after a short wait."""
     await asyncio.sleep(SETTLE)
     clock = await read_page_clock(page)
     await page.evaluate(TAKE)

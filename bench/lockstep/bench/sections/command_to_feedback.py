@@ -1,8 +1,8 @@
-"""From sending a command to its feedback: the headless client on loopback, and what of that is the console's.
+"""Measures the time from sending a command to its feedback, with the headless client on loopback.
 
-Each command is sent when the gate is open, so the event rate's limit is no part of the figure; it is the time that
-a script sees from calling `drive` to its return. The bridge's own log has, on the same monotonic clock, when it
-executed the event and when it issued the feedback: the wait for the control tick, the tick and the measurement. That
+Each command is sent when the gate is open, so the event rate's limit is no part of the figure; it is the time that a
+script sees from calling `drive` to its return. The bridge's own log has, on the same monotonic clock, the times at
+which it executed the event and issued the feedback: the wait for the control tick, the tick and the measurement. That
 is taken off event by event; the rest is the console's own share: client, data channel, server, robot link, and back.
 The baseline is the robot link alone: the same robot, driven the same way over TCP without a console between.
 """
@@ -34,7 +34,7 @@ async def run(context: Context) -> list[Result]:
 
 
 class _Measured:
-    """Trips in ms, and what of each is not the robot's."""
+    """Trips in ms, and the part of each that is not the robot's."""
 
     def __init__(self, trips: list[Trip], bridge: Bridge) -> None:
         robot = robot_times(bridge.event_log)

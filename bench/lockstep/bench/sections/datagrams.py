@@ -1,4 +1,4 @@
-"""What the console's UDP socket costs for each datagram that it sends, whole pictures in one call and one by one."""
+"""Measures the cost of a datagram in the console's UDP socket: whole pictures in one call, and one by one."""
 
 import time
 from contextlib import ExitStack, closing
@@ -28,7 +28,7 @@ def _compare(peers: int, each: int, turns: int) -> Result:
         receivers = [stack.enter_context(closing(UdpSocket.bind(HOST, 0))) for _ in range(peers)]
         sockets = [stack.enter_context(closing(UdpSocket.bind("0.0.0.0", 0, segments=cut))) for cut in (True, False)]
         seconds = [0.0, 0.0]
-        for _ in range(turns):  # in turns, so that a busy machine is as unfair to both
+        for _ in range(turns):  # in turns, so that a busy machine affects both alike
             for place, sender in enumerate(sockets):
                 seconds[place] += _send(sender, receivers, each)
     in_one, one_by_one = (1e6 * spent / turns / DATAGRAMS for spent in seconds)
@@ -45,7 +45,7 @@ def _compare(peers: int, each: int, turns: int) -> Result:
 
 
 def _send(sender: UdpSocket, receivers: list[UdpSocket], each: int) -> float:
-    """Seconds of this process."""
+    """Send the datagrams, and return this process' time in s."""
     paths = [Path((HOST, sender.address[1]), receiver.address) for receiver in receivers]
     datagrams = [Datagram(bytes(SIZE), path) for path in paths for _ in range(each)]
     began = time.process_time()

@@ -1,9 +1,9 @@
-"""From opening the page to its first picture: a new Chromium with an empty cache each time.
+"""Measures the time from opening the page to its first picture, each time in a new Chromium with an empty cache.
 
 The time runs from the start of the navigation (the page's time origin) to the first picture that passed the gate and
 was drawn. The baseline is a bare page on a plain aiortc server: one inline script, one video element.
 
-Behind three networks it is opened in network namespaces, with the kernel's own TCP; for root only.
+Behind three networks the page is opened in network namespaces, with the kernel's own TCP; for root only.
 """
 
 import sys
@@ -74,7 +74,7 @@ async def _far(profile: str, count: int) -> list[Result]:
 
 
 async def _open(link: str, first_picture: str) -> float:
-    """Milliseconds."""
+    """Open the page, and return the time in ms."""
     async with running_chromium() as browser, open_probed_page(browser, link) as page:
         found = await page.wait_for_function(first_picture, timeout=TIMEOUT_MS, polling=50)
         milliseconds: float = await found.json_value()

@@ -1,6 +1,6 @@
-"""What three gates let through of one session: by event, by age, and none.
+"""Compares the pictures that three gates let through in one session: by event, by age, and none.
 
-Somebody beside the robot drives at a fixed rate; three headless clients look on through the `hong-kong` network, each
+A client beside the robot drives at a fixed rate; three headless clients look on through the `hong-kong` network, each
 with another gate. `lockstep experiment growth` shows the same at more rates, with slower players.
 """
 
@@ -34,7 +34,7 @@ async def run(context: Context) -> list[Result]:
 
 
 def _by_rate(points: list[Point]) -> list[list[Point]]:
-    """For each rate the viewers in their order."""
+    """Return the viewers of each rate, in their order."""
     return [points[first : first + len(VIEWERS)] for first in range(0, len(points), len(VIEWERS))]
 
 
@@ -66,5 +66,5 @@ def _compare(ours: Point, other: Point) -> list[Result]:
 
 
 def _share(count: int, point: Point) -> float:
-    """Of the pictures received, in %."""
+    """Return the share of the pictures received, in %."""
     return 100 * count / max(1, point.received)

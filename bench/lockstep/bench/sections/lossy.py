@@ -1,9 +1,9 @@
-"""From sending a command to its feedback over a bad network: 5 % loss each way and 100 ms round trip.
+"""Measures the time from sending a command to its feedback over a bad network: 5 % loss each way, 100 ms round trip.
 
 The client reaches its console through the network emulator, which delays and loses packets, exactly repeatably. The
-baseline runs beside it through an emulator with the same loss and delay: two plain aiortc peers, of which one echoes
-what the other sends, on a reliable ordered data channel, one message at a time. Its echo does no work, so that its
-time is the channel's alone.
+baseline runs beside it through an emulator with the same loss and delay: two plain aiortc peers, one of which echoes
+the other's messages, on a reliable ordered data channel, one message at a time. Its echo does no work, so its time is
+the channel's alone.
 """
 
 import asyncio
@@ -91,7 +91,7 @@ async def _lockstep(count: int) -> _Ours:
 
 
 async def _echoes(count: int) -> list[float]:
-    """Round trips in ms."""
+    """Return the round trips in ms."""
     async with Network(LOSSY, seed=7) as network:
         asking = RTCPeerConnection(RTCConfiguration(iceServers=[]))
         answering = RTCPeerConnection(RTCConfiguration(iceServers=[]))
@@ -110,7 +110,7 @@ def _echo(channel: RTCDataChannel) -> None:
 
 
 async def _ask(channel: RTCDataChannel, count: int) -> list[float]:
-    """One message at a time, the next when the last came back."""
+    """Send one message at a time, the next when the last came back; return the round trips in ms."""
     opened, returned = asyncio.Event(), asyncio.Event()
     channel.on("open", opened.set)
     channel.on("message", lambda _: returned.set())

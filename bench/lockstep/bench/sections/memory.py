@@ -1,10 +1,10 @@
-"""Does the console's memory stay flat? Ten minutes with an operator who drives and observers that come and go.
+"""Measures whether the console's memory stays flat, over ten minutes with an operator who drives and observers.
 
-The baseline is plain aiortc (`bench.baseline_server`) with as many peers of the main camera, coming and going alike,
-at the same time at the same bridge. Growth compares the medians of the first and the last quarter after a warm-up
-of a quarter of the time (`bench/lockstep/bench/soak/memory.py`).
+The observers come and go. The baseline is plain aiortc (`bench.baseline_server`) with as many peers of the main camera,
+coming and going alike, at the same time at the same bridge. Growth compares the medians of the first and the last
+quarter after a warm-up of a quarter of the time (`bench/lockstep/bench/soak/memory.py`).
 
-After it the same without comings and goings: two hundred observers who stay, headless and counting only.
+Then the same is measured without comings and goings: two hundred observers who stay, headless and counting only.
 """
 
 import asyncio
@@ -25,7 +25,7 @@ __all__ = ["run"]
 
 SECTION = "memory"
 SECONDS, QUICK_SECONDS = 600, 20
-OBSERVERS, TURNOVER = 5, 5  # that stay; that come and go together
+OBSERVERS, TURNOVER = 5, 5  # observers that stay; observers that come and go together
 CROWD, QUICK_CROWD = 200, 5
 CROWD_SECONDS = 300
 STAY = 8.0  # s that a visitor stays
@@ -96,7 +96,7 @@ async def _audience(stack: AsyncExitStack, link: str, count: int, *how: str) -> 
 
 
 async def _visits(link: str, plain_link: str) -> None:
-    """Until cancelled: a group joins both, stays a while and leaves."""
+    """Let a group join both, stay a while and leave, again and again until cancelled."""
     while True:
         async with AsyncExitStack() as group:
             await _audience(group, link, TURNOVER)
@@ -105,7 +105,7 @@ async def _visits(link: str, plain_link: str) -> None:
 
 
 async def _samples(processes: list[Running], seconds: float, context: Context) -> list[list[float]]:
-    """Bytes of each process, once a second."""
+    """Return the bytes of each process, once a second."""
     found: list[list[float]] = [[] for _ in processes]
     end = time.monotonic() + seconds
     while time.monotonic() < end:

@@ -1,19 +1,19 @@
-"""50, 100 and 200 observers besides one operator: does each get every picture, how much does one cost, is the operator
-slowed?
+"""Measures 50, 100 and 200 observers besides one operator: missed pictures, the cost of each, and the operator's delay.
 
-The observers are headless clients in a separate process; they receive all cameras and the sound, count RTP and
-decode nothing. Their processes run when no other process wants to: real observers have their own machines. The operator
-drives from a third process, before they come, while they are there and after they have left: the machine's own speed
-changes within a minute.
+The observers are headless clients in a separate process; they receive all cameras and the sound, count RTP and decode
+nothing. Their processes run when no other process wants to: real observers have their own machines. The operator drives
+from a third process, before they come, while they are there and after they have left: the machine's own speed changes
+within a minute.
 
-Every picture: at both ends of the spell the bridge is held still for a moment, so that nothing is on its way while
-the pictures are counted, at the console's encoders and at each observer. Missed are the pictures that the console
-dropped because an outbox was full, and those lost on the way, by the gaps in RTP's numbers. That nothing else is
-missing is shown by those who were in one tier (docs/quality.md) all the time: they have exactly as many pictures as its
-encoder made. How many have a number that is no tier's is told: their path looked full for a part of the spell, so that
-they got other pictures meanwhile, or they missed some. Cost: processor time of the console's process (proc(5)) with the
-observers less that without, shared out among them. The baseline is the main camera alone on `bench.baseline_server`:
-aiortc encodes it for each peer.
+Pictures: at both ends of the spell the bridge is held still for a moment, so that nothing is on its way while the
+pictures are counted, at the console's encoders and at each observer. Missed are the pictures that the console dropped
+because an outbox was full, and those lost on the way, by the gaps in RTP's numbers. Observers that were in one tier
+(docs/quality.md) all the time show that nothing else is missing: they have exactly as many pictures as its encoder
+made. The number of observers whose count is no tier's is reported: their path looked full for a part of the spell, so
+that they got other pictures meanwhile, or they missed some.
+
+Cost: processor time of the console's process (proc(5)) with the observers less that without, divided by their number.
+The baseline is the main camera alone on `bench.baseline_server`: aiortc encodes it for each peer.
 """
 
 import asyncio
@@ -39,21 +39,21 @@ BARE_PEERS = 8
 BARE_SECONDS, QUICK_BARE_SECONDS = 8, 3
 ANSWER_SECONDS = 10.0
 SETTLE = 3.0  # s after an observer came or left
-CALM, QUICK_CALM = 20, 2  # s until what hundreds of handshakes did to the crowd's pictures is over
+CALM, QUICK_CALM = 20, 2  # s until the effect of hundreds of handshakes on the crowd's pictures is over
 ENCODE = 0.03  # s until the bridge's pictures are encoded
 LOOK, SAME, LOOKS = 0.01, 3, 40  # s between two looks at the observers; looks alike that settle it; looks at most
 ROBOT = "planar"  # the lightest: the machine's cores are for the console and the observers
 CPU_TARGET = 0.5  # % of a core for each of a hundred
 SLOWDOWN_TARGETS = {100: 2.0, 200: 1.2}
 TIERS = ("operator", "high", "crowd", "low")
-CORE = 100.0  # %: what two hundred may use
+CORE = 100.0  # %: the most that two hundred may use
 
 Received = dict[str, list[int]]  # per stream: frames, and packets lost
 
 
 @dataclass(frozen=True)
 class Spell:
-    """While the operator drives."""
+    """The figures of a spell in which the operator drives."""
 
     trips: list[float]  # ms
     console_cpu: float  # share of a core, in %
@@ -62,7 +62,7 @@ class Spell:
 
 @dataclass(frozen=True)
 class Counts:
-    """With the bridge held still."""
+    """Counts taken while the bridge is held still."""
 
     taken: dict[str, int]  # pictures that were encoded, by camera, each once for however many tiers
     tiers: dict[str, dict[str, int]]  # encoded pictures of each tier, by camera
@@ -72,7 +72,7 @@ class Counts:
 
 @dataclass(frozen=True)
 class Missed:
-    """Between two counts, of all observers together."""
+    """The pictures missed between two counts, of all observers together."""
 
     received: int  # pictures
     dropped: int  # at the console
@@ -81,14 +81,14 @@ class Missed:
 
     @property
     def percent(self) -> float:
-        """Of the pictures that were meant for an observer."""
+        """The share of the pictures meant for an observer, in %."""
         missed = self.dropped + self.lost
         return 100 * missed / (self.received + missed)
 
 
 @dataclass(frozen=True)
 class Watched:
-    """One crowd."""
+    """The measurements of one crowd."""
 
     count: int
     alone: Spell
@@ -135,7 +135,7 @@ async def _drive(stack: Stack, audiences: list[Running], operator: Console, even
 
 
 async def _count(stack: Stack, audiences: list[Running]) -> Counts:
-    """The bridge is held still only for as long as counting takes."""
+    """Count with the bridge held still, only for as long as that takes."""
     stack.bridge.process.pause()
     try:
         await asyncio.sleep(ENCODE)
@@ -146,7 +146,7 @@ async def _count(stack: Stack, audiences: list[Running]) -> Counts:
 
 
 def counts_from(metrics: Metrics, received: list[Received]) -> Counts:
-    """What the console says of its pictures; sound is left out."""
+    """Return the console's counts of its pictures, without sound."""
     taken = metrics.values("lockstep_media_pictures_taken_total", "stream")
 
     def of_cameras(name: str, **where: str) -> dict[str, int]:
@@ -159,7 +159,7 @@ def counts_from(metrics: Metrics, received: list[Received]) -> Counts:
 
 
 async def _settled(audiences: list[Running]) -> list[Received]:
-    """What each observer has received when nothing more comes."""
+    """Return the counts of each observer once no more pictures come."""
     found: list[list[Received]] = []
     while len(found) < SAME or any(each != found[-1] for each in found[-SAME:]):
         if len(found) > LOOKS:
@@ -171,7 +171,7 @@ async def _settled(audiences: list[Running]) -> list[Received]:
 
 
 async def _bare(bridge: Bridge, seconds: float) -> dict[int, float]:
-    """Processor time per peer in % of a core, by number of peers."""
+    """Return the processor time per peer in % of a core, by number of peers."""
     async with running_process(sys.executable, "-m", "lockstep.bench.baseline_server", bridge.address) as (
         server,
         ready,
@@ -193,10 +193,10 @@ async def _share(process: Running, seconds: float) -> float:
 
 
 def missed_between(before: Counts, after: Counts) -> Missed:
-    """What did not come.
+    """Return the pictures that were missed.
 
     Raises:
-        ValueError: a camera gave nothing, so that nothing can be said.
+        ValueError: a camera gave no pictures, so nothing can be said.
     """
     taken = _grown(before.taken, after.taken)
     if not taken or min(taken.values()) <= 0:

@@ -1,4 +1,7 @@
-"""What a recording costs the operator: command to feedback with the recorder off and on, taken in turns in one run."""
+"""Measures the cost of a recording for the operator: command to feedback with the recorder off and on.
+
+The two alternate in one run.
+"""
 
 import httpx
 
@@ -28,7 +31,7 @@ async def run(context: Context) -> list[Result]:
 
 
 async def _turns(robot: str, count: int) -> tuple[list[float], list[float]]:
-    """ms of each trip that are not the robot's, without and with a recording."""
+    """Return the part of each trip that is not the robot's, in ms, without and with a recording."""
     async with running_stack(robot) as stack, httpx.AsyncClient(base_url=stack.url, trust_env=False) as http:
         http.headers["Authorization"] = f"Bearer {stack.operator.partition('token=')[2].partition('&')[0]}"
         async with Console(stack.operator, name="bench", codec="H264") as console:

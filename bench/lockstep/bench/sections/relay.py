@@ -1,7 +1,7 @@
-"""Observers through real Janus: the delay that each adds, what a crowd costs, and a Janus that is killed.
+"""Measures observers through real Janus: the delay that each adds, the cost of a crowd, and a Janus that is killed.
 
-Everything runs in network namespaces with processes of its own; needs Linux, root and Debian's janus. The robot is the
-planar one. Observers of the crowd count packets of the main camera and get the feedback; they decode nothing.
+Everything runs in separate processes in network namespaces, which needs Linux, root and Debian's janus. The robot is
+the planar one. Observers of the crowd count packets of the main camera and get the feedback; they decode nothing.
 """
 
 from pathlib import Path

@@ -1,11 +1,11 @@
-"""The default robot's cost of one core: simulation, cameras and sound in its bridge, and encoding in the console.
+"""Measures the default robot's cost of one core: simulation, cameras and sound in its bridge, encoding in the console.
 
 Processor time is the kernel's count for each thread. Encoding is the time of the console's stream threads: decoding,
-scaling, encoding and packetising of pictures and of sound. The bridge's share holds its sound and the robot link too,
-which run in the same thread as the simulation. The rest of the console (WebRTC, fan-out, feedback, HTTP) is a row of
-its own: it is not part of the figure with the target. An operator drives and receives everything, at full size and
-rate: the quality controller is off. As the page does, the operator offers H.264 first. The operator's own process is
-not counted. The bridge writes no event log, as by default.
+scaling, encoding and packetising of pictures and of sound. The bridge's share includes its sound and the robot link,
+which run in the same thread as the simulation. The rest of the console (WebRTC, fan-out, feedback, HTTP) is a separate
+row, and is not part of the figure with the target. An operator drives and receives everything, at full size and rate:
+the quality controller is off. As the page does, the operator offers H.264 first. The operator's own process is not
+counted. The bridge writes no event log, as by default.
 """
 
 import asyncio
@@ -26,20 +26,20 @@ SECTION = "robot_cost"
 HELD = "simulation, camera and encoding together"
 SECONDS, QUICK_SECONDS = 25, 3
 WARM_UP = 2.0  # s
-EVENTS = 1_000_000  # more than fit
+EVENTS = 1_000_000  # more than fit into the time
 TARGET = 60.0  # % of one core
 RATE_TARGET = 29.0  # pictures a second of 30
-THREAD_NAME = 15  # bytes that Linux keeps of one (prctl(2), PR_SET_NAME)
+THREAD_NAME = 15  # bytes that Linux keeps of a name (prctl(2), PR_SET_NAME)
 
 
 class Cost(NamedTuple):
-    """Of one spell."""
+    """The costs in one spell."""
 
     drawing: float  # % of one core: the bridge's render thread
-    bridge: float  # the rest of it: simulation, sound, the robot link
+    bridge: float  # the rest of the bridge: simulation, sound, the robot link
     pictures: float  # the console's cameras
     sound: float  # its microphones
-    console: float  # the rest of it
+    console: float  # the rest of the console
     rate: float  # pictures of the main camera per second
     events: float  # per second
 
@@ -59,7 +59,7 @@ async def run(context: Context) -> list[Result]:
 
 @asynccontextmanager
 async def _driven(stack: Stack) -> AsyncIterator[Console]:
-    """An operator who drives all the time and receives everything, decoding nothing."""
+    """Start an operator who drives all the time and receives everything, decoding nothing."""
     async with (
         Console(stack.operator, name="operator", decode=False, codec="H264") as console,
         asyncio.TaskGroup() as tasks,
@@ -91,12 +91,12 @@ def _event(console: Console) -> int:
 
 
 async def _pictures(stack: Stack, camera: str) -> float:
-    """How many the console has encoded."""
+    """Return the number of pictures that the console has encoded."""
     return (await stack.metrics()).values("lockstep_media_pictures_taken_total", "stream").get(camera, 0.0)
 
 
 def _spent(stack: Stack, microphones: Collection[str]) -> tuple[float, float, float, float, float]:
-    """Seconds so far, in the order of `Cost`."""
+    """Return the processor seconds so far, in the order of `Cost`."""
     bridge, console = stack.bridge.process.thread_seconds(), stack.console.thread_seconds()
     drawing = sum(seconds for name, seconds in bridge.items() if name.startswith("render"))
     sounding = {f"media-{name}"[:THREAD_NAME] for name in microphones}
@@ -107,7 +107,7 @@ def _spent(stack: Stack, microphones: Collection[str]) -> tuple[float, float, fl
 
 
 def _results(cost: Cost, camera: str, seconds: float) -> list[Result]:
-    is_starved = cost.rate < RATE_TARGET  # then less was done than is to be paid for
+    is_starved = cost.rate < RATE_TARGET  # less was done than the target counts
     conditions = (
         f"{DEFAULT_ROBOT} driven at {cost.events:.0f} events/s by one peer that receives all, H.264; all cameras at "
         f"full size and rate, quality controller off; {seconds:.0f} s of processor time"

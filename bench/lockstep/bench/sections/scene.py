@@ -1,6 +1,7 @@
-"""Do viewers of the 3D scene slow the operator down? The operator drives without viewers and with three, in turns, so
-that the machine's other work falls on both alike. The viewers are WebSocket clients of the console's scene, in a
-process of their own; they draw nothing.
+"""Measures whether viewers of the 3D scene slow the operator down.
+
+The operator drives without viewers and with three, in turns, so that the machine's other work falls on both alike. The
+viewers are WebSocket clients of the console's scene, in a separate process; they draw nothing.
 """
 
 import asyncio
@@ -49,7 +50,7 @@ async def _drive(operator: Console, context: Context) -> list[float]:
 
 
 async def _watched(stack: Stack, operator: Console, context: Context) -> tuple[list[float], int]:
-    """The trips in ms, and bytes that the viewers got meanwhile."""
+    """Return the trips in ms, and the bytes that the viewers got meanwhile."""
     command = (sys.executable, "-m", "lockstep.bench.scene_viewers", stack.observer, str(VIEWERS))
     async with running_process(*command) as (viewers, _):
         before = await viewers.ask("count", ANSWER_SECONDS)

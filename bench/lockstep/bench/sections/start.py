@@ -1,7 +1,7 @@
-"""From starting the program to the first picture in the operator's page.
+"""Measures the time from starting the program to the first picture in the operator's page.
 
-`lockstep up` is started as a person starts it; as soon as it prints its links, a Chromium that is already running opens
-the operator's. The baseline is the same with a bridge and a plain aiortc server, each a process of its own, and a bare
+`lockstep up` is started as a user starts it; as soon as it prints its links, a Chromium that is already running opens
+the operator's. The baseline is the same with a bridge and a plain aiortc server, each in a separate process, and a bare
 page.
 """
 
@@ -42,7 +42,7 @@ async def run(context: Context) -> list[Result]:
 
 
 async def _lockstep(robot: str, browser: Browser) -> tuple[float, float]:
-    """Seconds to the links, and to the first picture."""
+    """Return the seconds to the links, and to the first picture."""
     lockstep = str(Path(sys.executable).with_name("lockstep"))
     with TemporaryDirectory(prefix="lockstep-bench-") as folder:
         began = time.monotonic()

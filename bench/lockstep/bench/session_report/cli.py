@@ -40,7 +40,11 @@ def report_command(
 
 
 def write_report(recording: Path, target: Path) -> Path:
-    """Raises RecordingError, OSError."""
+    """Write the report of a recording to `target`.
+
+    Raises:
+        RecordingError, OSError: the recording cannot be read, or the report cannot be written.
+    """
     session = read_session(recording)
     page = _page(recording, session, verify_file(recording), session_figures(session))
     target.write_text(page, encoding="utf-8")

@@ -1,4 +1,4 @@
-"""The thesis' figures of a recorded session, and others for an operator: SVG text. Needs matplotlib."""
+"""Draws the thesis' figures of a recorded session, and others for an operator, as SVG text. Needs matplotlib."""
 
 from collections.abc import Callable
 from typing import NamedTuple
@@ -15,7 +15,7 @@ MARK_COLOURS = {"contact": "#8a4fbf", "refusal": MEDIUM, "stop": BAD, "reset": B
 
 
 class Figure(NamedTuple):
-    name: str  # of its file
+    name: str  # of the figure's file
     title: str
     words: str
     svg: str
@@ -28,7 +28,7 @@ class Panel(NamedTuple):
 
 
 def session_figures(session: Session) -> list[Figure]:
-    """Those that the recording has something for."""
+    """Return the figures for which the recording has data."""
     found = [
         _figure(
             session,
@@ -145,7 +145,7 @@ def _gap(shown: Shown) -> Callable[[Axes], None]:
 
 
 def _against(operator: Series, stamp: Series) -> Callable[[Axes], None]:
-    """Both come with the same reports."""
+    """Return a drawing of the stamp against the operator's event; both come with the same reports."""
     known = dict(zip(operator.times, operator.values, strict=True))
     times = [time for time in stamp.times if time in known]
     behind = [known[time] - value for time, value in zip(stamp.times, stamp.values, strict=True) if time in known]

@@ -1,4 +1,4 @@
-"""A recorded session as series over time. Times in s since its beginning, on the recording's clock."""
+"""Reads a recorded session as series over time. Times in s since its beginning, on the recording's clock."""
 
 import math
 from dataclasses import dataclass, field
@@ -32,11 +32,11 @@ class Series:
 
 @dataclass
 class Shown:
-    """One stream: as it was captured, and as the operator's page said that it rendered it."""
+    """One stream: as it was captured, and as the operator's page reported its rendering."""
 
     captured: Series = field(default_factory=Series)  # stamp, at the time of capture
-    stamp: Series = field(default_factory=Series)  # newest one at the operator
-    rendered: Series = field(default_factory=Series)  # how many
+    stamp: Series = field(default_factory=Series)  # newest stamp at the operator
+    rendered: Series = field(default_factory=Series)  # number of renderings
     gap: Series = field(default_factory=Series)
     tolerance: Series = field(default_factory=Series)
 
@@ -49,9 +49,9 @@ class Session:
     marks: list[Mark]
     began: int  # µs since 1970
     streams: dict[str, Shown] = field(default_factory=dict)
-    robot: Series = field(default_factory=Series)  # event, when the robot measured it
+    robot: Series = field(default_factory=Series)  # event, at the time of its measurement at the robot
     operator: Series = field(default_factory=Series)  # event, as the operator's page reported it
-    answered: Series = field(default_factory=Series)  # ms from a command at the console to its feedback there
+    answered: Series = field(default_factory=Series)  # ms from a command to its feedback, both at the console
     picture_delay: Series = field(default_factory=Series)  # ms, by the operator's own clock
     round_trip: Series = field(default_factory=Series)  # ms
     force: Series = field(default_factory=Series)  # N
@@ -60,7 +60,11 @@ class Session:
 
 
 def read_session(path: Path) -> Session:
-    """Raises RecordingError, OSError."""
+    """Read a recording.
+
+    Raises:
+        RecordingError, OSError: it cannot be read.
+    """
     with RecordingReader(path) as reader:
         index = reader.index
         origin = index.started * 1000

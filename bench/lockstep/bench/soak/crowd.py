@@ -1,4 +1,4 @@
-"""Observers that come and go, and intruders that command without the seat. Headless, in this process."""
+"""Observers that come and go, and intruders that command without the seat. All are headless, in this process."""
 
 import asyncio
 import random
@@ -10,9 +10,9 @@ from lockstep.client.errors import CommandRefused, ConsoleError
 
 __all__ = ["Crowd", "Intruder"]
 
-AGAIN_SECONDS = 1.0  # until an observer that was thrown out tries again
+AGAIN_SECONDS = 1.0  # s until an observer that was thrown out tries again
 BETWEEN_TRIES = 0.2  # s between two commands of an intruder
-BACKWARDS = -0.5  # of the first axis; only intruders drive so
+BACKWARDS = -0.5  # value of the first axis with which only intruders drive
 
 
 class Crowd:
@@ -33,12 +33,12 @@ class Crowd:
             self._join()
 
     def come(self) -> None:
-        """A few join, up to the size."""
+        """Let a few observers join, up to the size."""
         for _ in range(min(self._size - len(self._guests), self._chance.randint(1, 5))):
             self._join()
 
     async def go(self) -> None:
-        """A few leave, like a person who closes the tab."""
+        """Let a few observers leave, like a person who closes the tab."""
         for _ in range(min(len(self._guests), self._chance.randint(1, 5))):
             guest = self._guests.pop(self._chance.randrange(len(self._guests)))
             await _ended(guest)
@@ -63,7 +63,7 @@ class Crowd:
 
 
 class Intruder:
-    """Commands without ever asking for the seat."""
+    """A client that sends commands without ever asking for the seat."""
 
     def __init__(self, link: str, name: str) -> None:
         self.tries = 0
@@ -71,7 +71,7 @@ class Intruder:
         self._name = name
 
     async def run(self) -> None:
-        """Until cancelled."""
+        """Intrude until cancelled."""
         while True:
             with suppress(ConsoleError):
                 async with Console(self._link, decode=False, name=self._name) as console:

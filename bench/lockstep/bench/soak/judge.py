@@ -1,4 +1,4 @@
-"""The verdict on a bridge's own record: what must never have happened. No I/O."""
+"""Judges a bridge's own record: finds what must never have happened. No I/O."""
 
 from collections.abc import Iterable, Mapping
 from typing import Any

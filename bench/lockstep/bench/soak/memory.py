@@ -1,4 +1,4 @@
-"""How much a process grows, from samples of its memory. No I/O."""
+"""Computes the growth of a process from samples of its memory. No I/O."""
 
 from collections import defaultdict
 from collections.abc import Sequence
@@ -13,18 +13,18 @@ ALIKE = 3  # samples at either end that are enough to compare
 
 
 class Sample(NamedTuple):
-    """A process at one moment."""
+    """The state of a process at one moment."""
 
     resident: float  # bytes
-    encoders: tuple[tuple[str, int], ...]  # how many picture encoders of each codec were open, by its name
+    encoders: tuple[tuple[str, int], ...]  # number of open picture encoders of each codec, by its name
 
 
 def growth_alike(samples: Sequence[Sample]) -> float | None:
-    """Relative growth as in `growth`, between moments with the same encoders open; None when there are no two such.
+    """Return the growth as in `growth`, between moments with the same encoders open; None if there are no two such.
 
-    An encoder takes ten megabytes, and how many are open follows from how the network and the machine are just now. So
-    the first third after the warm-up is compared with the last, for each set of encoders that both have; sets weigh
-    as often as both had them.
+    An encoder takes ten megabytes, and the number of open ones depends on the present state of the network and the
+    machine. So the first third after the warm-up is compared with the last, for each set of encoders that both have;
+    sets weigh as often as both had them.
     """
     warm = samples[int(len(samples) * WARM_UP) :]
     size = len(warm) // 3
@@ -45,7 +45,7 @@ def _by_encoders(samples: Sequence[Sample]) -> dict[tuple[tuple[str, int], ...],
 
 
 def growth(samples: Sequence[float]) -> float | None:
-    """Relative growth from the beginning to the end of one life, after the warm-up; None for too few samples.
+    """Return the relative growth from the beginning to the end of a life, after the warm-up; None for too few samples.
 
     Medians of the two ends are compared, so that a moment with more or fewer observers does not count.
     """

@@ -1,4 +1,4 @@
-"""Pages in Chromium through a soak: the operator's, whose person keeps driving, and an observer's, who watches."""
+"""Pages in Chromium through a soak: an operator's, which keeps driving, and an observer's, which watches."""
 
 import asyncio
 import time
@@ -18,21 +18,21 @@ TILT = "([axis, value]) => window.testPad.tilt(axis, value)"
 
 
 class WatchedPage:
-    """Reads the page's statistics, and reloads the page only when it does not come back, which is counted."""
+    """Reads the page's statistics. If the page does not come back, it is reloaded, which is counted."""
 
     def __init__(self, page: Page, calm_seconds: Callable[[], float]) -> None:
         self.page = page
         self.reloads = 0
         self.violations = 0
         self.slowest_return = 0.0  # s of calm until it was live again
-        self.events = 0  # seen to advance
+        self.events = 0  # events seen to advance
         self._calm_seconds = calm_seconds
         self._live_at = time.monotonic()
         self._last: dict[str, Any] | None = None
         self._news = asyncio.Event()
 
     async def run(self) -> None:
-        """Until cancelled."""
+        """Watch the page until cancelled."""
         while True:
             await asyncio.sleep(LOOK_SECONDS)
             try:
@@ -59,24 +59,24 @@ class WatchedPage:
             await self.act(statistics)
 
     async def until_live(self) -> None:
-        """Until it shows something new."""
+        """Wait until the page shows something new."""
         self._news.clear()
         await self._news.wait()
 
     async def act(self, statistics: dict[str, Any]) -> None:
-        """What its person does now."""
+        """Act as the page's user does in this state."""
 
     def _count(self, statistics: dict[str, Any]) -> None:
         self.violations = max(self.violations, sum(each["violations"] for each in statistics["streams"].values()))
 
     def _shows_something_new(self, statistics: dict[str, Any]) -> bool:
-        """Pictures advance: the one thing that needs everything to work."""
+        """Return whether pictures advance, which needs everything to work."""
         shown = _rendered(statistics)
         return self._last is None or shown != _rendered(self._last)
 
 
 class OperatorPage(WatchedPage):
-    """Its person wants to drive: asks for the seat, arms and pushes the stick, whenever the page lets them."""
+    """A page whose user wants to drive: asks for the seat, arms and pushes the stick, whenever the page allows it."""
 
     arms = 0
     seat_requests = 0
@@ -90,7 +90,7 @@ class OperatorPage(WatchedPage):
         elif not statistics["armed"]:
             await self._let_go()
             await self.page.evaluate(PRESS, [START, True])
-            await asyncio.sleep(0.08)  # a finger is no faster
+            await asyncio.sleep(0.08)  # a press is no shorter
             await self.page.evaluate(PRESS, [START, False])
             self.arms += 1
         else:

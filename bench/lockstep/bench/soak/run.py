@@ -1,5 +1,7 @@
-"""The soak: one operator and an observer in Chromium, headless observers that come and go, intruders, and a seeded plan
-of what goes wrong (schedule.py). The bridge's own record is the judge (judge.py)."""
+"""Runs the soak: clients under a seeded plan of disturbances (schedule.py), judged by the bridge's record (judge.py).
+
+The clients are one operator and an observer in Chromium, headless observers that come and go, and intruders.
+"""
 
 import asyncio
 import time
@@ -31,7 +33,7 @@ MAX_EVENT_AGE, HOLD = 2.0, 0.3  # of the planar robot
 
 
 async def soak(minutes: float, seed: int, observers: int, say: Callable[[str], None]) -> dict[str, Any]:
-    """What happened, by name; the first six must be 0, memory_growth small.
+    """Run the soak, and return the results by name; the first six must be 0, memory_growth small.
 
     Args:
         observers: headless ones, beside a page in Chromium
@@ -124,7 +126,7 @@ class _Soak:
                 await self._crowd.go()
 
     async def _cut(self, seconds: float, turn: int) -> None:
-        """In turn: packets are lost, or wait and arrive at the end; every fourth time on the robot link."""
+        """Cut the network: in turn packets are lost, or wait until the end; every fourth time on the robot link."""
         self._world.trouble_begins()
         try:
             self._network.outage(seconds, hold=turn % 2 == 1, robot=turn % 4 == 3)
@@ -133,7 +135,7 @@ class _Soak:
             self._world.trouble_ends()
 
     async def _until_live(self, *pages: WatchedPage) -> None:
-        """Every page shows new pictures after all is calm; one that does not would need a reload: that is counted."""
+        """Wait until every page shows new pictures after all is calm; one that does not is counted as a reload."""
         for page in pages:
             try:
                 async with asyncio.timeout(LAST_LOOK / len(pages)):
@@ -149,7 +151,7 @@ class _Soak:
             await asyncio.sleep(SAMPLE_SECONDS)
 
     async def _refusals(self) -> dict[str, float]:
-        """By reason, since the server's last start."""
+        """Return the refusals by reason, since the server's last start."""
         async with httpx.AsyncClient(base_url=self._world.console_url, trust_env=False) as http:
             with suppress(httpx.TransportError):
                 return Metrics((await http.get("/metrics")).text).values("lockstep_refusals_total", "reason")
@@ -183,5 +185,5 @@ class _Soak:
         }
 
     def _through(self, link: str) -> str:
-        """The link by way of the emulated network."""
+        """Return the link by way of the emulated network."""
         return self._network.link(link)

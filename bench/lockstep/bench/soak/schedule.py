@@ -1,4 +1,4 @@
-"""What happens to the session when: a seeded plan, without I/O."""
+"""Plans the disturbances of a session from a seed. No I/O."""
 
 import random
 from typing import Literal, NamedTuple
@@ -15,7 +15,7 @@ LAST_LIFE = 0.45  # share from which on the server lives without a restart, so t
 
 
 class Counts(NamedTuple):
-    """How often each disturbance comes."""
+    """The number of each disturbance."""
 
     bridge_kills: int
     server_restarts: int
@@ -26,17 +26,17 @@ class Counts(NamedTuple):
 class Action(NamedTuple):
     at: float  # s after the start
     kind: Kind
-    seconds: float = 0.0  # how long a cut or a stop lasts
+    seconds: float = 0.0  # duration of a cut or a stop
 
 
 def counts_for(minutes: float) -> Counts:
-    """What half an hour takes, in proportion, and each at least once."""
+    """Return the counts of half an hour in proportion to `minutes`, each at least 1."""
     share = minutes / 30
     return Counts(*(max(1, round(count * share)) for count in (5, 3, 20, 10)))
 
 
 def schedule(minutes: float, seed: int) -> list[Action]:
-    """All actions in order. The same arguments give the same plan.
+    """Return all actions in order. The same arguments give the same plan.
 
     Every kind is spread evenly, each action somewhere in its own slot.
     """
@@ -58,7 +58,7 @@ def schedule(minutes: float, seed: int) -> list[Action]:
 
 
 def _moves(chance: random.Random, minutes: float, begin: float, end: float) -> list[float]:
-    """Somebody comes or goes about every ten seconds."""
+    """Return times of an observer's coming or going, about every ten seconds."""
     return _spread(chance, max(2, round(minutes * 6)), begin, end)
 
 

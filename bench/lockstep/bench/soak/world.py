@@ -1,4 +1,4 @@
-"""The bridge and the console of a soak: processes that die and are started again at the same address."""
+"""The bridge and the console of a soak: processes that are killed and started again at the same address."""
 
 import asyncio
 import json
@@ -25,7 +25,7 @@ OPEN_ENCODERS = re.compile(r'^lockstep_media_encoders\{codec="(\w+)",stream="[^"
 
 
 class World:
-    """Enter it, and the bridge runs; then `open_console` with the address at which the console finds it."""
+    """A context manager in which the bridge runs; then call `open_console` with the console's address of the robot."""
 
     def __init__(self, folder: Path, robot: str = "planar") -> None:
         self.event_log = folder / "events.jsonl"
@@ -41,7 +41,7 @@ class World:
         self._bridge: Running | None = None
         self._server: Running | None = None
         self._bridge_port = self._server_port = 0
-        self._bridges = 0  # started
+        self._bridges = 0  # number of bridges started
         self._robot_address = ""
         self._troubles = 0
         self._calm_since = time.monotonic()
@@ -56,7 +56,7 @@ class World:
 
     @property
     def robot(self) -> tuple[str, int]:
-        """Where the bridge itself listens."""
+        """The address at which the bridge itself listens."""
         return "127.0.0.1", self._bridge_port
 
     async def __aexit__(
@@ -65,7 +65,7 @@ class World:
         await self._server_life.aclose()
         await self._bridge_life.aclose()
 
-    # What goes wrong
+    # Disturbances
 
     def trouble_begins(self) -> None:
         self._troubles += 1
@@ -75,7 +75,7 @@ class World:
         self._calm_since = time.monotonic()
 
     def calm_seconds(self) -> float:
-        """How long everything has been in order; 0 while something is not."""
+        """Return the seconds for which everything has been in order; 0 while something is not."""
         return 0.0 if self._troubles else time.monotonic() - self._calm_since
 
     async def kill_bridge(self) -> None:
@@ -103,7 +103,7 @@ class World:
             self.trouble_ends()
 
     async def stop_for(self, seconds: float) -> bool:
-        """STOP by an observer over HTTP, and the operator's reset after a while. False when the console was away."""
+        """Press STOP as an observer over HTTP, and reset as the operator later. False if the console was away."""
         async with httpx.AsyncClient(base_url=self.console_url, timeout=HTTP_SECONDS, trust_env=False) as http:
             try:
                 stopped = await http.post("/api/stop", headers=_bearer(self.observer), json={"reason": "soak"})
@@ -125,7 +125,7 @@ class World:
                 await asyncio.sleep(1.0)
 
     async def _reset(self, http: httpx.AsyncClient) -> bool:
-        """Ask for the reset of the newest stop, by the seat holder's link; whether no stop holds."""
+        """Ask for the reset of the newest stop, by the seat holder's link; return whether no stop holds."""
         session = await http.get("/api/session", headers=_bearer(self.operator))
         if not session.is_success or not session.json()["stopped"]:
             return session.is_success
@@ -133,17 +133,17 @@ class World:
         await http.post("/api/reset", headers=_bearer(self.operator), json={"number": number})
         return False
 
-    # What is measured
+    # Measurements
 
     def server_memory(self) -> int | None:
-        """Bytes; None while it is down."""
+        """Return the server's memory in bytes; None while it is down."""
         try:
             return None if self._server is None else self._server.resident_bytes()
         except (OSError, ValueError, IndexError):
             return None
 
     async def open_encoders(self) -> tuple[tuple[str, int], ...] | None:
-        """Of each codec how many picture encoders are open, by its name; None while the console does not answer."""
+        """Return the open picture encoders of each codec, by its name; None while the console does not answer."""
         async with httpx.AsyncClient(base_url=self.console_url, timeout=HTTP_SECONDS, trust_env=False) as http:
             try:
                 text = (await http.get("/metrics")).text
@@ -155,7 +155,7 @@ class World:
         return tuple(sorted(counts.items()))
 
     def records(self) -> Iterator[Mapping[str, Any]]:
-        """The bridge's record of all epochs. A killed bridge may leave half a line: it is passed over."""
+        """Yield the bridge's record of all epochs; half a line, which a killed bridge may leave, is passed over."""
         with self.event_log.open() as lines:
             for line in lines:
                 try:

@@ -1,1 +1,1 @@
-"""When a command may leave, and what became of it."""
+"""The operator's side of the command loop: pacing, repeats, rests and outcomes of commands."""

@@ -1,4 +1,4 @@
-"""The gate for commands: when the next one may leave. Held to tests/vectors/pacing.json. No I/O."""
+"""The gate for commands, which decides when the next one may leave. Checked by tests/vectors/pacing.json. No I/O."""
 
 from typing import Literal, NamedTuple
 
@@ -11,15 +11,15 @@ GateState = Literal["open", "no_feedback", "in_flight", "rate", "picture"]
 
 
 class NextCommand(NamedTuple):
-    """What a command sent now would be."""
+    """The numbers that a command sent now would carry."""
 
     event: int
-    issue: int  # of the feedback it answers
+    issue: int  # of the feedback that it answers
 
 
 class CommandGate:
-    """Open when the last command was answered, the event rate allows it and, with pacing `media`, the picture
-    on screen will be within tolerance of the next feedback as well."""
+    """Opens when the last command was answered, the event rate allows another and, with pacing `media`, the picture on
+    screen will be within tolerance of the next feedback as well."""
 
     def __init__(self, pacing: Pacing, tolerance: int, min_interval: float) -> None:
         self.pacing = pacing
@@ -32,11 +32,11 @@ class CommandGate:
 
     @property
     def in_flight(self) -> int | None:
-        """The event that was sent and not answered."""
+        """The event that was sent and not answered; None without one."""
         return self._in_flight
 
     def feedback(self, event: int, issue: int) -> bool:
-        """Take a feedback; whether it is newer than all before."""
+        """Take a feedback; return True if it is newer than all before it."""
         if self._feedback is not None:
             ahead = event_gap(event, self._feedback[0])
             if ahead < 0 or (ahead == 0 and issue <= self._feedback[1]):
@@ -47,23 +47,23 @@ class CommandGate:
         return True
 
     def sent(self, now: float) -> None:
-        """The next command left for the first time."""
+        """Note that the next command left for the first time."""
         self._in_flight = self.next().event
         self._sent_at = now
 
     def refused(self, event: int) -> bool:
-        """The robot or the console refused `event`; whether that was the one in flight."""
+        """Note that the robot or the console refused `event`; return True if that event was in flight."""
         if event != self._in_flight:
             return False
         self._in_flight = None
         return True
 
     def shown(self, stamp: int) -> None:
-        """A picture stamped `stamp` is on screen."""
+        """Note that a picture stamped `stamp` is on screen."""
         self._shown = stamp
 
     def state(self, now: float) -> GateState:
-        """Open, or the reason why not."""
+        """Return "open", or the reason that the gate is closed."""
         if self._feedback is None:
             return "no_feedback"
         if self._in_flight is not None:
@@ -75,11 +75,11 @@ class CommandGate:
         return "open"
 
     def opens_at(self) -> float:
-        """When the event rate allows the next command."""
+        """Return the time at which the event rate allows the next command."""
         return float("-inf") if self._sent_at is None else self._sent_at + self.min_interval
 
     def next(self) -> NextCommand:
-        """The command that an open gate lets pass.
+        """Return the command that an open gate lets pass.
 
         Raises:
             RuntimeError: there is no feedback yet.
@@ -89,8 +89,8 @@ class CommandGate:
         return NextCommand(event_after(self._feedback[0]), self._feedback[1])
 
     def _picture_is_near(self, event: int) -> bool:
-        """Near enough to stay within tolerance when the next feedback arrives, one event on. At tolerance 0 no picture
-        is; there the picture of the newest event suffices."""
+        """True if the picture on screen stays within tolerance when the next feedback arrives, one event on. At
+        tolerance 0 no picture can; there the picture of the newest event suffices."""
         if self._shown is None:
             return False
         return -self.tolerance <= event_gap(event, self._shown) <= max(self.tolerance - 1, 0)

@@ -1,14 +1,15 @@
-"""Driving, without I/O: which command or rest to send when, and the outcome of each intention.
+"""Decides without I/O which command or rest to send and when, and tells the outcome of each intention.
 
 Call `feedback`, `refusal`, `shown`, `intend` and `rest`. After each call, and at `wake_at`, send the messages that
 `due` returns, and hand out the results that `outcomes` returns.
 
 - One command is in flight; its repeats carry the newest intention under the same event number, and answer the newest
   issue of its feedback.
-- Armed and without a new intention for `IDLE`, the pilot sends neutral values at that interval.
+- Armed and without a new intention for `IDLE`, the sender sends neutral values at that interval.
 - A neutral command has to be executed before the robot may move: after taking the seat, a stop, a reset, a lost link,
-  and whenever the robot says so. The neutral command lets motion begin again, so only `arm` sends it, which a caller
-  asked for. The pilot gives up the command in flight and the wanted values, and sends no neutral command until then.
+  and whenever the robot says so. The neutral command lets motion begin again, so it is sent only when a caller asks
+  for it with `arm`. The sender gives up the command in flight and the wanted values, and sends no neutral command
+  until then.
 - While the path loses packets every command is followed by `ECHOES` copies, `ECHO` apart, until its answer: a copy
   covers the loss of the command and, being answered from the stored feedback, the loss of the answer too. On a clean
   path nothing is copied.
@@ -31,9 +32,9 @@ from lockstep.protocol.serial import FIRST_EVENT, event_gap
 __all__ = ["Outcome", "CommandSender"]
 
 IDLE = 0.2  # s; 5 Hz
-TURN = 0.1  # s for the next intention of a caller that waited longer than `IDLE` for an answer
+TURN = 0.1  # s that a caller has for its next intention after it waited longer than `IDLE` for an answer
 ECHO = 0.020  # s; longer than the console's own path to the robot and back
-ECHOES = 3  # at most; with the command itself as many as a row of lost packets is long
+ECHOES = 3  # at most; with the command itself as many packets as are lost in a row
 SALVO = 12
 SALVO_SPACING = 0.003  # s
 SALVO_LEAST = 0.050  # s; with a shorter interval single repeats are as quick
@@ -41,13 +42,13 @@ LOSSY_SPELL = 60.0  # s to go on copying after the last loss that was seen
 PATIENT_REASONS = {"late", "out_of_order", "rested", "unseen", "warning"}  # another try, on fresh feedback, can succeed
 NEEDLESS = 0.75  # an answer within this part of a ping's round trip after the last repeat answers an earlier sending
 NEEDLESS_BLIND = 0.25  # of the whole wait, while no ping is known
-PINGS = 8  # of which the shortest counts
+PINGS = 8  # pings, the shortest of which counts
 FEW_SAMPLES = 8
 NEVER = float("inf")
 
 
 class Outcome(NamedTuple):
-    """What became of all intentions up to `ticket`: `feedback` or `refusal` is set."""
+    """The outcome of all intentions up to `ticket`: `feedback` or `refusal` is set."""
 
     ticket: int
     feedback: Feedback | None
@@ -55,7 +56,7 @@ class Outcome(NamedTuple):
 
 
 class _Want(Enum):
-    """What the next command is to carry."""
+    """The values that the next command is to carry."""
 
     NOTHING = 0
     NEUTRAL = 1
@@ -67,10 +68,10 @@ class _Flight:
 
     def __init__(self, command: Command, want: _Want, ticket: int, now: float, *, neutral: bool) -> None:
         self.command = command
-        self.neutral = neutral  # all that it asks for is rest
+        self.neutral = neutral  # True if it asks for nothing but rest
         self.want = want
-        self.ticket = ticket  # of the intention it was sent for
-        self.issue = command.issue  # that the last sending answered
+        self.ticket = ticket  # of the intention that it was sent for
+        self.issue = command.issue  # the issue that the last sending answered
         self.sends = 1
         self.first_sent_at = now
         self.last_sent_at = now
@@ -87,8 +88,8 @@ class CommandSender:
         self.gate = gate
         self.timer = RepeatTimer()
         self.armed = False
-        self.ready = False  # whether the robot may move: a neutral command was executed since one was last needed
-        self.holds_seat = True  # else the executed event is another peer's
+        self.ready = False  # True if the robot may move: a neutral command was executed since one was last needed
+        self.holds_seat = True  # False: the executed event is another peer's
         self.newest: Feedback | None = None
         self.repeats = 0  # sent because no answer came in time
         self.echoes = 0  # sent because the path loses packets
@@ -101,20 +102,20 @@ class CommandSender:
         self._idle_at = NEVER
         self._flight: _Flight | None = None
         self._lossy_until = float("-inf")
-        self._pings: deque[float] = deque(maxlen=PINGS)  # round trips; none of a command is shorter
+        self._pings: deque[float] = deque(maxlen=PINGS)  # round trips; no command has a shorter one
         self._void: int | None = None  # an event that only neutral values may use
-        self._arming = False  # that command is wanted, or on its way
-        self._asked_again = False  # the answer to it asked for one more
+        self._arming = False  # a neutral command is wanted, or on its way
+        self._asked_again = False  # the answer to it asked for another one
         self._stop_number: int | None = None  # of the newest stop seen; None before the first feedback
         self._used_up: tuple[int, int] | None = None  # a feedback that can no longer be answered
         self._moved = False  # values were sent since the robot was last proven to be at rest
         self._rest: RestCall | None = None
         self._outcomes: deque[Outcome] = deque()
 
-    # What comes in
+    # Input
 
     def feedback(self, feedback: Feedback, now: float) -> bool:
-        """Take a feedback; whether it is newer than all before."""
+        """Take a feedback; return True if it is newer than all before it."""
         if not self.gate.feedback(feedback.event, feedback.issue):
             return False
         self.newest = feedback
@@ -129,21 +130,20 @@ class CommandSender:
         return True
 
     def seated(self) -> None:
-        """This console holds the control seat from now on."""
+        """Note that this console holds the control seat from now on."""
         self.holds_seat = True
         self.hold_back("not_neutral")
 
     def unseated(self) -> None:
-        """This console does not hold the control seat, or not any more."""
+        """Note that this console does not hold the control seat, or no longer holds it."""
         self.holds_seat = False
         self.hold_back("no_seat")
 
     def hold_back(self, reason: RefusalReason) -> None:
-        """The robot may not move until the program arms again: give up the wanted values and the flight, for
-        `reason`."""
+        """Give up the wanted values and the flight for `reason`; the robot may not move until the next `arm`."""
         self.ready = False
         if self._arming and reason == "not_neutral":
-            return  # arming is for that
+            return  # arming cures this
         self.armed = self._arming = False
         self._want = _Want.NOTHING
         if self._flight is not None:
@@ -161,7 +161,7 @@ class CommandSender:
             self.hold_back("not_neutral")
 
     def refusal(self, refusal: Refusal) -> None:
-        """Take a refusal. Those that fresh feedback can cure lead to another try, the others to an outcome."""
+        """Take a refusal. If fresh feedback can cure it, try again; otherwise it becomes an outcome."""
         flight = self._flight
         if flight is None or not self.gate.refused(refusal.event or flight.command.event):
             return  # event 0: the console could not even tell which
@@ -181,20 +181,20 @@ class CommandSender:
             self._outcomes.append(Outcome(flight.ticket, None, refusal))
 
     def shown(self, stamp: int) -> None:
-        """A picture of the main camera is on screen."""
+        """Note that a picture of the main camera is on screen."""
         self.gate.shown(stamp)
 
     def ping_answered(self, round_trip: float) -> None:
-        """A ping's round trip: stands in for that of a command while few of those are known."""
+        """Take a ping's round trip, in s; it stands in for that of a command while few of those are known."""
         self._pings.append(round_trip)
         if len(self.samples) < FEW_SAMPLES:
             self.timer.sample(round_trip)
 
     def loss(self, now: float) -> None:
-        """Some message of this connection was lost."""
+        """Note that some message of this connection was lost."""
         self._lossy_until = now + LOSSY_SPELL
 
-    # What the operator wants
+    # Intentions
 
     def intend(self, values: Sequence[float], now: float) -> int:
         """Send these values next; a command in flight repeats with them. Arms, and ends a rest. Returns a ticket."""
@@ -216,7 +216,7 @@ class CommandSender:
         return self._ticket
 
     def rest(self, now: float) -> None:
-        """Let go: rest at once, until it is proven; one neutral command; then silence. Disarms."""
+        """Send a rest at once, until it is proven, and one neutral command; then nothing. Disarms."""
         self.armed = self._arming = False
         self._values = list(self._neutral)
         if self._rest is not None:
@@ -233,13 +233,13 @@ class CommandSender:
 
     @property
     def resting(self) -> bool:
-        """A rest was asked for and is not proven yet."""
+        """True while a rest that was asked for is not proven."""
         return self._rest is not None
 
-    # What goes out
+    # Output
 
     def due(self, now: float) -> list[Command | Rest]:
-        """What to send now."""
+        """Return the messages to send now."""
         messages: list[Command | Rest] = []
         if self._rest is not None and now >= self._rest.due_at:
             messages.append(self._rest.send(now, self.timer))
@@ -255,7 +255,7 @@ class CommandSender:
         return messages
 
     def wake_at(self, now: float) -> float:
-        """When to call `due` again if nothing comes in before; infinite when only input can change anything."""
+        """Return the time to call `due` again without input before; infinity if only input can change anything."""
         moments = [NEVER if self._rest is None else self._rest.due_at]
         if self._flight is not None:
             moments += [self._flight.repeat_at, self._flight.echo_at]
@@ -266,7 +266,7 @@ class CommandSender:
         return min(moments)
 
     def outcomes(self) -> list[Outcome]:
-        """What became of intentions since the last call, oldest first."""
+        """Return the outcomes of intentions since the last call, oldest first."""
         taken = list(self._outcomes)
         self._outcomes.clear()
         return taken
@@ -295,7 +295,7 @@ class CommandSender:
         return command
 
     def _again(self, flight: _Flight, now: float) -> list[Command | Rest]:
-        """The repeat or the echoes of the command in flight that are due."""
+        """Return the repeat or the echoes of the command in flight that are due."""
         copies = 0
         if now >= flight.repeat_at:
             copies = 1
@@ -321,19 +321,21 @@ class CommandSender:
         return [again] * copies
 
     def _could_be_answered(self, flight: _Flight, now: float) -> bool:
-        """Else a repeat says nothing of losses, and a salvo would fill the window that SCTP has after one."""
+        """True if an answer can have arrived. Before that a repeat says nothing about losses, and a salvo would fill
+        the window that SCTP has after a loss."""
         return not self._pings or now - flight.first_sent_at >= min(self._pings)
 
     @property
     def _nonce(self) -> int:
-        """Of the issue that the gate answers."""
+        """The nonce of the issue that the gate answers."""
         return 0 if self.newest is None else self.newest.nonce
 
     def _wait(self, sends: int) -> float:
         return max(self._least(), self.timer.wait(sends))
 
     def _least(self) -> float:
-        """A ping does not reach the robot: until its share is known, pings may lengthen the wait but not shorten it."""
+        """Return the least wait. A ping does not reach the robot: until the robot's share is known, pings may lengthen
+        the wait but not shorten it."""
         return INITIAL if len(self.samples) < FEW_SAMPLES else 0.0
 
     def _only_neutral(self, event: int) -> bool:
@@ -346,7 +348,7 @@ class CommandSender:
 
     def _landed(self, flight: _Flight, feedback: Feedback, now: float) -> None:
         if not self.holds_seat:
-            self.hold_back("no_seat")  # that event was another peer's command
+            self.hold_back("no_seat")  # that event was the command of another peer
             return
         self._flight = None
         self._prove(flight, feedback)
@@ -363,8 +365,8 @@ class CommandSender:
             self._idle_at = max(self._idle_at, now + TURN)
 
     def _prove(self, flight: _Flight, feedback: Feedback) -> None:
-        """Whether the robot may move now. A neutral command that answers an issue from before, say, a reset counts for
-        nothing at the robot, so one more follows it. A cause that outlives that one arose after the arming."""
+        """Decide whether the robot may move now. A neutral command that answers an issue from before, say, a reset has
+        no effect at the robot, so one more follows it. A cause that outlives that one arose after the arming."""
         if feedback.stop.stopped or (not self.ready and not self._arming):
             return
         if not feedback.neutral_needed:

@@ -1,6 +1,6 @@
-"""When to repeat an unanswered command: RFC 6298 with a sub-second floor and cap. Held to tests/vectors/repeat.json.
+"""The interval at which an unanswered command is repeated: RFC 6298 with a sub-second floor and cap.
 
-No I/O; all times in seconds.
+Checked by tests/vectors/repeat.json. No I/O; all times in seconds.
 """
 
 __all__ = ["FLOOR", "INITIAL", "RepeatTimer"]
@@ -15,7 +15,7 @@ INITIAL = 0.100  # before the first sample
 
 
 class RepeatTimer:
-    """Estimates the round trip of a command and says how long to wait for its answer."""
+    """Estimates the round trip of a command, and from it the time to wait for its answer."""
 
     def __init__(self) -> None:
         self.interval = INITIAL
@@ -28,9 +28,9 @@ class RepeatTimer:
         return self._smoothed
 
     def sample(self, round_trip: float) -> None:
-        """One measured round trip (RFC 6298 2.2, 2.3).
+        """Take one measured round trip (RFC 6298 2.2, 2.3).
 
-        Karn's rule is the caller's: never of a command that was repeated, since its answer cannot be told from
+        Karn's rule is the caller's: take no sample of a command that was repeated, since its answer cannot be told from
         the answer to the repeat.
         """
         if self._smoothed is None:
@@ -44,13 +44,13 @@ class RepeatTimer:
 
     @property
     def early(self) -> float:
-        """How long to wait for the first answer where losses are expected: shorter, and wrong now and then."""
+        """The time to wait for the first answer where losses are expected: shorter, and wrong now and then."""
         if self._smoothed is None:
             return self.interval
         return min(CAP, max(FLOOR, self._smoothed + max(GRANULARITY, self._variation)))
 
     def wait(self, sends: int) -> float:
-        """How long to wait after the `sends`-th sending of one event.
+        """Return the time to wait after the `sends`-th sending of one event.
 
         The first two repeats come at the interval. Backing off at once, as TCP does (RFC 6298 5.5), would protect
         a queue that lock-step never builds: at most one small command is in flight.

@@ -1,4 +1,4 @@
-"""One letting go: a rest that is repeated until the robot is proven to be at rest. No I/O."""
+"""A rest that is repeated until the robot is proven to be at rest. No I/O."""
 
 from lockstep.client.control.repeat_timer import RepeatTimer
 from lockstep.protocol.messages import Feedback, Rest
@@ -10,9 +10,9 @@ SETTLE = 1.0  # s after which any feedback that is at rest was measured after th
 
 
 class RestCall:
-    """Proof is a feedback at rest that cannot have been measured before the rest took effect: the feedback to the
-    neutral command that was sent after it, a feedback from a stopped robot, or, when commands are refused, a feedback
-    that arrived much later."""
+    """A rest and its proof: a feedback at rest that cannot have been measured before the rest took effect. That is the
+    feedback to the neutral command that was sent after it, a feedback from a stopped robot, or, when commands are
+    refused, a feedback that arrived much later."""
 
     def __init__(self, rest: Rest, once: bool, now: float) -> None:
         self.rest = rest
@@ -23,7 +23,7 @@ class RestCall:
         self._sends = 0
 
     def send(self, now: float, timer: RepeatTimer) -> Rest:
-        """The rest to send now; the next is due after the timer's wait."""
+        """Return the rest to send now; the next is due after the timer's wait."""
         self._sends += 1
         self.due_at = now + timer.wait(self._sends)
         return self.rest

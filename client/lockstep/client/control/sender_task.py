@@ -1,4 +1,4 @@
-"""The shell around the pilot: its timer, and the futures of callers that wait for feedback."""
+"""Runs a command sender on asyncio: its timer, and the futures of callers that wait for feedback."""
 
 import asyncio
 from collections.abc import Callable, Sequence
@@ -13,7 +13,7 @@ __all__ = ["Driver"]
 
 
 class Driver:
-    """Sends the pilot's commands and rests, at once and at the right times."""
+    """Sends the commands and rests of a `CommandSender`, at once and at the right times."""
 
     def __init__(self, sender: CommandSender, send: Callable[[Command | Rest], None]) -> None:
         self.sender = sender
@@ -26,7 +26,7 @@ class Driver:
         self._lost: ConsoleLost | None = None
 
     def feedback(self, feedback: Feedback) -> bool:
-        """Take a feedback; whether it is newer than all before."""
+        """Take a feedback; return True if it is newer than all before it."""
         newer = self.sender.feedback(feedback, self._loop.time())
         self.pump()
         return newer
@@ -36,17 +36,17 @@ class Driver:
         self.pump()
 
     def shown(self, stamp: int) -> None:
-        """A picture of the main camera is on screen."""
+        """Note that a picture of the main camera is on screen."""
         self.picture_delay.shown(stamp, self._loop.time())
         self.sender.shown(stamp)
         self.pump()
 
     def loss(self) -> None:
-        """A message of this connection was lost."""
+        """Note that a message of this connection was lost."""
         self.sender.loss(self._loop.time())
 
     async def drive(self, values: Sequence[float]) -> Feedback:
-        """Send `values` as soon as the gate opens; the feedback that answers.
+        """Send `values` as soon as the gate opens; return the feedback that answers them.
 
         Raises:
             NotArmed: a neutral command comes first.
@@ -59,19 +59,19 @@ class Driver:
         return await answered
 
     async def arm(self) -> Feedback:
-        """Send a neutral command; the feedback that answers it. Raises as `drive`."""
+        """Send a neutral command; return the feedback that answers it. Raises like `drive`."""
         answered: asyncio.Future[Feedback] = self._future()
         self._waiting.append((self.sender.arm(), answered))
         self.pump()
         return await answered
 
     def hold_back(self, reason: RefusalReason) -> None:
-        """The robot may not move until the program arms again."""
+        """Keep the robot from moving until the program arms again."""
         self.sender.hold_back(reason)
         self.pump()
 
     async def rest(self) -> None:
-        """Rest at once; returns when the robot is proven to be at rest. Raises ConsoleLost."""
+        """Rest at once; return when the robot is proven to be at rest. Raises ConsoleLost."""
         self.sender.rest(self._loop.time())
         rested: asyncio.Future[None] = self._future()
         self._rested.append(rested)
@@ -84,7 +84,7 @@ class Driver:
         return self._loop.create_future()
 
     def pump(self) -> None:
-        """Send what the pilot has due, hand out outcomes, and set the timer for the next time."""
+        """Send the due messages, hand out outcomes, and set the timer for the next time."""
         if self._timer is not None:
             self._timer.cancel()
             self._timer = None
@@ -117,7 +117,7 @@ class Driver:
             self._rested.clear()
 
     def end(self, lost: ConsoleLost) -> None:
-        """The connection ended: end every wait."""
+        """End every wait: the connection ended."""
         self._lost = lost
         self.pump()
         pending: list[asyncio.Future[Any]] = [*(future for _, future in self._waiting), *self._rested]

@@ -1,1 +1,1 @@
-"""From RTP packets to pictures and sounds that carry their event."""
+"""Turns RTP packets into pictures and sounds that carry their event."""

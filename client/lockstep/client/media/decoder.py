@@ -23,7 +23,7 @@ REMEMBERED = 32  # frames that a decoder may keep back
 
 
 def is_h264_keyframe(data: bytes) -> bool:
-    """Whether the access unit (RFC 6184, as an Annex B byte stream) can be decoded without earlier ones."""
+    """True if the access unit (RFC 6184, as an Annex B byte stream) can be decoded without earlier ones."""
     found = set()
     position = data.find(b"\x00\x00\x01")
     while 0 <= position < len(data) - 3:
@@ -33,7 +33,7 @@ def is_h264_keyframe(data: bytes) -> bool:
 
 
 def is_vp8_keyframe(data: bytes) -> bool:
-    """Whether the frame is a keyframe (RFC 6386 9.1), begun at its beginning."""
+    """True if `data` is a keyframe (RFC 6386 9.1), from its first byte on."""
     return len(data) >= 10 and data[0] & 1 == 0 and data[3:6] == VP8_START_CODE
 
 
@@ -42,15 +42,15 @@ class Decoded(NamedTuple):
 
     frame: av.VideoFrame | av.AudioFrame
     stamp: int | None
-    timestamp: int  # of RTP
+    timestamp: int  # RTP timestamp
     captured: float | None = None  # s since 1970 on the sender's clock
 
 
 class Decoder:
-    """One stream's decoder.
+    """Decodes one stream.
 
     Raises:
-        KeyError: no decoder for this codec.
+        KeyError: there is no decoder for this codec.
     """
 
     def __init__(self, codec: str) -> None:
@@ -65,7 +65,7 @@ class Decoder:
         self._origin: OrderedDict[int, EncodedFrame] = OrderedDict()
 
     def decode(self, encoded: EncodedFrame) -> list[Decoded]:
-        """What comes out after `encoded` went in.
+        """Decode `encoded` and return the frames that come out.
 
         Raises:
             av.FFmpegError: the data is not a frame of this codec.

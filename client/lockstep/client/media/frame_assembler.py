@@ -1,4 +1,4 @@
-"""From RTP packets to encoded frames, as early as possible and never a broken one. No I/O.
+"""Assembles RTP packets into encoded frames, as early as possible and never a broken one. No I/O.
 
 A video frame is complete with its marker packet (RFC 3550 5.1); waiting for the next frame to begin, as a general
 jitter buffer does, would cost one frame time of delay. After a frame that could not be completed nothing is given
@@ -18,7 +18,7 @@ KEYFRAME_RETRY = 0.4  # s between two keyframe requests, at least; and a round t
 
 
 class MediaPacket(NamedTuple):
-    """One RTP packet, its payload format already taken off."""
+    """One RTP packet without its payload format."""
 
     sequence: int
     timestamp: int
@@ -38,7 +38,7 @@ class EncodedFrame(NamedTuple):
 
 
 class Assembler(Protocol):
-    """What a stream needs of either kind."""
+    """The interface of both assemblers."""
 
     lost: int
     round_trip: float  # s to the sender and back; 0 while unknown
@@ -51,7 +51,7 @@ class Assembler(Protocol):
 
 
 class AudioAssembler:
-    """Every packet is a frame, given out at once; a packet that comes late is left out."""
+    """Gives out every packet as a frame at once, and leaves out late ones."""
 
     def __init__(self) -> None:
         self.lost = 0
@@ -73,11 +73,14 @@ class AudioAssembler:
         return False
 
     def broken(self) -> None:
-        """Every audio packet decodes without others."""
+        """Do nothing: every audio packet decodes without others."""
 
 
 class VideoAssembler:
-    """Frames in order. Call `add` with every packet, then `wants_keyframe`. Other parts ask for missing packets."""
+    """Gives out video frames in order; other parts ask for missing packets.
+
+    Call `add` with every packet, then `wants_keyframe`.
+    """
 
     def __init__(self, is_keyframe: Callable[[bytes], bool]) -> None:
         self.lost = 0  # packets given up
@@ -86,14 +89,14 @@ class VideoAssembler:
         self._is_keyframe = is_keyframe
         self._packets: dict[int, MediaPacket] = {}
         self._start: int | None = None  # sequence number that begins the next frame
-        self._end = 0  # the first one after `_start` that is not there
-        self._gap_since: float | None = None  # since when the first missing packet has held up all others
-        self._gap_at = 0  # that packet
+        self._end = 0  # number of the first missing packet after `_start`
+        self._gap_since: float | None = None  # time since which the first missing packet has held up all others
+        self._gap_at = 0  # number of that packet
         self._needs_keyframe = True
         self._keyframe_due = float("inf")
 
     def add(self, packet: MediaPacket, now: float) -> list[EncodedFrame]:
-        """The frames that `packet` completes."""
+        """Return the frames that `packet` completes."""
         if self._start is None:
             self._begin_at(packet.sequence)
             self._keyframe_due = now + self._keyframe_retry  # the sender begins with one: it may be on its way
@@ -107,7 +110,7 @@ class VideoAssembler:
         return frames
 
     def wants_keyframe(self, now: float) -> bool:
-        """Whether to ask for a keyframe now."""
+        """True if it is time to ask for a keyframe."""
         if not self._needs_keyframe or now < self._keyframe_due:
             return False
         self._keyframe_due = now + self._keyframe_retry
@@ -118,7 +121,7 @@ class VideoAssembler:
         return max(KEYFRAME_RETRY, 1.5 * self.round_trip)
 
     def broken(self) -> None:
-        """A frame that was given out did not reach the decoder, or failed there."""
+        """Note that a frame that was given out did not reach the decoder, or failed there."""
         self._needs_keyframe = True
 
     def _begin_at(self, sequence: int) -> None:

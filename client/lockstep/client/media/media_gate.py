@@ -1,4 +1,4 @@
-"""The gate for pictures and sound: one rule, the same in web/, both held to tests/vectors/gate.json. No I/O.
+"""The gate for pictures and sound: one rule, the same in web/, both checked by tests/vectors/gate.json. No I/O.
 
 The mode `event` is the rule. The two others are for comparison: `off` renders everything; `age` renders media that were
 captured at most `MAX_AGE` ago by synchronised clocks, and ignores events.
@@ -14,13 +14,13 @@ GateMode = Literal["event", "off", "age"]
 Verdict = Literal["render", "discard", "hold"]
 Medium = TypeVar("Medium")
 
-MAX_AGE = 0.5  # s; of the mode `age`
+MAX_AGE = 0.5  # s; for the mode `age`
 
 
 def verdict(
     feedback: int | None, stamp: int | None, tolerance: int, mode: GateMode = "event", age: float | None = None
 ) -> tuple[Verdict, int | None]:
-    """What to do with a medium stamped `stamp` while `feedback` is the newest event, and its gap.
+    """Return the verdict on a medium stamped `stamp` while `feedback` is the newest event, and the gap.
 
     The gap is None when either side is unknown. `age`, in seconds, is for the mode `age` alone; None when unknown.
     """
@@ -45,9 +45,9 @@ class Gated(NamedTuple, Generic[Medium]):
 
 
 class MediaGate(Generic[Medium]):
-    """Gate of one stream. Keeps the newest medium that overtook the feedback, and counts.
+    """The gate of one stream. Keeps the newest medium that overtook the feedback, and counts.
 
-    Call `feedback` on every feedback and `offer` with every medium; each returns what to render now, or None.
+    Call `feedback` on every feedback and `offer` with every medium; each returns the medium to render now, or None.
     """
 
     def __init__(self, tolerance: int, mode: GateMode = "event") -> None:
@@ -69,20 +69,20 @@ class MediaGate(Generic[Medium]):
 
     @property
     def newest_feedback(self) -> int | None:
-        """What media are judged against; None before the first."""
+        """The event that media are judged against; None before the first."""
         return self._feedback
 
     @property
     def mean_gap(self) -> float | None:
-        """Of |gap| over the rendered media; None before the first gap is known."""
+        """The mean of |gap| over the rendered media; None before the first gap is known."""
         return self._gaps / self._gaps_known if self._gaps_known else None
 
     def reported(self) -> None:
-        """The figures were sent off: begin a new `lag`."""
+        """Begin a new `lag`: the figures were sent off."""
         self.lag = 0
 
     def feedback(self, event: int) -> Gated[Medium] | None:
-        """The newest feedback is of `event`."""
+        """Take the event of the newest feedback."""
         if self._feedback is not None and event_gap(event, self._feedback) <= 0:
             return None
         self._feedback = event
@@ -96,7 +96,7 @@ class MediaGate(Generic[Medium]):
         return self._settle(decision, medium, stamp, gap)
 
     def offer(self, medium: Medium, stamp: int | None, age: float | None = None) -> Gated[Medium] | None:
-        """A medium arrived. `age`: s since its capture, if clocks are synchronised."""
+        """Take a medium that arrived. `age`: s since its capture, if clocks are synchronised."""
         self.received += 1
         if stamp is not None:
             self.stamp = stamp
@@ -109,7 +109,7 @@ class MediaGate(Generic[Medium]):
         return self._settle(decision, medium, stamp, gap)
 
     def check(self, stamp: int | None, age: float | None = None) -> tuple[Verdict, int | None]:
-        """The verdict now on a medium that was let through before."""
+        """Return the verdict now on a medium that was let through before."""
         return verdict(self._feedback, stamp, self.tolerance, self.mode, age)
 
     def _hold(self, medium: Medium, stamp: int | None) -> None:
@@ -130,7 +130,7 @@ class MediaGate(Generic[Medium]):
         return Gated(medium, stamp, gap)
 
     def _note_gap(self, gap: int | None) -> None:
-        """Checks the rule again, apart from the verdict."""
+        """Count the gap, and check the rule again, apart from the verdict."""
         if gap is None:
             self.violations += self.mode == "event"
             return
@@ -141,6 +141,6 @@ class MediaGate(Generic[Medium]):
         self._gaps_known += 1
 
     def _overtaken(self, stamp: int | None) -> bool:
-        """Whether the waiting medium is not newer than the one being rendered: it would step back in time."""
+        """True if the waiting medium is not newer than the one being rendered: it would step back in time."""
         waiting = self._waiting[1] if self._waiting is not None else None
         return waiting is None or stamp is None or event_gap(waiting, stamp) <= 0

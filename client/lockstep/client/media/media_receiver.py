@@ -28,7 +28,7 @@ CLOCK_RATES = {"video": 90_000, "audio": 48_000}  # Hz; only the unit of the jit
 
 
 class PacketSource(Protocol):
-    """Where packets come from."""
+    """A source of media packets: the connection to a console or a relay."""
 
     def extension_id(self, sections: list[Section]) -> int | None: ...
     def take_packets(self, sinks: Mapping[str, PacketSink], sections: list[Section]) -> None: ...
@@ -38,7 +38,7 @@ class PacketSource(Protocol):
 
 
 class MediaReceiver:
-    """`prepare` with the answer's sections, then `run`; `close` at the end."""
+    """Receives the media of one connection: `prepare` with the answer's sections, then `run`; `close` at the end."""
 
     def __init__(
         self,
@@ -58,7 +58,7 @@ class MediaReceiver:
         self._reports = ReceiverReports(random.getrandbits(32))
 
     def prepare(self, source: PacketSource, sections: list[Section], decode: bool) -> None:
-        """Take the packets of `source`: into decoders, or only counting them."""
+        """Take the packets of `source`, to decode or only to count them."""
         self._source = source
         received = [section for section in sections if section.receives]
         if not decode:
@@ -105,7 +105,7 @@ class MediaReceiver:
                 group.create_task(stream.run(self._executor))
 
     async def _report(self, source: PacketSource) -> None:
-        """Receiver reports, spread in time (RFC 3550 6.2): without them the console must take the path for dead."""
+        """Send receiver reports, spread in time (RFC 3550 6.2): without them the console takes the path for dead."""
         while True:
             await asyncio.sleep(REPORT_SECONDS * random.uniform(0.5, 1.5))
             report = self._reports.report(time.monotonic())
@@ -113,23 +113,23 @@ class MediaReceiver:
                 source.send_control(report)
 
     def round_trip(self, seconds: float) -> None:
-        """A round trip to the console takes so long: lost packets are waited for accordingly."""
+        """Take the round trip to the console; lost packets are waited for accordingly."""
         if self._source is not None and self._streams:
             self._source.round_trip(seconds)
         for stream in self._streams:
             stream.round_trip(seconds)
 
     def feedback(self, event: int) -> None:
-        """The newest feedback is of `event`."""
+        """Take the event of the newest feedback."""
         for stream in self._streams:
             stream.feedback(event)
 
     def log(self, name: str) -> list[Rendering]:
-        """What was rendered of a stream; empty when it is not received."""
+        """Return the renderings of a stream; none if it is not received."""
         return next((stream.log.all() for stream in self._streams if stream.name == name), [])
 
     def stream(self, kind: str, name: str) -> Stream:
-        """The stream `name`, or the first of its kind when `name` is empty.
+        """Return the stream `name`, or the first of its kind when `name` is empty.
 
         Raises:
             NoSuchStream: it is not received.
@@ -142,7 +142,7 @@ class MediaReceiver:
         raise NoSuchStream(f"no {kind} stream {name!r} is received; there is: {known}")
 
     def reported(self) -> None:
-        """The statistics went to the console."""
+        """Note that the statistics went to the console."""
         for stream in self._streams:
             stream.gate.reported()
 
@@ -165,7 +165,7 @@ class MediaReceiver:
         )
 
     def end(self) -> None:
-        """No more packets will arrive."""
+        """Note that no more packets will arrive."""
         for stream in self._streams:
             stream.close()
 

@@ -10,11 +10,11 @@ Item = TypeVar("Item")
 
 
 class QueueClosed(Exception):
-    """Nothing will come any more."""
+    """The queue is closed and empty."""
 
 
 class NewestQueue(Generic[Item]):
-    """`put` never blocks and never fails; a full queue loses its oldest item. One reader."""
+    """A queue for one reader. `put` never blocks and never fails; a full queue loses its oldest item."""
 
     def __init__(self, bound: int) -> None:
         self.dropped = 0
@@ -36,7 +36,7 @@ class NewestQueue(Generic[Item]):
         self._changed.set()
 
     async def get(self) -> Item:
-        """The oldest item.
+        """Return the oldest item; wait for one if there is none.
 
         Raises:
             QueueClosed: the queue was closed and is empty.
@@ -49,7 +49,7 @@ class NewestQueue(Generic[Item]):
         return self._items.popleft()
 
     def clear(self) -> int:
-        """Forget all items; how many there were."""
+        """Forget all items and return their number."""
         count = len(self._items)
         self._items.clear()
         self.dropped += count

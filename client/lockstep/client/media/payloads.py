@@ -1,4 +1,4 @@
-"""What an RTP payload holds of a frame, as the decoders take it. No I/O."""
+"""Unpacks RTP payloads into the parts of a frame that decoders take. No I/O."""
 
 from collections.abc import Callable, Mapping
 
@@ -10,12 +10,12 @@ START_CODE = b"\x00\x00\x00\x01"
 
 
 def unpack_vp8(payload: bytes) -> bytes:
-    """Raises PayloadError."""
+    """Return the part of a VP8 frame in `payload`. Raises PayloadError."""
     return vp8_part(payload).data
 
 
 def unpack_h264(payload: bytes) -> bytes:
-    """As part of a byte stream with start codes. Raises PayloadError."""
+    """Return the part of an H.264 frame in `payload`, as a byte stream with start codes. Raises PayloadError."""
     return b"".join(START_CODE + part.data if part.begins_unit else part.data for part in h264_parts(payload))
 
 

@@ -10,12 +10,12 @@ __all__ = ["ReceiverReports"]
 SEQUENCES = 1 << 16
 RTCP_SR, RTCP_RR = 200, 201
 MOST_BLOCKS = 31
-SENDER_REPORT = 28  # bytes, the least
+SENDER_REPORT = 28  # bytes, at least
 
 
 @dataclass(slots=True)
 class _Source:
-    """One stream."""
+    """The counts of one stream."""
 
     clock_rate: int  # Hz
     first: int | None = None  # sequence number
@@ -27,22 +27,22 @@ class _Source:
     timestamp: int = 0
     jitter: float = 0.0  # in the clock's units
     report: int = 0  # middle of the last sender report's time
-    report_at: float = 0.0  # s, when it came
+    report_at: float = 0.0  # s, its arrival
 
 
 class ReceiverReports:
-    """Tell it of packets and of the sender's reports; ask it for a report about once a second."""
+    """Makes receiver reports. Pass it packets and the sender's reports; call `report` about once a second."""
 
     def __init__(self, own_ssrc: int) -> None:
         self._own = own_ssrc
         self._sources: dict[int, _Source] = {}
 
     def add(self, ssrc: int, clock_rate: int) -> None:
-        """Report about this stream."""
+        """Report on this stream from now on."""
         self._sources[ssrc] = _Source(clock_rate)
 
     def packet(self, header: RtpHeader, now: float) -> None:
-        """A packet arrived."""
+        """Count a packet that arrived."""
         source = self._sources.get(header.ssrc)
         if source is None:
             return
@@ -65,14 +65,14 @@ class ReceiverReports:
         source.transit = transit
 
     def control(self, data: bytes, now: float) -> None:
-        """A compound RTCP packet arrived; all but sender reports are left out."""
+        """Take a compound RTCP packet that arrived; all but sender reports are left out."""
         if len(data) >= SENDER_REPORT and data[1] == RTCP_SR:
             source = self._sources.get(int.from_bytes(data[4:8], "big"))
             if source is not None:
                 source.report, source.report_at = int.from_bytes(data[10:14], "big"), now
 
     def report(self, now: float) -> bytes | None:
-        """What to send; None before the first packet."""
+        """Return the report to send; None before the first packet."""
         blocks = [
             self._block(ssrc, source, source.first, now)
             for ssrc, source in self._sources.items()

@@ -1,4 +1,4 @@
-"""The newest things rendered and heard, for tests, measurements and the operator's own tools. No I/O."""
+"""Logs of the newest renderings and feedbacks, for tests, measurements and the operator's own tools. No I/O."""
 
 from collections import deque
 from typing import NamedTuple
@@ -33,5 +33,5 @@ class RenderLog:
         self._entries.append(entry)
 
     def all(self) -> list[Rendering]:
-        """Oldest first."""
+        """Return the renderings, oldest first."""
         return list(self._entries)

@@ -1,4 +1,4 @@
-"""Counting RTP instead of decoding it: cheap enough for a hundred observers in one process. No I/O."""
+"""Counts RTP instead of decoding it: cheap enough for a hundred observers in one process. No I/O."""
 
 from collections.abc import Callable
 
@@ -10,7 +10,7 @@ SEQUENCES = 1 << 16
 
 
 class RtpCounter:
-    """One stream. Frames are told apart by their RTP timestamp, so that a lost marker loses no frame."""
+    """Counts one stream. Frames are told apart by their RTP timestamp, so that a lost marker loses no frame."""
 
     def __init__(self, extension_id: int | None, read_stamp: Callable[[bytes], int | None]) -> None:
         self.packets = 0
@@ -25,7 +25,7 @@ class RtpCounter:
         self._timestamp: int | None = None
 
     def take(self, header: RtpHeader) -> None:
-        """One packet."""
+        """Count one packet."""
         self.packets += 1
         self.payload_type = header.payload_type
         if self._highest is None:
@@ -33,7 +33,7 @@ class RtpCounter:
         else:
             ahead = (header.sequence - self._highest) % SEQUENCES
             if ahead >= SEQUENCES // 2:
-                self.lost = max(0, self.lost - 1)  # came late after all
+                self.lost = max(0, self.lost - 1)  # late, and not lost
                 return
             self.lost += max(0, ahead - 1)
             self._highest = header.sequence

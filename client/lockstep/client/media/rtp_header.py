@@ -20,7 +20,7 @@ class RtpHeader(NamedTuple):
 
 
 def parse_rtp_header(data: bytes) -> RtpHeader | None:
-    """The header, or None when `data` is not an RTP packet."""
+    """Return the header, or None if `data` is not an RTP packet."""
     if len(data) < FIXED or data[0] >> 6 != 2:
         return None
     position = FIXED + 4 * (data[0] & 0x0F)
@@ -45,7 +45,7 @@ def parse_rtp_header(data: bytes) -> RtpHeader | None:
 
 
 def find_extension(profile: int, extension: bytes, wanted: int) -> bytes | None:
-    """The element with id `wanted`, or None when it is not there or the elements are cut short."""
+    """Return the element with id `wanted`, or None if it is missing or the elements are cut short."""
     if profile != ONE_BYTE and profile & 0xFFF0 != TWO_BYTE:
         return None
     header = 1 if profile == ONE_BYTE else 2

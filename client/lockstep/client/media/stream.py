@@ -41,7 +41,7 @@ class Sound(NamedTuple):
 
 
 class Stream:
-    """Give it packets, run `run`, tell it of feedbacks, read from `open_reader`."""
+    """One received stream. Pass it packets and feedbacks, run `run`, and read from `open_reader`."""
 
     def __init__(
         self,
@@ -75,7 +75,7 @@ class Stream:
     # From the network
 
     def packet(self, payload_type: int, packet: MediaPacket) -> bool:
-        """Take one packet; whether to ask the sender for a keyframe."""
+        """Take one packet; return True if the sender should be asked for a keyframe."""
         now = asyncio.get_running_loop().time()
         assembler = self._assembler_for(payload_type)
         if assembler is None:
@@ -83,11 +83,11 @@ class Stream:
         self._packets += 1
         for frame in assembler.add(packet, now):
             if not self._assembled(frame, assembler):
-                break  # those behind it build on it
+                break  # later frames build on it
         return assembler.wants_keyframe(now)
 
     def round_trip(self, seconds: float) -> None:
-        """A round trip to the sender takes so long."""
+        """Take the round trip to the sender."""
         self._round_trip = seconds
         if self._assembler is not None:
             self._assembler.round_trip = seconds
@@ -101,7 +101,7 @@ class Stream:
         return self._assembler
 
     def _assembled(self, frame: EncodedFrame, assembler: Assembler) -> bool:
-        """Whether the decoder will get it."""
+        """Queue a frame for the decoder; return False if the decoder is too slow."""
         self._frames += 1
         if self.carrier == "trailer":
             frame = _without_trailer(frame)
@@ -141,16 +141,15 @@ class Stream:
     # Through the gate, to the readers
 
     def feedback(self, event: int) -> None:
-        """The newest feedback is of `event`."""
+        """Take the event of the newest feedback."""
         self._render(self.gate.feedback(event))
 
     def check(self, medium: Decoded) -> tuple[Verdict, int | None]:
-        """The verdict now on a medium that a reader took."""
+        """Return the verdict now on a medium that a reader took."""
         return self.gate.check(medium.stamp, self._age(medium))
 
     def _age(self, medium: Decoded) -> float | None:
-        """Its age in s, if the sender's clock and this one agree; None when the medium does not carry its capture
-        time."""
+        """Return the medium's age in s, if both ends' clocks agree; None if it does not carry its capture time."""
         return None if medium.captured is None else self._wall_clock() - medium.captured
 
     def _render(self, gated: Gated[Decoded] | None) -> None:
@@ -176,7 +175,7 @@ class Stream:
         self._unread += reader.dropped
 
     def close(self) -> None:
-        """No more media will arrive: readers read the remaining ones, and end."""
+        """Note that no more media will arrive: readers read the remaining ones, and end."""
         self._closed = True
         for reader in self._readers:
             reader.close()

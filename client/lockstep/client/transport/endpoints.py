@@ -8,7 +8,7 @@ __all__ = ["open_endpoint"]
 
 
 def open_endpoint(hosts: Sequence[str]) -> Endpoint:
-    """An endpoint on all of these addresses that can be bound: a new address may not be ready yet."""
+    """Return an endpoint on all of these addresses that can be bound: a new address may not be ready yet."""
     try:
         return Endpoint(hosts)
     except OSError:

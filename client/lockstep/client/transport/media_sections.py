@@ -1,4 +1,4 @@
-"""What the client can receive, as sections of a session description."""
+"""The sections of a session description for everything that the client can receive."""
 
 from collections.abc import Mapping, Sequence
 from typing import Literal
@@ -9,7 +9,7 @@ __all__ = ["CODECS", "receiving"]
 
 FEEDBACK = ("nack", "nack pli")
 H264 = {"packetization-mode": "1", "level-asymmetry-allowed": "1"}
-# Of H.264 the baseline profile, plain and constrained: what encoders of the console and of relays make.
+# Of H.264 the baseline profile, plain and constrained, which the encoders of the console and of relays make.
 CODECS: Mapping[str, Sequence[Codec]] = {
     "video": (
         Codec(96, "VP8", 90_000, feedback=FEEDBACK),
@@ -24,10 +24,10 @@ CODECS: Mapping[str, Sequence[Codec]] = {
 
 
 def receiving(kind: Literal["video", "audio"], codec: str | None = None, extension: str | None = None) -> LocalMedia:
-    """A section that receives.
+    """Return a section that receives.
 
     Args:
-        codec: this one alone; None: whichever the sender likes
+        codec: the only codec; None: any that the sender likes
         extension: the URI of the header extension that brings stamps; None: they come otherwise
 
     Raises:

@@ -1,4 +1,4 @@
-"""An observer's way to the console beside a relay: one WebSocket for all that data channels would carry."""
+"""An observer's WebSocket to the console beside a relay, for all messages that data channels would carry."""
 
 import asyncio
 import ssl
@@ -22,18 +22,18 @@ from lockstep.protocol.messages import Ping, StopTaken
 __all__ = ["LineBlocked", "ObserverWebSocket"]
 
 OPEN_SECONDS = 5.0
-UNREAD_SECONDS = 0.5  # more for an answer: a client that was held up has it waiting and has not read it
+UNREAD_SECONDS = 0.5  # s more for an answer: a client that was held up may have it waiting, not yet read
 CLOSE_SECONDS = 3.0
 MAX_MESSAGE = 1024 * 1024  # bytes; the list of a thousand participants is the largest
-MAX_WAITING = 64  # messages that could not leave yet; then the oldest go
+MAX_WAITING = 64  # messages that could not leave yet; beyond that the oldest are dropped
 
 
 class LineBlocked(ConnectFailed):
-    """No WebSocket to the console, which answers over HTTP: a proxy or firewall on the way lets no WebSocket pass."""
+    """No WebSocket to the console opens, though it answers over HTTP: a proxy or firewall lets none pass."""
 
 
 class ObserverWebSocket:
-    """Used as `Peer` is. Order: `negotiate`, `connect`, then `send` until `ended` is set, then `close`."""
+    """An observer's WebSocket, used like `Peer`: `negotiate`, `connect`, `send` until `ended` is set, `close`."""
 
     def __init__(
         self,
@@ -43,9 +43,9 @@ class ObserverWebSocket:
         on_message: Callable[[str | bytes], None],
         silence_seconds: float,
     ) -> None:
-        """`silence_seconds`: in which the console says something after a ping."""
+        """`silence_seconds`: time within which the console says something after a ping."""
         self.ended = asyncio.Event()
-        self.why = ""  # it ended
+        self.why = ""  # reason that it ended
         self.skipped = 0  # messages that did not fit
         self._link = link
         self._relay = relay
@@ -61,15 +61,15 @@ class ObserverWebSocket:
         self._closing = False
 
     async def relay_ticket(self, peer: str = "") -> RelayTicket | None:
-        """Raises as `Whep.offer`."""
+        """Return the relay for this observer; None: the console itself. Raises like `Whep.offer`."""
         return await self._whep.relay(peer)
 
     async def negotiate(self) -> list[Section]:
-        """Open the line. There are no media sections.
+        """Open the WebSocket. There are no media sections.
 
         Raises:
             SignallingRefused, ConnectFailed: as `Whep.offer`.
-            LineBlocked: the console takes one, but it cannot be opened; or it is a console that knows none.
+            LineBlocked: the console takes a WebSocket, but none can be opened; or the console does not know them.
         """
         try:
             ticket = await self._whep.watch(self._relay)
@@ -84,18 +84,18 @@ class ObserverWebSocket:
                 open_timeout=OPEN_SECONDS,
                 close_timeout=1.0,
                 max_size=MAX_MESSAGE,
-                ping_interval=None,  # the reports ask, and so does the console
+                ping_interval=None,  # the reports serve as pings, and the console pings too
                 compression=None,
                 proxy=None if self._link.loopback else True,
             )
         except (OSError, TimeoutError, ImportError, WebSocketException) as error:
-            # ImportError: a proxy of a kind that takes a package which is not there.
+            # ImportError: this kind of proxy needs a package that is not installed.
             await self._give_back(ticket)
             raise LineBlocked(f"no WebSocket to the console ({error or type(error).__name__})") from error
         return []
 
     async def connect(self, seconds: float) -> None:
-        """Returns at once: the line is open."""
+        """Start reading and writing. Returns at once: the WebSocket is open."""
         loop = asyncio.get_running_loop()
         self._tasks = [
             loop.create_task(self._hear(), name="watch line in"),
@@ -103,7 +103,7 @@ class ObserverWebSocket:
         ]
 
     def send(self, channel: ChannelName, message: ClientMessage) -> None:
-        """The kind of a message says which channel it is for."""
+        """Send a message; its kind says which channel it is for."""
         if self.ended.is_set():
             return
         if len(self._waiting) >= MAX_WAITING:
@@ -121,15 +121,15 @@ class ObserverWebSocket:
             self.ended.set()
 
     async def restart_ice(self, seconds: float) -> None:
-        """Raises ConnectFailed: there is no ICE in TCP."""
+        """Raise ConnectFailed: there is no ICE in TCP."""
         raise ConnectFailed("this observer's WebSocket to the console is TCP: for another path make a new Console")
 
     async def stop_by_http(self, reason: str, press: str) -> StopTaken:
-        """The way to stop that needs no line; raises as `Whep.stop`."""
+        """Stop over HTTP, without the WebSocket; raises like `Whep.stop`."""
         return await self._whep.stop(reason, press)
 
     async def close(self) -> None:
-        """Idempotent."""
+        """Close the WebSocket. Idempotent."""
         if self._closing:
             return
         self._closing = True
@@ -167,7 +167,7 @@ class ObserverWebSocket:
                 self._filled.clear()
                 await self._filled.wait()
         except ConnectionClosed:
-            return  # heard as well
+            return  # `_hear` notices this too
 
     def _heard(self) -> None:
         if self._answer_due is not None:
@@ -189,4 +189,4 @@ class ObserverWebSocket:
             async with asyncio.timeout(CLOSE_SECONDS):
                 await self._whep.decline(ticket)
         except (TimeoutError, ConsoleError):
-            pass  # it ends without being cancelled
+            pass  # the ticket expires without being cancelled

@@ -21,11 +21,11 @@ class PacketSink(Protocol):
     """Takes the packets of one media section."""
 
     def packet(self, payload_type: int, packet: MediaPacket) -> bool:
-        """Take one; whether to ask the sender for a keyframe."""
+        """Take one packet; return True if the sender should be asked for a keyframe."""
 
 
 class Packets:
-    """`to_sinks` or `plain` before the answer, then `heard` with every event of the connection."""
+    """Passes packets to their consumers. `to_sinks` or `plain` before the answer, then `heard` with every event."""
 
     def __init__(self, connection: Connection) -> None:
         self.counts: Counter[str] = Counter()  # packets that were dropped, by reason
@@ -44,9 +44,9 @@ class Packets:
         stamp_uri: str | None = None,
         read_stamp: Callable[[bytes], int | None] = lambda value: None,
     ) -> None:
-        """Lost packets are asked for again, and received ones reported on.
+        """Pass packets to `sinks`, by mid; ask again for lost ones, and report on received ones.
 
-        `stamp_uri`: of the header extension that `read_stamp` understands.
+        `stamp_uri`: the URI of the header extension that `read_stamp` understands.
         """
         self._sinks, self._stamp_uri, self._read_stamp = sinks, stamp_uri, read_stamp
         for section in sections:
@@ -55,7 +55,7 @@ class Packets:
                     self._codecs[section.mid, number] = UNPACK[name]
 
     def plain(self, take: Callable[[bytes], None], control: Callable[[bytes], None]) -> None:
-        """Every RTP packet to `take` and every RTCP packet to `control`, and nothing is done for them."""
+        """Pass every RTP packet to `take` and every RTCP packet to `control`, and do nothing else for them."""
         self._take, self._control = take, control
         self._connection.peer.take_plain_packets()
 
@@ -85,7 +85,7 @@ class Packets:
             self._connection.request_keyframe(mid)
 
     def send_control(self, packet: bytes) -> None:
-        """An RTCP packet of our own; nothing while media are not up."""
+        """Send an RTCP packet from this side; nothing while media are not up."""
         try:
             self._connection.send_rtcp(packet)
         except PeerNotReady:

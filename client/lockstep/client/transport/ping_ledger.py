@@ -1,4 +1,4 @@
-"""Pings that are out: the round trip, and which of them were lost. No I/O."""
+"""Keeps the pings that are not answered yet: their round trip, and the lost ones. No I/O."""
 
 import itertools
 from collections import OrderedDict
@@ -12,7 +12,7 @@ FORGOTTEN = 10.0  # s; until then a late answer still tells the round trip
 
 
 class PingLedger:
-    """Call `send` for each ping, `answered` for each pong, `lost` now and then."""
+    """Measures round trips and losses. Call `send` for each ping, `answered` for each pong, `lost` now and then."""
 
     def __init__(self) -> None:
         self.round_trip: float | None = None  # s, of the last answered ping
@@ -21,13 +21,13 @@ class PingLedger:
         self._counted = 0  # pings up to this one were counted, if lost
 
     def send(self, now: float) -> int:
-        """The id of the ping to send now."""
+        """Return the id of the ping to send now."""
         number = next(self._ids)
         self._out[number] = now
         return number
 
     def answered(self, number: int, now: float) -> float | None:
-        """The round trip; None for a pong that answers nothing."""
+        """Return the round trip in s; None for a pong that answers nothing."""
         sent_at = self._out.pop(number, None)
         if sent_at is None:
             return None
@@ -35,7 +35,7 @@ class PingLedger:
         return self.round_trip
 
     def lost(self, now: float) -> int:
-        """How many pings have become lost since the last call. An answer that comes yet still tells the round trip."""
+        """Return the number of pings lost since the last call. A later answer still tells the round trip."""
         limit = LOST_UNKNOWN if self.round_trip is None else max(LOST_AFTER, LOST_TRIPS * self.round_trip)
         overdue = [number for number, sent_at in self._out.items() if sent_at < now - limit]
         count = sum(number > self._counted for number in overdue)

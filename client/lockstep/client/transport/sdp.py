@@ -1,4 +1,4 @@
-"""The few parts of SDP that the client reads and writes itself. Text in, text out; no I/O."""
+"""Reads and writes the few parts of SDP that the client handles itself. Text in, text out; no I/O."""
 
 import re
 from dataclasses import dataclass, field
@@ -25,12 +25,12 @@ class Section:
 
     @property
     def receives(self) -> bool:
-        """Whether, in an answer, the other side sends here."""
+        """True if, in an answer, the other side sends here."""
         return self.kind in ("audio", "video") and self.direction in ("sendonly", "sendrecv")
 
 
 def read_sections(sdp: str) -> list[Section]:
-    """The media sections, in order. Lines that it does not know are skipped."""
+    """Return the media sections, in order. Unknown lines are skipped."""
     sections: list[Section] = []
     for line in sdp.splitlines():
         if line.startswith("m="):
@@ -56,7 +56,8 @@ def _read_line(section: Section, line: str) -> None:
 
 
 def replace_candidates(sdp: str, host: str, port: int) -> str:
-    """The description with one host candidate, `host:port`, in place of each section's own: for a relay between."""
+    """Return the description with one host candidate, `host:port`, in place of each section's candidates, so that a
+    relay can stand between."""
     lines: list[str] = []
     replaced = False  # in the current section
     for line in sdp.splitlines():

@@ -1,4 +1,4 @@
-"""Watching through a Janus: pictures, sound and feedback come from there, everything else from the console."""
+"""Receives pictures, sound and feedback through a Janus; everything else comes from the console."""
 
 import asyncio
 import itertools
@@ -32,7 +32,7 @@ __all__ = ["RelayMedia", "RelayTicket"]
 ANSWER_SECONDS = 10.0
 KEEPALIVE_SECONDS = 25.0  # Janus forgets a session after 60 s
 SILENCE_SECONDS = 1.5  # without a message on the feedback channel; the console sends one there every 0.4 s
-HELD_UP_SECONDS, MOST_HELD_UP = 0.1, 3  # later than that this process was held up; so often in a row it may be
+HELD_UP_SECONDS, MOST_HELD_UP = 0.1, 3  # late by so much, this process was held up; forgiven so many times in a row
 MAX_MESSAGE = 256 * 1024  # bytes
 
 
@@ -49,7 +49,8 @@ class RelayTicket(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class RelayMedia:
-    """Order: `negotiate`, then `take_packets` or `take_raw_rtp`, then `connect`; `run` until `ended`, then `close`."""
+    """The media of a session, from a Janus. Order: `negotiate`, then `take_packets` or `take_raw_rtp`, then `connect`;
+    `run` until `ended`, then `close`."""
 
     def __init__(self, ticket: RelayTicket, on_message: Callable[[str | bytes], None]) -> None:
         if ticket.engine != "janus":
@@ -75,7 +76,7 @@ class RelayMedia:
         return self._ticket.relay
 
     async def negotiate(self, wanted: Callable[[StreamInfo], bool] = lambda _: True) -> list[Section]:
-        """Subscribe; the sections of the coming media. Raises ConnectFailed."""
+        """Subscribe and return the sections of the coming media. Raises ConnectFailed."""
         try:
             self._socket = await connect(
                 self._ticket.url,
@@ -114,7 +115,7 @@ class RelayMedia:
         return _named(read_sections(offer), heard.data, {stream.mid: stream.stream for stream in streams})
 
     def extension_id(self, sections: list[Section]) -> int | None:
-        """The stamp is behind the frame."""
+        """Return None: the stamp is behind the frame."""
         return None
 
     def take_packets(self, sinks: Mapping[str, PacketSink], sections: list[Section]) -> None:
@@ -127,12 +128,11 @@ class RelayMedia:
         self._need_packets().send_control(packet)
 
     def round_trip(self, seconds: float) -> None:
-        """The round trip to the console. Not used: the round trip to the relay is not measured, and the assumed one
-        suffices."""
+        """Ignore the round trip to the console: that to the relay is not measured, and the assumed one suffices."""
 
     @property
     def connection(self) -> Connection:
-        """Of `rtc`, after `negotiate`; for measurements."""
+        """The `rtc` connection, after `negotiate`; for measurements."""
         if self._connection is None:
             raise RuntimeError("negotiate first")
         return self._connection
@@ -143,7 +143,7 @@ class RelayMedia:
         return self._packets
 
     async def connect(self) -> None:
-        """Returns when feedback can come. Raises ConnectFailed."""
+        """Connect; return when feedback can come. Raises ConnectFailed."""
         jsep = {"type": "answer", "sdp": self._answer()}
         await self._ask("message", body={"request": "start"}, jsep=jsep)
         try:
@@ -153,14 +153,14 @@ class RelayMedia:
             raise ConnectFailed("no packet arrived from the relay: is UDP blocked on the way to it?") from None
 
     async def run(self) -> None:
-        """Until cancelled: keeps the session, and notices when the relay is gone."""
+        """Keep the session and notice when the relay is gone, until cancelled."""
         async with asyncio.TaskGroup() as tasks:
             tasks.create_task(self._listen_to_events())
             tasks.create_task(self._keep_alive())
             tasks.create_task(self._watch())
 
     async def close(self) -> None:
-        """Idempotent."""
+        """Close the connection to the relay. Idempotent."""
         self.ended.set()
         if self._endpoint is not None:
             self._endpoint.close()
@@ -199,7 +199,7 @@ class RelayMedia:
             self.ended.set()
 
     async def _ask(self, kind: str, **fields: Any) -> Heard:
-        """Before `run`, which reads later messages."""
+        """Send a request and return its answer. Only before `run`, which reads later messages."""
         transaction = f"{self._prefix}-{next(self._numbers)}"
         if self._socket is None:
             raise ConnectFailed("not connected to the relay")
@@ -227,7 +227,7 @@ class RelayMedia:
                 if _ends(text):
                     self._lose("the relay ended the subscription")
         except WebSocketException:
-            pass  # told below
+            pass  # handled below
         self._lose("the connection to the relay was closed")
 
     async def _keep_alive(self) -> None:
@@ -237,7 +237,7 @@ class RelayMedia:
             try:
                 await self._socket.send(text)
             except WebSocketException:
-                return  # the listener says so
+                return  # the listener tells it
 
     async def _watch(self) -> None:
         loop = asyncio.get_running_loop()
@@ -271,7 +271,7 @@ def _identifier(heard: Heard) -> int:
 
 
 def _named(sections: list[Section], data: dict[str, Any], names: dict[str, str]) -> list[Section]:
-    """The sections with their streams' names, which Janus tells beside its offer."""
+    """Return the sections with their streams' names, which Janus tells beside its offer."""
     streams = data.get("streams")
     by_mid = {
         str(each.get("mid")): names.get(str(each.get("feed_mid")), "")

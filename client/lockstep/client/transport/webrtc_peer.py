@@ -46,7 +46,7 @@ EXTENSION_URIS: dict[Carrier, str] = {"native": EVENT_REFERENCE_URI, "capture-ti
 ENDS = {
     "consent_expired": "the console answered nothing for 30 s",
     "no_path": "no way to the console was found: is UDP between here and the console blocked?",
-}  # others: it closed the connection
+}  # any other: the console closed the connection
 
 
 class Route(Protocol):
@@ -58,12 +58,12 @@ class Route(Protocol):
 
 
 def stamp_reader(carrier: Carrier) -> Callable[[bytes], int | None]:
-    """How to read the header extension of `carrier`."""
+    """Return the function that reads the header extension of `carrier`."""
     return unpack_capture_time if carrier == "capture-time" else unpack_event_reference
 
 
 class Peer:
-    """Order: `connect`, then `send` until `ended` is set, then `close`."""
+    """One connection to a console. Order: `negotiate`, `connect`, then `send` until `ended` is set, then `close`."""
 
     def __init__(
         self,
@@ -81,14 +81,14 @@ class Peer:
         sound_codec: str | None = None,
     ) -> None:
         self.ended = asyncio.Event()
-        self.why = ""  # the connection ended
+        self.why = ""  # reason that the connection ended
         self.skipped = 0  # messages on `control` that found others waiting
         self._link = link
         self._carrier = carrier
         self._route = route
         self._on_message = on_message
         self._relay_only = relay_only
-        self._relay = relay  # that media come from; "": from the console
+        self._relay = relay  # the relay that media come from; "": the console
         self._ice_servers: list[IceServer] = []
         self._whep = Whep(link, tls_ca)
         self._resource = ""
@@ -139,11 +139,11 @@ class Peer:
             self._stepped.set()
 
     async def relay_ticket(self, peer: str = "") -> RelayTicket | None:
-        """Where the console wants this observer to watch; raises as `negotiate`."""
+        """Return the relay where the console wants this observer to watch; raises like `negotiate`."""
         return await self._whep.relay(peer)
 
     async def negotiate(self) -> list[Section]:
-        """Offer, and take the answer: its media sections.
+        """Send an offer and take the answer; return its media sections.
 
         Raises:
             SignallingRefused, ConnectFailed: as `Whep.offer`.
@@ -168,7 +168,7 @@ class Peer:
             raise ConnectFailed(f"no TURN server gave an address: {why}")
 
     def extension_id(self, sections: list[Section]) -> int | None:
-        """The id under which the console sends the carrier's header extension."""
+        """Return the id under which the console sends the carrier's header extension."""
         uri = EXTENSION_URIS.get(self._carrier)
         return next((section.extensions[uri] for section in sections if uri and uri in section.extensions), None)
 
@@ -186,7 +186,7 @@ class Peer:
         self._need_packets().send_control(packet)
 
     def round_trip(self, seconds: float) -> None:
-        """A round trip to the console takes so long: lost packets are asked for accordingly."""
+        """Take the round trip to the console; lost packets are asked for accordingly."""
         self._need_connection().peer.note_round_trip(seconds)
 
     def _need_connection(self) -> Connection:
@@ -200,10 +200,10 @@ class Peer:
         return self._packets
 
     async def connect(self, seconds: float) -> None:
-        """Connect; returns when the data channels are open.
+        """Connect; return when the data channels are open.
 
         Raises:
-            ConnectFailed: no way to the console over UDP within `seconds`.
+            ConnectFailed: no way to the console over UDP was found within `seconds`.
         """
         connection = self._need_connection()
         try:
@@ -223,7 +223,7 @@ class Peer:
             raise ConnectFailed(self.why)
 
     def send(self, channel: ChannelName, message: ClientMessage) -> None:
-        """Send; on `control`, unless others still wait: an old command must not leave behind a newer one."""
+        """Send a message. On `control`, drop it if others wait: an old command must not leave after a newer one."""
         connection, number = self._connection, self._channels.get(channel)
         if connection is None or number is None or number not in self._open or self.ended.is_set():
             return
@@ -234,7 +234,7 @@ class Peer:
         try:
             connection.send(number, encode_console_message(message))
         except (PeerNotReady, ChannelNotOpen, AssociationClosed):
-            pass  # it has just ended, and says so
+            pass  # it has just ended, and an event says so
         except SendQueueFull:
             self.lose("the console takes nothing any more")
 
@@ -243,7 +243,7 @@ class Peer:
 
         Raises:
             SignallingRefused: the console does not restart this session, or it has ended.
-            ConnectFailed: no other path within `seconds`; the old one is as it was.
+            ConnectFailed: no other path was found within `seconds`; the old one stays.
         """
         connection, endpoint = self._need_connection(), self._endpoint
         if endpoint is None:
@@ -277,7 +277,7 @@ class Peer:
         connection.accept_restart(parse_fragment(answer, section.mid))
 
     async def stop_by_http(self, reason: str, press: str) -> StopTaken:
-        """The way to stop that needs no data channel; raises as `Whep.stop`."""
+        """Stop over HTTP, without a data channel; raises like `Whep.stop`."""
         return await self._whep.stop(reason, press)
 
     async def close(self) -> None:
@@ -291,7 +291,7 @@ class Peer:
                 if self._resource:
                     await self._whep.end(self._resource)
         except (TimeoutError, ConsoleError):
-            pass  # it ends the session when no packet arrives any more
+            pass  # the console ends the session when no packet arrives any more
         finally:
             if self._endpoint is not None:
                 self._endpoint.close()

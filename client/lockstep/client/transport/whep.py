@@ -64,7 +64,7 @@ class Whep:
     """The HTTP side of one connection."""
 
     def __init__(self, link: ConsoleLink, tls_ca: Path | None = None) -> None:
-        """`tls_ca`: a certificate in PEM to trust instead of the system's, as a console's self-signed one."""
+        """`tls_ca`: a PEM file to trust instead of the system's certificates, as a console's self-signed one."""
         self._base = link.base
         self._client = httpx.AsyncClient(
             headers={"Authorization": f"Bearer {link.token}"},
@@ -86,7 +86,7 @@ class Whep:
         await self._client.aclose()
 
     async def ice_servers(self) -> list[IceServer]:
-        """STUN and TURN servers with credentials that are good now; raises as `offer`."""
+        """Return STUN and TURN servers with credentials that are good now; raises like `offer`."""
         response = await self._request("GET", self._base + "/api/ice")
         try:
             found = _ice_servers.decode(response.content).ice_servers
@@ -95,9 +95,8 @@ class Whep:
         return [IceServer(each.urls, each.username, each.credential) for each in found]
 
     async def relay(self, peer: str = "") -> RelayTicket | None:
-        """The relay for this observer; None: the console itself. Raises as `offer`. Only for a connected `peer` the
-        answer has the relay's key.
-        """
+        """Return the relay for this observer; None: the console itself. The answer has the relay's key only for a
+        connected `peer`. Raises like `offer`."""
         response = await self._request("GET", f"{self._base}/api/relay{f'?peer={peer}' if peer else ''}")
         try:
             return _relay_answer.decode(response.content).relay
@@ -105,7 +104,7 @@ class Whep:
             raise SignallingRefused(response.status_code, "", "not an answer about relays") from error
 
     async def watch(self, relay: str) -> str:
-        """A ticket for a line to the console, of an observer that has its media from `relay`. Raises as `offer`."""
+        """Return a ticket for the WebSocket of an observer that has its media from `relay`. Raises like `offer`."""
         response = await self._request("POST", f"{self._base}/api/watch?relay={relay}")
         try:
             return _watch_ticket.decode(response.content).ticket
@@ -113,11 +112,11 @@ class Whep:
             raise SignallingRefused(response.status_code, "", "not a ticket") from error
 
     async def decline(self, ticket: str) -> None:
-        """Give a ticket back; raises as `offer`."""
+        """Give a ticket back; raises like `offer`."""
         await self._request("DELETE", f"{self._base}/watch/{ticket}")
 
     async def offer(self, sdp: str, *, trailer: bool, relay: str = "") -> Answer:
-        """Offer, and get the answer. `relay`: the relay that media come from.
+        """Send an offer and return the answer. `relay`: the relay that media come from.
 
         Raises:
             SignallingRefused: the console answered with an error.
@@ -133,17 +132,17 @@ class Whep:
         return Answer(response.text, resource)
 
     async def restart_ice(self, resource: str, fragment: str) -> str:
-        """Offer new ICE credentials and candidates (RFC 9725 4.3.3); the console's. Raises as `offer`."""
+        """Send new ICE credentials and candidates (RFC 9725 4.3.3); return the console's. Raises like `offer`."""
         headers = {"Content-Type": "application/trickle-ice-sdpfrag", "If-Match": "*"}
         response = await self._request("PATCH", resource, content=fragment.encode(), headers=headers)
         return response.text
 
     async def end(self, resource: str) -> None:
-        """End the session; raises as `offer`."""
+        """End the session; raises like `offer`."""
         await self._request("DELETE", resource)
 
     async def stop(self, reason: str, press: str) -> StopTaken:
-        """Latch the stop by HTTP; raises as `offer`, also when the robot has not confirmed it."""
+        """Latch the stop by HTTP; raises like `offer`, also when the robot has not confirmed it."""
         answer = await self._request("POST", self._base + "/api/stop", json={"reason": reason, "press": press})
         try:
             said = _stop_answer.decode(answer.content)

@@ -1,7 +1,7 @@
-"""`lockstep check`: whether a bridge in any language does what docs/robot-link.md asks.
+"""`lockstep check`: checks that a bridge in any language does what docs/robot-link.md asks.
 
-The cases stand in the `*_cases.py` files; each opens links of its own by a `Subject` and says what it finds by a
-`Violation`. The same cases run in the tests, against the bridge of this package and others.
+The cases are in the `*_cases.py` files; each opens its own links by a `Subject` and reports by a `Violation`. The same
+cases run in the tests, against the bridge of this package and others.
 """
 
 from lockstep.robot_bridge.conformance.case import Case, Outcome, Result

@@ -1,4 +1,4 @@
-"""A case: what the protocol asks, where the page says so, and how it is tried."""
+"""A case: the rule that the protocol sets, its section in the documentation, and the function that tries it."""
 
 from collections.abc import Awaitable, Callable
 from enum import StrEnum
@@ -26,4 +26,4 @@ class Outcome(StrEnum):
 class Result(NamedTuple):
     case: Case
     outcome: Outcome
-    detail: str = ""  # what was found instead, or why the case does not apply
+    detail: str = ""  # the violation, or why the case does not apply

@@ -23,7 +23,7 @@ __all__ = ["check"]
 SECRET_VARIABLE = "LOCKSTEP_LINK_SECRET"
 EXIT_FAILED = 1
 EXIT_USAGE = 2
-WORDS = {Outcome.OK: "ok", Outcome.FAILED: "FAILED"}  # of the others their own
+WORDS = {Outcome.OK: "ok", Outcome.FAILED: "FAILED"}  # the other outcomes are printed by their value
 WIDTH = max(len(case.name) for case in CASES)
 
 
@@ -70,7 +70,11 @@ def check(
 
 
 def _ask(address: str, fraction: float) -> None:
-    """Raises typer.Exit unless somebody says yes."""
+    """Ask whether the robot may move.
+
+    Raises:
+        typer.Exit: the answer is not yes.
+    """
     typer.echo(
         f"This MOVES the robot at {address}: the first axis that moves, to and fro, by {fraction:.0%} of its limit.\n"
         "It also presses STOP and releases it. Nobody may stand where the robot reaches.",
@@ -97,7 +101,7 @@ def _say(result: Result) -> None:
 
 
 def _nothing(result: Result) -> None:
-    """With --json all is printed at the end."""
+    """Print nothing: with --json everything is printed at the end."""
 
 
 def _summary(results: list[Result]) -> str:

@@ -15,19 +15,19 @@ from lockstep.robot_bridge.control.feedback_fit import misfit
 
 __all__ = ["BY", "Driver", "Motion", "first_motion"]
 
-BY = "lockstep check"  # who stops and resets
-TRIES = 5  # of a command that a bridge on a busy machine refuses, because it was held up itself
+BY = "lockstep check"  # name for stops and resets
+TRIES = 5  # attempts at a command that a bridge on a busy machine refuses because it was held up
 MOST_AHEAD = 3  # events by which a bridge may delay feedback, to keep max_event_rate
 RESET_AGAIN = 0.1  # s between two tries to reset a stop that is too new
 
 
 class Motion(Protocol):
-    """What the cases may move, and which stops are theirs."""
+    """The motions that the cases may make, and their own STOP presses."""
 
     presses: set[str]
 
     def next_values(self, description: RobotDescription) -> list[float]:
-        """Of a small motion; the next one goes the other way."""
+        """Return the values of a small motion; the next one goes the other way."""
 
 
 class Driver:
@@ -46,13 +46,15 @@ class Driver:
         return [axis.rest for axis in self.description.axes]
 
     def moving(self) -> list[float]:
-        """Raises:
-        NotApplicable: no axis of this robot moves.
+        """Return the values of a small motion.
+
+        Raises:
+            NotApplicable: no axis of this robot moves.
         """
         return self._motion.next_values(self.description)
 
     def command(self, values: Sequence[float], *, nonce: int | None = None, issue: int | None = None) -> Command:
-        """The next event, as an answer to the newest feedback unless told otherwise."""
+        """Return a command for the next event, as an answer to the newest feedback unless told otherwise."""
         newest = self.feedback
         return Command(
             event=event_after(newest.event),
@@ -62,7 +64,7 @@ class Driver:
         )
 
     async def next(self) -> LinkMessage:
-        """The next message.
+        """Return the next message.
 
         Raises:
             Violation: the link ended, or a feedback does not fit the description.
@@ -75,7 +77,7 @@ class Driver:
         return message
 
     async def heard(self, condition: Callable[[Feedback], bool], what: str, patience: float = PATIENCE) -> Feedback:
-        """The newest feedback, once it meets the condition.
+        """Wait until the newest feedback meets the condition, and return it.
 
         Raises:
             Violation: that took too long.
@@ -86,19 +88,19 @@ class Driver:
         return self.feedback
 
     async def becomes(self, command: Command) -> Feedback:
-        """The first feedback of the event that this command is to become."""
+        """Return the first feedback of the event that this command is to become."""
         return await self.heard(lambda feedback: feedback.event == command.event, f"event {command.event}")
 
     async def fresh(self) -> Feedback:
-        """The next feedback, whichever."""
+        """Return the next feedback."""
         before = self.feedback
         return await self.heard(lambda feedback: feedback is not before, "the state, once more")
 
     async def drive(self, values: Sequence[float]) -> Feedback:
-        """One command, and its feedback. A bridge that was held up gets the neutral command first that it asks for.
+        """Send a command and return its feedback. A bridge that was held up first gets the neutral command it needs.
 
         Raises:
-            Violation: it was refused.
+            Violation: the command was refused.
         """
         for _ in range(TRIES):
             await self._pace()
@@ -115,7 +117,7 @@ class Driver:
         raise Violation(f"a proper command was refused {TRIES} times, not_neutral or late")
 
     async def arm(self) -> None:
-        """What has to come before the first moving command."""
+        """Do everything that must come before the first moving command."""
         tries = 0
         while self.feedback.neutral_needed or self.feedback.warning > 0:
             await self.drive(self.neutral)
@@ -123,7 +125,7 @@ class Driver:
             expect(tries < TRIES, "a neutral command executed, and neutral_needed stays true")
 
     async def refused(self, message: Command | Reset, *reasons: str) -> Refusal:
-        """Send what has to be refused.
+        """Send a message that must be refused.
 
         Raises:
             Violation: it executed or was accepted, or was refused for another reason.
@@ -144,7 +146,7 @@ class Driver:
                     raise Violation(f"it released the stop; it had to be refused {reasons[0]!r}")
 
     async def stop(self, press: str, peer: Peer | None = None) -> int:
-        """Press STOP, on this link or another; the number that the press has."""
+        """Press STOP, on this link or another; return the number of the press."""
         self._motion.presses.add(press)
         on = peer or self.peer
         on.send(Stop(by=BY, reason="a case of the conformance check", press=press))
@@ -155,7 +157,7 @@ class Driver:
         return said.number
 
     async def reset(self) -> None:
-        """Release the newest stop as soon as the bridge lets that happen."""
+        """Release the newest stop as soon as the bridge accepts that."""
         number = self.feedback.stop.number
         loop = asyncio.get_running_loop()
         deadline = loop.time() + PATIENCE
@@ -168,7 +170,7 @@ class Driver:
                         await self.next()
 
     async def _executed(self, command: Command) -> Refusal | None:
-        """None: it did."""
+        """Send a command. Return its refusal, or None if it executed."""
         self.peer.send(command)
         longest = PATIENCE + MOST_AHEAD / self.description.max_event_rate
         async with within(longest, "a proper command was neither executed nor refused"):
@@ -196,12 +198,12 @@ class Driver:
             f"event {self.feedback.event} was current, and now {feedback.event} is",
         )
         self.feedback = feedback
-        if feedback.issue == 1:  # a later one says nothing of when the event began
+        if feedback.issue == 1:  # a later one does not tell when the event began
             self.began[feedback.event] = feedback.time
 
 
 def first_motion(description: RobotDescription, fraction: float, direction: int) -> list[float]:
-    """Every axis at rest but one, which gets a fraction of its range.
+    """Return values with every axis at rest but one, which gets a fraction of its range.
 
     Raises:
         NotApplicable: no axis moves.

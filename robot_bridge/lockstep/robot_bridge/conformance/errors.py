@@ -1,4 +1,4 @@
-"""Why a case of the conformance check does not end well.
+"""The reasons for which a case of the conformance check does not end well.
 
 CheckError
 ├── Violation               the bridge did something else than the protocol asks
@@ -11,7 +11,7 @@ __all__ = ["CheckError", "NotApplicable", "NotReady", "StoppedByOther", "Violati
 
 
 class CheckError(Exception):
-    """Base; the text says what was found, for a person."""
+    """Base of the check's errors; the text says what was found, for a person."""
 
 
 class Violation(CheckError):
@@ -31,8 +31,10 @@ class StoppedByOther(CheckError):
 
 
 def expect(condition: bool, found: str) -> None:
-    """Raises:
-    Violation: the condition does not hold.
+    """Require what the protocol asks. `found`: the text of the violation.
+
+    Raises:
+        Violation: the condition does not hold.
     """
     if not condition:
         raise Violation(found)

@@ -1,4 +1,4 @@
-"""One connection to a bridge that says only what a case tells it to, besides heartbeats."""
+"""A connection to a bridge that sends only the messages of a case, besides heartbeats."""
 
 import asyncio
 from collections import deque
@@ -33,35 +33,35 @@ MAX_WAITING = 64  # messages that wait for the case; of more, the oldest is forg
 
 
 class Peer(asyncio.Protocol):
-    """`send` and `write` say something, `next` and `find` hear. Heartbeats run while `beats` is true."""
+    """A connection: `send` and `write` send, `next` and `find` receive. Heartbeats run while `beats` is true."""
 
     def __init__(self) -> None:
         self.beats = True  # False: neither pings nor pongs, so that the bridge should take this side for dead
         self.ended = False  # the connection is over
-        self.pings: list[int] = []  # ids of those that came
+        self.pings: list[int] = []  # ids of the pings that came
         self._frames = FrameReader(MAX_MEDIA_FRAME)
         self._waiting: deque[LinkMessage] = deque(maxlen=MAX_WAITING)
-        self._broken: Violation | None = None  # what the bridge sent cannot be read
+        self._broken: Violation | None = None  # the bridge sent something that cannot be read
         self._news = asyncio.Event()
         self._transport: asyncio.Transport | None = None
         self._beat: asyncio.TimerHandle | None = None
         self._pinged = 0
 
-    # What a case does
+    # Called by cases
 
     def send(self, *messages: LinkMessage) -> None:
         self.write(b"".join(frame(encode_message(message)) for message in messages))
 
     def write(self, data: bytes) -> None:
-        """Bytes as they are."""
+        """Send bytes as they are."""
         if self._transport is not None and not self.ended:
             self._transport.write(data)
 
     async def next(self, patience: float = PATIENCE) -> LinkMessage | None:
-        """The next message besides heartbeats; None at the end of the stream.
+        """Return the next message besides heartbeats; None at the end of the stream.
 
         Raises:
-            Violation: nothing came in time, or something that is no message.
+            Violation: nothing came in time, or something that is not a message.
         """
         async with within(patience, f"nothing came for {patience:g} s"):
             while not self._waiting and not self.ended and self._broken is None:
@@ -76,7 +76,7 @@ class Peer(asyncio.Protocol):
     async def find(
         self, kind: type[Kind], accept: Callable[[Kind], bool] = lambda message: True, patience: float = PATIENCE
     ) -> Kind:
-        """The next message of this kind that is accepted; others are passed over.
+        """Return the next message of this kind that is accepted; others are passed over.
 
         Raises:
             Violation: it did not come in time, or the link ended.
@@ -91,7 +91,7 @@ class Peer(asyncio.Protocol):
         raise Violation(f"the connection ended; a {wanted} was expected")
 
     async def ends(self, *errors: str, patience: float = PATIENCE) -> None:
-        """The bridge ends the link, with a goodbye that names one of these errors.
+        """Wait until the bridge ends the link, with a goodbye that names one of these errors.
 
         Raises:
             Violation: it does not, or for another reason.
@@ -103,11 +103,11 @@ class Peer(asyncio.Protocol):
             raise Violation("a message came after the goodbye")
 
     async def hello(self, role: LinkRole, secret: LinkSecret | None = None, name: str = "") -> Hello:
-        """Shake hands.
+        """Shake hands, and return the bridge's hello.
 
         Raises:
             LinkRefused: the bridge said goodbye; the detail begins with its error.
-            Violation: its answer is none that the protocol knows.
+            Violation: the protocol does not know such an answer.
         """
         said = Hello(role=role, name=name, nonce=b"" if secret is None else draw_nonce())
         self.send(said)
@@ -132,13 +132,13 @@ class Peer(asyncio.Protocol):
         return answer
 
     def drain(self) -> list[LinkMessage]:
-        """What has come and waits, without waiting for more."""
+        """Return the messages that wait, without waiting for more."""
         waiting = list(self._waiting)
         self._waiting.clear()
         return waiting
 
     async def pinged(self, times: int, patience: float) -> int:
-        """Wait until so many pings came, or for so long; how many came."""
+        """Wait for a number of pings, for at most `patience` seconds; return the number that came."""
         try:
             async with asyncio.timeout(patience):
                 while len(self.pings) < times and not self.ended:
@@ -154,7 +154,7 @@ class Peer(asyncio.Protocol):
         self._close()
 
     def cut(self) -> None:
-        """Close without a word, as a link that breaks."""
+        """Close without a goodbye, like a link that breaks."""
         self._close()
 
     async def gone(self) -> None:
@@ -203,7 +203,7 @@ class Peer(asyncio.Protocol):
             self.pings.append(message.id)
             if self.beats:
                 self.send(Pong(id=message.id))
-        elif not (isinstance(message, Pong) and 0 < message.id <= self._pinged):  # our own heartbeats' are no news
+        elif not (isinstance(message, Pong) and 0 < message.id <= self._pinged):  # else a pong to a ping of this side
             self._waiting.append(message)
 
     def _ping(self) -> None:
@@ -225,10 +225,10 @@ class Peer(asyncio.Protocol):
 
 @asynccontextmanager
 async def opened(place: Place) -> AsyncIterator[Peer]:
-    """A connection on which nothing was said yet; left with a goodbye, unless it is over.
+    """Open a connection on which no message was sent yet; leave it with a goodbye, unless it is over.
 
     Raises:
-        LinkLost: nobody listens there.
+        LinkLost: no process listens there.
     """
     loop = asyncio.get_running_loop()
     try:

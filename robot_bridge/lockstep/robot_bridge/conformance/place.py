@@ -1,4 +1,4 @@
-"""Where a bridge is, and what it takes to be let in."""
+"""The address of a bridge, and the secret and TLS files for a link to it."""
 
 import ssl
 from typing import NamedTuple
@@ -21,10 +21,10 @@ class Place(NamedTuple):
 
 
 def parse_address(address: str) -> tuple[str, int, bool]:
-    """Host, port, and whether it speaks TLS.
+    """Return host, port, and whether the address is for TLS.
 
     Raises:
-        BadAddress: it is none.
+        BadAddress: the address has another form.
     """
     try:
         parts = urlsplit(address)

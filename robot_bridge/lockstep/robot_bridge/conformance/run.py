@@ -21,13 +21,13 @@ CASE_SECONDS = 120.0  # a robot may warn for 30 s each time before it moves
 
 
 async def play_all(subject: Subject, cases: Sequence[Case], tell: Callable[[Result], None]) -> list[Result]:
-    """The results in order; each is told as soon as it is known.
+    """Play the cases, and return the results in order; `tell` gets each as soon as it is known.
 
     Raises:
         NotReady: the robot is stopped, locked or taken.
-        LinkLost: nobody listens there.
+        LinkLost: no process listens there.
     """
-    with contextlib.suppress(Violation):  # the cases say it
+    with contextlib.suppress(Violation):  # the cases report it
         await subject.first_look()
     results: list[Result] = []
     over = ""  # why no further case can be tried
@@ -41,7 +41,7 @@ async def play_all(subject: Subject, cases: Sequence[Case], tell: Callable[[Resu
 
 
 async def play(subject: Subject, case: Case) -> Result:
-    """One case; the robot may be stopped afterwards."""
+    """Play one case; the robot may be stopped afterwards."""
     try:
         async with asyncio.timeout(CASE_SECONDS):
             await case.play(subject)
@@ -59,7 +59,7 @@ async def play(subject: Subject, case: Case) -> Result:
 
 
 async def _cleaned_up(subject: Subject) -> str:
-    """Why the check cannot go on; "" when the robot is at rest and released."""
+    """Clean up. Return why the check cannot go on; "" if the robot is at rest and released."""
     try:
         await subject.clean_up()
     except (Violation, StoppedByOther) as error:

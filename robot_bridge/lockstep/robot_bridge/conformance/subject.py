@@ -1,4 +1,4 @@
-"""The bridge that is checked: opens links to it for the cases, and remembers which way the last motion went."""
+"""The bridge that is checked: opens links to it for the cases, and remembers the direction of the last motion."""
 
 import asyncio
 from collections.abc import AsyncIterator
@@ -17,12 +17,12 @@ from lockstep.robot_bridge.errors import DescriptionError
 
 __all__ = ["FRACTION", "Subject", "described", "needs"]
 
-FRACTION = 0.1  # of an axis' limit, that the cases move it with
+FRACTION = 0.1  # share of an axis' limit by which the cases move it
 TAKEN_AGAIN = 0.05  # s between two tries while the bridge has not yet seen that the last case left
 
 
 class Subject:
-    """Where it is, and what the cases share."""
+    """The bridge's place, and the state that the cases share."""
 
     def __init__(self, place: Place, fraction: float = FRACTION) -> None:
         self.place = place
@@ -31,19 +31,19 @@ class Subject:
         self._direction = -1  # of the last motion
 
     def next_values(self, description: RobotDescription) -> list[float]:
-        """The values of a small motion; each goes the other way than the last, so that the robot stays where it is."""
+        """Return the values of a small motion, each opposite to the last, so that the robot stays where it is."""
         self._direction = -self._direction
         return first_motion(description, self._fraction, self._direction)
 
     @asynccontextmanager
     async def stranger(self) -> AsyncIterator[Peer]:
-        """A connection on which nothing was said yet."""
+        """Open a connection on which no message was sent yet."""
         async with opened(self.place) as peer:
             yield peer
 
     @asynccontextmanager
     async def link(self, role: LinkRole) -> AsyncIterator[tuple[Peer, Hello]]:
-        """With the handshake done.
+        """Open a link with the handshake done.
 
         Raises:
             LinkRefused: the bridge said goodbye.
@@ -53,7 +53,7 @@ class Subject:
 
     @asynccontextmanager
     async def operator(self, *, armed: bool = True) -> AsyncIterator[Driver]:
-        """`armed`: the neutral command that comes before the first motion was executed."""
+        """Open an operator link. `armed`: execute the neutral command that must come before the first motion."""
         async with self._operator() as (peer, hello):
             driver = Driver(peer, described(hello), self)
             await driver.heard(lambda feedback: bool(feedback.axes), "the first state")
@@ -62,11 +62,11 @@ class Subject:
             yield driver
 
     async def first_look(self) -> Feedback:
-        """What the robot says before anything is tried.
+        """Return the robot's feedback before anything is tried.
 
         Raises:
-            NotReady: it is stopped, locked or taken: that is not ours to change.
-            LinkLost: nobody listens there.
+            NotReady: the robot is stopped, locked or taken, which is not the check's to change.
+            LinkLost: no process listens there.
         """
         try:
             async with self._operator() as (peer, _):
@@ -80,16 +80,16 @@ class Subject:
         return feedback
 
     async def clean_up(self) -> None:
-        """After a case: the robot at rest, and released where the case stopped it."""
+        """Bring the robot to rest after a case, and release it if the case stopped it."""
         async with self.operator(armed=False) as driver:
             if driver.feedback.stop.stopped:
                 await driver.reset()
             await driver.heard(lambda feedback: feedback.at_rest, "at rest after the case")
-        self.presses.discard("")  # from now on, a press without an id is somebody else's again
+        self.presses.discard("")  # from now on, a press without an id is another client's again
 
     @asynccontextmanager
     async def _operator(self) -> AsyncIterator[tuple[Peer, Hello]]:
-        """The last case's operator may only just have left, so `taken` is tried again for a while."""
+        """Open an operator link. Repeat while it is `taken`: the last case's operator may only just have left."""
         deadline = asyncio.get_running_loop().time() + PATIENCE
         while True:
             async with opened(self.place) as peer:
@@ -105,8 +105,10 @@ class Subject:
 
 
 def described(hello: Hello) -> RobotDescription:
-    """Raises:
-    Violation: there is none, or it makes no sense.
+    """Return the bridge's description.
+
+    Raises:
+        Violation: there is no description, or it makes no sense.
     """
     if hello.description is None:
         raise Violation("the bridge sent no description")
@@ -118,8 +120,10 @@ def described(hello: Hello) -> RobotDescription:
 
 
 def needs(condition: bool, what: str) -> None:
-    """Raises:
-    NotApplicable: this robot has nothing of the kind.
+    """Require something of the robot that a case needs.
+
+    Raises:
+        NotApplicable: this robot does not have it.
     """
     if not condition:
         raise NotApplicable(what)

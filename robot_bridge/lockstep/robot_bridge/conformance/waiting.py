@@ -1,4 +1,4 @@
-"""Waiting for what a bridge has to do: what it does not do in time is a violation with words."""
+"""Waits for something that a bridge must do, and turns a timeout into a violation."""
 
 import asyncio
 from collections.abc import AsyncIterator
@@ -8,13 +8,15 @@ from lockstep.robot_bridge.conformance.errors import Violation
 
 __all__ = ["PATIENCE", "within"]
 
-PATIENCE = 5.0  # s for an answer that has to come; waited for in full only where it does not come
+PATIENCE = 5.0  # s for an answer that has to come; waited for in full only if it does not come
 
 
 @asynccontextmanager
 async def within(seconds: float, otherwise: str) -> AsyncIterator[None]:
-    """Raises:
-    Violation: the block took longer.
+    """Bound the time of a block. `otherwise`: the text of the violation.
+
+    Raises:
+        Violation: the block took longer.
     """
     try:
         async with asyncio.timeout(seconds):

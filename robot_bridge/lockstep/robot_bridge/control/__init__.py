@@ -1,1 +1,1 @@
-"""Events, limits and coming to rest: what the robot does with a command."""
+"""Execution of commands: events, limits and coming to rest."""

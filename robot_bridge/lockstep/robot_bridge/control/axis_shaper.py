@@ -1,8 +1,8 @@
-"""From commanded to applied axis values: clamp, slew, hold, brake. No I/O, no clock.
+"""Shapes commanded axis values into applied ones: clamp, slew, hold, brake. No I/O, no clock.
 
 Every value stays inside an envelope around its rest value that closes at the axis' `brake` rate and has closed `hold`
-seconds after the last execution. So a command never outlives `hold`, and no ramp is ever
-steeper than `brake` unless ticks were missed. A limiter (position limits, geofences) has the last word.
+seconds after the last execution. So a command never outlives `hold`, and no ramp is ever steeper than `brake` unless
+ticks were missed. A limiter (position limits, geofences) has the last word.
 """
 
 from collections.abc import Callable, Sequence
@@ -11,11 +11,14 @@ from lockstep.protocol.description import Axis
 
 __all__ = ["AxisShaper", "Limiter"]
 
-Limiter = Callable[[list[float], list[float]], list[float]]  # values, the same braking -> values nearer to rest
+Limiter = Callable[[list[float], list[float]], list[float]]  # (values, values under braking) -> values nearer to rest
 
 
 class AxisShaper:
-    """Call `drive` at execution, `rest` to come to rest early, and `step` or, after a failure, `brake` once a tick."""
+    """The applied values of all axes.
+
+    Call `drive` at execution, `rest` to come to rest early, and `step` or, after a failure, `brake` once a tick.
+    """
 
     def __init__(self, axes: Sequence[Axis], *, hold: float, limiter: Limiter | None = None) -> None:
         self._axes = tuple(axes)
@@ -28,12 +31,12 @@ class AxisShaper:
 
     @property
     def values(self) -> list[float]:
-        """What was applied last."""
+        """The values applied last."""
         return list(self._values)
 
     @property
     def at_rest(self) -> bool:
-        """Whether all applied values are at rest and none is to leave it."""
+        """True if all applied values are at rest and none is to leave it."""
         return self._values == self._rest_values and self._targets in (None, self._rest_values)
 
     def drive(self, values: Sequence[float], now: float) -> None:
@@ -48,18 +51,18 @@ class AxisShaper:
         self._targets = None
 
     def brake(self, dt: float) -> list[float]:
-        """One step towards rest at the brake rate, from any target; the limiter is not asked."""
+        """Take one step towards rest at the brake rate, from any target, without asking the limiter."""
         self._targets = None
         self._values = self._braked(dt)
         return list(self._values)
 
     def cut(self) -> None:
-        """The values are at rest from now on, without a ramp: the robot's motion meanwhile is unknown."""
+        """Set the values to rest without a ramp, because the robot's motion meanwhile is unknown."""
         self._targets = None
         self._values = list(self._rest_values)
 
     def step(self, now: float, dt: float) -> list[float]:
-        """The values for a tick of `dt` seconds that begins now."""
+        """Return the values for a tick of `dt` seconds that begins now."""
         left = self._deadline - now
         if left <= 0:
             self._targets = None
@@ -75,7 +78,7 @@ class AxisShaper:
         return min(max(value, axis.rest - reach), axis.rest + reach)
 
     def _braked(self, dt: float) -> list[float]:
-        """One step of braking from the last applied values."""
+        """Return the values after one step of braking from the last applied ones."""
         return [
             max(axis.rest, value - axis.brake * dt) if value > axis.rest else min(axis.rest, value + axis.brake * dt)
             for value, axis in zip(self._values, self._axes, strict=True)

@@ -15,11 +15,11 @@ Clock = Callable[[], float]
 if sys.platform == "linux":
 
     def now() -> float:
-        """Seconds, monotonic, suspended time included."""
+        """Return the time in seconds from a monotonic clock that includes suspended time."""
         return time.clock_gettime(time.CLOCK_BOOTTIME)
 
 else:
 
     def now() -> float:
-        """Seconds, monotonic; this platform has no clock that surely counts suspended time."""
+        """Return the time in seconds from a monotonic clock; here none surely includes suspended time."""
         return time.monotonic()

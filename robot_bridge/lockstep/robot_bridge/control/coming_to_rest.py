@@ -1,4 +1,4 @@
-"""Brings a robot to rest although calls of its adapter may raise. No clock, no task: the caller hands in `now`."""
+"""Brings a robot to rest even if calls of its adapter raise. No clock, no task: the caller hands in `now`."""
 
 import logging
 from collections.abc import Callable
@@ -15,11 +15,11 @@ _logger = logging.getLogger(__name__)
 
 
 class ComingToRest:
-    """Call `step` every tick until it returns True, or `at_once` when no more ticks will come; then `stop`.
+    """Applies values that lead to rest.
 
-    Each call of the adapter is guarded against any exception: a failed call does not prevent the next one.
-    The values ramp down at the axes' brake rates. After an `apply` that raised the robot's motion is unknown, so
-    that the rest values follow at once.
+    Call `step` every tick until it returns True, or `at_once` if no more ticks will come; then `stop`. Each call of the
+    adapter is guarded against any exception: a failed call does not prevent the next one. The values ramp down at the
+    axes' brake rates. After an `apply` that raised, the robot's motion is unknown, so the rest values follow at once.
     """
 
     def __init__(self, robot: Robot, shaper: AxisShaper, hold: float, now: float) -> None:
@@ -32,11 +32,11 @@ class ComingToRest:
 
     @property
     def rests(self) -> bool:
-        """Whether the adapter took the rest values often enough."""
+        """True if the adapter took the rest values often enough."""
         return self._taken >= REPEATS
 
     def step(self, now: float) -> bool:
-        """One tick. True when the robot rests, or when it has been tried for long enough."""
+        """Run one tick. True if the robot rests, or if that was tried for long enough."""
         if self._ramps:
             self._shaper.brake(self._robot.tick_seconds)
         else:
@@ -52,7 +52,7 @@ class ComingToRest:
         return self.rests
 
     def at_once(self) -> None:
-        """The rest values without a ramp, without waiting."""
+        """Apply the rest values without a ramp and without waiting."""
         self._shaper.cut()
         for _ in range(REPEATS):
             taken = self._attempt("apply", lambda: self._robot.apply(self._shaper.values))
@@ -60,7 +60,7 @@ class ComingToRest:
             self._taken = self._taken + 1 if taken else 0
 
     def stop(self) -> None:
-        """The robot's own stop, tried again when it raises."""
+        """Call the robot's own `stop`, again if it raises."""
         for _ in range(REPEATS):
             if self._attempt("stop", self._robot.stop):
                 return

@@ -26,12 +26,12 @@ MAX_NONCE = 2**53 - 1  # a JavaScript number holds these exactly
 
 
 def draw_nonce() -> int:
-    """A nonce that cannot be guessed; never 0, which stands for a command without a nonce."""
+    """Return a nonce that cannot be guessed; never 0, which stands for a command without a nonce."""
     return 1 + secrets.randbelow(MAX_NONCE)
 
 
 class _Issued(NamedTuple):
-    """What a command has to know of the issue that it answers."""
+    """An issue of the current event, for the check of the command that answers it."""
 
     time: float  # s
     nonce: int
@@ -39,20 +39,20 @@ class _Issued(NamedTuple):
 
 
 class Executed(NamedTuple):
-    """Drive the axes with these values; the event is pending until the next `issue`."""
+    """The command executes: drive the axes with these values. The event is pending until the next `issue`."""
 
     event: int
     values: list[float]
 
 
 class Answered(NamedTuple):
-    """A repeat of the current event: send its stored feedback again."""
+    """The command repeats the current event: send its stored feedback again."""
 
     feedback: Feedback
 
 
 class Absorbed(NamedTuple):
-    """A repeat of the pending event: its feedback is on the way."""
+    """The command repeats the pending event: its feedback is on the way."""
 
     event: int
 
@@ -65,8 +65,11 @@ CommandOutcome = Executed | Answered | Absorbed | Refused
 
 
 class EventCore:
-    """Owns `s`. Executes each event at most once, never on the strength of an old feedback or of one not seen, and
-    moves nothing before a neutral command where the interlock asks for one."""
+    """Owns the event reference `s` and executes each event at most once.
+
+    No command executes on the strength of an old feedback or of one not seen, and none moves the robot before a neutral
+    command while the interlock asks for one.
+    """
 
     def __init__(
         self,
@@ -79,7 +82,7 @@ class EventCore:
         start_warning: StartWarning | None = None,
         nonces: Callable[[], int] = draw_nonce,
     ) -> None:
-        """`max_event_rate`: Hz, of answered commands. `nonces`: draws that of each issue."""
+        """`max_event_rate`: Hz, of answered commands. `nonces`: draws the nonce of each issue."""
         if not is_event(first_event):
             raise ValueError(f"the first event must be a valid reference, not {first_event}")
         self._rest_values = [axis.rest for axis in axes]
@@ -92,7 +95,7 @@ class EventCore:
         self._current = first_event  # s: latest executed and answered event, 1
         self._pending: int | None = None  # executed, waiting for its feedback, 2
         self._feedback: Feedback | None = None  # latest issue of the current event; None before the first
-        self._issued_at = -math.inf  # s, when that was
+        self._issued_at = -math.inf  # s, when that issue was
         self._issue = 0  # number of the current event's latest issue, 2
         self._issued: dict[int, _Issued] = {}  # issues of the current event, oldest first
         self._nonces = nonces
@@ -121,20 +124,20 @@ class EventCore:
         return self._latch.state
 
     def begin(self, latch: StopLatch) -> None:
-        """Before the first issue: the latch as it was left. From then on its verbs are called through the core."""
+        """Set the latch, as it was left, before the first issue. From then on change it only through the core."""
         self._latch = latch
 
     @property
     def neutral_needed(self) -> bool:
-        """No moving command executes before a neutral one."""
+        """True while no moving command executes before a neutral one."""
         return self._interlock.needed
 
     def warns(self, now: float) -> float:
-        """s that the robot still warns before it may move; 0 when it does not."""
+        """Return the seconds for which the robot still warns before it may move; 0 if it does not warn."""
         return self._interlock.warns(now)
 
     def moves(self, values: Sequence[float]) -> bool:
-        """Whether these values are an intention to move; a light or horn alone is not."""
+        """Return whether these values are an intention to move; a light or horn alone is not."""
         return any(
             value != rest and drives
             for value, rest, drives in zip(values, self._rest_values, self._drives, strict=True)
@@ -179,7 +182,7 @@ class EventCore:
         return Executed(command.event, command.values)
 
     def refusal(self, event: int, reason: RefusalReason, detail: str = "", *, stop: int = 0) -> Refusal:
-        """A refusal that names the current event. `stop`: that a refused reset named."""
+        """Return a refusal that names the current event. `stop`: the stop that a refused reset named."""
         return Refusal(event=event, reason=reason, current=self._current, detail=detail[:500], stop=stop)
 
     def rest(self, event: int) -> bool:
@@ -213,15 +216,15 @@ class EventCore:
         return outcome
 
     def written(self, version: int, error: str = "") -> WriteOutcome:
-        """The latch's record of `version` is on the disk, or could not be written: what became of a reset."""
+        """Note that the latch's record of `version` is on the disk, or could not be; return a reset's outcome."""
         outcome = self._latch.written(version, error)
-        self._issue_wanted = True  # whether the state is kept is fed back too
+        self._issue_wanted = True  # feedback also says whether the state is kept
         if isinstance(outcome, ResetTaken):
             self.need_neutral()
         return outcome
 
     def lock_out(self, reason: str, now: float) -> StopGiven | None:
-        """Somebody at the robot keeps it from being driven: a stop that no reset releases before `let_in`."""
+        """Latch a stop that no reset releases before `let_in`, for a person at the robot who locks it."""
         given = self._latch.lock_out(reason, now)
         self._issue_wanted = True
         if given is not None:
@@ -229,14 +232,14 @@ class EventCore:
         return given
 
     def let_in(self) -> bool:
-        """The lock-out is over; the stop stays. False when there was none."""
+        """End the lock-out; the stop stays latched. False if the robot was not locked out."""
         if not self._latch.let_in():
             return False
         self.need_neutral()
         return True
 
     def need_neutral(self) -> None:
-        """From now on no moving command executes before a neutral one. The caller brings the axes to rest."""
+        """Refuse moving commands from now on until a neutral one. The caller brings the axes to rest."""
         self._interlock.require()
         self._issue_wanted = True
 
@@ -245,14 +248,14 @@ class EventCore:
             self._issue_wanted = True
 
     def want_issue(self) -> None:
-        """Issue again at the end of this tick (a client joined)."""
+        """Issue again at the end of this tick, because a client joined."""
         self._issue_wanted = True
 
     def issue_due(self, now: float) -> bool:
-        """Whether to measure and `issue` now.
+        """Return whether to measure and `issue` now.
 
-        An answer that comes sooner than the event rate allows waits, and with it the next event: nothing is refused.
-        A stop is fed back at once.
+        An answer that comes sooner than the event rate allows waits, and with it the next event: nothing is refused. A
+        stop is fed back at once.
         """
         self._look(now)
         if self._pending is not None and not self._latch.state.stopped:
@@ -270,9 +273,9 @@ class EventCore:
         *,
         time: float | None = None,
     ) -> Feedback:
-        """The feedback of the pending event, which thereby becomes current, or of the current event again.
+        """Return the feedback of the pending event, which thereby becomes current, or of the current event again.
 
-        `time`: its time of issue, on the clock of capture times; None: `now`.
+        `time`: the time of issue, on the clock of capture times; None: `now`.
         """
         if self._pending is not None:
             self._current, self._pending = self._pending, None
@@ -305,7 +308,7 @@ class EventCore:
         return self._feedback
 
     def _remember_issue(self, issued: _Issued) -> None:
-        """Issues come in order of time, so the forgotten ones are always the oldest."""
+        """Keep the issue and forget those too old or too many: issues come in order of time, so the oldest go."""
         while self._issued:
             oldest = next(iter(self._issued))
             if (

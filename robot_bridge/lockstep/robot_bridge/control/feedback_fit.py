@@ -1,4 +1,4 @@
-"""Whether a feedback is one of the robot that a description tells of. No I/O."""
+"""Checks that a feedback fits the robot's description. No I/O."""
 
 from collections.abc import Sequence
 
@@ -8,12 +8,12 @@ from lockstep.protocol.messages import Feedback
 __all__ = ["misfit"]
 
 WRENCH = 6  # values
-MOST = 1e12  # of any measured value, in its unit: further from zero nothing can be added, rounded or drawn
+MOST = 1e12  # bound of any measured value, in its unit: further from zero nothing can be added, rounded or drawn
 LONGEST = 1e9  # s, of a monotonic clock
 
 
 def misfit(feedback: Feedback, description: RobotDescription) -> str:
-    """What does not fit: a value too many or too few, or one that none can be; "" when all does."""
+    """Return the first misfit, such as a wrong number of values or an impossible value; "" if all fits."""
     rays = 0 if description.ranges is None else description.ranges.count
     values: tuple[tuple[str, Sequence[float], tuple[int, ...]], ...] = (
         ("axes", feedback.axes, (len(description.axes),)),

@@ -1,12 +1,12 @@
 """Geofences: zones on the floor that a base stays inside of, or outside of. No I/O, no clock.
 
-Each edge of a zone is a separate obstacle. The distance to a segment is a convex function of the place, so a motion
-by `w` comes nearer to the edge by no more than the part of `w` that points from the base to the edge's nearest point.
+Each edge of a zone is a separate obstacle. The distance to a segment is a convex function of the place, so a motion by
+`w` comes nearer to the edge by no more than the part of `w` that points from the base to the edge's nearest point.
 Keeping that part below the room to each edge therefore keeps the base on its side of every edge, for zones of any
 shape.
 
-The base is the circle that holds it, so turning on the spot is free. Turning while moving swings the motion round:
-until it has ended, an axis may point anywhere within the angle that the turn still covers.
+The base is treated as the circle that holds it, so turning on the spot is free. Turning while moving swings the motion
+round: until the turn has ended, an axis may point anywhere within the angle that it still covers.
 """
 
 import math
@@ -18,11 +18,11 @@ from lockstep.robot_bridge.control.stopping_distance import Demand, doubt, trave
 
 __all__ = ["FenceGuard", "Zone"]
 
-TOUCHING = 1e-9  # m; nearer than this, the direction to an edge is that across it
+TOUCHING = 1e-9  # m; nearer than this, the direction to an edge is the one across it
 
 
 class Nearest(NamedTuple):
-    """A place on a zone's boundary as seen from the base: how far, and the unit vector that points there."""
+    """A place on a zone's boundary as seen from the base: its distance, and the unit vector that points there."""
 
     distance: float
     nx: float
@@ -30,7 +30,7 @@ class Nearest(NamedTuple):
 
 
 class Zone:
-    """One geofence as edges."""
+    """The edges of one geofence."""
 
     def __init__(self, fence: Geofence) -> None:
         self.name = fence.name
@@ -45,7 +45,7 @@ class Zone:
         ]
 
     def look(self, x: float, y: float) -> tuple[bool, list[Nearest]]:
-        """Whether the place is on the permitted side, and the nearest place of every edge."""
+        """Return whether the place is on the permitted side, and the nearest place of every edge."""
         inside = False
         found: list[Nearest] = []
         for ax, ay, dx, dy, length in self._edges:
@@ -64,7 +64,7 @@ class Zone:
 
 
 class FenceGuard:
-    """Computes the base's demand on all zones."""
+    """Computes the base's demands on all zones."""
 
     def __init__(self, base: PlanarBase, description: RobotDescription, tick_seconds: float) -> None:
         index = {axis.name: number for number, axis in enumerate(description.axes)}
@@ -82,7 +82,7 @@ class FenceGuard:
         self.axes = tuple(number for number, _, _ in self._moves) + (() if self._turn is None else (self._turn[0],))
 
     def demands(self, offsets: Sequence[float], joints: Sequence[float]) -> list[Demand]:
-        """Empty when the base does not move, or far from every edge."""
+        """Return the demands on the edges within reach; empty if the base does not move or is far from every edge."""
         parts = [
             (
                 number,
@@ -105,7 +105,7 @@ class FenceGuard:
         return self._judge(x, y, yaw if math.isfinite(yaw) else 0.0, swing, reach, parts)
 
     def _swing(self, offsets: Sequence[float]) -> float:
-        """The angle that the turn covers until it has ended, at most half a circle."""
+        """Return the angle that the turn covers until it has ended, at most half a circle."""
         if self._turn is None or not offsets[self._turn[0]]:
             return 0.0
         return min(math.pi, sum(travel(offsets[self._turn[0]], self._reaction, self._turn[1])))

@@ -1,6 +1,6 @@
-"""Position limits whose joints the robot's posture moves: the robot tells how fast. No I/O, no clock.
+"""Guards position limits of joints whose motion depends on the posture: the robot tells the rates. No I/O, no clock.
 
-Limits of the same axes are looked at together, since every one of them is asked about in every tick that moves.
+Limits of the same axes are checked together, since all of them are checked in every tick that moves.
 """
 
 import math
@@ -14,7 +14,7 @@ __all__ = ["JointLimitGuard", "is_by_posture"]
 
 
 class _Bounds(NamedTuple):
-    """One limit: what of its joint's range may be used."""
+    """The usable range of one limit's joint."""
 
     name: str
     joint: int
@@ -24,7 +24,7 @@ class _Bounds(NamedTuple):
 
 
 class JointLimitGuard:
-    """The limits of one set of axes.
+    """Computes the demands on the limits of one set of axes.
 
     Attributes:
         axes: their numbers
@@ -48,7 +48,7 @@ class JointLimitGuard:
         )
 
     def demands(self, offsets: Sequence[float], joints: Sequence[float], rates: Sequence[float] | None) -> list[Demand]:
-        """Those that ask for more than the room, and doubts; empty when nothing moves.
+        """Return the demands that exceed the room, and doubts; empty if nothing moves.
 
         `offsets`: of all axes from rest. `rates`: of the joints now; None: not known.
         """
@@ -76,5 +76,5 @@ class JointLimitGuard:
 
 
 def is_by_posture(limit: PositionLimit) -> bool:
-    """Whether only the robot can tell what its axes do to the joint."""
+    """Return whether only the robot can tell how fast its axes move the joint."""
     return any(each.gain is None for each in limit.axes)

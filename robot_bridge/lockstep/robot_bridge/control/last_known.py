@@ -1,4 +1,4 @@
-"""What stands in a feedback where the robot could not measure: the last value that was known. No I/O."""
+"""Keeps the last known value of each measurement, for feedback in which the robot could not measure. No I/O."""
 
 import math
 from collections.abc import Sequence
@@ -19,7 +19,7 @@ class LastKnown:
         self._joints = [0.0] * len(description.joints)
 
     def settle(self, measured: Measurement) -> tuple[Measurement, list[str]]:
-        """The measurement, and the names of the axes and joints whose values in it are not of now."""
+        """Return the measurement, and the names of the axes and joints whose values in it are older ones."""
         unknown: list[str] = []
         self._axes = _settled(self._axis_names, measured.axes, self._axes, unknown)
         self._joints = _settled(self._joint_names, measured.joints, self._joints, unknown)
@@ -39,5 +39,5 @@ def _settled(names: Sequence[str], values: Sequence[float], before: Sequence[flo
 
 
 def _whole(values: list[float]) -> list[float]:
-    """A sensor's values belong together: one that is not a number leaves none of them."""
+    """Return the values, or none if one is not finite: a sensor's values belong together."""
     return values if all(map(math.isfinite, values)) else []

@@ -1,9 +1,9 @@
-"""Position limits and geofences together: what of the shaped values may reach the robot. No I/O, no clock.
+"""Limits the shaped values by all position limits and geofences before they reach the robot. No I/O, no clock.
 
-In every tick each limit asks: with these values, and all axes braking from the next tick on, does the robot stay
-within bounds? If not, the axes that lead there are scaled down, towards rest only: no axis moves that was not told to.
-Where even that would need a steeper ramp than the axes' brake, all limited axes brake. That continues the
-motion that was found to be good a tick before.
+In every tick each limit asks: with these values, and all axes braking from the next tick on, does the robot stay within
+bounds? If not, the axes that lead out of them are scaled down, towards rest only: no axis moves that was not told to.
+If even that would need a steeper ramp than the axes' brake, all limited axes brake. That continues the motion that was
+found to be good a tick before.
 """
 
 from collections.abc import Sequence
@@ -21,18 +21,18 @@ LINGER = 0.2  # s that a limit counts as acting after it last did, so that one p
 
 
 class PositionSense(Protocol):
-    """What the limits need of the robot."""
+    """The part of the robot that the limits need."""
 
     def positions(self) -> Sequence[float]: ...
     def joint_rates(self, values: Sequence[float]) -> Sequence[float] | None: ...
 
 
 class MotionLimits:
-    """Call once a tick, with the axes' wanted motion and their motion under braking.
+    """Limits the values of all axes. Call it once a tick, with the wanted values and the values under braking.
 
     Attributes:
         acting: names of the limits that slow an axis now
-        blind: names of the limits that do so because the position is not known
+        blind: names of the limits among them that slow it because the position is not known
     """
 
     def __init__(self, description: RobotDescription, sense: PositionSense, tick_seconds: float) -> None:
@@ -56,7 +56,7 @@ class MotionLimits:
         self._guarded = tuple(sorted(guarded))
 
     def __call__(self, values: list[float], braked: Sequence[float]) -> list[float]:
-        """What may be applied instead of `values`."""
+        """Return the values that may be applied instead of `values`."""
         rests = self._rest_values
         for number in self._guarded:
             if values[number] != rests[number]:
@@ -109,19 +109,19 @@ class MotionLimits:
         return limited
 
     def _is_gentle(self, number: int, value: float, braked: float) -> bool:
-        """Whether the axis gets there without a ramp that is steeper than its brake."""
+        """Return whether the axis gets to `value` without a ramp that is steeper than its brake."""
         rest = self._rest_values[number]
         return (value - rest) * (braked - rest) >= 0 and abs(value - rest) >= abs(braked - rest)
 
     def _braking(self, number: int, value: float, braked: float) -> float:
-        """The braking values, or the wanted ones where they are nearer to rest on the same side."""
+        """Return the braking value, or the wanted one if that is nearer to rest on the same side."""
         rest = self._rest_values[number]
         same_side = (value - rest) * (braked - rest) > 0
         return value if same_side and abs(value - rest) < abs(braked - rest) else braked
 
 
 def posture_guards(description: RobotDescription, tick_seconds: float) -> list[JointLimitGuard]:
-    """One for each set of axes that limits by posture have."""
+    """Return a guard for each set of axes of the limits that depend on the posture."""
     index = {axis.name: number for number, axis in enumerate(description.axes)}
     together: dict[tuple[int, ...], list[PositionLimit]] = {}
     for limit in filter(is_by_posture, description.position_limits):

@@ -1,4 +1,4 @@
-"""One position limit of the robot description, of a joint that its axes move by fixed gains. No I/O, no clock."""
+"""Guards one position limit of the robot description whose joint its axes move by fixed gains. No I/O, no clock."""
 
 import math
 from collections.abc import Sequence
@@ -10,8 +10,9 @@ __all__ = ["PositionGuard"]
 
 
 class PositionGuard:
-    """Computes the axes' demand on the limit. Motion away from the bound is not set off against motion towards it: the
-    axes do not all stop at the same time.
+    """Computes the axes' demands on the limit.
+
+    Motion away from the bound is not set off against motion towards it: the axes do not all stop at the same time.
     """
 
     def __init__(self, limit: PositionLimit, description: RobotDescription, tick_seconds: float) -> None:
@@ -26,7 +27,7 @@ class PositionGuard:
         self._reaction = tick_seconds + limit.latency
 
     def demands(self, offsets: Sequence[float], joints: Sequence[float]) -> list[Demand]:
-        """Empty when nothing that it limits moves. `offsets`: of all axes from rest."""
+        """Return the demands; empty if no axis of the limit moves. `offsets`: of all axes from rest."""
         moving = [number for number in self.axes if offsets[number]]
         if not moving:
             return []

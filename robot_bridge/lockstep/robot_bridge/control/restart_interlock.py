@@ -1,5 +1,6 @@
-"""Keeps a robot from moving on without its operator: a neutral command has to come first, and the robot may warn before
-it moves. No I/O, no clock (docs/robot-link.md, "Before the first motion").
+"""Refuses motion after a restart until a neutral command, and while the robot warns before it moves. No I/O, no clock.
+
+docs/robot-link.md, "Before the first motion", has the rules.
 """
 
 import math
@@ -13,7 +14,10 @@ SILENCE = 2.0  # s without an executed command after which a robot that warns ha
 
 
 class RestartInterlock:
-    """Call `require` for everything after which motion has to be a decision of its own."""
+    """Decides whether moving commands may execute.
+
+    Call `require` after everything that must not let the robot move on without a new decision of its operator.
+    """
 
     def __init__(self, warning: StartWarning | None = None) -> None:
         self._warning = warning
@@ -24,12 +28,12 @@ class RestartInterlock:
 
     @property
     def needed(self) -> bool:
-        """No moving command executes before a neutral one."""
+        """True while no moving command executes before a neutral one."""
         return self._needed
 
     @property
     def spell(self) -> int:
-        """Kept with each issue: a neutral command counts when it answers an issue of this spell."""
+        """The number to keep with each issue: a neutral command counts if it answers an issue of the present spell."""
         return self._spell
 
     def require(self) -> None:
@@ -39,20 +43,20 @@ class RestartInterlock:
         self._executed_at = math.inf
 
     def look(self, now: float) -> bool:
-        """Before anything is decided, and once a tick. True: from now on a neutral command is needed."""
+        """Require a neutral command after `SILENCE`; call before any decision and once a tick. True if it does."""
         if self._warning is None or now - self._executed_at <= SILENCE:
             return False
         self.require()
         return True
 
     def refuses(self, now: float) -> Literal["not_neutral", "warning"] | None:
-        """Why a moving command may not execute; None when it may."""
+        """Return why a moving command may not execute; None if it may."""
         if self._needed:
             return "not_neutral"
         return "warning" if now < self._warns_until else None
 
     def executed(self, *, moving: bool, spell: int, now: float) -> None:
-        """A command executed, as the answer to an issue of this spell."""
+        """Note that a command executed as the answer to an issue of this spell."""
         if self._needed and not moving and spell == self._spell:
             self._needed = False
             if self._warning is not None:
@@ -61,5 +65,5 @@ class RestartInterlock:
             self._executed_at = now
 
     def warns(self, now: float) -> float:
-        """s that the robot still warns; 0 when it does not."""
+        """Return the seconds for which the robot still warns; 0 if it does not."""
         return max(0.0, self._warns_until - now)

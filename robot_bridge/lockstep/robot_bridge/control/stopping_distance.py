@@ -1,4 +1,4 @@
-"""How far axes go before they can stand still, and the share of their values that keeps this within bounds.
+"""Computes the distance that axes need to stop, and the share of their values that keeps it within bounds.
 
 An axis that is `offset` from rest goes `offset * reaction` before braking takes effect and `offset² / (2 brake)` while
 it brakes. Scaled by a share `k`, that is `k * linear + k² * square`.
@@ -11,10 +11,10 @@ __all__ = ["Demand", "doubt", "share_of", "travel"]
 
 
 class Demand(NamedTuple):
-    """What `axes`, all together, ask of one limit in this tick."""
+    """The stopping distance of `axes` together against one limit, in this tick."""
 
     limit: str  # name of the limit
-    axes: tuple[int, ...]  # indices of the axes that are slowed when it is too much
+    axes: tuple[int, ...]  # indices of the axes that are slowed if the distance is too long
     linear: float  # distance in the joint's unit
     square: float
     room: float  # the remaining room; below 0 when the bound was passed
@@ -22,18 +22,18 @@ class Demand(NamedTuple):
 
 
 def doubt(limit: str, axes: tuple[int, ...]) -> Demand:
-    """The position is unknown: any motion of these axes is too much."""
+    """Return the demand for an unknown position: any motion of these axes is too much."""
     return Demand(limit, axes, 1.0, 0.0, 0.0, True)
 
 
 def travel(offset: float, reaction: float, brake: float) -> tuple[float, float]:
-    """The linear and the square part of the distance that `offset` leads to."""
+    """Return the linear and the square part of the stopping distance for `offset`."""
     speed = abs(offset)
     return speed * reaction, speed * speed / (2 * brake)
 
 
 def share_of(demand: Demand) -> float:
-    """The largest share of the values, 0 to 1, that stays within the room."""
+    """Return the largest share of the values, 0 to 1, that stays within the room."""
     linear, square, room = demand.linear, demand.square, demand.room
     if linear + square <= room:
         return 1.0

@@ -4,17 +4,17 @@ __all__ = ["Ticker"]
 
 
 class Ticker:
-    """Call `wait` before each beat and sleep for the seconds that it returns."""
+    """Beats at a fixed period. Call `wait` before each beat and sleep for the seconds that it returns."""
 
     def __init__(self, period: float, now: float, *, catch_up: int = 0) -> None:
-        """`catch_up`: how many missed beats are made good at once; the rest are skipped and counted."""
+        """`catch_up`: the number of missed beats made good at once; the rest are skipped and counted."""
         self._period = period
         self._catch_up = catch_up
         self._next = now
         self.skipped = 0
 
     def wait(self, now: float) -> float:
-        """Seconds until the next beat, 0 when it is due; moves on by one beat."""
+        """Move on by one beat, and return the seconds until it is due; 0 if it is due already."""
         self._next += self._period
         behind = int((now - self._next) / self._period) - self._catch_up
         if behind > 0:

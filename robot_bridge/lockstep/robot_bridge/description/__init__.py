@@ -1,1 +1,1 @@
-"""Whether a robot description can be driven by."""
+"""Checks of a robot description before the robot is driven by it."""

@@ -30,9 +30,9 @@ MAX_BODIES = 1024
 MAX_GEOMS = 4096
 MAX_LAYERS = 32
 MAX_LIMITS = 256
-FARTHEST = 1e6  # m, of drawn parts; their other numbers too
-MAX_NAME = 200  # characters, of a name or a label
-MAX_BYTES = 60_000  # of JSON: a peer that says nothing else takes messages of 65,536 bytes (RFC 8841 6.1)
+FARTHEST = 1e6  # m, for drawn parts; the bound of their other numbers too
+MAX_NAME = 200  # characters in a name or a label
+MAX_BYTES = 60_000  # of JSON: a peer that declares no maximum takes messages of 65,536 bytes (RFC 8841 6.1)
 SIDES = range(1, 8193)  # pixels
 FRAME_RATES = 240.0  # Hz
 SAMPLE_RATES = range(8000, 192_001)  # Hz
@@ -42,8 +42,10 @@ _CONTROL = frozenset("\u061c\u200e\u200f\u202a\u202b\u202c\u202d\u202e\u2066\u20
 
 
 def check_description(description: RobotDescription) -> None:
-    """Raises:
-    DescriptionError: with the first contradiction found.
+    """Check that a robot can be driven by this description.
+
+    Raises:
+        DescriptionError: names the first contradiction found.
     """
     if not description.axes:
         raise DescriptionError("a robot needs at least one axis")
@@ -82,10 +84,13 @@ def check_description(description: RobotDescription) -> None:
 
 
 def check_bounds(description: RobotDescription) -> None:
-    """Whether it can be shown: how much there is of everything, how far it reaches, and what names hold.
+    """Check that a description can be shown: the counts of its parts, the size of its numbers, and its texts.
 
-    Enough for a description that drives no robot any more, as of a recording; an older one may break newer rules.
-    Raises: DescriptionError: names the first part that is too many, too long or cannot be printed.
+    That is enough for a description that drives no robot any more, such as a recording's; an older one may break newer
+    rules.
+
+    Raises:
+        DescriptionError: names the first part that is too many, too long or cannot be printed.
     """
     _check_counts(description)
     _check_texts(description)
@@ -131,7 +136,7 @@ def _check_counts(description: RobotDescription) -> None:
 
 
 def _check_reach(description: RobotDescription) -> None:
-    """A bound for drawn parts: beyond it, computed numbers are not finite."""
+    """Check that drawn parts are within a bound: beyond it, computed numbers are not finite."""
     for body in description.bodies:
         numbers = [*body.position, *body.orientation]
         for joint in body.joints:
@@ -153,7 +158,7 @@ def _check_far(where: str, numbers: Iterable[float]) -> None:
 
 
 def _check_texts(description: RobotDescription) -> None:
-    """Of all that is shown to people, or names something."""
+    """Check every text that is shown to people or names something."""
     texts = [description.name, description.label]
     for axis in description.axes:
         texts += [axis.name, axis.label, axis.unit]

@@ -1,4 +1,4 @@
-"""Whether a description's position limits and geofences make sense, checked once before the bridge listens."""
+"""Checks a description's position limits and geofences once, before the bridge listens."""
 
 import math
 from collections.abc import Iterable, Sequence
@@ -9,15 +9,17 @@ from lockstep.robot_bridge.errors import DescriptionError
 __all__ = ["check_limits"]
 
 MAX_LATENCY = 1.0  # s
-MAX_CORNERS = 64  # of one zone
+MAX_CORNERS = 64  # of one geofence
 MAX_ZONES = 32
 
 Point = tuple[float, float]
 
 
 def check_limits(description: RobotDescription) -> None:
-    """Raises:
-    DescriptionError: with the first contradiction found.
+    """Check the position limits, the planar base and the geofences.
+
+    Raises:
+        DescriptionError: names the first contradiction found.
     """
     axes = {axis.name for axis in description.axes}
     joints = {joint.name for joint in description.joints}
@@ -88,7 +90,7 @@ def _check_fence(fence: Geofence) -> None:
 
 
 def _cross(first: tuple[Point, Point], second: tuple[Point, Point]) -> bool:
-    """Whether two segments share a point; touching counts."""
+    """Return whether two segments share a point; touching counts."""
     (a, b), (c, d) = first, second
     return _side(a, b, c) * _side(a, b, d) <= 0 and _side(c, d, a) * _side(c, d, b) <= 0 and _overlap(first, second)
 
@@ -98,7 +100,7 @@ def _side(a: Point, b: Point, p: Point) -> float:
 
 
 def _overlap(first: tuple[Point, Point], second: tuple[Point, Point]) -> bool:
-    """Whether the boxes around two segments do: segments on one line need not meet."""
+    """Return whether the boxes around two segments overlap: segments on one line need not meet."""
     return all(
         max(min(first[0][k], first[1][k]), min(second[0][k], second[1][k]))
         <= min(max(first[0][k], first[1][k]), max(second[0][k], second[1][k]))

@@ -1,4 +1,4 @@
-"""Connections that wait to be admitted: how many, and which of them goes when there are too many. No I/O, no clock."""
+"""Bounds the connections that wait to be admitted, and chooses which of them is ended. No I/O, no clock."""
 
 import ipaddress
 from collections import Counter
@@ -7,11 +7,11 @@ from typing import Generic, TypeVar
 __all__ = ["Applicants", "address_group"]
 
 Applicant = TypeVar("Applicant")
-PREFIX = 64  # bits of an IPv6 address: one customer has all addresses behind them
+PREFIX = 64  # bits of an IPv6 address that one customer has; the same customer has all addresses with them
 
 
 def address_group(address: str) -> str:
-    """What counts as one address: an IPv4 address, or the /64 of an IPv6 address."""
+    """Return the group that counts as one address: an IPv4 address, or the /64 of an IPv6 address."""
     try:
         parsed = ipaddress.ip_address(address.partition("%")[0])
     except ValueError:
@@ -24,8 +24,10 @@ def address_group(address: str) -> str:
 
 
 class Applicants(Generic[Applicant]):
-    """When there are too many, the oldest applicant of the address with the most goes. So an address only ever takes
-    places from itself, and a client that is quicker than all places fill gets in.
+    """Connections that wait to be admitted, with their addresses.
+
+    If there are too many, the oldest applicant of the address with the most goes. So an address only ever takes places
+    from itself, and a client gets in that is quicker than all places fill.
     """
 
     def __init__(self, limit: int) -> None:
@@ -39,7 +41,7 @@ class Applicants(Generic[Applicant]):
         return applicant in self._groups
 
     def add(self, applicant: Applicant, address: str) -> Applicant | None:
-        """The one that has to go, and is forgotten here; None while there is room."""
+        """Add an applicant. Return the one that has to go, which is forgotten here; None while there is room."""
         self._groups[applicant] = address_group(address)
         if len(self._groups) <= self._limit:
             return None
@@ -49,5 +51,5 @@ class Applicants(Generic[Applicant]):
         return oldest
 
     def remove(self, applicant: Applicant) -> None:
-        """It was admitted, or is gone."""
+        """Forget an applicant that was admitted or is gone."""
         self._groups.pop(applicant, None)

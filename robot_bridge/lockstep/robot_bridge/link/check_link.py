@@ -1,4 +1,4 @@
-"""Whether the robot link may listen where it is told to, checked before it does."""
+"""Checks that the robot link may listen on its address, before it does."""
 
 import ipaddress
 
@@ -9,8 +9,10 @@ __all__ = ["check_link", "is_loopback"]
 
 
 def check_link(settings: BridgeSettings) -> None:
-    """Raises:
-    InsecureLink: nothing would keep strangers from driving the robot.
+    """Check that only clients that may drive the robot can reach the link.
+
+    Raises:
+        InsecureLink: nothing would keep strangers from driving the robot.
     """
     if settings.insecure or settings.secret is not None or is_loopback(settings.host):
         return
@@ -23,7 +25,7 @@ def check_link(settings: BridgeSettings) -> None:
 
 
 def is_loopback(host: str) -> bool:
-    """A name other than localhost may lead anywhere."""
+    """Return whether only this machine can reach `host`. A name other than localhost may lead anywhere."""
     if host == "localhost":
         return True
     try:

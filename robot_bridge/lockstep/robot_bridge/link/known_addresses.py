@@ -1,5 +1,7 @@
-"""Addresses from which a link was admitted: their TLS handshakes do not wait for those of other addresses, after a
-restart too."""
+"""Remembers the addresses from which a link was admitted, also over a restart.
+
+Their TLS handshakes do not wait for those of other addresses.
+"""
 
 import os
 from contextlib import suppress
@@ -9,15 +11,18 @@ from lockstep.robot_bridge.link.applicants import address_group
 
 __all__ = ["KnownAddresses"]
 
-LIMIT = 64  # the newest
+LIMIT = 64  # newest addresses kept
 MAX_BYTES = 8192  # of the file
 
 
 class KnownAddresses:
-    """`read` and `write` block, and raise nothing: without the file a console waits longer after a restart."""
+    """A set of addresses, kept in a file.
+
+    `read` and `write` block, and raise nothing: without the file a console waits longer after a restart.
+    """
 
     def __init__(self, path: Path | None) -> None:
-        """`path`: a line for each address, the newest last; None: they are forgotten with this object."""
+        """`path`: a file with a line for each address, the newest last; None: they are forgotten with this object."""
         self._path = path
         self._groups: dict[str, None] = {}  # oldest first
 
@@ -25,7 +30,7 @@ class KnownAddresses:
         return address_group(address) in self._groups
 
     def add(self, address: str) -> bool:
-        """Whether it was not known."""
+        """Add an address. True if it was not known."""
         group = address_group(address)
         is_new = group not in self._groups
         self._groups.pop(group, None)

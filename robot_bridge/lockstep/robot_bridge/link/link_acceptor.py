@@ -1,4 +1,4 @@
-"""Accepts connections of the robot link, at a bounded rate, and shakes hands for TLS where that is asked for."""
+"""Accepts connections of the robot link, at a bounded rate, and shakes hands for TLS if it is asked for."""
 
 import asyncio
 import contextlib
@@ -25,8 +25,10 @@ MAX_HELLO = 16 * 1024  # bytes of a record
 
 
 def listening_socket(host: str, port: int) -> socket.socket:
-    """Raises:
-    OSError: the address cannot be had.
+    """Return a listening socket; an empty `host` listens on all addresses.
+
+    Raises:
+        OSError: the address cannot be had.
     """
     if not host and socket.has_dualstack_ipv6():
         return socket.create_server(("", port), family=socket.AF_INET6, dualstack_ipv6=True, backlog=BACKLOG)
@@ -38,7 +40,7 @@ def listening_socket(host: str, port: int) -> socket.socket:
 
 
 class _Pace:
-    """`rate` a second, `burst` at once; the others wait in the order in which they came."""
+    """A pace of `rate` a second, `burst` at once; further callers wait in the order in which they came."""
 
     def __init__(self, rate: float, burst: float) -> None:
         self._rate, self._burst = rate, burst
@@ -57,9 +59,10 @@ class _Pace:
 
 
 class LinkAcceptor:
-    """Takes over a listening socket. `close` ends it and the handshakes under way. TLS begins when the client's first
-    record has arrived whole: a connection that sends less costs only a descriptor. Addresses from which a link was
-    admitted before do not wait for the handshakes of others.
+    """Accepts connections of a listening socket, which it owns. `close` ends the socket and the handshakes under way.
+
+    TLS begins when the client's first record has arrived whole: a connection that sends less costs only a descriptor.
+    Addresses from which a link was admitted before do not wait for the handshakes of others.
     """
 
     def __init__(
@@ -72,7 +75,10 @@ class LinkAcceptor:
         max_handshakes: int,
         known: KnownAddresses | None = None,
     ) -> None:
-        """`failed`: a TLS handshake did. `max_handshakes`: that wait for a first record, and as many that go on."""
+        """`failed`: called if a TLS handshake fails.
+
+        `max_handshakes`: connections that may wait for a first record, and as many whose handshake goes on.
+        """
         self._listener = listener
         self._context = context
         self._factory = factory
@@ -92,7 +98,7 @@ class LinkAcceptor:
         self._accepting = asyncio.get_running_loop().create_task(self._accept(), name="link acceptor")
 
     def admitted(self, address: str) -> None:
-        """A link from there was."""
+        """Remember that a link from `address` was admitted."""
         if self._context is None or not self._known.add(address):
             return
         self._is_unwritten = True
@@ -105,7 +111,7 @@ class LinkAcceptor:
             await asyncio.to_thread(self._known.write)
 
     async def close(self) -> None:
-        """May be called again."""
+        """Stop accepting and close the socket. May be called again."""
         accepting, self._accepting = self._accepting, None
         try:
             if accepting is not None:
@@ -113,7 +119,7 @@ class LinkAcceptor:
                 await asyncio.wait([accepting])
             if self._writing is not None:
                 await asyncio.wait([self._writing])
-        finally:  # also when the closing is cancelled: no other code closes it
+        finally:  # also if the closing is cancelled: no other code closes the socket
             self._listener.close()
 
     async def _accept(self) -> None:
@@ -147,7 +153,7 @@ class LinkAcceptor:
                 return
             await _first_record(connection)
             task = asyncio.current_task()
-            assert task is not None  # this is one
+            assert task is not None  # this coroutine runs in one
             self._silent.remove(task)
             self._bound(self._shaking, task, address)
             await (self._acquainted if address in self._known else self._strangers).take()
@@ -165,14 +171,18 @@ class LinkAcceptor:
 
 
 def _close_if_cancelled(connection: socket.socket, task: asyncio.Task[None]) -> None:
-    """Also a task that was cancelled before its first step."""
+    """Close the connection of a cancelled task, even of one that was cancelled before its first step."""
     if task.cancelled():
         with contextlib.suppress(OSError):
             connection.close()
 
 
 async def _first_record(connection: socket.socket) -> None:
-    """Returns when a whole TLS record can be read. Raises OSError when no record arrives in time."""
+    """Wait until a whole TLS record can be read.
+
+    Raises:
+        OSError: no record arrived in time.
+    """
     async with asyncio.timeout(SILENCE):
         await _readable(connection, TLS_HEADER)
         header = connection.recv(TLS_HEADER, socket.MSG_PEEK)
@@ -183,7 +193,7 @@ async def _first_record(connection: socket.socket) -> None:
 
 
 async def _readable(connection: socket.socket, count: int) -> None:
-    """Returns when so many bytes are there, or the connection has ended."""
+    """Wait until `count` bytes are there, or the connection has ended."""
     loop = asyncio.get_running_loop()
     came = loop.create_future()
 

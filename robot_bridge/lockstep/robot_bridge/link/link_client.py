@@ -23,15 +23,15 @@ MAX_INBOX = 256  # messages besides media that may wait for the reader
 
 
 class RobotLink:
-    """One connection to a bridge.
+    """A connection to a bridge.
 
     >>> async with RobotLink("127.0.0.1", 5600, "operator", name="my console") as link:
     ...     async for message in link:
     ...         link.send(...)
 
-    It does not reconnect: make a new one. Iterating raises `LinkError` when the link breaks and ends after `close`.
-    A reader that falls behind loses the oldest messages and, per stream, all but the newest pictures; both are
-    counted in `drops`.
+    It does not reconnect: make a new one. Iterating raises `LinkError` when the link breaks and ends after `close`. A
+    reader that falls behind loses the oldest messages and, per stream, all but the newest pictures; both are counted in
+    `drops`.
     """
 
     def __init__(
@@ -44,7 +44,7 @@ class RobotLink:
         secret: LinkSecret | None = None,
         tls: ssl.SSLContext | None = None,
     ) -> None:
-        """`secret`: both sides prove that they know it. `tls`: as `LinkTls.client_context` makes it."""
+        """`secret`: both sides prove that they know it. `tls`: made by `LinkTls.client_context`."""
         self.role: LinkRole = role
         self.bad_input: Counter[str] = Counter()  # by name, {"malformed": 1}
         self.drops: Counter[str] = Counter()  # by message kind, {"feedback": 2}; media are in `media_drops`
@@ -58,13 +58,13 @@ class RobotLink:
         self._media: MediaOutbox[Media] = MediaOutbox()
         self._news = asyncio.Event()
         self._ticker: asyncio.TimerHandle | None = None
-        self._take: Callable[[LinkMessage], None] | None = None  # None: messages wait for who iterates
-        self._failure: Exception | None = None  # that it raised
+        self._take: Callable[[LinkMessage], None] | None = None  # None: messages wait for the iteration
+        self._failure: Exception | None = None  # the exception that `take` raised
         self._closed = False
 
     @property
     def hello(self) -> Hello:
-        """What the bridge said: its epoch and, but for the role `events`, the description.
+        """The bridge's hello: its epoch and, unless the role is `events`, the description.
 
         Raises:
             LinkError: not connected yet.
@@ -75,12 +75,12 @@ class RobotLink:
 
     @property
     def media_drops(self) -> Counter[str]:
-        """By stream."""
+        """The dropped media by stream."""
         return self._media.drops
 
     @property
     def connected(self) -> bool:
-        """Whether the handshake is done and the link lives."""
+        """True if the handshake is done and the link lives."""
         return self._session.hello is not None and self._session.ended is None
 
     async def connect(self) -> None:
@@ -128,17 +128,17 @@ class RobotLink:
         self._transport.send(message)
 
     def fileno(self) -> int:
-        """Of the socket, so that others can see whether something has come; -1 without one (select(2))."""
+        """Return the socket's descriptor, to see whether data has come (select(2)); -1 without a socket."""
         return self._transport.fileno()
 
     async def deliver(self, take: Callable[[LinkMessage], None]) -> None:
         """Hand each message to `take` as it comes, within its turn of the event loop, until `close`.
 
-        Who iterates gets it a turn or two later. Nothing waits for a reader then, and nothing is dropped.
+        Iteration gets messages a turn or two later. Here no message waits for a reader, and none is dropped.
 
         Raises:
             LinkError: the link broke.
-            Exception: what `take` raised; nothing was handed over after that.
+            Exception: the one that `take` raised; nothing was handed over after that.
         """
         self._take = take
         try:
@@ -198,7 +198,7 @@ class RobotLink:
             self._ticker = asyncio.get_running_loop().call_later(TICK_INTERVAL, self._tick)
 
     def _oldest(self) -> LinkMessage | None:
-        """Of those that wait; media last."""
+        """Remove and return the oldest waiting message, media last."""
         return self._inbox.pop(next(iter(self._inbox))) if self._inbox else self._media.pop()
 
     def _hand_over(self, take: Callable[[LinkMessage], None], message: LinkMessage) -> None:

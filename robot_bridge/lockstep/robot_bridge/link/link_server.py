@@ -1,4 +1,4 @@
-"""The bridge's listening side: admits links, hands their messages on, sends to them by role."""
+"""The bridge's listening side: admits links, hands their messages on, and sends to them by role."""
 
 import asyncio
 import math
@@ -38,9 +38,9 @@ from lockstep.robot_bridge.link.message_rate import MessageRate
 __all__ = ["LinkHandler", "LinkPeer", "LinkServer"]
 
 CLOSE_TIMEOUT = 1.0  # s for goodbyes to leave when the bridge closes
-READ_RATE = 500.0  # messages per second of a link that are read, on average; a watcher sends less than a tenth
+READ_RATE = 500.0  # messages per second read of a link, on average; a watcher sends less than a tenth
 OPERATOR_READ_RATE = 5000.0  # of the operator link, on which a console passes on the stops of many people
-READ_BURST = 50.0  # at once: about a millisecond of the loop
+READ_BURST = 50.0  # messages at once: about a millisecond of the loop
 
 
 GOODBYES = frozenset(
@@ -49,23 +49,23 @@ GOODBYES = frozenset(
 
 
 class LinkHandler(Protocol):
-    """What the server needs of the bridge. All methods return at once."""
+    """The part of the bridge that the server calls. All methods return at once."""
 
     def link_opened(self, peer: "LinkPeer") -> None:
         """A link was admitted; its hello is on the way."""
 
     def link_message(self, peer: "LinkPeer", message: Command | Rest | Stop | Reset) -> None:
-        """A valid message that the link's role permits."""
+        """A valid message came that the link's role permits."""
 
     def link_bad_input(self, peer: "LinkPeer", bad: BadInput) -> None:
-        """Something else, on a link that lives on; already counted."""
+        """Bad input came on a link that lives on; it is counted already."""
 
     def operator_lost(self) -> None:
         """The operator link ended, for any reason."""
 
 
 class LinkPeer(LinkTransport):
-    """One admitted or applying link."""
+    """A link that is admitted or asks to be."""
 
     def __init__(self, server: "LinkServer", clock: Callable[[], float], secret: LinkSecret | None) -> None:
         now = clock()
@@ -75,7 +75,7 @@ class LinkPeer(LinkTransport):
         self._bridge_session = session
         self._server = server
         self.name = ""  # the client's own name, "console"
-        self.address = ""  # where it comes from, "10.0.0.9"
+        self.address = ""  # the client's address, "10.0.0.9"
 
     def _admit(self, hello: Hello) -> Hello | Goodbye:
         self.name = hello.name
@@ -131,14 +131,14 @@ class LinkServer:
         self._max_strangers = max_strangers
         self._operator_grace = operator_grace
         self._addresses = KnownAddresses(addresses_file)
-        self._kept_for = ""  # name of the client whose operator link broke; "" when none has
-        self._kept_until = -math.inf  # s, for that client
+        self._kept_for = ""  # name of the client whose operator link broke; "" if none has
+        self._kept_until = -math.inf  # s, end of that client's grace
         self._secret = secret
         self._tls = tls
         self._clock = clock
-        self._connections: set[LinkPeer] = set()  # sockets, those that are closing included
+        self._connections: set[LinkPeer] = set()  # all sockets, those that are closing included
         self._silent: Applicants[LinkPeer] = Applicants(max_strangers)  # have not said hello
-        self._challenged: Applicants[LinkPeer] = Applicants(max_strangers)  # have, and owe the proof
+        self._challenged: Applicants[LinkPeer] = Applicants(max_strangers)  # have said hello and owe the proof
         self._known: set[LinkPeer] = set()  # admitted
         self._operator: LinkPeer | None = None
         self._events: set[LinkPeer] = set()
@@ -153,18 +153,18 @@ class LinkServer:
 
     @property
     def links(self) -> int:
-        """Sockets that are open."""
+        """The number of open sockets."""
         return len(self._connections)
 
     async def listen(self, host: str, port: int) -> tuple[str, int]:
-        """Listen; returns the address.
+        """Listen, and return the address.
 
         Raises:
             ListenError: the address cannot be had.
         """
         await asyncio.to_thread(self._addresses.read)
         try:
-            listener = await asyncio.to_thread(listening_socket, host, port)  # which may look up a name
+            listener = await asyncio.to_thread(listening_socket, host, port)  # may look up a name
         except OSError as error:
             raise ListenError(f"cannot listen on {host}:{port}: {error}") from error
         address = listener.getsockname()
@@ -183,7 +183,7 @@ class LinkServer:
         self._counters.bad_input["tls"] += 1
 
     async def run(self) -> None:
-        """Heartbeats, until cancelled."""
+        """Run the heartbeats until cancelled."""
         while True:
             await asyncio.sleep(TICK_INTERVAL)
             for peer in list(self._connections):
@@ -206,7 +206,7 @@ class LinkServer:
                 peer.abort()
 
     def publish_feedback(self, feedback: Feedback) -> None:
-        """To the operator link; its event to the event links."""
+        """Send a feedback to the operator link, and its event to the event links."""
         if self._operator is not None:
             self._operator.send(feedback)
         if self._events:
@@ -215,19 +215,19 @@ class LinkServer:
                 peer.send_encoded("event", notice)
 
     def publish_media(self, media: Media) -> None:
-        """To every media link, newest wins per stream."""
+        """Send a medium to every media link, newest wins per stream."""
         encoded = encode_once(media)
         for peer in self._media:
             peer.send_media(media, encoded)
 
     def drops(self) -> Counter[str]:
-        """What links that did not keep up have missed, those gone included."""
+        """Return the messages that slow links have missed, ended links included."""
         return sum((peer.drops for peer in self._connections), self._counters.drops)
 
     # called by the links
 
     def admit(self, peer: LinkPeer, hello: Hello) -> Hello | Goodbye:
-        """Called once the peer has proven the secret, where there is one."""
+        """Admit or refuse a link, after its peer has proven the secret if there is one."""
         if not self._has_room(hello):
             return Goodbye(error="full", detail=f"this bridge takes {self._max_links} links")
         if hello.role == "operator" and self._operator is not None:
@@ -251,12 +251,15 @@ class LinkServer:
         return self._hello
 
     def _has_room(self, hello: Hello) -> bool:
-        """The last place is the operator's: a console comes back, no matter how many links others open."""
+        """Return whether there is room for the link. The last place is the operator's.
+
+        So a console comes back, no matter how many links others open.
+        """
         others = len(self._known) - (self._operator is not None)
         return others < (self._max_links if hello.role == "operator" else self._max_links - 1)
 
     def _is_kept_from(self, name: str) -> bool:
-        """Whether another client's operator link broke just now: a stall gives the robot to no other client."""
+        """Return whether another client's operator link broke just now: a stall gives the robot to no other client."""
         return self._kept_for not in ("", name) and self._clock() < self._kept_until
 
     def connected(self, peer: LinkPeer) -> None:
@@ -267,7 +270,7 @@ class LinkServer:
             self._bound(self._silent, peer)
 
     def challenged(self, peer: LinkPeer) -> None:
-        """It has said hello and owes the proof: those who say nothing cannot push it out any more."""
+        """Move a peer that has said hello and owes the proof: silent connections cannot push it out any more."""
         if peer in self._silent:
             self._silent.remove(peer)
             self._bound(self._challenged, peer)
@@ -296,7 +299,7 @@ class LinkServer:
 
     def ended(self, peer: LinkPeer) -> None:
         if peer.session.ended is not None:
-            error = peer.session.ended.error  # which the peer may have made up
+            error = peer.session.ended.error  # the peer may have made it up
             self._counters.endings[error if error in GOODBYES else "other"] += 1
         self._forget_applicant(peer)
         self._known.discard(peer)
@@ -315,5 +318,5 @@ class LinkServer:
 
 
 def encode_once(message: LinkMessage) -> Callable[[], bytes]:
-    """The message's frame, encoded at the first call and shared by the others."""
+    """Return a function that encodes the message's frame at the first call and returns the same frame at the others."""
     return cache(lambda: frame(encode_message(message)))

@@ -1,7 +1,7 @@
-"""One connection of the robot link, seen from either side. No I/O, no clock (docs/robot-link.md, "Connections").
+"""The session of one robot link connection, on either side. No I/O, no clock (docs/robot-link.md, "Connections").
 
 Call order: `receive` with bytes as they come, `tick` every 50 ms or so, `end` to say goodbye; after each of them send
-what `take_outgoing` returns and, once `ended` is set, close. An ended session stays ended.
+the messages that `take_outgoing` returns and, once `ended` is set, close. An ended session stays ended.
 """
 
 from collections import OrderedDict
@@ -43,12 +43,12 @@ from lockstep.robot_bridge.link.message_rate import MessageRate
 __all__ = ["BadInput", "BridgeSession", "ClientSession", "LinkSession", "LinkState", "kind_of"]
 
 PING_INTERVAL = 0.2  # s
-SILENCE = 1.0  # s without a valid message after which the other side is taken for dead, and `ROUND_TRIPS` besides
-ROUND_TRIPS = 4  # in which TCP has found out about a loss and repaired it, though what repairs it may be lost too
+SILENCE = 1.0  # s without a valid message, and `ROUND_TRIPS` more, after which the other side is taken for dead
+ROUND_TRIPS = 4  # in which TCP has found out about a loss and repaired it, though the repair may be lost too
 MOST_SILENCE = 5.0  # s, even when the other side lengthens the round trip by late pongs
-PINGS_OUT = 64  # of which a pong still tells the round trip
+PINGS_OUT = 64  # pings without a pong whose time of sending is remembered
 HELLO_TIMEOUT = 2.0  # s
-OWN_STALL = 0.5  # s between two ticks; more means that we did not look, not that the other side was silent
+OWN_STALL = 0.5  # s between two ticks; more means that this side did not look, not that the other side was silent
 
 FROM_CLIENT: dict[LinkRole, tuple[type[LinkMessage], ...]] = {
     "operator": (Command, Rest, Stop, Reset),
@@ -69,20 +69,20 @@ class LinkState(Enum):
 
 
 class BadInput(NamedTuple):
-    """Something the other side should not have sent; it counts as nothing but bad input."""
+    """Something that the other side should not have sent; it counts only as bad input, not as a sign of life."""
 
     name: Literal["malformed", "not_allowed", "framing", "handshake", "unauthorised"]
     detail: str
-    event: int = 0  # of a command that was not allowed; 0 otherwise
+    event: int = 0  # of the command that was not allowed; 0 otherwise
 
 
 class LinkSession:
-    """What both sides share: frames, permissions, heartbeats, silence."""
+    """The common part of both sides: frames, permissions, heartbeats, silence."""
 
     def __init__(self, now: float, *, max_frame: int) -> None:
         self.state = LinkState.HANDSHAKE
         self.role: LinkRole | None = None  # the client's role; None before it is known
-        self.ended: Goodbye | None = None  # why it ended, by either side; None while it lives
+        self.ended: Goodbye | None = None  # the goodbye that ended it, from either side; None while it lives
         self.left = False  # the other side ended it because it goes away
         self._reader = FrameReader(max_frame)
         self._allowed: tuple[type[LinkMessage], ...] = ()
@@ -97,26 +97,27 @@ class LinkSession:
 
     @property
     def patience(self) -> float:
-        """Seconds of silence after which the other side is taken for dead.
+        """The seconds of silence after which the other side is taken for dead.
 
-        A loss holds back everything behind it until TCP has repeated it, which takes round trips: on a long path a
-        link that waited for a second alone would end with nearly every loss.
+        A loss holds back everything behind it until TCP has repeated it, which takes round trips: on a long path a link
+        that waited for only a second would end with nearly every loss.
         """
         return min(SILENCE + ROUND_TRIPS * self._round_trip, MOST_SILENCE)
 
     @property
     def missing(self) -> int:
-        """Bytes that a large message still needs; 0: none is on its way."""
+        """The bytes that a large message still needs; 0 if none is on its way."""
         return self._reader.missing
 
     @property
     def waits(self) -> bool:
-        """Whether received bytes were not read because `rate` was used up: call `receive` again later."""
+        """True if received bytes were not read because `rate` was used up: call `receive` again later."""
         return self.ended is None and self._reader.has_frame
 
     def receive(self, data: bytes, now: float, rate: MessageRate | None = None) -> list[LinkMessage | BadInput]:
-        """The messages in these bytes, in order; heartbeats are answered here and not returned. `rate`: messages beyond
-        it wait; None: no bound.
+        """Return the messages in these bytes, in order; heartbeats are answered here and not returned.
+
+        `rate`: messages beyond it wait; None: no bound.
         """
         events: list[LinkMessage | BadInput] = []
         self._reader.feed(data)
@@ -187,7 +188,7 @@ class LinkSession:
         self.state = LinkState.OPEN
 
     def _measured(self, round_trip: float) -> None:
-        """One more round trip; smoothed as TCP does (RFC 6298 2.3)."""
+        """Smooth one more round trip into the mean, as TCP does (RFC 6298 2.3)."""
         before = self._round_trip
         self._round_trip = round_trip if before == 0.0 else before + (round_trip - before) / 8
 
@@ -220,7 +221,7 @@ class LinkSession:
             self._finish(goodbye)
 
     def lose(self, detail: str) -> None:
-        """The connection ended without a goodbye."""
+        """End the session because the connection ended without a goodbye."""
         if self.ended is None:
             self._finish(Goodbye(error="lost", detail=detail[:500]))
 
@@ -229,15 +230,15 @@ class LinkSession:
         self.state = LinkState.ENDED
 
     def take_outgoing(self) -> list[LinkMessage]:
-        """What the session wants sent, in order; each message is returned once."""
+        """Return the messages to send, in order; each is returned once."""
         outgoing, self._outgoing = self._outgoing, []
         return outgoing
 
 
 class BridgeSession(LinkSession):
-    """The bridge's side. `admit` answers a hello of a known version and role: with our hello, or a goodbye.
+    """The bridge's side. `admit` answers a hello of a known version and role with the bridge's hello or a goodbye.
 
-    With a secret it is asked only about clients that have proven to know it.
+    With a secret, `admit` is called only for clients that have proven to know it.
     """
 
     def __init__(self, now: float, admit: Callable[[Hello], Hello | Goodbye], secret: LinkSecret | None = None) -> None:
@@ -250,11 +251,11 @@ class BridgeSession(LinkSession):
 
     @property
     def challenged(self) -> bool:
-        """Whether the client has said a proper hello and owes the proof."""
+        """True if the client has said a proper hello and owes the proof."""
         return self._challenged is not None and self.state is LinkState.HANDSHAKE
 
     def _shake_hands(self, message: LinkMessage, now: float) -> LinkMessage | BadInput | None:
-        """Returns the hello when it was admitted."""
+        """Return the hello if it was admitted."""
         if not isinstance(message, Hello):
             return self._reject("handshake", f"the first message must be hello, not {kind_of(message)}")
         if message.version != PROTOCOL_VERSION:
@@ -343,7 +344,7 @@ class ClientSession(LinkSession):
         return message
 
     def _receive_open(self, message: LinkMessage, now: float) -> LinkMessage | BadInput | None:
-        """A feedback that does not fit the description is bad input: no part could show or record it."""
+        """Refuse a feedback that does not fit the description as bad input: no part could show or record it."""
         described = None if self.hello is None else self.hello.description
         if isinstance(message, Feedback) and isinstance(message, self._allowed) and described is not None:
             wrong = misfit(message, described)
@@ -362,7 +363,10 @@ class ClientSession(LinkSession):
         return None
 
     def _is_proven(self, hello: Hello) -> bool:
-        """Without a secret the bridge needs no proof; with one, a bridge that did not ask for it is refused too."""
+        """Return whether the bridge has proven the secret. Without a secret no proof is needed.
+
+        With a secret, a bridge that did not ask for it is refused too.
+        """
         if self._secret is None:
             return True
         if self._bridge_nonce is None:
@@ -376,5 +380,5 @@ class ClientSession(LinkSession):
 
 
 def kind_of(message: LinkMessage) -> str:
-    """The `type` of the message on the wire."""
+    """Return the `type` of the message on the wire."""
     return str(message.__struct_config__.tag)

@@ -11,19 +11,23 @@ __all__ = ["LinkTls"]
 
 @dataclass(frozen=True, kw_only=True)
 class LinkTls:
-    """Files in PEM form.
+    """Files in PEM form for TLS.
 
-    At a bridge: `certificate` and `key` are its own; with `authority`, clients need a certificate that it signed.
-    At a client: `authority` has to have signed the bridge's (None: one that this machine trusts); `certificate` and
-    `key` are shown to a bridge that asks.
+    At a bridge: `certificate` and `key` are the bridge's; with `authority`, clients need a certificate that it signed.
+    At a client: `authority` must have signed the bridge's certificate (None: an authority that this machine trusts
+    must); `certificate` and `key` are shown to a bridge that asks.
     """
 
     certificate: Path | None = None
-    key: Path | None = None  # None: it stands in the certificate's file
+    key: Path | None = None  # None: the key is in the certificate's file
     authority: Path | None = None
 
     def bridge_context(self) -> ssl.SSLContext:
-        """Raises SecretError when a file is missing or no good."""
+        """Return the bridge's context.
+
+        Raises:
+            SecretError: a file is missing or cannot be used.
+        """
         if self.certificate is None:
             raise SecretError("TLS needs the bridge's certificate")
         context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
@@ -33,7 +37,11 @@ class LinkTls:
         return context
 
     def client_context(self) -> ssl.SSLContext:
-        """Raises SecretError when a file is missing or no good."""
+        """Return the client's context.
+
+        Raises:
+            SecretError: a file is missing or cannot be used.
+        """
         context = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)  # checks the bridge's name and certificate
         if self.authority is None:
             context.load_default_certs()

@@ -1,4 +1,4 @@
-"""What both ends of the robot link share on asyncio: one session on one TCP connection, with bounded output."""
+"""The asyncio transport of both ends of the robot link: one session on one TCP connection, with bounded output."""
 
 import asyncio
 import socket
@@ -25,14 +25,14 @@ class LinkTransport(asyncio.Protocol):
     """Feeds the session, sends its messages, and drops a peer that does not read.
 
     While the socket is full, messages wait in outboxes: one per kind, media per stream, newest wins. At most
-    `HIGH_WATER` bytes and one further message are buffered. Messages beyond `rate` wait in the socket, so that the
-    sender finds that full; no message is lost.
+    `HIGH_WATER` bytes and one further message are buffered. Messages beyond `rate` wait in the socket, so the sender
+    finds the socket full; no message is lost.
     """
 
     def __init__(
         self, session: LinkSession, clock: Callable[[], float] = time.monotonic, rate: MessageRate | None = None
     ) -> None:
-        """`rate`: None reads all that comes."""
+        """`rate`: None reads everything that comes."""
         self.session = session
         self._clock = clock
         self._message_rate = rate
@@ -42,32 +42,32 @@ class LinkTransport(asyncio.Protocol):
         self._media: MediaOutbox[bytes] = MediaOutbox()
         self._full = False  # the socket takes no more for now
         self._buffered = 0  # bytes at the last look, to see whether the other side takes any
-        self._moved = 0.0  # s, when it last took some
+        self._moved = 0.0  # s, when the other side last took some
         self._closing_since: float | None = None
         self._lost = False
 
     @property
     def drops(self) -> Counter[str]:
-        """What was replaced by something newer, by message kind or stream."""
+        """The messages that were replaced by something newer, by message kind or stream."""
         return self._control.drops + self._media.drops
 
     def received(self, event: LinkMessage | BadInput) -> None:
-        """One event of the session, for the subclass."""
+        """Handle one event of the session; for the subclass."""
 
     def lost(self) -> None:
-        """The session is over; called exactly once, for the subclass."""
+        """Handle the end of the session; called exactly once, for the subclass."""
 
     def send(self, message: LinkMessage) -> None:
         """Send, or keep the newest of its kind until there is room. Ignored after the end."""
         self.send_encoded(kind_of(message), partial(_encode, message))
 
     def send_encoded(self, kind: str, make: Callable[[], bytes]) -> None:
-        """As `send`, with a frame that several peers share."""
+        """Send as `send` does, with a frame that several peers share."""
         if self.session.ended is None:
             self._write(kind, make)
 
     def send_media(self, media: Media, make: Callable[[], bytes]) -> None:
-        """As `send_encoded`, per stream."""
+        """Send as `send_encoded` does, newest wins per stream."""
         if self._transport is None or self.session.ended is not None:
             return
         if self._full:
@@ -76,12 +76,12 @@ class LinkTransport(asyncio.Protocol):
             self._transport.write(make())
 
     def fileno(self) -> int:
-        """Of the socket; -1 without one."""
+        """Return the socket's descriptor; -1 without a socket."""
         tcp = None if self._transport is None else self._transport.get_extra_info("socket")
         return -1 if tcp is None else cast(int, tcp.fileno())
 
     def tick(self) -> None:
-        """Heartbeats, silence, peers that do not read, closes that hang."""
+        """Send heartbeats; end silent sessions, peers that do not read, and closes that hang."""
         now = self._clock()
         self.session.tick(now)
         self._flush_session(now)
@@ -126,7 +126,7 @@ class LinkTransport(asyncio.Protocol):
             self._message_rate.refill(now)
         events = self.session.receive(data, now, self._message_rate)
         if self.session.ended is None:
-            self._send_outgoing()  # the own hello leaves before any answer to messages behind the peer's
+            self._send_outgoing()  # this side's hello leaves before any answer to messages behind the peer's
         for event in events:
             self.received(event)
         self._flush_session(now)

@@ -1,8 +1,8 @@
-"""What waits while a peer cannot take more: newest wins, per kind of message or per stream. No I/O.
+"""Queues of messages for a peer that cannot take more: newest wins, per kind of message or per stream. No I/O.
 
-A picture replaces the one that waits. Sound keeps a few segments in order, since each lost one is heard. Pictures
-that need earlier ones to be decoded (h264) wait in order too; when they no longer fit, all of them go and the stream
-resumes with the next keyframe.
+A picture replaces the one that waits. Sound keeps a few segments in order, since each lost one is heard. Pictures that
+need earlier ones to be decoded (h264) wait in order too; if they no longer fit, all of them go and the stream resumes
+with the next keyframe.
 """
 
 from collections import Counter, deque
@@ -16,7 +16,7 @@ __all__ = ["MediaOutbox", "NewestOutbox"]
 Key = TypeVar("Key")
 Item = TypeVar("Item")
 
-ORDERED_DEPTH = 10  # segments or dependent pictures a stream may have waiting: 200 ms of sound
+ORDERED_DEPTH = 10  # segments or dependent pictures of a stream that may wait: 200 ms of sound
 
 
 class NewestOutbox(Generic[Key, Item]):
@@ -36,7 +36,7 @@ class NewestOutbox(Generic[Key, Item]):
         self._items[key] = item
 
     def pop(self) -> Item | None:
-        """The item whose key has waited longest; None when empty."""
+        """Return the item whose key has waited longest; None if the outbox is empty."""
         return self._items.pop(next(iter(self._items))) if self._items else None
 
 
@@ -52,7 +52,7 @@ class MediaOutbox(Generic[Item]):
         return sum(map(len, self._streams.values()))
 
     def put(self, media: Media, make: Callable[[], Item]) -> None:
-        """Take in a medium; `make` builds the item unless it is dropped at once."""
+        """Add a medium; `make` builds the item unless it is dropped at once."""
         queue = self._streams.setdefault(media.stream, deque())
         if media.keyframe:
             self._broken.discard(media.stream)
@@ -75,7 +75,7 @@ class MediaOutbox(Generic[Item]):
         self.drops[stream] += 1
 
     def pop(self) -> Item | None:
-        """The next item, streams in turn; None when empty."""
+        """Return the next item, streams in turn; None if the outbox is empty."""
         for stream, queue in self._streams.items():
             if queue:
                 self._streams[stream] = self._streams.pop(stream)  # to the end of the turn

@@ -1,7 +1,7 @@
-"""A link that is read no faster than its share of the thread's time allows: further data waits at its source.
+"""Reads a link no faster than its share of the thread's time allows: further data waits at its source.
 
-One event loop of a console serves many robots and all their operators. A bridge that sends any data without end takes
-half of the loop's time at most with its two links, in turns of a millisecond or two.
+One event loop of a console serves many robots and all their operators. A bridge that sends data without end takes half
+of the loop's time at most with its two links, in turns of a millisecond or two.
 """
 
 import asyncio
@@ -15,16 +15,16 @@ from lockstep.robot_bridge.link.link_transport import LinkTransport
 __all__ = ["PIECE", "READ_BURST", "READ_SHARE", "READ_TURN", "PacedTransport", "ReadBudget"]
 
 READ_SHARE = 0.25  # of the thread's time
-READ_BURST = 0.1  # s of it at once
-READ_TURN = 0.001  # s of it in one turn of the loop
+READ_BURST = 0.1  # s of the thread's time at once
+READ_TURN = 0.001  # s of the thread's time in one turn of the loop
 LONG_TURN = 0.01  # s of a turn that are made up for; a longer turn was another process' time
 PIECE = 4 << 10  # bytes between two looks at the time; a thousand of the shortest messages
 
 
 class ReadBudget:
-    """How much a connection may make a thread work. No I/O, no clock; times in s, both handed in.
+    """Bounds the time for which a connection may make a thread work. No I/O, no clock; the caller hands in times in s.
 
-    `worked` is the thread's own time: that it waits for a processor is not the connection's doing.
+    `worked` is the thread's own time: its waiting for a processor is not the connection's doing.
     """
 
     def __init__(self, share: float, burst: float, now: float) -> None:
@@ -41,7 +41,7 @@ class ReadBudget:
 
 
 class PacedTransport(LinkTransport):
-    """`worked`: the time that this thread has worked so far, s."""
+    """`worked`: returns the time that this thread has worked so far, s."""
 
     def __init__(
         self,
@@ -53,7 +53,7 @@ class PacedTransport(LinkTransport):
         self._worked = worked
         self._budget = ReadBudget(READ_SHARE, READ_BURST, clock())
         self._unread: deque[memoryview] = deque()
-        self._later: asyncio.TimerHandle | None = None  # reads on; None while everything is read
+        self._later: asyncio.TimerHandle | None = None  # the call that reads on; None while everything is read
 
     def data_received(self, data: bytes) -> None:
         self._unread.append(memoryview(data))
@@ -71,7 +71,7 @@ class PacedTransport(LinkTransport):
         wait = self._budget.spend(now - began, ended)
         if self._transport is None:
             return
-        if self._unread:  # a flood, so others come first, also where the thread itself gets little of its processor
+        if self._unread:  # a flood: others come first, even if the thread gets little of its processor
             wait = max(wait, min(ended - since, LONG_TURN) * (1 / READ_SHARE - 1))
         if self._unread or wait > 0:
             self._transport.pause_reading()
@@ -80,7 +80,7 @@ class PacedTransport(LinkTransport):
             self._transport.resume_reading()
 
     def _next_piece(self) -> bytes:
-        """Of a large message all that is there: it costs no more than copying it."""
+        """Return the next piece, or all that is there of a large message: reading it costs no more than copying it."""
         first = self._unread.popleft()
         end = max(PIECE, self.session.missing)
         if len(first) > end:

@@ -1,6 +1,6 @@
-"""`lockstep robot new`: writes a folder with a robot of one's own, its test and what installs it.
+"""`lockstep robot new`: writes a folder with a new robot, its test and its packaging.
 
-The folder's files are those of `template/`, where $package, $class_name and $label stand for the new robot's names.
+The files come from `template/`, where $package, $class_name and $label stand for the new robot's names.
 """
 
 import keyword
@@ -13,27 +13,27 @@ from string import Template
 __all__ = ["CannotWrite", "class_name", "write_new_robot"]
 
 TEMPLATE = Path(__file__).parent / "template"
-SUFFIX = ".txt"  # of a template's file, so that no tool takes it for what it becomes
-PACKAGE = "package"  # the folder that gets the robot's name
-TAKEN = ("tests", "test", "src")  # folders of the new one's own, or of tools that look into it
+SUFFIX = ".txt"  # of a template's file, so that no tool takes it for the file that it becomes
+PACKAGE = "package"  # stands for the robot's name in the template's paths
+TAKEN = ("tests", "test", "src")  # folders of the new robot, and of tools that look into them
 NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 
 
 class CannotWrite(Exception):
-    """The text says why."""
+    """The robot cannot be written; the text says why."""
 
 
 def class_name(name: str) -> str:
-    """ "MyArm" for "my_arm"."""
+    """Return the class name for a module name: "MyArm" for "my_arm"."""
     return "".join(part[:1].upper() + part[1:] for part in name.split("_"))
 
 
 def write_new_robot(name: str, parent: Path) -> Path:
-    """The folder, which is `parent`/`name`.
+    """Write the robot's folder `parent`/`name` and return it.
 
     Raises:
-        CannotWrite: the name is no good, or the folder is there already.
-        OSError: it cannot be written.
+        CannotWrite: the name cannot be used, or the folder exists already.
+        OSError: the folder cannot be written.
     """
     _check(name)
     folder = parent / name
@@ -58,5 +58,5 @@ def _check(name: str) -> None:
 
 
 def _here() -> set[str]:
-    """Names in the working directory, which Python may take for modules: a folder there has a message of its own."""
+    """Return the names in the working directory, which Python may take for modules; they have their own error."""
     return {each.name for each in Path.cwd().iterdir()}

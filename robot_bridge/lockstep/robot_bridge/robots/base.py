@@ -1,4 +1,4 @@
-"""What the bridge needs of a robot."""
+"""The interface between the bridge and a robot."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
@@ -13,7 +13,8 @@ __all__ = ["Measurement", "MediaSource", "Robot", "Stamp", "Stamper"]
 class Measurement(NamedTuple):
     """State of the robot, in the order and units of its description.
 
-    What cannot be measured now is NaN (axes and joints) or empty (wrench and ranges), and a fault says why.
+    A value that cannot be measured now is NaN (axes and joints) or an empty list (wrench and ranges), and a fault says
+    why.
     """
 
     axes: list[float]  # measured value of each axis
@@ -25,20 +26,20 @@ class Measurement(NamedTuple):
 
 
 class Stamp(NamedTuple):
-    """The event reference that holds now, and now on the bridge's monotonic clock (s)."""
+    """The event reference that holds now, and the time now on the bridge's monotonic clock (s)."""
 
     event: int
     time: float
 
 
 class Stamper(Protocol):
-    """Says which event held. Called from the event loop."""
+    """Returns the stamp of the event that held at a time. Called from the event loop."""
 
     def __call__(self) -> Stamp:
-        """Now."""
+        """Return the stamp of now."""
 
     def at(self, time: float) -> Stamp | None:
-        """At an earlier time of the bridge's monotonic clock; None when that is too long ago to be known."""
+        """Return the stamp of an earlier time (s, the bridge's monotonic clock); None if that is too long ago."""
 
 
 class MediaSource(ABC):
@@ -48,32 +49,32 @@ class MediaSource(ABC):
     async def run(self, stamp: Stamper, emit: Callable[[Media], None]) -> None:
         """Capture until cancelled.
 
-        Call `stamp` at the instant of capture (the start of a sound segment), on the event loop, together with
-        reading the state that the medium will show: a stamp may be older than the truth, never newer. A medium that
-        reaches the bridge some time after its capture is stamped with `stamp.at` the time of capture. Slow work
-        (rendering, encoding) runs in a thread. `emit` never blocks; the newest picture wins if the link is busy.
+        Call `stamp` at the instant of capture (the start of a sound segment), on the event loop, together with reading
+        the state that the medium will show: a stamp may be older than the truth, never newer. Stamp a medium that
+        reaches the bridge some time after its capture with `stamp.at` the time of capture. Slow work (rendering,
+        encoding) runs in a thread. `emit` never blocks; the newest picture wins if the link is busy.
         """
 
 
 class Robot(ABC):
-    """One robot. All methods are called from the bridge's event loop and must return at once.
+    """A robot. All methods but `rest_from_thread` are called from the bridge's event loop and must return at once.
 
-    Order: `describe` first; then, every `tick_seconds`, `apply` and `tick`; `measure` right after a `tick`.
-    Values reach `apply` already clamped, slew-limited and, without a command to execute, at rest.
+    Order: `describe` first; then, every `tick_seconds`, `apply` and `tick`; `measure` right after a `tick`. Values
+    reach `apply` already clamped, slew-limited and, without a command to execute, at rest.
 
     A method that raises ends the bridge. Before it does, the rest values are applied at the axes' brake rates, again
-    after each failure, then `stop` is called, then `close`; each call is made even if the others raised.
-    A new object is in the state that `reset` leaves behind; the bridge stops it when it was stopped before.
+    after each failure, then `stop` is called, then `close`; each call is made even if the others raised. A new object
+    is in the state that `reset` leaves behind; the bridge stops it if it was stopped before.
     """
 
     tick_seconds: float = 0.004
-    rests_from_thread: bool = False  # whether `rest_from_thread` may be called while another method hangs
+    rests_from_thread: bool = False  # True if `rest_from_thread` may be called while another method hangs
     rest_call: str = ""  # "package.module:function" for a watchdog process, see `rest_from_thread`; "": none
-    rest_arguments: tuple[str, ...] = ()  # what that function is called with
+    rest_arguments: tuple[str, ...] = ()  # arguments of that function
 
     @abstractmethod
     def describe(self) -> RobotDescription:
-        """The description; the same for the life of the object."""
+        """Return the description, which stays the same for the life of the object."""
 
     @abstractmethod
     def apply(self, values: Sequence[float]) -> None:
@@ -84,34 +85,35 @@ class Robot(ABC):
 
     @abstractmethod
     def measure(self) -> Measurement:
-        """The state now."""
+        """Measure the state now."""
 
     def positions(self) -> Sequence[float]:
-        """Position of each joint now, for limits and geofences; NaN where it is unknown or too old to be trusted.
+        """Return the position of each joint now, for limits and geofences; NaN if unknown or too old to be trusted.
 
         Called up to once a tick while the robot moves, so it should cost little.
         """
         return self.measure().joints
 
     def joint_rates(self, values: Sequence[float]) -> Sequence[float] | None:
-        """Velocity of each joint that these axis values cause in the posture of now; None when it is not known.
+        """Return the velocity of each joint that these axis values cause in the present posture; None if not known.
 
         Needed only for position limits with a gain of None.
         """
         return None
 
     def rest_from_thread(self) -> None:
-        """Bring the robot to rest now, called from another thread while `apply`, `tick` or `measure` may hang.
+        """Bring the robot to rest now. Called from another thread while `apply`, `tick` or `measure` may hang.
 
-        Called when no tick came for the description's `watchdog` seconds while the robot moves, and again every
-        so often until one comes. It must not wait for anything that a hanging method may hold, and the late writes of
-        such a method should not move the robot; the next tick applies rest values. Set `rests_from_thread` where it can
-        do that. It needs the interpreter's lock: native code that blocks without releasing that holds up this call too.
+        Called when no tick came for the description's `watchdog` seconds while the robot moves, and again at intervals
+        until one comes. It must not wait for anything that a hanging method may hold, and late writes of such a method
+        should not move the robot; the next tick applies rest values. Set `rests_from_thread` if the robot can do that.
+        The call needs the interpreter's lock: native code that blocks without releasing the lock holds up this call
+        too.
 
-        For such code there is `rest_call`. A separate process imports that module when the bridge starts, and calls
-        the function with `rest_arguments`. It returns a function, without arguments, that brings the robot to rest in
-        its own way, and returns False where no listener can have got that; it is called as this method is, and also
-        when the bridge is killed while the robot moves.
+        Set `rest_call` for such code. A separate process imports that module when the bridge starts, and calls the
+        function with `rest_arguments`. The function returns another, without arguments, which brings the robot to rest
+        in its own way and returns False if no listener can have got the message. That one is called as this method is,
+        and also when the bridge is killed while the robot moves.
         """
         raise NotImplementedError
 
@@ -119,23 +121,24 @@ class Robot(ABC):
     def stop(self) -> None:
         """Keep the robot standing by the strongest means that software has: engage brakes, cut power, hold the place.
 
-        Called when a stop was latched and the axes are back at their rest values (stop category 1 of IEC 60204-1 where
+        Called when a stop was latched and the axes are back at their rest values (stop category 1 of IEC 60204-1 if
         power is cut), when the bridge ends for any reason, and after a failure of any other method. May be called
-        again. Until `reset`, no value in `apply` may move the robot. Raising makes the bridge try again,
-        twice, and end.
+        again. Until `reset`, no value in `apply` may move the robot. If it raises, the bridge tries again, twice, and
+        ends.
         """
 
     def reset(self) -> None:
-        """The stop was released: undo `stop`. Must not move anything."""
+        """Undo `stop`, because the stop was released. Must not move anything."""
 
     def locked_out(self) -> str:
-        """Why a person at the robot has locked it (key switch, teach pendant); "" while it is not locked. Asked in
-        every tick. While the robot is locked it is stopped, and no remote person can release it.
+        """Return why a person at the robot has locked it (key switch, teach pendant); "" while it is not locked.
+
+        Called in every tick. While the robot is locked it is stopped, and no remote person can release it.
         """
         return ""
 
     def sources(self) -> Sequence[MediaSource]:
-        """Cameras and microphones; their names are those in the description."""
+        """Return the cameras and microphones, with the names that they have in the description."""
         return ()
 
     def close(self) -> None:

@@ -16,16 +16,17 @@ State = TypeVar("State")
 
 
 class CameraSource(MediaSource, Generic[State]):
-    """Takes stamp and state at one instant on the loop, and has them drawn.
+    """Takes the stamp and the state at one instant on the loop, and draws the picture.
 
-    What is drawn within a millisecond is drawn on the loop; what takes longer, in a thread. At most one picture is
-    being drawn: when drawing falls behind, the beats missed meanwhile are skipped.
+    A `draw` that takes less than a millisecond may return the bytes and so runs on the loop; a slower one returns an
+    awaitable and draws in a thread. At most one picture is drawn at a time: if drawing falls behind, the beats missed
+    meanwhile are skipped.
     """
 
     def __init__(
         self, camera: Camera, draw: Callable[[State, int], bytes | Awaitable[bytes]], state: Callable[[], State]
     ) -> None:
-        """`draw`: the state as yuv420p, and the event where the picture is to show it. `state`: the present one."""
+        """`draw`: draws a state and, if it is to be shown, the event, as yuv420p. `state`: returns the present one."""
         self._camera = camera
         self._draw = draw
         self._state = state

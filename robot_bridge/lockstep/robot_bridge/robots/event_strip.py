@@ -1,14 +1,14 @@
-"""The event reference drawn into a picture, so that a test can read it back from rendered pixels.
+"""Draws the event reference into a picture, so that a test can read it back from rendered pixels.
 
-The strip is the picture's top band: rows 0 to H // 20 - 1 of a picture of W x H pixels. It is divided into 32 cells
-of equal width: cell i covers the columns i * W // 32 to (i + 1) * W // 32 - 1. Cells 0 to 30 are the 31 bits of the
-event reference, most significant first; cell 31 is the even-parity bit: the exclusive or of the 31 others. A 1 is
-white (luma 235), a 0 is black (luma 16), without colour.
+The strip is the picture's top band: rows 0 to H // 20 - 1 of a picture of W x H pixels. It is divided into 32 cells of
+equal width: cell i covers the columns i * W // 32 to (i + 1) * W // 32 - 1. Cells 0 to 30 are the 31 bits of the event
+reference, most significant first; cell 31 is the even-parity bit: the exclusive or of the 31 others. A 1 is white (luma
+235), a 0 is black (luma 16), without colour.
 
-To read it, take the mean luma of the middle half of each cell (half its width and half its height, centred). Where
-luma is computed from RGB use 0.299 R + 0.587 G + 0.114 B. Above 160 the cell is a 1, below 90 a 0; anything between
-makes the strip unreadable. So does wrong parity, and an event of 0. The cells scale with the picture, so the strip
-survives scaling and compression.
+To read it, take the mean luma of the middle half of each cell (half its width and half its height, centred). If luma is
+computed from RGB use 0.299 R + 0.587 G + 0.114 B. Above 160 the cell is a 1, below 90 a 0; anything between makes the
+strip unreadable. So does wrong parity, and an event of 0. The cells scale with the picture, so the strip survives
+scaling and compression.
 """
 
 import msgspec
@@ -30,7 +30,7 @@ SURELY_BLACK = 90
 
 
 def strip_height(height: int) -> int:
-    """Rows that the strip takes of a picture of `height` rows."""
+    """Return the number of rows that the strip takes of a picture of `height` rows."""
     return height // 20
 
 
@@ -43,7 +43,7 @@ def draw_event_strip(luma: Luma, event: int) -> None:
 
 
 def with_event_strip(media: Media) -> Media:
-    """The medium with its stamp drawn over the top, where it is a raw picture; any other as it is."""
+    """Return a raw picture with its stamp drawn over the top; any other medium unchanged."""
     pixels = media.width * media.height
     if media.codec != "yuv420p" or not 0 < pixels <= len(media.payload):
         return media
@@ -53,7 +53,7 @@ def with_event_strip(media: Media) -> Media:
 
 
 def read_event_strip(luma: npt.NDArray[np.generic]) -> int | None:
-    """The event in a luma plane of shape (H, W); None when it cannot be read."""
+    """Return the event in a luma plane of shape (H, W); None if it cannot be read."""
     height, width = luma.shape
     rows = strip_height(height)
     band = luma[rows // 4 : rows - rows // 4].astype(float)

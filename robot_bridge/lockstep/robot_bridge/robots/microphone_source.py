@@ -1,4 +1,4 @@
-"""A microphone of a simulated robot: segments of sound, made from the simulation's sounds."""
+"""A microphone of a simulated robot: segments of sound, made from the simulation."""
 
 import asyncio
 import time
@@ -17,15 +17,15 @@ CATCH_UP: Final = 10  # segments made good after the loop was blocked, so that t
 
 
 class MicrophoneSource(MediaSource):
-    """A segment is stamped at its start and made at its end, as a real microphone would.
+    """Stamps a segment at its start and makes it at its end, as a real microphone would.
 
-    Making one takes about 0.1 ms, less than handing it to a thread and back would delay it.
+    Making one takes about 0.1 ms, less than the delay of handing it to a thread and back.
     """
 
     def __init__(
         self, microphone: Microphone, segment: Callable[[], bytes], begin: Callable[[], object] | None = None
     ) -> None:
-        """`segment`: the sound of the last 20 ms as pcm_s16le. `begin`: called when listening begins."""
+        """`segment`: returns the sound of the last 20 ms as pcm_s16le. `begin`: called when listening begins."""
         self._microphone = microphone
         self._segment = segment
         self._begin = begin

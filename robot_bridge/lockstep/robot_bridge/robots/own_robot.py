@@ -1,6 +1,6 @@
-"""A robot that somebody else wrote: named as "module:Class", or by an installed package's entry point.
+"""Makes robots from outside this package: named as "module:Class", or by an installed package's entry point.
 
-What is wrong with it is said in one line: where it was looked for, what was found, and the line of its own code.
+Errors say in one line where the robot was looked for, what was found, and the line of its code that failed.
 """
 
 import sys
@@ -21,18 +21,18 @@ GROUP = "lockstep.robots"  # of entry points, each "name = module:Class"
 
 
 def installed_robots() -> dict[str, str]:
-    """ "module:Class" by name, of every installed package that has robots."""
+    """Return "module:Class" by name, for the robots of all installed packages."""
     return {entry.name: entry.value for entry in entry_points(group=GROUP)}
 
 
 def create_own_robot(spec: str) -> Robot:
-    """A new robot. `spec`: "module:Class", also of a module in the working directory.
+    """Make a robot. `spec`: "module:Class", also of a module in the working directory.
 
     Raises:
         UnknownRobot: there is no such module, or nothing of that name in it.
-        BadRobot: it is no robot, or raises when it is made or described.
+        BadRobot: it is not a robot, or raises when it is made or described.
         DescriptionError: its description contradicts itself.
-        BridgeError: what it raised itself.
+        BridgeError: raised by the robot itself.
     """
     module, _, name = spec.partition(":")
     if not name or not all(part.isidentifier() for part in (*module.split("."), *name.split("."))):
@@ -88,9 +88,9 @@ def _call(what: str, make: Callable[[], object]) -> object:
 
 
 def _words(error: Exception) -> str:
-    """One line: what it was, and the line of code that it came from."""
+    """Describe an error in one line, with the line of code that it came from."""
     text = f"{type(error).__name__}: {' '.join(str(error).split())}".removesuffix(": ")
-    if isinstance(error, SyntaxError):  # names its line itself
+    if isinstance(error, SyntaxError):  # its text names the line
         return text
     frames = traceback.extract_tb(error.__traceback__)
     return f"{text} ({Path(frames[-1].filename).name}, line {frames[-1].lineno})"

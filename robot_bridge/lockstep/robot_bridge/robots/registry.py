@@ -1,4 +1,4 @@
-"""Robots by name. Each is imported only when asked for: a robot's packages are not needed for the others."""
+"""Makes robots by name. Each is imported only when needed: a robot's packages are not needed for the others."""
 
 from importlib import import_module
 
@@ -16,27 +16,27 @@ _PACKAGES = {
 
 
 def simulated_names() -> list[str]:
-    """Of the robots that come with this package."""
+    """Return the names of the robots that come with this package."""
     return sorted(_PACKAGES)
 
 
 def robot_names() -> list[str]:
-    """Of these, and of those that installed packages have as entry points."""
+    """Return the names of the robots of this package and of the entry points of installed packages."""
     return sorted({*_PACKAGES, *installed_robots()})
 
 
 def is_robot(name: str) -> bool:
-    """Whether `create_robot` would try to make one. Imports nothing of the robot."""
+    """Return whether `create_robot` would try to make a robot of that name. Imports nothing of the robot."""
     return name in _PACKAGES or ":" in name or name in installed_robots()
 
 
 def create_robot(name: str) -> Robot:
-    """A new robot. `name`: one of `robot_names`, or "module:Class".
+    """Make a robot. `name`: one of `robot_names`, or "module:Class".
 
     Raises:
         UnknownRobot: no robot has that name.
         BadRobot: a robot from outside this package cannot be made.
-        DescriptionError: its description contradicts itself.
+        DescriptionError: the robot's description contradicts itself.
         RobotUnavailable: a package that it needs is missing on this machine.
     """
     if name not in _PACKAGES:

@@ -1,4 +1,7 @@
-"""A switch file at the robot: while it exists, the robot is locked. A thread looks at it, because a disk may hang."""
+"""Watches a lock-out file at the robot: while it exists, the robot is locked.
+
+A thread looks at the file, because a disk may hang.
+"""
 
 import threading
 import time
@@ -13,7 +16,7 @@ JOIN_SECONDS = 1.0
 
 
 def look_at(path: Path) -> str:
-    """Why the robot is locked out; "" when it is not. What cannot be looked at counts as locked."""
+    """Return why the robot is locked out, or "" if it is not. A file that cannot be looked at counts as locked."""
     try:
         path.lstat()
         return f"locked at the robot ({path})"
@@ -29,7 +32,7 @@ def look_at(path: Path) -> str:
 
 
 class LockoutFile:
-    """Ask for `reason` after `start`; before the first look the robot counts as locked."""
+    """Looks at the file in a thread: call `start`, read `reason`. Until the first look the robot counts as locked."""
 
     def __init__(
         self,
@@ -48,19 +51,19 @@ class LockoutFile:
 
     @property
     def reason(self) -> str:
-        """Why the robot is locked out now; "" when it is not."""
+        """The reason why the robot is locked out now; "" while it is not."""
         reason, seen_at = self._seen
         if not reason and self._clock() - seen_at > PATIENCE:
             return f"the lock-out file cannot be looked at in time ({self._path})"
         return reason
 
     def start(self) -> None:
-        """Blocks until the first look is over, for at most `PATIENCE`."""
+        """Start the thread, and block until the first look is over, for at most `PATIENCE`."""
         self._thread.start()
         self._looked.wait(PATIENCE)
 
     def close(self) -> None:
-        """Blocks shortly; a look that hangs is left behind."""
+        """End the thread; blocks for at most `JOIN_SECONDS`, and abandons a look that hangs."""
         self._ending.set()
         if self._thread.is_alive():
             self._thread.join(JOIN_SECONDS)

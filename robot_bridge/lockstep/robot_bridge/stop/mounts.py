@@ -1,4 +1,4 @@
-"""What kind of place a directory is in."""
+"""Tells whether a directory is on a disk or in memory."""
 
 import os
 from pathlib import Path
@@ -10,7 +10,7 @@ IN_MEMORY = ("tmpfs", "ramfs")
 
 
 def is_in_memory(directory: Path, mounts: Path = MOUNTS) -> bool:
-    """Whether its files are gone when the machine is switched off. False also where the system does not tell."""
+    """Return whether the directory's files are lost when the machine is switched off; False if that is unknown."""
     try:
         device = os.stat(directory).st_dev
         lines = mounts.read_text().splitlines()

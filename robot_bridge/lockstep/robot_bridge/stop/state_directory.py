@@ -1,7 +1,7 @@
-"""Where a robot's latched stop is kept by default. A latch belongs to the robot, so its place has the robot's name.
+"""The default directory of a robot's latched stop, which has the robot's name because the latch belongs to the robot.
 
-No port is in it: the same robot on another port, or on any free one, has the same latch. Two bridges of one robot
-cannot run at once; two robots of one kind are told apart by `--state-dir`.
+The directory's name has no port: the same robot on another port, or on any free one, has the same latch. Two bridges of
+one robot cannot run at once; two robots of the same kind need `--state-dir` to be told apart.
 """
 
 import os
@@ -11,17 +11,20 @@ from pathlib import Path
 __all__ = ["default_place", "older_places"]
 
 FOLDER = "stops"
-OLDER_FOLDER = "bridges"  # where a place had the port behind its name, "planar-5600"
+OLDER_FOLDER = "bridges"  # older directories had the port behind the robot's name, "planar-5600"
 
 
 def default_place(robot: str) -> Path:
-    """By the XDG base directory specification. `robot`: its name, or that of the file that describes it."""
+    """Return the directory by the XDG base directory specification.
+
+    `robot`: the robot's name, or the name of the file that describes it.
+    """
     base = os.environ.get("XDG_STATE_HOME", "")
     return (Path(base) if os.path.isabs(base) else Path("~/.local/state").expanduser()) / "lockstep" / FOLDER / robot
 
 
 def older_places(place: Path, names: Sequence[str]) -> tuple[Path, ...]:
-    """Places of the robot from when they were named by port. `names`: that the robot had.
+    """Return the robot's directories from when they were named by port. `names`: all names that the robot had.
 
     A bridge that finds no state in `place` begins with the state in these.
     """

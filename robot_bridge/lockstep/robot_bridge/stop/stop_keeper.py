@@ -1,6 +1,6 @@
-"""Keeps the latched stop on the robot's disk, away from the loop, and answers those who wait for it.
+"""Keeps the latched stop on the robot's disk, away from the loop, and answers the clients that pressed STOP.
 
-The shell of `stop_latch.py` and `stop_store.py`. Without a directory the latch is kept in memory only, and every
+It does the I/O for `stop_latch.py` by `stop_store.py`. Without a directory the latch is kept in memory only, and every
 answer says so.
 """
 
@@ -32,7 +32,7 @@ Written = Callable[[int, str], None]  # version of the latch, and why it could n
 
 
 class StopAsker(Protocol):
-    """Somebody who pressed STOP."""
+    """A client that pressed STOP."""
 
     def send(self, message: StopTaken) -> None: ...
 
@@ -44,10 +44,13 @@ class _Waiting(NamedTuple):
 
 
 class StopKeeper:
-    """`open` before the first message, `changed` after each possible change of the latch, `close` at the end."""
+    """Writes every change of a latch to the disk.
+
+    Call `open` before the first message, `changed` after each possible change of the latch, and `close` at the end.
+    """
 
     def __init__(self, directory: Path | None, older: Sequence[Path] = ()) -> None:
-        """`older`: directories whose latch holds where `directory` is new."""
+        """`older`: directories whose latch is taken over if `directory` is new."""
         self._store = None if directory is None else StopStore(directory, older)
         self._latch = StopLatch()
         self._written: Written = lambda version, error: None
@@ -57,14 +60,14 @@ class StopKeeper:
         self._on_disk = -1  # version that was written last
         self._reserved = 0  # numbers up to this are reserved
         self._writing: asyncio.Task[None] | None = None
-        self._trouble = ""  # why the disk does not take it; "" while it does
+        self._trouble = ""  # why the latch cannot be written; "" while it can
 
     async def open(self, now: float) -> StopLatch:
-        """The latch as it was left, or stopped with the reason found; from now on the disk says that a bridge runs.
+        """Return the latch as it was left, or stopped with the reason found, and write to the disk that a bridge runs.
 
         Raises:
             StateDirInUse: another bridge uses the directory.
-            StateDirUnusable: it cannot be used.
+            StateDirUnusable: the directory cannot be used.
         """
         wall = wall_microseconds()
         if self._store is None:
@@ -83,7 +86,7 @@ class StopKeeper:
         return self._latch
 
     def start(self, written: Written) -> None:
-        """Write from now on. `written` is told of every write, on the loop, before the answers go out."""
+        """Write changes from now on. `written` is called after every write, on the loop, before the answers go out."""
         self._written = written
         if self._store is not None:
             self._writing = asyncio.get_running_loop().create_task(self._run(self._store), name="stop keeper")
@@ -92,7 +95,7 @@ class StopKeeper:
         self._wake.set()
 
     def answer(self, asker: StopAsker, press: str, number: int) -> None:
-        """Say that the press was taken: at once when it is on the disk already, or never will be."""
+        """Answer that the press was taken: at once if it is on the disk already or cannot be written."""
         answer, version = StopTaken(press=press, number=number), self._latch.version
         if version == self._on_disk and not self._trouble:
             asker.send(answer)
@@ -102,10 +105,10 @@ class StopKeeper:
             self._waiting.append(_Waiting(asker, answer, version))
 
     def note_end(self, reason: str) -> None:
-        """Why this bridge does not end in order, for the next one. From any thread.
+        """Tell the next bridge why this one does not end in order. May be called from any thread.
 
         Raises:
-            OSError: the disk does not take it.
+            OSError: the reason cannot be written.
         """
         if self._store is not None:
             self._store.note_end(reason)
@@ -120,7 +123,7 @@ class StopKeeper:
             return
         with suppress(TimeoutError):
             async with asyncio.timeout(CLOSE_TIMEOUT):
-                if self._on_disk >= 0:  # it was opened
+                if self._on_disk >= 0:  # the directory was opened
                     try:
                         await self._write(store, ended=in_order)
                     except OSError as error:
@@ -146,7 +149,7 @@ class StopKeeper:
                 self._tell(version, "")
 
     async def _wait(self, seconds: float) -> None:
-        """Returns when something may have changed, or after so long."""
+        """Wait until something may have changed, for at most `seconds`."""
         with suppress(TimeoutError):
             async with asyncio.timeout(seconds):
                 await self._wake.wait()

@@ -40,13 +40,13 @@ UNKEPT = "the reset could not be written to the robot's disk"
 
 
 class StopRecord(msgspec.Struct, frozen=True, kw_only=True):
-    """What is kept of the latch over a restart."""
+    """The part of the latch that is kept over a restart."""
 
     stopped: bool = False
-    by: str = ""  # who said the first stop since the last reset
+    by: str = ""  # name with the first stop since the last reset
     reason: str = ""
     number: int = 0  # of the newest stop; 0 before the first
-    press: str = ""  # that became the newest stop
+    press: str = ""  # the press that became the newest stop
     presses: list[tuple[str, int]] = []  # the newest ones and their numbers, oldest first
 
 
@@ -55,7 +55,7 @@ class StopGiven(NamedTuple):
 
     number: int
     is_new: bool  # False for a repeat of a press that is known
-    latched: bool  # whether the robot was not stopped before
+    latched: bool  # True if the robot was not stopped before
     overtaken: int = 0  # number of a reset that waited for the disk and is void now; 0 for none
 
 
@@ -66,7 +66,7 @@ class ResetTaken(NamedTuple):
 
 
 class ResetWaits(NamedTuple):
-    """The same, once it is on the disk."""
+    """The stop will be released once the reset is on the disk."""
 
     number: int
 
@@ -98,10 +98,10 @@ class StopLatch:
         keeps: bool = False,
         now: float = -math.inf,
     ) -> None:
-        """`record`: as it was left; None before the first run. `numbers_after`: no number up to this is given again.
+        """`record`: the latch as it was left; None before the first run. `numbers_after`: new numbers are higher.
 
-        `keeps`: whether there is a disk that `record` is written to. `now`: a stop that was left counts as new, since
-        its age is unknown.
+        `keeps`: whether `record` is written to a disk. `now`: a stop that was left counts as new, since its age is
+        unknown.
         """
         record = record or StopRecord()
         self.version = 0  # of `record`; raised by each change that has to be written
@@ -119,7 +119,7 @@ class StopLatch:
 
     @property
     def state(self) -> StopState:
-        """As it is fed back."""
+        """The state of the stop for feedback."""
         return msgspec.structs.replace(self._state, kept=self._keeps and self._written == self.version)
 
     @property
@@ -128,12 +128,12 @@ class StopLatch:
 
     @property
     def last_number(self) -> int:
-        """None up to this is given again."""
+        """The highest number given so far; no number up to it is given again."""
         return self._last_number
 
     @property
     def record(self) -> StopRecord:
-        """What has to be on the disk at `version`: a reset that waits for the disk is in it already."""
+        """The record that has to be on the disk at `version`, with the reset that waits for the disk already in it."""
         state, released = self._state, self._resetting is not None
         return StopRecord(
             stopped=state.stopped and not released,
@@ -145,7 +145,7 @@ class StopLatch:
         )
 
     def stop(self, press: str, by: str, reason: str, now: float) -> StopGiven:
-        """Anybody's. A press that is known is no new stop, also when it was reset; "" is never known."""
+        """Latch a stop, from any client. A known press is no new stop, even after a reset; "" is never known."""
         if press and press in self._presses:
             return StopGiven(self._presses[press], is_new=False, latched=False)
         number = self._next_number()
@@ -165,21 +165,22 @@ class StopLatch:
         return StopGiven(number, is_new=True, latched=latched, overtaken=overtaken)
 
     def may_move(self) -> None:
-        """The robot may move from now on: each press from now on is a new stop, even with a known id. So no choice of
-        an id keeps a stop from stopping. The disk may still have the old ids: a bridge that starts does not move before
-        this is called again.
+        """Forget the presses, because the robot may move from now on.
+
+        Every later press is a new stop, even with a known id, so no choice of ids keeps a stop from stopping. The disk
+        may still have the old ids: a bridge that starts does not move before this is called again.
         """
         self._presses.clear()
 
     def shown(self, state: StopState, now: float) -> None:
-        """A feedback says this now."""
+        """Note that a feedback with this state is sent now."""
         self._look(now)
         self._shown_at = now
         if state.stopped:
             self._shown = max(self._shown, state.number)
 
     def reset(self, number: int, now: float) -> ResetOutcome:
-        """`number`: of the newest stop that the sender has seen."""
+        """Decide about a reset. `number`: the newest stop that the sender has seen."""
         newest = self._state.number
         if number != newest:
             return ResetRefused(number, "stale_reset", f"the newest stop is {newest}")
@@ -197,9 +198,9 @@ class StopLatch:
         return self._release(number)
 
     def written(self, version: int, error: str = "") -> WriteOutcome:
-        """The record of `version` is on the disk, or could not be written, for a reason in words."""
+        """Note that the record of `version` is on the disk, or could not be written because of `error`."""
         if error:
-            self._written = min(self._written, version - 1)  # also a latch that was on the disk and is gone from there
+            self._written = min(self._written, version - 1)  # also a latch that was on the disk and has gone from there
         else:
             self._written = max(self._written, version)
         if self._resetting is None or version < self._resetting[1]:
@@ -208,11 +209,11 @@ class StopLatch:
         if not error:
             return self._release(number)
         self._resetting = None
-        self.version += 1  # the disk may hold the reset or not: the stop has to be written again
+        self.version += 1  # the disk may or may not hold the reset: the stop has to be written again
         return ResetRefused(number, "not_kept", f"{UNKEPT}: {error}"[:TEXT])
 
     def lock_out(self, reason: str, now: float) -> StopGiven | None:
-        """Somebody at the robot keeps it from being driven. None: the same was said before."""
+        """Lock the robot for a person at it, with a stop; None if it was locked already."""
         if reason == self._state.locked_out:
             return None
         begins = not self._state.locked_out
@@ -220,14 +221,14 @@ class StopLatch:
         return self.stop("", "at the robot", reason, now) if begins else None
 
     def let_in(self) -> bool:
-        """The lock-out is over; the stop stays. False when there was none."""
+        """End the lock-out; the stop stays latched. False if the robot was not locked out."""
         if not self._state.locked_out:
             return False
         self._state = msgspec.structs.replace(self._state, locked_out="")
         return True
 
     def _look(self, now: float) -> None:
-        """After the bridge was held up the stop counts as new: the age of the waiting resets is unknown."""
+        """Count the stop as new if the bridge was held up: the age of the waiting resets is unknown."""
         if now - self._shown_at > HELD_UP:
             self._stopped_at = now
 

@@ -1,8 +1,8 @@
-"""The latched stop on the robot's disk: the meaning of a state directory, and how it is read and written.
+"""Reads and writes the latched stop on the robot's disk, and says what the contents of a state directory mean.
 
-`start_of` is the rule and does no I/O. `StopStore` does it, and blocks: call it from a thread.
-Two files: `stop.json` has the latch; `numbers.json` shows that the directory was used before, has a number that no stop
-is near yet, and is locked while a bridge runs. A bridge that hung leaves a third, `ended.txt`, which says so.
+`start_of` has the rules and does no I/O. `StopStore` does the I/O, and blocks: call it from a thread. There are two
+files: `stop.json` has the latch; `numbers.json` shows that the directory was used before, reserves stop numbers far
+beyond those in use, and is locked while a bridge runs. A bridge that hung leaves a third, `ended.txt`, which says so.
 docs/robot-link.md, "On the robot's disk", says what follows from them.
 """
 
@@ -28,12 +28,12 @@ NOTE_FILE = "ended.txt"
 MAX_NOTE = 500  # characters
 MAX_BYTES = 1 << 20  # of a file that is read
 RESERVED = 1 << 30  # numbers that are reserved at each start
-RESERVED_BYTES = 64  # of the file that says so, spaces included
+RESERVED_BYTES = 64  # size of the file with the reserve, spaces included
 LATEST_CLOCK = 2**52  # microseconds; a clock beyond it, in the year 2112, is wrong
 
 
 class Kept(msgspec.Struct, frozen=True, kw_only=True):
-    """What `stop.json` holds."""
+    """The contents of `stop.json`."""
 
     version: int = 1
     latch: StopRecord
@@ -41,7 +41,7 @@ class Kept(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Reserved(msgspec.Struct, frozen=True, kw_only=True):
-    """What `numbers.json` holds."""
+    """The contents of `numbers.json`."""
 
     up_to: int  # no number above this was given
 
@@ -51,18 +51,18 @@ _read_reserved = msgspec.json.Decoder(Reserved)
 
 
 class Found(NamedTuple):
-    """What is in a state directory."""
+    """The contents of a state directory."""
 
     used: bool  # a bridge has run here before
     kept: Kept | None  # None: missing or unreadable
     trouble: str = ""  # why it is unreadable, in words; "" when it is missing
     reserved: int = 0  # 0: unknown
-    note: str = ""  # the reason that the bridge before gave for its end; "" without one
+    note: str = ""  # the reason that the previous bridge gave for its end; "" without one
     older: "tuple[Found, ...]" = ()  # the records of the directories that a new one replaces
 
 
 class Start(NamedTuple):
-    """How a bridge begins."""
+    """The state in which a bridge begins."""
 
     record: StopRecord
     numbers_after: int
@@ -70,15 +70,17 @@ class Start(NamedTuple):
 
 
 def wall_microseconds() -> int:
-    """Since 1970, by a clock that may be wrong or set back: good for nothing but a first number of a stop."""
+    """Return the microseconds since 1970. The clock may be wrong or set back: use it only for a first stop number."""
     return time.time_ns() // 1000
 
 
 def start_of(found: Found, wall_microseconds: int) -> Start:
-    """What a bridge begins with that finds this. `wall_microseconds`: since 1970, by a clock that may be wrong.
+    """Return the state in which a bridge begins that finds these contents.
 
-    Numbers go on after the newest on the disk. The clock and the reserve matter when that one may not be the newest: a
-    directory that was deleted, restored from a backup, or damaged, and a bridge that did not end in order.
+    `wall_microseconds`: since 1970, by a clock that may be wrong.
+
+    Numbers go on after the newest on the disk. The clock and the reserve matter if that number may not be the newest:
+    when the directory was deleted, restored from a backup or damaged, or the bridge did not end in order.
     """
     clock = max(0, min(wall_microseconds, LATEST_CLOCK))
     if not found.used and found.older:
@@ -91,14 +93,14 @@ def start_of(found: Found, wall_microseconds: int) -> Start:
     record = found.kept.latch
     if found.kept.ended:
         return Start(record, max(clock, record.number), "")
-    # It may have given numbers that never reached the disk.
+    # The bridge may have given numbers that never reached the disk.
     numbers_after = max(clock, record.number, found.reserved)
     reason = found.note or "The robot bridge did not end in order: power cut, kill, crash or hang"
     return Start(record, numbers_after, reason)
 
 
 def _start_of_all(starts: Sequence[Start]) -> Start:
-    """Stopped when one of them is."""
+    """Combine the starts of several directories: the robot is stopped if one of them is."""
     held = [start for start in starts if start.record.stopped or start.stop_reason]
     newest = max(held or starts, key=lambda start: start.record.number)
     return newest._replace(numbers_after=max(max(each.numbers_after, each.record.number) for each in starts))
@@ -113,13 +115,13 @@ class StopStore:
     """
 
     def __init__(self, directory: Path, older: Sequence[Path] = ()) -> None:
-        """`older`: directories that a new one takes the place of; they are read, and stay as they are."""
+        """`older`: directories that a new directory replaces; they are read and not changed."""
         self._directory = directory
         self._older = older
         self._lock = -1  # descriptor of `numbers.json`
 
     def open(self) -> Found:
-        """Take the directory and read it, and the older ones where it is new."""
+        """Lock the directory and read it, and the older ones if it is new."""
         try:
             older = () if self._is_used() else tuple(map(_look_into, self._older))
             self._directory.mkdir(mode=0o700, parents=True, exist_ok=True)
@@ -142,9 +144,12 @@ class StopStore:
         return (self._directory / NUMBERS_FILE).exists() or (self._directory / STOP_FILE).exists()
 
     def write(self, kept: Kept) -> None:
-        """Replace the latch in one step; when this returns it has reached the disk.
+        """Replace the latch in one step; when this returns, the latch has reached the disk.
 
-        A directory that was removed meanwhile is made again. Raises: OSError: it has not, or that is unknown.
+        A directory that was removed meanwhile is made again.
+
+        Raises:
+            OSError: the latch has not reached the disk, or that is unknown.
         """
         if not self._has_directory():
             self._take_again()
@@ -158,22 +163,26 @@ class StopStore:
         finally:
             os.close(descriptor)
         os.replace(path.with_suffix(".new"), path)
-        (self._directory / NOTE_FILE).unlink(missing_ok=True)  # the latch says it now
+        (self._directory / NOTE_FILE).unlink(missing_ok=True)  # `stop.json` has its reason now
         self._sync_directory()
 
     def is_there(self) -> bool:
-        """Whether the written files are still where the next bridge looks for them."""
+        """Return whether the written files are still where the next bridge looks for them."""
         return self._has_directory() and (self._directory / STOP_FILE).exists()
 
     def _has_directory(self) -> bool:
-        """Whether it is still the one that this bridge has locked."""
+        """Return whether the directory is still the one that this bridge has locked."""
         try:
             return os.path.samestat(os.stat(self._directory / NUMBERS_FILE), os.fstat(self._lock))
         except OSError:
             return False
 
     def _take_again(self) -> None:
-        """Raises OSError: the directory cannot be made, or another bridge uses what stands there now."""
+        """Make and lock the directory again.
+
+        Raises:
+            OSError: the directory cannot be made, or another bridge uses the one that is there now.
+        """
         reserved = os.pread(self._lock, RESERVED_BYTES, 0)
         self._directory.mkdir(mode=0o700, parents=True, exist_ok=True)
         fresh = os.open(self._directory / NUMBERS_FILE, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o600)
@@ -190,20 +199,21 @@ class StopStore:
         self._lock = fresh
 
     def note_end(self, reason: str) -> None:
-        """Say to the next bridge why this one does not end in order. From any thread; `write` takes it back.
+        """Tell the next bridge why this one does not end in order. From any thread; `write` takes it back.
 
         Raises:
-            OSError: it cannot be said.
+            OSError: the reason cannot be written.
         """
         (self._directory / NOTE_FILE).write_text(reason[:MAX_NOTE])
 
     def reserve(self, number: int) -> int:
-        """The number that this was raised to: none above it may be given before the next call.
+        """Reserve numbers after `number`; return the highest, above which none may be given before the next call.
 
-        Written in place, since the file is the lock, and always in as many bytes: a full disk leaves the older one.
+        The file is written in place, since it is the lock, and always with the same size: a full disk leaves the older
+        one.
 
         Raises:
-            OSError: as `write`.
+            OSError: as for `write`.
         """
         up_to = min(number + RESERVED, MAX_NUMBER)
         os.lseek(self._lock, 0, os.SEEK_SET)
@@ -214,7 +224,7 @@ class StopStore:
         return up_to
 
     def close(self) -> None:
-        """Let another bridge have it. Idempotent."""
+        """Release the directory to other bridges. May be called again."""
         descriptor, self._lock = self._lock, -1
         if descriptor >= 0:
             os.close(descriptor)
@@ -246,7 +256,7 @@ class StopStore:
             return ""
 
     def _sync_directory(self) -> None:
-        """A new name is on the disk only when its directory is."""
+        """Write the directory itself: until then a new file name is not on the disk."""
         descriptor = os.open(self._directory, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
         try:
             os.fsync(descriptor)
@@ -255,7 +265,7 @@ class StopStore:
 
 
 def _look_into(directory: Path) -> Found:
-    """What is in an older directory, which no bridge may use meanwhile."""
+    """Return the contents of an older directory, and lock it meanwhile against other bridges."""
     store = StopStore(directory)
     try:
         return store.open()
@@ -264,6 +274,6 @@ def _look_into(directory: Path) -> Found:
 
 
 def write_all(descriptor: int, data: bytes) -> None:
-    """All of it: a write may take a part."""
+    """Write all of `data`: one call may write only a part."""
     while data:
         data = data[os.write(descriptor, data) :]

@@ -1,1 +1,1 @@
-"""What brings the robot to rest when the bridge hangs."""
+"""Watchdogs that bring the robot to rest when the bridge hangs."""

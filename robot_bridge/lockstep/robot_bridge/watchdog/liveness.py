@@ -19,8 +19,8 @@ from lockstep.robot_bridge.thread_name import name_thread
 __all__ = ["EXIT_HUNG", "LIMIT", "Liveness"]
 
 EXIT_HUNG = 3
-LIMIT = 10.0  # s; a tick of an adapter that returns at all is shorter
-ALARM = 1.5  # of the limit
+LIMIT = 10.0  # s; every tick of an adapter that still works is shorter
+ALARM = 1.5  # of the limit, until the alarm
 BEAT = 1.0  # s between two signs of life, at most
 PER_LIMIT = 5  # signs of life in each limit, at least
 
@@ -28,15 +28,15 @@ _logger = logging.getLogger(__name__)
 
 
 class Liveness:
-    """For a process that is the bridge's alone. `start` in the main thread, `ticked` at every tick, then `close`.
+    """Ends a hanging process. Without arguments it does nothing.
 
-    Without arguments it does nothing.
+    The process must be the bridge's alone. Call `start` in the main thread, `ticked` at every tick, then `close`.
     """
 
     def __init__(self, limit: float | None = None, service: ServiceManager | None = None) -> None:
         """`limit`: s without a tick after which the process ends; None: it never does. Suspended time is not counted.
 
-        `service`: told at every sign of life, so that it hears nothing while the ticks stand still.
+        `service`: told at every sign of life, so that it is told nothing while the ticks stand still.
         """
         self._limit = limit
         self._service = service or ServiceManager({})
@@ -49,11 +49,11 @@ class Liveness:
         self._thread = threading.Thread(target=self._run, name="liveness", daemon=True)
 
     def start(self, note: Callable[[str], None]) -> None:
-        """The ticks begin. `note`: keeps the reason for the next start; called in another thread when they stop."""
+        """Start with the ticks. `note`: keeps the reason for the next start; called in another thread if they stop."""
         self._last = time.monotonic()
         self._note = note
         if self._limit is not None:
-            signal.signal(signal.SIGALRM, signal.SIG_DFL)  # which ends the process without a line of its code
+            signal.signal(signal.SIGALRM, signal.SIG_DFL)  # ends the process without a line of Python
             signal.pthread_sigmask(signal.SIG_UNBLOCK, [signal.SIGALRM])
             self._armed = True
             self._wind_up()
@@ -61,7 +61,7 @@ class Liveness:
         self._service.ready()
 
     def ticked(self) -> None:
-        """A tick has ended, or a step on the way out. Cheap."""
+        """Note that a tick has ended, or a step on the way out. Cheap."""
         now = time.monotonic()
         if now - self._last < self._beat:
             return
@@ -70,13 +70,13 @@ class Liveness:
         self._service.alive()
 
     def leaving(self) -> None:
-        """The process is about to end: it has the limit's time for that."""
+        """Note that the process is about to end, for which it has the time of the limit."""
         self._service.stopping()
         self._last = time.monotonic()
         self._wind_up()
 
     def close(self) -> None:
-        """The ticks have ended in order. The alarm stays: the rest of the process may hang too. Idempotent."""
+        """Note that the ticks have ended in order. The alarm stays: the rest of the exit may hang too. Idempotent."""
         self._closed.set()
         if self._thread.is_alive():
             self._thread.join(BEAT)
@@ -88,7 +88,7 @@ class Liveness:
             signal.setitimer(signal.ITIMER_REAL, ALARM * self._limit)
 
     def _run(self) -> None:
-        assert self._limit is not None  # else it is not started
+        assert self._limit is not None  # else the thread is not started
         name_thread("liveness")
         while (left := self._last + self._limit - time.monotonic()) > 0:
             if self._closed.wait(left):
@@ -99,7 +99,7 @@ class Liveness:
             os._exit(EXIT_HUNG)
 
     def _end(self, reason: str) -> None:
-        """Each of these may block or raise; the alarm ends the process then."""
+        """End the process. Each call here may block or raise; then the alarm ends the process."""
         with suppress(Exception):
             self._note(reason)
         _logger.critical("%s. It ends, so that it can be started again; every thread is at:", reason)

@@ -1,4 +1,4 @@
-"""Brings a robot to rest from a thread of its own when the event loop is held up."""
+"""Brings a robot to rest from a separate thread when the event loop is held up."""
 
 import logging
 import threading
@@ -35,7 +35,7 @@ class WatchdogThread:
         self._thread.start()
 
     def ticked(self, now: float, moving: bool) -> None:
-        """A tick begins; `moving`: its values are not at rest. Cheap: the thread does the check."""
+        """Note that a tick begins; `moving`: its values are not at rest. Cheap: the thread does the check."""
         self._last = now
         if moving and not self._moving:
             self._moving = True
@@ -44,12 +44,12 @@ class WatchdogThread:
         self._moving = moving
 
     def take_acted(self) -> bool:
-        """Whether it has acted since the last call."""
+        """Return whether the watchdog has acted since the last call."""
         acted, self._acted = self._acted, False
         return acted
 
     def close(self) -> None:
-        """Waits shortly for a call of `act` that goes on. May be called again."""
+        """End the thread; waits shortly for a call of `act` that goes on. May be called again."""
         with self._changed:
             self._closed = True
             self._changed.notify()

@@ -1,4 +1,4 @@
-"""Everything that looks whether the ticks go on: the loop itself, and what acts beside it where the robot allows."""
+"""Checks that the ticks go on: in the loop itself, and in a thread and a process beside it if the robot allows."""
 
 import asyncio
 import math
@@ -21,14 +21,17 @@ class Watchdog(Protocol):
 
 
 class Held(NamedTuple):
-    """The ticks were held up."""
+    """A gap in which the ticks were held up."""
 
-    seconds: float  # since the last one; at least the limit
+    seconds: float  # since the last tick; at least the limit
     acted: bool  # the robot was brought to rest beside the loop
 
 
 class Watchdogs:
-    """`start`; at every tick `begin`, then `ticked` before anything is applied; `close` when the robot rests."""
+    """All watchdogs of a robot.
+
+    Call `start`; at every tick `begin`, then `ticked` before anything is applied; `close` when the robot rests.
+    """
 
     def __init__(self, robot: Robot, limit: float, now: clock.Clock) -> None:
         self._limit = limit
@@ -43,15 +46,17 @@ class Watchdogs:
             self._beside.append(WatchdogProcess(limit, robot.rest_call, robot.rest_arguments))
 
     async def start(self) -> None:
-        """Raises:
-        RobotUnavailable: the robot's own function cannot be called in a process.
+        """Start the watchdogs beside the loop.
+
+        Raises:
+            RobotUnavailable: the robot's own function cannot be called in a process.
         """
         for watchdog in self._beside:
             await asyncio.to_thread(watchdog.start)
 
     def begin(self, now: float, moving: bool) -> Held | None:
-        """Whether the ticks were held up; `moving`: the last applied values are not at rest."""
-        acted = sum(watchdog.take_acted() for watchdog in self._beside) > 0  # each is asked
+        """Return a gap if the ticks were held up; `moving`: the last applied values are not at rest."""
+        acted = sum(watchdog.take_acted() for watchdog in self._beside) > 0  # take each watchdog's answer
         if self._gauge is None:
             self._gauge = StallGauge(self._limit, now)
         seconds, self._last = now - self._last, now
@@ -61,13 +66,13 @@ class Watchdogs:
         return None if gap is None else Held(seconds, acted)
 
     def ticked(self, now: float, moving: bool) -> None:
-        """The tick goes on; `moving`: its values are not at rest.
+        """Note that the tick goes on; `moving`: its values are not at rest.
 
         A robot counts as one that moves until rest has been applied for `limit` seconds: the call that applies it may
         hang, and its message may still be on its way when the bridge is killed.
 
         Raises:
-            RobotUnavailable: the watchdog process is gone, so that nothing watches over the robot.
+            RobotUnavailable: the watchdog process is gone, so nothing watches over the robot.
         """
         if moving:
             self._moved_at = now
@@ -76,6 +81,6 @@ class Watchdogs:
             watchdog.ticked(now, moves)
 
     def close(self) -> None:
-        """May be called again."""
+        """End the watchdogs. May be called again."""
         for watchdog in self._beside:
             watchdog.close()

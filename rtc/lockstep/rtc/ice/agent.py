@@ -23,13 +23,13 @@ class Agent:
     """Finds a path to the peer and keeps it; opens no socket, and gets the time from its caller.
 
     Signalling carries `local_credentials` and `local_candidates` to the peer, and the peer's to `set_remote`. Then the
-    agent lives by `receive_datagram` and `handle_timer`; drain `datagrams_to_send` and `events` after each. `path` is
-    where to send. A restart is `restart` and then `set_remote`; the path stays until the new session has nominated one.
-    An agent without a message from its peer waits without end: its owner bounds that.
+    agent lives by `receive_datagram` and `handle_timer`; drain `datagrams_to_send` and `events` after each. Send on
+    `path`. A restart is `restart` and then `set_remote`; the path stays until the new session has nominated one. An
+    agent without a message from its peer waits without end: its owner bounds that.
 
     Args:
         local_candidates: The addresses for the peer, and those that datagrams leave from.
-        controlling: Whether this agent decides on the path: the one whose offer began the session does, unless the
+        controlling: True if this agent decides on the path: the one whose offer began the session does, unless the
             peer is a lite agent. If both believe it, tie-breakers settle that.
         directory: Shared by agents that share sockets.
         rng: Makes credentials and transactions, which nobody may foresee: a `SystemRandom` except in tests.
@@ -54,11 +54,11 @@ class Agent:
         self._rng = rng or SystemRandom()
         self._role = Role(controlling, self._rng.getrandbits(64))
         self._current = self._new_session()
-        self._next: Session | None = None  # of a restart
-        self._retired: tuple[Session, float] | None = None  # the one before the last restart, and until when
-        self._told: tuple[Path | None, bool] = (None, False)  # by the last PathChanged
+        self._next: Session | None = None  # the session of a restart
+        self._retired: tuple[Session, float] | None = None  # session before the last restart, and its end
+        self._told: tuple[Path | None, bool] = (None, False)  # path and nomination of the last PathChanged
         self._events: list[Event] = []
-        self._answered: list[Event] = []  # those that follow the news of a path
+        self._answered: list[Event] = []  # events that follow the news of a path
         self._out: list[Datagram] = []
         self.ended = False
 
@@ -66,7 +66,7 @@ class Agent:
 
     @property
     def local_credentials(self) -> Credentials:
-        """Of the newest session."""
+        """The credentials of the newest session."""
         return (self._next or self._current).local_credentials
 
     @property
@@ -74,7 +74,7 @@ class Agent:
         return self._role.controlling
 
     def set_remote(self, credentials: Credentials, candidates: Iterable[Candidate], now: float) -> None:
-        """What the peer has signalled for the newest session. Credentials that it has already change nothing.
+        """Take the peer's credentials and candidates for the newest session. Known credentials change nothing.
 
         Raises:
             RuntimeError: the peer's credentials have changed; call `restart` first.
@@ -88,7 +88,7 @@ class Agent:
             self.add_remote_candidate(candidate)
 
     def add_remote_candidate(self, candidate: Candidate) -> None:
-        """One more candidate, as it arrives (RFC 8838). Names and unreachable addresses are counted and ignored."""
+        """Add a remote candidate as it arrives (RFC 8838). Names and unreachable addresses are counted and ignored."""
         session = self._next or self._current
         remote = session.remote_credentials
         if remote is not None and candidate.ufrag not in (None, remote.ufrag):
@@ -103,7 +103,8 @@ class Agent:
             session.add_remote_candidate(candidate)
 
     def restart(self, now: float, local_candidates: Iterable[LocalCandidate] | None = None) -> Credentials:
-        """Begin another session (RFC 8445 9), in place of one that has not finished. Returns the credentials to signal.
+        """Begin another session (RFC 8445 9), in place of an unfinished one; return the credentials to signal.
+
         `Restarted` or `RestartFailed` follows. `local_candidates`: the addresses for the peer from now on, as after a
         change of the network; None: as before.
         """
@@ -116,7 +117,7 @@ class Agent:
         return self._next.local_credentials
 
     def cancel_restart(self) -> None:
-        """The peer has refused it."""
+        """Give up a restart, because the peer has refused it."""
         if self._next is not None:
             self._next.end()
             self._next = None
@@ -125,20 +126,20 @@ class Agent:
 
     @property
     def path(self) -> Path | None:
-        """Where to send; None: nowhere."""
+        """The path to send on; None: there is no path."""
         return self._told[0]
 
     @property
     def rtt(self) -> float | None:
-        """Seconds, the shortest that the session has measured."""
+        """The shortest round trip that the session has measured, in s; None before the first."""
         return self._current.rtt
 
     def accepts(self, path: Path) -> bool:
-        """Whether data that came this way are the peer's, as far as ICE can say."""
+        """True if data on this path are the peer's, as far as ICE can say."""
         return self._directory.owner(path) is self
 
     def receive_datagram(self, data: bytes, path: Path, now: float) -> None:
-        """A STUN message (`lockstep.rtc.demux` tells). Others are dropped and counted."""
+        """Take a STUN message (see `lockstep.rtc.demux`). Others are dropped and counted."""
         head = transaction_of(data)
         if self.ended or head is None:
             self.counts["not_stun"] += 1
@@ -155,7 +156,7 @@ class Agent:
         return out
 
     def path_closed(self, path: Path, now: float) -> None:
-        """The TCP connection of this path has ended."""
+        """Note that the TCP connection of this path has ended."""
         for session in self._sessions():
             session.path_closed(path, now)
         self._settle(now)
@@ -169,8 +170,8 @@ class Agent:
         return min((each for each in times if each is not None), default=None)
 
     def handle_timer(self, now: float) -> None:
-        """Hand over the sockets' datagrams first: after a pause of the whole process, answers count before the
-        clock."""
+        """Do the due work. Hand over the sockets' datagrams first: after a pause of the whole process, answers count
+        before the clock."""
         if self._retired is not None and now >= self._retired[1]:
             self._retired[0].end()
             self._retired = None
@@ -183,7 +184,7 @@ class Agent:
         return events
 
     def close(self) -> None:
-        """Leave nothing behind in the directory. Nothing is said to the peer: ICE has no word for it."""
+        """Leave nothing behind in the directory. Nothing is sent to the peer: ICE has no message for it."""
         for session in self._sessions():
             session.end()
         self._retired = self._next = None
@@ -192,12 +193,12 @@ class Agent:
         self.ended = True
 
     def release(self, path: Path) -> None:
-        """For sessions: one of them has given up a path. The agent keeps it as long as another has it."""
+        """Note, for a session, that it has given up a path. The agent keeps a path that another session has."""
         if not any(session.has_heard(path) for session in self._sessions()):
             self._directory.release(path, self)
 
     def answered(self, session: Session, seconds: float) -> None:
-        """For sessions: a check on the path in use was answered after so long."""
+        """Note, for a session, that a check on the path in use was answered after `seconds`."""
         if session is self._current:
             self._answered.append(Answered(seconds))
 

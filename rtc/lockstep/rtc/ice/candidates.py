@@ -37,7 +37,7 @@ LINE = re.compile(
 
 
 class CandidateError(ValueError):
-    """A line that is no candidate, or a candidate of values that none can have."""
+    """A line that is not a candidate, or a candidate with impossible values."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,7 +53,7 @@ class Candidate:
     type: CandidateType
     related: Address | None = None  # raddr and rport, for people who look for faults
     tcp_type: TcpType | None = None
-    ufrag: str | None = None  # of the session that it belongs to, if the line says so
+    ufrag: str | None = None  # the ufrag of its session, if the line names it
 
     @property
     def address(self) -> Address:
@@ -61,7 +61,7 @@ class Candidate:
 
     @property
     def is_ip_address(self) -> bool:
-        """False for names: mDNS names need a resolver. An address with a zone means nothing to another host."""
+        """False for names (mDNS names need a resolver), and for a zone, which means nothing to another host."""
         return "%" not in self.host and _ip_address(self.host) is not None
 
     @property
@@ -73,7 +73,7 @@ class Candidate:
         return self.host != "255.255.255.255"
 
     def line(self) -> str:
-        """As the value of `a=candidate:` without its name, or of `RTCIceCandidate.candidate`."""
+        """Return the candidate as in `RTCIceCandidate.candidate`, and in SDP after `a=`."""
         words = [f"candidate:{self.foundation} {self.component} {self.transport} {self.priority}"]
         words.append(f"{self.host} {self.port} typ {self.type}")
         if self.related is not None:
@@ -86,7 +86,7 @@ class Candidate:
 
 
 def parse_candidate(line: str) -> Candidate:
-    """From `candidate:…`, with or without `a=` before it.
+    """Return the candidate in `candidate:…`, with or without `a=` before it.
 
     Raises:
         CandidateError: not a candidate, or one of an unknown type or transport, which RFC 8839 5.1 says to ignore.
@@ -118,7 +118,8 @@ def parse_candidate(line: str) -> Candidate:
 
 
 def candidate_priority(kind: CandidateType, local_preference: int, tcp_type: TcpType | None = None) -> int:
-    """Of a candidate of component 1. `local_preference` is 0 to 65535, for TCP 0 to 8191; a higher one is tried first.
+    """Return the priority of a candidate of component 1. `local_preference` is 0 to 65535, for TCP 0 to 8191; a higher
+    one is tried first.
 
     RFC 8445 5.1.2.1; RFC 6544 4.2 for TCP.
     """
@@ -130,18 +131,18 @@ def candidate_priority(kind: CandidateType, local_preference: int, tcp_type: Tcp
 
 
 def pair_priority(controlling: int, controlled: int) -> int:
-    """Of a pair, from the priorities of the two agents' candidates (RFC 8445 6.1.2.3)."""
+    """Return the priority of a pair, from the priorities of the two agents' candidates (RFC 8445 6.1.2.3)."""
     return (min(controlling, controlled) << 32) + 2 * max(controlling, controlled) + (controlling > controlled)
 
 
 def foundation(kind: CandidateType, base: str, transport: Transport) -> str:
-    """A number as text, equal for equal arguments (RFC 8445 5.1.1.3). It need not be unique: candidates with one number
-    are tried one after the other."""
+    """Return a number as text, equal for equal arguments (RFC 8445 5.1.1.3). It need not be unique: candidates with one
+    number are tried one after the other."""
     return str(zlib.crc32(f"{kind} {base} {transport}".encode()))
 
 
 def _normal_host(host: str) -> str:
-    """One way of writing for each IP address: addresses are compared as text."""
+    """Return the normal form of an IP address, or the name: addresses are compared as text."""
     address = _ip_address(host)
     return host if address is None else str(address)
 

@@ -20,7 +20,7 @@ class LocalCandidate:
 
 
 class PairState(Enum):
-    """RFC 8445 6.1.2.6 but for Frozen, which lets streams and components learn of each other's success.
+    """The states of RFC 8445 6.1.2.6 without Frozen, which lets streams and components learn of each other's success.
 
     With one stream of one component there is nothing to learn, and a peer that gives everything one foundation would
     have its pairs tried one after the other, 40 s each.
@@ -34,7 +34,7 @@ class PairState(Enum):
 
 @dataclass(slots=True, eq=False)
 class Pair:
-    """A local candidate and one of the peer's."""
+    """A local candidate and a remote one."""
 
     path: Path  # from the local base: the peer sees its datagrams coming from the local candidate
     local: Candidate
@@ -42,8 +42,8 @@ class Pair:
     state: PairState = PairState.WAITING
     heard: bool = False  # an authenticated check or answer came on it
     nominated: bool = False
-    nominated_by_peer: bool = False  # a check with USE-CANDIDATE came, and our own check decides (RFC 8445 7.3.1.5)
-    answered_at: float | None = None  # when a check on it was answered last
+    nominated_by_peer: bool = False  # a check with USE-CANDIDATE came; one from this side decides (RFC 8445 7.3.1.5)
+    answered_at: float | None = None  # time of the last answer to a check on it
 
     def priority(self, controlling: bool) -> int:
         ours, theirs = self.local.priority, self.remote.priority
@@ -51,21 +51,21 @@ class Pair:
 
 
 class CheckList:
-    """Pairs by path. A path has one pair: candidates that share a base are one (RFC 8445 6.1.2.4)."""
+    """The pairs of a session, by path. A path has one pair: candidates that share a base are one (RFC 8445 6.1.2.4)."""
 
     def __init__(self, max_pairs: int) -> None:
         self._max_pairs = max_pairs
         self.pairs: dict[Path, Pair] = {}
 
     def add(self, locals_: Iterable[LocalCandidate], remote: Candidate) -> None:
-        """Form pairs with a candidate of the peer's (RFC 8445 6.1.2.2)."""
+        """Form pairs with a remote candidate (RFC 8445 6.1.2.2)."""
         for local in locals_:
             path = Path(local.base, remote.address, local.candidate.transport)
             if path not in self.pairs and may_pair(local, remote):
                 self.pairs[path] = Pair(path, local.candidate, remote)
 
     def trim(self, controlling: bool, in_use: Pair | None) -> list[Pair]:
-        """Remove the pairs beyond the bound: the worst that have not succeeded (RFC 8445 6.1.2.5). Returns them."""
+        """Remove and return the pairs beyond the bound: the worst that have not succeeded (RFC 8445 6.1.2.5)."""
         removed: list[Pair] = []
         while len(self.pairs) > self._max_pairs:
             others = [pair for pair in self.pairs.values() if pair is not in_use]
@@ -75,19 +75,19 @@ class CheckList:
         return removed
 
     def next_ordinary(self, controlling: bool) -> Pair | None:
-        """The pair to check next, without triggered ones (RFC 8445 6.1.4.2)."""
+        """Return the pair to check next, without triggered ones (RFC 8445 6.1.4.2)."""
         waiting = (pair for pair in self.pairs.values() if pair.state is PairState.WAITING)
         return max(waiting, key=lambda pair: pair.priority(controlling), default=None)
 
     def remove_undecided(self) -> list[Pair]:
-        """A pair is nominated: pairs that have not succeeded need no more checks (RFC 8445 8.1.2)."""
+        """Remove and return the pairs that have not succeeded: a nomination ends their checks (RFC 8445 8.1.2)."""
         removed = [pair for pair in self.pairs.values() if pair.state is not PairState.SUCCEEDED]
         for pair in removed:
             del self.pairs[pair.path]
         return removed
 
     def unresolved(self) -> list[Pair]:
-        """Pairs that may still succeed."""
+        """Return the pairs that may still succeed."""
         settled = (PairState.SUCCEEDED, PairState.FAILED)
         return [pair for pair in self.pairs.values() if pair.state not in settled]
 
@@ -104,7 +104,7 @@ def may_pair(local: LocalCandidate, remote: Candidate) -> bool:
 
 
 def bases(candidates: Sequence[LocalCandidate]) -> list[LocalCandidate]:
-    """One candidate for each base, the best: others leave from the same address and prove nothing more."""
+    """Return the best candidate of each base: others leave from the same address and prove nothing more."""
     best: dict[tuple[Address, str], LocalCandidate] = {}
     for each in sorted(candidates, key=lambda local: -local.candidate.priority):
         best.setdefault((each.base, each.candidate.transport), each)

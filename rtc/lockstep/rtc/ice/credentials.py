@@ -20,7 +20,8 @@ class CredentialsError(ValueError):
 
 @dataclass(frozen=True, slots=True)
 class Credentials:
-    """
+    """The user name fragment and the password of one session.
+
     Raises:
         CredentialsError: of the wrong length, or of other characters than letters, digits, + and /.
     """
@@ -39,6 +40,7 @@ class Credentials:
 
 
 def new_credentials(random_bytes: Callable[[int], bytes] = secrets.token_bytes) -> Credentials:
-    """For one session; `random_bytes` makes as many as it is asked for, and they must be unpredictable."""
+    """Return credentials for one session; `random_bytes` returns as many as it is asked for, and they must be
+    unpredictable."""
     ufrag, password = base64.b64encode(random_bytes(UFRAG_BYTES)), base64.b64encode(random_bytes(PASSWORD_BYTES))
     return Credentials(ufrag.decode(), password.decode())

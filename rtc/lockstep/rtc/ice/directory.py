@@ -1,4 +1,4 @@
-"""The owner of a datagram, where many agents share sockets: agents enter their users, transactions and paths here, and
+"""Finds the owner of a datagram, where many agents share sockets: agents enter their users, transactions and paths, and
 remove them again."""
 
 from typing import TYPE_CHECKING
@@ -12,7 +12,7 @@ __all__ = ["Directory"]
 
 
 class Directory:
-    """Each entry belongs to one agent, which alone removes it.
+    """The entries of all agents. Each belongs to one agent, which alone removes it.
 
     A path is *claimed* when its far end has answered a check: an attacker with a forged source address never sees the
     check that it would have to answer. A path is *hinted at* when an authenticated check came from there; a hint lets
@@ -26,7 +26,7 @@ class Directory:
         self.hints: dict[Path, Agent] = {}
 
     def owner(self, path: Path) -> "Agent | None":
-        """The agent that data from there are for."""
+        """Return the agent that data on this path are for."""
         return self.claims.get(path) or self.hints.get(path)
 
     def hint(self, path: Path, agent: "Agent") -> None:
@@ -34,7 +34,7 @@ class Directory:
             self.hints[path] = agent
 
     def claim(self, path: Path, agent: "Agent") -> None:
-        """The agent's peer is there now. A path that another agent had moves."""
+        """Enter that the agent's peer is on this path now. A path that another agent had moves."""
         self.claims[path] = agent
         self.hints.pop(path, None)
 
@@ -45,5 +45,5 @@ class Directory:
 
     @property
     def size(self) -> int:
-        """Entries of all kinds."""
+        """The number of entries of all kinds."""
         return len(self.ufrags) + len(self.transactions) + len(self.claims) + len(self.hints)

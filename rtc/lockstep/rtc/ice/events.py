@@ -10,15 +10,15 @@ __all__ = ["Answered", "Ended", "Event", "PathChanged", "RestartFailed", "Restar
 
 @dataclass(frozen=True, slots=True)
 class PathChanged:
-    """Send there from now on. None: nowhere, until a restart that is under way has found a path."""
+    """The path to send on from now on. None: no path, until a restart that is under way has found one."""
 
     path: Path | None
-    nominated: bool  # false: it works, and the controlling agent has not decided yet (RFC 8445 12.1)
+    nominated: bool  # False: it works, and the controlling agent has not decided yet (RFC 8445 12.1)
 
 
 @dataclass(frozen=True, slots=True)
 class Answered:
-    """The peer has answered a check on the path in use: its round trip is at most this."""
+    """The peer has answered a check on the path in use: its round trip is at most `seconds`."""
 
     seconds: float
 

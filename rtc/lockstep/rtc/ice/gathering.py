@@ -1,4 +1,4 @@
-"""Candidates: of sockets that are bound, of a 1:1 NAT in front of them, and what STUN and TURN servers have told."""
+"""Gathers candidates: of bound sockets, of a 1:1 NAT in front of them, and from STUN and TURN servers."""
 
 import ipaddress
 from collections.abc import Iterable, Sequence
@@ -12,7 +12,7 @@ __all__ = ["Advertised", "AdvertisedError", "gather", "parse_advertised", "refle
 
 
 class AdvertisedError(ValueError):
-    """Not `outer` or `outer=inner` of two IP addresses of one version."""
+    """The text is not `outer` or `outer=inner` of two IP addresses of one version."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -20,14 +20,14 @@ class Advertised:
     """An address at which a NAT forwards every port to this machine, as for cloud machines and container networks."""
 
     outer: str
-    inner: str | None = None  # the local address that it forwards to; None: the first of its IP version, but loopback
+    inner: str | None = None  # the local address behind it; None: the first of its IP version that is not loopback
 
 
 def parse_advertised(text: str) -> Advertised:
-    """From `203.0.113.7` or `203.0.113.7=10.0.0.5`.
+    """Return the addresses in `203.0.113.7` or `203.0.113.7=10.0.0.5`.
 
     Raises:
-        AdvertisedError: anything else.
+        AdvertisedError: the text has neither form.
     """
     try:
         addresses = [ipaddress.ip_address(each.strip()) for each in text.split("=")]
@@ -41,16 +41,16 @@ def parse_advertised(text: str) -> Advertised:
 def gather(
     hosts: Sequence[str], port: int, tcp_port: int | None = None, advertised: Iterable[Advertised] = ()
 ) -> list[LocalCandidate]:
-    """Candidates for a UDP socket that is reached at `port` on all `hosts`, those to prefer first.
+    """Return candidates for a UDP socket that is reached at `port` on all `hosts`, the preferred ones first.
 
     Args:
         hosts: IP addresses of this machine.
-        tcp_port: Where TCP connections are accepted as well (RFC 6544, passive); None: nowhere.
+        tcp_port: The port on which TCP connections are accepted as well (RFC 6544, passive); None: no port.
     """
     hosts = [str(ipaddress.ip_address(host)) for host in hosts]
     found: list[LocalCandidate] = []
     for place, host in enumerate(hosts):
-        preference = 65535 - place  # RFC 8445 5.1.2.1: another one for each address
+        preference = 65535 - place  # RFC 8445 5.1.2.1: a different one for each address
         found.append(_local("host", (host, port), (host, port), preference))
         if tcp_port is not None:
             found.append(_local("host", (host, tcp_port), (host, tcp_port), 8191 - place, "passive"))
@@ -66,12 +66,12 @@ def gather(
 
 
 def reflexive(mapped: Address, base: Address, place: int) -> LocalCandidate:
-    """The mapped address of the socket at `base`, by a STUN server; a lower `place` is preferred."""
+    """Return the mapped address of the socket at `base`, from a STUN server; a lower `place` is preferred."""
     return _local("srflx", mapped, base, 65535 - place)
 
 
 def relayed(address: Address, mapped: Address | None, place: int) -> LocalCandidate:
-    """An address on a TURN server, which is its own base (RFC 8445 5.1.1.2)."""
+    """Return an address on a TURN server, which is its own base (RFC 8445 5.1.1.2)."""
     return _local("relay", address, address, 65535 - place, related=mapped)
 
 

@@ -1,6 +1,7 @@
-"""Many ICE agents on one UDP port: the owner of each datagram, and bounds on the cost of strangers. No datagram of a
-stranger makes a table grow: until MESSAGE-INTEGRITY holds, the only state is a table of a fixed size. The checks of
-that run from the cheap to the dear:
+"""Shares one UDP port among many ICE agents: finds the owner of each datagram, and bounds the cost of strangers.
+
+No datagram of a stranger makes a table grow: until MESSAGE-INTEGRITY holds, the only state is a table of a fixed size.
+The checks of that run from the cheap to the expensive:
 
 1. A response must name a transaction that an agent has begun; a request must name a user that exists. Both are one look
    into a dictionary, and an attacker who has not seen the signalling cannot guess either.
@@ -27,15 +28,15 @@ __all__ = ["Port", "PortSettings"]
 class PortSettings:
     """Bounds for datagrams from paths that their agent has not claimed."""
 
-    source_rate: float = 100.0  # requests a second of one address (IPv6: network): several browsers that connect
+    source_rate: float = 100.0  # requests a second from one address (IPv6: network): several browsers that connect
     source_burst: float = 200.0
-    total_rate: float = 1000.0  # requests a second of all together: 1.5 % of a core for their integrity
+    total_rate: float = 1000.0  # requests a second from all together: 1.5 % of a core for their integrity
     total_burst: float = 1000.0
     source_slots: int = 4096  # sources that share a slot share its rate
 
 
 class Port:
-    """Give agents `directory`; hand a datagram to the agent that `route` returns."""
+    """Routes datagrams to agents. Give agents `directory`; hand a datagram to the agent that `route` returns."""
 
     def __init__(self, settings: PortSettings | None = None) -> None:
         self.directory = Directory()
@@ -43,7 +44,7 @@ class Port:
         self._limit = SourceLimit(settings or PortSettings())
 
     def route(self, data: bytes, path: Path, now: float) -> Agent | None:
-        """The agent that this datagram is for; None: drop it."""
+        """Return the agent that this datagram is for; None: drop it."""
         kind = datagram_kind(data)
         if kind is DatagramKind.STUN:
             return self._route_stun(data, path, now)
@@ -76,7 +77,7 @@ class Port:
 
 
 class SourceLimit:
-    """A rate for each source, each agent and all together, in memory of a fixed size."""
+    """Limits the rate of each source, of each agent and of all together, in memory of a fixed size."""
 
     def __init__(self, settings: PortSettings) -> None:
         # A dictionary of sources would grow with forged ones, or forget honest ones. Python seeds the hash of texts
@@ -90,5 +91,5 @@ class SourceLimit:
 
 
 def source_of(host: str) -> str:
-    """Whoever has one IPv6 address has the 2⁶⁴ of its network."""
+    """Return the address, or the network of an IPv6 address: its holder has all 2⁶⁴ addresses of that."""
     return host if ":" not in host else ipaddress.IPv6Address(host).packed[:8].hex()

@@ -1,4 +1,4 @@
-"""The addresses at which a session's peer may be: from signalling, and from its checks."""
+"""The candidates of a session's peer: from signalling, and from its checks."""
 
 from lockstep.rtc.addresses import Path
 from lockstep.rtc.ice.candidates import Candidate, foundation
@@ -10,7 +10,8 @@ Key = tuple[str, str, int]  # transport, host, port
 
 
 class RemoteCandidates:
-    """Each kind has its own bound: checks from many addresses leave room for signalled candidates."""
+    """The remote candidates of one session. Each kind has its own bound: checks from many addresses leave room for
+    signalled candidates."""
 
     def __init__(self, settings: IceSettings) -> None:
         self._settings = settings
@@ -22,7 +23,7 @@ class RemoteCandidates:
         return self._signalled.get(key) or self._reflexive.get(key)
 
     def add_signalled(self, candidate: Candidate) -> bool:
-        """False: it is known already (RFC 8445 7.3.1.3), or there are too many."""
+        """Add a signalled candidate. Return False if it is known already (RFC 8445 7.3.1.3), or there are too many."""
         key = (candidate.transport, candidate.host, candidate.port)
         if key in self._signalled or key in self._reflexive:
             return False
@@ -32,7 +33,7 @@ class RemoteCandidates:
         return True
 
     def add_reflexive(self, path: Path, priority: int) -> Candidate:
-        """The peer-reflexive candidate that a check has shown (RFC 8445 7.3.1.3)."""
+        """Add and return the peer-reflexive candidate that a check has shown (RFC 8445 7.3.1.3)."""
         host, port = path.remote
         candidate = Candidate(
             foundation=foundation("prflx", host, path.transport),
@@ -48,7 +49,7 @@ class RemoteCandidates:
         return candidate
 
     def must_give_way(self) -> list[Candidate]:
-        """Peer-reflexive candidates, the oldest first, when there is no place for another one; else none."""
+        """Return the peer-reflexive candidates, the oldest first, if there is no place for another; else none."""
         if len(self._reflexive) < self._settings.max_peer_reflexive:
             return []
         return list(self._reflexive.values())

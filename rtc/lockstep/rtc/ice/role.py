@@ -1,4 +1,4 @@
-"""Which of two agents decides on the path (RFC 8445 4), and what settles it when both think the same (7.3.1.1)."""
+"""The role of an agent: the controlling one decides on the path (RFC 8445 4). Settles conflicts of roles (7.3.1.1)."""
 
 from dataclasses import dataclass
 from random import Random
@@ -14,11 +14,11 @@ class Role:
     tie_breaker: int  # 64 random bits
 
     def conflicts(self, request: Message) -> bool:
-        """Whether the peer claims the same role."""
+        """True if the peer claims the same role."""
         return (request.controlling if self.controlling else request.controlled) is not None
 
     def keeps_against(self, request: Message) -> bool:
-        """In a conflict: whether the own role stands and the peer has to change (RFC 8445 7.3.1.1)."""
+        """True if, in a conflict, this agent keeps its role and the peer has to change (RFC 8445 7.3.1.1)."""
         theirs = request.controlling if self.controlling else request.controlled
         # The greater tie-breaker controls; of equal ones, the agent that is asked.
         return (self.tie_breaker >= (theirs or 0)) is self.controlling
@@ -27,6 +27,6 @@ class Role:
         self.controlling = not self.controlling
 
     def told_to_switch(self, rng: Random) -> None:
-        """The peer answered 487: it has the greater claim (RFC 8445 7.2.5.1)."""
+        """Switch the role: the peer answered 487 and has the greater claim (RFC 8445 7.2.5.1)."""
         self.switch()
         self.tie_breaker = rng.getrandbits(64)

@@ -70,10 +70,10 @@ class Session:
         self._next_check_at = 0.0
         self._fails_at: float | None = None
         self._nominate_at: float | None = None
-        self._rival: tuple[Pair, float, float] | None = None  # nominated instead of `selected`, since when, until when
+        self._rival: tuple[Pair, float, float] | None = None  # nominated instead of `selected`; beginning, deadline
         directory.ufrags[credentials.ufrag] = agent
 
-    # What the user does
+    # Methods for the agent
 
     def wait_for_remote(self, now: float) -> None:
         """Fail if there is no path `connect_seconds` from now."""
@@ -85,7 +85,7 @@ class Session:
         self._next_check_at = now
 
     def add_remote_candidate(self, candidate: Candidate) -> None:
-        """One with an IP address, that signalling names."""
+        """Add a candidate with an IP address, that signalling names."""
         if not self._remotes.add_signalled(candidate):
             self._counts["candidate_not_added"] += 1
         elif not self.is_nominated:
@@ -93,7 +93,7 @@ class Session:
             self._drop(self._list.trim(self._role.controlling, self.selected))
 
     def end(self) -> None:
-        """Leave nothing behind."""
+        """End the session, and leave nothing behind in the directory."""
         self._directory.ufrags.pop(self.local_credentials.ufrag, None)
         for transaction in list(self._transactions.values()):
             self._forget(transaction)
@@ -105,7 +105,7 @@ class Session:
             self._agent.release(path)
 
     def retire(self) -> None:
-        """Another session has taken over: answer checks and hear data that are under way, and ask nothing more."""
+        """Answer checks and accept data that are under way, and ask nothing more: another session has taken over."""
         for transaction in list(self._transactions.values()):
             self._forget(transaction)
         self._triggered.clear()
@@ -113,23 +113,23 @@ class Session:
         self.remote_credentials = self.consent = self._rival = self._fails_at = self._nominate_at = None
 
     def path_closed(self, path: Path, now: float) -> None:
-        """The connection of a TCP path has ended."""
+        """Note that the connection of a TCP path has ended."""
         pair = self._list.pairs.pop(path, None)
         if pair is None:
             return
         self._drop([pair])
         if pair is self.selected:
             self.selected = self.consent = None
-            self._fails_at = now + self._settings.consent_seconds  # for the peer to connect again
+            self._fails_at = now + self._settings.consent_seconds  # time for the peer to connect again
             if (best := self._best(now)) is not None:
                 self._select(best, now)
 
     def has_heard(self, path: Path) -> bool:
-        """Whether an authenticated check or answer came from there: data may as well (RFC 8445 12.2)."""
+        """True if an authenticated check or answer came on this path: data may as well (RFC 8445 12.2)."""
         pair = self._list.pairs.get(path)
         return pair is not None and pair.heard
 
-    # What comes in
+    # Input
 
     def receive_request(self, data: bytes, path: Path, now: float) -> None:
         request = self._authentic(data, self.local_credentials.password)
@@ -222,7 +222,7 @@ class Session:
         if self._nominate_at is not None and now >= self._nominate_at:
             self._nominate_best(now)
 
-    # Checks of the peer's
+    # Checks of the peer
 
     def _authentic(self, data: bytes, password: str) -> Message | None:
         try:
@@ -242,11 +242,11 @@ class Session:
         self._out.append(Datagram(serialize(answer, self.local_credentials.password), path))
 
     def _learn_from_check(self, request: Message, path: Path, is_new: bool, now: float) -> None:
-        """RFC 8445 7.3.1.3 to 7.3.1.5.
+        """Learn a path, a nomination or consent from a check (RFC 8445 7.3.1.3 to 7.3.1.5).
 
-        A known check that comes again may be the peer's own repetition, by another port of its NAT, or that of an
+        A known check that comes again may be a repetition of the peer, by another port of its NAT, or that of an
         attacker who has recorded it. It may show a path, which counts for nothing until the peer has answered there; it
-        is no sign of consent, and does not choose among paths that work.
+        is not a sign of consent, and does not choose among paths that work.
         """
         pair = self._list.pairs.get(path) or self._pair_shown_by(request, path, now)
         if pair is None:
@@ -272,7 +272,7 @@ class Session:
             del self._seen[next(iter(self._seen))]
 
     def _pair_shown_by(self, request: Message, path: Path, now: float) -> Pair | None:
-        """A pair that is not in the check list. Its address may be new: a peer-reflexive candidate (7.3.1.3)."""
+        """Add a pair that is not in the check list. Its address may be new: a peer-reflexive candidate (7.3.1.3)."""
         remote = self._remotes.at(path)
         if remote is None:
             if not self._make_place_for_reflexive(now):
@@ -284,7 +284,8 @@ class Session:
         return self._list.pairs.get(path)
 
     def _make_place_for_reflexive(self, now: float) -> bool:
-        """An address that has not answered of late gives way to a new one: the peer has left it, or was never there."""
+        """Make place for a new address: one that has not answered of late gives way, for the peer has left it, or was
+        never there. Return False if none does."""
         crowd = self._remotes.must_give_way()
         for candidate in crowd:
             pairs = [pair for pair in self._list.pairs.values() if pair.remote is candidate]
@@ -297,7 +298,7 @@ class Session:
         return not crowd
 
     def _local_at(self, path: Path) -> Candidate:
-        """The candidate whose base was asked; an address without a candidate counts as a host candidate."""
+        """Return the candidate whose base was asked; an address without a candidate counts as a host candidate."""
         for local in self._locals:
             if local.base == path.local and local.candidate.transport == path.transport:
                 return local.candidate
@@ -306,7 +307,7 @@ class Session:
         name, priority = foundation("host", host, path.transport), candidate_priority("host", 0, tcp_type)
         return Candidate(name, 1, path.transport, priority, host, port, "host", tcp_type=tcp_type)
 
-    # Own checks
+    # Checks of this side
 
     @property
     def is_nominated(self) -> bool:
@@ -314,7 +315,7 @@ class Session:
 
     @property
     def _rto(self) -> float:
-        """RFC 8445 14.3; and on a path that is known to be long, not before an answer can have come."""
+        """The wait of RFC 8445 14.3; on a path that is known to be long, no less than an answer takes."""
         busy = len(self._list.unresolved()) * self._settings.check_interval
         return max(self._settings.rto, busy, 1.5 * (self.rtt or 0.0))
 
@@ -328,7 +329,7 @@ class Session:
             self._triggered.append(pair)
 
     def _repeat_early(self, pair: Pair, now: float) -> None:
-        """The peer's NAT lets us in since it has sent: ask again now.
+        """Ask again now: the peer's NAT lets this side in since the peer has sent.
 
         RFC 8445 7.3.1.4 begins another transaction; the same one once more needs no further state.
         """
@@ -345,7 +346,7 @@ class Session:
         return not self.is_nominated and self._list.next_ordinary(self._role.controlling) is not None
 
     def _begin_next_check(self, now: float) -> None:
-        """RFC 8445 6.1.4.2: triggered checks first."""
+        """Begin the next check, triggered ones first (RFC 8445 6.1.4.2)."""
         pair = self._triggered.popleft() if self._triggered else None
         if pair is None and not self.is_nominated:
             pair = self._list.next_ordinary(self._role.controlling)
@@ -355,11 +356,12 @@ class Session:
             self._next_check_at = now + self._settings.check_interval
 
     def _send_consent_check(self, pair: Pair, now: float) -> None:
-        """Repeats the nomination as well, so that a peer that sees another address of this side moves there at once."""
+        """Check consent. Repeat the nomination as well, so that a peer that sees another address of this side moves
+        there at once."""
         self._send_check(pair, now, nominates=self._role.controlling and pair.nominated)
 
     def _send_check(self, pair: Pair, now: float, nominates: bool) -> Transaction:
-        """A Binding request (RFC 8445 7.1), whose answer counts for 30 s unless its caller says otherwise."""
+        """Send a Binding request (RFC 8445 7.1), whose answer counts for 30 s unless the caller says otherwise."""
         assert self.remote_credentials is not None  # nothing is checked before
         controlling = self._role.controlling
         request = Message(
@@ -393,7 +395,7 @@ class Session:
                 transaction.repeated(now, self._settings)
 
     def _succeeded(self, transaction: Transaction, now: float) -> None:
-        """RFC 8445 7.2.5.3. The mapped address of the answer makes no pair of its own: its base is the same."""
+        """Take the success of a check (RFC 8445 7.2.5.3). The mapped address makes no pair: its base is the same."""
         pair = transaction.pair
         took = now - transaction.sent_at  # more than the round trip if this answers a repetition
         self.rtt = took if self.rtt is None else min(self.rtt, took)
@@ -414,7 +416,7 @@ class Session:
             self._agent.answered(self, took)
 
     def _repeat_checks_with_new_role(self) -> None:
-        """What is under way states the old role."""
+        """Repeat the checks that are under way, which state the old role."""
         for transaction in self._transactions.values():
             transaction.repeat_at = None
         for pair in self._list.pairs.values():
@@ -450,7 +452,7 @@ class Session:
             self.consent = Consent(pair.answered_at or now, now, self._settings, self._rng)
 
     def _plan_nomination(self, now: float) -> None:
-        """Regular nomination (RFC 8445 8.1.1): at once if nothing better can come, else a little later."""
+        """Plan a regular nomination (RFC 8445 8.1.1): at once if nothing better can come, else a little later."""
         if not self._role.controlling or self._nominate_at is not None or self._nominating:
             return
         assert self.selected is not None  # a pair has just succeeded
@@ -470,7 +472,7 @@ class Session:
             self._send_check(pair, now, nominates=True).begin(self._rto, self._settings)
 
     def _nominated(self, pair: Pair, now: float) -> None:
-        """RFC 8445 8.1.1 and 8.1.2.
+        """Take a nomination (RFC 8445 8.1.1 and 8.1.2).
 
         Peers go on nominating: libwebrtc when it has found another path, others of RFC 5245 with every check. The
         better path wins; a worse one replaces it when it does not answer any more.
@@ -489,7 +491,7 @@ class Session:
         self._drop(self._list.remove_undecided())
 
     def _settle_rival(self, now: float) -> None:
-        assert self._rival is not None  # the caller has looked
+        assert self._rival is not None  # the caller has checked
         pair, since, _ = self._rival
         self._rival = None
         current = self.selected
@@ -502,7 +504,7 @@ class Session:
 
 
 def as_peer_reflexive(candidate: Candidate) -> int:
-    """The PRIORITY of a check: the priority that the peer would give a peer-reflexive candidate of this base (RFC 8445
-    7.1.1)."""
+    """Return the PRIORITY of a check: the priority that the peer would give a peer-reflexive candidate of this base
+    (RFC 8445 7.1.1)."""
     local_preference = candidate.priority >> 8 & (0x1FFF if candidate.tcp_type else 0xFFFF)
     return candidate_priority("prflx", local_preference, candidate.tcp_type)

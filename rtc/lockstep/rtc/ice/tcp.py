@@ -8,11 +8,12 @@ MAX_DATAGRAM = 0xFFFF  # bytes; the length field has 16 bits
 
 
 class FramingError(ValueError):
-    """More bytes than a length field can say."""
+    """The datagram has more bytes than a length field can say."""
 
 
 def frame(data: bytes) -> bytes:
-    """
+    """Return the frame of a datagram.
+
     Raises:
         FramingError: more than `MAX_DATAGRAM` bytes.
     """
@@ -22,14 +23,14 @@ def frame(data: bytes) -> bytes:
 
 
 class TcpFraming:
-    """Datagrams out of the bytes of one connection, in pieces of any size. A peer may not announce more than
-    `max_datagram` bytes, because the beginning is kept until the end is there. After `too_long` close the connection;
-    the frames that follow cannot be told apart.
+    """Finds datagrams in the bytes of one connection, which come in pieces of any size.
+
+    A peer may not announce more than `max_datagram` bytes, because the beginning is kept until the end is there. After
+    `too_long` close the connection; the frames that follow cannot be told apart.
     """
 
     def __init__(self, max_datagram: int = 2048) -> None:
-        """`max_datagram`: a path of Ethernet has at most 1,500 bytes, and peers send the same datagrams over TCP and
-        UDP."""
+        """`max_datagram`: in bytes. An Ethernet path has at most 1,500, and peers send the same over TCP and UDP."""
         self._max = max_datagram
         self._kept = bytearray()
         self.too_long = False
@@ -54,6 +55,6 @@ class TcpFraming:
             if length:
                 datagrams.append(bytes(self._kept[position - length : position]))
             else:
-                self.counts["empty_frame"] += 1  # RFC 4571 2: permitted, and nothing
+                self.counts["empty_frame"] += 1  # RFC 4571 2: permitted, and without effect
         del self._kept[:position]
         return datagrams

@@ -1,4 +1,4 @@
-"""Rates with bursts."""
+"""Limits rates, with bursts."""
 
 from array import array
 

@@ -1,7 +1,7 @@
-"""What is wrong with a packet."""
+"""Errors of the RTP and RTCP parsers."""
 
 __all__ = ["RtpError"]
 
 
 class RtpError(ValueError):
-    """Bytes that are not the RTP or RTCP packet that they should be. The one error that the parsers raise."""
+    """The bytes are not the RTP or RTCP packet that they should be. The only error that the parsers raise."""

@@ -20,7 +20,7 @@ ONE_BYTE_MAX_ID = 14  # RFC 8285 4.2
 
 
 def pack_send_time(seconds: float) -> bytes:
-    """abs-send-time: 24 bits of 6.18 fixed point."""
+    """Return abs-send-time for `seconds`: 24 bits of 6.18 fixed point."""
     return (int(seconds * 0x40000) & 0xFFFFFF).to_bytes(3, "big")
 
 
@@ -38,8 +38,7 @@ class TransportNumbers:
 
 class ExtensionWriter(Stage):
     """Writes the extensions of a stream: fixed ones, the packet's own `values`, and values that are known only when it
-    leaves. It is the last stage of the way out: a packet that waited in the pacer says when it really left.
-    """
+    leaves. It is the last outgoing stage: a packet that waited in the pacer says when it really left."""
 
     def __init__(
         self,
@@ -48,8 +47,7 @@ class ExtensionWriter(Stage):
         fixed: Mapping[str, bytes] | None = None,
         numbers: TransportNumbers | None = None,
     ) -> None:
-        """`ids`: the negotiated ids, by URI; `fixed`: values of every packet, by URI. A value without an id is left
-        out."""
+        """`ids`: the negotiated ids, by URI; `fixed`: values of every packet, by URI; left out without an id."""
         super().__init__(following)
         self._ids = dict(ids)
         self._fixed = {self._ids[uri]: value for uri, value in (fixed or {}).items() if uri in self._ids}

@@ -23,10 +23,10 @@ NACK, TWCC = 1, 15  # formats of the first
 PLI, FIR, APPLICATION = 1, 4, 15  # formats of the second
 REMB = b"REMB"
 MAX_NACKED = 1024  # packets in one; no sender keeps more of them at a browser's rate
-MAX_STATUSES = 8192  # packets of one transport-wide feedback; a second of 90 Mbit/s, and it comes ten times in one
+MAX_STATUSES = 8192  # packets of one transport-wide feedback: one second at 90 Mbit/s; ten come in a second
 TICK = 0.000_25  # s, of an arrival's difference
 REFERENCE = 0.064  # s, of the reference time
-MAX_BITRATE = 1 << 53  # bit/s; an exponent of 63 says more than there is
+MAX_BITRATE = 1 << 53  # bit/s; an exponent of 63 stands for more than any path has
 
 
 def _header(kind: int, form: int, sender: int, media: int, body: bytes = b"") -> bytes:
@@ -35,7 +35,7 @@ def _header(kind: int, form: int, sender: int, media: int, body: bytes = b"") ->
 
 @dataclass(frozen=True, slots=True)
 class Nack:
-    """Packets that are missing (RFC 4585 6.2.1)."""
+    """A request for missing packets (RFC 4585 6.2.1)."""
 
     sender_ssrc: int
     media_ssrc: int
@@ -47,7 +47,7 @@ class Nack:
 
 
 def _pairs(lost: Iterable[int]) -> Iterator[tuple[int, int]]:
-    """A number and the sixteen bits for those after it."""
+    """Yield a sequence number and the sixteen bits for those after it."""
     first, bits = -1, 0
     for number in lost:
         ahead = (number - first) & 0xFFFF
@@ -63,7 +63,7 @@ def _pairs(lost: Iterable[int]) -> Iterator[tuple[int, int]]:
 
 @dataclass(frozen=True, slots=True)
 class PictureLoss:
-    """The picture cannot be decoded (RFC 4585 6.3.1)."""
+    """The receiver cannot decode the picture (RFC 4585 6.3.1)."""
 
     sender_ssrc: int
     media_ssrc: int
@@ -74,7 +74,7 @@ class PictureLoss:
 
 @dataclass(frozen=True, slots=True)
 class FullIntraRequest:
-    """A keyframe is wanted (RFC 5104 4.3.1)."""
+    """A request for a keyframe (RFC 5104 4.3.1)."""
 
     sender_ssrc: int
     requests: tuple[tuple[int, int], ...]  # SSRC, and the request's number: one that repeats is the same request
@@ -86,7 +86,7 @@ class FullIntraRequest:
 
 @dataclass(frozen=True, slots=True)
 class Remb:
-    """What the receiver believes that the path carries (draft-alvestrand-rmcat-remb 2.2)."""
+    """The bitrate that the receiver believes the path to carry (draft-alvestrand-rmcat-remb 2.2)."""
 
     sender_ssrc: int
     bitrate: int  # bit/s, of all streams together
@@ -102,7 +102,7 @@ class Remb:
 
 @dataclass(frozen=True, slots=True)
 class TransportFeedback:
-    """When packets arrived, by their transport-wide numbers (draft-holmer-rmcat-transport-wide-cc-extensions 3.1)."""
+    """The arrival times of packets, by transport-wide numbers (draft-holmer-rmcat-transport-wide-cc-extensions 3.1)."""
 
     sender_ssrc: int
     media_ssrc: int
@@ -127,7 +127,7 @@ class TransportFeedback:
 
 
 def _chunk(symbols: list[int]) -> bytes:
-    """A vector of seven two-bit symbols (3.1.4)."""
+    """Return a vector of seven two-bit symbols (3.1.4)."""
     bits = 0b11
     for symbol in [*symbols, *[0] * (7 - len(symbols))]:
         bits = bits << 2 | symbol
@@ -138,7 +138,7 @@ Feedback = Nack | PictureLoss | FullIntraRequest | Remb | TransportFeedback
 
 
 def parse_feedback(kind: int, form: int, body: bytes) -> Feedback | None:
-    """None for a format that nothing here reads. Raises RtpError, struct.error and IndexError."""
+    """Return the feedback; None for a format that is not read here. Raises RtpError, struct.error and IndexError."""
     sender, media = struct.unpack_from("!II", body)
     control = body[8:]
     if kind == TRANSPORT_FEEDBACK and form == NACK:
@@ -196,7 +196,7 @@ def _transport_feedback(sender: int, media: int, control: bytes) -> TransportFee
 
 
 def _symbols(chunk: int) -> list[int]:
-    """Of a run (3.1.3), or a vector of one- or two-bit symbols (3.1.4)."""
+    """Return the symbols of a run (3.1.3), or of a vector of one- or two-bit symbols (3.1.4)."""
     if not chunk & 0x8000:
         return [chunk >> 13 & 0b11] * (chunk & 0x1FFF)
     if not chunk & 0x4000:

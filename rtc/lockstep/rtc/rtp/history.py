@@ -13,11 +13,11 @@ __all__ = ["History", "HistorySettings", "RepairStream"]
 
 @dataclass(frozen=True, slots=True)
 class HistorySettings:
-    seconds: float = 2.5  # that a packet is kept; a path over a satellite needs 0.6 s for one try, and may lose that
+    seconds: float = 2.5  # s to keep a packet; a path over a satellite needs 0.6 s for one try, and may lose that
     packets: int = 4096  # kept; two and a half seconds of 15 Mbit/s
     octets: int = 3_000_000  # kept, of payload
     burst: int = 200  # packets that may be sent again at once
-    rate: float = 1000.0  # packets/s that may be sent again; a peer's NACKs cannot make us flood it
+    rate: float = 1000.0  # packets/s that may be sent again; a peer's NACKs cannot cause a flood of them
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,7 +37,7 @@ class _Kept:
 
 
 class History(Stage):
-    """It stands before the extensions are written: a retransmission says anew when it leaves."""
+    """Keeps sent packets. It stands before the extensions are written: a retransmission says anew when it leaves."""
 
     def __init__(
         self,
@@ -63,7 +63,7 @@ class History(Stage):
         self._budget_at = 0.0
 
     def rtp(self, packet: RtpPacket, now: float) -> None:
-        before = self._kept.pop(packet.sequence_number, None)  # of a whole turn of the numbers ago
+        before = self._kept.pop(packet.sequence_number, None)  # the packet with this number one turn ago
         if before is not None:
             self._octets -= len(before.packet.payload)
         self._kept[packet.sequence_number] = _Kept(packet, now)

@@ -19,13 +19,13 @@ KEYFRAME_INTERVAL = 0.5  # s between two requests: a keyframe that is on its way
 
 @dataclass(frozen=True, slots=True)
 class IncomingParameters:
-    """What was negotiated for one section."""
+    """The parameters that were negotiated for one section."""
 
-    own_ssrc: int  # of our reports
+    own_ssrc: int  # of the reports of this side
     clock_rates: Mapping[int, int]  # Hz, by payload type
     extension_ids: Mapping[str, int] = field(default_factory=dict)  # by URI
     repair_types: Mapping[int, int] = field(default_factory=dict)  # payload type of a retransmission → of the original
-    asks_again: bool = True  # whether the peer keeps packets (a=rtcp-fb: nack)
+    asks_again: bool = True  # True if the peer keeps packets (a=rtcp-fb: nack)
 
 
 class _Chain:
@@ -39,7 +39,8 @@ class _Chain:
 
 
 class IncomingStream:
-    """`ignored` counts packets that belong to nothing: retransmissions of an unknown stream, unknown payload types."""
+    """One stream from the peer. `ignored` counts packets that belong to nothing: retransmissions of an unknown stream,
+    unknown payload types."""
 
     def __init__(self, parameters: IncomingParameters, round_trip: RoundTrip) -> None:
         self.ignored = 0
@@ -48,20 +49,20 @@ class IncomingStream:
         self._round_trip = round_trip
         self._sink = Sink()
         self._chain: _Chain | None = None
-        self._asked_at = float("-inf")  # when a keyframe was last asked for
+        self._asked_at = float("-inf")  # the time of the last request for a keyframe
 
     @property
     def ssrc(self) -> int | None:
-        """None before the first packet."""
+        """The SSRC of the stream; None before the first packet."""
         return None if self._chain is None else self._chain.ssrc
 
     @property
     def reports(self) -> ReceiverReports | None:
-        """None before the first packet."""
+        """The stage that reports; None before the first packet."""
         return None if self._chain is None else self._chain.reports
 
     def rtp(self, packet: RtpPacket, now: float) -> None:
-        """A decrypted packet of this section."""
+        """Take a decrypted packet of this section."""
         is_repair = packet.payload_type in self._parameters.repair_types
         if not is_repair and packet.payload_type not in self._parameters.clock_rates:
             self.ignored += 1
@@ -78,7 +79,7 @@ class IncomingStream:
             self._chain.first.rtcp(packet, now)
 
     def request_keyframe(self, now: float) -> None:
-        """Ask for one, unless that was done just now. Nothing before the first packet: of which stream?"""
+        """Ask for a keyframe, unless that was done just now. No effect before the first packet shows the stream."""
         if self.ssrc is not None and now - self._asked_at >= KEYFRAME_INTERVAL:
             self._asked_at = now
             self._sink.control(PictureLoss(self._parameters.own_ssrc, self.ssrc), now)
@@ -91,7 +92,7 @@ class IncomingStream:
             self._chain.first.handle_timer(now)
 
     def packets(self) -> list[RtpPacket]:
-        """For the application, as they came: nothing is held back or put in order."""
+        """Return the packets for the application, as they came: nothing is held back or put in order."""
         return self._sink.drain_packets()
 
     def controls_to_send(self) -> list[RtcpPacket]:

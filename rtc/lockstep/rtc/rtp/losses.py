@@ -15,10 +15,10 @@ MAX_ASKED = 200  # packets in one NACK: it fits a datagram however they lie
 @dataclass(frozen=True, slots=True)
 class LossSettings:
     patience: float = 0.01  # s before a packet counts as lost: networks reorder a little
-    again: float = 1.1  # round trips between two requests: a sender answers no second one within its own
-    tries: int = 8  # times that a packet is asked for
-    seconds: float = 1.5  # after that no receiver waits for it any more
-    missing: int = 512  # packets that are waited for; with more a keyframe is sooner there
+    again: float = 1.1  # round trips between two requests: a sender does not answer a second one within one round trip
+    tries: int = 8  # requests for one packet, at most
+    seconds: float = 1.5  # after so long no receiver waits for a packet any more
+    missing: int = 512  # packets to wait for; with more a keyframe arrives sooner
 
 
 @dataclass(slots=True)

@@ -4,7 +4,7 @@ __all__ = ["Unwrapper", "is_after"]
 
 
 def is_after(one: int, other: int, bits: int = 16) -> bool:
-    """Whether the wrapping number `one` is ahead of `other`, as far as that can be told (RFC 1982 3.2)."""
+    """True if the wrapping number `one` is ahead of `other`, as far as that can be told (RFC 1982 3.2)."""
     return one != other and (one - other) % (1 << bits) < 1 << (bits - 1)
 
 
@@ -16,7 +16,7 @@ class Unwrapper:
         self._newest: int | None = None
 
     def unwrap(self, number: int) -> int:
-        """`number` as the one nearest to the newest before it; negative when it is older than the first."""
+        """Return the value of `number` nearest to the newest before it; negative when older than the first."""
         if self._newest is None:
             self._newest = number
             return number

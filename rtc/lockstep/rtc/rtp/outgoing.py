@@ -1,4 +1,4 @@
-"""One stream that we send: its numbers, and the chain of its stages."""
+"""One outgoing stream: its numbers, and the chain of its stages."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -19,7 +19,7 @@ MAX_PAYLOAD = 1200  # bytes; headers and encryption add some sixty, and paths ca
 
 @dataclass(frozen=True, slots=True)
 class OutgoingParameters:
-    """What was negotiated and drawn for one stream."""
+    """The parameters that were negotiated or drawn for one stream."""
 
     ssrc: int
     payload_type: int
@@ -32,12 +32,12 @@ class OutgoingParameters:
     extension_ids: Mapping[str, int] = field(default_factory=dict)  # by URI
     fixed_values: Mapping[str, bytes] = field(default_factory=dict)  # of extensions in every packet, by URI
     repair: RepairStream | None = None  # None: RFC 4588 is not in use
-    repeats: bool = True  # whether the peer may ask for packets again; False: nothing is kept
+    repeats: bool = True  # True: the peer may ask for packets again; False: nothing is kept
 
 
 @dataclass(slots=True)
 class PathShare:
-    """What the streams to one peer share."""
+    """The state that the streams to one peer share."""
 
     epoch: float  # s since 1970 at which the clock of `now` was 0
     round_trip: RoundTrip = field(default_factory=RoundTrip)
@@ -47,7 +47,7 @@ class PathShare:
 
 class OutgoingStream:
     def __init__(self, parameters: OutgoingParameters, share: PathShare, *, paced: bool) -> None:
-        """`paced`: whether keyframes are spread; sound is never held back."""
+        """`paced`: True if keyframes are spread; sound is never held back."""
         self.parameters = parameters
         self.sink = Sink()
         ssrc, round_trip = parameters.ssrc, share.round_trip
@@ -76,9 +76,9 @@ class OutgoingStream:
         Args:
             payloads: of its packets, each at most MAX_PAYLOAD bytes
             media_time: in the codec's clock, from any beginning
-            marker: whether the last packet says that the frame is whole
+            marker: True if the last packet says that the frame is whole
             values: of header extensions, by URI
-            captured_at: when, on the clock of `now`; None: now
+            captured_at: time on the clock of `now`; None: now
 
         Raises:
             ValueError: a payload is too long.
@@ -103,11 +103,11 @@ class OutgoingStream:
             self.reports.rtp(packet, now)
 
     def rtcp(self, packet: RtcpPacket, now: float) -> None:
-        """An RTCP packet of the peer; parts about other streams have no effect here."""
+        """Take an RTCP packet of the peer; parts about other streams have no effect here."""
         self.reports.rtcp(packet, now)
 
     def close(self, now: float) -> None:
-        """Say goodbye."""
+        """End the stream with a goodbye."""
         self.reports.goodbye(now)
 
     def timer(self) -> float | None:
@@ -117,7 +117,7 @@ class OutgoingStream:
         self.reports.handle_timer(now)
 
     def packets_to_send(self) -> list[bytes]:
-        """RTP, before encryption."""
+        """Return the RTP packets, before encryption."""
         return [packet.pack() for packet in self.sink.drain_packets()]
 
     def controls_to_send(self) -> list[RtcpPacket]:

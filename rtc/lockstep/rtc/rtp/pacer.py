@@ -20,7 +20,7 @@ class PacerSettings:
 
 
 class TokenBucket:
-    """What may leave for one peer: shared by the pacers of its streams."""
+    """The bytes that may leave for one peer, shared by the pacers of its streams."""
 
     def __init__(self, settings: PacerSettings | None = None) -> None:
         self.settings = settings or PacerSettings()
@@ -29,12 +29,12 @@ class TokenBucket:
         self._at: float | None = None
 
     def limit(self, bitrate: float | None) -> None:
-        """The path is believed to carry `bitrate` (bit/s); None: no limit was seen."""
+        """Limit the rate to a path that is believed to carry `bitrate` (bit/s); None: no limit was seen."""
         settings = self.settings
         self._rate = (settings.free_rate if bitrate is None else bitrate * settings.headroom) / 8
 
     def take(self, octets: int, now: float) -> bool:
-        """Whether a packet may leave. The last one may overdraw, so that a packet of any size passes some time."""
+        """Return True if a packet may leave. The last one may overdraw, so that any size passes some time."""
         if self._at is not None:
             self._tokens = min(float(self.settings.burst), self._tokens + (now - self._at) * self._rate)
         self._at = now
@@ -44,7 +44,7 @@ class TokenBucket:
         return True
 
     def wait(self) -> float:
-        """s after the last `take` until something may leave again."""
+        """Return the time in s after the last `take` until something may leave again."""
         return max(self.settings.least_wait, -self._tokens / self._rate)
 
 
@@ -61,7 +61,7 @@ class Pacer(Stage):
 
     @property
     def holds(self) -> bool:
-        """Whether packets wait here; `PacketsLeft` follows."""
+        """True while packets wait here; `PacketsLeft` follows."""
         return self._due is not None
 
     def rtp(self, packet: RtpPacket, now: float) -> None:

@@ -27,14 +27,14 @@ class RtpPacket:
     marker: bool = False
     csrcs: tuple[int, ...] = ()
     extensions: dict[int, bytes] = field(default_factory=dict)  # by id
-    values: Mapping[str, bytes] = field(default_factory=dict)  # of extensions, by URI; the ids are a stage's to know
-    two_byte: bool = False  # whether extensions are to have the two-byte form
+    values: Mapping[str, bytes] = field(default_factory=dict)  # of extensions, by URI; a stage knows the ids
+    two_byte: bool = False  # True: extensions are to have the two-byte form
     is_repair: bool = False  # it was sent before
     captured_at: float | None = None  # s of the clock of `now`, of the sample with this timestamp; None: unknown
 
     @classmethod
     def parse(cls, data: bytes) -> "RtpPacket":
-        """Raises RtpError."""
+        """Return the packet in `data`. Raises RtpError."""
         if len(data) < HEADER.size or data[0] >> 6 != 2:
             raise RtpError("not an RTP packet")
         flags, kind, sequence_number, timestamp, ssrc = HEADER.unpack_from(data)
@@ -69,7 +69,7 @@ class RtpPacket:
 
 
 def parse_extensions(profile: int, block: bytes) -> dict[int, bytes]:
-    """The elements of a header extension, by id; none where the profile is not one of RFC 8285. Raises RtpError."""
+    """Return the elements of a header extension, by id; none for a profile outside RFC 8285. Raises RtpError."""
     if profile == ONE_BYTE:
         return _parse_elements(block, one_byte=True)
     if profile & 0xFFF0 == TWO_BYTE:
@@ -104,9 +104,10 @@ def _parse_elements(block: bytes, *, one_byte: bool) -> dict[int, bytes]:
 
 
 def pack_extensions(elements: Mapping[int, bytes], *, two_byte: bool = False) -> bytes:
-    """The header extension with its four-byte header, in the one-byte form unless an element needs the other.
+    """Return the header extension with its four-byte header, in the one-byte form unless an element needs the other.
 
-    Raises ValueError: an id that is not 1 to 255, or more than 255 bytes.
+    Raises:
+        ValueError: an id that is not 1 to 255, or more than 255 bytes.
     """
     if two_byte or not all(key in ONE_BYTE_IDS and len(value) in ONE_BYTE_LENGTHS for key, value in elements.items()):
         if not all(1 <= key <= 255 and len(value) <= MAX_LENGTH for key, value in elements.items()):

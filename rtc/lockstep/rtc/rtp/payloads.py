@@ -1,4 +1,4 @@
-"""What the payload of one RTP packet holds of a picture: VP8 (RFC 7741) and H.264 (RFC 6184). Pure functions."""
+"""Finds the part of a picture in the payload of an RTP packet: VP8 (RFC 7741) and H.264 (RFC 6184). Pure functions."""
 
 from collections.abc import Iterator
 from typing import NamedTuple
@@ -21,11 +21,11 @@ class Vp8Part(NamedTuple):
 
 class H264Part(NamedTuple):
     data: bytes
-    begins_unit: bool  # whether a NAL unit begins with it; False: it goes on with one
+    begins_unit: bool  # True: a NAL unit begins with it; False: it continues one
 
 
 def vp8_part(payload: bytes) -> Vp8Part:
-    """RFC 7741 4.2. Raises PayloadError."""
+    """Return the part in a VP8 payload (RFC 7741 4.2). Raises PayloadError."""
     position = 1
     if payload and payload[0] & 0x80:
         more = payload[1] if len(payload) > 1 else 0
@@ -40,7 +40,7 @@ def vp8_part(payload: bytes) -> Vp8Part:
 
 
 def h264_parts(payload: bytes) -> Iterator[H264Part]:
-    """NAL units, or the part of one. Raises PayloadError."""
+    """Yield the NAL units in an H.264 payload, or the part of one. Raises PayloadError."""
     if len(payload) < 2:
         raise PayloadError("too short for H.264")
     kind = payload[0] & NAL_TYPE
@@ -57,7 +57,7 @@ def h264_parts(payload: bytes) -> Iterator[H264Part]:
 
 
 def _aggregated(payload: bytes) -> Iterator[H264Part]:
-    """RFC 6184 5.7.1."""
+    """Yield the NAL units of an aggregation packet (RFC 6184 5.7.1)."""
     position = 1
     while position < len(payload):
         size = int.from_bytes(payload[position : position + 2], "big")

@@ -9,7 +9,7 @@ from lockstep.rtc.rtp.stage import Stage, StreamEnded
 
 __all__ = ["ReceiverReports", "ReceiverReportSettings"]
 
-MAX_JITTER = 10.0  # s; more is a sender that began to count anew
+MAX_JITTER = 10.0  # s; more shows a sender that began to count anew
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,10 +26,10 @@ class ReceiverReports(Stage):
         clock_rate: int,
         settings: ReceiverReportSettings | None = None,
     ) -> None:
-        """`ssrc`: of the stream; `own_ssrc`: of who reports; `clock_rate` in Hz."""
+        """`ssrc`: that of the stream; `own_ssrc`: that of the reporter; `clock_rate` in Hz."""
         super().__init__(following)
-        self.packets = 0  # that came, each once for every time it came
-        self.newest_report: SenderReport | None = None  # the peer's: which sample was captured when
+        self.packets = 0  # packets that came, counted every time they came
+        self.newest_report: SenderReport | None = None  # from the peer; it tells capture times
         self._own_ssrc = own_ssrc
         self._ssrc = ssrc
         self._clock_rate = clock_rate
@@ -42,12 +42,12 @@ class ReceiverReports(Stage):
         self._transit: float | None = None  # arrival minus timestamp, in the codec's clock
         self._timestamp: int | None = None
         self._jitter = 0.0  # in the codec's clock
-        self._report_at = 0.0  # when the newest sender report came
+        self._report_at = 0.0  # arrival of the newest sender report
         self._due: float | None = None
 
     @property
     def jitter(self) -> float:
-        """s."""
+        """The jitter in s."""
         return self._jitter / self._clock_rate
 
     def rtp(self, packet: RtpPacket, now: float) -> None:

@@ -10,8 +10,7 @@ __all__ = ["Repairs"]
 
 class Repairs(Stage):
     def __init__(self, following: Stage, ssrc: int, payload_types: Mapping[int, int]) -> None:
-        """`ssrc`: of the repaired stream; `payload_types`: from a retransmission's type to that of the repeated
-        packet."""
+        """`ssrc`: that of the repaired stream; `payload_types`: from a retransmission's to the repeated packet's."""
         super().__init__(following)
         self.repaired = 0  # packets
         self.empty = 0  # retransmissions of nothing: some senders fill up with them to measure the path

@@ -12,13 +12,14 @@ __all__ = ["Requests", "RequestSettings"]
 
 @dataclass(frozen=True, slots=True)
 class RequestSettings:
-    patience: float = 1.0  # s that a request waits at most for a retransmission that is on its way
+    patience: float = 1.0  # s that a request waits, at most, for a retransmission that is on its way
 
 
 class Requests(Stage):
-    """A peer that lacks packets asks for both, them and a keyframe: the keyframe waits while they may still arrive.
+    """Passes requests on. A peer that lacks packets asks for them and for a keyframe: the keyframe waits while they may
+    still arrive.
 
-    It stands behind the history, whose retransmissions it sees go by.
+    This stage stands behind the history, whose retransmissions pass through it.
     """
 
     def __init__(
@@ -30,7 +31,7 @@ class Requests(Stage):
         self._round_trip = round_trip
         self._settings = settings or RequestSettings()
         self._repaired_at = float("-inf")
-        self._due: float | None = None  # when a request that waits is passed on
+        self._due: float | None = None  # the time to pass on a request that waits
         self._full_intra: int | None = None  # number of the last one
 
     def rtp(self, packet: RtpPacket, now: float) -> None:

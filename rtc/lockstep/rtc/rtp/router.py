@@ -1,4 +1,4 @@
-"""Which media section a packet is of, in one bundle (RFC 9143 9.2)."""
+"""Finds the media section of a packet in one bundle (RFC 9143 9.2)."""
 
 from collections import Counter
 from collections.abc import Collection, Iterable
@@ -13,7 +13,7 @@ MAX_SOURCES = 64  # SSRCs that are remembered: as many as decryption lets throug
 
 @dataclass(frozen=True, slots=True)
 class Route:
-    """What the negotiation says of one section's packets."""
+    """The packets of one section, as negotiated."""
 
     mid: str
     payload_types: frozenset[int]
@@ -22,7 +22,7 @@ class Route:
 
 
 class Router:
-    """`counts`: "unknown" (no section wants it), "sources" (more SSRCs than MAX_SOURCES)."""
+    """Finds a packet's section. `counts`: "unknown" (no section wants it), "sources" (over MAX_SOURCES SSRCs)."""
 
     def __init__(self, routes: Iterable[Route]) -> None:
         self.counts: Counter[str] = Counter()
@@ -31,7 +31,7 @@ class Router:
         self._mid_extensions = {each.mid_extension for each in self._routes.values()} - {None}
 
     def route(self, packet: RtpPacket) -> str | None:
-        """The mid; None when no section wants it."""
+        """Return the mid; None if no section wants the packet."""
         mid = self._named(packet) or self._by_ssrc.get(packet.ssrc) or self._only_one_with(packet.payload_type)
         if mid is None or packet.payload_type not in self._routes[mid].payload_types:
             self.counts["unknown"] += 1

@@ -28,7 +28,7 @@ MAX_COUNT = 31  # of report blocks, chunks or sources: five bits
 
 @dataclass(frozen=True, slots=True)
 class ReportBlock:
-    """What a receiver says of one stream (RFC 3550 6.4.1)."""
+    """A receiver's report about one stream (RFC 3550 6.4.1)."""
 
     ssrc: int
     fraction_lost: int  # in 256ths, since the report before
@@ -36,7 +36,7 @@ class ReportBlock:
     highest_sequence: int  # 32 bits: with the number of wraps
     jitter: int  # in the codec's clock
     last_report: int  # middle 32 bits of the newest sender report's NTP time; 0 before the first
-    delay: int  # since that one came, in 65536ths of a second
+    delay: int  # since that report came, in 65536ths of a second
 
     def pack(self) -> bytes:
         lost = self.fraction_lost << 24 | self.packets_lost & 0xFFFFFF
@@ -65,7 +65,7 @@ class SenderReport:
 
 @dataclass(frozen=True, slots=True)
 class ReceiverReport:
-    ssrc: int  # of who reports
+    ssrc: int  # of the reporter
     blocks: tuple[ReportBlock, ...] = ()
 
     def pack(self) -> bytes:
@@ -98,7 +98,7 @@ class Goodbye:
 
 @dataclass(frozen=True, slots=True)
 class UnknownRtcp:
-    """A packet of a type that nothing here reads."""
+    """A packet of a type that is not read here."""
 
     packet_type: int
     count: int  # the five bits that mean something else in each type
@@ -112,12 +112,12 @@ RtcpPacket = SenderReport | ReceiverReport | SourceDescription | Goodbye | Unkno
 
 
 def pack_rtcp(packets: Sequence[RtcpPacket]) -> bytes:
-    """A compound packet."""
+    """Return a compound packet."""
     return b"".join(packet.pack() for packet in packets)
 
 
 def parse_rtcp(data: bytes) -> list[RtcpPacket]:
-    """The packets of a compound one, or of one of reduced size (RFC 5506). Raises RtpError."""
+    """Return the packets in a compound one, or in one of reduced size (RFC 5506). Raises RtpError."""
     if not data:
         raise RtpError("no RTCP packet")
     return [_parse(kind, count, body) for kind, count, body in _split(data)]

@@ -14,7 +14,7 @@ MOST_EXPECTED = 100_000  # packets between two reports of a peer; more is invali
 
 @dataclass(frozen=True, slots=True)
 class SenderReportSettings:
-    interval: float = 1.0  # s; RFC 3550 6.2 would let video report more often, without a use
+    interval: float = 1.0  # s; RFC 3550 6.2 would let video report more often, without benefit
     remembered: int = 16  # reports that an answer may name; over a satellite the newest is not the one
 
 
@@ -33,7 +33,7 @@ class SenderReports(Stage):
         super().__init__(following)
         self.packets = 0  # sent, without retransmissions
         self.octets = 0  # of their payload
-        self.newest: ReportBlock | None = None  # the peer's
+        self.newest: ReportBlock | None = None  # from the peer
         self._ssrc = ssrc
         self._clock_rate = clock_rate
         self._cname = cname
@@ -41,9 +41,9 @@ class SenderReports(Stage):
         self._round_trip = round_trip
         self._settings = settings or SenderReportSettings()
         self.interval = self._settings.interval  # s
-        self._last: tuple[int, float] | None = None  # RTP timestamp, and when its sample was captured
+        self._last: tuple[int, float] | None = None  # RTP timestamp and capture time of one sample
         self._due: float | None = None
-        self._sent: dict[int, float] = {}  # middle of a report's NTP time, to when it was sent; the oldest first
+        self._sent: dict[int, float] = {}  # from the middle of a report's NTP time to its sending; the oldest first
 
     def rtp(self, packet: RtpPacket, now: float) -> None:
         self.packets += 1
@@ -62,12 +62,13 @@ class SenderReports(Stage):
         super().handle_timer(now)
 
     def report_early(self, now: float) -> None:
-        """Another stream of the same peer reports now: one packet has room for both, if this one's turn is near."""
+        """Report early if the turn of this stream is near: another stream of the peer reports now, and one packet has
+        room for both."""
         if self._due is not None and now >= self._due - self.interval / 2:
             self._report(now)
 
     def goodbye(self, now: float) -> None:
-        """The stream ends (RFC 3550 6.6); nothing when it never began."""
+        """End the stream (RFC 3550 6.6); no effect if it never began."""
         if self._due is not None:
             self._report(now)
             self._due = None

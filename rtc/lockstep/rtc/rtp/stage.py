@@ -40,7 +40,7 @@ class KeyframeRequested:
 
 @dataclass(frozen=True, slots=True)
 class Reception:
-    """The peer's report about an own stream, since its previous report."""
+    """The peer's report about an outgoing stream, since its previous report."""
 
     ssrc: int
     expected: int  # packets
@@ -51,7 +51,7 @@ class Reception:
 
 @dataclass(frozen=True, slots=True)
 class BandwidthEstimate:
-    """What the peer believes that the path carries, for these streams together (REMB)."""
+    """The bitrate that the peer believes the path to carry, for these streams together (REMB)."""
 
     bitrate: int  # bit/s
     ssrcs: frozenset[int]
@@ -59,7 +59,7 @@ class BandwidthEstimate:
 
 @dataclass(frozen=True, slots=True)
 class Arrivals:
-    """When packets arrived that were numbered for the whole transport, in the peer's clock."""
+    """The arrival times of packets that were numbered for the whole transport, in the peer's clock."""
 
     arrivals: tuple[tuple[int, float | None], ...]  # transport-wide number and s; None: not yet
 
@@ -91,7 +91,7 @@ StreamEvent = KeyframeRequested | Reception | BandwidthEstimate | Arrivals | Pac
 class RoundTrip:
     """The round trip of one peer's path. Reports measure it; stages that wait for an answer read it."""
 
-    seconds: float = 0.1  # an assumption before one was measured
+    seconds: float = 0.1  # an assumption until one is measured
     measured: bool = field(default=False)
 
     def measure(self, seconds: float) -> None:
@@ -105,27 +105,27 @@ class Stage:
         self.following = following
 
     def rtp(self, packet: RtpPacket, now: float) -> None:
-        """A packet on its way."""
+        """Take a packet on its way."""
         self.following.rtp(packet, now)
 
     def rtcp(self, packet: RtcpPacket, now: float) -> None:
-        """An RTCP packet that came from the peer."""
+        """Take an RTCP packet that came from the peer."""
         self.following.rtcp(packet, now)
 
     def control(self, packet: RtcpPacket, now: float) -> None:
-        """An RTCP packet that is to go to the peer."""
+        """Take an RTCP packet that is to go to the peer."""
         self.following.control(packet, now)
 
     def event(self, event: StreamEvent) -> None:
-        """Something that the application may want to know."""
+        """Take an event for the application."""
         self.following.event(event)
 
     def timer(self) -> float | None:
-        """When `handle_timer` is due: the earliest of this stage and those behind it."""
+        """Return the time at which `handle_timer` is due: the earliest of this stage and those behind it."""
         return earliest(self.due(), self.following.timer())
 
     def due(self) -> float | None:
-        """When this stage alone has something to do."""
+        """Return the time at which this stage alone has something to do."""
         return None
 
     def handle_timer(self, now: float) -> None:
@@ -173,5 +173,5 @@ class Sink(Stage):
 
 
 def earliest(*times: float | None) -> float | None:
-    """None when all are."""
+    """Return the earliest of these times; None if all are None."""
     return min((time for time in times if time is not None), default=None)

@@ -1,6 +1,6 @@
 """All streams to and from one peer, as its session description says: from frames to RTP and back, without I/O.
 
-What comes in and goes out here is plain; encryption is around it.
+Packets are plain here; encryption is around this module.
 """
 
 from collections import Counter
@@ -26,10 +26,10 @@ REPAIRED = ("nack",)  # a=rtcp-fb of a peer that asks for packets again, or keep
 
 @dataclass(frozen=True, slots=True)
 class Identity:
-    """What we call ourselves in RTP."""
+    """The name and the SSRC of this side in RTP."""
 
     cname: str
-    ssrc: int  # of a receiver only
+    ssrc: int  # for reports where nothing is sent
 
     @classmethod
     def new(cls, random: Random) -> "Identity":
@@ -41,19 +41,19 @@ class NegotiatedMedia:
     """One section, after the answer."""
 
     section: MediaSection  # the answer's: codecs and header extensions in use
-    direction: Direction  # the own one
-    ssrc: int  # of what we send
+    direction: Direction  # that of this side
+    ssrc: int  # of the outgoing stream
     repair_ssrc: int
     announced: frozenset[int] = frozenset()  # SSRCs that the peer has named
 
     @property
     def codec(self) -> Codec:
-        """What we send."""
+        """The codec of the outgoing stream."""
         return next(codec for codec in self.section.codecs if codec.repairs is None)
 
 
 class Streams:
-    """`counts`: "rtp_malformed", "rtcp_malformed", and packets that the router could not place."""
+    """The streams of one peer. `counts`: "rtp_malformed", "rtcp_malformed", and packets that no section wants."""
 
     def __init__(self, media: Sequence[NegotiatedMedia], identity: Identity, share: PathShare, random: Random) -> None:
         self.counts: Counter[str] = Counter()
@@ -69,7 +69,7 @@ class Streams:
         self._router = Router(_route(each) for each in receiving)
 
     def receive_rtp(self, data: bytes, now: float) -> None:
-        """A decrypted RTP packet."""
+        """Take a decrypted RTP packet."""
         try:
             packet = RtpPacket.parse(data)
         except RtpError:
@@ -82,7 +82,7 @@ class Streams:
             self.incoming[mid].rtp(packet, now)
 
     def receive_rtcp(self, data: bytes, now: float) -> None:
-        """A decrypted compound RTCP packet."""
+        """Take a decrypted compound RTCP packet."""
         try:
             packets = parse_rtcp(data)
         except RtpError:
@@ -104,30 +104,30 @@ class Streams:
             stream.reports.report_early(now)
 
     def close(self, now: float) -> None:
-        """Say goodbye for every stream that was sent."""
+        """Say goodbye for every outgoing stream."""
         for stream in self.outgoing.values():
             stream.close(now)
 
     def rtp_to_send(self) -> list[bytes]:
-        """Before encryption."""
+        """Return the RTP packets to send, before encryption."""
         return [packet for stream in self.outgoing.values() for packet in stream.packets_to_send()]
 
     def rtcp_to_send(self) -> list[bytes]:
-        """Compound packets, before encryption."""
+        """Return the compound packets to send, before encryption."""
         return self.compounds([packet for stream in self._all() for packet in stream.controls_to_send()])
 
     def compounds(self, controls: Sequence[RtcpPacket]) -> list[bytes]:
-        """`controls` as compound packets, before encryption."""
+        """Return `controls` as compound packets, before encryption."""
         return list(_compounds(controls, self._identity)) if controls else []
 
     def packets(self) -> Iterator[tuple[str, RtpPacket]]:
-        """What came, by mid."""
+        """Yield the received packets, each with its mid."""
         for mid, stream in self.incoming.items():
             for packet in stream.packets():
                 yield mid, packet
 
     def events(self) -> Iterator[tuple[str, StreamEvent]]:
-        """What streams have to tell, by mid."""
+        """Yield the events of all streams, each with its mid."""
         ways: tuple[Mapping[str, OutgoingStream | IncomingStream], ...] = (self.outgoing, self.incoming)
         for way in ways:
             for mid, stream in way.items():
@@ -176,7 +176,7 @@ def _route(media: NegotiatedMedia) -> Route:
 
 
 def _compounds(controls: Sequence[RtcpPacket], identity: Identity) -> Iterator[bytes]:
-    """RFC 3550 6.1: a report first, and a name; each within one datagram."""
+    """Yield compound packets with a report first, and a name (RFC 3550 6.1); each fits one datagram."""
     reports = [each for each in controls if isinstance(each, SenderReport | ReceiverReport)]
     others = [each for each in controls if not isinstance(each, SenderReport | ReceiverReport)]
     ssrc = reports[0].ssrc if reports else identity.ssrc

@@ -52,14 +52,14 @@ __all__ = ["Association", "State"]
 
 MOST_STREAMS = 65535  # announced; RFC 8831 6.2
 ROOM_BESIDE_SACK = 192  # bytes
-MOST_CONTROL = 64  # chunks that wait to leave: answers to the peer beyond them are not given
+MOST_CONTROL = 64  # chunks that wait to leave; the peer gets no answers beyond them
 MOST_REPORTED = 128  # bytes of an unknown chunk in the report to its sender
 
 _word = Struct("!L")
 
 
 class State(Enum):
-    """RFC 9260 4."""
+    """The states of RFC 9260 4."""
 
     CLOSED = "closed"
     COOKIE_WAIT = "cookie-wait"
@@ -78,11 +78,11 @@ _WANTS_TO_SEND = frozenset({State.CLOSED, State.COOKIE_WAIT, State.COOKIE_ECHOED
 
 
 class Association:
-    """Messages over the packets that DTLS carries.
+    """One SCTP association: messages over the packets that DTLS carries.
 
     Give every packet to `receive_packet`, call `handle_timer` when `timer` is due, and after each call of any method
     send the packets of `packets_to_send` and read `events`. `now` is seconds of one monotonic clock. Both ends call
-    `start` when DTLS is up, as RFC 8841 9.3 wants; either may be alone in that.
+    `start` when DTLS is up, as RFC 8841 9.3 wants; one end alone suffices.
 
     Nothing but the owner, the peer or a protocol error ends an association, and `Closed` names which. In particular
     there is no Association.Max.Retrans (RFC 9260 8.1) and no Max.Init.Retransmits: below lies ICE, whose consent
@@ -94,7 +94,7 @@ class Association:
     A restart by the peer (RFC 9260 5.2.4 A) ends the association: WebRTC has none, since it comes with a new DTLS
     connection.
 
-    `counts` has what was dropped or happened otherwise, by name.
+    `counts` has dropped input and other incidents, by name.
     """
 
     def __init__(
@@ -114,7 +114,7 @@ class Association:
         self.round_trip = RoundTrip(settings)
         self.max_message = min(settings.max_send_message, peer_max_message or settings.max_send_message)
         self._ended = False
-        self.now = 0.0  # the last that was handed in
+        self.now = 0.0  # the last time that was handed in
         self._peer_port = settings.port if peer_port is None else peer_port
         self._tag = int.from_bytes(random_bytes(4), "big") or 1
         self._cookies = Cookies(random_bytes(32), settings.cookie_lifetime)
@@ -127,11 +127,11 @@ class Association:
         self._packets: list[bytes] = []  # ready to leave
         self._control: list[bytes] = []  # chunks that leave with the next packet
         self._events: list[Event] = []
-        self._cookie = b""  # the peer's
+        self._cookie = b""  # from the peer
         self._cookie_is_due = False
         self._repeat_at: float | None = None  # T1 or T2
         self._repeats = 0
-        self._asked_at = 0.0  # when the handshake's chunk left
+        self._asked_at = 0.0  # the time at which the handshake's chunk left
         self._heartbeats = Heartbeats()
         self._handlers: dict[type, Callable[[Any], None]] = {
             Data: self._receive_data,
@@ -153,7 +153,7 @@ class Association:
             ShutdownComplete: self._receive_shutdown_complete,
         }
 
-    # What the owner does
+    # Methods for the owner
 
     def start(self, now: float) -> None:
         """Begin the handshake, when the peer has not done so already."""
@@ -195,15 +195,15 @@ class Association:
         self._sender.queue.put(Message(stream, protocol, payload, ordered, max_retransmits, expires))
 
     def buffered(self, stream: int) -> int:
-        """Bytes that wait on this stream, newest-wins messages apart."""
+        """Return the number of bytes that wait on this stream, without newest-wins messages."""
         return self._sender.queue.buffered(stream)
 
     def has_waiting(self, stream: int) -> bool:
-        """Whether a message waits on this stream that has not begun to leave."""
+        """True if a message waits on this stream that has not begun to leave."""
         return self._sender.queue.has(stream)
 
     def reset_streams(self, streams: tuple[int, ...], now: float) -> bool:
-        """Reset these outgoing streams, on which nothing waits. False: the peer cannot (RFC 6525 5.1.1)."""
+        """Reset these outgoing streams, on which nothing waits. Return False if the peer cannot (RFC 6525 5.1.1)."""
         self.now = now
         if self._ended or self._peer is None or not self._peer.reconfiguration:
             return False
@@ -228,10 +228,10 @@ class Association:
             self._send_alone(self._peer.tag, Abort([(USER_ABORT, b"")]))
         self._end(reason)
 
-    # What every core has
+    # The interface of every core
 
     def receive_packet(self, data: bytes, now: float) -> None:
-        """What DTLS delivered. Nothing is raised: bad input is dropped and counted, or ends the association."""
+        """Take a packet from DTLS. Nothing is raised: bad input is dropped and counted, or ends the association."""
         self.now = now
         try:
             packet = decode_packet(data)
@@ -257,7 +257,7 @@ class Association:
         self._after_packet()
 
     def packets_to_send(self) -> list[bytes]:
-        """Everything that is due, as of the last `now`. SACK and data share packets."""
+        """Return every due packet, as of the last `now`. SACK and data share packets."""
         if not self._ended:
             if self._is_up:
                 self._bundle()
@@ -269,7 +269,7 @@ class Association:
         return packets
 
     def timer(self) -> float | None:
-        """When `handle_timer` is due."""
+        """Return the time at which `handle_timer` is due; None: never."""
         if self._ended:
             return None
         due = self._repeat_at
@@ -291,7 +291,7 @@ class Association:
             self._sender.handle_timer(now)
 
     def events(self) -> list[Event]:
-        """What has happened; drained."""
+        """Return the events since the last call."""
         events, self._events = self._events, []
         return events
 
@@ -308,7 +308,7 @@ class Association:
             self._packets.append(self._packet(chunks))
 
     def _has_due(self) -> bool:
-        """Whether anything may leave now; mostly there is nothing."""
+        """True if anything may leave now; mostly there is nothing."""
         acknowledge_at = self._receiver.acknowledge_at
         return (
             not self._sender.is_quiet
@@ -327,7 +327,7 @@ class Association:
         )
 
     def _next_chunks(self) -> bytes:
-        """The next packet's chunks: control first (RFC 9260 6.10); a pending SACK travels with data (6.2)."""
+        """Return the next packet's chunks: control first (RFC 9260 6.10); a pending SACK travels with data (6.2)."""
         sender, receiver, now = self._sender, self._receiver, self.now
         control = self._take_control(self._room) if self._has_due_control() else b""
         room = self._room - len(control)
@@ -344,7 +344,7 @@ class Association:
         return control + sender.chunks(room, now)
 
     def _take_control(self, room: int) -> bytes:
-        """Control chunks that fit; a larger one waits for the next packet."""
+        """Take the control chunks that fit; a larger one waits for the next packet."""
         self._add_due_control()
         taken = b""
         while self._control and len(taken) + len(self._control[0]) <= room:
@@ -369,7 +369,7 @@ class Association:
                 self._control.append(heartbeat.encode())
 
     def _say(self, chunk: Chunk) -> None:
-        """An answer, which leaves with the next packet; none when too many wait."""
+        """Queue an answer, which leaves with the next packet; drop it when too many wait."""
         if len(self._control) < MOST_CONTROL:
             self._control.append(chunk.encode())
 
@@ -381,7 +381,7 @@ class Association:
         self._packets.append(encode_packet(self.settings.port, self._peer_port, tag, chunk.encode()))
 
     def _send_cookie(self) -> None:
-        """COOKIE ECHO, and as many messages as fit: nothing else leaves before the answer (RFC 9260 5.1 C)."""
+        """Send COOKIE ECHO, and as many messages as fit: nothing else leaves before the answer (RFC 9260 5.1 C)."""
         self._cookie_is_due = False
         echo = CookieEcho(self._cookie).encode()
         self._packets.append(self._packet(echo + self._sender.chunks(self._room - len(echo), self.now)))
@@ -389,12 +389,12 @@ class Association:
     # Packets in
 
     def _refusal(self, packet: Packet) -> str:
-        """Why a packet is not looked at; "" when it is (RFC 9260 8.5)."""
+        """Return the reason not to read a packet (RFC 9260 8.5); "" for a packet to read."""
         if packet.source != self._peer_port or packet.destination != self.settings.port:
             return "wrong_port"
         first = packet.chunks[0]
         if self._ended:
-            if isinstance(first, ShutdownAck):  # 8.4 5: the own one was lost
+            if isinstance(first, ShutdownAck):  # 8.4 5: the one of this side was lost
                 self._send_alone(packet.tag, ShutdownComplete(reflected=True))
             return "ended"
         if type(first) is Init:
@@ -404,7 +404,7 @@ class Association:
         return "" if packet.tag == self._tag else "wrong_tag"
 
     def _report_unknown(self, chunk: Chunk) -> bool:
-        """Whether to go on with the packet (RFC 9260 3.2)."""
+        """Report an unknown chunk. Return True to go on with the packet (RFC 9260 3.2)."""
         assert isinstance(chunk, Unknown)
         self.counts["unknown_chunk"] += 1
         if chunk.kind & 0x40 and self._peer is not None:
@@ -479,7 +479,7 @@ class Association:
             self._asked_at = self.now
 
     def _repeat(self) -> None:
-        """T1 or T2 has expired (RFC 9260 5.1, 9.2)."""
+        """Repeat a chunk: T1 or T2 has expired (RFC 9260 5.1, 9.2)."""
         if self.state is State.COOKIE_WAIT:
             self._send_init()
             return
@@ -493,7 +493,7 @@ class Association:
         self._repeat_later()
 
     def _answered(self) -> None:
-        """The peer has answered the handshake's chunk: a round trip, when it was sent once."""
+        """Note the answer to the handshake's chunk, which measures a round trip if the chunk was sent once."""
         if self._repeats == 0:
             self.round_trip.sample(self.now - self._asked_at, self.now)
         self._repeats = 0
@@ -526,7 +526,7 @@ class Association:
         self._repeat_later()
 
     def _receive_cookie_echo(self, chunk: CookieEcho) -> None:
-        """RFC 9260 5.1 D and the table of 5.2.4, of which a restart (A) is not left: INIT ends on it."""
+        """Take COOKIE ECHO: RFC 9260 5.1 D and the table of 5.2.4, without a restart (A), since INIT ends on that."""
         opened = self._cookies.open(chunk.body)
         if opened is None:
             self.counts["bad_cookie"] += 1
@@ -571,7 +571,7 @@ class Association:
     # The end
 
     def _go_on_shutting_down(self) -> None:
-        """RFC 9260 9.2: SHUTDOWN, or the answer to it, when everything has arrived."""
+        """Send SHUTDOWN, or the answer to it, when everything has arrived (RFC 9260 9.2)."""
         if not self._sender.idle:
             return
         if self.state is State.SHUTDOWN_PENDING:

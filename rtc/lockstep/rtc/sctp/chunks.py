@@ -61,12 +61,12 @@ _interleaved_skip = Struct("!HHL")
 
 
 def _packed(kind: int, flags: int, body: bytes) -> bytes:
-    """Padded to a multiple of four, which the length does not count."""
+    """Return a chunk padded to a multiple of four, which the length does not count."""
     return _chunk.pack(kind, flags, CHUNK_HEADER + len(body)) + body + bytes(-len(body) % 4)
 
 
 def encode_data(tsn: int, flags: int, stream: int, sequence: int, protocol: int, payload: bytes) -> bytes:
-    """A DATA chunk."""
+    """Return a DATA chunk."""
     length = DATA_HEADER + len(payload)
     encoded = _data.pack(0, flags, length, tsn, stream, sequence, protocol) + payload
     return encoded + bytes(-length % 4) if length % 4 else encoded
@@ -381,7 +381,7 @@ class InterleavedForwardTsn:
 
 @dataclass(slots=True)
 class Unknown:
-    """A chunk of a type that is not known here. The two highest bits of the type say what to do (RFC 9260 3.2)."""
+    """A chunk of an unknown type. The two highest bits of the type say what to do (RFC 9260 3.2)."""
 
     kind: int
     flags: int
@@ -412,8 +412,8 @@ Chunk = (
     | Unknown
 )
 
-# The shortest value that each type can have, and what decodes `data[start:end]` behind a header of four bytes. What is
-# inconsistent raises SctpParseError.
+# The shortest value that each type can have, and the decoder of `data[start:end]` behind a header of four bytes.
+# Decoders raise SctpParseError for inconsistent values.
 DECODERS: dict[int, tuple[int, Callable[[int, bytes, int, int], Chunk]]] = {
     Data.kind: (12, Data.decode),
     Init.kind: (16, Init.decode),

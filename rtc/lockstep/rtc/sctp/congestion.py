@@ -1,4 +1,4 @@
-"""How much may be unacknowledged (RFC 9260 7.2)."""
+"""The number of bytes that may be unacknowledged (RFC 9260 7.2)."""
 
 from lockstep.rtc.sctp.settings import SctpSettings
 
@@ -11,12 +11,12 @@ class CongestionWindow:
     def __init__(self, settings: SctpSettings) -> None:
         self._packet = settings.max_packet
         self._partial = 0  # bytes acknowledged since the window last grew
-        self._recovery_ends: int | None = None  # at the acknowledgement of this TSN
+        self._recovery_ends: int | None = None  # the TSN whose acknowledgement ends the recovery
         self.size = settings.initial_window * settings.max_packet
         self.threshold = settings.receive_window  # ssthresh; RFC 9260 7.2.1 lets it begin as high as one likes
 
     def acknowledged(self, size: int, was_full: bool, cumulative: int) -> None:
-        """`size` more bytes have arrived, and everything up to `cumulative`; the window `was_full` before."""
+        """Note that `size` more bytes have arrived, and everything up to `cumulative`; the window `was_full` before."""
         if self._recovery_ends is not None:
             if cumulative >= self._recovery_ends:
                 self._recovery_ends = None
@@ -32,14 +32,14 @@ class CongestionWindow:
             self.size += self._packet
 
     def lost(self, highest: int) -> None:
-        """A chunk is missing; `highest` is the last one sent. Once in a recovery (7.2.4)."""
+        """Note a missing chunk; `highest` is the last one sent. Once in a recovery (7.2.4)."""
         if self._recovery_ends is None:
             self._recovery_ends = highest
             self._halve()
             self.size = self.threshold
 
     def expired(self) -> None:
-        """Nothing came back at all, twice (7.2.3). `SctpSettings.window_floor` is the sender's."""
+        """Note that nothing came back at all, twice (7.2.3). `SctpSettings.window_floor` is the sender's."""
         self._halve()
         self._recovery_ends = None
         self.size = self._packet

@@ -1,10 +1,10 @@
-"""What the functions of this package raise. Nothing that a peer sends raises anything out of `receive_packet`."""
+"""The errors of this package. Nothing that a peer sends raises anything out of `receive_packet`."""
 
 __all__ = ["AssociationClosed", "MessageTooLarge", "ProtocolViolation", "SctpParseError", "SendQueueFull"]
 
 
 class SctpParseError(ValueError):
-    """The bytes are no SCTP packet, chunk or parameter. Raised by the parsers, and nothing else is."""
+    """The bytes are not an SCTP packet, chunk or parameter. The only error that the parsers raise."""
 
 
 class ProtocolViolation(Exception):
@@ -27,4 +27,4 @@ class MessageTooLarge(ValueError):
 
 
 class SendQueueFull(Exception):
-    """So many bytes wait on this stream that the message was not taken. Try again when they have left."""
+    """Too many bytes wait on this stream; the message was not taken. Try again when they have left."""

@@ -1,4 +1,4 @@
-"""What an association tells its owner."""
+"""The events of an association for its owner."""
 
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -8,7 +8,7 @@ __all__ = ["Closed", "Established", "Event", "MessageReceived", "OutgoingStreams
 
 @dataclass(frozen=True, slots=True)
 class Established:
-    """Both ends know each other."""
+    """The handshake is done: both ends know each other."""
 
     streams: int  # the peer takes messages on streams below this number
     interleaving: bool  # RFC 8260 is in use

@@ -1,4 +1,4 @@
-"""What two ends tell each other in INIT and INIT ACK, and the cookie that carries it (RFC 9260 5.1)."""
+"""The content of INIT and INIT ACK, and the cookie that carries it (RFC 9260 5.1)."""
 
 import hmac
 from collections.abc import Iterable
@@ -27,7 +27,7 @@ _MAC = 16  # bytes
 
 @dataclass(frozen=True, slots=True)
 class PeerInit:
-    """What the peer's INIT or INIT ACK says."""
+    """The content of the peer's INIT or INIT ACK."""
 
     tag: int
     window: int
@@ -40,7 +40,7 @@ class PeerInit:
 
 
 def own_parameters(settings: SctpSettings) -> list[Parameter]:
-    """What this end can do."""
+    """Return the parameters that name the abilities of this end."""
     extensions = [Reconfig.kind, ForwardTsn.kind]
     if settings.interleaving:
         extensions += [InterleavedData.kind, InterleavedForwardTsn.kind]
@@ -48,7 +48,8 @@ def own_parameters(settings: SctpSettings) -> list[Parameter]:
 
 
 def read_init(init: Init) -> PeerInit:
-    """
+    """Return the content of an INIT or INIT ACK.
+
     Raises:
         ProtocolViolation: a value that RFC 9260 3.3.2 forbids.
     """
@@ -73,7 +74,7 @@ def read_init(init: Init) -> PeerInit:
 
 
 def unrecognized(parameters: Iterable[Parameter]) -> list[Parameter]:
-    """What to report of these, by the two highest bits of their type (RFC 9260 3.2.1)."""
+    """Return the parameters to report, by the two highest bits of their type (RFC 9260 3.2.1)."""
     found: list[Parameter] = []
     for kind, value in parameters:
         if kind in (STATE_COOKIE, UNRECOGNIZED_PARAMETER, FORWARD_TSN_SUPPORTED, SUPPORTED_EXTENSIONS):
@@ -86,9 +87,10 @@ def unrecognized(parameters: Iterable[Parameter]) -> list[Parameter]:
 
 
 class Cookies:
-    """Cookies hold the state of a peer that is not there yet, so that this side keeps none for it (5.1.3). They have a
-    MAC and end after a time. Behind DTLS no attacker can forge or spoof packets; the remaining case is a peer that
-    answers late, or twice.
+    """Makes and opens cookies, which hold the state of a new peer, so that this side keeps none for it (5.1.3).
+
+    Cookies have a MAC and end after a time. Behind DTLS no attacker can forge or spoof packets; the remaining case is a
+    peer that answers late, or twice.
     """
 
     def __init__(self, key: bytes, lifetime: float) -> None:
@@ -110,7 +112,7 @@ class Cookies:
         return body + self._mac(body)
 
     def open(self, cookie: bytes) -> tuple[PeerInit, float] | None:
-        """The peer, and when the cookie was made. None: it is not from here."""
+        """Return the peer and the time at which the cookie was made. None: this side did not make it."""
         body, mac = cookie[: _fields.size], cookie[_fields.size :]
         if len(body) < _fields.size or not hmac.compare_digest(mac, self._mac(body)):
             return None

@@ -1,4 +1,4 @@
-"""Measuring the round trip where no message can (RFC 9260 8.3)."""
+"""Measures the round trip where no message can (RFC 9260 8.3)."""
 
 from struct import Struct
 
@@ -8,14 +8,15 @@ from lockstep.rtc.sctp.parameters import encode_parameters
 __all__ = ["Heartbeats"]
 
 INFO = 1  # RFC 9260 3.3.5
-LOST_AFTER = 5.0  # s, after which another one may be sent
+LOST_AFTER = 5.0  # s; then another one may be sent
 
 _number = Struct("!Q")
 
 
 class Heartbeats:
-    """One at a time. Karn's rule leaves no sample where everything is repeated: on a path whose round trip is longer
-    than the timeout, everything would be repeated for ever. An answer to a HEARTBEAT is that HEARTBEAT's alone."""
+    """Sends one HEARTBEAT at a time. Karn's rule leaves no sample where everything is repeated: on a path whose round
+    trip is longer than the timeout, everything would be repeated for ever. An answer to a HEARTBEAT belongs to it
+    alone."""
 
     def __init__(self) -> None:
         self._count = 0
@@ -23,7 +24,7 @@ class Heartbeats:
         self._sent_at = 0.0
 
     def ask(self, now: float) -> Heartbeat | None:
-        """One to send; None while another is under way."""
+        """Return a HEARTBEAT to send; None while another is under way."""
         if self._waits_for and now - self._sent_at < LOST_AFTER:
             return None
         self._count += 1
@@ -32,7 +33,7 @@ class Heartbeats:
         return Heartbeat(self._waits_for)
 
     def answered(self, chunk: HeartbeatAck, now: float) -> float | None:
-        """The round trip in seconds; None: it answers no HEARTBEAT that is under way."""
+        """Return the round trip in seconds; None if this answers no HEARTBEAT that is under way."""
         if not self._waits_for or chunk.body != self._waits_for:
             return None
         self._waits_for = b""

@@ -29,13 +29,13 @@ class Packet:
 
 
 def encode_packet(source: int, destination: int, tag: int, chunks: bytes) -> bytes:
-    """A packet of chunks that are encoded already."""
+    """Return a packet of encoded chunks."""
     header = _ports_and_tag.pack(source, destination, tag)
     return header + _checksum.pack(crc32c(header + _NO_CHECKSUM + chunks)) + chunks
 
 
 def decode_packet(data: bytes) -> Packet:
-    """Every chunk of a packet, unknown types as they are.
+    """Return a packet with all its chunks, unknown types as they are.
 
     Raises:
         SctpParseError: too short, wrong checksum, or a chunk that is not what its type and length say. No chunk of

@@ -53,7 +53,7 @@ _header = Struct("!HH")
 
 
 def decode_parameters(data: bytes, start: int = 0) -> list[Parameter]:
-    """The parameters from `start` to the end.
+    """Return the parameters from `start` to the end.
 
     Raises:
         SctpParseError: a length is less than four or points beyond the end.
@@ -71,5 +71,5 @@ def decode_parameters(data: bytes, start: int = 0) -> list[Parameter]:
 
 
 def encode_parameters(parameters: Sequence[Parameter]) -> bytes:
-    """All of them, each padded to a multiple of four; the chunk's length counts the last one's padding too."""
+    """Return all parameters, each padded to a multiple of four; the chunk's length counts the last padding too."""
     return b"".join(_header.pack(kind, len(value) + 4) + value + bytes(-len(value) % 4) for kind, value in parameters)

@@ -1,4 +1,4 @@
-"""Fragments to messages, and ordered messages into their order (RFC 9260 6.5, 6.6, 6.9; RFC 8260 2.2)."""
+"""Joins fragments into messages, and puts ordered messages into their order (RFC 9260 6.5, 6.6, 6.9; RFC 8260 2.2)."""
 
 from dataclasses import dataclass, field
 
@@ -12,7 +12,7 @@ __all__ = ["Reassembly"]
 
 OVERHEAD = 256  # bytes that a chunk costs beyond its payload, so that many small ones are no way around the bound
 
-# Where a fragment is, apart from its number: DATA's number is its TSN, I-DATA's counts within its message.
+# The place of a fragment, apart from its number: DATA's number is its TSN, I-DATA's counts within its message.
 _Space = tuple[int, bool, int] | None
 _DATA: _Space = None
 
@@ -42,7 +42,7 @@ class _Stream:
 
 
 class Reassembly:
-    """Messages leave through `delivered`. `held` is the size of incomplete and early ones, in bytes."""
+    """Joins fragments into messages, which leave by `delivered`. `held`: bytes of incomplete and early ones."""
 
     def __init__(self, settings: SctpSettings, interleaving: bool) -> None:
         self._max_message = settings.max_receive_message
@@ -55,11 +55,11 @@ class Reassembly:
 
     @property
     def waits_in_order(self) -> bool:
-        """Whether a complete message waits for an earlier one of its stream."""
+        """True if a complete message waits for an earlier one of its stream."""
         return any(stream.held for stream in self._streams.values())
 
     def push(self, chunk: Data | InterleavedData, tsn: int) -> None:
-        """A chunk that had not come before; `tsn` is unwrapped.
+        """Take a chunk that had not come before; `tsn` is unwrapped.
 
         Raises:
             ProtocolViolation: the message is larger than the peer was told.
@@ -92,7 +92,7 @@ class Reassembly:
         return unwrap(chunk.sequence, stream.expected, self._sequence_mask)
 
     def _join(self, chunk: Data | InterleavedData, tsn: int) -> _Run:
-        """The run that this fragment is in now: joined with the one before it and the one after it."""
+        """Return the run that this fragment is in now, joined with the one before it and the one after it."""
         sequence = self._unwrap(chunk)
         if isinstance(chunk, Data):
             space, number = _DATA, tsn
@@ -151,7 +151,7 @@ class Reassembly:
             self.delivered.append(message)
 
     def forward(self, cumulative: int, skips: list[Skip]) -> None:
-        """The peer has given up messages: nothing up to the TSN `cumulative` comes any more (RFC 3758 3.6)."""
+        """Drop messages that the peer has given up: nothing up to TSN `cumulative` comes any more (RFC 3758 3.6)."""
         latest: dict[tuple[int, bool], int] = {}
         for skip in skips:
             latest[skip.stream, skip.unordered] = skip.sequence  # one each; a peer's repeats cost nothing
@@ -163,7 +163,7 @@ class Reassembly:
             self._drop(run)
 
     def _skip(self, stream: _Stream, sequence: int) -> None:
-        """No ordered message up to this one arrives any more; those that have arrived are delivered."""
+        """Skip ordered messages up to this one, which do not arrive any more; those that have arrived are delivered."""
         expected = unwrap(sequence, stream.expected, self._sequence_mask) + 1
         if expected <= stream.expected:
             return
@@ -175,7 +175,7 @@ class Reassembly:
         self._release(stream)
 
     def reset(self, streams: tuple[int, ...]) -> None:
-        """These streams begin anew (RFC 6525 5.2.2); an empty list means all."""
+        """Begin these streams anew (RFC 6525 5.2.2); an empty list means all."""
         for number in streams or tuple(self._streams):
             stream = self._streams.pop(number, None)
             if stream is not None:
@@ -186,12 +186,12 @@ class Reassembly:
 
 
 def _same_message(one: Data | InterleavedData, other: Data | InterleavedData) -> bool:
-    """RFC 9260 6.9: fragments of one message share stream, sequence and order."""
+    """True if both are fragments of one message, which share stream, sequence and order (RFC 9260 6.9)."""
     return one.stream == other.stream and one.sequence == other.sequence and (one.flags ^ other.flags) & UNORDERED == 0
 
 
 def _is_given_up(run: _Run, cumulative: int, latest: dict[tuple[int, bool], int]) -> bool:
-    """Whether the rest of it comes no more. `latest` are the last messages given up, by stream and order."""
+    """True if the rest of it comes no more. `latest` are the last messages given up, by stream and order."""
     if isinstance(run.chunk, InterleavedData):  # RFC 8260 2.3.1: by message
         last = latest.get((run.chunk.stream, bool(run.chunk.flags & UNORDERED)))
         return last is not None and run.sequence <= unwrap(last, run.sequence)

@@ -1,4 +1,4 @@
-"""Which chunks have come, and what to tell the peer of it (RFC 9260 6.2)."""
+"""The chunks that have come, and the SACK that tells the peer of them (RFC 9260 6.2)."""
 
 from bisect import bisect_left
 from collections import deque
@@ -16,7 +16,7 @@ ENOUGH_BEYOND = 64  # chunks that came beyond a hole before it can count as give
 
 
 class ReceivedTsns:
-    """Everything up to `cumulative`, and runs beyond it. TSNs are unwrapped."""
+    """The received TSNs: everything up to `cumulative`, and runs beyond it. TSNs are unwrapped."""
 
     def __init__(self, initial_tsn: int, settings: SctpSettings) -> None:
         self.cumulative = initial_tsn - 1
@@ -31,11 +31,11 @@ class ReceivedTsns:
         return bool(self._runs)
 
     def unwrap(self, tsn: int) -> int:
-        near = self.cumulative  # `serial.unwrap` in place, for every chunk comes by here
+        near = self.cumulative  # `serial.unwrap` in place, for every chunk passes here
         return near - HALF + ((tsn - near + HALF) & MASK_32)
 
     def take(self, tsn: int, now: float) -> str:
-        """Note one more. "" when it is new and noted, otherwise the name of why it is not to be used."""
+        """Note one more TSN. Return "" if it is new and noted, otherwise the name of the reason not to use it."""
         if tsn == self.cumulative + 1 and not self._runs:  # nearly always
             self.cumulative = tsn
             return ""
@@ -73,7 +73,7 @@ class ReceivedTsns:
         return ""
 
     def forward(self, cumulative: int, now: float) -> None:
-        """Nothing up to `cumulative` comes any more (RFC 3758 3.6)."""
+        """Move to `cumulative`: nothing up to there comes any more (RFC 3758 3.6)."""
         self.cumulative = max(self.cumulative, cumulative)
         self._advance()
         self._watch(now)
@@ -97,7 +97,7 @@ class ReceivedTsns:
                 marks.popleft()
 
     def given_up(self, now: float) -> int | None:
-        """The TSN up to which missing chunks have been missing for so long that they were given up."""
+        """Return the TSN up to which chunks have been missing for so long that they were given up; None: no TSN."""
         if not self._marks or now - self._marks[0][0] < self._given_up_after:
             return None
         if sum(last - first + 1 for first, last in self._runs) < ENOUGH_BEYOND:
@@ -106,7 +106,7 @@ class ReceivedTsns:
         return highest if highest > self.cumulative else None
 
     def sack(self, window: int, most_gaps: int) -> Sack:
-        """The SACK for the peer; it reports duplicates once, and at most the first `most_gaps` gaps."""
+        """Return the SACK for the peer; it reports duplicates once, and at most the first `most_gaps` gaps."""
         base = self.cumulative
         gaps = [(first - base, last - base) for first, last in self._runs[:most_gaps]] if self._runs else ()
         duplicates, self._duplicates = self._duplicates, []

@@ -1,4 +1,4 @@
-"""The receiving half of an association: chunks to messages, and when to acknowledge them (RFC 9260 6.2)."""
+"""The receiving half of an association: chunks to messages, and the times of acknowledgements (RFC 9260 6.2)."""
 
 from collections import Counter
 
@@ -11,12 +11,12 @@ from lockstep.rtc.sctp.settings import SctpSettings
 
 __all__ = ["PLAIN_SACK", "Receiver"]
 
-PLAIN_SACK = 16  # bytes of one without gaps or duplicates
+PLAIN_SACK = 16  # bytes of a SACK without gaps or duplicates
 MOST_GAPS = 200  # in one SACK, which then fits into a packet beside some control chunks
 
 
 class Receiver:
-    """Messages leave through `messages`. After the chunks of a packet, call `packet_ends`.
+    """Turns chunks into messages, which leave through `messages`. After the chunks of a packet, call `packet_ends`.
 
     A SACK is due at `acknowledge_at`; before that it may travel with data while `is_pending`.
     """
@@ -27,8 +27,8 @@ class Receiver:
         self._counts = counts
         self._delay = settings.acknowledgement_delay
         self._window = settings.receive_window
-        self._packets = 0  # with data, since the last SACK
-        self._data_came = False  # in this packet
+        self._packets = 0  # packets with data, since the last SACK
+        self._data_came = False  # True: this packet has data
         self._hurry = False
         self.received = ReceivedTsns(initial_tsn, settings)
         self.reassembly = Reassembly(settings, interleaving)
@@ -44,8 +44,10 @@ class Receiver:
         return self.reassembly.delivered
 
     def receive_data(self, chunk: Data | InterleavedData, now: float) -> bool:
-        """One DATA or I-DATA chunk. False: its stream is out of bounds, which is to be reported (6.5). Raises:
-        ProtocolViolation: the peer broke a rule.
+        """Take one DATA or I-DATA chunk. Return False if its stream is out of bounds, which is to be reported (6.5).
+
+        Raises:
+            ProtocolViolation: the peer broke a rule.
         """
         if (chunk.kind != 0) is not self._interleaving:
             raise ProtocolViolation("interleaving_violated")  # RFC 8260 2.2.1
@@ -70,7 +72,7 @@ class Receiver:
         return True
 
     def _is_too_much(self, size: int, tsn: int) -> bool:
-        """Drop chunks beyond the window, but not the one that all others wait for."""
+        """True if a chunk is beyond the window and dropped; never the one that all others wait for."""
         held = self.reassembly.held
         if held > 2 * self._window:
             raise ProtocolViolation("receive_window_exceeded")
@@ -81,7 +83,7 @@ class Receiver:
         return True
 
     def receive_forward_tsn(self, chunk: ForwardTsn | InterleavedForwardTsn, now: float) -> None:
-        """RFC 3758 3.6, RFC 8260 2.3.1.
+        """Take FORWARD TSN or I-FORWARD-TSN (RFC 3758 3.6, RFC 8260 2.3.1).
 
         Raises:
             ProtocolViolation: the other kind than was agreed.
@@ -97,7 +99,7 @@ class Receiver:
         self.reassembly.forward(self.received.cumulative, skips)
 
     def packet_ends(self, now: float) -> bool:
-        """Decide when to acknowledge. Whether the packet had data."""
+        """Decide when to acknowledge. Return True if the packet had data."""
         if not self._data_came:
             return False
         self._data_came = False
@@ -120,7 +122,7 @@ class Receiver:
             self.reassembly.forward(last, [])
 
     def take_sack(self) -> bytes:
-        """The SACK chunk, which leaves now."""
+        """Return the SACK chunk, which leaves now."""
         self._packets = 0
         self.acknowledge_at = None
         return self.received.sack(max(0, self._window - self.reassembly.held), MOST_GAPS).encode()

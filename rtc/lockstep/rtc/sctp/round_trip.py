@@ -1,4 +1,4 @@
-"""How long an acknowledgement takes, and how long to wait for one before a chunk is repeated (RFC 9260 6.3)."""
+"""Measures acknowledgements, and tells the time to wait for one before a chunk is repeated (RFC 9260 6.3)."""
 
 from collections import deque
 from itertools import islice
@@ -31,12 +31,12 @@ class RoundTrip:
         self._probe = settings.initial_timeout
         self._ceiling = settings.timeout_ceiling
         self.smoothed: float | None = None  # s
-        self.reordering = 0.0  # s since it left, before which a chunk is late and not lost
+        self.reordering = 0.0  # s after it left, before which a chunk is late and not lost
         self.sampled_at = float("-inf")
 
     def sample(self, seconds: float, now: float) -> None:
-        """A chunk that was sent once, with the I bit, was acknowledged after `seconds` (Karn's rule, RFC 9260 6.3.1
-        C5). One sample a round trip is used (C4), so that the latest samples cover some time."""
+        """Take a sample: a chunk that was sent once, with the I bit, was acknowledged after `seconds` (Karn's rule, RFC
+        9260 6.3.1 C5). One sample a round trip is used (C4), so that the latest samples cover some time."""
         if self.smoothed is not None and now - self.sampled_at < self.smoothed:
             return
         if self.smoothed is None:
@@ -52,7 +52,7 @@ class RoundTrip:
         self._decide()
 
     def needless(self, now: float) -> None:
-        """The peer had a chunk already that was repeated."""
+        """Note that the peer already had a chunk that was repeated."""
         self._factor = min(2 * self._factor, LARGEST_FACTOR)
         self._factor_ends = now + FACTOR_LASTS
         self._decide()
@@ -71,7 +71,7 @@ class RoundTrip:
         self._probe = min(self.smoothed + min(wanted, most), self._ceiling)
 
     def timeout(self, expiries: int) -> float:
-        """How long to wait for an acknowledgement after so many waits in vain (RFC 9260 6.3.3 E2), in seconds."""
+        """Return the time in s to wait for an acknowledgement after so many waits in vain (RFC 9260 6.3.3 E2)."""
         if expiries == 0:
             return self._probe
         return min(self._probe * (1 << min(expiries, 16)), self._ceiling)

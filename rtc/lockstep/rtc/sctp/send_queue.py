@@ -1,4 +1,4 @@
-"""Messages that have not been sent yet, and whose turn it is."""
+"""The messages that have not been sent yet, and the order of their turns."""
 
 from collections import deque
 from typing import TYPE_CHECKING
@@ -52,7 +52,7 @@ class Message:
 
 
 class SendQueue:
-    """Newest-wins messages apart; all others by stream, and the streams take turns (RFC 8831 6.4 without
+    """Holds newest-wins messages apart; all others by stream, and the streams take turns (RFC 8831 6.4 without
     priorities).
 
     `dropped` counts newest-wins messages that made room for newer ones, `expired` messages whose time had passed
@@ -74,7 +74,8 @@ class SendQueue:
         return len(self.newest) + sum(map(len, self._streams.values()))
 
     def put(self, message: Message) -> None:
-        """
+        """Add a message.
+
         Raises:
             SendQueueFull: too much waits on this stream; the message was not taken.
         """
@@ -102,7 +103,7 @@ class SendQueue:
         return message
 
     def head(self, now: float) -> Message | None:
-        """The message of the stream whose turn it is; without expired ones that were never begun."""
+        """Return the message of the stream whose turn it is; drop expired ones that were never begun."""
         while self.turns:
             message = self._streams[self.turns[0]][0]
             late = message.expires is not None and now > message.expires and not message.taken
@@ -113,7 +114,7 @@ class SendQueue:
         return None
 
     def took(self, message: Message, size: int) -> None:
-        """So many bytes more of the head are in chunks. The next stream has its turn."""
+        """Note that `size` more bytes of the head are in chunks. The next stream has its turn."""
         message.taken += size
         stream = message.stream
         self.turns.rotate(-1)
@@ -127,11 +128,11 @@ class SendQueue:
             self.turns.remove(stream)
 
     def buffered(self, stream: int) -> int:
-        """Bytes that wait on this stream; newest-wins messages do not count."""
+        """Return the number of bytes that wait on this stream; newest-wins messages do not count."""
         return self._sizes.get(stream, 0)
 
     def has(self, stream: int) -> bool:
-        """Whether anything waits on this stream, newest-wins messages included."""
+        """True if anything waits on this stream, newest-wins messages included."""
         return stream in self._streams or any(message.stream == stream for message in self.newest)
 
     def clear(self) -> None:

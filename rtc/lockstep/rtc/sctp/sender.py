@@ -1,4 +1,4 @@
-"""Messages to chunks, and chunks until they are acknowledged or given up (RFC 9260 6.1 to 6.3, RFC 3758 3.5)."""
+"""Turns messages into chunks, and keeps these until acknowledged or given up (RFC 9260 6.1 to 6.3, RFC 3758 3.5)."""
 
 from collections import Counter, deque
 from enum import Enum
@@ -44,7 +44,7 @@ _ACKNOWLEDGED, _ABANDONED = _State.ACKNOWLEDGED, _State.ABANDONED
 
 
 class Outgoing:
-    """A chunk with a TSN, from when it has one until everything up to it is acknowledged."""
+    """A chunk with a TSN, which lives until everything up to it is acknowledged."""
 
     __slots__ = (
         "flags",
@@ -80,8 +80,8 @@ class Sender:
     """The sending half of an association, from messages to encoded chunks.
 
     Newest-wins messages leave first and have a window of their own, so that they wait for nothing else. The TSNs of a
-    plain message's fragments are consecutive, as RFC 9260 6.9 wants; what leaves while some of them wait for the
-    window simply has a later one.
+    plain message's fragments are consecutive, as RFC 9260 6.9 wants; a chunk that leaves while some of them wait for
+    the window has a later one.
 
     A chunk that nothing acknowledges in time is lost. The first time that is a probe, which costs the window no more
     than a reported loss does (RFC 8985 7); the second time, everything in flight is lost (RFC 9260 6.3.3).
@@ -97,7 +97,7 @@ class Sender:
         self.next_tsn = initial_tsn
         self.acknowledged = initial_tsn - 1  # everything up to this TSN has arrived
         self.ambiguous = False  # only repeated chunks were acknowledged, which says nothing about the round trip
-        self._advanced = initial_tsn - 1  # or was given up (Advanced.Peer.Ack.Point, RFC 3758 3.5)
+        self._advanced = initial_tsn - 1  # the same, or given up (Advanced.Peer.Ack.Point, RFC 3758 3.5)
         self._outstanding: deque[Outgoing] = deque()  # by TSN, without a hole
         self._newest_waiting: deque[Outgoing] = deque()
         self._waiting: list[tuple[int, Outgoing]] = []  # the others, a heap by TSN; some may wait no longer
@@ -111,9 +111,9 @@ class Sender:
         self._repeated: dict[int, None] = {}  # TSNs, the latest last
         self._sequences: dict[tuple[int, bool], int] = {}
         self._skips: dict[tuple[int, bool], int] = {}  # the last message given up, by stream and order
-        self.forward_at: float | None = None  # when a FORWARD TSN is due
+        self.forward_at: float | None = None  # the time at which a FORWARD TSN is due
         self._burst = 0  # bytes of reliable messages that may leave before the next acknowledgement or timer
-        self._asked_at = float("-inf")  # when a newest-wins chunk last had the I bit
+        self._asked_at = float("-inf")  # the time at which a newest-wins chunk last had the I bit
         self._newest_floor = settings.newest_wins_floor * settings.max_packet
         self._floor = settings.window_floor * settings.max_packet
         self._may_give_up = False
@@ -122,7 +122,7 @@ class Sender:
         self._largest = settings.max_packet - COMMON_HEADER - DATA_HEADER  # payload of a chunk that fills a packet
 
     def peer_is(self, window: int, *, interleaving: bool, partial_reliability: bool) -> None:
-        """What the handshake found. Without partial reliability every message is reliable (RFC 3758 3.3.1)."""
+        """Take the result of the handshake. Without partial reliability every message is reliable (RFC 3758 3.3.1)."""
         self._peer_window = window
         self._may_give_up = partial_reliability
         self._interleaving = interleaving
@@ -131,27 +131,27 @@ class Sender:
 
     @property
     def idle(self) -> bool:
-        """No chunk waits, and the peer has acknowledged all, also abandoned ones."""
+        """True if no chunk waits, and the peer has acknowledged all, also abandoned ones."""
         return not self._outstanding and self.forward_at is None and not len(self.queue)
 
     @property
     def outstanding(self) -> int:
-        """Chunks with a TSN that are not acknowledged."""
+        """The number of chunks with a TSN that are not acknowledged."""
         return len(self._outstanding)
 
     # Sending
 
     def _begin_burst(self) -> None:
-        """Something has happened after which reliable messages may leave in a row (RFC 9260 6.1 D)."""
+        """Let reliable messages leave in a row (RFC 9260 6.1 D), because something has happened."""
         self._burst = self._settings.max_burst * self._settings.max_packet
 
     @property
     def is_quiet(self) -> bool:
-        """Nothing waits to leave, whether it may or not."""
+        """True if nothing waits to leave, permitted or not."""
         return not (self.queue.newest or self._waiting or self.queue.turns or self._newest_waiting)
 
     def chunks(self, room: int, now: float) -> bytes:
-        """The due chunks that fit into `room` bytes, newest-wins messages first."""
+        """Return the due chunks that fit into `room` bytes, newest-wins messages first."""
         taken = b""
         if not self._flight:
             self._begin_burst()
@@ -167,8 +167,9 @@ class Sender:
         return taken
 
     def _due(self, now: float) -> Outgoing | None:
-        """RFC 9260 6.1 C would have repeats before everything new; newest-wins messages are before those too, which
-        changes the order within some packets and nothing else, since each kind has its own window."""
+        """Return the next due chunk. RFC 9260 6.1 C would have repeats before everything new; newest-wins messages are
+        before those too, which changes the order within some packets and nothing else, since each kind has its own
+        window."""
         newest = self._newest_waiting
         while newest and newest[0].state is not _WAITING:
             newest.popleft()
@@ -200,7 +201,7 @@ class Sender:
         return len(self._outstanding) < self._settings.max_outstanding
 
     def _admits(self, size: int) -> bool:
-        """Whether a chunk may leave that is not newest-wins (RFC 9260 6.1 A, B and D)."""
+        """True if a chunk may leave that is not newest-wins (RFC 9260 6.1 A, B and D)."""
         if not self._flight:
             return True  # A: one chunk may always be in flight, also into a closed window
         if self._burst <= 0 or min(size, self._largest) > self._peer_window:
@@ -208,7 +209,7 @@ class Sender:
         return self._flight < self.window.size or self._flight - self._newest_flight < self._floor
 
     def _chunks(self, message: Message, *, whole: bool) -> list[Outgoing]:
-        """The message's next chunk, or all of them. They have their TSNs from here on."""
+        """Return the message's next chunk, or all of them. They have their TSNs from here on."""
         payload, largest, newest = message.payload, self._largest, message.newest_wins
         if message.ordered or self._interleaving:
             self._number(message)
@@ -233,7 +234,7 @@ class Sender:
         return chunks
 
     def _number(self, message: Message) -> None:
-        """Give it the next number on its stream, before its first fragment."""
+        """Give a message the next number on its stream, before its first fragment."""
         if not message.taken:
             key = message.stream, not message.ordered
             message.sequence = self._sequences.get(key, 0)
@@ -261,7 +262,7 @@ class Sender:
         return self._encode(chunk)
 
     def _immediate(self, chunk: Outgoing, now: float) -> int:
-        """The I bit (RFC 7053): on the end of each reliable message, and where the window ends."""
+        """Return the I bit (RFC 7053): on the end of each reliable message, and where the window ends."""
         if not chunk.newest_wins:
             return IMMEDIATE if chunk.flags & END or not self._admits(self._largest) else 0
         if now - self._asked_at < self._settings.sample_interval:
@@ -283,7 +284,7 @@ class Sender:
         )
 
     def forward_tsn(self, now: float) -> ForwardTsn | InterleavedForwardTsn | None:
-        """What tells the peer of messages that were given up, when it is due (RFC 3758 3.5)."""
+        """Return the chunk that tells the peer of messages that were given up, when it is due (RFC 3758 3.5)."""
         if self.forward_at is None or now < self.forward_at:
             return None
         self.forward_at = now + self._round_trip.timeout(1)
@@ -296,7 +297,7 @@ class Sender:
         return ForwardTsn(cumulative, [Skip(skip.stream, skip.sequence & MASK_16) for skip in skips])
 
     def reset(self, streams: tuple[int, ...]) -> None:
-        """The peer has reset these: their messages are numbered from 0 again (RFC 6525 5.2.7)."""
+        """Number the messages of these streams from 0 again: the peer has reset them (RFC 6525 5.2.7)."""
         for stream in streams:
             for unordered in (False, True):
                 self._sequences.pop((stream, unordered), None)
@@ -305,7 +306,7 @@ class Sender:
     # Acknowledgements
 
     def receive_sack(self, sack: Sack, now: float) -> None:
-        """RFC 9260 6.2.1."""
+        """Take a SACK (RFC 9260 6.2.1)."""
         cumulative = unwrap(sack.cumulative, self.acknowledged)
         if cumulative < self.acknowledged:
             return  # D i: overtaken by a later one
@@ -338,7 +339,7 @@ class Sender:
         self._advance(now)
 
     def _land(self, chunk: Outgoing) -> None:
-        """It is not in flight any more."""
+        """Note that a chunk is not in flight any more."""
         self._flight -= chunk.size
         self._peer_window += chunk.size  # 6.2.1 C
         if chunk.newest_wins:
@@ -360,7 +361,7 @@ class Sender:
                     chunk.state = _ACKNOWLEDGED
 
     def _measure(self, arrived: list[Outgoing], now: float) -> None:
-        """One round trip from the latest of the chunks that the peer acknowledges at once and that were sent once."""
+        """Measure one round trip, by the latest chunk that was sent once and that the peer acknowledges at once."""
         latest = float("-inf")
         ambiguous = False
         for chunk in arrived:
@@ -383,9 +384,9 @@ class Sender:
                 self._round_trip.needless(now)
 
     def _count_misses(self, arrived: list[Outgoing], now: float) -> None:
-        """Chunks that left before one that has arrived now (RFC 9260 7.2.4). A repeated chunk may be missed again, by
-        chunks that left after the repeat. Three misses within the path's jitter are no loss yet (as in RFC 8985
-        6.2)."""
+        """Count chunks that left before one that has arrived now (RFC 9260 7.2.4). A repeated chunk may be missed
+        again, by chunks that left after the repeat. Three misses within the path's jitter are not a loss yet (as in RFC
+        8985 6.2)."""
         once = [chunk for chunk in arrived if chunk.sent_count == 1]
         if not once:
             return
@@ -420,7 +421,7 @@ class Sender:
         heappush(self._waiting, (chunk.tsn, chunk))
 
     def _abandon(self, chunk: Outgoing) -> None:
-        """The whole message is given up, also its unsent part (RFC 3758 3.5 A3)."""
+        """Give up the whole message, also its unsent part (RFC 3758 3.5 A3)."""
         message = chunk.message
         message.abandoned = True
         self._counts["abandoned"] += 1
@@ -434,8 +435,8 @@ class Sender:
             self._forgo_rest(message, chunk.flags & UNORDERED)
 
     def _forgo_rest(self, message: Message, unordered: int) -> None:
-        """A TSN in the place of the fragments that have none yet. The peer may have all others by now, and would take
-        a FORWARD TSN that ends with them for an old one."""
+        """Put a TSN in the place of the fragments that have none yet. The peer may have all others by now, and would
+        take a FORWARD TSN that ends with them for an old one."""
         rest = Outgoing(self.next_tsn, END | unordered, message, 0, b"", message.newest_wins)
         rest.state = _ABANDONED
         self.next_tsn += 1
@@ -472,13 +473,13 @@ class Sender:
 
     @property
     def _most_skips(self) -> int:
-        """Streams that fit into one FORWARD TSN."""
+        """The number of streams that fit into one FORWARD TSN."""
         return (self._settings.max_packet - COMMON_HEADER - 8) // (8 if self._interleaving else 4)
 
     # Time
 
     def deadline(self) -> float | None:
-        """When `handle_timer` is due. A FORWARD TSN that is due at once counts as due in the past."""
+        """Return the time at which `handle_timer` is due; a FORWARD TSN that is due at once counts as past."""
         due = self.forward_at
         if (sent := _first(self._sent)) is not None:
             expires = sent + self._round_trip.timeout(self._expiries)
@@ -519,7 +520,7 @@ class Sender:
         self.window.expired()
 
     def clear(self) -> None:
-        """The association has ended."""
+        """Drop everything: the association has ended."""
         self.queue.clear()
         for each in (self._outstanding, self._newest_waiting, self._sent, self._newest_sent):
             each.clear()
@@ -529,13 +530,13 @@ class Sender:
 
 
 def _is_done_with(chunk: Outgoing) -> bool:
-    """The peer has it, and keeps no fragment of a message because of it."""
+    """True if the peer has the chunk, and keeps no fragment of a message because of it."""
     is_whole = chunk.flags & WHOLE == WHOLE
     return chunk.state is _ACKNOWLEDGED and (is_whole or chunk.message.abandoned)
 
 
 def _first(sent: deque[tuple[float, Outgoing]]) -> float | None:
-    """When the first of these left that is still in flight."""
+    """Return the time at which the first of these left that is still in flight."""
     while sent:
         left, chunk = sent[0]
         if chunk.state is _IN_FLIGHT and chunk.sent_at == left:

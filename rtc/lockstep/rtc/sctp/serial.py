@@ -11,7 +11,7 @@ MASK_32 = 0xFFFFFFFF
 
 
 def unwrap(number: int, near: int, mask: int = MASK_32) -> int:
-    """The integer that looks like `number` on the wire and is the nearest to `near`. `mask` gives the width.
+    """Return the integer that looks like `number` on the wire and is the nearest to `near`. `mask` gives the width.
 
     A number that is exactly half the range away counts as older.
     """

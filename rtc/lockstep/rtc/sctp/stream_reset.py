@@ -1,4 +1,4 @@
-"""Resetting streams, which is how data channels close (RFC 6525, RFC 8831 6.7)."""
+"""Resets streams, which is the way in which data channels close (RFC 6525, RFC 8831 6.7)."""
 
 from dataclasses import dataclass
 from struct import Struct
@@ -44,14 +44,14 @@ class _Request:
 
 
 class StreamReset:
-    """Requests of this end, one at a time (5.1.1), and answers to the peer's. `answers` are due at once; drained."""
+    """Requests of this end, one at a time (5.1.1), and answers to the peer. `answers` are due at once; drained."""
 
     def __init__(self, own_initial_tsn: int, peer_initial_tsn: int) -> None:
         self._wanted: list[int] = []
         self._request: _Request | None = None
         self._next_number = own_initial_tsn  # RFC 6525 4.1
         self._tries = 0
-        self._peer_number = peer_initial_tsn  # of the peer's next request
+        self._peer_number = peer_initial_tsn  # of the next request of this end (RFC 6525 4.1)
         self._last_result = NOTHING_TO_DO
         self._deferred: _Request | None = None  # of the peer, until its last message has come
         self.due_at: float | None = None
@@ -64,7 +64,7 @@ class StreamReset:
             self.due_at = now
 
     def next_request(self, last_tsn: int, now: float) -> Reconfig | None:
-        """The request that is due. `last_tsn` is the last that this end has assigned. Call `sent` afterwards."""
+        """Return the request that is due. `last_tsn` is the last that this end has assigned. Call `sent` afterwards."""
         if self.due_at is None or now < self.due_at:
             return None
         if self._request is None:
@@ -82,11 +82,11 @@ class StreamReset:
 
     @property
     def tries(self) -> int:
-        """How often the current request was sent."""
+        """The number of times that the current request was sent."""
         return self._tries
 
     def receive(self, chunk: Reconfig, cumulative: int, now: float) -> list[Event]:
-        """A RE-CONFIG chunk; `cumulative` is the last TSN before the first missing one."""
+        """Take a RE-CONFIG chunk; `cumulative` is the last TSN before the first missing one."""
         events: list[Event] = []
         for kind, value in chunk.parameters:
             if kind == RECONFIG_RESPONSE and len(value) >= _response.size:
@@ -113,7 +113,7 @@ class StreamReset:
         return [OutgoingStreamsReset(request.streams, result in (NOTHING_TO_DO, PERFORMED))]
 
     def _take_turn(self, wire_number: int, result: int) -> bool:
-        """Answer a request: whether it is the next one. The last one is answered again as it was (5.2.1)."""
+        """Answer a request. Return True if it is the next one. The last one is answered again as it was (5.2.1)."""
         number = unwrap(wire_number, self._peer_number)
         is_next = number == self._peer_number and self._deferred is None
         if is_next:
@@ -143,7 +143,7 @@ class StreamReset:
         return []
 
     def advanced(self, cumulative: int) -> list[Event]:
-        """All chunks up to `cumulative` have arrived: the peer's request may be complete now (5.2.2 E2)."""
+        """Note that all chunks up to `cumulative` have arrived: the peer's request may be complete now (5.2.2 E2)."""
         request = self._deferred
         if request is None or cumulative < request.last_tsn:
             return []

@@ -1,4 +1,4 @@
-"""Session descriptions of one BUNDLE: text to data, data to text, and what offer and answer make of each other."""
+"""Session descriptions of one BUNDLE: from text to data, from data to text, and the negotiation of offer and answer."""
 
 from lockstep.rtc.sdp.codecs import common_codecs, is_same_format
 from lockstep.rtc.sdp.description import (

@@ -1,4 +1,4 @@
-"""Codecs in session descriptions: their lines, and which of two ends' are the same."""
+"""Codecs in session descriptions: their lines, and the codecs that two ends share."""
 
 import re
 from collections.abc import Iterable, Mapping, Sequence
@@ -14,7 +14,7 @@ STATIC = {0: ("PCMU", 8000), 8: ("PCMA", 8000), 9: ("G722", 8000)}  # RFC 3551 6
 MAX_PAYLOAD_TYPE = 127  # RFC 3550 5.1: seven bits
 LIKE_RTCP = range(64, 96)  # RFC 5761 4: packets with these are taken for RTCP
 AUXILIARY = {"rtx", "red", "ulpfec", "flexfec-03", "telephone-event", "cn"}  # carry nothing without another codec
-# What makes two codecs of one name different things, with the value that is meant where nothing is said.
+# The parameters that make two codecs of one name different things, with the values that are meant by default.
 FORMAT: Mapping[str, Mapping[str, str]] = {
     "h264": {"packetization-mode": "0"},  # RFC 6184 8.1; the profile is compared by its meaning
     "vp9": {"profile-id": "0"},  # RFC 9628 6
@@ -27,7 +27,7 @@ H264_BASELINE, H264_MAIN, H264_EXTENDED = 0x42, 0x4D, 0x58
 def read_codecs(
     formats: Sequence[str], attributes: Iterable[tuple[str, str]], kind: str, section: str
 ) -> tuple[Codec, ...]:
-    """Those of an m= line's formats, in its order, that a packet can carry and that have a name. Raises SdpError."""
+    """Return the codecs of an m= line, in its order, that a packet can carry and that have a name. Raises SdpError."""
     of_type: dict[str, dict[int, list[str]]] = {"rtpmap": {}, "fmtp": {}, "rtcp-fb": {}}
     for_all: list[str] = []  # RFC 4585 4.2: feedback of every payload type
     for name, value in attributes:
@@ -70,7 +70,7 @@ def _parameters(lines: Iterable[str]) -> dict[str, str]:
 
 
 def common_codecs(offered: Sequence[Codec], known: Sequence[Codec]) -> tuple[Codec, ...]:
-    """Those of `offered` that `known` has too, the first of `known` first; with the codecs that repair them.
+    """Return those of `offered` that `known` has too, the first of `known` first; with the codecs that repair them.
 
     They have the offer's payload types and format, and the parameters and feedback of both (RFC 3264 6.1, 8.3.2).
     """
@@ -96,7 +96,7 @@ def _agreed(offered: Codec, own: Codec) -> Codec:
 
 
 def is_same_format(one: Codec, other: Codec) -> bool:
-    """Whether a stream of one is a stream of the other."""
+    """True if a stream of one is a stream of the other."""
     name = one.name.lower()
     if (name, one.clock_rate, one.channels) != (other.name.lower(), other.clock_rate, other.channels):
         return False
@@ -109,8 +109,8 @@ def is_same_format(one: Codec, other: Codec) -> bool:
 
 
 def _h264_profile(codec: Codec) -> tuple[int, bool] | None:
-    """Profile and whether it is constrained (RFC 6184 8.1, table 5); None for an invalid one, which equals no known
-    one."""
+    """Return the profile, and True if it is constrained (RFC 6184 8.1, table 5); None for an invalid one, which equals
+    no known one."""
     text = codec.parameters.get("profile-level-id", "42000a")  # RFC 6184 8.1: the default
     if not re.fullmatch(r"[0-9A-Fa-f]{6}", text):
         return None

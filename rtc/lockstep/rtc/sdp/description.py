@@ -34,18 +34,18 @@ _WAYS: Mapping[Direction, tuple[bool, bool]] = {
     "sendonly": (True, False),
     "recvonly": (False, True),
     "inactive": (False, False),
-}  # whether its writer sends, and receives
+}  # the writer sends, the writer receives
 _DIRECTIONS = {ways: direction for direction, ways in _WAYS.items()}
 
 
 def reverse(direction: Direction) -> Direction:
-    """As the other end sees it."""
+    """Return the direction as the other end sees it."""
     sends, receives = _WAYS[direction]
     return _DIRECTIONS[receives, sends]
 
 
 def both(one: Direction, other: Direction) -> Direction:
-    """What `one` and `other` allow (RFC 3264 6.1)."""
+    """Return the direction that `one` and `other` allow (RFC 3264 6.1)."""
     first, second = _WAYS[one], _WAYS[other]
     return _DIRECTIONS[first[0] and second[0], first[1] and second[1]]
 
@@ -134,21 +134,21 @@ class MediaSection:
         return self.kind in ("audio", "video")
 
     def extension_id(self, uri: str) -> int | None:
-        """None when it is not in use here."""
+        """Return the id of a header extension; None when it is not in use here."""
         return next((each.id for each in self.extensions if each.uri == uri), None)
 
     def repair_of(self, codec: Codec) -> Codec | None:
-        """The codec by which `codec` is retransmitted; None without one."""
+        """Return the codec by which `codec` is retransmitted; None without one."""
         return next((each for each in self.codecs if each.repairs == codec.payload_type), None)
 
     def repair_source(self, ssrc: int) -> int | None:
-        """The SSRC of what retransmits stream `ssrc` (RFC 4588 8.3); None when that is not said."""
+        """Return the SSRC that retransmits stream `ssrc` (RFC 4588 8.3); None when that is not said."""
         groups = [each.ssrcs for each in self.source_groups if each.semantics == "FID" and len(each.ssrcs) == 2]
         return next((repair for original, repair in groups if original == ssrc), None)
 
 
 def rejection_of(kind: str, mid: str, protocol: str, formats: tuple[str, ...]) -> MediaSection:
-    """A section that is not in use, and keeps its place (RFC 3264 6)."""
+    """Return a section that is not in use, and keeps its place (RFC 3264 6)."""
     return MediaSection(kind, mid, protocol, formats, rejected=True, direction="inactive", rtcp_mux=False)
 
 
@@ -164,7 +164,7 @@ class SessionDescription:
 
     @property
     def accepted(self) -> tuple[MediaSection, ...]:
-        """Those that are in the bundle."""
+        """The sections that are in the bundle."""
         return tuple(section for section in self.sections if not section.rejected)
 
     def section(self, mid: str) -> MediaSection | None:

@@ -1,10 +1,10 @@
-"""What is wrong with a description."""
+"""Errors in session descriptions."""
 
 __all__ = ["SdpError"]
 
 
 class SdpError(ValueError):
-    """A description that cannot be used. The one error of this package.
+    """A description that cannot be used. The only error of this package.
 
     `section` is the mid of the faulty media section, or "#0" by its place when it has none; None when the whole
     description is faulty. `reason` is for the author of the description.

@@ -1,4 +1,4 @@
-"""Fragments that bring candidates or an ICE restart to a session that runs (RFC 8840 9)."""
+"""Fragments that bring candidates or an ICE restart to a running session (RFC 8840 9)."""
 
 import re
 from dataclasses import dataclass, field
@@ -16,7 +16,7 @@ MID = re.compile(r"[!-~]{1,64}")
 
 
 class FragmentCandidate(NamedTuple):
-    """A candidate, and the media section it is for."""
+    """A candidate, and the media section that it is for."""
 
     mid: str
     line: str  # "candidate:…", without "a="
@@ -24,7 +24,7 @@ class FragmentCandidate(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Fragment:
-    """What a fragment says."""
+    """The content of a fragment."""
 
     ufrag: str = ""  # "" when it names none
     password: str = field(default="", repr=False)
@@ -33,7 +33,7 @@ class Fragment:
 
 
 def parse_fragment(text: str, first_mid: str) -> Fragment:
-    """The fragment in `text`. Raises SdpError.
+    """Return the fragment in `text`. Raises SdpError.
 
     Args:
         first_mid: for lines before the first media section; with BUNDLE all candidates are for it
@@ -64,14 +64,14 @@ def parse_fragment(text: str, first_mid: str) -> Fragment:
 
 
 def _same(value: str, allowed: re.Pattern[str], before: str) -> str:
-    """All sections of a bundle have the same credentials."""
+    """Check a credential and return it: all sections of a bundle have the same ones."""
     if not allowed.fullmatch(value) or before not in ("", value):
         raise SdpError("ice-ufrag or ice-pwd is not valid")
     return value
 
 
 def write_fragment(fragment: Fragment, kind: str, mid: str) -> str:
-    """The text of `fragment`, with all candidates for the section `mid` of `kind`: that of the bundle's transport."""
+    """Return the text of `fragment`, with all candidates for the bundle's transport: section `mid` of `kind`."""
     lines = [f"a=ice-ufrag:{fragment.ufrag}", f"a=ice-pwd:{fragment.password}"] if fragment.ufrag else []
     lines += [f"m={kind} 9 UDP/TLS/RTP/SAVPF 0", f"a=mid:{mid}"]
     lines += [f"a={each.line}" for each in fragment.candidates]

@@ -29,13 +29,13 @@ RESERVED_ID = 15  # of header extensions; ends the list in the one-byte form (RF
 
 @dataclass(frozen=True, slots=True)
 class LocalMedia:
-    """What we can do in one media section."""
+    """The abilities of this side in one media section."""
 
     codecs: Sequence[Codec]  # the preferred one first; with "rtx" among them, retransmission as well
     direction: Direction = "sendrecv"
     extensions: Sequence[str] = ()  # URIs
-    msid: str = ""  # "stream track", of what we send
-    sources: tuple[Source, ...] = ()  # of what we send
+    msid: str = ""  # "stream track", of the outgoing stream
+    sources: tuple[Source, ...] = ()  # of the outgoing stream
     source_groups: tuple[SourceGroup, ...] = ()
 
 
@@ -52,12 +52,12 @@ def answer_to(
     session_id: int = 0,
     version: int = 1,
 ) -> SessionDescription:
-    """The own answer. Sections without a local counterpart or a common codec are rejected (RFC 3264 6).
+    """Return the answer. Sections without a local counterpart or a common codec are rejected (RFC 3264 6).
 
     Args:
-        transport: the own one; its `setup` is the own role where the offer leaves the choice (RFC 8842 5.3)
-        media: the own abilities, by mid
-        data: whether this side takes data channels
+        transport: that of this side; its `setup` is the role where the offer leaves the choice (RFC 8842 5.3)
+        media: the abilities of this side, by mid
+        data: True if this side takes data channels
         max_message_size: bytes of one message that this side takes; None: 65536
 
     Raises:
@@ -79,7 +79,7 @@ def answer_to(
 
 
 def _own_setup(offered: Setup, preferred: Setup) -> Setup:
-    """RFC 8842 5.3."""
+    """Return the DTLS role of this side (RFC 8842 5.3)."""
     if offered == "actpass":
         return "active" if preferred == "active" else "passive"
     return "passive" if offered == "active" else "active"
@@ -113,7 +113,7 @@ def _answered(
 
 
 def _without_repair(own: LocalMedia) -> LocalMedia:
-    """RFC 4588 is not in use: its streams are not announced."""
+    """Return `own` without its repair streams, which are not announced where RFC 4588 is not in use."""
     groups = [group for group in own.source_groups if group.semantics == "FID"]
     repairs = {ssrc for group in groups for ssrc in group.ssrcs[1:]}
     return replace(
@@ -131,7 +131,7 @@ def _agreed_extensions(offered: MediaSection, own: LocalMedia, chosen: Mapping[s
 
 
 def _chosen_ids(offer: SessionDescription) -> dict[str, int]:
-    """For extensions whose id is left to us; the same in every section, as it has to be (RFC 9143 9.2)."""
+    """Return ids for the extensions whose id the answer chooses; equal in every section, as RFC 9143 9.2 wants."""
     extensions = [each for section in offer.sections for each in section.extensions]
     used = {each.id for each in extensions} | {RESERVED_ID}
     free = (number for number in range(1, LARGEST_EXTENSION_ID + 1) if number not in used)
@@ -146,7 +146,7 @@ def _chosen_ids(offer: SessionDescription) -> dict[str, int]:
 
 
 def media_section(mid: str, kind: str, own: LocalMedia, ids: Mapping[str, int]) -> MediaSection:
-    """A section of an offer. `ids`: of the header extensions, by URI; the same for every section."""
+    """Return a section of an offer. `ids`: of the header extensions, by URI; the same for every section."""
     sends = own.direction in ("sendrecv", "sendonly")
     return MediaSection(
         kind=kind,
@@ -162,7 +162,7 @@ def media_section(mid: str, kind: str, own: LocalMedia, ids: Mapping[str, int]) 
 
 
 def data_section(mid: str, max_message_size: int | None = None) -> MediaSection:
-    """A section for data channels (RFC 8841 4)."""
+    """Return a section for data channels (RFC 8841 4)."""
     return MediaSection(
         kind="application",
         mid=mid,
@@ -177,12 +177,12 @@ def data_section(mid: str, max_message_size: int | None = None) -> MediaSection:
 def offer_of(
     sections: Sequence[MediaSection], transport: Transport, *, session_id: int = 0, version: int = 1
 ) -> SessionDescription:
-    """Our offer of these sections. The peer chooses who opens DTLS (RFC 8842 5.2)."""
+    """Return an offer of these sections. The peer chooses who opens DTLS (RFC 8842 5.2)."""
     return SessionDescription(replace(transport, setup="actpass"), tuple(sections), session_id, version)
 
 
 def check_answer(offer: SessionDescription, answer: SessionDescription) -> None:
-    """Whether `answer` answers `offer`. Then its sections are in use. Raises SdpError."""
+    """Check that `answer` answers `offer`. Then its sections are in use. Raises SdpError."""
     if len(offer.sections) != len(answer.sections):
         raise SdpError(f"{len(answer.sections)} sections for the offer's {len(offer.sections)} (RFC 3264 6)")
     if answer.transport.setup not in ("active", "passive"):

@@ -43,7 +43,7 @@ MAX_U32 = (1 << 32) - 1
 
 @dataclass(frozen=True, slots=True)
 class SdpLimits:
-    """What a peer may make us read."""
+    """Bounds on the text of a peer."""
 
     text: int = 256 * 1024  # characters; a section of Chromium with all its codecs has 7,000
     sections: int = 64  # each costs work for as long as the session lasts
@@ -74,7 +74,7 @@ class _Lines:
 
 
 def parse_description(text: str, limits: SdpLimits | None = None) -> SessionDescription:
-    """The description in `text`. Raises SdpError."""
+    """Return the description in `text`. Raises SdpError."""
     limits = limits or SdpLimits()
     if len(text) > limits.text:
         raise SdpError(f"more than {limits.text} characters")
@@ -97,7 +97,7 @@ def parse_description(text: str, limits: SdpLimits | None = None) -> SessionDesc
 
 
 def _split(text: str, most: int) -> tuple[str, _Lines, list[_Lines]]:
-    """The origin, the session's attributes and each section's."""
+    """Return the origin, the session's attributes and each section's."""
     lines = [line.rstrip("\r") for line in text.split("\n")]  # RFC 8866 5: a lone line feed is accepted
     if lines[0] != "v=0":
         raise SdpError('does not begin with "v=0"')
@@ -132,7 +132,7 @@ def _check_mids(sections: Sequence[MediaSection]) -> None:
 
 
 def _tagged(session: _Lines, sections: Sequence[MediaSection]) -> int:
-    """The place of the section whose transport is everybody's (RFC 9143 7.2)."""
+    """Return the place of the section whose transport all sections share (RFC 9143 7.2)."""
     bundles = [value.split()[1:] for value in session.all("group") if value.split()[:1] == ["BUNDLE"]]
     live = [section.mid for section in sections if not section.rejected]
     if not live:
@@ -200,7 +200,7 @@ def _number(text: str | None, what: str, most: int, section: str) -> int | None:
 
 
 def _extensions(values: Iterable[str], section: str) -> tuple[HeaderExtension, ...]:
-    """Those whose id a packet can carry, or the answer is to choose (RFC 8285 5)."""
+    """Return the extensions whose id a packet can carry, or the answer is to choose (RFC 8285 5)."""
     found: dict[int, HeaderExtension] = {}
     for value in values:
         match = EXTMAP.fullmatch(value)
@@ -246,7 +246,7 @@ def _ssrc(text: str, section: str) -> int:
 
 
 def _transport(lines: _Lines, session: _Lines, section: str, limits: SdpLimits) -> Transport:
-    """Of the section, or where it says nothing, of the session (RFC 8839 5.4, RFC 8842 5.1)."""
+    """Return the transport of the section, or where it says nothing, of the session (RFC 8839 5.4, RFC 8842 5.1)."""
 
     def value(name: str) -> str | None:
         return lines.first(name) or session.first(name)

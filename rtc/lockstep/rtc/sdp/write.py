@@ -6,12 +6,12 @@ from lockstep.rtc.sdp.description import Codec, HeaderExtension, MediaSection, S
 
 __all__ = ["write_description"]
 
-DISCARD_PORT = 9  # RFC 8829 5.2.1: what counts are the candidates
+DISCARD_PORT = 9  # RFC 8829 5.2.1: the candidates count
 UNSPECIFIED = "IN IP4 0.0.0.0"
 
 
 def write_description(description: SessionDescription) -> str:
-    """The text of `description`."""
+    """Return the text of `description`."""
     return "\r\n".join([*_lines(description), ""])
 
 
@@ -98,7 +98,8 @@ def _pair(name: str, value: str, between: str) -> str:
 
 
 def _transport(transport: Transport, *, with_candidates: bool) -> Iterator[str]:
-    """In every section, for peers that look for it there (RFC 8829 5.3.1); candidates in the tagged one only."""
+    """Yield the transport's lines for each section, where peers look for them (RFC 8829 5.3.1); candidates for the
+    tagged one only."""
     yield f"a=ice-ufrag:{transport.ufrag}"
     yield f"a=ice-pwd:{transport.password}"
     for fingerprint in transport.fingerprints:

@@ -1,4 +1,4 @@
-"""An address on a TURN server that stands for us (RFC 8656), without I/O.
+"""An address on a TURN server that stands for this side (RFC 8656), without I/O.
 
     allocation = Allocation("user", "password", random_bytes)
     allocation.start(now)
@@ -37,15 +37,15 @@ __all__ = ["Allocated", "Allocation", "AllocationEnded"]
 
 UDP = b"\x11\x00\x00\x00"  # REQUESTED-TRANSPORT (RFC 8656 18.8)
 BAD_ANSWER = StunErrorCode(500, "an answer that lacks something")
-GONE = (437, 403)  # of a refresh: the server knows the allocation no more (RFC 8656 7.3), or not with these credentials
+GONE = (437, 403)  # to a refresh: the server knows the allocation no more (RFC 8656 7.3), or not with these credentials
 
 
 @dataclass(frozen=True, slots=True)
 class Allocated:
-    """Peers reach us at `relayed` from now on."""
+    """Peers reach this side at `relayed` from now on."""
 
     relayed: Address
-    mapped: Address | None  # the own address, as the server sees it
+    mapped: Address | None  # the address of this side, as the server sees it
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,13 +60,14 @@ class _Peer:
     address: Address
     channel: int
     bound: bool = False
-    bind_at: float | None = None  # when the channel is bound again
+    bind_at: float | None = None  # the time to bind the channel again
     refused_until: float = 0.0
     waiting: deque[bytes] = field(default_factory=deque)
 
 
 class Allocation:
-    """`counts`: dropped datagrams, by reason: "peers", "refused", "waiting", "not_allocated", "malformed", …"""
+    """One allocation. `counts`: dropped datagrams, by reason: "peers", "refused", "waiting", "not_allocated",
+    "malformed", …"""
 
     def __init__(
         self,
@@ -77,7 +78,7 @@ class Allocation:
         reliable: bool = False,
         settings: TurnSettings | None = None,
     ) -> None:
-        """`reliable`: the server is reached by TCP or TLS; hand in what `TurnStream` finds there."""
+        """`reliable`: the server is reached by TCP or TLS; hand in the messages that `TurnStream` finds."""
         self._settings = settings or TurnSettings()
         self._reliable = reliable
         self._requests = Requests(random_bytes, self._settings, username=username, password=password, reliable=reliable)
@@ -93,13 +94,13 @@ class Allocation:
         self._ended = False
 
     def start(self, now: float) -> None:
-        """Ask for it. Allocated or AllocationEnded follows."""
+        """Ask for the allocation. Allocated or AllocationEnded follows."""
         lifetime = self._settings.lifetime.to_bytes(4)
         attributes = [(Attribute.REQUESTED_TRANSPORT, UDP), (Attribute.LIFETIME, lifetime)]
         self._requests.begin(Method.ALLOCATE, attributes, now)
 
     def send(self, data: bytes, peer: Address, now: float) -> None:
-        """From the relayed address. What cannot go now waits a little, and is dropped and counted otherwise."""
+        """Send from the relayed address. Data that cannot go now wait a little, or are dropped and counted."""
         if self.relayed is None:
             self.counts["not_allocated"] += 1
             return
@@ -117,16 +118,16 @@ class Allocation:
                 self._bind(known, now)
 
     def close(self, now: float) -> None:
-        """Give it back; drain `data_to_send` once more. Idempotent."""
+        """Give the allocation back; drain `data_to_send` once more. Idempotent."""
         if self.relayed is not None:
             self._requests.begin(Method.REFRESH, [(Attribute.LIFETIME, bytes(4))], now)
             self._out += self._requests.data_to_send()
         self._end(None)
 
-    # The way in
+    # Input
 
     def receive(self, data: bytes, now: float) -> None:
-        """A message of the server's."""
+        """Take a message from the server."""
         if self._ended:
             self.counts["ended"] += 1
             return
@@ -148,7 +149,7 @@ class Allocation:
             self._received.append((parsed[1], peer.address))
 
     def _receive_indication(self, data: bytes, transaction: bytes) -> None:
-        """Before a channel is bound, data of its peer come so. Only of peers that have a permission."""
+        """Take data of a peer from before its channel is bound. Only peers with a permission count."""
         try:
             attributes = read_attributes(data, MAX_TURN_MESSAGE)
             address = parse_address(attributes.get(Attribute.XOR_PEER_ADDRESS), transaction)
@@ -164,13 +165,13 @@ class Allocation:
     # Output
 
     def data_to_send(self) -> list[bytes]:
-        """To the server."""
+        """Return the messages for the server."""
         out = self._requests.data_to_send() + self._out
         self._out = []
         return out
 
     def received(self) -> list[tuple[bytes, Address]]:
-        """What peers have sent to the relayed address, and who."""
+        """Return the data that peers have sent to the relayed address, each with its sender."""
         received, self._received = self._received, []
         return received
 
@@ -249,7 +250,7 @@ class Allocation:
         return peer
 
     def _bind(self, peer: _Peer, now: float) -> None:
-        """RFC 8656 12.1."""
+        """Bind a channel (RFC 8656 12.1)."""
         peer.bind_at = None
         # XOR with the transaction changes IPv6 addresses only, and a relayed address of IPv4 has no peers of IPv6.
         address = (Attribute.XOR_PEER_ADDRESS, pack_address(peer.address, bytes(12)))

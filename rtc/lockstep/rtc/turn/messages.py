@@ -1,4 +1,4 @@
-"""What a TURN client says and hears (RFC 8656 5, 18): attributes, ChannelData, and the borders of both on a stream."""
+"""The messages of a TURN client (RFC 8656 5, 18): attributes, ChannelData, and the borders of both on a stream."""
 
 import struct
 from enum import IntEnum
@@ -24,7 +24,7 @@ MAX_TURN_MESSAGE = 2048  # bytes: a datagram as large as the socket takes, with 
 
 
 class Method(IntEnum):
-    """RFC 8656 17."""
+    """The methods of RFC 8656 17."""
 
     ALLOCATE = 0x003
     REFRESH = 0x004
@@ -33,7 +33,7 @@ class Method(IntEnum):
 
 
 class Attribute(IntEnum):
-    """RFC 8489 14 and RFC 8656 18."""
+    """The attributes of RFC 8489 14 and RFC 8656 18."""
 
     USERNAME = 0x0006
     MESSAGE_INTEGRITY = 0x0008
@@ -50,17 +50,17 @@ class Attribute(IntEnum):
 
 
 def long_term_key(username: str, realm: bytes, password: str) -> bytes:
-    """RFC 8489 9.2.2. Every TURN server has this one; the stronger one is not deployed."""
+    """Return the key of RFC 8489 9.2.2. Every TURN server has this one; the stronger one is not deployed."""
     return md5(username.encode() + b":" + realm + b":" + password.encode(), usedforsecurity=False).digest()
 
 
 def pack_channel_data(channel: int, data: bytes, *, padded: bool) -> bytes:
-    """`padded`: on a stream, to a multiple of four bytes (RFC 8656 12.5)."""
+    """Return ChannelData. `padded`: on a stream, to a multiple of four bytes (RFC 8656 12.5)."""
     return CHANNEL_HEADER.pack(channel, len(data)) + data + (bytes(-len(data) % 4) if padded else b"")
 
 
 def parse_channel_data(message: bytes) -> tuple[int, bytes] | None:
-    """Channel and data; None for another message."""
+    """Return channel and data; None for another message."""
     if len(message) < CHANNEL_HEADER.size:
         return None
     channel, length = CHANNEL_HEADER.unpack_from(message)
@@ -70,7 +70,7 @@ def parse_channel_data(message: bytes) -> tuple[int, bytes] | None:
 
 
 class TurnStream:
-    """Finds messages in the bytes of a TCP connection. `broken`: it is not TURN; close it."""
+    """Finds messages in the bytes of a TCP connection. `broken`: the bytes are not TURN; close it."""
 
     def __init__(self) -> None:
         self.broken = False
@@ -87,7 +87,7 @@ class TurnStream:
         return messages
 
     def _length(self) -> int | None:
-        """Of the message at the beginning; None: not known yet, or no message."""
+        """Return the length of the message at the beginning; None: not known yet, or not a message."""
         if len(self._kept) < 8:  # no message is shorter but ChannelData of at most four bytes, which no server sends
             return None
         first, length = int.from_bytes(self._kept[:2]), int.from_bytes(self._kept[2:4])

@@ -21,28 +21,28 @@ from lockstep.rtc.turn.settings import TurnSettings
 __all__ = ["TIMEOUT", "Answer", "Request", "Requests"]
 
 UNAUTHENTICATED, STALE_NONCE = 401, 438
-TIMEOUT = StunErrorCode(408, "no answer")  # an own code: RFC 8489 has none for it
+TIMEOUT = StunErrorCode(408, "no answer")  # a code of this package: RFC 8489 has none for it
 Attributes = Sequence[tuple[int, bytes]]
 
 
 @dataclass(slots=True, eq=False)
 class Request:
-    """One that waits for its answer."""
+    """A request that waits for its answer."""
 
     method: int
     attributes: Attributes
     subject: object = None  # chosen by its user
     transaction: bytes = b""
     data: bytes = b""
-    due_at: float = 0.0  # when it is repeated, or given up
+    due_at: float = 0.0  # the time to repeat it, or to give it up
     wait: float = 0.0
     sent: int = 0
-    nonce: bytes | None = None  # that it was sent with
+    nonce: bytes | None = None  # the nonce that it was sent with
 
 
 @dataclass(frozen=True, slots=True)
 class Answer:
-    """What became of a request."""
+    """The outcome of a request."""
 
     request: Request
     error: StunErrorCode | None  # None: success
@@ -50,7 +50,8 @@ class Answer:
 
 
 class Requests:
-    """`begin`, then as every core: pass the server's answers to `receive`; drain `data_to_send` and `answers`."""
+    """Repeats requests until they are answered. `begin`, then as every core: pass the server's answers to `receive`;
+    drain `data_to_send` and `answers`."""
 
     def __init__(
         self,
@@ -61,7 +62,7 @@ class Requests:
         password: str | None = None,
         reliable: bool = False,
     ) -> None:
-        """`reliable`: on a stream, where nothing is repeated (RFC 8489 6.2.2)."""
+        """`reliable`: True on a stream, where nothing is repeated (RFC 8489 6.2.2)."""
         self.counts: Counter[str] = Counter()
         self._random_bytes = random_bytes
         self._settings = settings
@@ -81,7 +82,7 @@ class Requests:
         return any(each.subject is subject for each in self._pending.values())
 
     def forget(self) -> None:
-        """Nobody waits for answers any more."""
+        """Forget all requests: nobody waits for answers any more."""
         self._pending.clear()
 
     def _send(self, request: Request, now: float) -> None:
@@ -98,10 +99,10 @@ class Requests:
         self._pending[request.transaction] = request
         self._out.append(request.data)
 
-    # The way in
+    # Input
 
     def receive(self, data: bytes, now: float) -> None:
-        """A STUN response; an answer to no own request is counted."""
+        """Take a STUN response; one that answers no request of this object is counted."""
         head = transaction_of(data)
         request = self._pending.get(head[1]) if head is not None else None
         if head is None or request is None or head[0] not in (Kind.SUCCESS, Kind.ERROR):
@@ -125,7 +126,7 @@ class Requests:
         self._answers.append(Answer(request, error, attributes))
 
     def _try_again(self, request: Request, error: StunErrorCode, attributes: dict[int, bytes], now: float) -> bool:
-        """RFC 8489 9.2.5: with the credentials that the server asks for, or with its new nonce."""
+        """Try again with the credentials that the server asks for, or with its new nonce (RFC 8489 9.2.5)."""
         realm, nonce = attributes.get(Attribute.REALM), attributes.get(Attribute.NONCE)
         if error.code not in (UNAUTHENTICATED, STALE_NONCE) or nonce is None or nonce == request.nonce:
             return False

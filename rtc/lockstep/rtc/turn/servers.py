@@ -1,4 +1,4 @@
-"""Which STUN and TURN servers to ask (RFC 7064, RFC 7065), and a STUN server's answer about the own address."""
+"""The STUN and TURN servers to ask (RFC 7064, RFC 7065), and a STUN server's answer about the address of this side."""
 
 import re
 from collections import Counter
@@ -20,7 +20,7 @@ URI = re.compile(
     re.IGNORECASE,
 )
 PORTS = {"stun": 3478, "turn": 3478, "stuns": 5349, "turns": 5349}
-MAX_SERVERS = 8  # that are asked: each costs a connection attempt and candidates
+MAX_SERVERS = 8  # servers that are asked: each costs a connection attempt and candidates
 
 
 class ServerUriError(ValueError):
@@ -29,7 +29,7 @@ class ServerUriError(ValueError):
 
 @dataclass(frozen=True, slots=True)
 class IceServer:
-    """As RTCIceServer of W3C: one server by one or more ways, and its credentials."""
+    """One server by one or more ways, and its credentials, like RTCIceServer of W3C."""
 
     urls: Sequence[str]
     username: str | None = None
@@ -46,9 +46,10 @@ class ServerUri:
 
 
 def parse_server_uri(text: str) -> ServerUri:
-    """
+    """Return the parts of a URI.
+
     Raises:
-        ServerUriError: it is not one.
+        ServerUriError: it is not the URI of a STUN or TURN server.
     """
     match = URI.fullmatch(text)
     port = int(match["port"] or PORTS[match["scheme"].lower()]) if match is not None else 0
@@ -67,7 +68,7 @@ def parse_server_uri(text: str) -> ServerUri:
 
 
 def server_uris(servers: Iterable[IceServer], counts: Counter[str]) -> list[tuple[ServerUri, IceServer]]:
-    """Those that can be asked: at most MAX_SERVERS, each once. What cannot is counted by its reason."""
+    """Return the servers that can be asked: at most MAX_SERVERS, each once. Others are counted by reason."""
     found: dict[ServerUri, IceServer] = {}
     for server in servers:
         for url in server.urls:
@@ -86,7 +87,7 @@ def server_uris(servers: Iterable[IceServer], counts: Counter[str]) -> list[tupl
 
 
 class MappedAddress:
-    """Asks one STUN server from one socket which address it sees (RFC 8445 5.1.1.2). A core as the others.
+    """Asks one STUN server from one socket for the address that it sees (RFC 8445 5.1.1.2). A core like the others.
 
     `mapped` is the address when it is known; `done`: nothing more will come.
     """

@@ -1,1 +1,1 @@
-"""The audit: who drove, stopped and let in whom, on disk and in memory."""
+"""The audit of drivers, stops and invitations, on disk and in memory."""

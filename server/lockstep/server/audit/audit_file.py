@@ -1,6 +1,6 @@
-"""The audit log on disk: JSON lines, only ever appended to; a full file is set aside and a new one begun.
+"""The audit log on disk: JSON lines, only ever appended to; a full file is rotated.
 
-Each line carries the hash of the line before (`lockstep.server.evidence.chain`), over files and restarts.
+Each line carries the hash of the line before (`lockstep.server.evidence.chain`), across files and restarts.
 """
 
 import os
@@ -17,7 +17,7 @@ from lockstep.server.util.regular_file import bounded_lines, open_regular
 
 __all__ = ["AuditFile", "chained_lines", "chatter_path", "last_records", "rotated", "stored_records"]
 
-TAIL_BYTES = 1 << 20  # looked at when the console starts; thousands of records
+TAIL_BYTES = 1 << 20  # read when the console starts; thousands of records
 
 
 class _Line(AuditRecord, frozen=True, kw_only=True, omit_defaults=True):
@@ -31,10 +31,12 @@ _decoder = msgspec.json.Decoder(AuditRecord)
 
 
 class AuditFile:
-    """Blocks: used from the writer's thread only. Every method may raise OSError; what was whole stays whole.
+    """One file with its rotated ones. Blocks: used from the writer's thread only.
+
+    Every method may raise OSError; lines that were whole stay whole.
 
     Attributes:
-        last: number of the last record that was written or found; 0: there is none
+        last: number of the last record that was written or found; 0 without records
         head: hash of its line
     """
 
@@ -44,12 +46,12 @@ class AuditFile:
         self._max_bytes = max_bytes
         self._files = files
         self._handle: int | None = None
-        self._size = 0  # of what is known to be whole
+        self._size = 0  # bytes of whole lines
 
     def write(self, records: list[AuditRecord]) -> None:
-        """All of them, safely on disk, or none."""
+        """Write all records safely to disk, or none."""
         if self._handle is not None and not self._is_there(self._handle):
-            self.close()  # somebody moved or deleted it, or has put something else in its place
+            self.close()  # somebody moved, deleted or replaced it
         self.open()
         data, head = self._chained(records)
         if self._size and self._size + len(data) > self._max_bytes:
@@ -62,33 +64,33 @@ class AuditFile:
         except OSError:
             with suppress(OSError):  # the first error is the one that says why
                 os.ftruncate(handle, self._size)
-            self.close()  # what is on disk is looked at anew before the next attempt
+            self.close()  # the next attempt looks at the disk anew
             raise
         self._size += len(data)
         if records:
             self.last, self.head = records[-1].n, head
 
     def open(self) -> None:
-        """Find the end of the chain. Done by the first `write` too."""
+        """Open the file and find the end of the chain; the first `write` does it too."""
         if self._handle is None:
             self._opened()
             try:
                 last, head = _end_of(self._path)
             except OSError:
-                self.close()  # else the next record would begin a chain of its own
+                self.close()  # else the next record would begin a new chain
                 raise
-            if last >= self.last:  # else records of this run are gone: the chain goes on behind them, which shows that
+            if last >= self.last:  # else records of this run are gone: the chain goes on behind them and shows it
                 self.last, self.head = last, head
 
     def _is_there(self, handle: int) -> bool:
-        """Whether what is written here can be found at the path."""
+        """True if the open file is the one at the path."""
         try:
             return os.path.samestat(os.fstat(handle), os.stat(self._path))
         except FileNotFoundError:
             return False
 
     def _chained(self, records: list[AuditRecord]) -> tuple[bytes, str]:
-        """Their lines, and the hash of the last one."""
+        """Return the records' lines and the hash of the last one."""
         lines, head = [], self.head
         for record in records:
             line = _encoder.encode(_Line(**msgspec.structs.asdict(record), before=head))
@@ -131,17 +133,17 @@ class AuditFile:
 
 
 def rotated(path: Path, number: int) -> Path:
-    """The file that was set aside `number` times; 0 is the one that is written."""
+    """Return the path of the file that was rotated `number` times; 0 is the one that is written."""
     return path if number == 0 else path.with_name(f"{path.name}.{number}")
 
 
 def chatter_path(path: Path) -> Path:
-    """The file beside the audit's own in which stands what a link can cause as often as it likes."""
+    """Return the path, beside the audit's own file, for records that a link can cause as often as it likes."""
     return path.with_name(f"{path.stem}-chatter{path.suffix}")
 
 
 def stored_records(path: Path) -> Iterator[AuditRecord]:
-    """All that is kept, in both files, in the order of their numbers; what cannot be understood is passed over."""
+    """Yield all records kept in both files, in the order of their numbers; skip lines that cannot be decoded."""
     own, chatter = (_stored(each) for each in (path, chatter_path(path)))
     return merge(own, chatter, key=lambda record: record.n)
 
@@ -153,7 +155,7 @@ def _stored(path: Path) -> Iterator[AuditRecord]:
 
 
 def chained_lines(path: Path) -> Iterator[ChainedLine]:
-    """Of one file and of those that were set aside, oldest first."""
+    """Yield the lines of one file and of its rotated ones, oldest first."""
     numbers = {int(each.suffix[1:]) for each in path.parent.glob(f"{path.name}.*") if each.suffix[1:].isdecimal()}
     for number in (*sorted(numbers - {0}, reverse=True), 0):
         try:
@@ -165,16 +167,16 @@ def chained_lines(path: Path) -> Iterator[ChainedLine]:
 
 
 def last_records(path: Path) -> list[AuditRecord]:
-    """Those at the end of the log; empty when there is none or it cannot be read."""
+    """Return the records at the end of the log; empty if it does not exist or cannot be read."""
     found: list[AuditRecord] = []
     for each in (path, chatter_path(path)):
-        with suppress(OSError):  # the writer says so
+        with suppress(OSError):  # the writer reports it
             found += [record for record, _ in _last_lines(each)]
     return sorted(found, key=lambda record: record.n)
 
 
 def _end_of(path: Path) -> tuple[int, str]:
-    """Number and hash of the last line that is a record. Raises OSError: it cannot be read."""
+    """Return number and hash of the last line that is a record. Raises OSError: it cannot be read."""
     last = (0, GENESIS)
     for record, line in _last_lines(path):
         last = record.n, line_hash(line)

@@ -1,4 +1,4 @@
-"""The audit log of one console: its file and its thread, its last records in memory, and how it fares."""
+"""The audit log of one console: its file, its thread, its last records in memory, and any reason why it fails."""
 
 import asyncio
 from collections.abc import Callable, Iterator
@@ -25,14 +25,14 @@ log = structlog.get_logger(__name__)
 
 
 class AuditLog:
-    """`append` from the loop.
+    """Keeps records in memory and on disk. Call `append` from the loop.
 
     Attributes:
         tail: the last records, those of earlier runs included
-        trouble: why it cannot be written at present, "" when it can
+        trouble: the reason if it cannot be written at present, else ""
         on_trouble: called on the loop whenever `trouble` changes
         on_record: called with every record
-        newest_anchor: the newest signed head, from any thread; None: there is none yet
+        newest_anchor: returns the newest signed head, None before the first; thread-safe
     """
 
     def __init__(
@@ -75,7 +75,7 @@ class AuditLog:
         self._writer.close()
 
     def _changed(self, trouble: str) -> None:
-        """In the writer's thread."""
+        """Pass `trouble` to the loop; called in the writer's thread."""
         try:
             self._loop.call_soon_threadsafe(self._tell, trouble)
         except RuntimeError:
@@ -94,11 +94,12 @@ class AuditLog:
 def open_audit_log(
     directory: StateDir, settings: Settings, robot: str = "", signer: Signer | None = None
 ) -> Iterator[AuditLog]:
-    """Continues the numbers of the last run. Without a place for it, records stay in memory until there is one;
-    `trouble` says why.
+    """Open the audit log, which continues the numbers of the last run.
+
+    If its file cannot be opened, records stay in memory until it can; `trouble` says why.
 
     Args:
-        signer: signs heads of it; None: they are not signed
+        signer: signs its heads; None: they are not signed
     """
 
     def store_at(path: Path) -> AuditStore:
@@ -119,15 +120,15 @@ def open_audit_log(
 
 
 def anchors_path(settings: Settings, directory: Path) -> Path:
-    """Where signed heads of the audit in that directory go: the second place that the settings name, or the files."""
+    """Return the path for signed heads of the audit in that directory: as set, or else beside the recordings."""
     return settings.audit_anchor or recordings_directory(settings.recording, directory) / ANCHORS_NAME
 
 
 class _LateFile:
-    """Stands in for a file that could not be had at the start: each attempt to write looks for it anew.
+    """Stands in for a file that could not be opened at the start: each attempt to write tries again.
 
-    Blocks: used from the writer's thread only. Records that were numbered without knowing those on the disk get the
-    numbers behind them there.
+    Blocks: used from the writer's thread only. Records that were numbered without knowing those on the disk are
+    renumbered to come after them.
     """
 
     def __init__(self, directory: StateDir, store_at: Callable[[Path], AuditStore]) -> None:

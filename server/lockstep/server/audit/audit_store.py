@@ -1,4 +1,4 @@
-"""Where the audit's records go: what counts in one file, chatter in another, and signed heads of both elsewhere."""
+"""Stores the audit's records in one file, chatter in another, and signed heads of both elsewhere."""
 
 import time
 from pathlib import Path
@@ -18,12 +18,12 @@ ANCHOR_SECONDS = 60.0  # between two signed heads, while anything is written
 
 
 def audit_name(path: Path, robot: str) -> str:
-    """What anchors call the audit at `path`."""
+    """Return the name of the audit at `path` in anchors."""
     return f"{robot}/{path.stem}" if robot else path.stem
 
 
 class AuditStore:
-    """Blocks: used from the writer's thread only.
+    """The files of one audit. Blocks: used from the writer's thread only.
 
     Attributes:
         newest_anchor: the signed head that was made last; None before the first
@@ -45,11 +45,11 @@ class AuditStore:
         self._signer = signer
         self._anchors = anchors
         self._anchored_at = -ANCHOR_SECONDS
-        self._trouble = False  # the newest anchor is not kept
+        self._trouble = False  # the newest anchor could not be written
         self._written = 0  # number up to which the audit's own file has the records of this run
 
     def write(self, records: list[AuditRecord]) -> None:
-        """All of them, safely on disk, or OSError: then once more, all that were not taken."""
+        """Write all records safely to disk. After an OSError call again with all: written ones are skipped."""
         own = [record for record in records if record.kind not in CHATTER and record.n > self._written]
         chatter = [record for record in records if record.kind in CHATTER]
         if own:
@@ -59,13 +59,13 @@ class AuditStore:
             self._chatter.write(chatter)
 
     def last(self) -> int:
-        """Number of the newest record on the disk; 0: there is none. Raises OSError."""
+        """Return the number of the newest record on the disk, 0 without records. Raises OSError."""
         self._own.open()
         self._chatter.open()
         return max(self._own.last, self._chatter.last)
 
     def settle(self) -> None:
-        """Nothing waits: sign what is written, when that is due."""
+        """Sign the heads if that is due; called when no record waits."""
         if time.monotonic() - self._anchored_at >= ANCHOR_SECONDS:
             self._anchor()
 
@@ -75,7 +75,7 @@ class AuditStore:
         self._chatter.close()
 
     def _anchor(self) -> None:
-        """Never raises: the audit itself goes on."""
+        """Sign the heads of both files. Never raises: the audit itself goes on."""
         if self._signer is None or self._anchors is None:
             return
         try:

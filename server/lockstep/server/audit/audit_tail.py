@@ -1,4 +1,4 @@
-"""The last records of the audit, in memory: what supervisors are shown. No I/O."""
+"""The last records of the audit, in memory, as supervisors are shown them. No I/O."""
 
 from collections import deque
 from collections.abc import Iterable, Iterator
@@ -12,9 +12,9 @@ KEPT = 5000  # records; about 2 MB
 
 
 class AuditTail:
-    """When it is full, the kind with the most records gives one up: the oldest of the link that has the most of them.
+    """The last records. A full tail drops one of the kind with the most: the oldest of the link with most of them.
 
-    So whoever causes many records of a kind pushes out their own, and a kind with few records loses none.
+    So a link that causes many records of a kind pushes out its own, and a kind with few records loses none.
     """
 
     def __init__(self, records: Iterable[AuditRecord] = ()) -> None:
@@ -50,12 +50,12 @@ class AuditTail:
             del links[link]
 
     def after(self, n: int, limit: int) -> list[AuditRecord]:
-        """The first `limit` records behind number `n` of those that are kept; with a negative `n` the newest."""
+        """Return the first `limit` records after number `n` of those that are kept; with a negative `n` the newest."""
         if n < 0:
             return self.before(self._last + 1, limit)
         return list(islice((record for record in self._records.values() if record.n > n), limit))
 
     def before(self, n: int, limit: int) -> list[AuditRecord]:
-        """The last `limit` records in front of number `n` of those that are kept, oldest first."""
+        """Return the last `limit` records before number `n` of those that are kept, oldest first."""
         found = list(islice((each for each in reversed(self._records.values()) if each.n < n), limit))
         return found[::-1]

@@ -1,4 +1,4 @@
-"""The audit trail: turns what happens into records with the event reference that holds, and hands them to the log."""
+"""The audit trail: makes records of what happens, with the current event reference, and passes them to the log."""
 
 import asyncio
 import time
@@ -14,11 +14,11 @@ __all__ = ["AuditTrail", "RecordKeeper"]
 NOBODY = Actor()
 BEYOND = "counted together: too many for one link"
 MERGE_SECONDS = 1.0  # repetitions become one record
-SLOW_TICKS = 60  # of that: what is beyond a link's budget becomes one record
+SLOW_TICKS = 60  # times that: what is beyond a link's budget becomes one record
 
 
 class RecordKeeper(Protocol):
-    """The log. Returns at once; iterating gives the last records, oldest first."""
+    """The log. `append` returns at once; iterating gives the last records, oldest first."""
 
     @property
     def next_number(self) -> int: ...
@@ -28,7 +28,7 @@ class RecordKeeper(Protocol):
 
 
 class AuditTrail:
-    """Run `run` as a task. All else is called on the loop and returns at once."""
+    """Makes the audit's records. Run `run` as a task; all else is called on the loop and returns at once."""
 
     def __init__(self, clock: EventClock, log: RecordKeeper) -> None:
         self._clock = clock
@@ -36,7 +36,7 @@ class AuditTrail:
         self._next = log.next_number
         self._merger = AuditMerger()
         self._budget = AuditBudget()
-        self._beyond = AuditMerger()  # the budget
+        self._beyond = AuditMerger()  # records beyond the budget
         self._ticks = 0
         self._holder = Actor()
         self._holder_is_noted = True  # the newest record of the seat says who has it
@@ -44,11 +44,11 @@ class AuditTrail:
         self._description = next((each.what for each in reversed([*log]) if each.kind == "epoch"), "")
 
     def record(self, kind: AuditKind, actor: Actor = NOBODY, what: str = "", detail: str = "") -> None:
-        """Write down `kind`, now. Of some kinds, what is beyond the link's budget is only counted."""
+        """Write a record of `kind` now. Some kinds are only counted beyond the link's budget."""
         self._record(kind, actor, what, detail)
 
     def _record(self, kind: AuditKind, actor: Actor, what: str, detail: str) -> bool:
-        """Whether it was written down by itself."""
+        """Record like `record`; True if it was written, False if it was only counted."""
         if kind in LIMITED and not self._budget.take(kind, actor.link, time.monotonic()):
             self._beyond.add(kind, _link_alone(actor), what)
             return False
@@ -76,18 +76,18 @@ class AuditTrail:
         self._next += 1
 
     def started(self, console: str, page: str, protocol: int) -> None:
-        """The console begins, with that software."""
+        """Record that the console starts, with its software's versions."""
         self.record("start", what=f"console {console}", detail=f"page {page}, robot link protocol {protocol}")
 
     def epoch(self, label: str, description: str) -> None:
-        """Another run of the bridge, whose robot's description has this hash. A hash other than the last is said."""
+        """Record another run of the bridge, with the hash of its robot's description and the last one if it differs."""
         what = f"description {description}"
         changed = f"; was {self._description}" if self._description not in ("", what) else ""
         self.record("epoch", what=what, detail=f"{label}{changed}")
         self._description = what
 
     def seat(self, seat: Seat, holder: Actor, by: Actor) -> None:
-        """The seat is another one now: `holder` has it, or nobody; or other peers claim it; because of `by`."""
+        """Record that the seat changed because of `by`: its holder is `holder`, or nobody, or other peers claim it."""
         claims = [claim.peer for claim in seat.claims]
         if holder.peer != self._holder.peer:
             detail = f"was {self._holder.name} ({self._holder.peer})" if self._holder.peer else ""
@@ -99,14 +99,14 @@ class AuditTrail:
             self._claims = claims
 
     def again(self, kind: AuditKind, actor: Actor, what: str) -> None:
-        """As `record`, for what may come many times a second."""
+        """Count a record that is merged with its repetitions, for what may come many times a second."""
         self._merger.add(kind, actor, what)
 
     def refused(self, actor: Actor, reason: str) -> None:
         self.again("refusal", actor, reason)
 
     async def run(self) -> None:
-        """Until cancelled."""
+        """Write merged records every `MERGE_SECONDS`, until cancelled."""
         try:
             while True:
                 await asyncio.sleep(MERGE_SECONDS)
@@ -116,7 +116,7 @@ class AuditTrail:
             self.flush(beyond=True)
 
     def flush(self, *, beyond: bool = False) -> None:
-        """Write down what was merged until now; with `beyond` also what went beyond the links' budgets."""
+        """Write what was merged until now; with `beyond` also what went beyond the links' budgets."""
         now = time.monotonic()
         self._note_holder(now)
         for kind, actor, what, count in self._merger.take():
@@ -130,12 +130,12 @@ class AuditTrail:
                 self._write(kind, actor, what, BEYOND, count)
 
     def _note_holder(self, now: float) -> None:
-        """Whoever keeps a seat that went round too often to be written down each time."""
+        """Record the holder of a seat that changed hands too often to be recorded each time."""
         if not self._holder_is_noted and self._budget.take("seat", self._holder.link, now):
             self._holder_is_noted = True
             self._write("seat", self._holder, "has it now" if self._holder.peer else "free now")
 
 
 def _link_alone(actor: Actor) -> Actor:
-    """All that came by one link counts together, whatever its peers are called."""
+    """Return the link's actor: what its peers do counts together, whatever they are called."""
     return Actor(role=actor.role, link=actor.link)

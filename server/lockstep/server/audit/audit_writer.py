@@ -14,9 +14,9 @@ __all__ = ["AuditWriter", "RecordFile"]
 
 log = structlog.get_logger(__name__)
 
-MAX_WAITING = 4096  # records; then the oldest of those that could not be written go
+MAX_WAITING = 4096  # records; then the oldest of those that could not be written are dropped
 RETRY_SECONDS = 2.0
-SETTLE_SECONDS = 5.0  # between two looks at the file while nothing comes
+SETTLE_SECONDS = 5.0  # between two calls of `settle` while no record comes
 CLOSE_SECONDS = 3.0
 
 
@@ -27,7 +27,7 @@ class RecordFile(Protocol):
 
 
 class AuditWriter:
-    """Call `start`, `append` from the loop, and `close` at the end, which writes what waits.
+    """The writer's thread. Call `start`, `append` from the loop, and `close` at the end, which writes what waits.
 
     Args:
         changed: called from the thread when writing begins to fail, with the reason, and with "" when it works again
@@ -60,7 +60,7 @@ class AuditWriter:
         self._wake.set()
 
     def close(self) -> None:
-        """Idempotent; gives up after a few seconds when the disk does not answer."""
+        """End the thread; give up after a few seconds if the disk does not answer. Idempotent."""
         self._closing.set()
         self._wake.set()
         if self._thread.is_alive():
@@ -81,7 +81,7 @@ class AuditWriter:
         self._file.close()
 
     def _attempt(self, waiting: deque[AuditRecord]) -> bool:
-        """Write all that waits. False: try again later."""
+        """Write all records that wait; False if that has to be tried again later."""
         while not self._queue.empty():
             waiting.append(self._queue.get_nowait())
             if len(waiting) > MAX_WAITING:
@@ -91,7 +91,7 @@ class AuditWriter:
             return True
         try:
             self._file.write(list(waiting))
-        except Exception as error:  # not the disk's alone: this thread must not end without a word
+        except Exception as error:  # not OSError alone: this thread must not end silently
             self.failures += 1
             self._report(getattr(error, "strerror", None) or str(error) or type(error).__name__)
             return False

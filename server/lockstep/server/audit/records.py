@@ -1,4 +1,4 @@
-"""The audit's records: who drove when, and what else somebody may want to know afterwards. No I/O, no clock."""
+"""The audit's records of who drove when, and of other events worth knowing afterwards. No I/O, no clock."""
 
 from collections.abc import Iterator
 from typing import Literal, NamedTuple
@@ -18,7 +18,7 @@ AuditKind = Literal[
     "claim",  # the claims on the seat changed
     "stop",
     "reset",
-    "silence",  # a supervisor silenced the stops of a link, or that ended
+    "silence",  # of a link's stops by a supervisor: begun, ended
     "refusal",  # merged: `count` of the same within a second
     "invitation",
     "revocation",
@@ -32,23 +32,23 @@ AuditKind = Literal[
     "audit",  # records were lost before this one
 ]
 
-# What one link can cause as often as it likes. It is kept in a file of its own, which is full sooner.
+# Kinds that one link can cause as often as it likes. They are kept in a separate file, which is full sooner.
 CHATTER: frozenset[AuditKind] = frozenset({"joined", "renamed", "left", "claim", "refusal", "note", "reading"})
 
-# What is written one by one only as often as its link's budget allows; the rest is counted together.
+# Kinds that are written one by one only as often as their link's budget allows; the rest is counted together.
 # The others are either not caused by a link, or limited where they are asked for.
 LIMITED: frozenset[AuditKind] = frozenset(
     {"joined", "renamed", "left", "seat", "claim", "invitation", "revocation", "recording", "reading", "publication"}
 )
 BURST = 30.0  # records of one kind and link at once
 RATE = 0.1  # Hz, afterwards
-MAX_BUDGETS = 1024  # links times kinds that are told apart; further ones share one
+MAX_BUDGETS = 1024  # pairs of kind and link; further links of a kind share one
 
 MAX_PENDING = 256  # different keys within one interval; further ones are counted together
 
 
 class Actor(NamedTuple):
-    """Who did something."""
+    """The person behind a record, with connection and link."""
 
     name: str = ""
     role: str = ""
@@ -74,13 +74,13 @@ class AuditRecord(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True)
 
 
 class AuditBudget:
-    """How often a link may have a kind of record written down one by one. `now` is monotonic seconds."""
+    """Limits how often a link may have a kind of record written one by one. `now` is monotonic seconds."""
 
     def __init__(self) -> None:
         self._buckets: dict[tuple[AuditKind, str], TokenBucket] = {}
 
     def take(self, kind: AuditKind, link: str, now: float) -> bool:
-        """Whether it may be written now; then it counts."""
+        """Take one record from the budget; False if it is used up."""
         key = (kind, link)
         if key not in self._buckets and len(self._buckets) >= MAX_BUDGETS:
             key = (kind, "")
@@ -90,12 +90,12 @@ class AuditBudget:
         return bucket.take(now)
 
     def forget_idle(self, now: float) -> None:
-        """Drop the budgets that nobody has drawn on for long enough."""
+        """Drop the budgets that are full again."""
         self._buckets = {key: bucket for key, bucket in self._buckets.items() if not bucket.is_full(now)}
 
 
 class AuditMerger:
-    """Counts what the same peer did again; a flood of it becomes one record an interval."""
+    """Counts repeated actions of the same peer; a flood of them becomes one record an interval."""
 
     def __init__(self) -> None:
         self._counts: dict[tuple[AuditKind, Actor, str], int] = {}
@@ -107,7 +107,7 @@ class AuditMerger:
         self._counts[key] = self._counts.get(key, 0) + count
 
     def take(self) -> Iterator[tuple[AuditKind, Actor, str, int]]:
-        """What came since the last time: who, what, how often."""
+        """Yield what was added since the last call: kind, actor, what, and how often."""
         counts, self._counts = self._counts, {}
         for (kind, actor, what), count in counts.items():
             yield kind, actor, what, count

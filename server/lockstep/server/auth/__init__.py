@@ -1,1 +1,1 @@
-"""Who may do what: tokens, invitations, and how both end."""
+"""Access control: tokens, invitations, and their expiry and revocation."""

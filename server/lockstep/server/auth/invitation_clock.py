@@ -1,4 +1,4 @@
-"""The time by which links end: it never runs backwards, over restarts neither. No I/O."""
+"""The clock by which links end. It never runs backwards, not even across restarts. No I/O."""
 
 import threading
 
@@ -6,14 +6,14 @@ __all__ = ["LinkClock"]
 
 
 class LinkClock:
-    """Seconds since 1970: the wall clock's, or the newest time that was ever seen and what has passed since.
+    """Seconds since 1970: the wall clock's, or the newest time ever seen plus the time since then, if that is later.
 
-    A link that was seen to have expired stays expired, whatever the wall clock says later. After a wall clock that was
-    ahead, time goes on from there.
+    A link that was seen to have expired stays expired, whatever the wall clock says later. If the wall clock was ahead,
+    time goes on from there.
 
     Args:
         seen: the newest time of an earlier run, s since 1970; 0 for none
-        steady: of a clock that nobody sets, in s, as all that are called so here
+        steady: time of a monotonic clock in s, here and in all methods
     """
 
     def __init__(self, seen: float, steady: float) -> None:
@@ -22,13 +22,13 @@ class LinkClock:
         self._busy = threading.Lock()
 
     def at(self, wall: float, steady: float) -> float:
-        """What time it is when the wall clock says `wall`. May be called from any thread."""
+        """Return the time at the wall clock's `wall`. Thread-safe."""
         with self._busy:
             self._seen = max(wall, self._seen + max(0.0, steady - self._steady))
             self._steady = max(self._steady, steady)
             return self._seen
 
     def saw(self, seen: float) -> None:
-        """Another process saw this time."""
+        """Take note of a time that another process saw."""
         with self._busy:
             self._seen = max(self._seen, seen)

@@ -1,4 +1,4 @@
-"""The invitations on disk. Several processes change them: consoles, and `lockstep invite` and `revoke` beside them."""
+"""The invitations on disk. Several processes change them: consoles, `lockstep invite` and `lockstep revoke`."""
 
 import math
 import threading
@@ -25,8 +25,8 @@ ELSEWHERE = "revoked-elsewhere.json"
 SEEN = "newest-time.json"
 ASIDE = "revoked-lately"
 ASIDE_BYTES = 4096  # ids of links, one a line
-BEHIND_SECONDS = 60.0  # that a clock may be behind the newest time without a word
-HANGS_AFTER = 10.0  # s that a change may take; then nobody knows what other processes have revoked meanwhile
+BEHIND_SECONDS = 60.0  # that a clock may be behind the newest time without a warning
+HANGS_AFTER = 10.0  # s that a change may take; then it is unknown what other processes have revoked meanwhile
 MAX_ELSEWHERE = 5000  # links that other consoles revoked; those that would end first are forgotten first
 Result = TypeVar("Result")
 
@@ -49,22 +49,23 @@ _seen = msgspec.json.Decoder(_Seen)
 
 
 class InvitationStore:
-    """`is_revoked` answers from memory; `refresh` brings the memory up to date, which costs one `stat`.
+    """The stored invitations. `is_revoked` answers from memory; `refresh` updates the memory, which costs one `stat`.
 
-    What is forgotten is written after the time by which it had ended, so no clock that is wrong later revives it.
+    An expired link is removed only after the time by which it had ended is on disk: a clock that is wrong later cannot
+    revive it.
 
     Attributes:
         on_revoked: called, from any thread, when there may be more revoked links
-        trouble: why the list cannot be read at present, so that nobody knows which links are revoked; "" when it can
+        trouble: the reason if the list cannot be read at present, so that revocations are unknown; else ""
 
     Raises:
-        StateDirUnusable, StateDamaged: it cannot be read, or not be understood.
+        StateDirUnusable, StateDamaged: it cannot be read or decoded.
     """
 
     def __init__(self, directory: StateDir) -> None:
         self._directory = directory
         self._busy = threading.Lock()
-        self._busy_since = math.inf  # s, when whoever holds it took it
+        self._busy_since = math.inf  # s, when `_busy` was taken
         self.on_revoked: Callable[[], None] = _ignore
         self.trouble = ""
         seen = self._read_seen()
@@ -75,46 +76,46 @@ class InvitationStore:
         self._known = self._read()
         self._elsewhere = self._read_elsewhere()
         self._revoked = self._known.revoked()
-        self._ended: set[str] = set()  # revoked by this process, whether or not the disk has taken it
-        self._unwritten: set[str] = set()  # of these, what the disk has to be asked again for
-        self._aside: tuple[int, int] | None = None  # version of what was set aside
+        self._ended: set[str] = set()  # revoked by this process, whether or not on disk
+        self._unwritten: set[str] = set()  # those of them that are still to be written
+        self._aside: tuple[int, int] | None = None  # version of the file that was set aside
         self._look_aside()
         if seen > time.time() + BEHIND_SECONDS:
             log.warning("this machine's clock is behind; links end by the newest time that was seen", seen=seen)
 
     def now(self) -> float:
-        """The time by which links end, s since 1970; it never runs backwards."""
+        """Return the time by which links end, s since 1970; it never runs backwards."""
         return self._clock.at(time.time(), _steady())
 
     def check(self, identity: Identity, known: Invitations) -> None:
-        """Within a change of `known`: raises LinkExpired or LinkRevoked when the link of `identity` is good no more."""
+        """Raise LinkExpired or LinkRevoked if the link of `identity` has ended; call within a change of `known`."""
         if identity.expires <= self.now():
             raise LinkExpired("this link has expired; ask for a new one")
         if self.is_revoked(identity.token_id) or identity.token_id in known.revoked():
             raise LinkRevoked("this link was revoked")
 
     def keep_time(self) -> None:
-        """Blocks: write down what time it is, for the next run."""
+        """Write the time to disk, for the next run. Blocks."""
         with self._alone():
             self._write_seen()
             self._directory.set_aside(ASIDE, ASIDE_BYTES)
 
     @property
     def known(self) -> Invitations:
-        """Only to be looked at."""
+        """The invitations in memory; not to be changed."""
         return self._known
 
     def is_revoked(self, invitation_id: str) -> bool:
         return invitation_id in self._revoked or invitation_id in self._elsewhere or invitation_id in self._ended
 
     def invited_with(self, link: str) -> str:
-        """The link that this one was made with; "" for none, and for one that is not known here."""
+        """Return the link that this one was made with; "" if it was made without one, or is unknown here."""
         return self._known.invited_with(link)
 
     def end_at_once(self, by: Identity, invitation_id: str) -> bool:
-        """From now on `is_revoked` of this link, and of all that was invited with it. The disk may take its time.
+        """Revoke this link, and all that was invited with it, in memory, without waiting for the disk.
 
-        Whether it is known here; a link that another process has just made is found by `update` alone.
+        False if it is unknown here; a link that another process has just made is found by `update` alone.
         """
         return self._end_here(invitation_id, by)
 
@@ -127,16 +128,16 @@ class InvitationStore:
         return True
 
     def write_later(self, invitation_id: str) -> None:
-        """The disk did not take that this link was revoked: `keep_ended` is to try again."""
+        """Note that the revocation of this link could not be written: `keep_ended` is to try again."""
         self._unwritten.add(invitation_id)
 
     def note_ended(self) -> None:
-        """Blocks: write what the disk did not take to the place that was set aside for it, for the next start."""
+        """Write the unwritten revocations to the file that was set aside for them, for the next start. Blocks."""
         with self._alone():
             self._write_aside(self._read_aside() | self._unwritten)
 
     def _look_aside(self) -> None:
-        """What an earlier run, or a command beside this one, could write nowhere else."""
+        """Take the revocations that an earlier run, or another process, could write nowhere else."""
         version = self._directory.version(ASIDE)
         if version != self._aside:
             self._aside = version
@@ -155,36 +156,36 @@ class InvitationStore:
 
     @property
     def unwritten(self) -> bool:
-        """Whether a link was revoked that the disk does not know of yet."""
+        """True if a revocation is not on disk yet."""
         return bool(self._unwritten)
 
     def keep_ended(self) -> list[Invitation]:
-        """Blocks: write down what the disk did not take; what has changed by that."""
+        """Write the unwritten revocations; return the invitations that this changed. Blocks."""
         wanted = frozenset(self._unwritten)
         ended = self.update(lambda invitations: _end(invitations, wanted, self.now()))
         self._unwritten -= wanted
-        with self._alone(), suppress(StateDirUnusable):  # a link that is noted there for longer has ended all the same
+        with self._alone(), suppress(StateDirUnusable):  # a link noted there for longer has ended anyway
             self._write_aside(self._read_aside() - wanted)
         return ended
 
     def has_ended(self, link: str, expires: float) -> bool:
-        """Whether the link of this id, which expires then, is good no more."""
+        """True if the link of this id, which expires at `expires`, is no longer good."""
         return self.is_revoked(link) or self.now() >= expires
 
     def revoked_links(self) -> dict[str, float]:
-        """All that is known to be revoked, here and elsewhere, and when each would have expired."""
+        """Return all links known to be revoked, here and elsewhere, and when each would have expired."""
         here = {each.id: each.expires for each in self._known.all if each.revoked_at is not None}
         return {**self._elsewhere, **here}
 
     def revoked_elsewhere(self, links: Mapping[str, float]) -> bool:
-        """Other consoles revoked these: `is_revoked` knows it from now on. Whether any of them is new."""
+        """Add links that other consoles revoked, for `is_revoked`; True if any of them is new."""
         fresh = {link: expires for link, expires in links.items() if link not in self._elsewhere}
         if fresh:
             self._elsewhere = _newest({**self._elsewhere, **fresh})
         return bool(fresh)
 
     def keep_revoked_elsewhere(self) -> list[Invitation]:
-        """Blocks: write down what `revoked_elsewhere` was told, and end what was invited with those links."""
+        """Write the links passed to `revoked_elsewhere`, and revoke what was invited with them. Blocks."""
         with self._alone():
             known = {**self._read_elsewhere(), **self._elsewhere}
             now = self._write_seen()
@@ -195,7 +196,7 @@ class InvitationStore:
         return self.update(lambda invitations: _end_those_of(invitations, kept, now))
 
     def update(self, change: Callable[[Invitations], Result]) -> Result:
-        """Applies `change` to what is on disk now and writes it back; nothing is written when it raises."""
+        """Apply `change` to the invitations on disk and write them back; nothing is written if it raises."""
         with self._alone():
             known = self._read_known()
             result = change(known)
@@ -206,8 +207,8 @@ class InvitationStore:
         return result
 
     def refresh(self) -> list[Invitation]:
-        """What another process has added or revoked since. While the list cannot be read, `trouble` says why."""
-        if not self._busy.acquire(blocking=False):  # our own change is under way in a thread
+        """Return what another process has added or revoked since. If the list cannot be read, `trouble` says why."""
+        if not self._busy.acquire(blocking=False):  # a change is under way in a thread of this process
             if _steady() - self._busy_since > HANGS_AFTER:
                 self._tell_trouble("the disk does not answer", "a change of the list does not end")
             return []
@@ -230,7 +231,7 @@ class InvitationStore:
 
     @contextmanager
     def _alone(self) -> Iterator[None]:
-        """Only one thread of one process is inside."""
+        """Let one thread of one process at a time inside."""
         with self._busy:
             self._busy_since = _steady()
             try:
@@ -249,7 +250,7 @@ class InvitationStore:
         return [step for each in self._known.all for step in _steps(each) if step not in before]
 
     def _read_known(self) -> Invitations:
-        """As `_read`, when this run has seen the file before."""
+        """Read the invitations. Raises StateDamaged if the file is gone that this run has seen before."""
         if self._version is not None and self._directory.version(FILE) is None:
             raise StateDamaged(self._directory.path / FILE, "it is gone")
         return self._read()
@@ -276,10 +277,10 @@ class InvitationStore:
             raise StateDamaged(self._directory.path / SEEN, f"not understood: {error}") from error
 
     def _write_seen(self) -> float:
-        """The time, once it is on disk."""
+        """Write the time to disk and return it."""
         self._clock.saw(self._read_seen())
         now = self.now()
-        if self._directory.version(FILE) is not None:  # so whoever finds the time knows that there was a list
+        if self._directory.version(FILE) is not None:  # so that a time on disk proves that there was a list
             self._directory.write(SEEN, msgspec.json.encode(_Seen(now)))
         return now
 
@@ -292,7 +293,7 @@ class InvitationStore:
 
 
 def _steady() -> float:
-    """Counts also while the machine sleeps, where the system can tell."""
+    """Return monotonic s, which count also while the machine sleeps, where the system can tell."""
     return time.clock_gettime(time.CLOCK_BOOTTIME) if hasattr(time, "CLOCK_BOOTTIME") else time.monotonic()
 
 
@@ -317,6 +318,6 @@ def _ignore() -> None:
 
 
 def _steps(invitation: Invitation) -> list[Invitation]:
-    """What happened to it: it was made, and perhaps revoked."""
+    """Return the steps of an invitation: it was made, and perhaps revoked."""
     made = msgspec.structs.replace(invitation, revoked_at=None)
     return [made] if invitation.revoked_at is None else [made, invitation]

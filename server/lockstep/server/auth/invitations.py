@@ -1,4 +1,4 @@
-"""Invitations: links that somebody was given, and who may give or revoke them. No I/O, no clock.
+"""Invitations: links given to people, and the rules for giving and revoking them. No I/O, no clock.
 
 | role | may invite | sees and revokes |
 |---|---|---|
@@ -6,8 +6,8 @@
 | operator | observers, operators | what it invited |
 | supervisor | anyone | everything |
 
-An invitation ends no later than the link it was made with, is revoked with it, and is good for no robot that the other
-is not good for.
+An invitation ends no later than the link it was made with, is revoked with it, and is good only for robots that this
+link is good for.
 """
 
 import secrets
@@ -25,8 +25,8 @@ __all__ = ["MAX_SECONDS", "Invitation", "Invitations", "may_invite"]
 
 MAX_LIVE = 500
 MAX_KEPT = 5000  # with those that ended lately
-FOR_SUPERVISORS = 0.1  # of both: an operator who makes links without end shuts nobody else out
-FAMILY = 0.25  # of both: what an operator's link has invited, and what that has, at most
+FOR_SUPERVISORS = 0.1  # share of both: an operator who makes links without end shuts nobody else out
+FAMILY = 0.25  # largest share of both for links invited with an operator's link, or with these
 MIN_SECONDS = 60.0
 MAX_SECONDS = 366 * 24 * 3600.0
 SHOWN_AFTER_END = 24 * 3600.0  # s that an ended one stays in the list
@@ -39,25 +39,25 @@ _MAY_INVITE: dict[Role, tuple[Role, ...]] = {
 
 
 class Invitation(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
-    """What is kept of a link: never the token, which the key makes again from this."""
+    """The stored part of a link: never the token, which the key makes again from this."""
 
     id: Annotated[str, msgspec.Meta(min_length=1, max_length=64)]  # the token's jti
     role: Role
     name: str
     created: float  # s since 1970, as all times here
     expires: float
-    by: str = ""  # name of who invited; "" from the command line or made at start
+    by: str = ""  # name of the inviter; "" from the command line or made at start
     by_link: str = ""  # id of the link that it was made with
     at_start: bool = False  # printed by every start of the console
     revoked_at: float | None = None
-    robots: tuple[str, ...] = ()  # of a fleet, that it is good for; empty: all
+    robots: tuple[str, ...] = ()  # robots of a fleet that it is good for; empty: all
 
     @property
     def identity(self) -> Identity:
         return Identity(self.role, self.name, self.id, self.expires, self.robots, self.created)
 
     def concerns(self, robot: str) -> bool:
-        """Whether it is good for that robot; "" is the robot of a console that has only one."""
+        """True if it is good for that robot; "" is the robot of a console that has only one."""
         return self.identity.may_see(robot)
 
     def is_good(self, now: float) -> bool:
@@ -69,7 +69,7 @@ def may_invite(role: Role) -> tuple[Role, ...]:
 
 
 class Invitations:
-    """All of them; `now` is seconds since 1970. `by` is None on the command line, which may do everything."""
+    """All invitations. `now` is seconds since 1970; `by` is None on the command line, which may do everything."""
 
     def __init__(self, known: list[Invitation]) -> None:
         self._known = {invitation.id: invitation for invitation in known}
@@ -79,7 +79,7 @@ class Invitations:
         return list(self._known.values())
 
     def invited_with(self, invitation_id: str) -> str:
-        """The link that this one was made with; "" for none, and for one that is not known."""
+        """Return the link that this one was made with; "" if it was made without one, or is unknown."""
         found = self._known.get(invitation_id)
         return "" if found is None else found.by_link
 
@@ -89,11 +89,11 @@ class Invitations:
     def invite(
         self, by: Identity | None, role: Role, name: str, seconds: float, now: float, robots: tuple[str, ...] = ()
     ) -> Invitation:
-        """A new invitation; for those `robots` of a fleet, or for as many as `by` may see.
+        """Make an invitation for those `robots` of a fleet, or for as many as `by` may see.
 
         Raises:
             NotAllowed: the role of `by` may not invite `role`, or it may not see a robot itself.
-            BadParameter: the time is not within bounds, or there is no such name for a robot.
+            BadParameter: the time is not within bounds, or a robot's name is not valid.
             TooManyInvitations: revoke some first.
         """
         if by is not None and role not in may_invite(by.role):
@@ -131,9 +131,9 @@ class Invitations:
             self._check_family(by, now)
 
     def _check_family(self, by: Identity, now: float) -> None:
-        """Raises TooManyInvitations: the link of `by`, with all that it invited, has its share of them.
+        """Raise TooManyInvitations if the link of `by`, with all that it invited, has used up its share.
 
-        The link that the console prints may be everybody's, and has no share of its own.
+        The link that the console prints may be everybody's, so no share bounds it.
         """
         own = self._known.get(by.token_id)
         if own is not None and own.at_start:
@@ -148,7 +148,7 @@ class Invitations:
             raise TooManyInvitations(f"{kept} made with your link are remembered; ask a supervisor for one")
 
     def _founders(self) -> dict[str, str]:
-        """Of each link the first in its line of inviters that nobody invited, or that the printed link did."""
+        """Map each link to the first in its line of inviters, which nobody or the printed link invited."""
         found: dict[str, str] = {}
         for invitation in self._known.values():
             line: dict[str, None] = {}
@@ -164,7 +164,7 @@ class Invitations:
         return found
 
     def for_start(self, role: Role, seconds: float, now: float) -> Invitation:
-        """The link that the console prints: the same one at every start until half of its time is over."""
+        """Return the link that the console prints: the same one at every start until half of its time is over."""
         for each in self._known.values():
             if each.at_start and each.role == role and each.is_good(now) and each.expires - now >= seconds / 2:
                 return each
@@ -174,7 +174,7 @@ class Invitations:
         return self._add(fresh)
 
     def revoke(self, by: Identity | None, invitation_id: str, now: float) -> list[Invitation]:
-        """Revoke it and all that was invited with it; those that were good until now.
+        """Revoke an invitation and all that was invited with it; return those that were not revoked before.
 
         Raises:
             NotFound: there is no such invitation that `by` may revoke.
@@ -192,7 +192,7 @@ class Invitations:
         return revoked
 
     def visible(self, by: Identity | None) -> list[Invitation]:
-        """Those that `by` may see, newest first."""
+        """Return the invitations that `by` may see, newest first."""
         found = [each for each in self._known.values() if by is None or _sees(by, each)]
         return sorted(found, key=lambda each: each.created, reverse=True)
 

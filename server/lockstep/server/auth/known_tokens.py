@@ -1,4 +1,4 @@
-"""Tokens that were good a while ago. They give no right: they say whose request is looked at first."""
+"""Tokens that were good a while ago. They give no right, only priority to requests."""
 
 from collections import OrderedDict
 
@@ -8,7 +8,7 @@ MAX_TOKENS = 10_000
 
 
 class KnownTokens:
-    """The newest of them, bounded."""
+    """The newest known tokens, bounded in number."""
 
     def __init__(self, most: int = MAX_TOKENS) -> None:
         self._most = most
@@ -24,5 +24,5 @@ class KnownTokens:
             self._tokens.popitem(last=False)
 
     def forget(self, token: str) -> None:
-        """It is good no more: who brings it is a stranger."""
+        """Forget a token that is no longer good: its sender is a stranger."""
         self._tokens.pop(token, None)

@@ -1,4 +1,4 @@
-"""Access tokens: signed (JWT, HS256, RFC 7519), with a role, a name, an id and an end."""
+"""Access tokens: signed (JWT, HS256, RFC 7519), with a role, a name, an id and an expiry time."""
 
 import math
 import secrets
@@ -34,38 +34,38 @@ __all__ = [
 ]
 
 ALGORITHM = "HS256"
-MAX_TOKEN = 4096  # characters; ours have about 200, and 40 more for each robot that they name
-MAX_ROBOTS = 32  # that one link names
+MAX_TOKEN = 4096  # characters; the console's have about 200, and 40 more for each robot that they name
+MAX_ROBOTS = 32  # robots that one link may name
 INVALID = "the token is not valid"
 
 RobotName = Annotated[str, msgspec.Meta(max_length=32)]
 
 
 class Identity(NamedTuple):
-    """Who a token stands for."""
+    """The holder of a token."""
 
     role: Role
     name: str
     token_id: str
     expires: float  # s since 1970
-    robots: tuple[str, ...] = ()  # of a fleet, that it is good for; empty: all
+    robots: tuple[str, ...] = ()  # robots of a fleet that it is good for; empty: all
     issued: float = math.inf  # s since 1970, when the link was made; infinite: not known
 
     def may_see(self, robot: str) -> bool:
-        """Whether this link is good for that robot; "" is the robot of a console that has only one."""
+        """True if this link is good for that robot; "" is the robot of a console that has only one."""
         return not self.robots or robot in self.robots
 
     @property
     def actor(self) -> Actor:
-        """For the audit."""
+        """The actor for the audit."""
         return Actor(self.name, self.role, "", self.token_id)
 
 
 class Right:
-    """What somebody may do with a link, asked anew each time: whoever waits between a check and an effect checks again.
+    """The rights of a link, checked at every access: code that waits between a check and an effect checks again.
 
-    Every attribute raises LinkExpired or LinkRevoked once the link has ended, and StateUnavailable while nobody can
-    know which links are revoked.
+    Every attribute raises LinkExpired or LinkRevoked once the link has ended, and StateUnavailable while it is unknown
+    which links are revoked.
     """
 
     __slots__ = ("_check", "_identity")
@@ -102,7 +102,7 @@ class HasRole(Protocol):
 
 
 class SceneTicket(NamedTuple):
-    """What a ticket for the 3D scene says of the link that it was made for."""
+    """The link that a ticket for the 3D scene was made for."""
 
     link: str
     role: Role
@@ -126,7 +126,7 @@ class _TicketClaims(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omi
     role: Role  # of that link
     name: Annotated[str, msgspec.Meta(max_length=60)]
     link: Annotated[str, msgspec.Meta(max_length=64)]  # id of that link
-    robot: RobotName = ""  # whose scene it opens
+    robot: RobotName = ""  # the one whose scene it opens
 
 
 class _FileClaims(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
@@ -137,7 +137,7 @@ class _FileClaims(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_
     name: Annotated[str, msgspec.Meta(max_length=60)]
     link: Annotated[str, msgspec.Meta(max_length=64)]
     file: Annotated[str, msgspec.Meta(max_length=200)]  # the one recording that it opens
-    robot: RobotName = ""  # whose recording
+    robot: RobotName = ""  # the one whose recording it is
 
 
 Claims = TypeVar("Claims", _LinkClaims, _TicketClaims, _FileClaims)
@@ -156,14 +156,14 @@ def _no_trouble() -> str:
 
 
 class Access:
-    """Issues and checks tokens. Who brings one that we did not sign is never told what is wrong with it.
+    """Issues and checks tokens. A sender of a token that the console did not sign is never told what is wrong with it.
 
     Args:
-        is_revoked: by the id of a token
-        trouble: why nobody can know which links are revoked; "" while it is known
+        is_revoked: True for the id of a revoked token
+        trouble: the reason while it is unknown which links are revoked, else ""
         now: s since 1970
-        robot: whose door this is: only links that are good for it pass, and tickets open nothing of another one's;
-            "": the only robot of a console, None: the fleet's own door, which every good link passes
+        robot: the robot to check access to: only links that are good for it pass, and tickets made for another robot
+            are refused; "": the only robot of a console, None: the fleet itself, to which every good link gives access
     """
 
     def __init__(
@@ -185,40 +185,40 @@ class Access:
         self._is_revoked = is_revoked
 
     def at(self, robot: str | None) -> Self:
-        """The same, at the door of another robot."""
+        """Return the same access control for another robot."""
         known = (self._is_revoked, robot, self._trouble, self._now)
         return type(self)(self._secret, self._token_seconds, self._ticket_seconds, *known)
 
     def issue(self, role: Role, name: str, robots: tuple[str, ...] = ()) -> str:
-        """A token with a new id, for as long as the settings say."""
+        """Return a token with a new id, good for as long as the settings say."""
         now = self._now()
         return self.sign(Identity(role, name, secrets.token_hex(8), now + self._token_seconds, robots), now)
 
     def sign(self, identity: Identity, issued: float) -> str:
-        """The token that stands for `identity`; the same one whenever the arguments are."""
+        """Return the token of `identity`; the same arguments give the same token."""
         role, name, token_id, expires, robots = identity[:5]
         return self._encode(_LinkClaims("lockstep", expires, issued, role, name, token_id, robots))
 
     def verify(self, token: str) -> Identity:
-        """Whom `token` stands for.
+        """Return the holder of `token`.
 
         Raises:
             TokenInvalid: not a token of this console.
-            LinkExpired, LinkRevoked: it was one.
-            LinkOtherRobot: it is one, for other robots.
-            StateUnavailable: nobody can know whether it is revoked.
+            LinkExpired, LinkRevoked: it is no longer good.
+            LinkOtherRobot: it is good for other robots.
+            StateUnavailable: it is unknown whether it is revoked.
         """
         identity = self._identity(token)
         self.check(identity)
         return identity
 
     def check(self, identity: Identity) -> None:
-        """Raises as `verify` does when the link of `identity` is good no more."""
+        """Raise as `verify` does if the link of `identity` is no longer good."""
         self._check_link(identity.token_id, identity.expires)
         self._check_list()
 
     def bearer(self, authorization: str | None) -> Right:
-        """What an Authorization header (RFC 6750 2.1) gives the right to.
+        """Return the right that an Authorization header (RFC 6750 2.1) gives.
 
         Raises:
             TokenMissing: there is no bearer token.
@@ -229,7 +229,7 @@ class Access:
         return right
 
     def bearer_to_stop(self, authorization: str | None) -> Right:
-        """As `bearer`, but good also while nobody can know which links are revoked: a stop must not wait for a disk."""
+        """Return the right as `bearer` does, even while revocations are unknown: a stop must not wait for a disk."""
         right = Right(
             self._identity(_required_token(authorization)),
             lambda identity: self._check_link(identity.token_id, identity.expires),
@@ -238,24 +238,24 @@ class Access:
         return right
 
     def issue_ticket(self, holder: Identity) -> str:
-        """A short-lived permission to open the 3D scene, for the holder of a link. It ends no later than the link.
+        """Issue a short-lived ticket for the 3D scene to the holder of a link. It ends no later than the link.
 
         It may stand in a path: it opens nothing else.
         """
         return self._encode(_TicketClaims("lockstep-scene", *self._ticket_for(holder), self._own))
 
     def verify_ticket(self, ticket: str) -> SceneTicket:
-        """The link it was made for; raises as `verify` does."""
+        """Return the link that a ticket was made for; raise as `verify` does."""
         claims = self._decode(ticket, _TicketClaims)
         self._check_ticket(claims)
         return SceneTicket(claims.link, claims.role, claims.ends)
 
     def issue_file_ticket(self, file: str, holder: Identity) -> str:
-        """A short-lived permission to download one recording, for the holder of a link."""
+        """Issue a short-lived ticket for one recording's download to the holder of a link."""
         return self._encode(_FileClaims("lockstep-file", *self._ticket_for(holder), file, self._own))
 
     def verify_file_ticket(self, ticket: str, file: str) -> Right:
-        """The right of the link it was made for; raises as `verify` does, also when it is for another file."""
+        """Return the right of a ticket's link; raise as `verify` does, also if the ticket is for another file."""
         claims = self._decode(ticket, _FileClaims)
         self._check_ticket(claims)
         if claims.file != file:
@@ -298,7 +298,7 @@ class Access:
         return jwt.encode(msgspec.to_builtins(claims), self._secret, ALGORITHM)
 
     def _decode(self, token: str, kind: type[Claims]) -> Claims:
-        """The claims, strictly: exactly these, of these types. PyJWT only checks the signature."""
+        """Decode the claims strictly: exactly these, of these types. PyJWT only checks the signature."""
         try:
             if len(token) > MAX_TOKEN:
                 raise TokenInvalid(INVALID)
@@ -310,7 +310,7 @@ class Access:
 
 
 def bearer_token(authorization: str | None) -> str:
-    """The token in an Authorization header (RFC 6750 2.1); "" when there is none."""
+    """Return the token in an Authorization header (RFC 6750 2.1), or ""."""
     scheme, _, token = (authorization or "").partition(" ")
     return token.strip() if scheme.lower() == "bearer" else ""
 
@@ -323,6 +323,6 @@ def _required_token(authorization: str | None) -> str:
 
 
 def require_role(caller: HasRole, *roles: Role) -> None:
-    """Raises NotAllowed unless `caller` has one of `roles`."""
+    """Raise NotAllowed unless `caller` has one of `roles`."""
     if caller.role not in roles:
         raise NotAllowed(f"only the {' or the '.join(roles)} may do this")

@@ -44,7 +44,7 @@ MakeSettings = Callable[..., Settings]
 
 
 def add_access_commands(app: typer.Typer, make_settings: MakeSettings) -> None:
-    """`make_settings` turns flags into settings, as for the other commands."""
+    """Add the commands. `make_settings` turns flags into settings, as for the other commands."""
 
     @app.command()
     def invite(
@@ -199,7 +199,7 @@ def _verify(path: Path, robot: str, anchors: Path, key: str, as_json: bool) -> N
 
 
 def _public_key(directory: Path) -> str:
-    """That of a state directory; "" where none was made, and none is made by looking."""
+    """Return the public key of a state directory; "" if it has none. Makes none."""
     if not (directory / KEY_FILE).exists():
         return ""
     try:
@@ -216,7 +216,7 @@ def _state(settings: Settings) -> ConsoleState:
 
 
 def _note_ended(state: ConsoleState, link: str, error: StateDirUnusable) -> None:
-    """The list cannot be written: a disk that is full still has what was set aside for this."""
+    """Note a revocation when the list cannot be written: a full disk still has the space set aside for this."""
     state.invitations.write_later(link)
     try:
         state.invitations.note_ended()
@@ -257,14 +257,14 @@ def _line(record: AuditRecord, as_json: bool) -> str:
         return msgspec.json.encode(record).decode()
     when = _when(record.time)
     who = f"{record.who} ({record.role})" if record.role else record.who
-    # What stands in the file may be from anybody, and a terminal obeys what it prints.
+    # The text in the file may be from anybody, and a terminal obeys what it prints.
     words = "  ".join(printable(each) for each in (who, record.what, record.detail) if each)
     times = f"  x{record.count}" if record.count > 1 else ""
     return f"{record.n:6}  {when}  s={record.event:<7} {record.kind:10}  {words}{times}"
 
 
 def _when(time: float) -> str:
-    """`time`: s since 1970, as a file says, which may be any number."""
+    """Return a time in words. `time`: s since 1970, as a file says, which may be any number."""
     try:
         return datetime.fromtimestamp(time).astimezone().strftime("%Y-%m-%d %H:%M:%S")
     except (ValueError, OverflowError, OSError):

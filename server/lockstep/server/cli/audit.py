@@ -1,4 +1,4 @@
-"""`lockstep audit --verify`: what the chain and the signed heads say of an audit, in words."""
+"""`lockstep audit --verify`: checks the chain and the signed heads of an audit, and reports in words."""
 
 import sys
 from pathlib import Path
@@ -23,15 +23,15 @@ class AuditVerdict(NamedTuple):
     own: ChainReport
     chatter: ChainReport
     anchors: AnchorNote
-    place: Path  # where signed heads were looked for
-    key: str  # that the heads had to be signed with; "" where none is known
+    place: Path  # file or folder of the signed heads, or a recording
+    key: str  # key that the heads had to be signed with; "" where none is known
 
     @property
     def ok(self) -> bool:
         return not self.own.count and not self.chatter.count
 
     def say(self, path: Path) -> None:
-        """Print it."""
+        """Print the verdict."""
         for name, report in ((path.name, self.own), (chatter_path(path).name, self.chatter)):
             sys.stdout.write("\n".join(map(escaped, _chain_words(name, report))) + "\n")
         sys.stdout.write("\n".join(map(escaped, _anchor_words(self))) + "\n")
@@ -43,7 +43,7 @@ class AuditVerdict(NamedTuple):
 
 
 def verify_audit(path: Path, robot: str, anchors: Path, key: str) -> AuditVerdict:
-    """Of the audit at `path`.
+    """Check the audit at `path`.
 
     Args:
         anchors: file or folder of its signed heads, or a recording; one that is not there holds none
@@ -51,7 +51,7 @@ def verify_audit(path: Path, robot: str, anchors: Path, key: str) -> AuditVerdic
 
     Raises:
         OSError: something cannot be read.
-        RecordingError: the recording is none.
+        RecordingError: the recording is not readable.
     """
     own, chatter = check_chain(chained_lines(path)), check_chain(chained_lines(chatter_path(path)))
     name = audit_name(path, robot)
@@ -61,7 +61,7 @@ def verify_audit(path: Path, robot: str, anchors: Path, key: str) -> AuditVerdic
 
 
 def _recorded(recording: Path, name: str) -> list[Anchor]:
-    """Those that the signatures of a recording hold."""
+    """Return the signed heads that the signatures of a recording hold."""
     found: dict[str, Anchor] = {}
     with RecordingReader(recording) as reader:
         for record in reader.records(topics={SIGNATURE}):

@@ -1,4 +1,4 @@
-"""Where the console of a state directory is reached, for commands that run beside it."""
+"""The address of a state directory's console, for commands that run beside it."""
 
 import msgspec
 
@@ -17,12 +17,12 @@ _decoder = msgspec.json.Decoder(_Address)
 
 
 def write_address(directory: StateDir, url: str) -> None:
-    """The console that started last is the one that is found."""
+    """Write the address. The console that started last is the one that is found."""
     directory.write(FILE, msgspec.json.encode(_Address(url)))
 
 
 def read_address(directory: StateDir) -> str:
-    """ "" when no console has run with this directory."""
+    """Return the address; "" when no console has run with this directory."""
     data = directory.read(FILE)
     try:
         return "" if data is None else _decoder.decode(data).url

@@ -62,7 +62,7 @@ EXIT_USAGE = 2
 EXIT_PORT_TAKEN = 3
 EXIT_BRIDGE = 4
 NO_NAMES = "a board needs robots with names that no other console has: --robot NAME=tcp://…"
-# A worker thread of ours (encoders, the 3D scene) may hold the interpreter this long while a command waits.
+# A worker thread (encoders, the 3D scene) may hold the interpreter this long while a command waits.
 SWITCH_INTERVAL = 0.0005  # s; Python's own is ten times that
 
 
@@ -201,7 +201,7 @@ def up(
         bridges[name] = BridgeProcess(
             kind, "127.0.0.1", port_of_bridge, [*options, *own], secret.reveal(), say, robot_python
         )
-    if "" not in bridges:  # where they will be, is known when they run
+    if "" not in bridges:  # their addresses are known when they run
         settings = settings.model_copy(update={"robots": tuple(f"{name}=tcp://127.0.0.1:1" for name in bridges)})
     is_own = any(kind not in simulated_names() for kind in kinds.values())
     _run(settings, bridges, as_json, quiet, is_own)
@@ -286,7 +286,7 @@ def serve(
 
 
 def _robots(given: list[str] | None) -> dict[str, object]:
-    """One address alone is the only robot of a console; anything else is a fleet."""
+    """Return the robots' settings. One address alone is the only robot of a console; anything else is a fleet."""
     if not given:
         return {}
     if len(given) == 1 and not is_named(given[0]):
@@ -295,7 +295,7 @@ def _robots(given: list[str] | None) -> dict[str, object]:
 
 
 def _simulated(given: list[str] | None) -> dict[str, str]:
-    """Kinds of the robots to run, by name; "" is the only robot of a console."""
+    """Return the kinds of the robots to run, by name; "" is the only robot of a console."""
     try:
         return simulated_robots(given or [DEFAULT_ROBOT])
     except BadFleet as error:
@@ -307,7 +307,7 @@ def _media(quality: Switch | None) -> dict[str, bool] | None:
 
 
 def _words(texts: list[str] | None) -> tuple[str, ...] | None:
-    """As a setting that is given several times, and may hold any character."""
+    """Return the value of a setting that may be given several times, and may hold any character."""
     return tuple(texts) if texts else None
 
 
@@ -326,7 +326,7 @@ def _network(
     turn: Turn,
     turn_secret: TurnSecret,
 ) -> dict[str, object]:
-    """The arguments by the names of their settings."""
+    """Return the arguments by the names of their settings."""
     return dict(locals())
 
 
@@ -337,7 +337,7 @@ def _run(
     quiet: bool,
     own_robot: bool = False,
 ) -> None:
-    """`own_robot`: one of them was named as somebody's own class, so that its bridge may say that there is none."""
+    """Run the console. `own_robot`: a robot is the user's own class, which its bridge may fail to find."""
     configure_logs(logging.WARNING if quiet else logging.INFO, settings.log_format)
     for each in unknown_settings(os.environ, Settings):
         say(each)
@@ -363,7 +363,7 @@ def _run(
     except ssl.SSLError as error:
         raise _usage(f"tls_cert and tls_key are no certificate chain and its key: {error}") from error
     except BridgeFailed as error:
-        if own_robot and error.code == EXIT_USAGE:  # it has said itself what cannot be meant
+        if own_robot and error.code == EXIT_USAGE:  # the bridge itself has said what is wrong
             raise typer.Exit(EXIT_USAGE) from error
         say(str(error))
         raise typer.Exit(EXIT_BRIDGE) from error
@@ -373,7 +373,7 @@ def _run(
 
 
 def _check_files(settings: Settings) -> None:
-    """Before anything runs."""
+    """Check the certificate files before anything runs."""
     try:
         for path in (settings.tls_cert, settings.tls_key):
             if path is not None:

@@ -1,4 +1,4 @@
-"""Durations as people write them: "8h", "30m", "1d12h"."""
+"""Parses and formats durations as people write them: "8h", "30m", "1d12h"."""
 
 import re
 
@@ -9,7 +9,7 @@ PART = re.compile(r"([0-9]{1,6})([smhdw])")
 
 
 def parse_duration(text: str) -> float:
-    """Seconds.
+    """Return the seconds of a duration.
 
     Raises:
         ValueError: not numbers followed by s, m, h, d or w.
@@ -21,7 +21,7 @@ def parse_duration(text: str) -> float:
 
 
 def duration_words(seconds: float) -> str:
-    """The two largest units: "7h 59m"."""
+    """Return the two largest units: "7h 59m"."""
     left, words = max(0, round(seconds)), []
     for unit in ("d", "h", "m", "s"):
         count, left = divmod(left, UNITS[unit])

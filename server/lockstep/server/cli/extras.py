@@ -1,4 +1,4 @@
-"""Loads what a command needs from an optional extra of the distribution, or says in words how to install it."""
+"""Loads a module that needs an optional extra of the distribution, or says in words how to install it."""
 
 from importlib import import_module
 from typing import Any
@@ -12,7 +12,7 @@ EXIT_USAGE = 2
 
 
 def load_extra(module: str, extra: str) -> Any:
-    """The module of this name.
+    """Import the module of this name.
 
     Raises:
         typer.Exit: a library of the extra is not installed; the exit code is 2.

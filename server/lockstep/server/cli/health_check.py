@@ -16,7 +16,7 @@ SECONDS = 2.0
 
 
 def health_url(settings: Settings) -> str:
-    """On loopback, unless the console listens on one address only."""
+    """Return the URL of /healthz: on loopback, unless the console listens on one address only."""
     host = {"0.0.0.0": "127.0.0.1", "::": "::1"}.get(settings.host, settings.host)
     shown = f"[{host}]" if ":" in host else host
     return f"{'https' if settings.encrypted else 'http'}://{shown}:{settings.port}/healthz"
@@ -24,7 +24,7 @@ def health_url(settings: Settings) -> str:
 
 def main() -> int:
     here = ssl.create_default_context()
-    here.check_hostname, here.verify_mode = False, ssl.CERT_NONE  # it asks itself: whose certificate it is, is known
+    here.check_hostname, here.verify_mode = False, ssl.CERT_NONE  # it asks itself: the certificate's owner is known
     try:
         with urlopen(health_url(Settings()), timeout=SECONDS, context=here) as answer:
             return 0 if answer.status == 200 else 1

@@ -1,4 +1,4 @@
-"""The command `lockstep`. What a command does is loaded when that command is asked for: few need all of it."""
+"""The command `lockstep`. The code of a command is loaded when that command is asked for: few need all of it."""
 
 import faulthandler
 import gc
@@ -55,7 +55,7 @@ def _recordings() -> typer.Typer:
     return commands
 
 
-# In the order of `lockstep --help`; what each returns has these commands and no others.
+# In the order of `lockstep --help`; each group has these commands and no others.
 LOADERS: dict[Callable[[], typer.Typer], tuple[str, ...]] = {
     _console: ("up", "serve"),
     _robot: ("robot",),

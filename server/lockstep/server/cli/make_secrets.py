@@ -1,8 +1,8 @@
 """Makes the secrets that containers of one machine share: `python -m lockstep.server.cli.make_secrets FOLDER`.
 
-Each has a folder of its own in it, `link/link_secret` and `turn/turn_secret`, so that a container can be given one and
-not see the other: the relay, which faces the Internet, has no use for the robot's. One that is there already stays.
-The folders are mounted by nobody else, so the files may be read by every user: each container runs as one of its own.
+Each secret has its own folder in FOLDER, `link/link_secret` and `turn/turn_secret`, so that a container can be given
+one and not see the other: the relay, which faces the Internet, does not need the robot's. Existing secrets stay.
+Nobody else mounts the folders, so every user may read the files: each container runs as a different user.
 """
 
 import os
@@ -17,7 +17,7 @@ SECRET_BYTES = 32
 
 
 def make_secrets(folder: Path) -> list[str]:
-    """The names of those that were missing."""
+    """Make the missing secrets, and return their names."""
     made = []
     for name in NAMES:
         place = folder / name

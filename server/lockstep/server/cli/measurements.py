@@ -1,4 +1,4 @@
-"""Commands that measure or draw. They live in `bench/`, which nothing here imports: loaded when one is asked for.
+"""Commands that measure or draw. They are in `bench/`, which is imported only when one is asked for.
 
 Where `bench/` is not installed, as in the images, there are no such commands.
 """
@@ -12,7 +12,7 @@ from lockstep.server.cli.extras import load_extra
 
 __all__ = ["add_bench_commands"]
 
-# name → function that typer can run, and what `lockstep --help` says of it
+# name → module and function that typer can run, and its text in `lockstep --help`
 COMMANDS = {
     "experiment": (
         "lockstep.bench.experiment.cli",

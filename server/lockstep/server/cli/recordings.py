@@ -50,7 +50,7 @@ class ExportFormat(StrEnum):
 
 
 def add_recording_commands(app: typer.Typer, make_settings: MakeSettings) -> None:
-    """`make_settings` turns flags into settings, as for the other commands."""
+    """Add the commands. `make_settings` turns flags into settings, as for the other commands."""
     record = typer.Typer(no_args_is_help=True, help="Start and end the recording of a running console.")
     app.add_typer(record, name="record")
 
@@ -148,7 +148,7 @@ def add_recording_commands(app: typer.Typer, make_settings: MakeSettings) -> Non
 
 
 def _ask(settings: Settings, robot: str, method: str, path: str, body: dict[str, str] | None = None) -> dict[str, Any]:
-    """What the console of this state directory answers."""
+    """Return the answer of this state directory's console."""
     import httpx
 
     state = _state(settings)
@@ -157,7 +157,7 @@ def _ask(settings: Settings, robot: str, method: str, path: str, body: dict[str,
         raise _usage("no console has run with this state directory")
     headers = {"Authorization": f"Bearer {state.access.issue('supervisor', 'command line')}"}
     try:
-        # Its certificate may be its own; whoever can write the state directory can name any address there anyway.
+        # Its certificate may be self-signed; a writer of the state directory can name any address there anyway.
         with httpx.Client(verify=not settings.tls, trust_env=False, timeout=HTTP_SECONDS) as http:
             answer = http.request(
                 method, f"{url}{ROBOTS}/{robot}{path}" if robot else f"{url}{path}", headers=headers, json=body
@@ -194,7 +194,7 @@ def _shelf(settings: Settings, robot: str, directory: Path | None) -> RecordingS
 
 
 def recording_file(file: Path, settings: Settings, robot: str, directory: Path | None) -> Path:
-    """`file` itself, or the recording of that id."""
+    """Return `file` itself, or the recording of that id."""
     if file.is_file():
         return file
     found = _shelf(settings, robot, directory).path(file.name)
@@ -223,7 +223,7 @@ def _line(entry: RecordingEntry) -> str:
 
 
 def _in_words(verdict: Verdict) -> str:
-    """Names and topics in it are from the file: printed as they stand, they could write a verdict of their own."""
+    """Return the verdict in words. Names and topics are from the file: unescaped, they could fake a verdict."""
     lines = [f"{verdict.commands} commands, {verdict.events} events, {verdict.pictures_and_sounds} pictures and sounds"]
     for name, check in verdict.checks.items():
         looked = f" ({check.looked} looked at)" if check.looked else ""

@@ -1,4 +1,4 @@
-"""`lockstep replay`: serves the player for one recording until it is ended. Apart, since it loads much of the web."""
+"""`lockstep replay`: serves the player for one recording until it is ended. Apart, since it loads the web stack."""
 
 import asyncio
 import secrets
@@ -25,7 +25,7 @@ TICKET_SECONDS = 600.0
 
 
 def serve_replay(path: Path, host: str, port: int, as_json: bool) -> None:
-    """Until the process is told to end.
+    """Serve the player until the process is told to end.
 
     Raises:
         typer.Exit: the port is taken, or the file is no recording.
@@ -49,7 +49,7 @@ async def _serve(path: Path, host: str, port: int, as_json: bool) -> None:
         told = recording_id(path)
         link = f"{url}/recordings#token={access.issue('observer', 'replay')}&recording={quote(told, safe='')}"
         app = create_replay_app(path, access, host)
-        await asyncio.to_thread(app.state.recordings.library.entries)  # so that its index is known when it is asked for
+        await asyncio.to_thread(app.state.recordings.library.entries)  # its index is known when the page asks for it
         async with running(app, listener):
             if as_json:
                 said = {"console": url, "recording": told, "link": link}

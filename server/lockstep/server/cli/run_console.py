@@ -1,4 +1,4 @@
-"""A console from its first step to its last: bridges of its own first, then HTTP, then the links."""
+"""Runs a console from start to end: its own bridges first, then HTTP, then the links."""
 
 import asyncio
 import datetime
@@ -31,12 +31,12 @@ from lockstep.server.util.state_dir import StateDirUnusable
 
 __all__ = ["ConsoleFailed", "run_console", "say"]
 
-PATIENCE = 2.0  # s until somebody who waits for a robot is told so
+PATIENCE = 2.0  # s until people are told that the console waits for a robot
 GC_THRESHOLDS = (5_000, 20, 10)  # allocations, young collections, middle collections
 
 
 class ConsoleFailed(Exception):
-    """What the console runs has failed. Whoever started it should start it anew: it would answer nobody any more."""
+    """The console has failed. Its supervisor should start it anew: it would answer nobody any more."""
 
 
 async def run_console(
@@ -46,10 +46,10 @@ async def run_console(
     bridges: Mapping[str, BridgeProcess],
     as_json: bool,
 ) -> None:
-    """Until a signal: the bridges first, then the console; the console ends first.
+    """Run until a signal. The bridges start before the console, and end after it.
 
     Args:
-        bridges: of our own, by the robots' names; "" is the only robot of a console
+        bridges: the console's own, by the robots' names; "" is the only robot of a console
 
     Raises:
         ConsoleFailed: the log says why.
@@ -92,7 +92,7 @@ def say(text: str) -> None:
 
 
 async def _start(bridges: Mapping[str, BridgeProcess]) -> dict[str, str]:
-    """Their addresses. One that does not start ends all: whoever asked for them wants them all."""
+    """Start the bridges and return their addresses. One that does not start ends all: the user wants them all."""
     starting = [asyncio.ensure_future(bridge.start()) for bridge in bridges.values()]
     try:
         return dict(zip(bridges, await asyncio.gather(*starting), strict=True))
@@ -117,9 +117,9 @@ def _application(settings: Settings, state: ConsoleState) -> FastAPI:
 
 
 def _calm_garbage_collection() -> None:
-    """A full collection over all modules stalls the loop by 100 ms and more with a hundred peers.
+    """Make collections rare: a full one over all modules stalls the loop by 100 ms and more with a hundred peers.
 
-    What lives now lives until the end, so it is taken out of the collector's sight; the rest is looked at less often.
+    Objects that live now live until the end, so they are frozen; the others are collected less often.
     """
     gc.collect()
     gc.freeze()
@@ -127,7 +127,7 @@ def _calm_garbage_collection() -> None:
 
 
 def _certificate(settings: Settings, directory: Path) -> Certificate | None:
-    """What to encrypt HTTP with; None: not at all. Raises StateDirUnusable."""
+    """Return the certificate for HTTPS; None: no encryption. Raises StateDirUnusable."""
     if settings.tls_cert is not None and settings.tls_key is not None:
         return Certificate(settings.tls_cert, settings.tls_key)
     if not settings.tls:
@@ -145,7 +145,7 @@ def _certificate(settings: Settings, directory: Path) -> Certificate | None:
 async def _unless(
     stopping: asyncio.Task[None], starting: Coroutine[None, None, dict[str, str]]
 ) -> dict[str, str] | None:
-    """What `starting` returns; None when we are asked to stop first."""
+    """Return the result of `starting`; None when a signal to stop comes first."""
     task = asyncio.get_running_loop().create_task(starting)
     await asyncio.wait((task, stopping), return_when=asyncio.FIRST_COMPLETED)
     if task.done():
@@ -157,9 +157,9 @@ async def _unless(
 
 
 async def _announce(application: FastAPI, links: ConsoleLinks, as_json: bool) -> None:
-    """The links, once they lead to a robot. For people at once when the robot is not there yet.
+    """Print the links, once they lead to a robot. People are told meanwhile that the robot is not there yet.
 
-    In a fleet no robot holds up the others: who is not there after a while is named, and the links come.
+    In a fleet no robot holds up the others: one that is not there after a while is named, and the links are printed.
     """
     fleet = getattr(application.state, "fleet", None)
     if isinstance(fleet, Fleet):

@@ -11,10 +11,10 @@ EXIT_USAGE = 2
 
 
 def make_settings(**flags: object) -> Settings:
-    """What the environment says, overridden by the flags that were given.
+    """Return the settings of the environment, overridden by the flags that were given.
 
     Raises:
-        typer.Exit: a setting cannot be so; the exit code is 2.
+        typer.Exit: a setting is invalid; the exit code is 2.
     """
     given = {name: value for name, value in flags.items() if value is not None and value != []}
     given = {name: ",".join(value) if isinstance(value, list) else value for name, value in given.items()}

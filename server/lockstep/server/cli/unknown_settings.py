@@ -1,4 +1,4 @@
-"""Names variables of the environment that look like settings and are none. No I/O."""
+"""Finds environment variables that look like settings but are not. No I/O."""
 
 from collections.abc import Iterable
 from difflib import get_close_matches
@@ -25,11 +25,11 @@ OTHERS = frozenset(
 
 
 def unknown_settings(environment: Iterable[str], settings: type[BaseModel], more: Iterable[str] = ()) -> list[str]:
-    """A sentence for each variable of `environment` that begins as a setting and that nothing reads.
+    """Return a sentence for each variable of `environment` that begins as a setting and that nothing reads.
 
     Args:
         environment: names of variables
-        settings: what reads them
+        settings: the class that reads them
         more: further names that are read
     """
     known = {*_names(settings, PREFIX), *OTHERS, *more}
@@ -38,7 +38,7 @@ def unknown_settings(environment: Iterable[str], settings: type[BaseModel], more
 
 
 def _names(settings: type[BaseModel], prefix: str) -> Iterable[str]:
-    """The variables of all fields, and of the fields of their own fields."""
+    """Yield the variables of all fields, and of the fields of nested settings."""
     for name, field in settings.model_fields.items():
         yield f"{prefix}{name.upper()}"
         for kind in (field.annotation, *get_args(field.annotation)):

@@ -1,1 +1,1 @@
-"""One console put together: its apps, each robot's session, and the process that serves them."""
+"""Builds a console: its apps, and each robot's session."""

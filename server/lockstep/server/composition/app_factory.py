@@ -1,4 +1,4 @@
-"""What every app of a console begins and ends with, for one robot or several: house, errors, front door."""
+"""The common parts of a console's apps, for one robot or several: context, error answers, middleware."""
 
 import asyncio
 from collections.abc import AsyncIterator
@@ -31,9 +31,9 @@ log = structlog.get_logger(__name__)
 
 
 def bare_app(title: str, settings: Settings, lifespan: Lifespan[FastAPI] | None = None) -> FastAPI:
-    """Without a route. It needs `app.state.context` before the first request.
+    """Return an app without routes. It needs `app.state.context` before the first request.
 
-    `app.state.failed` is set when what its lifespan runs has failed: then it serves nobody any more.
+    `app.state.failed` is set when its lifespan has failed: then it serves nobody any more.
     """
     app = FastAPI(
         title=title,
@@ -70,11 +70,11 @@ def open_context(
     max_peers: int | None = None,
     reserved: int = 0,
 ) -> ConsoleContext:
-    """To be called when the lifespan of `app` begins; `state` stands in for what the settings name."""
+    """Open the context when the lifespan of `app` begins; `state` replaces the one that the settings name."""
     asyncio.get_running_loop().set_exception_handler(metrics.faults.uncaught)
     opened = state or open_state(settings)
     endpoint = MediaEndpoint(settings)
-    if settings.media_port:  # which somebody else might take meanwhile
+    if settings.media_port:  # another process might take it meanwhile
         endpoint.open()
     context = ConsoleContext(opened, RequestRateLimits(settings), metrics, endpoint, max_peers, reserved)
     app.state.context = context
@@ -83,7 +83,7 @@ def open_context(
 
 
 def guard_app(app: FastAPI, settings: Settings) -> None:
-    """What every request passes before any route."""
+    """Add the middleware that every request passes before any route."""
     if settings.allowed_origins:
         app.add_middleware(
             CORSMiddleware,
@@ -110,13 +110,13 @@ def guard_app(app: FastAPI, settings: Settings) -> None:
 
 
 def _link_of(scope: Scope, known: KnownTokens) -> str:
-    """The link whose good token a request brings; "" without one. What it opens is each route's to say."""
+    """Return the link of a request's good token; "" without one. Each route decides what it opens."""
     token = bearer_token(Headers(scope=scope).get("authorization"))
     context = getattr(scope["app"].state, "context", None)
     if not token or not isinstance(context, ConsoleContext):
         return ""
     try:
-        # Enough to stop the robot with, so also while nobody knows which links are revoked.
+        # Enough for a STOP, so it is good also while the revoked links are unknown.
         link = context.state.access.at(None).bearer_to_stop(f"Bearer {token}").token_id
     except AccessError:
         known.forget(token)
@@ -137,11 +137,11 @@ def _caught(scope: Scope, error: Exception) -> None:
 
 
 def _route(scope: Scope) -> str:
-    """Not the path: one may hold a ticket."""
+    """Return the route, not the path: a path may hold a ticket."""
     return str(getattr(scope.get("route"), "path", ""))
 
 
 async def _same_origin(connection: HTTPConnection) -> None:
-    """A dependency of all routes. WebSockets check for themselves: a refusal is another thing there."""
+    """Check the origin, for all routes. WebSockets check it themselves: they refuse in another way."""
     if connection.scope["type"] == "http" and connection.scope["method"] not in SAFE_METHODS:
         check_origin(connection.headers, connection.app.state.settings.allowed_origins)

@@ -23,7 +23,7 @@ REQUESTS = 200.0  # Hz, of one address, after a burst of twice as many
 
 
 def create_replay_app(path: Path, access: Access, host: str) -> FastAPI:
-    """Answers /api/recordings and the page, both for this file alone."""
+    """Return an app that answers /api/recordings and the page, both for this file alone."""
     app = FastAPI(title="Lockstep replay", docs_url=None, redoc_url=None, openapi_url=None)
     app.state.recordings = RecordingService(FileLibrary(path), access, opens_all=True)
     app.include_router(recordings.router)

@@ -27,7 +27,7 @@ __all__ = ["attach_session", "create_app", "session_app"]
 
 
 def create_app(settings: Settings, state: ConsoleState | None = None) -> FastAPI:
-    """The app. It connects to the robot while its lifespan runs; `state` stands in for what the settings name."""
+    """Return the app, which connects to the robot in its lifespan. `state` replaces the one that the settings name."""
 
     @asynccontextmanager
     async def lifespan(app: FastAPI) -> AsyncIterator[None]:
@@ -60,7 +60,7 @@ def create_app(settings: Settings, state: ConsoleState | None = None) -> FastAPI
 
 
 def session_app(settings: Settings, lifespan: Lifespan[FastAPI] | None = None) -> FastAPI:
-    """The routes of one robot but for its pages. They need `app.state.context`, and answer by `attach_session`."""
+    """Return an app of one robot's routes, without pages. It needs `app.state.context` and `attach_session`."""
     app = bare_app("Lockstep", settings, lifespan)
     app.include_router(whep.router)
     app.include_router(whip.router)
@@ -76,14 +76,14 @@ def session_app(settings: Settings, lifespan: Lifespan[FastAPI] | None = None) -
 
 
 def attach_session(app: FastAPI, session: Dependencies | None) -> None:
-    """From now on the routes speak for that session; None: it has failed, and they say so."""
+    """Let the routes answer for that session from now on; None: it has failed, and they say so."""
     app.state.dependencies = session
     app.state.recordings = None if session is None else session.recordings
 
 
 @cache
 def _description() -> msgspec.Raw:
-    """Made once: it is large, and anybody may ask for it."""
+    """Return the OpenAPI document, made once: it is large, and anybody may ask for it."""
     return msgspec.Raw(msgspec.json.encode(openapi_document()))
 
 

@@ -1,4 +1,4 @@
-"""One robot's whole session: console, media, seat, recorder, scene, audit. Everything that one robot does not share."""
+"""The session of one robot: console, media, seat, recorder, scene, audit, and all else that robots do not share."""
 
 import asyncio
 from collections.abc import AsyncIterator, Awaitable, Callable
@@ -46,12 +46,12 @@ async def running_session(
     robot: str = "",
     stops: StopKeeper | None = None,
 ) -> AsyncIterator[Dependencies]:
-    """While entered, the session runs. A fault of what drives ends it, and comes out as an ExceptionGroup.
+    """Run the session while entered. A fault of the console ends it, and is raised as an ExceptionGroup.
 
     Args:
-        directory: where it keeps what is its own
+        directory: for the session's own files
         robot: its name in a fleet; "" is the only robot of a console
-        stops: what is known of stops, where that outlives the session; whoever has it runs it. None: it has its own
+        stops: known stops that outlive the session, run by their owner; None: the session has its own
     """
     with open_audit_log(directory, settings, robot, context.state.signer) as audit:
         async with (
@@ -81,7 +81,7 @@ async def _running_stops(
 
 
 async def run_on(name: str, run: Callable[[], Awaitable[None]], faults: Faults) -> None:
-    """Until cancelled, or until it is done. What serves besides takes nobody's control and no STOP with it."""
+    """Run a side task until cancelled or done, and again after a fault, which must not affect control or STOP."""
     while True:
         try:
             await attempt(run())

@@ -1,1 +1,1 @@
-"""Who drives, and what may pass to the robot: seat, arbiter, event clock, participants."""
+"""Control of the robot: seat, command arbiter, stops, speed cap, participants."""

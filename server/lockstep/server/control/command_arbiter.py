@@ -1,10 +1,10 @@
-"""The command desk: what may pass to the robot. No I/O, no clock.
+"""Decides which commands and rests pass to the robot. No I/O, no clock.
 
-Every verb returns what to do; the shell does it. The desk never lets a second command pass while one is in flight
-on the robot link: a repeat of it is absorbed, and a repeat of the event already executed is answered from the
+Every method returns an outcome, on which the caller acts. The arbiter never lets a second command pass while one is in
+flight on the robot link: a repeat of it is absorbed, and a repeat of the event already executed is answered from the
 feedback at hand. So the link's TCP never holds more than one command, and nothing is replayed after a stall.
 
-What happens to a command, in this order:
+The outcomes of a command; the first condition that holds decides:
 
 | condition | outcome |
 |---|---|
@@ -16,15 +16,15 @@ What happens to a command, in this order:
 | its event is the current one, and was the sender's own | answered with the current feedback |
 | its event is the one in flight, and is the sender's own | absorbed |
 | not the next event, or something is in flight | refused `out_of_order` |
-| the issue that it answers is none that the console knows | refused `late` |
+| the console does not know the issue that it answers | refused `late` |
 | its nonce is not that of this issue | refused `unseen` |
 | it moves, and no neutral command of the sender was executed since that was last needed | refused `not_neutral` |
 | else | clamped to the axes' ranges and the speed cap, forwarded |
 
-A neutral command is needed of a new holder of the seat, and of every holder after a stop, a reset, a new link or
-epoch, and whatever else the robot says so after (`Feedback.neutral_needed`). It counts once it was executed.
+A new holder of the seat has to send a neutral command first, and so has every holder after a stop, a reset, a new link
+or epoch, and whenever the robot says so (`Feedback.neutral_needed`). The command counts once it was executed.
 
-A repeat of somebody else's event is not answered: after a hand-over the new holder would take the old one's
+A repeat of another sender's event is not answered: after a hand-over the new holder would take the old one's
 execution for its own.
 """
 
@@ -59,19 +59,19 @@ class ForwardRest(NamedTuple):
 
 
 class Answer(NamedTuple):
-    """Send to the peer that asked."""
+    """Send the feedback to the peer that asked."""
 
     feedback: Feedback
 
 
 class Refuse(NamedTuple):
-    """Tell the peer that asked."""
+    """Send the refusal to the peer that asked."""
 
     refusal: Refusal
 
 
 class Absorbed(NamedTuple):
-    """Nothing to do: the same is already on its way."""
+    """Do nothing: the same message is already on its way."""
 
 
 CommandOutcome = Forward | Answer | Refuse | Absorbed
@@ -79,9 +79,9 @@ RestOutcome = ForwardRest | Refuse | Absorbed
 
 
 class CommandArbiter:
-    """Call `link_up` before anything is forwarded, `link_down` when the link ends, and show it all the bridge says.
+    """Decides on commands and rests. Tell it of the link (`link_up`, `link_down`) and of every message of the bridge.
 
-    `presses`: those of STOP; while one has no answer no command passes.
+    `presses`: presses of STOP; no command passes while one of them is unanswered.
     """
 
     def __init__(
@@ -103,9 +103,9 @@ class CommandArbiter:
         self._abandoned = False  # its sender has given up the seat since
         self._resting: Rest | None = None  # forwarded and not yet followed by a feedback
         self._nonces: dict[int, int] = {}  # issue of the current event -> its nonce, oldest first
-        self._issued_event = 0  # that they belong to; 0 before the first feedback
+        self._issued_event = 0  # event of these nonces; 0 before the first feedback
         self._shown_stop = 0  # number of the newest stop that a feedback has shown
-        self._newest_stop = 0  # and of the newest that the bridge has told of
+        self._newest_stop = 0  # number of the newest stop that the bridge has latched
 
     @property
     def in_flight(self) -> Command | None:
@@ -121,13 +121,13 @@ class CommandArbiter:
         self._forget()
 
     def epoch_ends(self) -> None:
-        """Call before the clock begins another epoch: nothing that is known of this one holds in the next."""
+        """Forget this epoch: nothing known of it holds in the next. Call before the clock begins another one."""
         self._sent_event = self._shown_stop = self._newest_stop = 0
         self._nonces.clear()
         self._forget()
 
     def command(self, peer: str, command: Command, now: float = math.inf) -> CommandOutcome:
-        """Without `now` nothing that was measured counts any more, and a speed cap in force is at its lowest."""
+        """Decide on a command. Without `now` no measured delay counts, and a speed cap in force is at its lowest."""
         description, feedback = self._description, self._clock.feedback
         if not self._seat.holds(peer):
             return self._refuse(command, "no_seat")
@@ -161,16 +161,16 @@ class CommandArbiter:
             return self._refuse(command, "not_neutral", "send a neutral command first")
         self._in_flight = self._clamped(command, description, self._speed_cap.share(now))
         self._sender, self._sent_event, self._abandoned = peer, command.event, False
-        self._resting = None  # a rest of before does not void this one
+        self._resting = None  # an earlier rest does not void this command
         return Forward(self._in_flight)
 
     @property
     def _stop_is_coming(self) -> bool:
-        """A stop is on its way to the bridge, or has arrived and no feedback has shown it."""
+        """True if a stop is on its way to the bridge, or has arrived and no feedback has shown it."""
         return bool(self._presses.pending) or self._newest_stop > self._shown_stop
 
     def moves(self, command: Command) -> bool:
-        """Whether `command` is an intention to move; a light or horn that warns before motion is none."""
+        """True if `command` is meant to move the robot; a light or horn that warns before motion does not count."""
         description = self._description
         if description is None:
             return False
@@ -179,23 +179,23 @@ class CommandArbiter:
         return any(value != axis.rest and axis.name != signal for value, axis in axes)
 
     def rest(self, peer: str, rest: Rest) -> RestOutcome:
-        """A rest of the holder always passes. One that names an event that is far ahead names the next instead."""
+        """Forward a rest of the holder, always. If it names an event beyond the next one, it names the next instead."""
         if not self._seat.holds(peer):
             return self._refuse(rest, "no_seat")
         latest = event_after(self._clock.event)
         return self._forward_rest(Rest(event=latest) if is_newer(rest.event, latest) else rest)
 
     def abandon(self) -> RestOutcome:
-        """The holder is gone or gave up the seat: what it has under way is void too."""
+        """Rest because the holder is gone or gave up the seat: its command in flight is void too."""
         self._abandoned = True
         return self._forward_rest(Rest(event=event_after(self._clock.event)))
 
     def stop_taken(self, taken: StopTaken) -> None:
-        """The bridge has latched a stop."""
+        """Called when the bridge has latched a stop."""
         self._newest_stop = max(self._newest_stop, taken.number)
 
     def feedback(self, feedback: Feedback) -> None:
-        """A feedback that the event clock accepted."""
+        """Take a feedback that the event clock accepted."""
         if feedback.event != self._issued_event:
             self._nonces.clear()
         self._issued_event = feedback.event
@@ -215,7 +215,7 @@ class CommandArbiter:
         self._shown_stop = max(self._shown_stop, feedback.stop.number)
 
     def refused(self, refusal: Refusal) -> str:
-        """The bridge refused something; returns the peer to tell, or "" for none."""
+        """Take a refusal of the bridge. Return the peer to tell, or "" for none."""
         if self._in_flight is not None and refusal.event in (0, self._in_flight.event):
             self._in_flight = None
             return self._sender

@@ -1,4 +1,4 @@
-"""The console: the one owner of its state. Hears the robot and the peers, decides by the cores, tells everyone."""
+"""The console, sole owner of its state: takes messages of the robot and the peers, decides, and tells everyone."""
 
 import asyncio
 import time
@@ -85,14 +85,14 @@ RESTART_AFTER = 1.0  # s until a background task that failed runs again
 
 
 class MediaFeed(Protocol):
-    """What the console needs of the media plane."""
+    """The part of the media hub that the console uses."""
 
     def configure(self, description: RobotDescription) -> None: ...
     def feed(self, media: Media, now: float) -> None: ...
 
 
 class Console:
-    """Enter `run` once; it returns when cancelled, with all peers and links closed."""
+    """The console of one robot. Call `run` once; it returns when cancelled, with all peers and links closed."""
 
     def __init__(
         self,
@@ -107,7 +107,7 @@ class Console:
         stops: StopKeeper,
         silenced: SilencedLinks | None = None,
     ) -> None:
-        """`silenced`: of all robots of this console; None: this one has its own."""
+        """`silenced`: the silenced links of all robots of this console; None: this robot has its own."""
         self.clock = clock or EventClock()
         self._listener = listener or SessionListener()
         self.audit = AuditTrail(self.clock, audit_log)
@@ -116,7 +116,7 @@ class Console:
         times = SeatTimes(settings.seat_timeout, settings.seat_idle_seconds, settings.seat_claim_seconds)
         self.seat = SeatKeeper(times, self.peers, self, self.audit)
         self.people = ParticipantList(self.peers, self.clock, self.audit, self.seat.renamed, self._refuse_request)
-        self.further_news: list[Callable[[], ServerMessage]] = []  # what else newcomers are told
+        self.further_news: list[Callable[[], ServerMessage]] = []  # further messages to newcomers
         self._metrics = metrics
         self._media = media
         self._scene = scene or NoSceneFeed()
@@ -128,14 +128,14 @@ class Console:
         self._fanout = FeedbackFanout(
             settings.observer_feedback_hz, self._is_driven_by, self.peers.drivers, self.peers.observers
         )
-        self._forwarded_at = 0.0  # when the command in flight left
-        self._shown_stop = StopState()  # what everyone was told last
+        self._forwarded_at = 0.0  # departure of the command in flight
+        self._shown_stop = StopState()  # state that everyone was told last
         self._link_was_up = False
-        self._robot_is_taken = False  # by another console, and everyone was told
+        self._robot_is_taken = False  # another console has the robot, and everyone was told
         self._audit_trouble = ""
 
     async def run(self) -> None:
-        """Until cancelled. The peers end before the links: the last thing that leaves is the rest."""
+        """Run until cancelled. The peers end before the links, so the last message to the robot is the rest."""
         self.audit.started(console_version(), page_build(), PROTOCOL_VERSION)
         async with asyncio.TaskGroup() as tasks:
             tasks.create_task(self._guard("feedback", self._fanout.run))
@@ -158,12 +158,12 @@ class Console:
         )
 
     def link_holds_seat(self, link: str) -> bool:
-        """Whether a peer with the link of this id drives."""
+        """True if a peer with the link of this id holds the seat."""
         holder = self.peers.by_id(self.seat.rules.holder)
         return holder is not None and holder.identity.token_id == link
 
     def audit_trouble(self, trouble: str, lost: int) -> None:
-        """The audit log cannot be written, for a reason, or can again: "". `lost`: records that never will be."""
+        """Tell everyone why the audit log cannot be written; "": it can again. `lost`: records lost for good."""
         self._audit_trouble = trouble
         self._metrics.audit_failing.set(bool(trouble))
         if trouble:
@@ -175,7 +175,7 @@ class Console:
     # PeerHost
 
     def channel_opened(self, peer: Peer, channel: ChannelName) -> None:
-        """A newcomer is told all there is to know on this channel."""
+        """Send a newcomer the whole state that this channel carries."""
         if channel == "control" and self.clock.feedback is not None:
             peer.send_feedback(encode_console_message(self.clock.feedback))
         elif channel == "stop":
@@ -248,7 +248,7 @@ class Console:
     # SeatHost
 
     def rest_robot(self, why: str) -> None:
-        """Before anybody else drives: what the last holder has under way is void too."""
+        """Rest the robot before anybody else drives: the last holder's command in flight is void too."""
         outcome = self._arbiter.abandon()
         if isinstance(outcome, ForwardRest) and self.robot.send(outcome.rest):
             self._metrics.rests.labels(why).inc()
@@ -260,7 +260,7 @@ class Console:
     # RobotHost
 
     def epoch_began(self, epoch: str, description: RobotDescription) -> None:
-        """References of different epochs are never compared: every peer starts anew."""
+        """Begin an epoch. References of different epochs are never compared, so every peer starts anew."""
         self.stops.epoch_ends(self.clock.stop)
         self._arbiter.epoch_ends()
         self.clock.begin(epoch)
@@ -339,7 +339,7 @@ class Console:
     def link_failed(self, role: LinkRole, error: Exception) -> None:
         self._metrics.faults.caught(f"robot link {role}", error)
 
-    # what follows from the cores' outcomes
+    # acting on outcomes
 
     def _command(self, peer: Peer, command: Command, now: float) -> None:
         outcome = self._arbiter.command(peer.id, command, now)
@@ -421,7 +421,7 @@ class Console:
     # background tasks
 
     async def _guard(self, name: str, task: Callable[[], Awaitable[None]]) -> None:
-        """Runs `task` again when it fails: a fault of ours in one place must not take the seat's watchdog with it."""
+        """Run `task` again when it fails: a fault in one place must not take the seat's watchdog with it."""
         while True:
             try:
                 await attempt(task())

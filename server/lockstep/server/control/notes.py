@@ -1,7 +1,7 @@
 """Notes to everyone: cleaned, numbered, limited in rate. No I/O, no clock.
 
-Newcomers get the last ones of this session, which ends when nobody has been there for SESSION_GAP. What earlier ones
-wrote is in the audit and the recordings, for those who may read them.
+Newcomers get the last notes of this session, which ends when nobody has been there for SESSION_GAP. Notes of earlier
+sessions are in the audit and the recordings, for those who may read them.
 """
 
 from collections import deque
@@ -20,11 +20,11 @@ BURST = 5  # notes of one link at once, however many connections it has
 LINK_RATE = 0.5  # notes a second of one link
 BOARD_BURST = 20.0  # of all peers together: every note goes to everyone
 BOARD_RATE = 4.0
-SESSION_GAP = 600.0  # s; whoever reloads the page, or comes back after a cut, still finds the notes
+SESSION_GAP = 600.0  # s; the notes outlast a reload of the page and a lost connection
 
 
 class NoteBoard:
-    """`now` is monotonic seconds, `clock` seconds since 1970; both are handed in."""
+    """The last notes of a session. `now` is monotonic seconds, `clock` seconds since 1970."""
 
     def __init__(self, now: float) -> None:
         self._kept: deque[SharedNote] = deque(maxlen=KEPT)
@@ -34,23 +34,23 @@ class NoteBoard:
         self._empty_since: float | None = None
 
     def left_empty(self, now: float) -> None:
-        """Nobody is there any more."""
+        """Called when the last participant has left."""
         self._empty_since = now
 
     def joined(self, now: float) -> None:
-        """Somebody came. What was written before a time without anybody is not for them to read."""
+        """Called when somebody joins. Drops notes from before a gap without anybody: they are not for newcomers."""
         if self._empty_since is not None and now - self._empty_since >= SESSION_GAP:
             self._kept.clear()
         self._empty_since = None
 
     def __iter__(self) -> Iterator[SharedNote]:
-        """The last ones, oldest first."""
+        """Iterate over the last notes, oldest first."""
         return iter(list(self._kept))
 
     def write(
         self, link: str, peer: str, name: str, role: Role, text: str, epoch: str, event: int, now: float, clock: float
     ) -> SharedNote | RefusalReason:
-        """Keep a note; or why not: this link or all together write too often, or nothing in it can be printed."""
+        """Keep a note, or refuse it: this link or all together write too often, or nothing in it can be printed."""
         text = printable(text)
         if not text:
             return "malformed"

@@ -1,4 +1,4 @@
-"""The people on the console: who is here, what they are called, and what they write to each other."""
+"""The people on the console: the list of them, their names, and their notes to each other."""
 
 import asyncio
 import time
@@ -18,10 +18,10 @@ CROWD = 10  # peers; the list of participants goes out at most once a second, te
 
 
 class ParticipantList:
-    """Run `share` as a task. All else is called on the loop and returns at once.
+    """Keeps the list of participants. Run `share` as a task; everything else is called on the loop and returns at once.
 
     Args:
-        renamed: called with those whose name is another one now
+        renamed: called with the peers whose names have changed
         refuse: tells a peer that something was refused
     """
 
@@ -42,7 +42,7 @@ class ParticipantList:
 
     def joined(self, peer: Peer) -> None:
         if peer.thumbnail:
-            peer.name = peer.wanted_name  # nobody sees it, but a stop says whose it is
+            peer.name = peer.wanted_name  # not in the list, but a stop names its sender
             return
         self._board.joined(time.monotonic())
         self._audit.record("joined", peer.actor, ", ".join(sorted({stream.carrier for stream in peer.streams})))
@@ -50,7 +50,7 @@ class ParticipantList:
     def left(self, peer: Peer) -> None:
         if not peer.thumbnail:
             self._audit.record("left", peer.actor, peer.ended)
-            if all(each.thumbnail or each.ended for each in self._peers):  # one that closes is there no more
+            if all(each.thumbnail or each.ended for each in self._peers):  # a peer that is closing no longer counts
                 self._board.left_empty(time.monotonic())
 
     def welcome(self, peer: Peer) -> None:
@@ -67,13 +67,13 @@ class ParticipantList:
             self._audit.record("renamed", peer.actor, detail=f"was {before}")
 
     def settle_names(self) -> None:
-        """No two are called the same; who leaves makes room."""
+        """Give every peer a distinct name; a name is free again when its owner leaves."""
         changed = self._peers.settle_names()
         if changed:
             self._renamed(changed)
 
     def write(self, peer: Peer, text: str) -> None:
-        """A note to everyone."""
+        """Send a note to everyone, or refuse it."""
         link, epoch, event = peer.identity.token_id, self._clock.epoch, self._clock.event
         note = self._board.write(link, peer.id, peer.name, peer.role, text, epoch, event, time.monotonic(), time.time())
         if isinstance(note, SharedNote):
@@ -83,7 +83,7 @@ class ParticipantList:
             self._refuse(peer, note, "note")
 
     async def share(self) -> None:
-        """Until cancelled: the list of participants, when it changed."""
+        """Send everyone the list of participants whenever it has changed, until cancelled."""
         shown = Participants(participants=[])
         while True:
             await asyncio.sleep(max(1.0, len(self._peers) / CROWD))

@@ -1,4 +1,4 @@
-"""What the console needs of the 3D scene, and what stands in for one that is switched off."""
+"""The console's interface to the 3D scene, and a substitute for a scene that is switched off."""
 
 from typing import Protocol
 
@@ -9,7 +9,7 @@ __all__ = ["SceneFeed", "NoSceneFeed"]
 
 
 class SceneFeed(Protocol):
-    """None of these may wait."""
+    """The part of the 3D scene that the console uses. No method may block."""
 
     def configure(self, description: RobotDescription) -> None: ...
     def command(self, command: Command) -> None: ...
@@ -17,7 +17,7 @@ class SceneFeed(Protocol):
 
 
 class NoSceneFeed:
-    """Looks at nothing."""
+    """Ignores everything, in place of a scene that is switched off."""
 
     def configure(self, description: RobotDescription) -> None: ...
     def command(self, command: Command) -> None: ...

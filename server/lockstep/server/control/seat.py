@@ -1,4 +1,4 @@
-"""The control seat: who may drive. No I/O, no clock.
+"""The control seat, the right to drive. No I/O, no clock.
 
 At most one peer holds the seat. It never stays with a peer that is gone, silent or idle, and whenever it changes hands
 the robot rests first. Each input is about one peer, to which the seat is FREE, its own (HOLDER), somebody else's while
@@ -17,10 +17,10 @@ it asks for it (CLAIMANT), or somebody else's (OTHER):
 | heartbeat lost for `heartbeat_seconds` and four round trips | – | leaves | – | – |
 | idle for `idle_seconds` | – | leaves | – | – |
 
-*Seated* while somebody else holds it, and *leaves*, rest the robot. Whoever leaves makes room for the claim that has
-waited longest; without one the seat is free. A claim is put to whoever holds the seat then and keeps its deadline.
+*Seated* while somebody else holds it, and *leaves*, rest the robot. When the holder leaves, the claim that has waited
+longest gets the seat; without a claim the seat is free. A claim goes to each later holder too and keeps its deadline.
 
-Before the table is asked: a role that may not drive is refused `not_allowed`, and so is take by anyone but a
+Before the table applies: a role that may not drive is refused `not_allowed`, and so is take by anyone but a
 supervisor; a grant or decline by another than the holder is refused `no_seat`; a claim too many, or soon after a
 decline, is refused.
 
@@ -41,9 +41,9 @@ from lockstep.protocol.messages import RefusalReason
 
 __all__ = ["TABLE", "ControlSeat", "Move", "SeatInput", "SeatOutcome", "SeatRefusal", "SeatTimes", "Standing"]
 
-COUNTDOWN = 30.0  # s before the idle release that everyone is told of
+COUNTDOWN = 30.0  # s before the idle release, announced to everyone
 MAX_CLAIMS = 8
-ROUND_TRIPS, MOST_ROUND_TRIPS = 4, 5.0  # that a silence may last longer on a long path, and in s
+ROUND_TRIPS, MOST_ROUND_TRIPS = 4, 5.0  # by which a silence may be longer on a long path, and their bound in s
 DECLINED_FOR = 5.0  # s after a decline in which the same peer cannot claim again
 
 
@@ -55,7 +55,7 @@ class Standing(Enum):
 
 
 class SeatInput(Enum):
-    """The value is what everyone is told as the reason of a change."""
+    """An input of the seat. Its value tells everyone the reason of a change."""
 
     REQUEST = "request"
     REQUEST_IF_FREE = "request if free"
@@ -81,7 +81,7 @@ class Move(Enum):
 
 
 class SeatRefusal(NamedTuple):
-    """Tell `peer`."""
+    """A refusal to send to `peer`."""
 
     peer: str
     reason: RefusalReason
@@ -89,7 +89,7 @@ class SeatRefusal(NamedTuple):
 
 
 class SeatOutcome(NamedTuple):
-    """What follows from an input: rest the robot, tell everyone, refuse; in this order. All false: nothing."""
+    """The effects of an input, in this order: rest the robot, tell everyone, refuse. All false: none."""
 
     rest: bool = False
     changed: bool = False
@@ -97,7 +97,7 @@ class SeatOutcome(NamedTuple):
 
 
 class SeatTimes(NamedTuple):
-    """Seconds."""
+    """Time limits of the seat, in seconds."""
 
     heartbeat: float = 3.0  # of silence, and some round trips of the holder's path
     idle: float = 300.0  # without an intention to move
@@ -124,7 +124,7 @@ TABLE: dict[tuple[Standing, SeatInput], Move] = {
 
 
 class ControlSeat:
-    """The seat's state; peers are known by their ids. `now` is monotonic seconds, handed in.
+    """The state of the seat. Peers are known by their ids; `now` is monotonic seconds.
 
     Call `heard` for every valid message of a peer, `moved` for every moving command of the holder that passed,
     `neutral` for every neutral one that was executed, `neutral_needed` when another one has to come before the robot
@@ -132,7 +132,7 @@ class ControlSeat:
 
     Attributes:
         holder: "" while the seat is free
-        why: the input that brought this about, "" at first
+        why: the input that decided on the holder, "" at first
     """
 
     def __init__(self, times: SeatTimes) -> None:
@@ -145,7 +145,7 @@ class ControlSeat:
         self._counting = False  # everyone was told of the idle countdown
         self._proven = False  # a neutral command of the holder was executed since one was needed
         self._claims: dict[str, float] = {}  # peer -> deadline, oldest first
-        self._declined: dict[str, float] = {}  # peer -> when it may claim again
+        self._declined: dict[str, float] = {}  # peer -> time from which it may claim again
 
     def standing(self, peer: str) -> Standing:
         if not self.holder:
@@ -158,18 +158,18 @@ class ControlSeat:
         return self.standing(peer) is Standing.HOLDER
 
     def may_move(self, peer: str) -> bool:
-        """Whether `peer` holds the seat and a neutral command of it was executed since one was last needed."""
+        """True if `peer` holds the seat and a neutral command of it was executed since one was last needed."""
         return self.holds(peer) and self._proven
 
     def claims(self, now: float) -> dict[str, float]:
-        """Peers that ask for the seat, longest waiting first, and the seconds that are left to each."""
+        """Return the peers that ask for the seat, longest waiting first, with the seconds left to each."""
         return {peer: max(0.0, deadline - now) for peer, deadline in self._claims.items()}
 
     def idle_seconds_left(self, now: float) -> float | None:
-        """Until the idle holder loses the seat; None unless everyone is to see the countdown."""
+        """Return the seconds until the idle holder loses the seat; None unless everyone is to see the countdown."""
         return max(0.0, self._idle_at() - now) if self._counting else None
 
-    # what peers ask for
+    # requests of peers
 
     def request(self, peer: str, role: Role, now: float, *, only_if_free: bool = False) -> SeatOutcome:
         if role == "observer":
@@ -182,7 +182,7 @@ class ControlSeat:
         return self._step(peer, SeatInput.TAKE, now)
 
     def answer(self, peer: str, claimant: str, now: float, *, grant: bool) -> SeatOutcome:
-        """`peer` answers the claim of `claimant`; nothing happens when there is no such claim any more."""
+        """Take the answer of `peer` to the claim of `claimant`; ignore it if there is no such claim any more."""
         if not self.holds(peer):
             return SeatOutcome(refusal=SeatRefusal(peer, "no_seat", "only the holder answers"))
         return self._step(claimant, SeatInput.GRANTED if grant else SeatInput.DECLINED, now)
@@ -190,14 +190,14 @@ class ControlSeat:
     def release(self, peer: str, now: float) -> SeatOutcome:
         return self._step(peer, SeatInput.RELEASE, now)
 
-    # what is seen of peers
+    # observations of peers
 
     def gone(self, peer: str, now: float) -> SeatOutcome:
         self._declined.pop(peer, None)
         return self._step(peer, SeatInput.GONE, now)
 
     def heard(self, peer: str, now: float, round_trip: float = 0.0) -> None:
-        """`round_trip`: s, of the path to `peer` as it was measured last; 0 before."""
+        """Called for each message of `peer`. `round_trip`: s, as measured last; 0 before the first measurement."""
         if self.holds(peer):
             self._heard_at, self._round_trip = now, round_trip
 
@@ -205,15 +205,15 @@ class ControlSeat:
         self._proven = self._proven or self.holds(peer)
 
     def neutral_needed(self) -> None:
-        """Nobody moves the robot before another neutral command."""
+        """Require another neutral command before anybody moves the robot."""
         self._proven = False
 
     def moved(self, peer: str, now: float) -> SeatOutcome:
-        """Ends an idle countdown."""
+        """Restart the idle time of the holder, and end a countdown."""
         return self._stay(now) if self.holds(peer) else NOTHING
 
     def expire(self, now: float) -> Iterator[SeatOutcome]:
-        """What has run out, one after the other; act on each before the next."""
+        """Yield an outcome for each time limit that has run out; act on each before the next."""
         if self.holder and now - self._heard_at >= self._patience():
             yield self._step(self.holder, SeatInput.SILENT, now)
         if self.holder and now >= self._idle_at():
@@ -225,7 +225,7 @@ class ControlSeat:
             yield SeatOutcome(changed=True)
 
     def _patience(self) -> float:
-        """Seconds of silence after which the holder is gone."""
+        """Return the seconds of silence after which the holder is gone."""
         return self._times.heartbeat + min(ROUND_TRIPS * self._round_trip, MOST_ROUND_TRIPS)
 
     # the moves
@@ -253,7 +253,7 @@ class ControlSeat:
                 return SeatOutcome(changed=True, refusal=SeatRefusal(peer, "declined", what.value))
 
     def _seat(self, peer: str, what: SeatInput, now: float) -> SeatOutcome:
-        """`peer`, or nobody, holds the seat from now on."""
+        """Give the seat to `peer`, or to nobody."""
         rest = bool(self.holder)
         self.holder, self.why = peer, (SeatInput.REQUEST if what is SeatInput.REQUEST_IF_FREE else what).value
         self._heard_at = self._moved_at = now

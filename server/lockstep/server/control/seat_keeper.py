@@ -1,4 +1,4 @@
-"""Keeps the control seat: asks its rules, and acts on what follows. The rest leaves before anyone is told."""
+"""Applies the rules of the control seat and acts on their outcomes. The rest leaves before anyone is told."""
 
 import asyncio
 import time
@@ -14,20 +14,20 @@ from lockstep.server.peers.peer_registry import PeerRegistry
 __all__ = ["SeatHost", "SeatKeeper", "SeatMessage"]
 
 CHECKS = 12  # within one heartbeat timeout
-LINK_CLAIMS = 2  # of the connections of one link at once: all together have a few, and others want to ask too
+LINK_CLAIMS = 2  # at once by all connections of a link: there are few places for claims, and others want to ask too
 
 SeatMessage = SeatRequest | SeatGrant | SeatDecline | SeatTake | SeatRelease
 
 
 class SeatHost(Protocol):
-    """What the keeper needs of the console."""
+    """The part of the console that the keeper uses."""
 
     def rest_robot(self, why: str) -> None: ...
     def refuse(self, peer: Peer, refusal: SeatRefusal) -> None: ...
 
 
 class SeatKeeper:
-    """Run `watch` as a task. All else is called on the loop and returns at once."""
+    """Keeps the seat. Run `watch` as a task; everything else is called on the loop and returns at once."""
 
     def __init__(self, times: SeatTimes, peers: PeerRegistry, host: SeatHost, audit: AuditTrail) -> None:
         self.rules = ControlSeat(times)
@@ -37,7 +37,7 @@ class SeatKeeper:
         self._audit = audit
 
     def message(self) -> Seat:
-        """What everyone is told."""
+        """Return the seat's state as everyone is told it."""
         now = time.monotonic()
         return Seat(
             holder=self.rules.holder,
@@ -51,7 +51,7 @@ class SeatKeeper:
         )
 
     def handle(self, peer: Peer, message: SeatMessage) -> None:
-        """What `peer` asks for."""
+        """Act on a request of `peer`."""
         now = time.monotonic()
         match message:
             case SeatRequest(only_if_free=False) if self._asks_too_much(peer, now):
@@ -68,7 +68,7 @@ class SeatKeeper:
                 self._act(self.rules.release(peer.id, now), peer)
 
     def _asks_too_much(self, peer: Peer, now: float) -> bool:
-        """Whether it would be one claim too many of its link."""
+        """True if this would be one claim too many of the link of `peer`."""
         if self.rules.standing(peer.id) is not Standing.OTHER:
             return False
         asking = [self._peers.by_id(each) for each in self.rules.claims(now)]
@@ -79,7 +79,7 @@ class SeatKeeper:
         self.rules.heard(peer.id, time.monotonic(), peer.round_trip)
 
     def moved(self, peer: Peer) -> None:
-        """A moving command of `peer` passed."""
+        """Called when a moving command of `peer` was forwarded."""
         self._act(self.rules.moved(peer.id, time.monotonic()), peer)
 
     def gone(self, peer: Peer) -> None:
@@ -91,7 +91,7 @@ class SeatKeeper:
             self._peers.tell("session", self.message())
 
     async def watch(self) -> None:
-        """Until cancelled."""
+        """Act on time limits that run out, until cancelled."""
         while True:
             await asyncio.sleep(min(self._times.heartbeat / CHECKS, 1.0))
             for outcome in self.rules.expire(time.monotonic()):

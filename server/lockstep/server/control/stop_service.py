@@ -1,6 +1,6 @@
-"""The life of a STOP at the console: taken from everybody, sent, confirmed by the bridge, kept while it is away, reset.
+"""Handles STOP at the console: takes it from everybody, keeps it until the bridge confirms it, and resets it.
 
-The rules stand in `stop_presses.py`, `reset_attempts.py` and `silenced_links.py`; this is the shell around them.
+The rules are in `stop_presses.py`, `reset_attempts.py` and `silenced_links.py`; this module does their I/O.
 """
 
 import asyncio
@@ -43,12 +43,12 @@ __all__ = ["SILENCED", "StopAnswer", "StopOutcome", "StopService", "StopsLink"]
 
 log = structlog.get_logger(__name__)
 
-CONFIRM_SECONDS = 1.0  # that whoever pressed waits for the bridge's answer
-AGAIN_SECONDS = 0.5  # until what has no answer is sent again, on a link that lives
-WATCH_SECONDS = 0.1  # between two looks, while something has no answer
+CONFIRM_SECONDS = 1.0  # wait for the bridge's answer to a press
+AGAIN_SECONDS = 0.5  # until an unanswered press is sent again, on a link that is up
+WATCH_SECONDS = 0.1  # between two checks, while something is unanswered
 MAX_LISTENERS = 16  # connections that are told of one press
-PRESSES, PRESS_RATE = 20, 20.0  # Hz, of one link by whatever they come: new ones, and answers to repeats
-RECORDS, RECORD_RATE = 5, 0.2  # Hz, of stops of one link, in full and in the log; the audit counts what is more
+PRESSES, PRESS_RATE = 20, 20.0  # Hz, of one link by any path: new ones, and answers to repeats
+RECORDS, RECORD_RATE = 5, 0.2  # Hz, of stops of one link, in full and in the log; the audit counts the others
 RESETS, RESET_RATE = 5, 1.0  # Hz, of one link
 ROBOT_RESETS, ROBOT_RESET_RATE = 10, 2.0  # Hz, of all links together
 
@@ -63,7 +63,7 @@ HEARD = "The STOP of your link works again."
 
 
 class StopsLink(Protocol):
-    """What the service needs of the connection to the robot."""
+    """The part of the connection to the robot that the service uses."""
 
     @property
     def up(self) -> bool: ...
@@ -74,12 +74,12 @@ class StopsLink(Protocol):
 
 
 class StopOutcome(NamedTuple):
-    """What became of a press, as far as is known now."""
+    """The outcome of a press, as far as it is known."""
 
     press: str
     taken: StopTaken | None  # the bridge's answer; None: it has not answered
     detail: str = ""  # why it is not delivered; "" when it is
-    released: bool = False  # the stop that it became was reset since
+    released: bool = False  # its stop was reset since
 
     @property
     def delivered(self) -> bool:
@@ -87,7 +87,7 @@ class StopOutcome(NamedTuple):
 
     @property
     def kept(self) -> bool:
-        """On the robot's disk."""
+        """True if the stop is on the robot's disk."""
         return self.taken is not None and self.taken.kept
 
     @property
@@ -96,19 +96,19 @@ class StopOutcome(NamedTuple):
 
 
 class StopAnswer(NamedTuple):
-    """What whoever said STOP over HTTP is told."""
+    """The answer to a STOP over HTTP."""
 
     outcome: StopOutcome
     event: int
     up: bool  # the link to the robot
 
     def error(self) -> Unavailable:
-        """Of a stop that is not delivered."""
+        """Return the error for a stop that is not delivered."""
         return Unconfirmed(self.outcome.detail) if self.up else LinkDown(self.outcome.detail)
 
 
 class _Asker(NamedTuple):
-    """Who asked for a reset, and how the outcome is told."""
+    """The sender of a reset, and how it learns the outcome."""
 
     by: Actor
     where: str
@@ -116,7 +116,10 @@ class _Asker(NamedTuple):
 
 
 class StopService:
-    """Run `run` as a task. All else is called on the loop and returns at once, but for `outcome` and `reset`."""
+    """Handles the stops and resets of one robot. Run `run` as a task.
+
+    Everything but `outcome` and `reset` is called on the loop and returns at once.
+    """
 
     def __init__(
         self,
@@ -130,7 +133,7 @@ class StopService:
         listener: SessionListener,
         silenced: SilencedLinks | None = None,
     ) -> None:
-        """`holder`: the peer that holds the control seat, or "". `silenced`: of all robots; None: this one's alone."""
+        """`holder`: the peer that holds the control seat, or "". `silenced`: of all robots; None: of this one alone."""
         self._robot = robot
         self._keeper = keeper
         self._presses = keeper.presses
@@ -148,31 +151,31 @@ class StopService:
         self._link_repeats = RateLimits(PRESS_RATE, PRESSES)
         self._records = RateLimits(RECORD_RATE, RECORDS)
         self._logged = RateLimits(RECORD_RATE, RECORDS)
-        self._listeners: dict[str, list[tuple[str, str]]] = {}  # press -> who waits for it, and calls it what
+        self._listeners: dict[str, list[tuple[str, str]]] = {}  # press -> (waiting peer, id that it knows)
         self._late = {press.id for press in self._presses.pending}  # "not delivered yet" is in the audit
-        self._deadlines: dict[str, float] = {}  # press -> until when its answer is waited for
-        self._newest: Settled | None = None  # stop of this epoch that was said from here
-        self._sent_at = 0.0  # when all that is pending was sent last
+        self._deadlines: dict[str, float] = {}  # press -> end of the wait for its answer
+        self._newest: Settled | None = None  # newest stop of this epoch that was sent from here
+        self._sent_at = 0.0  # last time that all pending presses were sent
         self._wake = asyncio.Event()
         if self._late:
-            self._wake.set()  # the link for commands may be another console's: then nothing else sends these
+            self._wake.set()  # another console may have the link for commands: then nothing else sends these
         self._news = asyncio.Event()  # replaced at every answer
         keeper.on_trouble = self._trouble_changed
 
     @property
     def unconfirmed(self) -> bool:
-        """Whether a stop is on its way that the robot has not answered."""
+        """True if a stop is on its way that the robot has not answered."""
         return bool(self._presses.pending)
 
     @property
     def trouble(self) -> str:
-        """What newcomers are told of the disk; "" when nothing is wrong."""
+        """The warning to newcomers about the disk; "" when nothing is wrong."""
         return UNWRITTEN.format(self._keeper.trouble) if self._keeper.trouble else ""
 
     # STOP
 
     def stop(self, press: Press, given: str = "") -> None:
-        """Latch the stop. The outcome is that of the first press with this id; `given`: what its sender calls it.
+        """Latch the stop. A repeat has the outcome of the first press with its id. `given`: the id from the sender.
 
         Raises:
             Silenced: a supervisor has silenced the stops of this link.
@@ -184,7 +187,7 @@ class StopService:
             self._audit.refused(by, "silenced")
             raise Silenced(SILENCED)
         if (taken := self._presses.outcome(press.id)) is not None and self._is_released(taken):
-            self._presses.forget(press.id)  # the robot may move: it says whether this is a repeat or a new stop
+            self._presses.forget(press.id)  # the robot may move: it decides whether this is a repeat or a new stop
         rate = self._link_repeats if self._presses.knows(press.id) else self._link_presses
         too_fast = bool(by.link) and not rate.spend(by.link, time.monotonic())
         outcome = self._presses.press(press, hold=too_fast)
@@ -193,7 +196,7 @@ class StopService:
         match outcome:
             case AlreadyTaken(taken):
                 self._audit.again("stop", by, f"{where}, again")
-                self._answer(press.id, taken)  # one that comes too fast is in the state of the stop all the same
+                self._answer(press.id, taken)  # a sender that repeats too fast sees it in the state of the stop
             case NewPress(_, replaced):
                 self._await(press, replaced)
                 self._send_new(press)
@@ -203,14 +206,14 @@ class StopService:
                 self._audit.again("stop", by, f"{where}, again")
 
     def _named(self, by: Actor) -> Actor:
-        """By the name that whoever pressed is called here, where only one person has the link; a request tells none."""
+        """Return `by` with its name here, if only one person has the link: a request over HTTP carries no name."""
         if by.peer or not by.link:
             return by
         names = {peer.name for peer in self._peers if peer.identity.token_id == by.link}
         return by._replace(name=names.pop()) if len(names) == 1 else by
 
     def _await(self, press: Press, replaced: Press | None) -> None:
-        """Its answer, for so long that nobody takes it for delivered who is told nothing."""
+        """Set a deadline for its answer, after which the press counts as undelivered: silence is not delivery."""
         now = time.monotonic()
         self._deadlines[press.id] = now + CONFIRM_SECONDS
         if len(self._presses.pending) == 1:
@@ -231,7 +234,7 @@ class StopService:
             self._not_delivered(press)
 
     def _forget_settled(self) -> None:
-        """So many presses that some share an outcome: what is known of those that nobody waits for goes."""
+        """Forget presses that are no longer pending: there are so many that some share an outcome."""
         pending = self._presses.is_pending
         self._late = {press for press in self._late if pending(press)}
         self._deadlines = {press: until for press, until in self._deadlines.items() if pending(press)}
@@ -245,7 +248,7 @@ class StopService:
             self._record(press, f"{press.where}, not delivered yet")
 
     async def outcome(self, press: str) -> StopOutcome:
-        """What became of a press: waits for the bridge for a second, and for the disk where the robot is away."""
+        """Return the outcome of a press. Waits a second for the bridge, and for the disk if the robot is away."""
         try:
             async with asyncio.timeout(CONFIRM_SECONDS):
                 while (taken := self._presses.outcome(press)) is None and self._robot_may_answer(press):
@@ -267,7 +270,7 @@ class StopService:
         return self._robot.up or press not in self._late
 
     def _listen(self, peer: str, press: str, told: str) -> None:
-        """The connection is told when the robot answers, by the id that it knows."""
+        """Register `peer` to be told of the robot's answer, by the id that it knows."""
         if not peer:
             return
         listeners = self._listeners.setdefault(press, [])
@@ -280,17 +283,17 @@ class StopService:
             if peer is not None:
                 peer.send("stop", msgspec.structs.replace(taken, press=told))
 
-    # what the link says
+    # events of the link
 
     def link_up(self) -> None:
-        """Some link is up: all that is pending goes first, in order."""
+        """Called when some link is up: send all pending presses first, in order."""
         for press in self._presses.pending:
             self._robot.send_stop(press.message())
         self._sent_at = time.monotonic()
         self._wake.set()
 
     def link_down(self, detail: str) -> None:
-        """The link for commands is down. What has no answer goes by the other, or has to outlive this console."""
+        """Called when the link for commands is down: unanswered presses go by the other link, or are kept on disk."""
         for press in self._presses.pending:
             if not self._robot.send_stop(press.message()):
                 self._not_delivered(press)
@@ -298,9 +301,9 @@ class StopService:
         self._spread()
 
     def epoch_ends(self, held: StopState) -> None:
-        """Another bridge: it is told of a stop that held at the last one, in case it does not remember.
+        """Tell the next bridge of a stop that held at the last one, in case it does not remember.
 
-        Also of one that the last bridge took, and that no feedback has shown.
+        Also of a stop that the last bridge took, and that no feedback has shown.
         """
         newest, self._newest = self._newest, None
         if held.stopped and held.press:
@@ -317,7 +320,7 @@ class StopService:
             self._wake.set()
 
     def taken(self, taken: StopTaken) -> None:
-        """The bridge's answer to a stop."""
+        """Take the bridge's answer to a stop."""
         settled = self._presses.taken(taken)
         if settled and (self._newest is None or taken.number > self._newest.taken.number):
             self._newest = settled[0]
@@ -338,7 +341,7 @@ class StopService:
             self._settle(self._resets.feedback(stop))
 
     def refused(self, refusal: Refusal) -> bool:
-        """Whether it was a reset that the bridge refused."""
+        """Take a refusal of the bridge. True if it refused a reset."""
         outcomes = self._resets.refused(refusal)
         self._settle(outcomes)
         return bool(outcomes) or (not refusal.event and refusal.reason in RESET_REASONS)
@@ -367,7 +370,7 @@ class StopService:
             raise self._reset_error(outcome.reason, outcome.detail)
 
     def reset_by_peer(self, peer: Peer, number: int) -> None:
-        """As `reset`; a refusal is sent to the peer."""
+        """Release stop `number` for a peer, which is sent a refusal."""
 
         def tell(outcome: ResetOutcome[_Asker]) -> None:
             if outcome.reason is not None:
@@ -395,7 +398,7 @@ class StopService:
                 self._settle(self._resets.link_down(self._robot.detail))
 
     def _refusal_of_reset(self, by: Actor, number: int) -> tuple[RefusalReason, str] | None:
-        """Why this one may not reset now; None: it may."""
+        """Return the reason why `by` may not reset now; None: it may."""
         if by.role != "supervisor":
             if by.role == "observer":
                 return "not_allowed", "observers do not reset"
@@ -453,7 +456,7 @@ class StopService:
     # silence
 
     def silence(self, by: Peer, peer: str, *, silent: bool) -> RefusalReason | None:
-        """A supervisor silences the stops of the link of `peer`, or ends that; why not, or None."""
+        """Silence the stops of the link of `peer` for a supervisor, or end that. Return a refusal's reason, or None."""
         found = self._peers.by_id(peer)
         if by.role != "supervisor" or found is None or found.role == "supervisor":
             return "not_allowed"
@@ -467,7 +470,7 @@ class StopService:
         return None
 
     def show_silence(self) -> None:
-        """Tell those whose stops were silenced, or are heard again, here or at another robot or console."""
+        """Tell the peers whose stops were silenced, or are heard again, here or at another robot or console."""
         now = time.monotonic()
         for peer in self._peers:
             silent = self._silenced.holds(peer.identity.token_id, now)
@@ -482,7 +485,7 @@ class StopService:
     # background
 
     async def run(self) -> None:
-        """Until cancelled: what has no answer in time. Looks at once: an earlier run may have ended by a fault."""
+        """Act on missing answers until cancelled. Checks at once: an earlier run may have ended by a fault."""
         self._wake.set()
         while True:
             await self._wake.wait()
@@ -491,7 +494,7 @@ class StopService:
                 await asyncio.sleep(WATCH_SECONDS)
 
     def _look(self, now: float) -> bool:
-        """Whether anything is left to wait for."""
+        """Act on missing answers. True if anything is left to wait for."""
         for press in self._presses.take_held():
             self._send_new(press)
         late = [press for press in self._presses.pending if now >= self._deadlines.get(press.id, now + 1)]
@@ -505,7 +508,7 @@ class StopService:
         return bool(self._presses.pending or self._resets)
 
     def _record(self, press: Press, what: str) -> None:
-        """In full for the first of each link; a flood becomes one record a second."""
+        """Record the first stops of each link in full; a flood becomes one record a second."""
         if self._records.spend(press.by.link or press.by.name, time.monotonic()):
             self._audit.record("stop", press.by, what, press.reason)
         else:

@@ -1,1 +1,1 @@
-"""What makes audit and recordings evidence: hash chains, and signatures of their heads (docs/recording.md)."""
+"""Makes audit and recordings evidence: hash chains, and signatures of their heads (docs/recording.md)."""

@@ -1,6 +1,6 @@
-"""Signed heads of the audit: what somebody with the public key can hold against the files later.
+"""Signed heads of the audit, against which anybody with the public key can check the files later.
 
-`AnchorFile` is the shell; the rest has no I/O and no clock.
+Nothing but `AnchorFile` does I/O; nothing reads a clock.
 """
 
 import errno
@@ -26,17 +26,20 @@ __all__ = [
 ]
 
 ANCHORS_NAME = "audit-anchors.jsonl"
-DOMAIN = b"lockstep audit anchor 1\n"  # nothing else that this key signs begins like that
+DOMAIN = b"lockstep audit anchor 1\n"  # nothing else that this key signs begins with it
 
 
 class Anchor(msgspec.Struct, frozen=True, kw_only=True):
-    """The audit ended with these two records at that time. Signed are `DOMAIN` and this, with an empty signature."""
+    """States that the audit ended with these two records at that time.
+
+    The signature covers `DOMAIN` and this struct with an empty signature.
+    """
 
     version: int = 1
-    log: str  # which audit: "audit", in a fleet "left/audit"; several may share one file of anchors
-    n: int  # of the last record in the audit's file; 0: there is none
+    log: str  # name of the audit: "audit", in a fleet "left/audit"; several may share one file of anchors
+    n: int  # of the last record in the audit's file; 0 without records
     head: str  # its hash
-    chatter_n: int  # the same of the file with what links cause often
+    chatter_n: int  # the same for the chatter file
     chatter_head: str
     time: float  # s since 1970, the console's clock
     key: str
@@ -59,7 +62,7 @@ def sign_anchor(anchor: Anchor, signer: Signer) -> Anchor:
 
 
 def parse_anchor(line: bytes | str) -> Anchor | None:
-    """None: it is none, or its signature does not fit."""
+    """Parse a line; None if it is not an anchor, or its signature does not fit."""
     try:
         found = _decoder.decode(line)
     except (msgspec.DecodeError, UnicodeError, RecursionError):
@@ -68,22 +71,22 @@ def parse_anchor(line: bytes | str) -> Anchor | None:
 
 
 def anchor_text(anchor: Anchor | None) -> str:
-    """What `parse_anchor` takes; "" for None."""
+    """Return the text that `parse_anchor` takes; "" for None."""
     return "" if anchor is None else msgspec.json.encode(anchor).decode()
 
 
 class AnchorNote(msgspec.Struct, kw_only=True):
-    """What the anchors say of an audit."""
+    """The result of checking an audit against its anchors."""
 
-    known: int = 0  # that were looked at
+    known: int = 0  # anchors that were checked
     fitting: int = 0
     other_keys: int = 0
-    too_old: int = 0  # of records that are not kept any more
+    too_old: int = 0  # anchors of records that are not kept any more
     newest: Anchor | None = None  # of those that fit
 
 
 def check_anchors(audit: ChainReport, chatter: ChainReport, anchors: Iterable[Anchor], key: str) -> AnchorNote:
-    """Hold the audit's two files against what was signed with `key`; faults are added to the reports."""
+    """Check the audit's two files against the anchors signed with `key`; add faults to the reports."""
     note = AnchorNote()
     for anchor in anchors:
         note.known += 1
@@ -103,7 +106,7 @@ def check_anchors(audit: ChainReport, chatter: ChainReport, anchors: Iterable[An
 
 
 def _fits(report: ChainReport, n: int, head: str) -> bool | None:
-    """None: the record is not kept any more."""
+    """True if record `n` has the hash `head`, False after a fault; None if it is not kept any more."""
     if n == 0:
         return True
     known = report.hashes.get(n)
@@ -122,10 +125,10 @@ def _fits(report: ChainReport, n: int, head: str) -> bool | None:
 
 
 class AnchorFile:
-    """Only ever appended to. Blocks; used from one thread.
+    """A file of anchors, only ever appended to. Blocks; used from one thread.
 
     Args:
-        max_bytes: then it is set aside, once
+        max_bytes: size at which the file is rotated; one older file is kept
     """
 
     def __init__(self, path: Path, max_bytes: int) -> None:
@@ -133,7 +136,7 @@ class AnchorFile:
         self._max_bytes = max_bytes
 
     def append(self, anchor: Anchor) -> None:
-        """Raises OSError: it is not there, or not whole."""
+        """Append an anchor. Raises OSError: it was not written, or not as a whole."""
         self.path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
         if self.path.exists() and self.path.stat().st_size > self._max_bytes:
             os.replace(self.path, self._older)
@@ -150,7 +153,7 @@ class AnchorFile:
             os.close(handle)
 
     def read(self, log: str) -> list[Anchor]:
-        """Those of that audit whose signatures fit, oldest first. Raises OSError."""
+        """Return the anchors of that audit whose signatures fit, oldest first. Raises OSError."""
         found: list[Anchor] = []
         for path in (self._older, self.path):
             if path.exists():

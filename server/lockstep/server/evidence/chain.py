@@ -1,4 +1,4 @@
-"""Lines that each carry the hash of the line before, and what is wrong with a chain of them. No I/O, no clock.
+"""Checks chains of lines, each of which carries the hash of the line before. No I/O, no clock.
 
 The canonical bytes of a line are the bytes of the file, without the line's end. The first line carries `GENESIS`.
 """
@@ -18,7 +18,7 @@ FaultKind = Literal["changed", "reordered", "unchained", "cut", "anchor"]
 
 
 class Place(NamedTuple):
-    """Where a line stands."""
+    """The position of a line."""
 
     file: str
     line: int  # from 1 on
@@ -33,7 +33,7 @@ class ChainedLine(NamedTuple):
 
 
 class Fault(msgspec.Struct, frozen=True):
-    """Something that is not as it was written."""
+    """A difference from what was written."""
 
     kind: FaultKind
     n: int  # of the record
@@ -41,15 +41,15 @@ class Fault(msgspec.Struct, frozen=True):
 
 
 class ChainReport(msgspec.Struct, kw_only=True):
-    """What a chain says. `hashes` are those of the records that are kept, by number."""
+    """The result of a check. `hashes` are those of the records that are kept, by number."""
 
     records: int = 0
-    first: int = 0  # number of the oldest record; 0: there is none
+    first: int = 0  # number of the oldest record; 0 without records
     last: int = 0
     head: str = GENESIS  # hash of the last line
     earlier: bool = False  # records before the first are not kept any more
-    unchained: int = 0  # of a version without a chain, in front of all others
-    unreadable: list[str] = []  # places of lines that are no record: a write that was cut off
+    unchained: int = 0  # records of a version without a chain, in front of all others
+    unreadable: list[str] = []  # places of lines that are not records: a write was cut off
     faults: list[Fault] = []
     count: int = 0  # of faults; only the first are kept
     hashes: dict[int, str] = {}
@@ -74,7 +74,7 @@ def line_hash(line: bytes) -> str:
 
 
 def check_chain(lines: Iterable[ChainedLine]) -> ChainReport:
-    """Of one file with those that were set aside before it, oldest first."""
+    """Check the lines of one file and of those that were rotated before it, oldest first."""
     report = ChainReport()
     numbers: dict[str, int] = {}  # of the records seen, by hash
     chained = False

@@ -19,7 +19,7 @@ KEY_DIGITS, SIGNATURE_DIGITS = 64, 128
 
 
 class Signer:
-    """Used from any thread.
+    """Signs with one private key. Thread-safe.
 
     Attributes:
         public_key: 64 hexadecimal digits
@@ -30,16 +30,16 @@ class Signer:
         self.public_key = private.public_key().public_bytes(Encoding.Raw, PublicFormat.Raw).hex()
 
     def sign(self, data: bytes) -> str:
-        """128 hexadecimal digits."""
+        """Return the signature, 128 hexadecimal digits."""
         return self._private.sign(data).hex()
 
 
 def evidence_signer(directory: StateDir) -> Signer:
-    """That of the state directory; its key is made at the first call.
+    """Return the signer of the state directory; its key is made at the first call.
 
     Raises:
-        StateDirUnusable: it cannot be read or made.
-        StateDamaged: what is there is no key.
+        StateDirUnusable: the key cannot be read or made.
+        StateDamaged: the file does not hold a key.
     """
     pem = directory.secret(KEY_FILE, _fresh_key)
     try:
@@ -60,7 +60,7 @@ def is_public_key(text: str) -> bool:
 
 
 def is_signed(public_key: str, data: bytes, signature: str) -> bool:
-    """Whether the owner of `public_key` signed `data`. Anything may be given; what is none is not signed."""
+    """True if the owner of `public_key` signed `data`. A malformed key or signature gives False."""
     key, signed = _bytes(public_key, KEY_DIGITS), _bytes(signature, SIGNATURE_DIGITS)
     if key is None or signed is None:
         return False

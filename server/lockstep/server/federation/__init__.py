@@ -1,4 +1,4 @@
-"""Several consoles behind one entry: what they tell each other, and through what (docs/fleet.md)."""
+"""Shares the state of several consoles behind one entry through a board (docs/fleet.md)."""
 
 import importlib.util
 import socket
@@ -27,10 +27,10 @@ def make_board(
     public_url: str,
     registry: CollectorRegistry,
 ) -> Board:
-    """The board that the settings name.
+    """Return the board that the settings name.
 
     Raises:
-        BoardUnusable: there can be none here.
+        BoardUnusable: this board cannot work here.
     """
     if not settings.has_board:
         return MemoryBoard()
@@ -44,7 +44,7 @@ def make_board(
 
 
 def check_board(settings: BoardSettings, public_url: str) -> None:
-    """Called before anything else is started. Raises BoardUnusable when there can be no board, with the reason."""
+    """Check the board before anything else starts. Raises BoardUnusable with the reason that it cannot work."""
     if not settings.has_board:
         return
     if not public_url:

@@ -1,4 +1,4 @@
-"""The board on which consoles behind one entry tell each other what they do. It never moves a robot."""
+"""The board on which consoles behind one entry share their states. It never moves a robot."""
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
@@ -16,7 +16,7 @@ __all__ = ["Board", "BoardHost", "BoardState", "Conflict", "SharedAudit", "Share
 
 @dataclass(frozen=True, kw_only=True)
 class Conflict:
-    """Two living consoles say that they have the robot of this name."""
+    """Two living consoles claim the robot of this name."""
 
     robot: str
     consoles: tuple[str, ...]  # their names
@@ -25,14 +25,14 @@ class Conflict:
 
 @dataclass(frozen=True, kw_only=True)
 class BoardState:
-    shared: bool = False  # whether there may be other consoles at all
-    unknown_since: float | None = None  # s since 1970; None: what is known of the others is fresh
-    detail: str = ""  # what is wrong with the board, for a person
+    shared: bool = False  # True if there may be other consoles at all
+    unknown_since: float | None = None  # s since 1970; None: the knowledge of the others is fresh
+    detail: str = ""  # the board's trouble, for a person
     conflicts: tuple[Conflict, ...] = ()
 
 
 class StopAnswer(NamedTuple):
-    """What the console of a robot said to a STOP. `confirmed`: it said anything in time."""
+    """The answer of a robot's console to a STOP. `confirmed`: the console answered in time."""
 
     confirmed: bool
     delivered: bool
@@ -51,7 +51,7 @@ class SharedRecord(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class SharedAudit(NamedTuple):
-    """Oldest first. `detail`: why it may not be all."""
+    """Records, oldest first. `detail`: the reason that some may be missing."""
 
     records: list[SharedRecord]
     complete: bool
@@ -59,41 +59,41 @@ class SharedAudit(NamedTuple):
 
 
 class BoardHost(Protocol):
-    """What the board asks of this console. Called on the loop; returns at once, but for `stop_robot`."""
+    """This console as the board needs it. All is called on the loop and returns at once, except `stop_robot`."""
 
     async def stop_robot(self, name: str, press: Press) -> StopAnswer:
-        """Latched at once; returns within a second or so, when the robot has answered or has not."""
+        """Latch a stop at once; return within a second or so, whether the robot has answered or not."""
         ...
 
     def silences(self) -> dict[str, float]:
-        """Links whose stops other consoles have to silence too, and until when, in s since 1970."""
+        """Return the links whose stops other consoles have to silence too, with the end in s since 1970."""
         ...
 
     def silenced_elsewhere(self, console: str, links: Mapping[str, float]) -> None:
-        """What that console says so of; all of it, each time."""
+        """Take the links that `console` has silenced: all of them, each time."""
         ...
 
     def links_revoked(self, ended: list[Invitation]) -> None:
-        """Another console has revoked links; `ended` are invitations of ours that end with them."""
+        """Note that another console has revoked links; `ended` are this console's invitations that end with them."""
         ...
 
 
 class Board(Protocol):
-    """Run `run` as a task. All that is not awaited is called on the loop and returns at once."""
+    """Run `run` as a task. Methods that are not coroutines are called on the loop and return at once."""
 
     @property
     def state(self) -> BoardState: ...
 
     async def run(self) -> None:
-        """Until cancelled."""
+        """Run until cancelled."""
         ...
 
     def publish(self, tiles: Sequence[Tile]) -> None:
-        """All robots of this console. The newest wins; call it as often as there is news, and once a second."""
+        """Show all robots of this console. The newest wins; call it on every change, and once a second."""
         ...
 
     def others(self) -> list[Tile]:
-        """Robots of the other consoles, without those whose names are ours."""
+        """Return the robots of other consoles, except those with a name of this console's robots."""
         ...
 
     def record(self, robot: str, record: AuditRecord) -> None:
@@ -101,9 +101,9 @@ class Board(Protocol):
         ...
 
     async def audit(self, limit: int) -> SharedAudit:
-        """The newest `limit` records that consoles have shared."""
+        """Return the newest `limit` records that consoles have shared."""
         ...
 
     async def stop(self, robots: Collection[str], press: Press) -> dict[str, StopAnswer]:
-        """STOP for robots of other consoles; every one of `robots` is answered for within a few seconds."""
+        """Stop robots of other consoles; return an answer for every one of `robots` within a few seconds."""
         ...

@@ -1,7 +1,7 @@
-"""Seals what consoles keep in the store with a key made from the one that signs links.
+"""Seals the consoles' values in the store with a key derived from the key that signs links.
 
-A tile's address becomes a link that people follow with their token, and a STOP or a revocation is obeyed. So who can
-write to the store but does not have the signing key must not be believed. A seal does not hide anything.
+A tile's address becomes a link that people follow with their token, and a STOP or a revocation is obeyed. So a
+writer to the store without the signing key must not be believed. A seal does not hide anything.
 """
 
 import hashlib
@@ -15,7 +15,7 @@ SIZE = 32  # characters: 128 bits in hexadecimal
 
 
 class Seal:
-    """A sealed text is its seal, then the text. `kind` keeps one from passing for another."""
+    """A sealed text is its seal, then the text. `kind` keeps one text from passing for another."""
 
     def __init__(self, signing_key: str) -> None:
         self._key = hmac.digest(signing_key.encode(), b"lockstep board", hashlib.sha256)
@@ -24,11 +24,11 @@ class Seal:
         return self.of(kind, text) + text
 
     def take(self, kind: str, sealed: bytes, largest: int) -> bytes:
-        """The text.
+        """Check the seal and return the text.
 
         Raises:
             InputTooLarge: it has more than `largest` bytes.
-            InputNotSealed: by a console with our signing key, for this kind.
+            InputNotSealed: it is not sealed for this kind, by a console with the same signing key.
         """
         if len(sealed) > largest + SIZE:
             raise InputTooLarge(f"{kind}: more than {largest} bytes")
@@ -38,5 +38,5 @@ class Seal:
         return text
 
     def of(self, kind: str, text: bytes) -> bytes:
-        """The seal alone."""
+        """Return the seal alone."""
         return hmac.digest(self._key, kind.encode() + b"\0" + text, hashlib.sha256).hex()[:SIZE].encode()

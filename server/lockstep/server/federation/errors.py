@@ -1,16 +1,16 @@
-"""What can go wrong between this console and the others.
+"""Errors between this console and others.
 
 BoardError
-├── BoardUnusable       the settings ask for what cannot be had here
-├── BoardTrouble        the store does not do its part
+├── BoardUnusable       the settings ask for a board that cannot work here
+├── BoardTrouble        the store does not work
 │   ├── BoardUnreachable    no connection, or it ended
 │   ├── BoardSilent         no answer in time
-│   ├── BoardRefused        it does not let us in, or forbids a command
-│   ├── BoardFull           it takes no more, or only reads
-│   └── BoardWrongType      somebody keeps something else at a key of ours
-└── BoardInput          something in the store is not what a console writes
+│   ├── BoardRefused        it refuses the login, or a command
+│   ├── BoardFull           it is full, or read-only
+│   └── BoardWrongType      a key of the consoles holds another type of value
+└── BoardInput          a value in the store is not one that a console writes
     ├── InputTooLarge
-    ├── InputNotSealed      not sealed by our signing key
+    ├── InputNotSealed      not sealed with this console's signing key
     └── InputMalformed
 """
 

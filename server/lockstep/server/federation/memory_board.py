@@ -14,7 +14,7 @@ ALONE = StopAnswer(confirmed=False, delivered=False, event=0, detail="there is n
 
 
 class MemoryBoard:
-    """There are no others: nothing is told, nothing is heard."""
+    """A board without other consoles: it sends nothing and receives nothing."""
 
     @property
     def state(self) -> BoardState:

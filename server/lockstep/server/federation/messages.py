@@ -1,4 +1,4 @@
-"""What consoles keep in the store and tell each other; read only when it keeps to these bounds. No I/O."""
+"""The consoles' values in the store and messages to each other, with the bounds that readers check. No I/O."""
 
 from dataclasses import dataclass
 from typing import Annotated, Literal, TypeVar
@@ -40,7 +40,7 @@ __all__ = [
 ]
 
 MAX_ROBOTS = 64  # of one console
-MAX_PUBLISHED = 256 * 1024  # bytes of what one console shows
+MAX_PUBLISHED = 256 * 1024  # bytes of one console's state
 MAX_NEWS = 16 * 1024
 MAX_AUDIT_LINE = 8 * 1024
 
@@ -59,18 +59,18 @@ class SilencedLink:
 
 @dataclass(frozen=True, kw_only=True)
 class Published:
-    """All that one console shows."""
+    """The state of one console."""
 
     id: ConsoleId
     name: Name  # for people
-    n: Annotated[int, Field(ge=1, lt=2**53)]  # counts up; an old one never stands for a living console
+    n: Annotated[int, Field(ge=1, lt=2**53)]  # counts up; an old number is no sign of life
     robots: Annotated[tuple[Tile, ...], Field(max_length=MAX_ROBOTS)]
     silenced: Annotated[tuple[SilencedLink, ...], Field(max_length=MAX_SILENCED)] = ()
 
 
 @dataclass(frozen=True, kw_only=True)
 class Changed:
-    """Look at what `console` shows now."""
+    """The state of `console` has changed: look at it."""
 
     console: ConsoleId
     kind: Literal["changed"] = "changed"
@@ -87,12 +87,12 @@ class Gone:
 @dataclass(frozen=True, kw_only=True)
 class RevokedLink:
     id: Annotated[str, Field(min_length=1, max_length=64, pattern=r"^\S+$")]
-    expires: Annotated[float, Field(ge=0, allow_inf_nan=False)]  # s since 1970; nobody need remember it for longer
+    expires: Annotated[float, Field(ge=0, allow_inf_nan=False)]  # s since 1970; not needed for longer
 
 
 @dataclass(frozen=True, kw_only=True)
 class Revoked:
-    """There are links in the list of revoked ones that were not there before."""
+    """The list of revoked links has new entries."""
 
     console: ConsoleId
     kind: Literal["revoked"] = "revoked"
@@ -100,16 +100,16 @@ class Revoked:
 
 @dataclass(frozen=True, kw_only=True)
 class StopRequest:
-    """STOP for robots of other consoles; whoever has one of them obeys and answers."""
+    """STOP for robots of other consoles; a console that has one of them obeys and answers."""
 
-    console: ConsoleId  # that asks
+    console: ConsoleId  # the console that asks
     request: RequestId
     robots: Annotated[tuple[RobotName, ...], Field(max_length=MAX_ROBOTS * 8)]
     by: Name
     role: Name
     link: Annotated[str, Field(max_length=64)]
     reason: Words
-    press: Annotated[str, Field(max_length=64)] = ""  # "": of a console that does not know of presses
+    press: Annotated[str, Field(max_length=64)] = ""  # "": from a console that does not know of presses
     kind: Literal["stop"] = "stop"
 
 
@@ -119,13 +119,13 @@ class Outcome:
     delivered: bool
     event: Annotated[int, Field(ge=0, lt=2**31)]
     number: Annotated[int, Field(ge=0, lt=2**53)] = 0  # of the stop; 0 when it was not delivered
-    detail: Words = ""  # why it was not delivered
-    kept: bool = False  # on the robot's disk; false also of a console that does not say
+    detail: Words = ""  # reason that it was not delivered
+    kept: bool = False  # on the robot's disk; also false from a console that does not say
 
 
 @dataclass(frozen=True, kw_only=True)
 class StopReply:
-    console: ConsoleId  # that answers
+    console: ConsoleId  # the console that answers
     request: RequestId
     robots: Annotated[tuple[Outcome, ...], Field(max_length=MAX_ROBOTS)]
     kind: Literal["stopped"] = "stopped"
@@ -147,7 +147,7 @@ def pack_published(seal: Seal, published: Published) -> bytes:
 
 
 def unpack_published(seal: Seal, sealed: bytes) -> Published:
-    """Raises BoardInput, as do all that unpack."""
+    """Check and decode a sealed state. Raises BoardInput, as all unpack functions do."""
     return _checked(_published, seal.take("console", sealed, MAX_PUBLISHED))
 
 
@@ -168,7 +168,7 @@ def unpack_revoked(seal: Seal, sealed: bytes) -> RevokedLink:
 
 
 def pack_record(seal: Seal, console: str, robot: str, record: AuditRecord) -> dict[bytes, bytes]:
-    """The fields of an entry; `line` is the very line of the audit's file."""
+    """Return the fields of an entry; `line` is the very line of the audit's file."""
     line = msgspec.json.encode(record)
     fields = {b"console": console.encode(), b"robot": robot.encode(), b"line": line}
     return {**fields, b"seal": seal.of("audit", b"\n".join(fields.values()))}
@@ -195,7 +195,7 @@ def _checked(adapter: TypeAdapter[Kept], text: bytes) -> Kept:
 
 
 def _first_fault(error: Exception) -> str:
-    """What was wrong and where; never the input itself, which may be anything."""
+    """Return the first fault and its place; never the input itself, which may be anything."""
     if isinstance(error, ValidationError):
         fault = error.errors(include_url=False, include_input=False, include_context=False)[0]
         return f"{'.'.join(map(str, fault['loc']))}: {fault['type']}"[:200]

@@ -1,4 +1,4 @@
-"""What the board counts. Names: docs/console-api.md."""
+"""Metrics of the board. Names: docs/console-api.md."""
 
 from prometheus_client import CollectorRegistry, Counter, Gauge
 

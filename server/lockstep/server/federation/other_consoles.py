@@ -1,4 +1,4 @@
-"""What this console knows of the others: who lives, what they show, and whose names collide. No I/O, no clock."""
+"""Tracks the other consoles: their signs of life, their states and name conflicts. No I/O, no clock."""
 
 from collections.abc import Collection, Iterator
 from dataclasses import dataclass, replace
@@ -12,7 +12,7 @@ __all__ = ["GONE_AFTER", "MAX_CONSOLES", "UNKNOWN_AFTER", "OtherConsoles"]
 MAX_CONSOLES = 64
 UNKNOWN_AFTER = 3.0  # s without a sign of life
 GONE_AFTER = 60.0
-LIVES_AFTER = 2  # signs of life; what is only found in the store may be left over from a run that ended
+LIVES_AFTER = 2  # signs of life; a state that is only found in the store may be left over from a run that ended
 
 NOT_HEARD = "its console is not heard"
 
@@ -21,7 +21,7 @@ NOT_HEARD = "its console is not heard"
 class _Other:
     shown: Published
     heard_at: float
-    signs: int = 1  # that it lives
+    signs: int = 1  # signs of life
 
     def lives(self, now: float) -> bool:
         return self.signs >= LIVES_AFTER and not self.silent(now)
@@ -31,7 +31,7 @@ class _Other:
 
 
 class OtherConsoles:
-    """`now` is monotonic. A console lives while the number of what it shows goes up: no clocks are compared."""
+    """`now` is monotonic. A console lives while the number of its state goes up: no clocks are compared."""
 
     def __init__(self, own_id: str, own_name: str) -> None:
         self._own_id = own_id
@@ -39,7 +39,7 @@ class OtherConsoles:
         self._others: dict[str, _Other] = {}
 
     def heard(self, published: Published, now: float) -> bool:
-        """What a console shows was read. False when it is nothing new, or there are too many consoles."""
+        """Take the state of a console. Return False if it is not new, or there are too many consoles."""
         if published.id == self._own_id:
             return False
         known = self._others.get(published.id)
@@ -55,11 +55,11 @@ class OtherConsoles:
         return True
 
     def gone(self, console: str) -> None:
-        """It said goodbye."""
+        """Forget a console that said goodbye."""
         self._others.pop(console, None)
 
     def name(self, console: str) -> str:
-        """For people; the id of one that is not known."""
+        """Return the name for people; the id of an unknown console."""
         known = self._others.get(console)
         return console if known is None else known.shown.name
 
@@ -67,11 +67,11 @@ class OtherConsoles:
         return sum(other.lives(now) for other in self._others.values())
 
     def owners(self, robots: Collection[str], now: float) -> dict[str, str]:
-        """Names of the consoles that have these robots, as far as known, by robot."""
+        """Return the names of the consoles that have these robots, as far as known, by robot."""
         return {tile.name: other.shown.name for other, tile in self._tiles(now) if tile.name in robots}
 
     def tiles(self, own: Collection[str], now: float) -> list[Tile]:
-        """One for each name that is not our own: the living console's, if there is one."""
+        """Return one tile for each name that is not in `own`: that of a living console, if there is one."""
         self._forget(now)
         found: dict[str, Tile] = {}
         for other, tile in self._tiles(now):
@@ -92,7 +92,7 @@ class OtherConsoles:
         )
 
     def _tiles(self, now: float) -> Iterator[tuple[_Other, Tile]]:
-        """The living first, then always in the same order, so that a conflict does not flicker."""
+        """Yield the living first, then always in the same order, so that a conflict does not flicker."""
         for _, other in sorted(self._others.items(), key=lambda item: (item[1].silent(now), item[0])):
             for tile in other.shown.robots:
                 yield other, tile
@@ -102,7 +102,7 @@ class OtherConsoles:
 
 
 def _seen(tile: Tile, other: _Other, now: float) -> Tile:
-    """As it is now, not as it was when it was shown."""
+    """Return the tile as of now, not as of the time when it was published."""
     age_ms = (now - other.heard_at) * 1000
     feedback_age_ms = None if tile.feedback_age_ms is None else round(tile.feedback_age_ms + age_ms, 1)
     if other.silent(now):

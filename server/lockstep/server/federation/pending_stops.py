@@ -1,4 +1,4 @@
-"""STOP for robots of other consoles: who was asked, who has answered. No I/O, no clock."""
+"""Tracks STOPs for robots of other consoles: requests and answers. No I/O, no clock."""
 
 import asyncio
 from collections import OrderedDict
@@ -13,7 +13,7 @@ NOT_SAID = "its console could not deliver it, and does not say why"
 
 
 class Asked:
-    """A request of ours, until all have answered or nobody waits any more."""
+    """A request of this console, until all have answered or nobody waits any more."""
 
     def __init__(self, request: StopRequest) -> None:
         self.request = request
@@ -21,7 +21,7 @@ class Asked:
         self.complete = asyncio.Event()
 
     def answered(self, reply: StopReply) -> None:
-        """What counts of two answers for one robot is the worse: two consoles claim it."""
+        """Take a reply. Of two answers for one robot the worse counts: two consoles claim the robot."""
         for each in reply.robots:
             known = self.answers.get(each.robot)
             if each.robot in self.request.robots and (known is None or known.delivered):
@@ -53,7 +53,7 @@ class PendingStops:
             asked.answered(reply)
 
     def is_new(self, request: StopRequest) -> bool:
-        """Whether to carry it out: a request that is repeated is carried out once. Then call `obeyed`."""
+        """Return whether to carry out a request: a repeated one is carried out once. Then call `obeyed`."""
         if request.request in self._obeyed:
             return False
         self._obeyed[request.request] = None
@@ -66,5 +66,5 @@ class PendingStops:
             self._obeyed[request.request] = outcomes
 
     def outcomes(self, request: StopRequest) -> tuple[Outcome, ...]:
-        """What became of it; empty while it is being carried out."""
+        """Return the outcomes of a request; empty while it is being carried out."""
         return self._obeyed.get(request.request) or ()

@@ -1,4 +1,4 @@
-"""The board in Redis: tells what this console shows, hears the others. Its trouble is nobody else's."""
+"""The board in Redis: publishes the state of this console and reads the others'. Its errors affect nothing else."""
 
 import asyncio
 import secrets
@@ -48,11 +48,11 @@ log = structlog.get_logger(__name__)
 
 PERIOD = 1.0  # s between two signs of life
 SPACING = 0.1  # s, at least, between two rounds
-MAX_WAITING = 2048  # audit records that could not be shared yet; then the oldest go
+MAX_WAITING = 2048  # audit records that could not be shared yet; then the oldest are dropped
 BATCH = 256
-STOP_PATIENCE = 2.0  # s for all who have the robots to answer
-STOP_AGAIN = 0.4  # s until it is asked again
-MAX_STOPS = 32  # different ones whose answers are waited for; what is more is sent once
+STOP_PATIENCE = 2.0  # s for all consoles that have the robots to answer
+STOP_AGAIN = 0.4  # s until the request is sent again
+MAX_STOPS = 32  # stops that wait for answers at the same time; further ones are sent once
 NEWS_AT_ONCE = 20  # messages, then a pause: a flood of news takes no more than its share of the loop
 NEWS_PAUSE = 0.01
 FAREWELL_SECONDS = 0.5
@@ -60,7 +60,7 @@ TOO_MANY = StopAnswer(False, False, 0, "not confirmed: sent, but too many stops 
 
 
 class RedisBoard:
-    """A `Board`. Each connection to Redis is a session of its own, tried again with growing pauses."""
+    """A `Board`. Each connection to Redis is a separate session, retried with growing pauses."""
 
     def __init__(
         self, url: str, seal: Seal, host: BoardHost, links: KnownLinks, metrics: BoardMetrics, public_url: str,
@@ -80,15 +80,15 @@ class RedisBoard:
         self._pending = PendingStops()
         self._tiles: tuple[Tile, ...] = ()
         self._n = 0  # of the last sign of life
-        self._loud = False  # whether the others should look at once
+        self._loud = False  # True if the others should look at once
         self._wake = asyncio.Event()
         self._waiting: deque[tuple[str, AuditRecord]] = deque()
-        self._known_at = time.time()  # when what is known of the others was true
+        self._known_at = time.time()  # time of the newest knowledge of the others
         self._unknown_since: float | None = self._known_at
         self._trouble = "not connected yet"
-        self._unseen = ""  # why this console cannot be shown to the others
-        self._unshared = ""  # why the audit is not shared
-        self._conflicts: tuple[Conflict, ...] = ()  # that the log has named
+        self._unseen = ""  # reason that this console cannot be shown to the others
+        self._unshared = ""  # reason that the audit is not shared
+        self._conflicts: tuple[Conflict, ...] = ()  # conflicts that the log has named
 
     # Board
 
@@ -175,7 +175,7 @@ class RedisBoard:
                 self._lost(BoardTrouble("a fault of this console"))
             await asyncio.sleep(backoff.next())
 
-    # a session: from one connection until it is lost
+    # A session: from one connection until its loss
 
     async def _session(self, backoff: Backoff) -> None:
         async with RedisStore(self._url) as store, store.news() as news:
@@ -280,10 +280,10 @@ class RedisBoard:
             case StopRequest():
                 await self._hear_stop(store, news)
 
-    # stops
+    # Stops
 
     async def _hear_stop(self, store: RedisStore, request: StopRequest) -> None:
-        """Robots answer in their own time: the news goes on meanwhile."""
+        """Obey or answer a request. Robots take time to answer: the news goes on meanwhile."""
         own = sorted(self._own() & set(request.robots))
         if not own:
             return
@@ -315,7 +315,7 @@ class RedisBoard:
             await store.tell(self._pack(StopReply(console=self.id, request=request.request, robots=outcomes)))
 
     async def _ask(self, request: StopRequest, complete: asyncio.Event) -> None:
-        """Until all have answered; Redis forgets news that nobody hears, so it is asked more than once."""
+        """Repeat a request until all have answered, since Redis forgets news that nobody hears."""
         while not complete.is_set():
             await self._say(request)
             with suppress(TimeoutError):
@@ -335,7 +335,7 @@ class RedisBoard:
             why = f"{owner} did not answer" if owner else "no console has it"
         return StopAnswer(False, False, 0, f"not confirmed: {why}")
 
-    # how it fares
+    # State
 
     def _own(self) -> set[str]:
         return {tile.name for tile in self._tiles}
@@ -344,7 +344,7 @@ class RedisBoard:
         return pack_news(self._seal, news)
 
     def _found(self) -> None:
-        """All that there is to know was read."""
+        """Note that the states of all other consoles were read."""
         now = time.monotonic()
         if self._unknown_since is not None:
             log.info("other consoles are known", board=board_place(self._url))
@@ -372,7 +372,7 @@ class RedisBoard:
         self._metrics.up.set(0)
 
     def _once(self, known: str, error: BoardError, what: str) -> str:
-        """For what goes on without: logged when it begins."""
+        """Count an error that does not end the session; log it when it begins."""
         self._count(error)
         if not known:
             log.warning(what, board=board_place(self._url), error=error.name, detail=error.detail)

@@ -1,7 +1,7 @@
-"""The only place that leans on private parts of redis-py: a bound on what the server may make us read.
+"""Bounds the answers that redis-py reads from the server. The only module that uses private parts of redis-py.
 
-Whoever can write to the store can put half a gigabyte where a console expects a line, and redis-py reads what it is
-announced. `tests/server/federation/test_redis_private.py` fails when an upgrade moves these parts.
+A writer to the store can put half a gigabyte where a console expects a line, and redis-py reads any length that the
+server announces. `tests/server/federation/test_redis_private.py` fails when an upgrade moves these parts.
 """
 
 from redis._parsers.resp2 import _AsyncRESP2Parser
@@ -17,7 +17,7 @@ class AnswerTooLarge(InvalidResponse):
 
 
 class BoundedParser(_AsyncRESP2Parser):
-    """Gives the connection up instead of reading a string that no console wrote."""
+    """Gives the connection up instead of reading a string longer than any that a console writes."""
 
     async def _read(self, length: int) -> bytes:
         if length > LARGEST:

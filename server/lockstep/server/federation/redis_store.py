@@ -1,12 +1,12 @@
-"""Redis as consoles use it: what each shows, news between them, the shared audit and revoked links. A thin shell.
+"""Keeps the consoles' states, their news, the shared audit and revoked links in Redis. A thin shell.
 
 | key | |
 |---|---|
-| `lockstep:consoles` | sorted set: ids of consoles, by when they last showed something |
-| `lockstep:console:ID` | what one console shows; expires |
+| `lockstep:consoles` | sorted set: ids of consoles, by the time of their last sign of life |
+| `lockstep:console:ID` | the state of one console; expires |
 | `lockstep:audit` | capped stream: audit records |
-| `lockstep:revoked` | sorted set: links that were revoked, by when they would have expired |
-| `lockstep:news` | the channel |
+| `lockstep:revoked` | sorted set: revoked links, by the time of their expiry |
+| `lockstep:news` | the channel for news |
 """
 
 import asyncio
@@ -53,18 +53,18 @@ AUDIT = PREFIX + "audit"
 REVOKED = PREFIX + "revoked"
 NEWS = PREFIX + "news"
 
-EXPIRES_MS = 5000  # what a console shows, after its last sign of life
-REMEMBERED = 3600.0  # s that an id stays in the list of consoles
+EXPIRES_MS = 5000  # of a console's state, after its last sign of life
+REMEMBERED = 3600.0  # s an id stays in the list of consoles
 AUDIT_KEPT = 10_000  # records, about
 MAX_REVOKED = 5000
 TIMEOUT = 2.0  # s for one exchange
-HEARTBEAT = 3.0  # s without news until the connection for it is tried
+HEARTBEAT = 3.0  # s without news until the connection for news is tested
 CONNECTIONS = 8
-MAX_ID = 64  # bytes; longer ones are not ours
+MAX_ID = 64  # bytes; a longer id is not a console's
 
 
 class RedisStore:
-    """Enter it to use it. Everything raises BoardTrouble in bounded time, or InputTooLarge."""
+    """Enter it to use it. All methods raise BoardTrouble in bounded time, or InputTooLarge."""
 
     def __init__(self, url: str, timeout: float = TIMEOUT) -> None:
         self._timeout = timeout
@@ -73,8 +73,8 @@ class RedisStore:
             url,
             protocol=2,
             parser_class=BoundedParser,
-            # The bounds are ours. With one of redis-py's its writes pass through asyncio.wait_for, which swallows a
-            # cancellation in Python 3.11.
+            # `RedisStore` bounds the time itself. With a bound of redis-py, writes pass through asyncio.wait_for, which
+            # swallows a cancellation in Python 3.11.
             socket_timeout=None,
             socket_connect_timeout=timeout,
             retry=Retry(NoBackoff(), 0),
@@ -89,7 +89,7 @@ class RedisStore:
         await self._redis.aclose()
 
     async def show(self, console: str, sealed: bytes, news: bytes | None, now: float) -> None:
-        """What a console shows from now on; `news` tells the others to look. `now` is seconds since 1970."""
+        """Set the state of a console; `news` tells the others to look. `now` is seconds since 1970."""
         async with self._pipeline() as commands:
             commands.set(f"{PREFIX}console:{console}", sealed, px=EXPIRES_MS)
             commands.zadd(CONSOLES, {console: now})
@@ -99,12 +99,12 @@ class RedisStore:
                 commands.publish(NEWS, news)
 
     async def shown(self, own: str, refused: Callable[[BoardError], None]) -> AsyncIterator[bytes]:
-        """What the other living consoles show; what is wrong with a single one is `refused`."""
+        """Yield the states of the other living consoles; call `refused` with errors of a single one."""
         with self._named():
             async with asyncio.timeout(self._timeout):
                 ids = await self._redis.zrevrange(CONSOLES, 0, MAX_CONSOLES)
         others = [each for each in ids if isinstance(each, bytes) and each != own.encode() and len(each) <= MAX_ID]
-        # GETRANGE, so that a value of any size costs no more than ours may have
+        # GETRANGE, so that a value of any size costs no more than the largest valid one
         async with self._pipeline() as commands:
             for each in others:
                 commands.getrange(f"{PREFIX}console:".encode() + each, 0, MAX_PUBLISHED + SIZE)
@@ -132,14 +132,14 @@ class RedisStore:
                 commands.xadd(AUDIT, entry, maxlen=AUDIT_KEPT, approximate=True)
 
     async def newest(self, limit: int) -> list[dict[bytes, bytes]]:
-        """Records, newest first."""
+        """Return records, newest first."""
         with self._named():
             async with asyncio.timeout(self._timeout):
                 entries: list[Any] = await self._redis.xrevrange(AUDIT, count=limit) or []
         return [fields for _, fields in entries if fields]
 
     async def revoke(self, links: Sequence[tuple[bytes, float]], news: bytes, now: float) -> None:
-        """Sealed ids and when they would have expired."""
+        """Add links: sealed ids, each with the time of its expiry."""
         async with self._pipeline() as commands:
             for sealed, expires in links:
                 commands.zadd(REVOKED, {sealed: expires})
@@ -159,16 +159,16 @@ class RedisStore:
 
     @asynccontextmanager
     async def news(self) -> AsyncIterator[AsyncIterator[bytes]]:
-        """From now on, without an end."""
+        """Subscribe while entered; yield an endless iterator over the news."""
         async with self._redis.pubsub() as channel:
             with self._named():
                 async with asyncio.timeout(self._timeout):
                     await channel.subscribe(NEWS)
-                    await channel.get_message(timeout=self._timeout)  # the answer to that
+                    await channel.get_message(timeout=self._timeout)  # the answer to the subscription
             yield self._messages(channel)
 
     async def _messages(self, channel: PubSub) -> AsyncIterator[bytes]:
-        asked = False  # whether a sign of life is owed to us
+        asked = False  # True while the answer to a ping is due
         while True:
             with self._named():
                 message = await channel.get_message(timeout=HEARTBEAT)
@@ -183,7 +183,7 @@ class RedisStore:
 
     @asynccontextmanager
     async def _pipeline(self) -> AsyncIterator[Pipeline]:
-        """Commands that go together and whose answers nobody needs; the first error is raised when leaving."""
+        """Send commands together on leaving, for nothing but their effect; raise the first error."""
         with self._named():
             async with self._redis.pipeline(transaction=False) as commands:
                 yield commands
@@ -192,7 +192,7 @@ class RedisStore:
                         raise each
 
     async def _execute(self, commands: Pipeline) -> list[Any]:
-        """The answers; those that are errors too."""
+        """Return all answers, errors included."""
         if not len(commands):
             return []
         async with asyncio.timeout(self._timeout):
@@ -201,7 +201,7 @@ class RedisStore:
 
     @contextmanager
     def _named(self) -> Iterator[None]:
-        """Turns what redis-py raises into our names."""
+        """Turn exceptions of redis-py into errors of the board."""
         try:
             yield
         except (TimeoutError, RedisTimeout) as error:

@@ -1,4 +1,4 @@
-"""Shares revoked links through the board: what one console revokes opens no other."""
+"""Shares revoked links through the board: a link that one console revokes opens no other."""
 
 import asyncio
 import time
@@ -18,7 +18,7 @@ __all__ = ["KnownLinks", "RevocationStore", "Revocations"]
 
 log = structlog.get_logger(__name__)
 
-LOOK_SECONDS = 10.0  # until the list is read again though nobody said that it has changed
+LOOK_SECONDS = 10.0  # until the list is read again without news of a change
 
 
 class KnownLinks(Protocol):
@@ -43,12 +43,12 @@ class Revocations:
         self._links = links
         self._seal = seal
         self._console = console
-        self._told: set[str] = set()  # known here, that the store has
-        self._seen: set[bytes] = set()  # entries of the store that were looked at
-        self._look_at = 0.0  # when the list is read next
+        self._told: set[str] = set()  # known links that the store has
+        self._seen: set[bytes] = set()  # entries of the store that were read
+        self._look_at = 0.0  # time of the next look at the list
 
     def listen(self, wake: Callable[[], None]) -> None:
-        """`wake` is called on this loop when something was revoked here."""
+        """Call `wake` on this loop when a link was revoked here."""
         loop = asyncio.get_running_loop()
 
         def revoked() -> None:
@@ -58,7 +58,7 @@ class Revocations:
         self._links.on_revoked = revoked
 
     def begin(self) -> None:
-        """The store may have lost everything, and we may have missed news."""
+        """Start anew: the store may have lost everything, and this console may have missed news."""
         self._told.clear()
         self.look()
 
@@ -66,12 +66,12 @@ class Revocations:
         self._look_at = 0.0
 
     async def exchange(self, store: RevocationStore, count: Callable[[BoardError], None]) -> list[Invitation] | None:
-        """Tell what is new here, hear what is new elsewhere.
+        """Share links that were revoked here, and learn those that were revoked elsewhere.
 
-        Returns the invitations of ours that end with that; None when there is no news.
+        Returns this console's invitations that end with them; None when there is no news.
 
         Raises:
-            BoardSilent, BoardUnreachable: other errors are counted.
+            BoardSilent, BoardUnreachable: no answer in time, or no connection; other errors are counted.
         """
         try:
             await self._tell(store)

@@ -1,4 +1,4 @@
-"""What one robot of a fleet looks like from outside, to other consoles and in `GET /api/fleet`."""
+"""The summary of one robot of a fleet, for other consoles and `GET /api/fleet`."""
 
 from dataclasses import dataclass, replace
 from typing import Annotated, Literal
@@ -11,7 +11,7 @@ from lockstep.protocol.console import Role
 __all__ = ["MAX_PEOPLE", "ROBOT_NAME", "Person", "Tile", "loud", "within_bounds"]
 
 ROBOT_NAME = r"^[a-z0-9][a-z0-9-]{0,31}$"  # for pydantic; with `re`, use fullmatch
-MAX_PEOPLE = 20  # that a tile names; the others are counted
+MAX_PEOPLE = 20  # people that a tile names; the others are counted
 MAX_FAULTS = 20
 
 Name = Annotated[str, Field(max_length=60)]
@@ -22,7 +22,7 @@ Event = Annotated[int, Field(ge=0, lt=2**31)]
 
 
 def _check_url(url: str) -> str:
-    """Only what a page may offer as a link: never a script, never somebody's password."""
+    """Accept only addresses that a page may offer as a link: never a script, never somebody's password."""
     parts = urlsplit(url)
     if parts.scheme not in ("http", "https") or not parts.hostname or "@" in parts.netloc:
         raise ValueError("not http(s)://host/…")
@@ -38,14 +38,14 @@ class Person:
 
 @dataclass(frozen=True, kw_only=True)
 class Tile:
-    """The same for every reader. What is read from other consoles is checked against these bounds."""
+    """A robot's summary, the same for every reader. Tiles from other consoles are checked against these bounds."""
 
     name: Annotated[str, Field(pattern=ROBOT_NAME)]  # "left"
     label: Name  # of the robot's description; "" before it was reached
     url: Annotated[str, Field(max_length=300), AfterValidator(_check_url)]  # own robots': "robots/left/"
     link: Literal["up", "down", "unknown"]  # unknown: its console is not heard; only of other consoles' robots
-    detail: Words = ""  # why it is down
-    link_age_ms: Number | None = None  # how long the link has been so; None: it was never up
+    detail: Words = ""  # reason that it is down
+    link_age_ms: Number | None = None  # age of the link's state; None: the link was never up
     epoch: Annotated[str, Field(max_length=64)] = ""
     event: Event = 0  # 0 before the first feedback
     event_rate: Number = 0.0  # events a second, over the last few seconds
@@ -53,9 +53,9 @@ class Tile:
     stop_by: Words = ""
     stop_reason: Words = ""
     at_rest: bool = True
-    driver: Name = ""  # who holds the seat; "": nobody
-    claims: Annotated[tuple[Name, ...], Field(max_length=MAX_PEOPLE)] = ()  # who asks for the seat
-    participants: Annotated[tuple[Person, ...], Field(max_length=MAX_PEOPLE)] = ()  # who drives first
+    driver: Name = ""  # holder of the seat; "": nobody
+    claims: Annotated[tuple[Name, ...], Field(max_length=MAX_PEOPLE)] = ()  # people who ask for the seat
+    participants: Annotated[tuple[Person, ...], Field(max_length=MAX_PEOPLE)] = ()  # the driver first
     participant_count: Count = 0
     watching: Count = 0  # thumbnails
     feedback_age_ms: Number | None = None  # None: never had one
@@ -69,7 +69,7 @@ class Tile:
 
 
 def within_bounds(tile: Tile, public_url: str) -> Tile:
-    """As others take it: nothing longer than they read, and an address that leads here from anywhere."""
+    """Return a tile as others take it: nothing longer than they read, and an address that leads here from anywhere."""
     return replace(
         tile,
         label=tile.label[:60],
@@ -87,7 +87,7 @@ def within_bounds(tile: Tile, public_url: str) -> Tile:
 
 
 def loud(tile: Tile) -> tuple[object, ...]:
-    """What others should know at once; the rest can wait for a second."""
+    """Return the values that others should know at once; the rest can wait for a second."""
     return (
         tile.name, tile.link, tile.epoch, tile.stopped, tile.driver, tile.claims, tile.participants,
         tile.participant_count, tile.recording, tile.faults, tile.trouble,

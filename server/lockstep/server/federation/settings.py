@@ -16,8 +16,8 @@ class BoardSettings(BaseSettings):
     """Part of `Settings`."""
 
     board: SecretStr = SecretStr("")  # "rediss://:password@host:6379/0"; "": this console is alone
-    board_file: Path | None = None  # the same, in a file; comes first
-    console_name: str = ""  # what other consoles' overviews call this one; "": the machine's name and a number
+    board_file: Path | None = None  # file with the address; takes precedence
+    console_name: str = ""  # name of this console in other consoles' overviews; "": the machine's name and a number
 
     @field_validator("board_file", mode="before")
     @classmethod
@@ -44,14 +44,14 @@ class BoardSettings(BaseSettings):
 
     @property
     def board_url(self) -> str:
-        """With its password: never to be shown. "" without a board; OSError when the file cannot be read."""
+        """The address with its password: never show it. "" without a board. OSError: the file cannot be read."""
         if self.board_file is not None:
             return self.board_file.read_text(errors="replace").strip()
         return self.board.get_secret_value()
 
 
 def board_place(url: str) -> str:
-    """Where the board is, for people and logs: without user and password."""
+    """Return the board's address for people and logs: without user and password."""
     parts = urlsplit(url)
     return (
         f"{parts.scheme}://{parts.path}"
@@ -61,7 +61,7 @@ def board_place(url: str) -> str:
 
 
 def check_address(url: str) -> None:
-    """Raises ValueError that does not repeat the address, which may hold a password."""
+    """Check the board's address. Raises ValueError without the address, which may hold a password."""
     try:
         parts = urlsplit(url)
         good = parts.scheme in ("redis", "rediss") and parts.hostname is not None and parts.port != 0

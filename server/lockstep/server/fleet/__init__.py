@@ -1,1 +1,1 @@
-"""Several robots on one console: a whole session each, one way in."""
+"""Several robots on one console: a session for each robot, one address for all."""

@@ -21,8 +21,8 @@ class FleetAudit(msgspec.Struct, frozen=True, kw_only=True):
     """Answer of GET /api/fleet/audit."""
 
     records: list[SharedRecord]  # oldest first
-    complete: bool  # whether those of the other consoles are among them
-    detail: str  # why they may not be
+    complete: bool  # the records include those of the other consoles
+    detail: str  # reason why they may not
 
 
 @router.get("/api/fleet/audit")
@@ -42,12 +42,12 @@ async def audit(
 
 
 def _key(shared: SharedRecord) -> tuple[str, int, float]:
-    """Our own records are on the board too."""
+    """Return the key of a record: this console's own records are on the board too."""
     return shared.robot, shared.record.n, shared.record.time
 
 
 def _own(fleet: Fleet, limit: int) -> list[SharedRecord]:
-    """Of our own robots, from memory: the board need not have them yet."""
+    """Return the records of this console's robots, from memory: the board need not have them yet."""
     return [
         SharedRecord(console="", robot=name, record=record)
         for name, session in fleet.sessions.items()

@@ -1,4 +1,4 @@
-"""How fast a robot's events come, and since when its link is as it is. No I/O, no clock: fed once a second."""
+"""Measures a robot's event rate, and the age of its link's state. No I/O, no clock: fed once a second."""
 
 from collections import deque
 
@@ -10,17 +10,17 @@ WINDOW = 3.0  # s over which the rate is taken
 
 
 class Pulse:
-    """Feed `look` at intervals.
+    """The event rate and the link of one robot. Call `look` at intervals.
 
     Attributes:
-        link_since: when the link became as it is; None: it was never up
+        link_since: time of the link's last change; None: it was never up
     """
 
     def __init__(self) -> None:
         self.link_since: float | None = None
         self._up = False
         self._epoch = ""
-        self._looks: deque[tuple[float, int]] = deque(maxlen=16)  # when, and the event that held
+        self._looks: deque[tuple[float, int]] = deque(maxlen=16)  # time, and the current event
 
     def look(self, now: float, *, up: bool, epoch: str, event: int) -> None:
         if up != self._up:
@@ -34,7 +34,7 @@ class Pulse:
 
     @property
     def event_rate(self) -> float:
-        """Events a second over the last few; 0 before there were two looks."""
+        """Events per second over the last few seconds; 0 before there were two looks."""
         if len(self._looks) < 2:
             return 0.0
         (began, first), (now, last) = self._looks[0], self._looks[-1]

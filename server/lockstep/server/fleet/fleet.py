@@ -1,4 +1,4 @@
-"""All robots of one console: their sessions, who may see which, STOP for all, and the board of other consoles."""
+"""All robots of one console: their sessions, the access to them, STOP for all, and the board of other consoles."""
 
 import asyncio
 import time
@@ -33,29 +33,31 @@ __all__ = ["Fleet", "Stopped", "fleet_caller", "fleet_of"]
 log = structlog.get_logger(__name__)
 
 LOOK_SECONDS = 1.0  # between two looks at every robot
-START_SECONDS = 20.0  # that the console waits for its sessions before it answers
+START_SECONDS = 20.0  # wait of the console for its sessions before it answers
 RESTART_AFTER = 1.0  # s until a background task that failed runs again
 ELSEWHERE = Actor("another console")
 
 
 class Stopped(NamedTuple):
-    """What became of a STOP at one robot."""
+    """The outcome of a STOP at one robot."""
 
     name: str
     delivered: bool
     event: int
     detail: str  # why it was not delivered; "" when it was
     number: int = 0  # of the stop at that robot; 0 when it was not delivered
-    console: str = ""  # that has the robot; "" is this one
+    console: str = ""  # console of the robot; "" is this one
     kept: bool = False  # on that robot's disk
 
 
 class Fleet:
-    """Enter `running` once. Everything else is called on the same loop and returns at once, but for `stop_all`.
+    """All robots of one console. Enter `running` once.
+
+    Everything but `stop_all` is called on the same loop and returns at once.
 
     Attributes:
         sessions: by the robots' names
-        board: where other consoles are; it never decides anything about a robot of ours
+        board: the board of other consoles; it never decides anything about this console's robots
     """
 
     def __init__(self, robots: Mapping[str, Settings]) -> None:
@@ -68,7 +70,7 @@ class Fleet:
 
     @asynccontextmanager
     async def running(self, context: ConsoleContext, board: Board) -> AsyncIterator[None]:
-        """While entered, all sessions run. On entering it waits for their starts, but not long for one that hangs."""
+        """Run all sessions while entered. Waits for their starts first, but not long for one that hangs."""
         self._context, self._door, self.board = context, context.state.access.at(None), board
         directory = context.state.directory.path
         async with asyncio.TaskGroup() as tasks:
@@ -90,10 +92,10 @@ class Fleet:
             for task in (*running, *settled):
                 task.cancel()
 
-    # who may
+    # access
 
     def caller(self, connection: HTTPConnection) -> Right:
-        """The right that a request brings. Raises AccessError, StateUnavailable; to stop, the first only."""
+        """Return the right that a request brings. Raises AccessError, StateUnavailable; to stop, the first only."""
         if self._door is None:
             raise TypeError("the fleet is not running")
         bearer = self._door.bearer_to_stop if connection.scope["path"].endswith("/stop") else self._door.bearer
@@ -101,26 +103,26 @@ class Fleet:
 
     @property
     def lets_in(self) -> bool:
-        """False while nobody knows which links are revoked."""
+        """False while the revoked links are unknown."""
         return self._context is None or not self._context.state.invitations.trouble
 
     def may(self, identity: Identity, name: str) -> bool:
-        """Whether that link is good for that robot."""
+        """True if that link is good for that robot."""
         return identity.may_see(name)
 
-    # what there is to see
+    # overview
 
     def own_tiles(self) -> list[Tile]:
         now = time.monotonic()
         return [self._tile(session, now) for session in self.sessions.values()]
 
     def tiles(self, identity: Identity) -> list[Tile]:
-        """Of all robots, other consoles' too, that this link may see; by name."""
+        """Return the tiles of all robots that this link may see, other consoles' too; by name."""
         found = [tile for tile in (*self.own_tiles(), *self.board.others()) if identity.may_see(tile.name)]
         return sorted(found, key=lambda tile: (tile.name, tile.console))
 
     def _tile(self, session: FleetSession, now: float) -> Tile:
-        """A fault with one robot must not hide the others."""
+        """Return the tile of a robot. A fault with one robot must not hide the others."""
         here = session.dependencies
         if here is None:
             return absent_tile(session.name)
@@ -133,7 +135,7 @@ class Fleet:
     # STOP
 
     async def stop_all(self, identity: Identity, press: Press) -> list[Stopped]:
-        """Every robot that this link may see, all at once: our own, and those of other consoles."""
+        """Stop every robot that this link may see, all at once: this console's, and those of other consoles."""
         self.metrics.stops.inc()
         elsewhere = {tile.name: tile.console for tile in self.board.others() if identity.may_see(tile.name)}
         stopping = [self._stop(session, press) for name, session in self.sessions.items() if identity.may_see(name)]
@@ -142,7 +144,7 @@ class Fleet:
         return sorted([*own, *others])
 
     async def _stop_elsewhere(self, robots: Mapping[str, str], press: Press) -> list[Stopped]:
-        """`robots`: with the consoles that have them."""
+        """Stop robots of other consoles. `robots`: their names, with the consoles that have them."""
         if not robots:
             return []
         if self._context is not None and self._context.is_silenced(press.by.link):
@@ -154,7 +156,7 @@ class Fleet:
         ]
 
     async def _stop(self, session: FleetSession, press: Press) -> Stopped:
-        """A fault with one robot must not keep the stop from the others."""
+        """Stop one robot. A fault with it must not keep the stop from the others."""
         try:
             answer = await session.stop(press)
         except Silenced as error:
@@ -168,7 +170,7 @@ class Fleet:
     # BoardHost
 
     async def stop_robot(self, name: str, press: Press) -> StopAnswer:
-        """Somebody stops it at another console."""
+        """Stop one robot for somebody at another console."""
         session = self.sessions.get(name)
         if session is None:
             return StopAnswer(True, False, 0, "that console does not have this robot")
@@ -189,7 +191,7 @@ class Fleet:
     # background tasks
 
     async def _run_session(self, session: FleetSession, context: ConsoleContext, directory: Path) -> None:
-        """Each has a directory of its own for recordings and audit."""
+        """Run a session, with its own directory for recordings and audit."""
         await session.run(context, robot_place(directory, session.name), self.metrics, self._recorded)
 
     def _recorded(self, robot: str, record: AuditRecord) -> None:
@@ -213,7 +215,7 @@ class Fleet:
         return any(session.moving for session in self.sessions.values())
 
     async def _guard(self, name: str, task: Callable[[], Awaitable[None]]) -> None:
-        """Runs `task` again when it fails."""
+        """Run `task` again when it fails."""
         while True:
             try:
                 await attempt(task())
@@ -223,7 +225,7 @@ class Fleet:
 
 
 def fleet_of(connection: HTTPConnection) -> Fleet:
-    """The fleet that a request came to."""
+    """Return the fleet that a request came to."""
     found = connection.app.state.fleet
     if not isinstance(found, Fleet):
         raise TypeError("the app has no fleet")
@@ -231,5 +233,5 @@ def fleet_of(connection: HTTPConnection) -> Fleet:
 
 
 async def fleet_caller(connection: Request) -> Right:
-    """Who asks the fleet. Raises AccessError."""
+    """Return the caller's right at the fleet. Raises AccessError."""
     return fleet_of(connection).caller(connection)

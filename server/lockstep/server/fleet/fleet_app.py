@@ -24,7 +24,7 @@ __all__ = ["create_fleet_app"]
 
 
 def create_fleet_app(settings: Settings, robots: Mapping[str, Settings], state: ConsoleState | None = None) -> FastAPI:
-    """The app. It connects to the robots while its lifespan runs; `robots` are their settings by name."""
+    """Return the app, which connects to the robots in its lifespan. `robots`: their settings by name."""
     fleet = Fleet(robots)
 
     @asynccontextmanager
@@ -64,7 +64,7 @@ async def _with_slash(request: Request, name: str) -> Response:
 
 @cache
 def _description() -> msgspec.Raw:
-    """Made once: it is large, and anybody may ask for it."""
+    """Return the OpenAPI document, made once: it is large, and anybody may ask for it."""
     return msgspec.Raw(msgspec.json.encode(fleet_openapi()))
 
 

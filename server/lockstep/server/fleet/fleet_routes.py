@@ -60,7 +60,7 @@ class StoppedRobot(msgspec.Struct, frozen=True, kw_only=True):
     event: int
     detail: str  # why it was not delivered
     number: int  # of the stop at that robot; 0 when it was not delivered
-    console: str  # that has the robot; "" is this one
+    console: str  # console of the robot; "" is this one
     kept: bool  # on that robot's disk; false when it was not delivered
 
 
@@ -151,7 +151,7 @@ def _stopped(each: Stopped) -> StoppedRobot:
 
 
 def _notices(state: BoardState) -> list[Notice]:
-    """What is wrong among the consoles, in words."""
+    """Return the troubles among the consoles, in words."""
     found = []
     if state.unknown_since is not None:
         since = time.strftime("%H:%M:%S UTC", time.gmtime(state.unknown_since))

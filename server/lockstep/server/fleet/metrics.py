@@ -1,4 +1,4 @@
-"""The metrics of all robots in one text: what each robot's session counts, with its name in the label `robot`."""
+"""The metrics of all robots in one text: the metrics of each session, with the robot's name in the label `robot`."""
 
 from collections.abc import Iterable, Iterator
 
@@ -16,7 +16,7 @@ __all__ = ["FleetMetrics"]
 
 
 class FleetMetrics:
-    """Counts what concerns no robot, and collects what the robots' sessions count."""
+    """Counts what concerns no robot, and collects the metrics of the robots' sessions."""
 
     def __init__(self) -> None:
         self._sessions: dict[str, Dependencies] = {}
@@ -48,7 +48,7 @@ class FleetMetrics:
         self._sessions.pop(robot, None)
 
     def collect(self) -> None:
-        """Bring into the metrics of all robots what is counted elsewhere."""
+        """Update the metrics of all robots with counts that are kept elsewhere."""
         for session in self._sessions.values():
             session.collect()
 
@@ -59,7 +59,7 @@ class _Together(Collector):
         self._sessions = sessions
 
     def collect(self) -> Iterator[Metric]:
-        """One family each, however many robots there are: the format allows a name only once."""
+        """Yield one family for each name, however many robots there are: the format allows a name only once."""
         together: dict[str, Metric] = {}
         _add(together, self._own.collect(), "")
         for robot, session in self._sessions.items():

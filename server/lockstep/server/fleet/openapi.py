@@ -35,7 +35,7 @@ FLEET_OPERATIONS: tuple[Operation, ...] = (
 
 
 def fleet_openapi() -> dict[str, Any]:
-    """OpenAPI 3.1, in JSON's types alone."""
+    """Return the OpenAPI 3.1 document, in JSON's types alone."""
     of_robots = [
         each._replace(
             path=f"{ROBOTS}/{{robot}}{each.path}",

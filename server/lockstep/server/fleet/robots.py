@@ -1,4 +1,4 @@
-"""Settings of each robot of a fleet: the console's, and what the fleet's file says of that robot alone."""
+"""The settings of each robot of a fleet: the console's, and those in the fleet's file for that robot alone."""
 
 import tomllib
 from collections.abc import Mapping
@@ -11,7 +11,7 @@ from lockstep.server.util.robot_names import BadFleet, check_names, parse_robots
 
 __all__ = ["OWN", "robot_settings"]
 
-# What one robot may have otherwise than the others. All else concerns the whole console.
+# The settings that may differ between robots. All others concern the whole console.
 OWN = frozenset(
     {
         *("robot", "link_secret", "link_secret_file", "link_tls_cert", "link_tls_key", "link_tls_ca"),
@@ -20,15 +20,15 @@ OWN = frozenset(
         *("max_peers", "max_relayed", "max_thumbnails", "reserved_places", "scene", "scene_hz", "media", "recording"),
     }
 )
-# A camera hangs at one robot: given to the whole console, it would show every robot the same.
+# A camera belongs to one robot: given to the whole console, it would show the same at every robot.
 NEVER_SHARED = ("cameras", "microphones", "whip", "speaker", "relay")
 
 
 def robot_settings(settings: Settings) -> dict[str, Settings]:
-    """By name, in the order in which they were named; first those of the flag.
+    """Return the settings by name, in the order in which the robots were named; first those of the flag.
 
     Raises:
-        BadFleet: a name, the file or what it says of a robot is no good.
+        BadFleet: a name, the file or a robot's table in it is invalid.
     """
     shared = [name for name in NEVER_SHARED if getattr(settings, name)]
     if shared:

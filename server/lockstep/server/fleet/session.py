@@ -1,4 +1,4 @@
-"""One robot of a fleet: its routes, and its session, which is started again when it fails. No other one notices."""
+"""One robot of a fleet: its routes, and its session, which is started again when it fails, unnoticed by others."""
 
 import asyncio
 from collections.abc import Callable
@@ -30,12 +30,12 @@ __all__ = ["FleetSession"]
 
 log = structlog.get_logger(__name__)
 
-HEALTHY_AFTER = 30.0  # s that a session lives, then its next failure is answered soon again
+HEALTHY_AFTER = 30.0  # s of life after which a session is started again soon at its next failure
 FIRST_WAIT, LONGEST_WAIT = 0.5, 10.0  # s before a session that failed is started again
 
 
 class FleetSession:
-    """Run `run` as a task. The routes answer from the beginning on, by name while there is no session.
+    """One robot of a fleet. Run `run` as a task; without a session the routes answer with a named error.
 
     Attributes:
         app: the robot's routes, to be mounted
@@ -58,13 +58,13 @@ class FleetSession:
 
     @property
     def dependencies(self) -> Dependencies | None:
-        """None while the session has failed."""
+        """The dependencies of the session; None while it has failed."""
         found: Dependencies | None = self.app.state.dependencies
         return found
 
     @property
     def ended(self) -> int:
-        """Connections, ever."""
+        """The number of connections that have ended so far."""
         here = self.dependencies
         return self._ended_before + (0 if here is None else here.console.peers.ended)
 
@@ -75,13 +75,13 @@ class FleetSession:
 
     @property
     def access(self) -> Access:
-        """Who may come to this robot; known as long as it runs."""
+        """The access to this robot; known as long as it runs."""
         if self._access is None:
             raise TypeError("the fleet is not running")
         return self._access
 
     async def stop(self, press: Press) -> StopAnswer:
-        """What became of it. Without a session the stop is the first that the next one does. Raises Silenced."""
+        """Stop the robot and return the outcome. Without a session the next one sends it first. Raises Silenced."""
         here = self.dependencies
         if here is not None:
             return await here.stop(press)
@@ -90,7 +90,7 @@ class FleetSession:
             raise TypeError("the fleet is not running")
         if press.by.link and self._context.is_silenced(press.by.link):
             raise Silenced(SILENCED)
-        stops.presses.forget(press.id)  # nobody knows here whether what it became still holds: the robot says it
+        stops.presses.forget(press.id)  # only the robot knows whether the stop of this press still holds
         pressed = stops.presses.press(press)
         log.warning("stop kept", by=press.by.name, where=press.where, reason=press.reason, robot=self.name)
         if isinstance(pressed, NewPress) and pressed.replaced is not None:
@@ -102,7 +102,7 @@ class FleetSession:
     async def run(
         self, context: ConsoleContext, directory: Path, metrics: FleetMetrics, told: Callable[[str, AuditRecord], None]
     ) -> None:
-        """Until cancelled. `told` hears every record of its audit."""
+        """Run until cancelled. `told` is called with every record of the robot's audit."""
         self.app.state.context = self._context = context
         self._access = context.state.access.at(self.name)
         stops = self._stops = StopKeeper(directory, self.settings.robot, lasts=context.state.lasts)
@@ -124,7 +124,7 @@ class FleetSession:
         told: Callable[[str, AuditRecord], None],
         stops: StopKeeper,
     ) -> None:
-        """Sessions, one after the other."""
+        """Run sessions, one after the other."""
         loop = asyncio.get_running_loop()
         while True:
             since = loop.time()
@@ -160,7 +160,7 @@ class FleetSession:
                 metrics.forget(self.name)
 
     def look(self, now: float) -> None:
-        """Once a second: how it does."""
+        """Take the session's event and link state, once a second."""
         here = self.dependencies
         if here is None:
             self.pulse.look(now, up=False, epoch="", event=1)

@@ -13,7 +13,7 @@ __all__ = ["FleetSettings"]
 
 
 class FleetSettings(BaseSettings):
-    """Part of `Settings`. With any robot here, or a file of them, the console is a fleet's."""
+    """The fleet's part of `Settings`. With any robot, or a file of them, the console is a fleet's."""
 
     robots: NameList = ()  # "left=tcp://10.0.0.5:5600", comma-separated in the environment
     fleet_file: Path | None = None  # TOML: a table for each robot, with settings of its own

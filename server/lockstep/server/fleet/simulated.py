@@ -1,4 +1,4 @@
-"""What several simulated robots of one console are called. No I/O."""
+"""The names and files of several simulated robots of one console. No I/O."""
 
 from collections import Counter
 from collections.abc import Sequence
@@ -10,12 +10,12 @@ __all__ = ["own_event_log", "own_state_dir", "simulated_robots"]
 
 
 def simulated_robots(given: Sequence[str]) -> dict[str, str]:
-    """Kinds of robots by name. One that is not named is the only robot of a console: its name is "".
+    """Return the kinds of robots by name. One without a name is the only robot of a console: its name is "".
 
     Several are "left=planar", or "planar" alone, which is then its name; the second is "planar-2".
 
     Raises:
-        BadFleet: a name is no good, or is given twice.
+        BadFleet: a name is invalid, or is given twice.
     """
     if len(given) == 1 and "=" not in given[0]:
         return {"": given[0]}
@@ -42,13 +42,13 @@ def _free(kind: str, numbers: Counter[str], taken: set[str]) -> str:
 
 
 def own_state_dir(state_dir: Path, robot: str) -> Path:
-    """Where a robot's bridge keeps its stop: with the robot, whatever port the console has.
+    """Return the directory in which a robot's bridge keeps its stop, the same for every port of the console.
 
-    `robot`: its name, or what it is called that has none: its kind, or the file that describes it.
+    `robot`: its name, or without one its kind, or the name of the file that describes it.
     """
     return state_dir / "stops" / robot
 
 
 def own_event_log(path: Path, robot: str) -> Path:
-    """Each bridge has a file of its own: events-left.jsonl for the robot left."""
+    """Return the file of a robot's bridge: events-left.jsonl for the robot left."""
     return path if not robot else path.with_name(f"{path.stem}-{robot}{path.suffix}")

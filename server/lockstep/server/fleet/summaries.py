@@ -1,4 +1,4 @@
-"""What a robot's session looks like from outside. No I/O."""
+"""Summarises a robot's session as a tile of the overview. No I/O."""
 
 from lockstep.protocol.console import Report
 from lockstep.server.federation.robot_summary import MAX_PEOPLE, Person, Tile
@@ -9,16 +9,16 @@ __all__ = ["FAILED", "UNREADABLE", "absent_tile", "tile_of"]
 
 UNREADABLE = "What this robot does cannot be read: a fault of the console."
 FAILED = "The console's session of this robot has failed; it is started again."
-MAX_WORDS, MAX_NAME, MAX_FAULTS = 500, 60, 20  # what a tile may hold
+MAX_WORDS, MAX_NAME, MAX_FAULTS = 500, 60, 20  # bounds of a tile
 
 
 def absent_tile(name: str, trouble: str = FAILED) -> Tile:
-    """Of a robot whose session does not run."""
+    """Return the tile of a robot whose session does not run."""
     return Tile(name=name, label="", url=_url(name), link="down", trouble=trouble)
 
 
 def tile_of(here: Dependencies, pulse: Pulse, now: float) -> Tile:
-    """`now` is on the monotonic clock."""
+    """Return the tile of a robot whose session runs. `now` is on the monotonic clock."""
     console, clock, robot = here.console, here.console.clock, here.console.robot
     driver = console.peers.by_id(console.seat.rules.holder)
     people = [peer for peer in console.peers if not peer.thumbnail]
@@ -56,7 +56,7 @@ def tile_of(here: Dependencies, pulse: Pulse, now: float) -> Tile:
 
 
 def _gap(report: Report) -> tuple[int | None, int | None]:
-    """The largest gap that the driver's page reported last, and its tolerance; None: it has no pictures."""
+    """Return the largest gap that the driver's page reported last, and its tolerance; None: it has no pictures."""
     streams = [stream for stream in report.streams if stream.stamp]
     if not streams:
         return None, None

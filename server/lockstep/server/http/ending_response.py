@@ -1,4 +1,4 @@
-"""An answer that ends with the link that it was given to, also while it is under way."""
+"""A response that ends with the link that it was given to, even while it is being sent."""
 
 import asyncio
 from contextlib import suppress
@@ -15,7 +15,7 @@ LOOK_SECONDS = 0.5
 
 
 class EndingResponse(Response):
-    """Sends `response` while `right` holds; then the connection is cut, so nobody takes a part for the whole."""
+    """Sends `response` while `right` holds; then cuts the connection, so that nobody takes a part for the whole."""
 
     def __init__(self, response: Response, right: Right) -> None:
         super().__init__(status_code=response.status_code)
@@ -46,7 +46,7 @@ class EndingResponse(Response):
 
 
 async def _close_body(response: Response) -> None:
-    """Lets go of the file that a body is read from; `response` would when it is read to its end."""
+    """Close the file that a body is read from; `response` does so only when it has read it to its end."""
     close = getattr(getattr(response, "body_iterator", None), "aclose", None)
     if close is not None:
         await close()

@@ -1,4 +1,4 @@
-"""An answer in JSON that nobody keeps."""
+"""JSON responses that no cache stores."""
 
 import msgspec
 from fastapi import Response

@@ -1,4 +1,4 @@
-"""Settings of how the console is reached: names, TLS, STUN and TURN."""
+"""Network settings of the console: names, TLS, STUN and TURN."""
 
 import ipaddress
 from pathlib import Path
@@ -20,7 +20,7 @@ NameList = Annotated[tuple[str, ...], NoDecode]  # "a,b" in the environment
 class NetworkSettings(BaseSettings):
     """Part of `Settings`. Times in seconds."""
 
-    public_url: str = ""  # where people find the console, "https://robot.example.org"; "": where it listens
+    public_url: str = ""  # the console's address for people, "https://robot.example.org"; "": where it listens
     allowed_hosts: NameList = ()  # further names that requests may be for, as behind a proxy; "*" is any
 
     tls: Literal["", "self-signed"] = ""
@@ -32,8 +32,8 @@ class NetworkSettings(BaseSettings):
     turn: NameList = ()  # "turn:turn.example.org:3478?transport=udp"
     turn_secret: SecretStr = SecretStr("")  # shared with the TURN server (coturn: static-auth-secret)
     turn_secret_file: Path | None = None  # instead of the above
-    turn_seconds: Annotated[float, Field(ge=60, le=600)] = 600.0  # that a credential is good for, unless its link ends
-    relay_console: bool = False  # the console asks STUN and TURN for addresses of its own too
+    turn_seconds: Annotated[float, Field(ge=60, le=600)] = 600.0  # lifetime of a credential, unless its link ends
+    relay_console: bool = False  # the console too asks STUN and TURN for its addresses
 
     @field_validator("allowed_hosts", "tls_names", "stun", "turn", mode="before")
     @classmethod
@@ -87,7 +87,7 @@ class NetworkSettings(BaseSettings):
 
     @property
     def encrypted(self) -> bool:
-        """The console itself speaks TLS."""
+        """True if the console itself speaks TLS."""
         return bool(self.tls or self.tls_cert)
 
     @property

@@ -1,4 +1,4 @@
-"""The body of every error over HTTP: problem details (RFC 9457), with the error's stable name besides."""
+"""The body of every error over HTTP: problem details (RFC 9457), extended by the error's stable name."""
 
 from http import HTTPStatus
 

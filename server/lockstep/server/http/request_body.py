@@ -1,4 +1,4 @@
-"""Reads request bodies with a bound, before anything else looks at them."""
+"""Reads request bodies up to a bound, before anything else looks at them."""
 
 import asyncio
 from functools import cache
@@ -23,7 +23,7 @@ def media_type(request: Request) -> str:
 
 
 async def read_text(request: Request, expected: str, bound: int) -> str:
-    """The body as text.
+    """Return the body as text.
 
     Raises:
         WrongMediaType: it is not declared as `expected`, or it is not UTF-8.
@@ -44,7 +44,7 @@ def _decoder(kind: type[Body]) -> msgspec.json.Decoder[Body]:
 
 
 async def read_json(request: Request, kind: type[Body]) -> Body:
-    """The body as `kind`; an empty body is an empty object.
+    """Return the body as `kind`; an empty body counts as an empty object.
 
     Raises:
         BadJson: not JSON, or a field of the wrong type.
@@ -74,7 +74,7 @@ async def _read(request: Request, bound: int) -> bytes:
 
 
 def deadline(request: Request) -> float:
-    """On the loop's clock: of head and body together, where the connection measures them."""
+    """Return the deadline on the loop's clock: for head and body together, if the connection measures them."""
     found = request.scope.get("state", {}).get(DEADLINE)
     if isinstance(found, float):
         return found

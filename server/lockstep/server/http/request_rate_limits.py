@@ -1,4 +1,4 @@
-"""How often those may ask who are known, or failed to say who they are. Everybody has passed the front door."""
+"""Rate limits of offers and of requests without a valid token, behind the trusted-host middleware."""
 
 import time
 from collections.abc import Callable
@@ -14,7 +14,7 @@ __all__ = ["RequestRateLimits"]
 
 
 class RequestRateLimits:
-    """Offers are counted by token, failures by address."""
+    """Counts offers by token and failures by address."""
 
     def __init__(self, settings: LimitSettings, clock: Callable[[], float] = time.monotonic) -> None:
         self._offers = RateLimits(settings.max_offer_rate, settings.max_offer_burst)

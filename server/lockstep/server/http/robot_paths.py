@@ -1,4 +1,4 @@
-"""Where a robot's routes lie in a fleet: those of a console with one robot, below a prefix. No I/O."""
+"""Paths of a robot's routes in a fleet: those of a console with one robot, below a prefix. No I/O."""
 
 import re
 
@@ -9,6 +9,6 @@ _PREFIX = re.compile(rf"{ROBOTS}/[^/]+(?=/)")
 
 
 def below_robot(path: str) -> str:
-    """`path` as the robot's own routes have it: "/api/stop" for "/robots/left/api/stop", and for itself."""
+    """Return `path` without a robot's prefix: "/api/stop" for "/robots/left/api/stop", and for itself."""
     found = _PREFIX.match(path)
     return path if found is None else path[found.end() :]

@@ -1,4 +1,4 @@
-"""Security headers, and the check where a request comes from."""
+"""Security headers, and the check of a request's origin."""
 
 import re
 from urllib.parse import urlsplit
@@ -13,21 +13,21 @@ __all__ = ["FILE_POLICY", "PAGE_POLICY", "SCENE_POLICY", "SecurityHeaders", "che
 
 SAFE_METHODS = ("GET", "HEAD", "OPTIONS")
 
-# The page loads only its own files; its workers may also come from blobs. Styles may be set on elements. A page with a
-# script in it says which: by its hash, in a policy that has this directive alone (`static_files.script_policy`).
+# The page loads only its own files; its workers may also come from blobs. Styles may be set on elements. A page with
+# inline scripts names their hashes, in a policy of this directive alone (`static_files.script_policy`).
 PAGE_POLICY = (
     "default-src 'none'; script-src 'self'; worker-src 'self' blob:; style-src 'self' 'unsafe-inline'; "
     "img-src 'self' data: blob:; media-src 'self' blob:; font-src 'self' data:; connect-src 'self'; "
     "frame-src 'self'; manifest-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
 )
 
-# What is no document, a script or an answer of the API, loads nothing: a policy of the page's length in front of each
-# would be a twentieth of what a page's opening takes. SVG and what somebody opens by its address keep to it as well.
+# Responses other than documents, such as scripts and API answers, load nothing: a policy as long as the page's on each
+# would be a twentieth of the bytes that opening a page takes. It also binds SVG, and files opened by their address.
 FILE_POLICY = "default-src 'none'; frame-ancestors 'none'"
 
 # viser's client is one HTML file: inline script, script made from text, WebAssembly, workers and fonts from data and
-# blob URLs. So it is in an origin of its own that has no storage, no token and no rights (`sandbox` without
-# allow-same-origin), and speaks with its stream alone.
+# blob URLs. So it has an opaque origin without storage, token or rights (`sandbox` without allow-same-origin), and may
+# connect to its stream alone.
 SCENE_POLICY = (
     "sandbox allow-scripts; default-src 'none'; script-src 'unsafe-inline' 'unsafe-eval' blob: data:; "
     "worker-src blob: data:; style-src 'unsafe-inline'; img-src data: blob:; font-src data:; "
@@ -36,7 +36,7 @@ SCENE_POLICY = (
 
 SCRIPTS = "script-src 'self'"
 HASHED_SCRIPTS = re.compile(rf"{SCRIPTS}( 'sha256-[A-Za-z0-9+/]{{43}}=')+")
-HOST = re.compile(r"[\w.:\[\]-]+", re.ASCII)  # what may stand in a policy
+HOST = re.compile(r"[\w.:\[\]-]+", re.ASCII)  # a host that may stand in a policy
 
 HEADERS = {
     "Referrer-Policy": "no-referrer",
@@ -53,14 +53,14 @@ PERMISSIONS = (
     "display-capture=(), browsing-topics=()"
 )
 DOCUMENTS = ("text/html", "application/xhtml+xml")
-HSTS = "max-age=31536000"  # RFC 6797; no sub-domains: they are not ours to decide for
+HSTS = "max-age=31536000"  # RFC 6797; without sub-domains, which may be somebody else's
 
 
 class SecurityHeaders:
-    """Adds the headers to every HTTP answer."""
+    """A middleware that adds the headers to every HTTP response."""
 
     def __init__(self, app: ASGIApp, lasting_tls: bool = False, relays: tuple[str, ...] = ()) -> None:
-        """`lasting_tls`: a certificate that browsers trust, so that they may insist on TLS from now on.
+        """`lasting_tls`: browsers trust the certificate, so they may insist on TLS from now on.
 
         `relays`: WebSocket origins that the page connects to besides its own.
         """
@@ -90,26 +90,26 @@ class SecurityHeaders:
         await self._app(scope, receive, send_with_headers)
 
     def _policy_with(self, scripts: str) -> str:
-        """The page's policy, with the hashes of the scripts that stand in it."""
+        """Return the page's policy with the hashes of its inline scripts."""
         return self._page_policy.replace(SCRIPTS, scripts) if HASHED_SCRIPTS.fullmatch(scripts) else self._page_policy
 
 
 def scene_policy(scope: Scope) -> str:
-    """That of the 3D scene; its stream is where its page came from."""
+    """Return the policy of the 3D scene, whose stream is on the host that its page came from."""
     host = Headers(scope=scope).get("host", "")
     scheme = "wss" if scope["scheme"] == "https" else "ws"
     return SCENE_POLICY.format(stream=f"{scheme}://{host}" if HOST.fullmatch(host) else "'none'")
 
 
 def check_origin(headers: Headers, allowed: tuple[str, ...]) -> None:
-    """A browser says which page a request comes from; only our own pages and the allowed ones may change anything.
+    """Check the Origin of a browser's request: only the console's pages and the allowed ones may change anything.
 
     Raises:
-        OriginRefused: another site's page.
+        OriginRefused: the request comes from another site's page.
     """
     origin = headers.get("origin")
     if origin is None or origin in allowed:
-        return  # not a browser, or a friend
+        return  # not from a browser, or from an allowed page
     try:
         site = urlsplit(origin).netloc
     except ValueError as error:  # "http://["

@@ -1,4 +1,4 @@
-"""Serves the page that Vite built, and says how to build it when it is not there."""
+"""Serves the page that Vite built, or instructions to build it."""
 
 import asyncio
 import base64
@@ -19,7 +19,7 @@ __all__ = ["WEB_DIST", "page_router", "script_policy", "takes_coding"]
 
 WEB_DIST = Path(__file__).parents[1] / "web_dist"
 
-PACKED = (".css", ".html", ".js", ".md", ".svg", ".txt")  # what is worth compressing; fonts are already
+PACKED = (".css", ".html", ".js", ".md", ".svg", ".txt")  # worth compressing; fonts are compressed already
 SMALLEST = 1000  # bytes; less is one packet anyway
 CODINGS = ("br", "gzip")
 INLINE_SCRIPT = re.compile(rb"<script>(.*?)</script>", re.DOTALL)
@@ -36,17 +36,17 @@ NOT_BUILT = """<!doctype html><html lang="en"><meta charset="utf-8"><title>Locks
 class _Served(NamedTuple):
     body: bytes
     coding: str  # "" for none
-    policy: str  # Content-Security-Policy of what scripts stand in it; "" for none
+    policy: str  # Content-Security-Policy for its inline scripts; "" without any
 
 
 class _PackedFiles:
-    """Files as they are served: read and compressed once, when first asked for, and kept; as many as were built."""
+    """Files as they are served: read and compressed at the first request, and kept; as many as were built."""
 
     def __init__(self) -> None:
         self._served: dict[tuple[Path, frozenset[str]], tuple[int, _Served]] = {}
 
     async def response(self, found: Path, request: Request, headers: dict[str, str]) -> Response:
-        """In the best coding that the browser takes and the file is worth."""
+        """Return the file in the best coding that the browser accepts, if it is worth compressing."""
         state = os.stat(found)
         worth = found.suffix in PACKED and state.st_size >= SMALLEST
         accepted = request.headers.get("accept-encoding", "")
@@ -64,7 +64,7 @@ class _PackedFiles:
 def _served(found: Path, codings: frozenset[str]) -> _Served:
     plain = found.read_bytes()
     policy = script_policy(plain) if found.suffix == ".html" else ""
-    packed = found.with_name(f"{found.name}.{hashlib.sha256(plain).hexdigest()[:16]}.br")  # of the build, or none
+    packed = found.with_name(f"{found.name}.{hashlib.sha256(plain).hexdigest()[:16]}.br")  # if the build made it
     if "br" in codings and packed.is_file():
         return _Served(packed.read_bytes(), "br", policy)
     if "gzip" in codings:
@@ -73,13 +73,13 @@ def _served(found: Path, codings: frozenset[str]) -> _Served:
 
 
 def script_policy(html: bytes) -> str:
-    """The directive that allows exactly the scripts that stand in a page (CSP 3, 2.3.1); "" without any."""
+    """Return the directive that allows exactly a page's inline scripts (CSP 3, 2.3.1); "" without any."""
     hashes = [base64.b64encode(hashlib.sha256(each).digest()).decode() for each in INLINE_SCRIPT.findall(html)]
     return " ".join(["script-src 'self'", *(f"'sha256-{each}'" for each in hashes)]) if hashes else ""
 
 
 def takes_coding(accepted: str, coding: str) -> bool:
-    """Of an Accept-Encoding (RFC 9110 12.5.3); a quality of 0 is a no."""
+    """True if an Accept-Encoding (RFC 9110 12.5.3) accepts `coding`; a quality of 0 refuses it."""
     for each in accepted.split(","):
         name, _, parameter = each.strip().partition(";")
         if name.strip().lower() in (coding, "*"):
@@ -88,13 +88,13 @@ def takes_coding(accepted: str, coding: str) -> bool:
 
 
 def page_router(directory: Path = WEB_DIST, first: str = "index.html", *, of_robot: bool = True) -> APIRouter:
-    """Routes for `/`, `/recordings`, the hashed assets (cached for good) and the few files beside them.
+    """Return routes for `/`, `/recordings`, the hashed assets (cached for good) and the few files beside them.
 
-    Pages know their addresses by their own, so all of this may lie below any prefix.
+    Pages use relative addresses, so all of this may lie below any prefix.
 
     Args:
         first: the page at `/`
-        of_robot: with the pages that only a robot has
+        of_robot: include the pages that only a robot has
     """
     router = APIRouter()
     root = directory.resolve()
@@ -120,7 +120,7 @@ def page_router(directory: Path = WEB_DIST, first: str = "index.html", *, of_rob
         try:
             found = (root / path).resolve()
             is_page = found.is_relative_to(root) and found.is_file()
-        except (OSError, ValueError):  # no name of a file: too long, or with a null character
+        except (OSError, ValueError):  # not a file name: too long, or with a null character
             is_page = False
         if not is_page:
             raise NotFound("no such page")

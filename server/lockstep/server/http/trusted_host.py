@@ -1,4 +1,4 @@
-"""What every request passes before anything looks at it: whose name it asks for, and how often its address asks."""
+"""Trusted-host middleware: checks each request's host name and its address's rate before anything else."""
 
 import ipaddress
 import socket
@@ -21,20 +21,20 @@ from lockstep.server.util.rate_limits import RateLimits
 __all__ = ["STOP_BURST", "STOP_RATE", "TrustedHost", "HostNames", "client_address"]
 
 STOPS = ("/api/stop", "/api/fleet/stop")
-# Stops of one link by HTTP that pass every limit and wait for nobody. A page says one press once a second, to each
-# console; what is more goes through the limits and turns of all other requests.
+# Stops of one link by HTTP that pass every limit and wait for nobody. A page repeats a press once a second, to each
+# console; further stops go through the limits and turns of all other requests.
 STOP_RATE, STOP_BURST = 20.0, 20  # Hz
-HEALTH = ("/healthz", "/readyz")  # counted apart: a check must not fail for what else comes from its address
+HEALTH = ("/healthz", "/readyz")  # counted apart: a check must not fail because of other requests from its address
 POLICY_VIOLATION = 1008  # RFC 6455 7.4.1
 PATIENCE = 5  # requests in a row that are turned away, then the connection is closed
 CLOSE = (b"connection", b"close")
 
 
 class HostNames:
-    """The names that a request may be for.
+    """The host names that a request may be for.
 
-    A page of another site can have its name point to our address (DNS rebinding) and then counts as the same site.
-    Its requests still say whose name they are for. An address cannot be made to point elsewhere, so all addresses pass.
+    Another site can have its name point to the console's address (DNS rebinding); its page then counts as the same
+    site. Its requests still carry that name. An address cannot be made to point elsewhere, so all addresses pass.
     """
 
     def __init__(self, names: tuple[str, ...], machine: str = "") -> None:
@@ -43,7 +43,7 @@ class HostNames:
         self._names = {name.lower() for name in names} | {"localhost", machine, f"{machine}.local"}
 
     def check(self, host: str | None) -> None:
-        """Raises HostRefused."""
+        """Raise HostRefused if `host` is not one of the names."""
         if self._any:
             return
         try:
@@ -57,9 +57,9 @@ class HostNames:
 class TrustedHost:
     """An ASGI middleware, for HTTP and WebSockets. Refusals are counted by name and answered like all others.
 
-    What brings a good token is served before what does not, and keeps its connection when there are too many; a stop
-    that brings one passes every limit, up to a rate of its link's own, unless that link's stops are silenced. A fault
-    in what is behind is answered by name, counted, and goes no further.
+    A request with a good token is served before those without, and keeps its connection when there are too many; a
+    stop with one passes every limit, up to a rate per link, unless the link's stops are silenced. A fault of the app is
+    answered by name, counted, and goes no further.
     """
 
     def __init__(
@@ -76,7 +76,7 @@ class TrustedHost:
         places: ConnectionPlaces | None = None,
         caught: Callable[[Scope, Exception], None] | None = None,
     ) -> None:
-        """`health`: of health checks. `link_of`: the link whose good token a request brings, "" without one.
+        """`health`: limits of health checks. `link_of`: returns the link of a request's good token, "" without one.
 
         `is_silenced`: whether a supervisor has silenced the stops of that link.
         """
@@ -117,7 +117,7 @@ class TrustedHost:
         await self._serve(scope, receive, send)
 
     def _goes_first(self, scope: Scope, link: str) -> bool:
-        """Whether it is a stop that no limit holds up."""
+        """True if it is a stop that passes every limit."""
         if not link or scope.get("method") != "POST" or not _is_one_of(scope, STOPS):
             return False
         return not self._is_silenced(scope, link) and self._stops.spend(link, self._clock())
@@ -150,7 +150,7 @@ def _is_one_of(scope: Scope, paths: tuple[str, ...]) -> bool:
 
 
 def _patient(send: Send, place: Place) -> Send:
-    """Closes the connection of who is turned away again and again. A good token in between forgives all."""
+    """Close the connection after `PATIENCE` refused requests in a row. A good token in between resets the count."""
 
     async def counted(message: Message) -> None:
         if message["type"] == "http.response.start":
@@ -164,7 +164,7 @@ def _patient(send: Send, place: Place) -> Send:
 
 
 def client_address(scope: Scope) -> str:
-    """Of one client, as it is counted."""
+    """Return a client's address as it is counted."""
     client = scope.get("client")
     return "" if client is None else counted_address(str(client[0]))
 

@@ -1,4 +1,4 @@
-"""Which software and which robot description a session had, for the audit."""
+"""Versions of a session's software and robot description, for the audit."""
 
 import hashlib
 from functools import cache
@@ -15,7 +15,7 @@ __all__ = ["console_version", "description_hash", "page_build"]
 
 @cache
 def console_version() -> str:
-    """Of the installed package; "unknown" where it was not installed."""
+    """Return the version of the installed package; "unknown" if it is not installed."""
     try:
         return version("lockstep-console")
     except PackageNotFoundError:
@@ -23,7 +23,7 @@ def console_version() -> str:
 
 
 def page_build(directory: Path = WEB_DIST) -> str:
-    """SHA-256 of the page's first file, which names all others by their hashes; "none" where no page is built."""
+    """SHA-256 of the page's first file, which names all others by their hashes; "none" if no page is built."""
     try:
         return hashlib.sha256((directory / "index.html").read_bytes()).hexdigest()
     except OSError:

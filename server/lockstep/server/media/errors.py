@@ -1,7 +1,7 @@
-"""What can go wrong with media.
+"""Errors of the media pipeline.
 
 MediaError
-├── PayloadError            the payload of a medium is not what its header says
+├── PayloadError            the payload of a medium does not match its header
 ├── UnsupportedCodecError   a codec that this stream cannot take in or send out
 └── EncodeError             a codec library refused a picture or sound
 """
@@ -14,7 +14,7 @@ class MediaError(Exception):
 
     Attributes:
         name: stable, lower-case identifier; the `stage` of the drop counter
-        detail: what exactly was wrong, for a person
+        detail: the exact cause, for a person
     """
 
     name = "media"

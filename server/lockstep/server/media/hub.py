@@ -1,4 +1,4 @@
-"""The media plane: the streams of one robot, encoded once and sent to every peer."""
+"""The media hub: the streams of one robot, encoded once and sent to every peer."""
 
 import asyncio
 import re
@@ -41,28 +41,28 @@ from lockstep.server.webrtc.datagram_queue import DatagramQueue, DriverQueue
 
 __all__ = ["MediaPlan", "MediaHub", "MediaSettings", "Subscriptions"]
 
-NOT_DRIVING_RATE = 1000.0  # Hz, datagrams of all together who may drive and do not, before they wait as observers' do
-REPORTED = 50  # peers that get sender reports in a second
+NOT_DRIVING_RATE = 1000.0  # Hz, datagrams of all peers that may drive but do not, before theirs wait as observers' do
+REPORTED = 50  # peers that get a sender report in a second
 MAX_LINK_TIME = 1e9  # s; no monotonic clock gets there, and NaN is not below it
 
 AnyStream = VideoStream | AudioStream
 
 
 class PlannedStream(NamedTuple):
-    """One stream in the section of an answer, or of an offer to a relay."""
+    """One stream in a section of an answer, or of an offer to a relay."""
 
     mid: str
     stream: AnyStream
-    codecs: tuple[Codec, ...]  # the one to send, and what repairs it
+    codecs: tuple[Codec, ...]  # the one to send, and its repair codec if there is one
     carrier: Carrier
 
 
 class MediaPlan(NamedTuple):
-    """What a peer is given, before it is answered."""
+    """The media planned for a peer before its offer is answered."""
 
     media: dict[str, LocalMedia]  # by mid
     streams: list[PlannedStream]
-    voice: str = ""  # mid of the section in which the peer's own sound is taken; "" when it is not
+    voice: str = ""  # mid of the section that receives the peer's own sound; "" without one
     thumbnail: bool = False
 
 
@@ -81,13 +81,13 @@ class MediaHub:
         wall_clock: Callable[[], float] = time.time,
         on_fault: Callable[[str, Exception], None] | None = None,
     ) -> None:
-        """`attached`: cameras and microphones of the console's own; their streams come after the robot's.
+        """`attached`: cameras and microphones attached to the console; their streams come after the robot's.
 
-        `on_fault` hears where something that serves all peers failed, and what was raised; it goes on.
+        `on_fault` gets the name and the exception of a service for all peers that failed; the service goes on.
         """
         self._settings = settings
         self._attached = {spec.name: spec for spec in attached}
-        self._stream_names: dict[str, str] = {}  # of those, by the source's name
+        self._stream_names: dict[str, str] = {}  # of attached sources, by the source's name
         self._metrics = MediaMetrics(metrics_registry)
         self._wall_clock = wall_clock
         self._capture_clock = CaptureClock()
@@ -128,7 +128,7 @@ class MediaHub:
             self._service_tasks = [loop.create_task(self._quality.run())]
 
     def feed(self, media: Media, now: float) -> None:
-        """Take a picture or sound from the robot link. Called on the loop, never blocks; newest wins.
+        """Take a picture or sound from the robot link. Called on the loop, never blocks; the newest wins.
 
         `now` is on a monotonic clock, the same for all calls.
         """
@@ -143,7 +143,7 @@ class MediaHub:
         stream.feed(media, now, self._capture_clock.wall_time(media.time))
 
     def record(self, take: FrameTaker | None, keyframe_seconds: float = 4.0) -> None:
-        """Hand every stream, encoded, to `take` from now on; None: no more. Over epochs too."""
+        """Hand the encoded frames of every stream to `take` from now on, across epochs; None stops it."""
         self._recorder, self._record_keyframes = take, keyframe_seconds
         self._record_streams()
 
@@ -165,16 +165,16 @@ class MediaHub:
             )
 
     def record_keyframes(self) -> None:
-        """A new file begins: every camera starts with a keyframe."""
+        """Request a keyframe of every camera, because a new file begins."""
         for stream in self._streams.values():
             stream.record_keyframe()
 
     def recorded_codecs(self) -> dict[str, str]:
-        """What each stream is recorded as where nobody takes another codec, by its name: "H264", "opus" or "PCMU"."""
+        """Return each stream's recording codec while nobody takes another, by stream name: "H264", "opus" or "PCMU"."""
         return {each.name: _recorded_codecs(each)[0] for each in self._streams.values()}
 
     def _attached_stream(self, spec: SourceSpec, name: str) -> AnyStream:
-        """What the source really gives shows when it comes."""
+        """Create the stream of an attached source, whose real format shows with its first media."""
         settings, fan_out, metrics = self._settings, self._fan_out, self._metrics
         if spec.kind == "audio":
             return AudioStream(Microphone(name=name, label=spec.label, sample_rate=48_000), settings, fan_out, metrics)
@@ -183,11 +183,11 @@ class MediaHub:
         return VideoStream(camera, settings, fan_out, metrics)
 
     def stream_of(self, source: str) -> str:
-        """The stream of an attached source: its name, or one like it when the robot has a stream of that name."""
+        """Return the stream name of an attached source: its own name, or a similar one if the robot has that."""
         return self._stream_names.get(source, source)
 
     def feed_local(self, media: Media, now: float) -> None:
-        """As `feed`, for what was captured here: its time is on the clock of `now`."""
+        """As `feed`, for a medium captured by this machine, whose time is on the clock of `now`."""
         stream = self._streams.get(media.stream)
         if stream is not None:
             stream.feed(media, now, self._wall_clock() - (now - media.time))
@@ -200,12 +200,12 @@ class MediaHub:
     def plan(
         self, offer: SessionDescription, *, trailer: bool, thumbnail: bool = False, voice: bool = False
     ) -> MediaPlan:
-        """What an offer gets.
+        """Plan the media that answer an offer.
 
         The i-th video section gets the i-th camera, the i-th audio section the i-th microphone; sections without
         one, or without a codec that it has, are answered inactive. `trailer` asks for the trailer carrier; otherwise
         the offer's header extensions decide. `thumbnail`: the first camera alone, in the lowest tier. `voice`: the
-        first audio section in which the peer would only send is for its own sound.
+        first audio section in which the peer would only send receives its own sound.
         """
         sources: dict[str, Iterator[AnyStream]] = {
             kind: iter([stream for stream in self._streams.values() if stream.kind == kind][: 1 if thumbnail else None])
@@ -239,9 +239,9 @@ class MediaHub:
     def attach(
         self, connection: Connection, plan: MediaPlan, *, priority: bool, turns: Turns | None = None
     ) -> Subscriptions:
-        """Give a peer the streams that were planned, once `connection` has answered with the plan's media.
+        """Give a peer its planned streams, once `connection` has answered with the plan's media.
 
-        `priority` is for the operator: served first and at once. `turns`: those that its datagrams wait for.
+        `priority` is for the operator: served first and at once. `turns`: the queue in which its datagrams wait.
         """
         cameras = sum(each.stream.kind == "video" for each in plan.streams)
         peer = self._peer_of(connection, plan, self._quality_of(cameras, priority), priority=priority, turns=turns)
@@ -251,22 +251,22 @@ class MediaHub:
         return self._joined(peer)
 
     def plan_publication(self, camera_codec: str = "") -> tuple[MediaPlan, list[OfferedMedia]]:
-        """Every stream for a relay, each in one codec, with trailers; and what to offer.
+        """Plan every stream for a relay, each in one codec and with trailers; return the plan and the media to offer.
 
-        `camera_codec`: "" is what is being encoded already for somebody, so that it costs no encoder.
+        `camera_codec`: "" selects a codec that is already encoded for somebody, so that it costs no encoder.
         """
         plan, offered = MediaPlan({}, []), []
         for number, stream in enumerate(self._streams.values()):
             name = stream.codec_in_use(camera_codec if stream.kind == "video" else "")
             planned = PlannedStream(str(number), stream, offered_codecs(stream.kind, name), "trailer")
             plan.streams.append(planned)
-            # A relay hands playout-delay on, and browsers show pictures at once.
+            # A relay forwards playout-delay, so that browsers show pictures at once.
             uris = (MID_URI, PLAYOUT_DELAY_URI) if stream.kind == "video" else (MID_URI,)
             offered.append(OfferedMedia(planned.mid, stream.kind, replace(_sent(planned), extensions=uris)))
         return plan, offered
 
     def publish(self, connection: Connection, plan: MediaPlan) -> Subscriptions:
-        """Give a relay the streams that were planned, once `connection` is up. Call it with the offer."""
+        """Give a relay its planned streams, once `connection` is up. Call it with the offer."""
         cameras = sum(each.stream.kind == "video" for each in plan.streams)
         peer = self._peer_of(connection, plan, self._quality_of(cameras, priority=False), priority=False)
         peer.quality.relays = True
@@ -315,12 +315,12 @@ class MediaHub:
         return peer
 
     def _spread_reports(self) -> None:
-        """A crowd gets its sender reports more rarely (RFC 3550 6.2)."""
+        """Send reports more rarely to a crowd (RFC 3550 6.2)."""
         for peer in self._peers:
             peer.report_every(float(max(1, -(-len(self._peers) // REPORTED))))
 
     def _gives_h264(self, stream: AnyStream) -> bool:
-        """Whether the camera may encode by itself, as far as is known now; then its peers had better take that."""
+        """True if the camera itself may encode H.264, as far as is known now; its peers should then take that codec."""
         if not isinstance(stream, VideoStream):
             return False
         if stream.gives is not None:
@@ -331,17 +331,18 @@ class MediaHub:
 
     @property
     def turns(self) -> DatagramQueue:
-        """Those of observers, in which publishers have theirs too."""
+        """The queue of observers' datagrams, which publishers' datagrams share."""
         return self._turns
 
     def turns_of(self, *, waits: bool) -> DatagramQueue | DriverQueue:
-        """For a new peer. `waits`: its datagrams take observers' turns; else only those that are too many, unless it
-        drives.
+        """Return the datagram queue for a new peer.
+
+        `waits`: its datagrams wait in observers' turns; otherwise only those above the rate do, unless it drives.
         """
         return self._turns if waits else DriverQueue(self._turns, self._may_go_at_once)
 
     def _may_go_at_once(self) -> bool:
-        """Whether one more datagram of those who may drive and do not is handled before all that waits."""
+        """True if one more datagram of the peers that may drive but do not is handled before all waiting ones."""
         return self._not_driving.take(time.monotonic())
 
     def _quality_of(self, cameras: int, priority: bool) -> PeerQuality:
@@ -424,7 +425,7 @@ def _msid(name: str) -> str:
 
 
 def _recorded_codecs(stream: AnyStream) -> tuple[str, ...]:
-    """The best first."""
+    """Return the codecs that a recording may have, the best first."""
     return tuple(sorted(stream.codecs, key=lambda codec: codec not in ("H264", "opus")))
 
 

@@ -1,4 +1,4 @@
-"""Counters of the media plane, under `lockstep_media_` at /metrics."""
+"""Counters of the media hub, under `lockstep_media_` at /metrics."""
 
 from prometheus_client import CollectorRegistry, Counter, Gauge, Histogram
 
@@ -8,7 +8,7 @@ ENCODE_BUCKETS = (0.0005, 0.001, 0.002, 0.004, 0.008, 0.016, 0.033, 0.066, 0.13,
 
 
 class MediaMetrics:
-    """One set per plane. Stages of `dropped`, in the order of the path:
+    """The counters of one media hub. Stages of `dropped`, in the order of the path:
 
     unknown_stream, bad_time, too_often, stale_stamp, unsupported_codec, bad_payload, thinned, encoder_busy, path_busy,
     encode_failed, worker_failed, peer_busy

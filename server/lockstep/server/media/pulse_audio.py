@@ -24,7 +24,7 @@ class PulseStream:
     """A stream of 16-bit samples, interleaved. Calls block; use it from one thread."""
 
     def __init__(self, direction: int, device: str, rate: int, channels: int, buffer: _BufferAttributes) -> None:
-        """`device` "" is the default one. Raises OSError: there is no PulseAudio, or it refused."""
+        """Open a stream; `device` "" is the default one. Raises OSError if there is no PulseAudio, or it refuses."""
         self._library = _load()
         self._frame = 2 * channels  # bytes
         error = ctypes.c_int()
@@ -38,19 +38,19 @@ class PulseStream:
 
     @classmethod
     def recording(cls, device: str, rate: int, channels: int, count: int) -> Self:
-        """Gives `count` samples at a time."""
+        """Open a stream that records `count` samples at a time."""
         fragment = count * 2 * channels
         return cls(RECORD, device, rate, channels, _BufferAttributes(UNSET, UNSET, UNSET, UNSET, fragment))
 
     @classmethod
     def playing(cls, device: str, rate: int, channels: int, buffered: int) -> Self:
-        """Holds at most about `buffered` samples back, and begins with a fifth of that."""
+        """Open a stream that plays; it buffers at most about `buffered` samples and begins with a fifth of that."""
         size = buffered * 2 * channels
         prebuffer = size // 5 // (2 * channels) * 2 * channels
         return cls(PLAYBACK, device, rate, channels, _BufferAttributes(2 * size, size, prebuffer, UNSET, UNSET))
 
     def read(self, count: int) -> bytes:
-        """Raises OSError when the server has gone."""
+        """Read `count` samples of each channel. Raises OSError when the server has gone."""
         data = ctypes.create_string_buffer(count * self._frame)
         error = ctypes.c_int()
         if self._library.pa_simple_read(self._stream, data, len(data.raw), ctypes.byref(error)) < 0:
@@ -58,13 +58,13 @@ class PulseStream:
         return data.raw
 
     def write(self, samples: bytes) -> None:
-        """Raises OSError when the server has gone."""
+        """Play samples. Raises OSError when the server has gone."""
         error = ctypes.c_int()
         if self._library.pa_simple_write(self._stream, samples, len(samples), ctypes.byref(error)) < 0:
             raise OSError(f"PulseAudio: {self._words(error)}")
 
     def close(self) -> None:
-        """Idempotent."""
+        """Close the stream. Idempotent."""
         stream, self._stream = self._stream, None
         if stream:
             self._library.pa_simple_free(stream)
@@ -83,7 +83,7 @@ class PulseStream:
 
 
 def _load() -> Any:
-    """Raises OSError when it is not installed."""
+    """Load the library. Raises OSError when it is not installed."""
     library = ctypes.CDLL("libpulse-simple.so.0")
     library.pa_simple_new.restype = ctypes.c_void_p
     library.pa_simple_new.argtypes = [

@@ -1,4 +1,4 @@
-"""One stream on its way to one peer."""
+"""The delivery of one stream to one peer."""
 
 from collections.abc import Callable
 from typing import Protocol
@@ -13,16 +13,16 @@ __all__ = ["FrameSender", "Subscription"]
 
 
 class FrameSender(Protocol):
-    """What sends frames over RTP."""
+    """Sends frames over RTP."""
 
     @property
     def paced(self) -> bool:
-        """Whether packets wait for the pacer."""
+        """True while packets wait for the pacer."""
 
     def transmit(self, frame: EncodedFrame) -> tuple[int, int] | None:
-        """Send a frame: packets and bytes of payload. None, and nothing is sent, while the network takes nothing.
+        """Send a frame and return its packets and payload bytes; None, and nothing sent, while the network is blocked.
 
-        What the pacer holds back of it waits; call only when nothing waits.
+        Packets that the pacer holds back wait; call it only when none waits.
         """
 
 
@@ -40,10 +40,10 @@ class Subscription:
         on_dropped: Callable[[], None],
         on_failed: Callable[[Exception], None],
     ) -> None:
-        """`on_failed` hears what serving this stream raised, and raises nothing itself."""
+        """`on_failed` gets the exception that serving this stream raised, and raises nothing itself."""
         self.priority = priority
         self.trailer = carrier == "trailer"
-        self.h264: Profile | None = None  # that was negotiated; None for another codec
+        self.h264: Profile | None = None  # negotiated profile; None for another codec
         self.sender: FrameSender | None = None  # None before the transport is connected
         self._outbox = outbox
         self._on_dropped = on_dropped
@@ -59,7 +59,7 @@ class Subscription:
 
     @property
     def paced(self) -> bool:
-        """Whether part of the last frame has not left yet."""
+        """True while part of the last frame has not left yet."""
         return self.sender is not None and self.sender.paced
 
     def put(self, frame: EncodedFrame) -> None:

@@ -1,4 +1,4 @@
-"""What one peer gets, and how it does."""
+"""The media streams that one peer receives, and their statistics."""
 
 import logging
 from collections.abc import Callable
@@ -19,7 +19,7 @@ logger = logging.getLogger(__name__)
 
 
 class Delivery(NamedTuple):
-    """One stream of one peer, with all that serves it."""
+    """One stream of one peer, with the objects that serve it."""
 
     info: StreamInfo
     stream: Stream  # type: ignore[type-arg]  # the job type does not matter here
@@ -31,7 +31,7 @@ REPORTS_OFTEN = 1 / 3  # s
 
 
 class Subscriptions:
-    """Its connection tells it `connected`, and `heard` what is about a stream. It ends with `close`."""
+    """One peer's subscriptions. Its connection calls `connected`, then `heard` for stream events; `close` ends it."""
 
     def __init__(
         self,
@@ -44,16 +44,16 @@ class Subscriptions:
         on_paced: Callable[[Subscription], None] = lambda target: None,
         turns: DriverQueue | None = None,
     ) -> None:
-        """`on_paced` hears that a stream may send more; `turns` are told whether this peer drives."""
+        """`on_paced` is called when a stream may send more; `turns` is told whether this peer drives."""
         self.quality = quality
-        self.voice = ""  # mid of the section in which the peer's own sound is taken; "" when it is not
+        self.voice = ""  # mid of the section that receives the peer's own sound; "" without one
         self.deliveries = deliveries
         self._connection = connection
         self._on_close = on_close
         self._on_connected = on_connected
         self._on_paced = on_paced
         self._turns = turns
-        self._report_seconds = 1.0  # between two sender reports, unless it comes first
+        self._report_seconds = 1.0  # between two sender reports, unless this peer comes first
         self._has_left = False
         self._has_failed = False
         self._tell_failed: Callable[[str, Exception], None] = _log_failure
@@ -75,22 +75,22 @@ class Subscriptions:
 
     @property
     def tier(self) -> Tier | None:
-        """None: it receives no video."""
+        """The peer's tier; None if it receives no video."""
         return self.quality.tier if self.quality.cameras else None
 
     @property
     def loss(self) -> float | None:
-        """0 to 1, of pictures on the way to this peer; None before its first report."""
+        """The loss of pictures on the path to this peer, 0 to 1; None before its first report."""
         return self.quality.loss
 
     @property
     def round_trip_ms(self) -> float | None:
-        """Of RTCP; None before the first that was measured."""
+        """The RTCP round trip in ms; None before the first measurement."""
         return self.quality.round_trip_ms
 
     @property
     def queues(self) -> bool:
-        """Whether packets waited on the path to this peer within the last minute."""
+        """True if packets waited on the path to this peer within the last minute."""
         return self.quality.path.limited
 
     def report(self, report: Report, now: float) -> None:
@@ -98,7 +98,7 @@ class Subscriptions:
         self.quality.report(report, now)
 
     def connected(self) -> None:
-        """The connection is up: media flow from now on."""
+        """Start sending media: the connection is up."""
         self._set_pace()
         for delivery in () if self._has_left else self.deliveries:
             delivery.target.sender = delivery.sender
@@ -108,7 +108,7 @@ class Subscriptions:
             self._on_connected()
 
     def heard(self, mid: str, event: StreamEvent) -> None:
-        """What the peer says about the stream in section `mid`, or what became of it."""
+        """Handle an event of the stream in section `mid`: the peer's feedback, or packets that left."""
         delivery = next((each for each in self.deliveries if each.info.mid == mid), None)
         if delivery is None or self._has_left:
             return
@@ -124,7 +124,7 @@ class Subscriptions:
             self._on_paced(delivery.target)
 
     def drives(self, holds_seat: bool) -> None:
-        """Whether this peer holds the control seat: the operator's tier is made for who does."""
+        """Set whether this peer holds the control seat; the operator's tier is planned for the holder."""
         self.quality.drives = holds_seat
         for delivery in self.deliveries:
             delivery.target.priority = holds_seat
@@ -133,17 +133,17 @@ class Subscriptions:
         self._set_pace()
 
     def report_every(self, seconds: float) -> None:
-        """Send sender reports as often, unless this peer comes first."""
+        """Send a sender report every `seconds`, unless this peer comes first."""
         if seconds != self._report_seconds:
             self._report_seconds = seconds
             self._set_pace()
 
     def _set_pace(self) -> None:
-        """How often reports go out, and which peers' datagrams leave first.
+        """Set the interval of sender reports and the urgency of this peer's datagrams.
 
-        A round trip tells of the queue that the last report met, so a peer on whom the operator's pictures depend gets
-        three reports a second: a queue of a few hundred milliseconds is to be seen before it has grown to a second.
-        Over the narrowest paths that is a hundredth of what passes; RTCP may take a twentieth (RFC 4585 3.4).
+        A round trip shows the queue that the last report met, so a peer on whom the operator's pictures depend gets
+        three reports a second: a queue of a few hundred milliseconds has to show before it has grown to a second.
+        On the narrowest paths that is a hundredth of the traffic; RTCP may take a twentieth (RFC 4585 3.4).
         """
         quality = self.quality
         comes_first = quality.drives or quality.operator or quality.relays
@@ -151,21 +151,21 @@ class Subscriptions:
         self._connection.peer.report_every(REPORTS_OFTEN if comes_first else self._report_seconds)
 
     def on_quality(self, tell: Callable[[Quality], None]) -> None:
-        """Call `tell` when something else was decided for this peer's pictures."""
+        """Call `tell` whenever the quality of this peer's pictures changes."""
         self.quality.on_quality = tell
 
     def request_keyframe(self, mid: str) -> None:
-        """Somebody behind this peer cannot decode."""
+        """Request a keyframe for somebody behind this peer who cannot decode."""
         for delivery in self.deliveries:
             if delivery.info.mid == mid:
                 delivery.stream.request_keyframe(delivery.info.codec, delivery.target, "pli")
 
     def on_failed(self, tell: Callable[[str, Exception], None]) -> None:
-        """Call `tell` with the stage and what was raised once this peer cannot be served; it raises nothing."""
+        """Call `tell` with the stage and the exception once this peer cannot be served; `tell` raises nothing."""
         self._tell_failed = tell
 
     def failed(self, stage: str, error: Exception) -> None:
-        """Serving this peer raised `error`: it gets nothing more. Only the first is told. Raises nothing."""
+        """Stop serving this peer, because doing so raised `error`. Only the first error is told. Raises nothing."""
         if not self._has_failed:
             self._has_failed = True
             self._leave_all()
@@ -178,7 +178,7 @@ class Subscriptions:
             self.failed("forget", error)
 
     def _leave_all(self) -> Exception | None:
-        """Every stream is left, and the plane knows it, whatever one of them raises."""
+        """Leave every stream and tell the media hub, even if some of that raises; return the first error."""
         self._has_left = True
         first: Exception | None = None
         for delivery in self.deliveries:
@@ -194,7 +194,7 @@ class Subscriptions:
         return first
 
     async def close(self) -> None:
-        """Stop sending to this peer. Idempotent; its connection is somebody else's to close."""
+        """Stop sending to this peer. Idempotent; does not close its connection."""
         self.detach()
 
 

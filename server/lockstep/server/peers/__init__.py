@@ -1,1 +1,1 @@
-"""Operators and observers that are connected: what they may say, and what they are told."""
+"""The connected operators and observers, and the messages from and to them."""

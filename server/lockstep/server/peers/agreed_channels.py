@@ -16,7 +16,7 @@ MAP = re.compile(r'(\d{1,5}) ([^;"=]+="?[^;"]*"?(?:;[^;"=]+="?[^;"]*"?)*)')
 
 
 class AgreedChannel(NamedTuple):
-    """One of our channels, and how the peer keeps it."""
+    """One of the console's channels, with the reliability that the peer chose."""
 
     id: int
     name: ChannelName
@@ -25,10 +25,10 @@ class AgreedChannel(NamedTuple):
 
 
 def agreed_channels(maps: Sequence[str]) -> list[AgreedChannel]:
-    """Those that an offer names by `a=dcmap`; empty when the peer opens its channels by itself.
+    """Return the channels that an offer names by `a=dcmap`; none if the peer opens its channels itself.
 
     Raises:
-        BadSdp: a line that is none, a channel that we have not, or one twice.
+        BadSdp: a malformed line, an unknown channel, or a channel twice.
     """
     if len(maps) > len(CHANNELS):
         raise BadSdp(f"more data channels than the {len(CHANNELS)} that there are")

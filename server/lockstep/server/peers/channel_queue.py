@@ -1,7 +1,7 @@
-"""What waits to be sent on one data channel. No I/O.
+"""Messages that wait to be sent on one data channel. No I/O.
 
 A channel that has taken everything is written to at once; while bytes are still buffered, messages wait here.
-Feedback keeps only the newest. Everything else waits in order up to a bound; then the oldest goes, counted.
+Only the newest feedback is kept. Other messages wait in order up to a bound; then the oldest is dropped and counted.
 """
 
 from collections import deque
@@ -35,7 +35,7 @@ class ChannelQueue:
         self._newest = text
 
     def take(self) -> str | None:
-        """The next text to write, or None."""
+        """Return the next text to write, or None."""
         if self._waiting:
             return self._waiting.popleft()
         text, self._newest = self._newest, None

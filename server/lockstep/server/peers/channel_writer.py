@@ -1,4 +1,4 @@
-"""Writes to one data channel without ever filling it: what the channel does not take at once waits in an outbox."""
+"""Writes to one data channel without ever filling it: messages that it does not take at once wait in an outbox."""
 
 from lockstep.rtc.channels import ChannelNotOpen
 from lockstep.rtc.endpoint import Connection
@@ -12,14 +12,14 @@ ENDED = (ChannelNotOpen, AssociationClosed, PeerNotReady)
 
 
 class ChannelWriter:
-    """A message is handed to the channel only while none waits there, so feedback is never queued behind feedback.
+    """Hands a message to the channel only while none waits there, so feedback is never queued behind feedback.
 
     Attributes:
         too_large: messages that the peer's max-message-size (RFC 8841 6) forbids
     """
 
     def __init__(self, connection: Connection, channel: int) -> None:
-        """Call `flush` with `ChannelWritable`."""
+        """Call `flush` on `ChannelWritable`."""
         self._connection = connection
         self._channel = channel
         self.outbox = ChannelQueue()
@@ -39,7 +39,7 @@ class ChannelWriter:
         self.flush()
 
     def flush(self) -> None:
-        """Hand on what waits in the outbox, as far as the channel takes it at once."""
+        """Hand on the messages in the outbox, as far as the channel takes them at once."""
         peer = self._connection.peer
         while not peer.has_waiting(self._channel):
             text = self.outbox.take()

@@ -1,4 +1,4 @@
-"""Parses what clients send on data channels and lines. Failures are named ChannelErrors; nothing else comes out."""
+"""Parses the messages of clients on data channels and lines. Raises named ChannelErrors and nothing else."""
 
 import json
 from typing import Literal
@@ -38,18 +38,18 @@ ChannelName = Literal["control", "session", "stop"]
 
 
 class _AnyStop(msgspec.Struct, frozen=True, kw_only=True):
-    type: Literal["stop"]  # no tag: msgspec takes what lacks the only tag that there is
+    type: Literal["stop"]  # no tag: msgspec accepts a message that lacks the only possible tag
     reason: object = ""
     press: object = ""
 
 
 CHANNELS: dict[ChannelName, tuple[type[ClientMessage], ...]] = {
-    "control": (Command, Rest, Report, Ping, Stop),  # a stop is never turned away for the channel it took
+    "control": (Command, Rest, Report, Ping, Stop),  # a stop is accepted on every channel
     "session": (SeatRequest, SeatGrant, SeatDecline, SeatTake, SeatRelease, SilenceStops, Rename, Note, Stop),
     "stop": (Stop, Reset),
 }
 
-# Where one line carries all channels, the kind says which it is; a stop is for `stop`, the last that takes it.
+# On a line, which carries all channels, the kind of a message tells its channel; a stop is for `stop`, the last here.
 CHANNEL_OF: dict[type[ClientMessage], ChannelName] = {kind: name for name in CHANNELS for kind in CHANNELS[name]}
 
 _any_stop = msgspec.json.Decoder(_AnyStop)
@@ -58,10 +58,10 @@ MAX_MESSAGE = 16 * 1024  # bytes; a report of 32 streams is the largest, about 7
 
 
 def channel_name(label: str) -> ChannelName:
-    """The channel with this label.
+    """Return the channel with this label.
 
     Raises:
-        UnknownChannel: we have no such channel.
+        UnknownChannel: there is no such channel.
     """
     for name in CHANNELS:
         if label == name:
@@ -74,7 +74,7 @@ def channel_of(message: ClientMessage) -> ChannelName:
 
 
 def parse_message(channel: ChannelName | None, data: object) -> ClientMessage:
-    """What a client sent on `channel`; None: on a line, which carries all of them.
+    """Parse a client's message on `channel`; None: on a line, which carries all channels.
 
     Raises:
         BinaryMessage: not text.
@@ -96,7 +96,7 @@ def parse_message(channel: ChannelName | None, data: object) -> ClientMessage:
 
 
 def stop_in(data: object) -> Stop | None:
-    """The stop in what `parse_message` refuses. What says that it is a stop is one, whatever else is wrong with it."""
+    """Return the stop in a message that `parse_message` refuses: any message of type stop, whatever its faults."""
     if not isinstance(data, str | bytes) or len(data) > MAX_MESSAGE:
         return None
     try:
@@ -107,7 +107,7 @@ def stop_in(data: object) -> Stop | None:
 
 
 def _stop_in_text_cut_short(data: str | bytes) -> Stop | None:
-    """JSON with half of a surrogate pair in it, as of text that was cut within an emoji."""
+    """Parse JSON with half of a surrogate pair in it, as in text that was cut within an emoji."""
     try:
         found = msgspec.convert(_whole(json.loads(data)), _AnyStop)
     except (ValueError, RecursionError):
@@ -116,7 +116,7 @@ def _stop_in_text_cut_short(data: str | bytes) -> Stop | None:
 
 
 def _whole(value: object) -> object:
-    """Without halves of surrogate pairs in the texts of an object."""
+    """Return an object without halves of surrogate pairs in its texts."""
     if not isinstance(value, dict):
         return value
     return {
@@ -125,7 +125,7 @@ def _whole(value: object) -> object:
 
 
 class MessageBudget:
-    """Token bucket: how many messages one peer may send. Stop messages do not ask."""
+    """Token bucket for the messages of one peer. Stop messages are exempt."""
 
     def __init__(self, rate: float, now: float) -> None:
         self._rate = rate
@@ -133,7 +133,7 @@ class MessageBudget:
         self._at = now
 
     def spend(self, now: float) -> None:
-        """Raises Flood when more than `rate` messages a second come, after a burst of as many."""
+        """Count a message. Raises Flood when more than `rate` messages a second come, after a burst of as many."""
         self._level = min(self._rate, self._level + (now - self._at) * self._rate)
         self._at = now
         if self._level < 1:

@@ -1,10 +1,9 @@
-"""Feedback to everyone: whoever drives at once, others who may drive in slices, observers at a bounded rate besides.
+"""Sends feedback: to the driver at once, to others who may drive in slices, to observers also at a bounded rate.
 
-Whoever does not drive gets the newest only.
+All but the driver get only the newest. The more observers there are, the less often each is served, down to half the
+rate.
 
-The more observers there are, the less often each is served, down to half the rate.
-
-`FeedbackPace` says when; `FeedbackFanout` sends. Sending to a peer costs a fraction of a millisecond in Python, so a
+`FeedbackPace` times it; `FeedbackFanout` sends. Sending to a peer costs a fraction of a millisecond in Python, so a
 hundred peers are served in small slices, and the operator's commands are handled between them.
 """
 
@@ -22,13 +21,13 @@ LEAST_RATE = 0.5  # of the full rate
 
 
 class FeedbackReceiver(Protocol):
-    """What the fan-out needs of a peer."""
+    """The part of a peer that the fan-out needs."""
 
     def send_feedback(self, text: str) -> None: ...
 
 
 class FeedbackPace:
-    """When the observers get the newest feedback: at most `rate` times a second. No I/O."""
+    """Paces the newest feedback to the observers: at most `rate` times a second. No I/O."""
 
     def __init__(self, rate: float) -> None:
         self._shortest = 1 / rate
@@ -40,15 +39,15 @@ class FeedbackPace:
         self._newest = text
 
     def share(self, observers: int) -> None:
-        """So many share the rate."""
+        """Set the number of observers that share the rate."""
         self._interval = self._shortest / max(LEAST_RATE, min(1.0, FULL_RATE / max(1, observers)))
 
     def wait(self, now: float) -> float | None:
-        """Seconds until something is due; None when nothing waits."""
+        """Return the seconds until something is due; None if nothing waits."""
         return None if self._newest is None else max(0.0, self._next_at - now)
 
     def take(self, now: float) -> str | None:
-        """The newest feedback if it is due, else None."""
+        """Return the newest feedback if it is due, else None."""
         if self._newest is None or now < self._next_at:
             return None
         text, self._newest = self._newest, None
@@ -68,7 +67,7 @@ class FeedbackFanout:
         operators: Callable[[], Sequence[FeedbackReceiver]],
         observers: Callable[[], Sequence[FeedbackReceiver]],
     ) -> None:
-        """`drives`: whether this one of the `operators` does; one link may have a hundred of them that do not."""
+        """`drives` returns whether one of the `operators` drives; one link may have a hundred that do not."""
         self._pace = FeedbackPace(rate)
         self._drives = drives
         self._operators = operators
@@ -76,7 +75,7 @@ class FeedbackFanout:
         self._offered = asyncio.Event()
         self._newest = ""
         self._behind: dict[FeedbackReceiver, None] = {}  # operators that have not got the newest yet, in order
-        self._asked = False  # for a turn
+        self._asked = False  # True while a turn of the loop is requested
 
     def publish(self, text: str) -> None:
         self._newest = text

@@ -1,4 +1,4 @@
-"""One peer: what it may say, its heartbeat, its end. `WebRtcPeer` and `WebSocketPeer` are the two ways it comes."""
+"""One peer: its messages, its heartbeat, its end. `WebRtcPeer` and `WebSocketPeer` are its two transports."""
 
 import asyncio
 import secrets
@@ -80,7 +80,7 @@ class PeerStreams(Protocol):
 
 
 class PeerHost(Protocol):
-    """Whom a peer reports to. All are called on the loop and return at once."""
+    """Takes the reports of peers. All methods are called on the loop and return at once."""
 
     def channel_opened(self, peer: "Peer", channel: ChannelName) -> None: ...
     def message_received(self, peer: "Peer", channel: ChannelName, message: ClientMessage) -> None: ...
@@ -90,7 +90,7 @@ class PeerHost(Protocol):
 
 
 class MessageWriter(Protocol):
-    """One way to the remote, which never waits."""
+    """Writes to the remote without ever waiting."""
 
     @property
     def lost(self) -> int:
@@ -104,8 +104,8 @@ class MessageWriter(Protocol):
 class Peer(ABC):
     """A session: await `run`; it returns when the peer has ended and everything of it is closed.
 
-    `end` asks for the end from outside, with the reason that logs and metrics show. Whatever serving it raises ends it
-    alone: `failed` is told of the stage, and nothing comes out of what others call.
+    `end` ends it from outside, with the reason that logs and metrics show. An exception while it is served ends it
+    alone: `failed` is told of the stage, and methods that others call raise nothing.
     """
 
     def __init__(
@@ -118,17 +118,17 @@ class Peer(ABC):
         connect_seconds: float | None = None,
         silence_seconds: float | None = None,
     ) -> None:
-        """The last two instead of the limits' own."""
-        self.id = secrets.token_hex(4)  # public: the others see it
+        """`connect_seconds` and `silence_seconds` replace the limits' values."""
+        self.id = secrets.token_hex(4)  # public: others see it
         self.identity = identity
         self.wanted_name = clean_name(identity.name, identity.role)
-        self.name = ""  # what others see; `PeerRegistry` gives it
+        self.name = ""  # shown to others; `PeerRegistry` sets it
         self.report = Report()  # newest
         self._quality: Quality | None = None  # newest
-        self.ended = ""  # why; "" while it lives
+        self.ended = ""  # reason; "" while it lives
         self._has_failed = False
         self.silenced = False  # a supervisor has silenced the stops of its link
-        self.thumbnail = False  # a small picture on somebody's overview, not somebody who takes part
+        self.thumbnail = False  # a small picture on somebody's overview, not a participant
         self.relay = ""  # the relay that it watches through; "": media and feedback come from here
         self._media = media
         self._host = host
@@ -139,7 +139,7 @@ class Peer(ABC):
         rate = limits.max_observer_rate if identity.role == "observer" else limits.max_message_rate
         self._budget = MessageBudget(rate, self._loop.time())
         self._patience = RateLimits(FORGIVEN_RATE, limits.max_bad_messages)
-        self.asks = TokenBucket(ASK_RATE, ASK_BURST, self._loop.time())  # for what concerns everybody
+        self.asks = TokenBucket(ASK_RATE, ASK_BURST, self._loop.time())  # of requests that concern everybody
         self._answers = RepeatReplyLimiter()
         self._heard_at = self._loop.time()
         self._connected = asyncio.Event()
@@ -149,7 +149,7 @@ class Peer(ABC):
 
     @property
     def connected(self) -> bool:
-        """It was, at least once."""
+        """True if it was connected at least once."""
         return self._connected.is_set()
 
     @property
@@ -162,7 +162,7 @@ class Peer(ABC):
 
     @property
     def voice(self) -> str:
-        """The media section in which its voice is taken; "" when it is not."""
+        """The media section in which its voice is taken; "" if its voice is not taken."""
         return self._media.voice
 
     async def run(self) -> None:
@@ -175,7 +175,7 @@ class Peer(ABC):
             await self._close()
 
     def end(self, why: str) -> None:
-        """Only the first reason counts."""
+        """End the peer. Only the first reason counts."""
         if not self.ended:
             self.ended = why
             self._end.set()
@@ -184,7 +184,7 @@ class Peer(ABC):
                 self._host.peer_ended(self)
 
     def failed(self, stage: str, error: Exception) -> None:
-        """Something of ours raised `error` while this peer was served: it ends. Only the first is told."""
+        """End the peer, since serving it raised `error`. Only the first error is reported."""
         if not self._has_failed:
             self._has_failed = True
             self._host.peer_failed(self, stage, error)
@@ -192,7 +192,7 @@ class Peer(ABC):
 
     @contextmanager
     def contained(self, stage: str) -> Iterator[None]:
-        """What is raised in it ends this peer, and nothing else."""
+        """Let exceptions of the block end this peer, and nothing else."""
         try:
             yield
         except Exception as error:
@@ -200,7 +200,7 @@ class Peer(ABC):
 
     @property
     def actor(self) -> Actor:
-        """For the audit."""
+        """This peer, for the audit."""
         return Actor(self.name, self.role, self.id, self.identity.token_id)
 
     def rename(self, name: str) -> None:
@@ -211,7 +211,7 @@ class Peer(ABC):
             self.send_text(channel, encode_console_message(message))
 
     def send_text(self, channel: ChannelName, text: str) -> None:
-        """Ignored while the channel is not open: a newcomer is told everything when it opens. So is who has ended."""
+        """Send unless the peer has ended or the channel is not open: a newcomer is told everything when it opens."""
         if channel in self._writers and not self.ended:
             with self.contained("message out"):
                 self._writers[channel].send(text)
@@ -223,11 +223,11 @@ class Peer(ABC):
 
     @property
     def round_trip(self) -> float:
-        """Seconds, of RTCP; 0 before the first that was measured."""
+        """Round trip time by RTCP, in seconds; 0 before the first measurement."""
         return (self._media.round_trip_ms or 0.0) / 1000
 
     def may_be_answered_again(self) -> bool:
-        """Whether a repeat of its command is answered now; if so, it counts."""
+        """Return whether a repeat of its command is answered now; if so, count it."""
         return self._answers.allows(self._loop.time(), queues=self._media.queues)
 
     def participant(self) -> Participant:
@@ -246,7 +246,7 @@ class Peer(ABC):
         )
 
     def drives(self, holds_seat: bool) -> None:
-        """Whether it holds the control seat: its media come first then."""
+        """Note whether it holds the control seat: if so, its media come first."""
         with self.contained("media"):
             self._media.drives(holds_seat)
 
@@ -255,7 +255,7 @@ class Peer(ABC):
         self.send("session", quality)
 
     def dropped(self) -> int:
-        """Messages that did not fit."""
+        """Return the number of messages that did not fit."""
         return sum(writer.lost for writer in set(self._writers.values()))
 
     async def _wait_until_connected(self) -> None:
@@ -281,7 +281,7 @@ class Peer(ABC):
             self.end("silent")
 
     async def abandon(self) -> None:
-        """Instead of `run`: it was never admitted."""
+        """Close a peer that was never admitted. Call it instead of `run`."""
         await self._close()
 
     async def _close(self) -> None:
@@ -293,7 +293,7 @@ class Peer(ABC):
         except TimeoutError:
             log.warning("peer did not close in time", peer=self.id)
 
-    # what the two ways say
+    # Called by the transports
 
     @abstractmethod
     async def _close_transport(self) -> None: ...
@@ -303,7 +303,7 @@ class Peer(ABC):
         self._connected.set()
 
     def _open(self, channel: ChannelName, writer: MessageWriter) -> None:
-        """From now on the remote can be told things."""
+        """Send to the remote on `channel` with `writer` from now on."""
         self._writers[channel] = writer
         with self.contained("channel"):
             self._host.channel_opened(self, channel)
@@ -311,7 +311,7 @@ class Peer(ABC):
                 self.send("session", self._quality)
 
     def _received(self, channel: ChannelName | None, data: object) -> None:
-        """`channel`: None where one way carries all. Only a valid message counts as life."""
+        """Take a message. `channel`: None on a line, which carries all. Only a valid message is a sign of life."""
         if not self.ended:
             with self.contained("message in"):
                 self._take(channel, data)
@@ -350,7 +350,10 @@ class Peer(ABC):
         return message
 
     def transport_refused(self, name: str) -> None:
-        """What came was more than fits, below the messages. SCTP and TCP cannot leave one out."""
+        """End the peer: a transport below the messages received more than it can hold.
+
+        SCTP and TCP cannot leave a message out.
+        """
         self._host.input_refused(self, "transport", TransportRefused(name))
         self.end("too much")
 

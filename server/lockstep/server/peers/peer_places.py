@@ -1,23 +1,23 @@
-"""Who gets one of the places for peers. No I/O."""
+"""Decides which peers get a place. No I/O."""
 
 from lockstep.protocol.console import Role
 from lockstep.server.errors import TooManyPeers
 
 __all__ = ["RESERVED_FOR_LINK", "check_place"]
 
-LINK_SHARE = 3, 4  # of the places for observers, that one link may have
-RESERVED_FOR_LINK = 2  # of the last places, that one link may have: a page, and a program or another page
+LINK_SHARE = 3, 4  # share of the observers' places that one link may have
+RESERVED_FOR_LINK = 2  # of the last places one link may have these: a page, and a program or another page
 
 
 def check_place(role: Role, held: int, taken: int, bound: int, reserved: int) -> None:
-    """Raises TooManyPeers unless there is a place for one more.
+    """Raise TooManyPeers unless there is a place for one more peer.
 
-    The last `reserved` places are not for observers, and of these one is for a supervisor. One link cannot take all.
+    The last `reserved` places are not for observers, and one of them is for a supervisor. One link cannot take all.
 
     Args:
-        held: places that its link has already, at most `taken`
-        taken: by everybody
-        bound: places that there are
+        held: places that the peer's link has already, at most `taken`
+        taken: places that all links have already
+        bound: number of places
     """
     usual = max(1, bound - reserved)
     limit = usual if role == "observer" else bound - 1 if role == "operator" and reserved > 1 else bound

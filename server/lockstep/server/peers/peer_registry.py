@@ -1,4 +1,4 @@
-"""The peers that are connected: admitted, told, seen off."""
+"""The connected peers: admits them, sends to them, ends them."""
 
 import asyncio
 from collections import Counter
@@ -54,7 +54,7 @@ class PeerRegistry:
         joined: Callable[[Peer], None],
         told: Callable[[ServerMessage], None] = lambda message: None,
     ) -> None:
-        """`joined` is called with newcomers, `told` with what everyone is told."""
+        """`joined` is called with newcomers, `told` with messages to everyone."""
         self._limits = limits
         self._joined = joined
         self._told = told
@@ -62,9 +62,9 @@ class PeerRegistry:
         self._sessions: dict[Peer, asyncio.Task[None]] = {}
         self._reserved: Counter[str] = Counter()  # places of peers that are being negotiated, by token
         self._closing = False
-        self.ended = 0  # connections, ever
+        self.ended = 0  # connections so far that have ended
         self.relays: list[FeedbackReceiver] = []
-        self.turns = FairQueue()  # in which watchers are written to
+        self.turns = FairQueue()  # order of the writes to watchers
         self.further_bounds: list[Callable[[Identity], None]] = []  # raise TooManyPeers where there is no place
 
     def __iter__(self) -> Iterator[Peer]:
@@ -75,30 +75,30 @@ class PeerRegistry:
 
     @property
     def taken(self) -> int:
-        """Places that are taken by peers that get media from here, and by those that are being negotiated."""
+        """Places of peers that get media from here, and of peers that are being negotiated."""
         return sum(not peer.relay for peer in self._sessions) + self._reserved.total()
 
     def taken_by(self, token_id: str) -> int:
-        """Of the `taken` places, those of one link."""
+        """Return the number of `taken` places that one link has."""
         here = sum(not peer.relay and peer.identity.token_id == token_id for peer in self._sessions)
         return here + self._reserved[token_id]
 
     @property
     def thumbnails(self) -> int:
-        """Of these, small pictures on somebody's overview: no participants."""
+        """Number of peers that are small pictures on somebody's overview, not participants."""
         return sum(peer.thumbnail for peer in self._sessions)
 
     def drivers(self) -> list[Peer]:
-        """Those whose role may drive."""
+        """Return the peers whose role may drive."""
         return [peer for peer in self._sessions if peer.role != "observer"]
 
     def observers(self) -> list[FeedbackReceiver]:
-        """Those that get feedback from here: a relay gets it once for all who watch through it."""
+        """Return the observers that get feedback from here; a relay gets it once for all of its watchers."""
         here = [peer for peer in self._sessions if peer.role == "observer" and not peer.relay]
         return [*self.relays, *here]
 
     def settle_names(self) -> list[Peer]:
-        """Give everyone the name they asked for, or that with a number; those whose name changed."""
+        """Give everyone the name they asked for, or that with a number. Return the peers whose name changed."""
         people = [peer for peer in self._sessions if not peer.thumbnail]
         names = unique_names([(peer.wanted_name, peer.name) for peer in people])
         changed = []
@@ -110,15 +110,15 @@ class PeerRegistry:
 
     @contextmanager
     def place(self, identity: Identity, *, relayed: bool = False, thumbnail: bool = False) -> Iterator[None]:
-        """Keeps a place while a peer is being negotiated; `check_place` says who gets one.
+        """Keep a place while a peer is being negotiated; `check_place` decides which peers get a place.
 
-        `relayed`: it has its media from a relay; such peers cost little, and are counted by themselves; as are those
+        `relayed`: the peer gets its media from a relay. Such peers cost little and are counted separately, as are peers
         that get a `thumbnail`.
 
         Raises:
             TooManyPeers: there is no place for this link.
-            TooManyRequests: so many peers of this link have not connected yet.
-            ShuttingDown: the console ends.
+            TooManyRequests: too many peers of this link have not connected yet.
+            ShuttingDown: the console is shutting down.
         """
         if self._closing:
             raise ShuttingDown("the console is shutting down")
@@ -154,28 +154,28 @@ class PeerRegistry:
         return next((peer for peer in self._sessions if peer.id == peer_id), None)
 
     def by_resource(self, resource: str) -> WebRtcPeer:
-        """Raises NotFound when no peer has this WHEP resource."""
+        """Return the peer with this WHEP resource. Raises NotFound if there is no such peer."""
         for peer in self._sessions:
             if isinstance(peer, WebRtcPeer) and peer.resource == resource:
                 return peer
         raise NotFound("no such WHEP resource")
 
     def by_ticket(self, ticket: str) -> WebSocketPeer:
-        """Raises NotFound when nobody is waited for with this ticket."""
+        """Return the peer that waits for this ticket. Raises NotFound if there is no such peer."""
         for peer in self._sessions:
             if isinstance(peer, WebSocketPeer) and not peer.ended and peer.ticket == ticket != "":
                 return peer
         raise NotFound("no such ticket")
 
     def tell(self, channel: ChannelName, message: ServerMessage) -> None:
-        """Everyone."""
+        """Send a message to everyone."""
         text = encode_console_message(message)
         for peer in self._sessions:
             peer.send_text(channel, text)
         self._told(message)
 
     def participants(self) -> Participants:
-        """Those who may drive first. In a crowd only they come with measured values: the list changes less often."""
+        """Return all, those who may drive first. In a crowd only they have measured values: the list changes less."""
         people = [peer for peer in self._sessions if not peer.thumbnail]
         found = []
         for peer in people:
@@ -193,12 +193,12 @@ class PeerRegistry:
             peer.end(why)
 
     async def all_gone(self) -> None:
-        """Returns when those who are here now have left."""
+        """Wait until the peers that are here now have left."""
         if self._sessions:
             await asyncio.wait(self._sessions.values())
 
     async def close(self) -> None:
-        """No more peers; the ones here end. Idempotent."""
+        """Admit no more peers and end those that are here. Idempotent."""
         self._closing = True
         self.end_all("shutdown")
         try:

@@ -1,4 +1,4 @@
-"""Ends what a link gave when the link ends: peers at once, viewers of the 3D scene too."""
+"""Ends the peers of a link at once when the link ends, and its viewers of the 3D scene too."""
 
 import asyncio
 from collections.abc import Callable
@@ -11,13 +11,13 @@ from lockstep.server.peers.peer_registry import PeerRegistry
 
 __all__ = ["UNKNOWN_SECONDS", "TokenRevocation"]
 
-# For how long who is here may stay while nobody can know which links are revoked. Newcomers are refused at once; a disk
-# that is away for a moment should not take the robot out of somebody's hands.
+# Connected peers may stay this long while the list of revoked links cannot be read. Newcomers are refused at once; a
+# disk that is away for a moment should not take the robot out of somebody's hands.
 UNKNOWN_SECONDS = 10.0
 
 
 class TokenRevocation:
-    """Of one robot. The house calls `enforce`."""
+    """Ends access to one robot. The console context calls `enforce`."""
 
     def __init__(
         self,
@@ -27,17 +27,17 @@ class TokenRevocation:
         robot: str = "",
         show_silence: Callable[[], None] = lambda: None,
     ) -> None:
-        """`show_silence`: called at every look; tells peers whether their stops are silenced."""
+        """`show_silence` is called by every `enforce`; it tells peers whether their stops are silenced."""
         self.peers = peers
         self._show_silence = show_silence
         self._audit = audit
         self._invitations = invitations
         self._robot = robot
-        self._looked = asyncio.Event()  # replaced at every look
+        self._looked = asyncio.Event()  # replaced by every `enforce`
         self._trouble_since: float | None = None
 
     def enforce(self, changed: list[Invitation], by: Actor, now: float) -> None:
-        """Act on what `by` has invited or revoked, and on what has expired. `now` is s since 1970."""
+        """Act on links that `by` has made or revoked, and on links that have expired. `now` is s since 1970."""
         for each in changed:
             if each.concerns(self._robot):
                 kind: AuditKind = "invitation" if each.revoked_at is None else "revocation"
@@ -55,18 +55,18 @@ class TokenRevocation:
         self._looked = asyncio.Event()
 
     def silence_ended(self, link: str) -> None:
-        """The stops of this link are heard again, by themselves."""
+        """Record that the silence of this link's stops has run out."""
         self._audit.record("silence", what="ended", detail=link)
 
     async def ended(self, link: str, expires: float) -> None:
-        """Returns when the link with this id is revoked or has expired, at the next look at the latest."""
+        """Wait until the link with this id is revoked or has expired; return at the next `enforce` at the latest."""
         while not self._invitations.has_ended(link, expires):
             if self._unknown_for(self._invitations.now()) > UNKNOWN_SECONDS:
                 return
             await self._looked.wait()
 
     def _unknown_for(self, now: float) -> float:
-        """How long nobody has known which links are revoked, in s."""
+        """Return the seconds for which the list of revoked links could not be read."""
         if not self._invitations.trouble:
             self._trouble_since = None
             return 0.0

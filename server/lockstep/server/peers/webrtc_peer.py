@@ -22,7 +22,7 @@ from lockstep.server.webrtc.ice_session import IceSession
 __all__ = ["WebRtcPeer"]
 
 MAX_REQUESTS = 10.0  # Hz, of candidates and ICE restarts, after a burst of as many
-# Why a connection ends; all other reasons of `PeerEnded` are "connection closed".
+# Reasons of `PeerEnded`, as the console reports them; all others are "connection closed".
 ENDS = {
     "consent_expired": "consent expired",
     "no_path": "connection failed",
@@ -36,7 +36,7 @@ ORDINARY = ("closed", "aborted", "peer_closed", "peer_aborted")
 
 
 class PeerMediaStreams(PeerStreams, Protocol):
-    """The media that it gets, as far as its connection has something to tell."""
+    """The media that a WebRTC peer gets; takes events of the connection too."""
 
     def connected(self) -> None: ...
     def heard(self, mid: str, event: StreamEvent) -> None: ...
@@ -74,13 +74,13 @@ class WebRtcPeer(Peer):
             raise TooManyRequests(f"more than {MAX_REQUESTS:g} requests a second for one session") from error
 
     def agree_on(self, channels: Sequence[AgreedChannel]) -> None:
-        """Data channels that open with the association, without a message that says so."""
+        """Open data channels together with the association, without a message that opens them."""
         for each in channels:
             reliability = Reliability(ordered=each.ordered, max_retransmits=each.max_retransmits)
             self._connection.peer.open_negotiated_channel(each.id, each.name, reliability=reliability)
 
     def heard(self, event: PeerEvent) -> None:
-        """An event of its connection."""
+        """Take an event of its connection."""
         if isinstance(event, PeerEnded):
             if self._connection.fault is not None:
                 self.failed("connection", self._connection.fault)
@@ -119,7 +119,7 @@ class WebRtcPeer(Peer):
             self.transport_refused(event.reason)
 
     def _channel_closed(self) -> None:
-        """By the peer; or with the association, for a reason."""
+        """End the peer: it closed the channel, or the association ended for a reason."""
         channels = self._connection.peer.channels
         closed = None if channels is None else channels.closed
         if closed is None or closed.reason in ORDINARY:

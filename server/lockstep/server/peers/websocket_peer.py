@@ -1,7 +1,7 @@
-"""An observer that watches through a relay: it speaks with the console by its line, one WebSocket for all channels.
+"""An observer that watches through a relay: it talks to the console over its line, one WebSocket for all channels.
 
-A line costs nothing while nobody says anything. What it says is what data channels would carry; the kind of a message
-says which channel it is for.
+An idle line costs nothing. It carries the messages that data channels would carry; the kind of a message tells its
+channel.
 """
 
 import asyncio
@@ -20,8 +20,8 @@ from lockstep.server.util.fair_queue import FairQueue
 __all__ = ["TICKET_SECONDS", "Line", "LineEnded", "WebSocketPeer", "close_code"]
 
 TICKET_SECONDS = 10.0  # from the answer with the ticket to the line
-BEATS = 2.0  # silence of a watcher against that of others: it reports every 15 s, and one report may be late
-READ_SECONDS = 10.0  # that one message may wait for a remote that does not read
+BEATS = 2.0  # factor of the silence allowed to others: a watcher reports every 15 s, and one report may be late
+READ_SECONDS = 10.0  # one message may wait this long for a remote that does not read
 GOODBYE_SECONDS = 1.0
 
 # RFC 6455 7.4.1 and the IANA registry
@@ -40,7 +40,7 @@ CLOSE_CODES = {
 
 
 class LineEnded(Exception):
-    """The line is gone. `code`: the reason as a WebSocket says it."""
+    """The line is gone. `code` is the close code of the WebSocket."""
 
     def __init__(self, code: int) -> None:
         super().__init__(code)
@@ -51,25 +51,25 @@ class Line(Protocol):
     """One WebSocket; its messages are text."""
 
     async def receive(self) -> str | bytes:
-        """Raises LineEnded."""
+        """Wait for the next message. Raises LineEnded."""
         ...
 
     async def send(self, text: str) -> None:
-        """Waits while the remote does not read. Raises LineEnded."""
+        """Send a message; wait while the remote does not read. Raises LineEnded."""
         ...
 
     async def close(self, code: int, reason: str) -> None: ...
 
 
 class WebSocketPeer(Peer):
-    """As every peer it runs from its admission on; whoever brings its ticket in time calls `serve`.
+    """Runs from its admission on, as every peer does; the request that brings its ticket in time calls `serve`.
 
     Attributes:
-        ticket: secret, good for one line: who takes it makes it ""
+        ticket: secret, good for one line: the request that uses it sets it to ""
     """
 
     def __init__(self, relay: str, identity: Identity, host: PeerHost, limits: PeerLimits, turns: FairQueue) -> None:
-        """`turns`: in which all watchers are written to, so that what everyone is told is told between commands."""
+        """`turns` orders the writes to all watchers, so that commands are handled between the copies of a broadcast."""
         super().__init__(
             _NoMedia(),
             identity,
@@ -122,26 +122,26 @@ class WebSocketPeer(Peer):
         except TimeoutError:
             self.end("does not read")
         except LineEnded:
-            return  # heard as well
+            return  # `_hear` ends the peer
 
     async def _hang_up(self, line: Line) -> None:
         try:
             async with asyncio.timeout(GOODBYE_SECONDS):
                 await line.close(close_code(self.ended), self.ended)
         except (TimeoutError, LineEnded):
-            return  # who serves the line drops it
+            return  # the server of the line drops it
 
     async def _close_transport(self) -> None:
-        """`serve` closes it."""
+        """Do nothing: `serve` closes the line."""
 
 
 def close_code(why: str) -> int:
-    """How a WebSocket says why a peer ended."""
+    """Return the close code for the reason that a peer ended."""
     return CLOSE_CODES.get(why, NORMAL)
 
 
 class _LineWriter:
-    """What waits to be sent, bounded as for a data channel."""
+    """Messages that wait to be sent, bounded as for a data channel."""
 
     def __init__(self) -> None:
         self._outbox = ChannelQueue()
@@ -167,7 +167,7 @@ class _LineWriter:
 
 
 class _NoMedia:
-    """They come from the relay."""
+    """No media from the console: they come from the relay."""
 
     voice = ""
     tier: Tier | None = None

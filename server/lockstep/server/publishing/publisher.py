@@ -1,4 +1,4 @@
-"""One publisher: somebody's connection by WHIP, from its answer to its end."""
+"""One publisher: a client's connection by WHIP, from its answer to its end."""
 
 import asyncio
 import secrets
@@ -37,9 +37,9 @@ COMMAND = (sys.executable, "-m", "lockstep.server.media.published.decoder_proces
 MAX_REQUESTS = 10.0  # Hz, of candidates and ICE restarts, after a burst of as many
 LOOK_SECONDS = 0.05  # between two looks at what is missing
 STALLED_SECONDS = 3.0  # without a picture; then the page says so
-MOST_BPS = 6_000_000  # that a publisher is asked not to exceed
-MOST_FLOODED = 10_000  # packets beyond every budget, then it ends
-ENDS = {"consent_expired": "consent expired", "no_path": "connection failed"}  # why a connection ends
+MOST_BPS = 6_000_000  # bit rate that a publisher is asked not to exceed
+MOST_FLOODED = 10_000  # packets beyond every budget; then it ends
+ENDS = {"consent_expired": "consent expired", "no_path": "connection failed"}  # reasons that a connection ends
 
 PacketOutcome = Literal["lost", "malformed", "foreign", "flooded", "not_decoded"]
 
@@ -56,11 +56,11 @@ class PublisherLimits(Protocol):
 class Publisher:
     """Await `run`; it returns when the publication has ended and everything of it is closed. `end` asks for that.
 
-    What it sends can end it, and nothing else: its pictures are decoded in a process of its own.
+    Its packets can end it, and nothing else: its pictures are decoded in a separate process.
 
     Attributes:
-        resource: secret: the path of the WHIP session
-        ended: why; "" while it lives
+        resource: secret path of the WHIP session
+        ended: reason of the end; "" while it lives
         ice: its ICE session; set by `receives`
     """
 
@@ -83,28 +83,28 @@ class Publisher:
         self._mid = ""  # of the section in which its pictures come
         self._ssrc: int | None = None  # of its pictures; None before the first packet
         self._foreign = 0  # packets of another source
-        self._fault: Exception | None = None  # what handling its packets has raised
+        self._fault: Exception | None = None  # exception from handling its packets
         self._decoder = ReaderProcess(camera.spec.name, COMMAND, self._decoded, None)
-        self._shown_at = time.monotonic()  # when the last picture came, or the publication began
+        self._shown_at = time.monotonic()  # time of the last picture, or of the publication's begin
         self._not_decoded = 0
 
     @property
     def actor(self) -> Actor:
-        """For the audit."""
+        """This publisher, for the audit."""
         return Actor(self.name, self.identity.role, self.id, self.identity.token_id)
 
     @property
     def stalled(self) -> bool:
-        """Whether no picture came for a while; the same link may then publish anew."""
+        """True if no picture came for a while; the same link may then publish anew."""
         return time.monotonic() - self._shown_at > STALLED_SECONDS
 
     @property
     def path_seconds(self) -> float | None:
-        """By how much more its pictures are taken to be old than its camera's latency says."""
+        """The age that its pictures are taken to have beyond its camera's latency."""
         return None if self._incoming is None else self._incoming.path.seconds(time.monotonic())
 
     def counts(self) -> dict[PacketOutcome, int]:
-        """What came and could not be used, since the start."""
+        """Return the counts of packets and pictures that could not be used, since the start."""
         incoming = self._incoming
         return {
             "lost": 0 if incoming is None else incoming.lost,
@@ -122,20 +122,20 @@ class Publisher:
             raise TooManyRequests(f"more than {MAX_REQUESTS:g} requests a second for one session") from error
 
     def end(self, why: str) -> None:
-        """Only the first reason counts."""
+        """End the publication. Only the first reason counts."""
         if not self.ended:
             self.ended = why
             self._end.set()
 
     def receives(self, connection: Connection, username: str, mid: str, codec: PictureCodec) -> None:
-        """Its pictures come in this section. Call once, with the answer; `username` is of the offer."""
+        """Take its pictures from section `mid`. Call once, with the answer; `username` is of the offer."""
         self._connection, self._mid = connection, mid
         self._incoming = IncomingPictures(codec, self.camera.spec.latency, time.monotonic())
         self.ice = IceSession(connection, username)
         connection.limit(mid, MOST_BPS)
 
     def heard(self, event: PeerEvent) -> None:
-        """An event of its connection."""
+        """Take an event of its connection."""
         try:
             self._take(event)
         except Exception as error:
@@ -165,7 +165,7 @@ class Publisher:
         self._pass_on(self._incoming.take(taken, time.monotonic()))
 
     def _round_trip(self, seconds: float) -> None:
-        """One was measured on its path."""
+        """Take a round trip that was measured on its path."""
         if self._incoming is not None and self._connection is not None:
             self._incoming.path.observe(seconds, time.monotonic())
             self._connection.peer.note_round_trip(seconds)
@@ -183,7 +183,7 @@ class Publisher:
         return incoming.flooded + connection.counts["receive_overflow"]
 
     async def run(self, link_ended: Callable[[], Awaitable[None]]) -> None:
-        """`link_ended` returns when its link is good no more."""
+        """Run until its end. `link_ended` returns when its link is no longer valid."""
         structlog.contextvars.bind_contextvars(peer=self.id)
         try:
             async with asyncio.TaskGroup() as tasks:
@@ -205,12 +205,12 @@ class Publisher:
             raise self._fault
 
     def close(self) -> None:
-        """Its connection. Instead of `run` where it was never admitted."""
+        """Close its connection. Call it instead of `run` if it was never admitted."""
         if self._connection is not None:
             self._connection.close()
 
     async def _decode(self) -> None:
-        await self._connected.wait()  # who never connects costs no process
+        await self._connected.wait()  # a client that never connects costs no process
         why = await self._decoder.run(msgspec.json.encode(self.camera.spec) + b"\n")
         self.end(f"decoder {why}")
 
@@ -226,7 +226,7 @@ class Publisher:
             self.end("never connected")
 
     async def _look(self) -> None:
-        """Give up what does not come, ask for keyframes, and see whether anything still comes."""
+        """Give up missing packets, ask for keyframes, and check for silence."""
         await self._connected.wait()
         self._shown_at = time.monotonic()
         while self._incoming is not None and self._connection is not None:

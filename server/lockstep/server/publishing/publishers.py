@@ -1,4 +1,4 @@
-"""Who publishes cameras now: at most one for each camera, and one camera for each link."""
+"""The present publishers of cameras: at most one for each camera, and one camera for each link."""
 
 import asyncio
 from collections.abc import Awaitable, Callable, Iterator, Sequence
@@ -18,7 +18,7 @@ __all__ = ["Publishers"]
 
 log = structlog.get_logger(__name__)
 
-MOST_CLOSING = 4  # publications that have ended, and whose connections and processes have not yet
+MOST_CLOSING = 4  # ended publications whose connections and processes still end
 WORDS = {
     "deleted": "its publisher has left",
     "link ended": "its publisher's link has ended",
@@ -28,11 +28,11 @@ WORDS = {
     "too much": "its publisher sent too much",
     "replaced": "its publisher begins anew",
 }
-LinkEnded = Callable[[str, float], Awaitable[None]]  # id of the link, and when it expires
+LinkEnded = Callable[[str, float], Awaitable[None]]  # id of the link, and the time of its expiry
 
 
 class Publishers:
-    """Await `run`; it ends when it is cancelled, with all publications."""
+    """Await `run`; when it is cancelled, it ends all publications."""
 
     def __init__(
         self,
@@ -42,14 +42,14 @@ class Publishers:
         faults: Faults,
         registry: CollectorRegistry,
     ) -> None:
-        """`link_ended` returns when that link is good no more."""
+        """`link_ended` returns when that link is no longer valid."""
         self._cameras = {camera.spec.name: camera for camera in cameras}
         self._link_ended = link_ended
         self._audit = audit
         self._faults = faults
         self._here: dict[Publisher, asyncio.Task[None]] = {}
-        self._reserved: dict[PublishedCamera, str] = {}  # while it is negotiated: the link
-        self._counted: dict[Publisher, dict[PacketOutcome, int]] = {}  # what the metrics know
+        self._reserved: dict[PublishedCamera, str] = {}  # links that negotiate for a camera
+        self._counted: dict[Publisher, dict[PacketOutcome, int]] = {}  # counts that the metrics have
         self._closing = False
         self._publishers = Gauge("lockstep_whip_publishers", "Publishers that are here", registry=registry)
         self._ended = Counter("lockstep_whip_ended", "Publications that ended", ["why"], registry=registry)
@@ -72,19 +72,19 @@ class Publishers:
 
     @contextmanager
     def place(self, identity: Identity, wanted: str) -> Iterator[PublishedCamera]:
-        """The camera that this link may publish, kept for it while it is negotiated.
+        """Keep a camera that this link may publish while it negotiates.
 
-        Where the same link publishes already, that has to have stalled; it ends, and its camera is published anew.
+        If the same link publishes already, that has to have stalled; it ends, and its camera is published anew.
 
         Args:
-            wanted: the name of a camera; "" is its link's own or the first that nobody publishes
+            wanted: the name of a camera; "" is that of the link, or the first that nobody publishes
 
         Raises:
             NotFound: no such camera.
             CameraTaken: somebody else publishes it.
-            AlreadyPublishing: this link publishes.
+            AlreadyPublishing: this link publishes already.
             TooManyRequests: publications end faster than they can be closed.
-            ShuttingDown: the console ends.
+            ShuttingDown: the console is shutting down.
         """
         if self._closing:
             raise ShuttingDown("the console is shutting down")
@@ -106,7 +106,7 @@ class Publishers:
             del self._reserved[camera]
 
     def _free_camera(self, wanted: str, before: Publisher | None) -> PublishedCamera:
-        """`before`: whose camera is about to be free."""
+        """Return a free camera. `before`: the publisher whose camera is about to be free."""
         taken = {each.camera for each in self._here if each is not before and not each.ended} | self._reserved.keys()
         own = "" if before is None else before.camera.spec.name
         names = [wanted] if wanted else sorted(self._cameras, key=lambda name: name != own)
@@ -116,7 +116,7 @@ class Publishers:
         return free
 
     def admit(self, publisher: Publisher) -> None:
-        """From now on it is the camera's publisher."""
+        """Make it the publisher of its camera."""
         task = asyncio.get_running_loop().create_task(self._run(publisher), name=f"publisher {publisher.id}")
         self._here[publisher] = task
         self._publishers.inc()
@@ -125,25 +125,25 @@ class Publishers:
         log.info("publisher joined", peer=publisher.id, name=publisher.name, source=publisher.camera.spec.name)
 
     def by_resource(self, resource: str) -> Publisher:
-        """Raises NotFound when there is no such WHIP session."""
+        """Return the publisher of a WHIP session. Raises NotFound if there is no such session."""
         for publisher in self._here:
             if publisher.resource == resource and not publisher.ended:
                 return publisher
         raise NotFound("no such WHIP session")
 
     def end(self, publisher: Publisher, why: str) -> None:
-        """Its camera is nobody's from now on; what is left of it is closed soon."""
+        """End a publisher: its camera is free at once; its connection and process are closed soon."""
         publisher.end(why)
         self._released(publisher)
 
     def collect(self) -> None:
-        """Bring into the metrics what is counted elsewhere."""
+        """Update the metrics from counts that are kept elsewhere."""
         for publisher in self._here:
             self._count(publisher)
             self._path.labels(publisher.camera.spec.name).set(publisher.path_seconds or 0.0)
 
     async def run(self) -> None:
-        """Until cancelled."""
+        """Run until cancelled."""
         try:
             await asyncio.Event().wait()
         finally:
@@ -154,7 +154,7 @@ class Publishers:
                 await asyncio.wait(self._here.values())
 
     def _released(self, publisher: Publisher) -> None:
-        """Its camera is nobody's from now on."""
+        """Free its camera."""
         reason = publisher.ended.replace(" ", "_")
         publisher.camera.end(publisher, reason, WORDS.get(publisher.ended, "the connection to its publisher is lost"))
 

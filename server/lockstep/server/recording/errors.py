@@ -1,4 +1,4 @@
-"""What can go wrong with recordings.
+"""Errors of recordings.
 
 RecordingError
 ├── RecordingDamaged    not a recording, or not readable to its end
@@ -10,10 +10,10 @@ __all__ = ["DiskTrouble", "RecordingDamaged", "RecordingError", "RecordingTamper
 
 
 class RecordingError(Exception):
-    """Base of all.
+    """Base class of the errors of recordings.
 
     Attributes:
-        detail: what exactly, for a person
+        detail: the exact reason, for a person
     """
 
     def __init__(self, detail: str) -> None:

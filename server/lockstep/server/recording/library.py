@@ -1,4 +1,4 @@
-"""The recordings that can be looked at: those of a console, or one file. What blocks is marked; use a thread for it."""
+"""The recordings of a console, or one file. Methods that block say so: call them on a thread."""
 
 from pathlib import Path
 from typing import Protocol
@@ -18,28 +18,28 @@ __all__ = ["ConsoleLibrary", "FileLibrary", "Library"]
 class Library(Protocol):
     @property
     def automatic(self) -> bool:
-        """Whether it records without being asked."""
+        """True if it records without being asked."""
 
     def state(self) -> RecordingState: ...
 
     def start(self, by: str, name: str) -> RecordingState:
-        """Raises ConsoleError."""
+        """Start a recording. Raises ConsoleError."""
 
     async def stop(self) -> RecordingState:
-        """Raises ConsoleError."""
+        """End the recording. Raises ConsoleError."""
 
     def entries(self) -> list[RecordingEntry]:
-        """Blocks. The newest first."""
+        """Return the recordings, newest first. Blocks."""
 
     def open(self, recording_id: str) -> tuple[RecordingReader, RecordingEntry]:
-        """Blocks; close the reader. Raises NotFound, RecordingError, OSError."""
+        """Open a recording; close the reader. Blocks. Raises NotFound, RecordingError, OSError."""
 
     def delete(self, recording_id: str) -> None:
-        """Blocks. Raises NotFound, AlreadyRecording, NotAllowed, OSError."""
+        """Delete a recording. Blocks. Raises NotFound, AlreadyRecording, NotAllowed, OSError."""
 
 
 class ConsoleLibrary:
-    """Of a running console: also the file that is being written."""
+    """The recordings of a running console, with the file that is being written."""
 
     def __init__(self, recorder: Recorder) -> None:
         self._recorder = recorder

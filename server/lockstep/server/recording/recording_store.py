@@ -1,4 +1,4 @@
-"""The directory of recordings: lists them, completes interrupted ones, deletes what is too much. Blocks."""
+"""The directory of recordings: lists them, completes interrupted ones, deletes the oldest. Blocks."""
 
 import fcntl
 import math
@@ -26,8 +26,8 @@ log = structlog.get_logger(__name__)
 
 SUFFIX = ".mcap"
 DAY = 86_400.0
-LIST_SECONDS = 1.0  # that a list holds at most: whoever asks again and again costs no more than a look at the directory
-SETTLED_NS = 100_000_000  # since when a directory is unchanged, or a change may bear the same time
+LIST_SECONDS = 1.0  # life of a list: further requests within it cost no more than a look at the directory
+SETTLED_NS = 100_000_000  # within this time of a directory's last change, a later one may bear the same time
 
 
 class RecordingEntry(msgspec.Struct, frozen=True, kw_only=True):
@@ -45,53 +45,54 @@ class RecordingEntry(msgspec.Struct, frozen=True, kw_only=True):
     first_event: int
     last_event: int
     bytes: int
-    marks: dict[str, int]  # how many of each kind
+    marks: dict[str, int]  # number of each kind
     lost: int
     running: bool
     interrupted: bool
 
 
 class _Listed(NamedTuple):
-    """What the directory had."""
+    """A list of the directory."""
 
     at: float  # s, monotonic; minus infinity: it may have changed since without a sign
-    changed: int  # ns, when it was changed last
-    written: list[Path]  # what somebody was writing
+    changed: int  # ns, last change of the directory
+    written: list[Path]  # files that were being written
     entries: list[RecordingEntry]
 
 
 def recording_id(path: Path) -> str:
-    """The file's name without its suffix; bytes that are no UTF-8 cannot be told, and are replaced."""
+    """Return the file's name without its suffix; bytes that are no UTF-8 are replaced."""
     return os.fsencode(path.stem).decode(errors="replace")
 
 
 class RecordingStore:
-    """One directory. Files that are no recordings are passed over, and so are symbolic links: whoever may read what is
-    here may not read what somewhere else is. From any thread.
+    """One directory of recordings, for use from any thread.
+
+    Other files are passed over, and so are symbolic links: the right to read recordings is no right to read elsewhere.
     """
 
     def __init__(self, directory: Path, settings: RecordingSettings) -> None:
         self.directory = directory
         self._settings = settings
-        self._busy = threading.Lock()  # one list at a time: those that wait find all known
+        self._busy = threading.Lock()  # one list at a time: the next one finds all entries known
         self._listed = _Listed(-math.inf, -1, [], [])
-        self._written: list[Path] = []  # what somebody writes, as far as the list under way has come
+        self._written: list[Path] = []  # files being written that the list under way has found
         self._known: dict[Path, tuple[tuple[int, int], RecordingEntry | None]] = {}  # by size and time of change
 
     def prepare(self) -> None:
-        """Raises OSError: the directory cannot be made."""
+        """Make the directory. Raises OSError."""
         self.directory.mkdir(mode=0o700, parents=True, exist_ok=True)
 
     def files(self) -> list[Path]:
-        """Raises OSError: the directory cannot be read."""
+        """Return the recording files. Raises OSError: the directory cannot be read."""
         return [path for path in self.directory.glob(f"*{SUFFIX}") if path.is_file() and not path.is_symlink()]
 
     def path(self, wanted: str) -> Path | None:
-        """None: there is none of that id. Raises OSError."""
+        """Return the file of that id, or None. Raises OSError."""
         return next((path for path in self.files() if recording_id(path) == wanted), None)
 
     def entries(self) -> list[RecordingEntry]:
-        """The newest first. Files that are being written are not among them. Raises OSError."""
+        """Return the recordings, newest first, without files that are being written. Raises OSError."""
         with self._busy:
             if not self._is_still(self._listed):
                 self._listed = self._list()
@@ -109,7 +110,7 @@ class RecordingStore:
         return _Listed(now, changed, self._written, sorted(found, key=lambda entry: entry.started, reverse=True))
 
     def _is_still(self, listed: _Listed) -> bool:
-        """Whether nothing was made, deleted or finished since."""
+        """True if nothing was made, deleted or finished since."""
         try:
             return (
                 time.monotonic() - listed.at < LIST_SECONDS
@@ -138,7 +139,7 @@ class RecordingStore:
             return None
 
     def recover(self) -> int:
-        """Complete the files that were interrupted; how many."""
+        """Complete the files that were interrupted, and return their number."""
         count = 0
         for path in self.files():
             try:
@@ -159,14 +160,14 @@ class RecordingStore:
         return count
 
     def prune(self, keep: Collection[Path] = ()) -> list[str]:
-        """Delete recordings that are too old, and the oldest while there are too many bytes; returns their ids.
+        """Delete recordings that are too old, and the oldest while there are too many bytes; return their ids.
 
         Raises:
             OSError: the directory cannot be read.
         """
         dated = []
         for path in self.files():
-            with suppress(OSError):  # somebody else deletes too
+            with suppress(OSError):  # another process deletes too
                 status = path.stat()
                 dated.append((status.st_mtime, status.st_size, path))
         total = sum(size for _, size, _ in dated)
@@ -218,7 +219,7 @@ def entry_of(
 
 
 def _changed(directory: Path) -> int:
-    """When something was made in it or deleted, in ns; -1: nobody knows."""
+    """Return the time of the last creation or deletion in it, in ns; -1: not known."""
     try:
         return directory.stat().st_mtime_ns
     except OSError:
@@ -226,7 +227,7 @@ def _changed(directory: Path) -> int:
 
 
 def _is_locked(path: Path) -> bool:
-    """Whether somebody writes it now."""
+    """True if the file is being written now."""
     with path.open("rb") as file:
         try:
             fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)

@@ -1,4 +1,4 @@
-"""Who may do what with recordings: one rule for lists, chunks, records and files (docs/recording.md). No I/O, no clock.
+"""The rights to recordings: one rule for lists, chunks, records and files (docs/recording.md). No I/O, no clock.
 
 | | observer | operator | supervisor |
 |---|---|---|---|
@@ -9,7 +9,7 @@
 | end | – | yes; an automatic recording: with the seat | yes |
 | delete | – | – | yes |
 
-That the link is good now, and for this robot, was checked before. Times are µs since 1970.
+The caller has checked that the link is good now, and for this robot. Times are µs since 1970.
 """
 
 from typing import NamedTuple
@@ -24,7 +24,7 @@ BEFORE = "it was recorded before your link was made"
 
 
 class RecordingReaderRight(NamedTuple):
-    """What one link may read.
+    """The right of one link to read recordings.
 
     Attributes:
         since: when the link was made; None: it may read everything
@@ -35,26 +35,26 @@ class RecordingReaderRight(NamedTuple):
 
     @classmethod
     def of(cls, role: Role, issued: float) -> "RecordingReaderRight":
-        """`issued`: when the link was made, s since 1970; infinite where that is not known, which opens nothing."""
+        """Make the right of a link. `issued`: s since 1970; infinite where that is not known, which opens nothing."""
         if role == "supervisor":
             return cls(role, None)
         return cls(role, int(min(issued, 1e12) * 1e6))
 
     def sees(self, ended: int) -> bool:
-        """Whether a recording that ended then is in the list."""
+        """True if a recording that ended then is in the list."""
         return self.since is None or ended >= self.since
 
     def reads(self, started: int) -> bool:
-        """A chunk, or a whole file, that began then."""
+        """True if a chunk, or a whole file, that began then may be read."""
         return self.since is None or started >= self.since
 
     def check_reads(self, started: int) -> None:
-        """Raises NotAllowed."""
+        """Raise NotAllowed unless a chunk or file that began then may be read."""
         if not self.reads(started):
             raise NotAllowed(BEFORE)
 
     def part_of(self, index: EventIndex) -> EventIndex:
-        """What the index says of what may be read; its chunks stay, so that their numbers do.
+        """Return the part of the index that may be read. Its chunks stay, so that their numbers do.
 
         Raises:
             NotAllowed: nothing may be read.
@@ -68,7 +68,7 @@ class RecordingReaderRight(NamedTuple):
 
 
 def check_end(role: Role, *, automatic: bool, holds_seat: bool) -> None:
-    """Whether that role may end the recording that runs. Raises NotAllowed."""
+    """Raise NotAllowed unless that role may end the running recording."""
     if role == "observer":
         raise NotAllowed("only the operator or the supervisor may do this")
     if automatic and role != "supervisor" and not holds_seat:

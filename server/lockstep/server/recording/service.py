@@ -1,4 +1,4 @@
-"""What the routes of recordings need."""
+"""The dependencies of the recording routes."""
 
 import asyncio
 import contextvars
@@ -16,14 +16,14 @@ from lockstep.server.util.rate_limits import RateLimits
 __all__ = ["RecordingAudit", "RecordingService"]
 
 
-STARTS, START_RATE = 20, 0.1  # Hz, of one link: the shelf is bounded in bytes, not in files
-READERS = 2  # threads; who reads recordings waits for each other
+STARTS, START_RATE = 20, 0.1  # Hz, of one link: the recording store is bounded in bytes, not in files
+READERS = 2  # threads; readers of recordings wait for each other
 
 Result = TypeVar("Result")
 
 
 class RecordingAudit(Protocol):
-    """What the routes need of the audit."""
+    """The part of the audit that the routes use."""
 
     def record(self, kind: AuditKind, actor: Actor = ..., what: str = ..., detail: str = ...) -> None: ...
     def again(self, kind: AuditKind, actor: Actor, what: str) -> None: ...
@@ -39,7 +39,7 @@ class _NoAudit:
 
 @dataclass(frozen=True)
 class RecordingService:
-    """`app.state.recordings`; None while a robot's session has failed.
+    """The recordings of one robot: `app.state.recordings`, which is None while the robot's session has failed.
 
     Attributes:
         holds_seat: whether a peer with the link of this id drives
@@ -56,7 +56,7 @@ class RecordingService:
     threads: ThreadPoolExecutor = field(default_factory=lambda: ThreadPoolExecutor(READERS, "recordings"))
 
     async def in_thread(self, work: Callable[[], Result]) -> Result:
-        """What reads files. A slow disk, or many who read, take no thread from anything else.
+        """Run `work`, which reads files. A slow disk, or many readers, take no thread from anything else.
 
         Raises:
             ShuttingDown: it is closed.
@@ -69,5 +69,5 @@ class RecordingService:
         return await reading
 
     def close(self) -> None:
-        """Idempotent; waits for nobody."""
+        """Close the threads. Idempotent; waits for nothing."""
         self.threads.shutdown(wait=False, cancel_futures=True)

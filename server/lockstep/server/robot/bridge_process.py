@@ -1,4 +1,4 @@
-"""Runs a robot bridge as a process of its own, beside the console: what a robot renders never holds up a command."""
+"""Runs a robot bridge in a separate process, beside the console: rendering of a robot never holds up a command."""
 
 import asyncio
 import os
@@ -37,7 +37,7 @@ class BridgeFailed(Exception):
 
 
 class BridgeProcess:
-    """`start` returns its address; then await `watch`, which starts it again when it dies. `close` ends it.
+    """`start` returns the bridge's address; then await `watch`, which restarts it when it dies. `close` ends it.
 
     It keeps the port of its first run, so that the robot link finds it again.
     """
@@ -52,10 +52,10 @@ class BridgeProcess:
         say: Callable[[str], None],
         python: str | None = None,
     ) -> None:
-        """`secret`: of the robot link; an environment variable takes it there, which other users cannot read.
+        """`secret`: of the robot link; passed in an environment variable, which other users cannot read.
 
-        `python`: another interpreter than ours, such as that of a ROS installation. It finds the bridge's code here,
-        and none of the packages beside it: those are of another version of Python, and would hide its own.
+        `python`: another interpreter than the console's, such as that of a ROS installation. It finds the bridge's code
+        here, but not the packages beside it: those are for another version of Python, and would hide its own.
         """
         self._robot = robot
         self._host = host
@@ -70,7 +70,7 @@ class BridgeProcess:
         self._backoff = Backoff(0.5, 10.0)
 
     async def start(self) -> str:
-        """Its address, "tcp://host:port".
+        """Start the bridge and return its address, "tcp://host:port".
 
         Raises:
             BridgeFailed: it ended, or said nothing in time.
@@ -107,7 +107,7 @@ class BridgeProcess:
         return address
 
     async def watch(self) -> None:
-        """Until cancelled."""
+        """Restart the bridge when it dies, until cancelled."""
         loop = asyncio.get_running_loop()
         while True:
             if self._process is not None:
@@ -123,7 +123,7 @@ class BridgeProcess:
                 self._say(f"{error}; trying again")
 
     async def close(self) -> None:
-        """Ends it, gently first. Idempotent."""
+        """End the bridge, gently first. Idempotent."""
         process, self._process = self._process, None
         if process is not None and process.returncode is None:
             await _end(process)
@@ -147,7 +147,7 @@ class BridgeProcess:
         try:
             async with asyncio.timeout(START_TIMEOUT):
                 while True:
-                    with suppress(ValueError):  # a line that is too long, and gone
+                    with suppress(ValueError):  # skips a line that is too long
                         line = await process.stdout.readline()
                         if not line:
                             raise BridgeFailed(await process.wait())
@@ -158,7 +158,7 @@ class BridgeProcess:
 
 
 async def _end(process: asyncio.subprocess.Process) -> None:
-    """Gently first."""
+    """End a process, gently first."""
     with suppress(ProcessLookupError):
         process.terminate()
     try:
@@ -178,7 +178,7 @@ _announcement = msgspec.json.Decoder(_Announcement)
 
 
 def _address_in(line: bytes) -> str | None:
-    """None: something else, such as what a robot's library prints."""
+    """Return the address in a line; None for other output, such as that of a robot's library."""
     try:
         return _announcement.decode(line).robot
     except (msgspec.DecodeError, UnicodeDecodeError, RecursionError):

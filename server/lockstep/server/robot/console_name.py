@@ -1,4 +1,4 @@
-"""What a console calls itself at a robot bridge: the same after a restart, and another for another console."""
+"""The name of a console at a robot bridge: the same after a restart, and different for each console."""
 
 import hashlib
 import socket
@@ -10,6 +10,6 @@ __all__ = ["console_name"]
 
 
 def console_name(state_dir: Path | None) -> str:
-    """By its machine and its state directory, "console at control-room (3fa9c1)"."""
+    """Return the name, made of the machine and the state directory: "console at control-room (3fa9c1)"."""
     place = str((state_dir or default_state_dir()).absolute())
     return f"console at {socket.gethostname()[:64]} ({hashlib.sha256(place.encode()).hexdigest()[:6]})"

@@ -1,4 +1,4 @@
-"""How the console gets at a robot bridge that does not take everybody: the link's secret and TLS."""
+"""The console's credentials at a robot bridge: the link's secret and TLS."""
 
 import ssl
 from pathlib import Path
@@ -33,7 +33,7 @@ class LinkCredentials(NamedTuple):
 
 
 def link_access(settings: LinkSettings) -> LinkCredentials:
-    """Raises SecretError when a file or the secret is no good."""
+    """Read the credentials that the settings name. Raises SecretError if a file or the secret is invalid."""
     secret = None
     if settings.link_secret_file is not None:
         secret = LinkSecret.read(settings.link_secret_file)

@@ -20,13 +20,13 @@ __all__ = ["ReconnectingLink", "LinkSink"]
 
 log = structlog.get_logger(__name__)
 
-HEALTHY_AFTER = 5.0  # s up, then the next loss is retried soon again
+HEALTHY_AFTER = 5.0  # s up; then the next loss is retried soon again
 FAULT = "internal_error: this console failed at what the robot sent"
 
 
 class LinkSink(Protocol):
-    """Who is told. `link_closed` also follows a try that failed, with what was wrong; `link_failed` comes before it
-    where one of these raised `error`."""
+    """Takes the events of a link. `link_closed` also follows a try that failed, with the reason; `link_failed` comes
+    before it if one of these methods raised `error`."""
 
     def link_opened(self, role: LinkRole, epoch: str, description: RobotDescription) -> None: ...
     def link_closed(self, role: LinkRole, detail: str) -> None: ...
@@ -35,7 +35,7 @@ class LinkSink(Protocol):
 
 
 class ReconnectingLink:
-    """What hearing the robot raises ends this link alone, and is no reason not to connect again."""
+    """One link to the robot. An exception of the sink ends this link alone, which then connects again."""
 
     def __init__(
         self,
@@ -47,7 +47,7 @@ class ReconnectingLink:
         access: LinkCredentials,
         name: str = "console",
     ) -> None:
-        """`name`: a bridge keeps a robot for the console whose link broke by it."""
+        """`name`: tells the bridge for which console it keeps the robot after a link broke."""
         self._name = name
         self._access = access
         self._host = host
@@ -60,7 +60,7 @@ class ReconnectingLink:
         self._drops: Counter[str] = Counter()
 
     def send(self, message: LinkMessage) -> bool:
-        """Whether it was handed to a link that lives."""
+        """Send a message. Return whether a link that is up took it."""
         if self._link is None:
             return False
         try:
@@ -70,17 +70,17 @@ class ReconnectingLink:
         return True
 
     def bad_input(self) -> Counter[str]:
-        """What the bridge sent that could not be read, by name, on all links so far."""
+        """Return the counts of messages that could not be read, by name of the error, on all links so far."""
         return self._bad_input + (self._link.bad_input if self._link is not None else Counter())
 
     def drops(self) -> Counter[str]:
-        """Messages that came faster than they were read, by kind or stream, on all links so far."""
+        """Return the counts of messages that came faster than they were read on all links so far, by kind or stream."""
         if self._link is None:
             return self._drops
         return self._drops + self._link.drops + self._link.media_drops
 
     async def run(self) -> None:
-        """Until cancelled."""
+        """Run until cancelled."""
         while True:
             try:
                 await attempt(self._once())

@@ -47,7 +47,7 @@ class RobotSettings(LinkSettings, Protocol):
 
 
 class RobotHost(Protocol):
-    """Whom the connection reports to. All are called on the loop and return at once."""
+    """Takes the reports of the connection. All methods are called on the loop and return at once."""
 
     def epoch_began(self, epoch: str, description: RobotDescription) -> None: ...
     def link_up(self) -> None: ...
@@ -64,9 +64,9 @@ class RobotConnection:
 
     Attributes:
         epoch, description: of the bridge reached last; "" and None before the first
-        up: whether the operator link is up
+        up: True while the operator link is up
         reached: set while it is up
-        detail: why it is down
+        detail: reason that it is down
     """
 
     def __init__(self, settings: RobotSettings, host: RobotHost) -> None:
@@ -95,29 +95,29 @@ class RobotConnection:
         return self.reached.is_set()
 
     async def run(self) -> None:
-        """Until cancelled."""
+        """Run until cancelled."""
         async with asyncio.TaskGroup() as tasks:
             for role, keeper in self._keepers.items():
                 tasks.create_task(keeper.run(), name=f"robot link {role}")
 
     def send(self, message: Command | Rest | Reset) -> bool:
-        """Whether it was handed to the link."""
+        """Send over the operator link. Return whether the link took the message."""
         return self._keepers["operator"].send(message)
 
     def send_stop(self, stop: Stop) -> bool:
-        """As `send`, over every link that lives: TCP may repeat a lost packet on one of them for seconds."""
+        """Send over every link that is up, as `send`: TCP may repeat a lost packet on one of them for seconds."""
         sent = [keeper.send(stop) for keeper in self._keepers.values()]
         return any(sent)
 
     def bad_input(self) -> Counter[str]:
-        """What the bridge sent that could not be read, by name."""
+        """Return the counts of messages from the bridge that could not be read, by name of the error."""
         return sum((keeper.bad_input() for keeper in self._keepers.values()), Counter())
 
     def drops(self) -> Counter[str]:
-        """Messages from the bridge that came faster than they were read, by kind or stream."""
+        """Return the counts of messages from the bridge that came faster than they were read, by kind or stream."""
         return sum((keeper.drops() for keeper in self._keepers.values()), Counter())
 
-    # the keepers' events
+    # Events of the links
 
     def link_opened(self, role: LinkRole, epoch: str, description: RobotDescription) -> None:
         self._epochs[role] = epoch
@@ -144,7 +144,7 @@ class RobotConnection:
 
     def link_received(self, role: LinkRole, message: LinkMessage) -> None:
         if self._epochs.get(role) != self.epoch:
-            return  # what the old bridge said last, while the other link has met the new one already
+            return  # last messages of the old bridge, while the other link has reached the new one already
         if isinstance(message, Media):
             self._host.media_received(message)
         elif isinstance(message, Feedback):

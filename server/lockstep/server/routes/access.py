@@ -37,7 +37,7 @@ class InvitationRequest(msgspec.Struct, frozen=True, kw_only=True):
     role: Role = "observer"
     name: Annotated[str, msgspec.Meta(max_length=60)] = ""
     seconds: float = DEFAULT_SECONDS
-    # Of a fleet; unset: the one whose route this is; empty: as many as the inviter's own link.
+    # Of a fleet; unset: the robot of this route; empty: all those of the inviter's own link.
     robots: Annotated[list[RobotName], msgspec.Meta(max_length=MAX_ROBOTS)] | None = None
 
 
@@ -45,12 +45,12 @@ class InvitationInfo(msgspec.Struct, frozen=True, kw_only=True):
     id: str
     role: Role
     name: str
-    by: str  # who invited; "" when it was made on the command line or at start
+    by: str  # inviter; "" when it was made on the command line or at start
     created: float  # s since 1970
     expires: float
     revoked: bool
-    connected: int  # peers that are here with it now
-    robots: list[str]  # of a fleet, that it is good for; empty: all
+    connected: int  # peers
+    robots: list[str]  # robots of a fleet that it is good for; empty: all
 
 
 class InvitationList(msgspec.Struct, frozen=True, kw_only=True):
@@ -126,7 +126,7 @@ async def revoke(request: Request, caller: Caller, invitation_id: str) -> Respon
 
 
 async def _noted(here: Dependencies) -> str:
-    """What is known of a revocation that the list of links did not take, in words."""
+    """Note a revocation that the list of links did not take, and return the outcome in words."""
     try:
         await asyncio.to_thread(here.state.invitations.note_ended)
     except StateDirUnusable:
@@ -150,7 +150,7 @@ async def audit(
 
 
 async def _update(here: Dependencies, by: Identity, change: Callable[[Invitations, Identity, float], Result]) -> Result:
-    """What `by` changes. Waits for the disk in a thread, and looks at the link of `by` when its turn has come.
+    """Make a change for `by`. Waits for the disk in a thread, and checks the link of `by` when its turn has come.
 
     Raises:
         StateDirUnusable: the disk does not take it.

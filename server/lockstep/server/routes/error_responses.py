@@ -1,4 +1,4 @@
-"""How errors are answered over HTTP: by name, counted, and never cached."""
+"""Answers errors over HTTP: by name, counted, and never cached."""
 
 from http import HTTPStatus
 
@@ -18,19 +18,19 @@ __all__ = ["answer_errors", "count_refused"]
 
 
 def answer_errors(app: FastAPI) -> None:
-    """Everything that a route of `app` raises on purpose. It needs `app.state.context`."""
+    """Add handlers for all errors that routes of `app` raise on purpose. It needs `app.state.context`."""
     app.add_exception_handler(ConsoleError, _answer_console_error)
     app.add_exception_handler(HTTPException, _answer_http_exception)
     app.add_exception_handler(RequestValidationError, _answer_validation_error)
 
 
 def count_refused(scope: Scope, name: str) -> None:
-    """What the front door turned away."""
+    """Count bad input that the middleware found, or that was in the body of a STOP."""
     _bad_input(scope["app"].state).labels("http", name).inc()
 
 
 def _bad_input(state: object) -> Counter:
-    """Of the robot whose routes these are; of the house while it has no session, and where there is no robot."""
+    """Return the counter of the routes' robot; of the console context without a session, or without a robot."""
     here = getattr(state, "dependencies", None)
     counted: Counter = here.metrics.bad_input if isinstance(here, Dependencies) else _context(state).metrics.bad_input
     return counted
@@ -56,7 +56,7 @@ async def _answer_console_error(request: Request, error: Exception) -> Response:
 
 
 def _audit_refused(request: Request, name: str) -> None:
-    """Merged, as all refusals are: by the route, of which there are few, and never by the path, of which are many."""
+    """Audit a refusal, merged by the route, of which there are few, and never by the path, of which there are many."""
     actor, here = getattr(request.state, "actor", None), getattr(request.app.state, "dependencies", None)
     if isinstance(actor, Actor) and isinstance(here, Dependencies):
         route = getattr(request.scope.get("route"), "path", "")
@@ -64,7 +64,7 @@ def _audit_refused(request: Request, name: str) -> None:
 
 
 async def _answer_http_exception(request: Request, error: Exception) -> Response:
-    """Routes that do not exist, methods that are not allowed."""
+    """Answer routes that do not exist, and methods that are not allowed."""
     if not isinstance(error, HTTPException):
         raise error
     name = {404: "not_found", 405: "method_not_allowed"}.get(error.status_code, "http_error")

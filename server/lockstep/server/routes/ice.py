@@ -1,4 +1,4 @@
-"""STUN and TURN servers for who has a token: GET /api/ice, and the same as Link headers of the WHEP answer."""
+"""STUN and TURN servers for holders of a token: GET /api/ice, and the same as Link headers of the WHEP answer."""
 
 import time
 from typing import Annotated
@@ -23,7 +23,7 @@ async def ice(request: Request, caller: Annotated[Right, Depends(authorized)]) -
 
 
 def servers_for(settings: Settings, user: Identity) -> IceServers:
-    """What `user` may use from now on; the link's id shows in the TURN server's log."""
-    now = time.time()  # of the TURN server's clock
+    """Return the servers that `user` may use from now on; the link's id shows in the TURN server's log."""
+    now = time.time()  # on the TURN server's clock
     seconds = min(settings.turn_seconds, max(0.0, user.expires - now))
     return ice_servers(settings.stun, settings.turn, settings.turn_key, seconds, user.token_id, now)

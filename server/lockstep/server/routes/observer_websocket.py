@@ -1,4 +1,4 @@
-"""The line of an observer behind a relay: POST /api/watch for a ticket, the WebSocket /watch/TICKET to speak."""
+"""The WebSocket of an observer behind a relay: POST /api/watch for a ticket, then /watch/TICKET."""
 
 from typing import Annotated
 
@@ -22,7 +22,7 @@ router = APIRouter()
 
 class WatchTicket(msgspec.Struct, frozen=True):
     ticket: str  # opens one WebSocket: /watch/TICKET
-    seconds: float  # that it is good for
+    seconds: float  # of its validity
 
 
 @router.post("/api/watch")
@@ -77,7 +77,7 @@ async def line(websocket: WebSocket, ticket: str) -> None:
     except OSError:
         watcher.end("line closed")  # gone before it was accepted
     except Exception as error:
-        watcher.failed("line", error)  # a fault with one line must not be uvicorn's
+        watcher.failed("line", error)  # a fault of one connection must not reach uvicorn
 
 
 class _WebSocketLine:
@@ -98,7 +98,7 @@ class _WebSocketLine:
         try:
             await self._websocket.send_text(text)
         except (WebSocketDisconnect, RuntimeError) as error:
-            raise LineEnded(0) from error  # starlette says so by either
+            raise LineEnded(0) from error  # starlette raises either
 
     async def close(self, code: int, reason: str) -> None:
         try:

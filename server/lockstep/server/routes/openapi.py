@@ -1,6 +1,6 @@
 """The OpenAPI document of the console's HTTP interface: one table of operations. No I/O.
 
-FastAPI could only write one that knows no answers, since bodies are read with bounds and answers are msgspec structs.
+FastAPI could document neither bodies nor answers: bodies are read with bounds, and answers are msgspec structs.
 """
 
 import json
@@ -104,7 +104,7 @@ class Operation(NamedTuple):
     method: str
     path: str
     summary: str
-    status: int  # when it goes well
+    status: int  # on success
     answer: type[msgspec.Struct] | str | None  # a struct as JSON, text of a media type, nothing
     errors: Errors = ()
     body: type[msgspec.Struct] | str | None = None
@@ -293,7 +293,7 @@ OPERATIONS: tuple[Operation, ...] = (
 
 
 def openapi_document(operations: Sequence[Operation] = OPERATIONS) -> dict[str, Any]:
-    """OpenAPI 3.1, in JSON's types alone."""
+    """Return the OpenAPI 3.1 document, in JSON's types alone."""
     structs = {Problem} | {kind for each in operations for kind in (each.answer, each.body) if isinstance(kind, type)}
     ordered = sorted(structs, key=lambda struct: struct.__name__)
     _, components = msgspec.json.schema_components(ordered, ref_template="#/components/schemas/{name}")
@@ -333,13 +333,13 @@ def _operation(operation: Operation) -> dict[str, Any]:
 
 
 def operation_id(operation: Operation) -> str:
-    """For generated clients: the method and the words of the path, `post_api_stop`."""
+    """Return the id for generated clients: the method and the words of the path, `post_api_stop`."""
     words = [re.sub(r"\W+", "_", each).strip("_") for each in operation.path.split("/")]
     return "_".join([operation.method, *filter(None, words)])
 
 
 def _tag(path: str) -> str:
-    """The group that documentation shows an operation in: "recordings" of /api/recordings/{id}."""
+    """Return the group of an operation in the documentation: "recordings" of /api/recordings/{id}."""
     words = [each for each in path.split("/") if each and not each.startswith("{") and each != "api"]
     return words[0] if words else "console"
 
@@ -358,7 +358,7 @@ def _responses(operation: Operation) -> dict[str, Any]:
 
 
 def _errors(operation: Operation) -> dict[int, list[HttpError]]:
-    """By status: what this operation can raise, and what anything can."""
+    """Return the errors by status: those of this operation, and those of all operations."""
     errors = (*operation.errors, *EVERYWHERE, *(WITH_TOKEN if operation.token else ()))
     if operation.method != "get":
         errors += (OriginRefused,)

@@ -68,7 +68,7 @@ class RecordingList(msgspec.Struct, frozen=True, kw_only=True):
 
     state: RecordingState
     recordings: list[RecordingEntry]  # the newest first
-    older: int  # that were left out behind these
+    older: int  # number of older ones that were left out
 
 
 class RecordingDetails(msgspec.Struct, frozen=True, kw_only=True):
@@ -102,7 +102,7 @@ Caller = Annotated[Right, Depends(_caller)]
 
 
 def _right(request: Request, caller: Right) -> RecordingReaderRight:
-    """What the caller may read."""
+    """Return the caller's right to read recordings."""
     identity = caller.identity
     if _service(request).opens_all:
         return RecordingReaderRight(identity.role, None)
@@ -217,7 +217,7 @@ async def records(
         reader.close()
         raise
     _service(request).audit.again("reading", actor, recording_id)
-    # The response closes the iterator, and that the file, also when whoever asked is gone.
+    # The response closes the iterator, and with it the file, also when the client is gone.
     body = _bounded(reader, first, last, topics, decodable, right)
     answer = StreamingResponse(body, media_type="application/octet-stream", headers={"Cache-Control": "no-store"})
     return EndingResponse(answer, caller)
@@ -241,7 +241,7 @@ async def download(request: Request, recording_id: str, ticket: str = "") -> Res
     """Of a running recording what is there now; `lockstep export` and other tools take that too."""
     access = _service(request).access
     right = None
-    if ticket:  # whose making was audited, and checked against the link
+    if ticket:  # it was audited, and checked against the link, when it was made
         caller = access.verify_file_ticket(ticket, recording_id)
     else:
         caller = await _caller(request)
@@ -313,7 +313,7 @@ async def _with_reader(
 
 
 def _told(error: RecordingError | OSError) -> ConsoleError:
-    """What is damaged stays so; another reason may pass."""
+    """Return the error to answer with. Damage is permanent; another reason may pass."""
     if isinstance(error, FileNotFoundError):
         return NotFound("it was deleted")
     if isinstance(error, RecordingError):
@@ -329,7 +329,7 @@ def _bounded(
     decodable: bool,
     right: RecordingReaderRight,
 ) -> Iterator[bytes]:
-    """Ends early where the file is broken: the status is on its way already."""
+    """Yield the records. Ends early where the file is broken: the status is on its way already."""
     sent = 0
     try:
         for record in reader.records(first, last, topics, decodable=decodable):

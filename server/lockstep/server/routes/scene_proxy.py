@@ -1,9 +1,9 @@
-"""The 3D scene: /scene/TICKET/ is viser's client, from memory, /scene/ws/TICKET its WebSocket, passed on.
+"""A proxy of the 3D scene: /scene/TICKET/ is viser's client, from memory, /scene/ws/TICKET its WebSocket.
 
-The client runs what recordings and messages tell it to, so it has no rights here: its page is sandboxed into an origin
-that is nobody's (`SCENE_POLICY`), and takes no parameter but those that the console gives it. Only camera movements
-pass from the viewer to viser. Its protocol knows much more (one message opens a tunnel to the public Internet), and
-none of that is a viewer's business.
+The client runs what recordings and messages tell it to, so it has no rights here: its page is sandboxed into an opaque
+origin (`SCENE_POLICY`), and takes no parameters but those that the console gives it. Only camera movements pass from
+the viewer to viser. Its protocol has many more messages (one opens a tunnel to the public Internet), which no viewer
+needs.
 """
 
 import asyncio
@@ -31,7 +31,7 @@ UPSTREAM_TIMEOUT = 5.0  # s
 MAX_DOWN = 16 << 20  # bytes of one message from viser; meshes are the largest
 DOWN_QUEUE = 2  # messages read ahead; then viser waits, and keeps only the newest of each kind
 ALLOWED_UP = frozenset({"ViewerCameraMessage"})
-UP_RATE, UP_BURST = 60.0, 120.0  # Hz, messages of one viewer; what comes faster waits where it is sent
+UP_RATE, UP_BURST = 60.0, 120.0  # Hz, messages of one viewer; faster ones wait at the sender
 TRY_AGAIN_LATER = 1013  # RFC 6455 7.4.1 and the IANA registry
 POLICY_VIOLATION = 1008
 GOING_AWAY = 1001
@@ -64,14 +64,14 @@ async def nothing(path: str) -> Response:
 
 
 def scene_query(request: Request, ticket: str) -> str:
-    """What viser's client is told about where its stream is and how it looks."""
+    """Return the parameters of viser's client: the address of its stream, and its appearance."""
     root = str(request.scope.get("root_path", ""))
     base = str(request.base_url.replace(path="")).replace("http", "ws", 1).rstrip("/")
     return "&".join((f"websocket={base}{root}/scene/ws/{ticket}", *FLAGS))
 
 
 def _check_query(request: Request, ticket: str) -> None:
-    """Raises BadParameter unless it is what `scene_query` says: one parameter of viser's loads any script."""
+    """Raise BadParameter unless the query is that of `scene_query`: one of viser's parameters loads any script."""
     known = dict.fromkeys(FLAGS, "") | dict([scene_query(request, ticket).partition("&")[0].split("=", 1)])
     for name, value in request.query_params.multi_items():
         if name not in known:
@@ -102,7 +102,7 @@ async def stream(websocket: WebSocket, ticket: str) -> None:
 
 
 def is_allowed(data: bytes) -> bool:
-    """Whether a viewer's message may pass."""
+    """True if a viewer's message may pass."""
     try:
         kind = _kind.decode(data).type
     except (msgspec.DecodeError, UnicodeError, RecursionError):
@@ -118,7 +118,7 @@ _kind = msgspec.msgpack.Decoder(_Kind)
 
 
 def _subprotocols(websocket: WebSocket) -> list[Subprotocol]:
-    """viser's client names its version here; viser answers with the same or closes."""
+    """Return the version that viser's client names; viser answers with the same or closes."""
     offered: list[str] = websocket.scope.get("subprotocols", [])
     return [Subprotocol(each) for each in offered if each.startswith("viser-v")][:1]
 
@@ -161,7 +161,7 @@ async def _viewer_to_scene(websocket: WebSocket, upstream: ClientConnection) -> 
     try:
         while True:
             data = await websocket.receive_bytes()
-            if not budget.take(clock()):  # viser's thread, which gets it, takes its time from everybody
+            if not budget.take(clock()):  # viser's thread, which handles it, takes time from everybody
                 await asyncio.sleep(budget.wait(clock()))
                 budget.take(clock())
             if is_allowed(data):
@@ -182,4 +182,4 @@ async def _scene_to_viewer(websocket: WebSocket, upstream: ClientConnection) -> 
             await websocket.send_bytes(data if isinstance(data, bytes) else data.encode())
         await websocket.close(GOING_AWAY)
     except (WebSocketDisconnect, ConnectionClosed, RuntimeError):
-        return  # the viewer is gone; starlette says so by any of these
+        return  # the viewer is gone; starlette raises any of these

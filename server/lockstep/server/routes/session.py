@@ -1,4 +1,4 @@
-"""The HTTP API besides WHEP: what is going on, stop, reset, health, metrics (docs/console-api.md)."""
+"""The HTTP API besides WHEP: session, stop, reset, scene, health, metrics (docs/console-api.md)."""
 
 from typing import Annotated
 
@@ -40,8 +40,8 @@ class SessionInfo(msgspec.Struct, frozen=True, kw_only=True):
     link: LinkInfo
     you: dict[str, str]  # role and name of the token
     peers: dict[str, list[StreamInfo]]  # streams of each peer
-    streams: list[StreamOffer]  # that there are; empty before the robot was reached
-    voice: bool  # whether the console takes the voice of who holds the seat
+    streams: list[StreamOffer]  # all streams; empty before the robot was reached
+    voice: bool  # the console takes the voice of the seat's holder
     description: RobotDescription | None
     feedback: Feedback | None
 

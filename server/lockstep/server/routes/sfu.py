@@ -1,4 +1,4 @@
-"""Where an observer gets pictures, sound and feedback: from the console, or through a relay (docs/relay.md)."""
+"""Sends observers to the console or to a relay for pictures, sound and feedback (docs/relay.md)."""
 
 from typing import Annotated
 

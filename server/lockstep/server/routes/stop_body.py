@@ -1,4 +1,4 @@
-"""The body of a STOP by HTTP: whatever it is, it is a stop. What cannot be read of it is left out."""
+"""Reads the body of a STOP over HTTP. Every body is a stop; fields that cannot be read are left out."""
 
 import asyncio
 from typing import Annotated
@@ -13,7 +13,7 @@ from lockstep.server.stop.stop_presses import MAX_REASON, stop_text
 
 __all__ = ["BODY_SECONDS", "StopRequest", "read_stop"]
 
-BODY_SECONDS = 1.0  # that a stop waits for the rest of its request
+BODY_SECONDS = 1.0  # wait of a stop for the rest of its request
 
 
 class StopRequest(msgspec.Struct, frozen=True):
@@ -29,9 +29,9 @@ class _AnyBody(msgspec.Struct, frozen=True):
 
 
 async def read_stop(request: Request) -> StopRequest:
-    """What the body says, its id as it was given. What is wrong with it is counted, and refuses nothing.
+    """Return the body, with its id as it was given. Errors in it are counted, and refuse nothing.
 
-    Also that it does not come: the network may have lost it, and the robot is not to move on until that is repaired.
+    A missing body refuses nothing either: the network may have lost it, and the robot must not move on meanwhile.
     """
     try:
         found = await _read_in_time(request)

@@ -49,10 +49,10 @@ FRAGMENT = "application/trickle-ice-sdpfrag"
 FURTHER_SECTIONS = 2  # besides one for each stream: the data channels, and the operator's voice
 NEGOTIATION_TIMEOUT = 10.0  # s until STUN and TURN servers have told their addresses
 
-# The welcome has the robot's description, which of an arm with many bodies is longer than 16 KiB.
-LARGEST_MESSAGE = 64 * 1024  # bytes, that every browser takes
+# The welcome has the robot's description, which is longer than 16 KiB for an arm with many bodies.
+LARGEST_MESSAGE = 64 * 1024  # bytes; every browser takes that
 OF_OBSERVERS = PeerSettings(sctp=SctpSettings(max_send_message=LARGEST_MESSAGE))
-# Whoever drives hears soon what has come, with the feedback in most cases: no repeat waits for it.
+# Drivers get acknowledgements soon, with the feedback in most cases: no repeat waits for them.
 OF_DRIVERS = PeerSettings(sctp=SctpSettings(max_send_message=LARGEST_MESSAGE, acknowledgement_delay=0.01))
 
 router = APIRouter()
@@ -127,7 +127,7 @@ async def patch(resource: str, request: Request, caller: Annotated[Right, Depend
 
 
 async def patched(request: Request, here: Dependencies, ice: IceSession, still_there: Callable[[], object]) -> Response:
-    """What a PATCH does, of WHEP and of WHIP. `still_there` raises when the session has ended."""
+    """Handle a PATCH of WHEP or WHIP. `still_there` raises when the session has ended."""
     expected = _precondition(request, ice.tag)
     text = await read_text(request, FRAGMENT, here.settings.max_sdp_bytes)
     still_there()  # it may have ended while the body came
@@ -146,7 +146,7 @@ async def patched(request: Request, here: Dependencies, ice: IceSession, still_t
 
 
 def _precondition(request: Request, tag: str) -> str:
-    """What the request expects of the ICE session: `*` (any), or its tag (RFC 9110 13.1.1)."""
+    """Return the request's precondition on the ICE session: `*` (any), or its tag (RFC 9110 13.1.1)."""
     expected = request.headers.get("if-match", "").strip()
     if not expected:
         raise PreconditionRequired("a PATCH needs If-Match: the ETag of the ICE session, or * to restart it")
@@ -162,7 +162,7 @@ async def delete(resource: str, request: Request, caller: Annotated[Right, Depen
 
 
 def _own(here: Dependencies, resource: str, caller: Right) -> WebRtcPeer:
-    """The peer of this resource; somebody else's is as good as none."""
+    """Return the caller's peer of this resource. Raises NotFound, also for the resource of somebody else."""
     peer = here.console.peers.by_resource(resource)
     if peer.identity.token_id != caller.token_id:
         raise NotFound("no such WHEP resource")
@@ -179,7 +179,7 @@ def _check_sections(here: Dependencies, offer: SessionDescription) -> None:
 async def _negotiate(
     here: Dependencies, caller: Right, identity: Identity, offer: SessionDescription, *, trailer: bool, thumbnail: bool
 ) -> tuple[WebRtcPeer, SessionDescription]:
-    """The peer, and its answer. `identity`: as whom `caller` takes part."""
+    """Return the peer, and its answer. `identity`: the one under which `caller` takes part."""
     # The console's own candidates are a setting, and a peer's address is learnt from its checks: no server is asked.
     servers = servers_for(here.settings, identity).ice_servers if here.settings.relay_console else []
     channels = agreed_channels([each for section in offer.accepted for each in section.channel_maps])

@@ -1,4 +1,4 @@
-"""WHIP signalling (RFC 9725): somebody with an operator's link publishes a camera of the console's own."""
+"""WHIP signalling (RFC 9725): a client with an operator's link publishes one of the console's own cameras."""
 
 import asyncio
 from dataclasses import replace
@@ -134,7 +134,7 @@ def _parsed(text: str) -> SessionDescription:
 
 
 def _pictures(offer: SessionDescription) -> MediaSection:
-    """The first section that sends pictures that can be taken, with its best-liked codec and what repairs that."""
+    """Return the first section that sends usable pictures, with its preferred codec and the codec of its repairs."""
     for section in offer.sections:
         if section.kind == "video" and section.direction in ("sendonly", "sendrecv"):
             common = {each.payload_type for each in common_codecs(section.codecs, PICTURES)}
@@ -146,7 +146,7 @@ def _pictures(offer: SessionDescription) -> MediaSection:
 
 
 def _enabled(request: Request) -> Dependencies:
-    """Raises NotFound where nobody may publish anything."""
+    """Return the dependencies. Raises NotFound where nobody may publish anything."""
     here = dependencies(request)
     if not here.publishers.enabled:
         raise NotFound("nothing can be published to this console: LOCKSTEP_WHIP names no camera")
@@ -154,7 +154,7 @@ def _enabled(request: Request) -> Dependencies:
 
 
 def _own(here: Dependencies, resource: str, caller: Right) -> Publisher:
-    """The publisher of this session; somebody else's is as good as none."""
+    """Return the caller's publisher of this session. Raises NotFound, also for the session of somebody else."""
     publisher = here.publishers.by_resource(resource)
     if publisher.identity.token_id != caller.token_id:
         raise NotFound("no such WHIP session")
@@ -164,7 +164,7 @@ def _own(here: Dependencies, resource: str, caller: Right) -> Publisher:
 async def _negotiate(
     here: Dependencies, caller: Right, offer: SessionDescription, section: MediaSection, camera: PublishedCamera
 ) -> tuple[Publisher, str]:
-    """`section`: the one whose pictures are taken; others are answered inactive."""
+    """Return the publisher, and its answer. `section`: its pictures are taken; others are answered inactive."""
     servers = servers_for(here.settings, caller.identity).ice_servers if here.settings.relay_console else []
     publisher = Publisher(camera, caller.identity, here.settings)
     try:

@@ -1,8 +1,8 @@
-"""Where the commands of the last moments would have brought the robot, by its description alone. No I/O.
+"""Computes the poses to which the latest commands would have led the robot, by its description alone. No I/O.
 
-Beside the measured robot this shows what came between: slew, slip, a limit, an obstacle. Commands are what the console
-forwarded under each event; each counts from its own feedback until the next one, by the bridge's clock, and no longer
-than the robot holds a command. At rest nothing counts.
+Beside the measured robot this shows the effect of slew, slip, a limit or an obstacle. Commands are those that the
+console forwarded under each event; each counts from the feedback of its event until the next one, by the bridge's
+clock, and no longer than the robot holds a command. At rest nothing counts.
 """
 
 import copy
@@ -37,7 +37,7 @@ class _Span(NamedTuple):
 
 
 class CommandedPath:
-    """`command` takes what is forwarded, `feedback` what comes back; `poses` says where the bodies would be."""
+    """`command` takes a forwarded command, `feedback` a feedback; `poses` returns the commanded poses."""
 
     def __init__(self, description: RobotDescription) -> None:
         self.seconds = min(max(description.hold, 0.0), 5.0)
@@ -55,7 +55,7 @@ class CommandedPath:
 
     @property
     def known(self) -> bool:
-        """Whether the description says what any axis moves."""
+        """True if the description tells the effect of any axis."""
         return bool(self._gains or self._base or self._twists)
 
     def command(self, event: int, values: Sequence[float]) -> None:
@@ -75,13 +75,13 @@ class CommandedPath:
             self._records.popleft()
 
     def as_of_now(self) -> Self:
-        """To be asked for `poses` in another thread: for a robot of many parts that takes a while."""
+        """Return a copy for `poses` in another thread, which takes a while for a robot of many parts."""
         found = copy.copy(self)
         found._commands, found._records = dict(self._commands), self._records.copy()
         return found
 
     def poses(self) -> dict[str, Pose] | None:
-        """In the world, of every body; None where nothing was commanded, or the description does not say enough."""
+        """Return the poses of all bodies in the world; None if nothing was commanded, or the description lacks data."""
         spans = list(self._spans())
         if not self.known or not any(any(span.offsets.values()) for span in spans):
             return None
@@ -96,7 +96,7 @@ class CommandedPath:
         return poses
 
     def _spans(self) -> list[_Span]:
-        """What was commanded between one feedback and the next."""
+        """Return the commands between each feedback and the next."""
         records = list(self._records)
         return [
             _Span(self._offsets(record), min(after.time - record.time, self.seconds))
@@ -124,7 +124,7 @@ class CommandedPath:
 
 
 def _gains(description: RobotDescription) -> dict[str, dict[str, float]]:
-    """The axes of each joint whose gain does not change with the posture."""
+    """Return the gains of axes by joint, for joints whose gains do not change with the posture."""
     joints = {joint.name for joint in description.joints}
     return {
         limit.joint: {each.axis: each.gain for each in limit.axes if each.gain is not None}
@@ -144,7 +144,7 @@ def _moved_base(
 
 
 def _moved_body(twist: BodyTwist, before: Mapping[str, Pose], after: Mapping[str, Pose], spans: list[_Span]) -> Pose:
-    """From where the body was in its frame when the commands began, to where its frame would be now."""
+    """Return the commanded pose: from the body's pose in its frame at the first command, in its frame as of now."""
     here = Pose((0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0))
     pose = joined(inverse(before.get(twist.frame, here)), before[twist.body])
     point = joined(pose, Pose(twist.point, here.orientation)).position

@@ -1,4 +1,4 @@
-"""The commanded robot, drawn through the measured one in the 3D scene. Runs in the scene's own thread."""
+"""Draws the commanded robot over the measured one in the 3D scene. Runs in the scene's own thread."""
 
 import math
 from collections.abc import Mapping
@@ -12,14 +12,14 @@ from lockstep.server.scene.shapes import add_geom
 __all__ = ["SceneGhost"]
 
 COLOR = (1.0, 0.76, 0.30, 0.32)
-LARGER = 1.02  # so that it covers what it agrees with
+LARGER = 1.02  # so that it covers the parts that it agrees with
 SOLID = 0.5  # geoms more transparent than this have no ghost
 SAME_WAY = math.cos(math.radians(3) / 2)
 LIFT = 0.2  # m, of the label above the lowest moving body
 
 
 class SceneGhost:
-    """Translucent, and only there while commands alone would have led elsewhere."""
+    """A translucent robot, shown only while the commands alone would have led elsewhere."""
 
     def __init__(self, server: viser.ViserServer, description: RobotDescription, seconds: float, least: float) -> None:
         self._least = least  # m
@@ -50,7 +50,7 @@ class SceneGhost:
         return bool(self._root.visible)
 
     def show(self, poses: Mapping[str, Pose] | None, measured: Mapping[str, Pose]) -> None:
-        """None: nothing is commanded, or it is not known what that would do."""
+        """Show the commanded poses; None: nothing is commanded, or its effect is unknown."""
         shown = poses is not None and any(self._differs(poses[name], measured[name]) for name in self._frames)
         if shown and poses is not None:
             for name, frame in self._frames.items():
@@ -59,7 +59,7 @@ class SceneGhost:
             self._root.visible = shown
 
     def _differs(self, pose: Pose, measured: Pose) -> bool:
-        """By enough to see: a ghost that covers its robot says nothing and flickers."""
+        """Return whether the poses differ visibly: a ghost that covers its robot says nothing and flickers."""
         agreement = abs(sum(a * b for a, b in zip(pose.orientation, measured.orientation, strict=True)))
         return agreement < SAME_WAY or math.dist(pose.position, measured.position) > self._least
 

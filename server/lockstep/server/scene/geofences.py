@@ -16,7 +16,7 @@ CALM, ACTING = 2.0, 6.0  # pixels
 
 
 class SceneFences:
-    """Lines, which get thick while a zone slows the robot."""
+    """Lines around the zones; they get thick while a zone slows the robot."""
 
     def __init__(self, server: viser.ViserServer, description: RobotDescription) -> None:
         self.lines = {
@@ -28,12 +28,12 @@ class SceneFences:
                 thickness_units="screen",
             )
             for number, fence in enumerate(description.geofences)
-            if len(fence.polygon) > 1  # the bridge checks it; a bridge of somebody else's may not
+            if len(fence.polygon) > 1  # the bridge checks it; one by another author may not
         }
         self._acting: frozenset[str] = frozenset()
 
     def show(self, acting: Collection[str]) -> None:
-        """Sets only what changed."""
+        """Set the thickness of the lines that changed."""
         now = frozenset(acting) & self.lines.keys()
         for name in now ^ self._acting:
             self.lines[name].thickness = ACTING if name in now else CALM
@@ -41,6 +41,6 @@ class SceneFences:
 
 
 def _edges(fence: Geofence) -> np.typing.NDArray[np.float32]:
-    """(edges, 2 ends, xyz)."""
+    """Return the edges as an array (edges, 2 ends, xyz)."""
     corners = np.array([(x, y, LIFT) for x, y in fence.polygon], np.float32)
     return np.stack((corners, np.roll(corners, -1, axis=0)), axis=1)

@@ -24,14 +24,14 @@ Quaternion = tuple[float, float, float, float]  # w, x, y, z
 
 
 class Pose(NamedTuple):
-    """Of a body in its parent."""
+    """The pose of a body in its parent, or in the world."""
 
     position: Vector
     orientation: Quaternion
 
 
 def body_pose(body: Body, joints: Mapping[str, float]) -> Pose:
-    """The body's joints act in list order, in its own frame, after its fixed position and orientation."""
+    """Return the pose in the parent. The body's joints act in list order, in its frame, after its fixed pose."""
     pose = Pose(body.position, body.orientation)
     for joint in body.joints:
         pose = _moved(pose, joint, joints.get(joint.joint, 0.0))
@@ -39,11 +39,11 @@ def body_pose(body: Body, joints: Mapping[str, float]) -> Pose:
 
 
 def scene_paths(description: RobotDescription) -> dict[str, str]:
-    """The path of every body in the scene tree, "/robot/base/arm": parents first, no orphans."""
+    """Return the path of every body in the scene tree, "/robot/base/arm": parents first, no orphans."""
     parents = {body.name: body.parent for body in description.bodies}
     paths: dict[str, str] = {}
     for body in description.bodies:
-        chain, name = list[str](), body.name  # those whose path is not known yet: each is looked at once
+        chain, name = list[str](), body.name  # bodies whose path is not known yet: each is looked at once
         while name in parents and name not in paths and len(chain) <= len(parents):
             chain.append(name)
             name = parents[name]
@@ -55,12 +55,12 @@ def scene_paths(description: RobotDescription) -> dict[str, str]:
 
 
 def world_positions(description: RobotDescription, joints: Mapping[str, float]) -> list[Vector]:
-    """Where the bodies are in the world, in the order of `scene_paths`."""
+    """Return the bodies' positions in the world, in the order of `scene_paths`."""
     return [pose.position for pose in world_poses(description, joints).values()]
 
 
 def world_poses(description: RobotDescription, joints: Mapping[str, float]) -> dict[str, Pose]:
-    """The bodies' poses in the world, in the order of `scene_paths`."""
+    """Return the bodies' poses in the world, in the order of `scene_paths`."""
     bodies = {body.name: body for body in description.bodies}
     world = Pose((0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0))
     poses: dict[str, Pose] = {}
@@ -71,13 +71,13 @@ def world_poses(description: RobotDescription, joints: Mapping[str, float]) -> d
 
 
 def joined(outer: Pose, inner: Pose) -> Pose:
-    """A pose given in another one."""
+    """Return `inner`, which is given in `outer`, in the frame of `outer`."""
     position = _added(outer.position, rotate(outer.orientation, inner.position))
     return Pose(position, product(outer.orientation, inner.orientation))
 
 
 def inverse(pose: Pose) -> Pose:
-    """Of a pose of unit orientation."""
+    """Return the inverse of a pose of unit orientation."""
     w, x, y, z = pose.orientation
     back = (w, -x, -y, -z)
     at_x, at_y, at_z = rotate(back, pose.position)
@@ -94,7 +94,7 @@ def _moved(pose: Pose, joint: BodyJoint, value: float) -> Pose:
 
 
 def about(axis: Vector, angle: float) -> Quaternion:
-    """A turn about `axis`, which need not be of length 1; about no axis it is no turn."""
+    """Return a turn about `axis`, which need not be of length 1; about a zero axis it is no turn."""
     largest = max(map(abs, axis))
     if largest == 0:
         return (1.0, 0.0, 0.0, 0.0)

@@ -22,7 +22,7 @@ GRID_SECTION = (66, 78, 94)
 ARROW = (255, 176, 32)
 RANGES = (64, 200, 255)
 LABEL_LIFT = 0.4  # m above the highest joint
-FLOOR_LIFT = 0.004  # m, so that the grid shows on a floor of the robot's own
+FLOOR_LIFT = 0.004  # m, so that the grid shows on a floor in the robot's description
 STOPPED = " · STOPPED"
 CELL = 0.5  # m, of the grid
 TRAIL_STEP = 0.004  # of the radius of the scene
@@ -30,7 +30,7 @@ RAY = (40, 92, 122)
 GHOST_APART = 0.008  # of the radius of the scene: nearer than this the ghost is not drawn
 ARROW_LEAST = 0.15  # m, so that a light contact shows
 ARROW_LENGTH = 0.6  # m at full scale
-MIN_VIEW, MAX_VIEW = 1.6, 6.0  # m, how far the first look stands off
+MIN_VIEW, MAX_VIEW = 1.6, 6.0  # m, distance of the first view
 
 Triple = tuple[float, float, float]
 
@@ -38,7 +38,7 @@ Triple = tuple[float, float, float]
 class SceneModel:
     """One robot in one viser server. `pose` sets only what changed.
 
-    `factor` is by how much the description was magnified before.
+    `factor` is the magnification of the description.
     """
 
     def __init__(self, server: viser.ViserServer, description: RobotDescription, factor: float = 1.0) -> None:
@@ -66,7 +66,7 @@ class SceneModel:
         self.fences = SceneFences(server, description)
 
     def pose(self, feedback: Feedback, commanded: Mapping[str, Pose] | None = None) -> None:
-        """`commanded`: where the bodies would be by the commands alone; None: nothing is commanded."""
+        """Show a feedback. `commanded`: poses of the bodies by the commands alone; None: nothing is commanded."""
         joints = dict(zip(self._joint_names, feedback.joints, strict=False))
         with self._server.atomic():
             # First: viewers hold back all that follows until they show a picture of this event (web's scene_gate.ts).
@@ -107,7 +107,7 @@ class SceneModel:
         camera.position = (x - distance * 0.62, y - distance * 0.62, z * 0.6 + distance * 0.62)
 
     def _center(self) -> Triple:
-        """Of the bodies that hang on joints, else of all."""
+        """Return the center of the bodies on joints, else of all bodies."""
         names = list(self._paths)
         moving = {body.name for body in self._description.bodies if body.joints}
         positions = world_positions(self._description, {})
@@ -131,7 +131,7 @@ class SceneModel:
                 self.frames[body.name].wxyz = body.orientation
 
     def _add_label(self) -> viser.LabelHandle:
-        """The event reference, above what moves first, and moving with it."""
+        """Add the event reference above the first moving body; it moves with the body."""
         positions = world_positions(self._description, {})
         top = max((z for _, _, z in positions), default=0.0) + LABEL_LIFT
         root = next((self._paths[body.name] for body in self._moving), "/robot")
@@ -195,7 +195,7 @@ class SceneModel:
                 handle.visible = bool(seen)
 
     def _add_rays(self) -> viser.LineSegmentsHandle | None:
-        """From the ring to what each of its sensors sees."""
+        """Add a ray from the ring to the point that each of its sensors sees."""
         ring = self._description.ranges
         if ring is None or ring.body not in self._paths:
             return None
@@ -210,7 +210,7 @@ class SceneModel:
 
 
 def _skin(body: Body) -> tuple[float, float]:
-    """How far from the body's origin its surface is, and how high its middle: an arrow inside it would not be seen."""
+    """Return the body's extent from its origin, and the height of its middle: an arrow inside it would be hidden."""
     around = [
         (max(geom.size) if geom.shape == "box" else geom.size[0], geom.position[2])
         for geom in body.geoms
@@ -220,7 +220,7 @@ def _skin(body: Body) -> tuple[float, float]:
 
 
 def length_words(metres: float) -> str:
-    """ "500 nm": as people write it."""
+    """Return a length as people write it: "500 nm"."""
     for unit, size in (("m", 1.0), ("mm", 1e-3), ("µm", 1e-6)):
         if metres >= 0.1 * size:
             return f"{metres / size:.3g} {unit}"

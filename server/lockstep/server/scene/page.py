@@ -1,4 +1,4 @@
-"""viser's client: one HTML file, read once and kept in memory, with the script that gates it before all of its own."""
+"""viser's client: one HTML file, read once and kept in memory, with the gate's script before all of its scripts."""
 
 import gzip
 from pathlib import Path
@@ -19,7 +19,7 @@ class ScenePage(NamedTuple):
 
 
 def scene_page(client: bytes) -> ScenePage:
-    """From the HTML of viser's client. Raises ValueError when it has no head."""
+    """Make the page from the HTML of viser's client. Raises ValueError if that has no head."""
     if b"<head>" not in client:
         raise ValueError("viser's client has no <head>")
     plain = client.replace(b"<head>", HOOK, 1)
@@ -27,10 +27,10 @@ def scene_page(client: bytes) -> ScenePage:
 
 
 def read_scene_page(port: int) -> ScenePage:
-    """Blocks: from viser on loopback.
+    """Read the page from viser on loopback. Blocks.
 
     Raises:
-        OSError, ValueError: it cannot be had.
+        OSError, ValueError: the page cannot be read.
     """
     opener = build_opener(ProxyHandler({}))
     with opener.open(f"http://127.0.0.1:{port}/", timeout=READ_SECONDS) as answer:

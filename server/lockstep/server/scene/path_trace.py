@@ -1,4 +1,4 @@
-"""Where the robot has been, in the 3D scene: lines behind its base and its tool. Runs in the scene's own thread."""
+"""The robot's trails in the 3D scene: lines behind its base and its tool. Runs in the scene's own thread."""
 
 from collections import deque
 from collections.abc import Mapping
@@ -18,7 +18,7 @@ Vector = tuple[float, float, float]
 
 
 class SceneTrails:
-    """Of the body that moves first, and of the one that a twist moves, else of the one farthest out."""
+    """Trails of the first moving body, and of the body that a twist moves, else of the outermost body."""
 
     def __init__(self, server: viser.ViserServer, description: RobotDescription, step: float) -> None:
         paths = scene_paths(description)
@@ -45,7 +45,7 @@ class SceneTrails:
             trail.add(joined(poses[name], Pose(self._points[name], (1.0, 0.0, 0.0, 0.0))).position)
 
     def lengths(self) -> list[int]:
-        """Points of each trail."""
+        """Return the number of points of each trail."""
         return [trail.length for trail in self._trails.values()]
 
 
@@ -64,7 +64,7 @@ class _Trail:
         return max(0, len(self._lines) - 1) * CHUNK + len(self._points)
 
     def add(self, point: Vector) -> None:
-        """A point that lies nearer than a step to the last one adds nothing."""
+        """Add a point, unless it lies nearer than a step to the last one."""
         if self._points and float(np.linalg.norm(np.subtract(point, self._points[-1]))) < self._step:
             return
         if len(self._points) >= CHUNK:

@@ -1,4 +1,4 @@
-"""Robots of any size in one 3D scene: what is far smaller than a metre, or far larger than a hall, is magnified.
+"""Scales robots for the 3D scene: magnifies those far smaller than a metre, shrinks those far larger than a hall.
 
 viser's grid, camera and controls, and meshes in single precision, are made for metres. No I/O.
 """
@@ -14,7 +14,7 @@ from lockstep.server.scene.kinematics import Pose
 
 __all__ = ["SceneScale"]
 
-SMALLEST, LARGEST = 0.5, 100.0  # m, of the whole scene, that need no magnifying
+SMALLEST, LARGEST = 0.5, 100.0  # m, sizes of the whole scene that need no magnification
 WANTED = 2.0  # m
 BEYOND = 1e6  # m: a description that says more than this, or is not finite, is taken as it is
 Triple = tuple[float, float, float]
@@ -31,7 +31,7 @@ class SceneScale:
         self._in_metres = [joint.unit == "m" for joint in description.joints]
 
     def description(self, description: RobotDescription) -> RobotDescription:
-        """The same robot, so many times larger."""
+        """Return the same robot, magnified by `factor`."""
         if self.factor == 1.0:
             return description
         by = self.factor
@@ -47,7 +47,7 @@ class SceneScale:
         )
 
     def feedback(self, feedback: Feedback) -> Feedback:
-        """Where the parts of the larger robot are."""
+        """Return the feedback of the magnified robot."""
         if self.factor == 1.0:
             return feedback
         joints = [
@@ -58,7 +58,7 @@ class SceneScale:
         return msgspec.structs.replace(feedback, joints=joints, ranges=ranges)
 
     def poses(self, poses: dict[str, Pose] | None) -> dict[str, Pose] | None:
-        """Where its bodies are, by poses of the robot as it is."""
+        """Return the poses of the magnified robot, from those of the robot as it is."""
         if poses is None or self.factor == 1.0:
             return poses
         return {name: _magnified(pose, self.factor) for name, pose in poses.items()}
@@ -75,7 +75,7 @@ def _factor(reach: float) -> float:
 
 
 def _reaches(description: RobotDescription) -> Iterator[float]:
-    """How far from its body's parent everything reaches; a robot is about as large as the largest of these."""
+    """Yield the reach of all parts from their body's parent; a robot is about as large as the largest of these."""
     for body in description.bodies:
         yield math.hypot(*body.position)
         for geom in body.geoms:

@@ -1,4 +1,4 @@
-"""viser itself. Imported when somebody opens the full 3D scene for the first time: loading it takes a while."""
+"""Starts viser. Imported when somebody opens the full 3D scene for the first time: loading viser takes a while."""
 
 import logging
 
@@ -13,10 +13,10 @@ __all__ = ["build_model", "start_viser"]
 
 
 def start_viser() -> tuple[viser.ViserServer, ScenePage]:
-    """Blocks until it listens, on a free port of loopback.
+    """Start viser on a free port of loopback. Blocks until it listens.
 
     Raises:
-        OSError, ValueError: its client cannot be had.
+        OSError, ValueError: its client cannot be read.
     """
     # viser announces itself and every refusal on standard output, which belongs to the console's own links.
     rich.get_console().quiet = True
@@ -32,7 +32,7 @@ def start_viser() -> tuple[viser.ViserServer, ScenePage]:
 
 
 def build_model(server: viser.ViserServer, description: RobotDescription, factor: float) -> SceneModel:
-    """Instead of what the scene showed before."""
+    """Build the robot in the scene, in place of the previous one."""
     with server.atomic():
         server.scene.reset()
         return SceneModel(server, description, factor)

@@ -23,7 +23,8 @@ def add_geom(server: viser.ViserServer, path: str, geom: Geom) -> None:
     else:
         make = trimesh.creation.cylinder if geom.shape == "cylinder" else trimesh.creation.capsule
         mesh = make(radius=first, height=2 * second)
-        # viser's cylinder stands on another axis than ours (z), and it has no capsule: both go as meshes, centred.
+        # viser's cylinder does not stand on z as the description's does, and viser has no capsule: both go as centred
+        # meshes.
         vertices = np.asarray(mesh.vertices - mesh.bounds.mean(axis=0), dtype=np.float32)
         scene.add_mesh_simple(
             path, vertices, np.asarray(mesh.faces), color=color, opacity=opacity, position=at, wxyz=wxyz

@@ -1,4 +1,4 @@
-"""The 3D scene: viser on a loopback port, started for the first who opens it, posed while somebody watches."""
+"""The 3D scene: viser on a loopback port, started for the first viewer, posed while somebody watches."""
 
 import asyncio
 import time
@@ -32,19 +32,19 @@ Result = TypeVar("Result")
 
 log = structlog.get_logger(__name__)
 
-START_TIMEOUT = 20.0  # s, of a busy machine
+START_TIMEOUT = 20.0  # s, on a busy machine
 STOP_TIMEOUT = 5.0  # s
-SHARE = 0.25  # of the time, for building and posing: whatever the robot is like, their thread holds up all others
-LINK_PART = 4  # one link gets this part of the places
-RESERVED_PART = 5  # this part is not for observers
+SHARE = 0.25  # share of the time for building and posing: whatever the robot, their thread holds up all others
+LINK_PART = 4  # one link gets 1 / LINK_PART of the places
+RESERVED_PART = 5  # 1 / RESERVED_PART of the places is not for observers
 OPENS, OPEN_RATE = 10, 0.5  # Hz, scenes that one link opens: viser tells each the whole scene
 
 
 class SceneView:
-    """Enter `run` as a task. Starting, building and posing happen in threads, the newest feedback wins.
+    """Run `run` as a task. Starting, building and posing happen in threads; the newest feedback wins.
 
     Attributes:
-        port: where viser listens, on loopback; 0 before somebody opens the scene
+        port: port of viser on loopback; 0 before somebody opens the scene
     """
 
     def __init__(self, rate: float, max_viewers: int, metrics: Metrics) -> None:
@@ -52,7 +52,7 @@ class SceneView:
         self._interval = 1 / rate
         self._max_viewers = max_viewers
         self._metrics = metrics
-        self._wanted = False  # somebody opens it, and viser is to be started
+        self._wanted = False  # True if somebody opens the scene and viser must start
         self._started = asyncio.Event()
         self._server: viser.ViserServer | None = None
         self._model: SceneModel | None = None
@@ -61,7 +61,7 @@ class SceneView:
         self._feedback: Feedback | None = None  # not shown yet
         self._path: CommandedPath | None = None
         self._viewers = 0
-        self._worked = 0.0  # s, of threads for the picture that is being made
+        self._worked = 0.0  # s of thread time for the picture that is being made
         self._of_link: Counter[str] = Counter()
         self._opens = RateLimits(OPEN_RATE, OPENS)
         self._page: ScenePage | None = None
@@ -73,7 +73,7 @@ class SceneView:
         self._news.set()
 
     def command(self, command: Command) -> None:
-        """One that was forwarded to the robot."""
+        """Take a command that was forwarded to the robot."""
         if self._path is not None:
             self._path.command(command.event, command.values)
 
@@ -86,17 +86,17 @@ class SceneView:
 
     @property
     def page(self) -> ScenePage:
-        """Raises SceneUnavailable before `open`."""
+        """viser's client. Raises SceneUnavailable before `open`."""
         if self._page is None:
             raise SceneUnavailable("the 3D scene has not started")
         return self._page
 
     @contextmanager
     def viewer(self, ticket: SceneTicket) -> Iterator[None]:
-        """While entered, somebody watches. One link gets a quarter of the places, observers not the last ones.
+        """Count a viewer while entered. One link gets a quarter of the places; observers do not get the last ones.
 
         Raises:
-            SceneUnavailable: too many do, or this link begins too often.
+            SceneUnavailable: there are too many viewers, or this link opens scenes too often.
         """
         if not self._opens.spend(ticket.link, time.monotonic()):
             raise SceneUnavailable("this link opens scenes too often")
@@ -116,12 +116,12 @@ class SceneView:
             yield
         finally:
             self._of_link[ticket.link] -= 1
-            self._of_link += Counter()  # forgets those that have none
+            self._of_link += Counter()  # forgets links without a scene
             self._viewers -= 1
             self._metrics.scene_viewers.set(self._viewers)
 
     async def open(self) -> None:
-        """Returns when viser listens, which `run` starts for whoever comes first.
+        """Wait until viser listens; `run` starts it for the first viewer.
 
         Raises:
             SceneUnavailable: it does not start.
@@ -137,7 +137,7 @@ class SceneView:
             raise SceneUnavailable("the 3D scene does not start") from error
 
     async def run(self) -> None:
-        """Until cancelled."""
+        """Run until cancelled."""
         while True:
             await self._news.wait()
             self._news.clear()
@@ -164,7 +164,7 @@ class SceneView:
     async def _built(
         self, server: "viser.ViserServer", description: RobotDescription, factor: float
     ) -> "SceneModel | None":
-        """None: nothing can be made of it. A shape that viser does not take must not end the console."""
+        """Build the model; None if it fails: a shape that viser does not take must not end the console."""
         try:
             return await asyncio.to_thread(self._timed, partial(_build, server, description, factor))
         except Exception as error:
@@ -179,7 +179,7 @@ class SceneView:
             self._model = None  # rather no picture than one that stands still
 
     def _timed(self, work: Callable[[], Result]) -> Result:
-        """In a thread: what it does there, and not what it waits for on a busy machine, holds up the others."""
+        """Run `work` in a thread and add its CPU time, which delays others; waiting on a busy machine does not."""
         began = time.thread_time()
         try:
             return work()
@@ -191,7 +191,7 @@ class SceneView:
         log.warning("the 3D scene cannot be " + what, error=f"{type(error).__name__}: {error}")
 
     async def close(self) -> None:
-        """Idempotent."""
+        """Stop viser. Idempotent."""
         server, self._server = self._server, None
         if server is not None:
             async with asyncio.timeout(STOP_TIMEOUT):
@@ -199,7 +199,7 @@ class SceneView:
 
 
 def pause(worked: float, interval: float) -> float:
-    """s to the next picture of the scene, after one for which a thread has worked so many s."""
+    """Return the seconds to the next picture of the scene, after a thread has worked `worked` s for the last one."""
     return max(interval, worked * (1 / SHARE - 1))
 
 

@@ -1,1 +1,1 @@
-"""Observers by the thousand: the session goes into an SFU that others keep."""
+"""Publishes the session to external SFU servers, for observers by the thousand."""

@@ -1,11 +1,11 @@
-"""Who watches where. No I/O, no clock is read here."""
+"""Assigns observers to the console or to a relay. No I/O; reads no clock."""
 
 from collections.abc import Mapping
 from typing import NamedTuple
 
 __all__ = ["Assignment"]
 
-PENDING_SECONDS = 10.0  # that a place is kept for somebody who was told of it and is not there yet
+PENDING_SECONDS = 10.0  # a place is kept this long for an observer that was told of it and has not arrived
 
 
 class _Promise(NamedTuple):
@@ -14,18 +14,18 @@ class _Promise(NamedTuple):
 
 
 class Assignment:
-    """Up to `direct` observers connect to the console itself; the others go where the fewest are."""
+    """Up to `direct` observers connect to the console itself; the others go to the relay with the fewest."""
 
     def __init__(self, direct: int) -> None:
         self._direct = direct
         self._promises: list[_Promise] = []
 
     def choose(self, now: float, direct: int, relays: Mapping[str, int]) -> str:
-        """The relay for one more observer; "" is the console itself.
+        """Return the relay for one more observer; "" is the console itself.
 
         Args:
             direct: observers that get media from the console now
-            relays: those that can be used, and how many observers each has now
+            relays: the relays that can be used, each with its present number of observers
         """
         self._promises = [promise for promise in self._promises if promise.until > now]
         choice = ""
@@ -35,18 +35,18 @@ class Assignment:
         return choice
 
     def arrived(self, relay: str) -> None:
-        """Somebody who was sent there is there, and counted by the caller from now on."""
+        """Note that an observer has arrived at `relay`; the caller counts it from now on."""
         for promise in self._promises:
             if promise.relay == relay:
                 self._promises.remove(promise)
                 return
 
     def expected(self, now: float) -> bool:
-        """Whether anybody is on the way to a relay."""
+        """Return whether an observer is on the way to a relay."""
         return any(promise.relay and promise.until > now for promise in self._promises)
 
     def full(self, now: float, direct: int) -> bool:
-        """Whether one more observer would have to go to a relay."""
+        """Return whether one more observer would have to go to a relay."""
         waiting = sum(promise.relay == "" and promise.until > now for promise in self._promises)
         return direct + waiting >= self._direct
 

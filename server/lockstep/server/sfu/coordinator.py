@@ -27,22 +27,22 @@ __all__ = ["SfuCoordinator", "RelayedMedia", "RelayedPeer"]
 
 log = structlog.get_logger(__name__)
 
-WAIT_SECONDS = 3.0  # that an observer waits for a relay before it is served directly
-LINGER_SECONDS = 20.0  # that the session stays in the relays without an observer there
+WAIT_SECONDS = 3.0  # an observer waits this long for a relay before the console serves it directly
+LINGER_SECONDS = 20.0  # the session stays in the relays this long without an observer there
 HEARTBEAT_SECONDS = 0.4  # between two messages on the feedback channel, also while the robot link is down
 BACKOFF, BACKOFF_CAP = 0.1, 2.0  # s
-DISTRUST_SECONDS = 30.0  # that a relay which failed is tried after the others
+DISTRUST_SECONDS = 30.0  # a relay that failed is tried after the others for this long
 HEALTHY_SECONDS = 10.0
-LOOK_SECONDS = 0.25  # between two looks at who may still watch
-STRAY_SECONDS = 60.0  # after which whoever has a key and no line to the console is thought to watch on without it
-RENEW_SECONDS = 600.0  # between two publications for the sake of those
+LOOK_SECONDS = 0.25  # between two checks that the observers may still watch
+STRAY_SECONDS = 60.0  # then an observer with a key and no line to the console is thought to watch on without it
+RENEW_SECONDS = 600.0  # between two publications because of such observers
 NEW_EPOCH, ENDED, UNWATCHED, STRAY = "new epoch", "a link ended", "nobody watches", "somebody left with a key"
-OWN_REASONS = (NEW_EPOCH, ENDED, UNWATCHED, STRAY)  # to end a publication; no relay's fault
+OWN_REASONS = (NEW_EPOCH, ENDED, UNWATCHED, STRAY)  # reasons of the console to end a publication; no fault of a relay
 HEARTBEAT = encode_console_message(Pong(id=0))
 
 
 class RelayedPeer(Protocol):
-    """What it needs of a peer."""
+    """The part of a peer that the coordinator needs."""
 
     @property
     def relay(self) -> str: ...
@@ -53,14 +53,14 @@ class RelayedPeer(Protocol):
 
 
 class _Holder(NamedTuple):
-    """Somebody who was handed the key of the present publication."""
+    """A link that was given the key of the present publication."""
 
-    expires: float  # their link, s since 1970
-    seen_at: float  # when one of their peers was here last, s on the monotonic clock
+    expires: float  # s since 1970
+    seen_at: float  # last time that one of its peers was here, s on the monotonic clock
 
 
 class SfuCoordinator:
-    """Run `run` as a task. Everything else is called on the same loop and returns at once, but for `ticket`."""
+    """Run `run` as a task. Everything else is called on the same loop and returns at once, except `ticket`."""
 
     def __init__(
         self,
@@ -70,7 +70,7 @@ class SfuCoordinator:
         has_ended: Callable[[str, float], bool],
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
-        """`has_ended`: whether the link of this id, which expires then, is good no more."""
+        """`has_ended` returns whether the link with this id and expiry is no longer valid."""
         self.stations = [
             SfuServer(str(number), url, settings.relay_public[number] if settings.relay_public else url.address)
             for number, url in enumerate(settings.relay_urls)
@@ -82,35 +82,35 @@ class SfuCoordinator:
         self._handout = Assignment(settings.observers_direct)
         self._publication: Publication | None = None
         self._wanted = asyncio.Event()
-        self._asked_at = float("-inf")  # when somebody last asked for a relay
-        self._changed = asyncio.Event()  # replaced whenever a station became live or was lost
+        self._asked_at = float("-inf")  # last request for a relay
+        self._changed = asyncio.Event()  # replaced whenever a relay became live or was lost
         self._holders: dict[str, _Holder] = {}  # of the present publication's key, by link
         self._published_at = float("-inf")
 
-    # What the console tells
+    # Calls from the console
 
     def epoch_began(self) -> None:
-        """Media of another epoch are another publication."""
+        """Start another publication, for the media of another epoch."""
         self._restart(NEW_EPOCH)
 
     def _restart(self, why: str) -> None:
-        """Publish anew: another feed with other keys, so that who may not watch any more does not."""
+        """Publish anew: another feed with other keys shuts out observers that may no longer watch."""
         if self._publication is not None:
             self._publication.end(why)
 
     def send_feedback(self, text: str) -> None:
-        """A receiver among the observers; all that watch through relays at once."""
+        """Send feedback to all observers behind relays at once, as one receiver among the observers."""
         if self._publication is not None:
             self._publication.send_feedback(text)
 
-    # What observers ask
+    # Requests of observers
 
     async def ticket(self, peer: RelayedPeer | None, lost: str) -> RelayTicket | None:
-        """Where one more observer watches; None: directly. It holds a key, see `key`.
+        """Return a ticket to the relay for one more observer; None: the console. It holds a key, see `key`.
 
         Args:
-            peer: who asks again, because what it watched is gone
-            lost: "RELAY-FEED" that it lost; the same is not given out again
+            peer: the observer, if it asks again because its relay is gone
+            lost: the "RELAY-FEED" that it lost, which is not given out again
         """
         now = self._clock()
         direct = sum(not each.relay and each.role == "observer" for each in self._peers())
@@ -129,9 +129,9 @@ class SfuCoordinator:
         return None if station is None else self._engine.ticket(station)
 
     def key(self, peer: RelayedPeer) -> RelayTicket | None:
-        """What lets `peer` into the relay that it was admitted for; None: that does not carry the session now.
+        """Return the ticket that lets `peer` into its relay; None if that does not carry the session now.
 
-        Its link is remembered: when that ends, the key is good no more.
+        The link of `peer` is remembered: when the link ends, the key becomes invalid.
         """
         station = next((each for each in self.stations if each.live and each.name == peer.relay), None)
         if station is None:
@@ -140,12 +140,12 @@ class SfuCoordinator:
         return self._engine.ticket(station)
 
     def arrived(self, relay: str) -> bool:
-        """A peer that watches there is connected to the console; False: there is no such relay."""
+        """Note that a peer which watches through `relay` has connected. Return False if there is no such relay."""
         self._handout.arrived(relay)
         return any(station.name == relay for station in self.stations)
 
     async def _usable(self, lost: str) -> list[SfuServer]:
-        """Stations that carry the session, waited for a while."""
+        """Return the relays that carry the session; wait a while for the first."""
         deadline = self._clock() + WAIT_SECONDS
         while True:
             found = [each for each in self.stations if each.live and f"{each.name}-{each.feed}" != lost]
@@ -157,10 +157,10 @@ class SfuCoordinator:
             except TimeoutError:
                 continue
 
-    # Its own life
+    # The task
 
     async def run(self) -> None:
-        """Until cancelled. Without relays it has nothing to do."""
+        """Run until cancelled; return at once without relays."""
         backoff = Backoff(BACKOFF, BACKOFF_CAP)
         while self.stations:
             await self._wanted.wait()
@@ -174,7 +174,7 @@ class SfuCoordinator:
             except (RelayError, MediaError, OSError, ConnectionError) as error:
                 self._lost(origin, str(error))
             except Exception as error:
-                # A fault of the console's own; a relay never ends the console.
+                # A fault of the console itself; a relay never ends the console.
                 log.exception("publishing failed", relay=origin.url.address)
                 self._lost(origin, type(error).__name__)
             if self._clock() - began > HEALTHY_SECONDS:
@@ -182,7 +182,7 @@ class SfuCoordinator:
             await asyncio.sleep(backoff.next())
 
     def _order(self, station: SfuServer) -> tuple[float, int]:
-        """Those that failed lately come last, and of those the one that failed just now: it may be dead."""
+        """Sort key: relays that failed lately come last, and the latest failure at the end, as it may be dead."""
         distrusted = self._clock() - station.failed_at < DISTRUST_SECONDS
         return station.failed_at if distrusted else -math.inf, int(station.name)
 
@@ -192,7 +192,7 @@ class SfuCoordinator:
         return waiting or any(each.relay for each in self._peers())
 
     async def _carry(self, origin: SfuServer) -> None:
-        """From here into one relay, and from there into the others; returns when it ended or nobody watches."""
+        """Publish to one relay, and from there to the others; return when that has ended or nobody watches."""
         async with self._engine.publish(origin, secrets.randbits(52) | 1) as publication:
             self._publication = publication
             self._holders.clear()
@@ -225,7 +225,7 @@ class SfuCoordinator:
             await asyncio.gather(*tasks, return_exceptions=True)
 
     async def _watch(self, publication: Publication) -> None:
-        """Ends it when nobody watches any more, or when somebody who has its key may not watch any more."""
+        """End the publication when nobody watches, or a holder of its key may no longer watch."""
         quiet_since = self._clock()
         while True:
             await asyncio.sleep(LOOK_SECONDS)
@@ -240,7 +240,7 @@ class SfuCoordinator:
                 publication.end(UNWATCHED)
 
     def _has_strays(self) -> bool:
-        """Whether somebody may watch without being a participant; not more often than once in a while."""
+        """Return whether somebody may watch without taking part; False for `RENEW_SECONDS` after a publication."""
         now = self._clock()
         here = {each.identity.token_id for each in self._peers() if each.relay}
         for link in here & self._holders.keys():
@@ -249,7 +249,7 @@ class SfuCoordinator:
         return gone and now - self._published_at > RENEW_SECONDS
 
     async def _beat(self, publication: Publication) -> None:
-        """Observers tell a relay that hangs from a robot that is silent."""
+        """Send heartbeats, so that observers can tell a relay that hangs from a robot that is silent."""
         while True:
             await asyncio.sleep(HEARTBEAT_SECONDS)
             publication.send_feedback(HEARTBEAT)
@@ -298,14 +298,14 @@ class SfuCoordinator:
 
 
 class FedMedia(Protocol):
-    """The console's media."""
+    """The part of the console's media that `RelayedMedia` needs."""
 
     def configure(self, description: RobotDescription) -> None: ...
     def feed(self, media: Media, now: float) -> None: ...
 
 
 class RelayedMedia:
-    """The console's media, of which the relays hear when an epoch begins."""
+    """Passes calls on to the console's media, and tells the relays when an epoch begins."""
 
     def __init__(self, media: FedMedia, relays: SfuCoordinator) -> None:
         self._media = media

@@ -1,9 +1,9 @@
-"""What can go wrong with a relay.
+"""Errors of a relay.
 
 RelayError
 ├── RelayUnreachable   no connection, or it ended
 ├── RelaySilent        it did not answer in time
-└── RelayRefused       it said no
+└── RelayRefused       it refused a request
 """
 
 __all__ = ["RelayError", "RelayRefused", "RelaySilent", "RelayUnreachable"]
@@ -36,7 +36,7 @@ class RelaySilent(RelayError):
 
 
 class RelayRefused(RelayError):
-    """Attributes: code: Janus' own."""
+    """The relay refused a request. `code` is Janus' error code; 0 without one."""
 
     name = "refused"
 

@@ -1,4 +1,4 @@
-"""Relays that are Janus: one gets the session from here and passes it on to the others."""
+"""The engine for Janus relays: one gets the session from the console and passes it on to the others."""
 
 import asyncio
 import hashlib
@@ -20,7 +20,7 @@ __all__ = ["JanusEngine"]
 
 
 class JanusEngine:
-    """Its keys are made from the console's own, so that a console that was restarted can go on with its room."""
+    """Derives the keys of a room from the console's key, so that a restarted console can go on with its room."""
 
     def __init__(self, settings: RelaySettings, endpoint: Connect, media: PublishedMedia, key: str) -> None:
         self._codec = settings.relay_codec
@@ -28,7 +28,7 @@ class JanusEngine:
         self._endpoint = endpoint
         self._media = media
         self._key = key.encode()
-        self._pin = ""  # of the present publication; another one with each
+        self._pin = ""  # of the present publication; each has a new one
 
     @asynccontextmanager
     async def publish(self, station: SfuServer, feed: int) -> AsyncIterator[Publication]:
@@ -47,7 +47,7 @@ class JanusEngine:
     async def pass_on(
         self, origin: SfuServer, station: SfuServer, publication: Publication
     ) -> AsyncIterator[JanusSession]:
-        """`station` gets the feed from `origin` while entered."""
+        """Feed `station` from `origin` while entered."""
         name = f"{station.name}-{secrets.token_hex(4)}"
         async with open_janus(station.url.address) as session, open_janus(origin.url.address) as there:
             handle, sender = await session.attach(_ignore), await there.attach(_ignore)
@@ -89,7 +89,7 @@ async def _end_with(session: JanusSession, publication: Publication) -> None:
 
 
 def _ignore(_: object) -> None:
-    """Handles for administration hear nothing that matters."""
+    """Ignore events on a handle for administration."""
 
 
 async def _quietly(request: Awaitable[None]) -> None:

@@ -1,4 +1,4 @@
-"""The session as one publisher in a Janus: encoded media with trailers, and feedback on a data channel."""
+"""Publishes the session in a Janus, as one publisher: encoded media with trailers, and feedback on a data channel."""
 
 import asyncio
 from collections.abc import AsyncIterator, Callable
@@ -28,13 +28,13 @@ NEWEST_WINS = Reliability(ordered=False, max_retransmits=0)
 
 
 class Connect(Protocol):
-    """What it needs of the console's endpoint."""
+    """The part of the console's endpoint that publishing needs."""
 
     async def connect(self, *, controlling: bool) -> Connection: ...
 
 
 class PublishedMedia(Protocol):
-    """What it needs of the media plane."""
+    """The part of the media hub that publishing needs."""
 
     def plan_publication(self, camera_codec: str = "") -> tuple[MediaPlan, list[OfferedMedia]]: ...
     def publish(self, connection: Connection, plan: MediaPlan) -> Subscriptions: ...
@@ -49,7 +49,7 @@ async def publish(
     feed: int,
     codec: str = "",
 ) -> AsyncIterator[Publication]:
-    """Published while entered; the yielded object says when it ended by itself. Raises RelayError on entering."""
+    """Publish while entered; the yielded publication tells of an earlier end. Raises RelayError on entering."""
     room = room_of(session)
     found: list[Publication] = []
 
@@ -89,12 +89,12 @@ async def publish(
 
 
 class _Line:
-    """Hears of the connection to the relay."""
+    """Handles the events of the connection to the relay."""
 
     def __init__(
         self, connection: Connection, media: Subscriptions, writer: ChannelWriter, publication: Publication
     ) -> None:
-        self.decided = asyncio.Event()  # whether there is a connection
+        self.decided = asyncio.Event()  # set when the connection is made, or has failed
         self._connection = connection
         self._media = media
         self._writer = writer

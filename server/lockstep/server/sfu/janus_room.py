@@ -1,4 +1,4 @@
-"""The session's room in one Janus (https://janus.conf.meetecho.com/docs/videoroom.html): made, filled, passed on."""
+"""The session's room in one Janus (https://janus.conf.meetecho.com/docs/videoroom.html)."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -12,22 +12,22 @@ __all__ = ["JanusRoom", "RoomKeys"]
 
 NO_SUCH_ROOM = 426  # JANUS_VIDEOROOM_ERROR_NO_SUCH_ROOM
 ROOM_EXISTS = 427
-PLAYOUT_DELAY_ID = 2  # of the header extension in offers of the console: the second of those that it names
+PLAYOUT_DELAY_ID = 2  # of the header extension in the console's offers: the second that they name
 CODECS = {"H264": "h264", "VP8": "vp8", "opus": "opus", "PCMU": "pcmu"}
 
 
 @dataclass(frozen=True, repr=False)
 class RoomKeys:
-    """What opens a room. Observers are told `pin` alone; none of these is ever logged."""
+    """Keys of a room. Observers are told `pin` alone; no key is ever logged."""
 
-    admin_key: str  # that creating rooms in this Janus takes; "" when it takes none
-    secret: str  # changes the room
-    publisher: str  # token without which nobody publishes in a room of ours
-    pin: str  # lets in
+    admin_key: str  # required to create rooms in this Janus; "" if it requires no key
+    secret: str  # required to change the room
+    publisher: str  # token required to publish in a room of this console
+    pin: str  # required to join
 
 
 class JanusRoom:
-    """All requests raise RelayError."""
+    """Creates and fills the room, and passes it on. All requests raise RelayError."""
 
     def __init__(self, session: JanusSession, room: int, keys: RoomKeys) -> None:
         self._session = session
@@ -35,7 +35,7 @@ class JanusRoom:
         self._keys = keys
 
     async def prepare(self, handle: int) -> None:
-        """Have the room, and let in whoever has the pin and nobody with an older one.
+        """Create the room, or give it the new pin, so that an older pin no longer opens it.
 
         A room that somebody else made keeps its pin; it has to be the one in `keys`.
         """
@@ -76,7 +76,7 @@ class JanusRoom:
                 raise
 
     async def publish(self, handle: int, feed: int, offer: str, streams: Mapping[str, str]) -> str:
-        """Join and publish; the answer. `streams`: names by mid, for those who subscribe."""
+        """Join and publish; return the answer. `streams`: names by mid, for subscribers."""
         answer = await self._session.message(
             handle,
             {
@@ -96,7 +96,7 @@ class JanusRoom:
         return str(answer.jsep["sdp"])
 
     async def receive_from(self, handle: int, feed: int, streams: list[StreamInfo]) -> "Inlet":
-        """Expect `feed` from another Janus; where it has to be sent."""
+        """Expect `feed` from another Janus; return the ports to send it to."""
         answer = await self._session.message(
             handle,
             {
@@ -142,7 +142,7 @@ class JanusRoom:
         )
 
     async def stop_sending(self, handle: int, feed: int, name: str) -> None:
-        """End what `send_to` began."""
+        """Stop passing `feed` on."""
         await self._session.message(
             handle,
             {
@@ -155,7 +155,7 @@ class JanusRoom:
         )
 
     async def forget(self, handle: int, feed: int) -> None:
-        """No more of a feed that came from another Janus."""
+        """Remove a feed that came from another Janus."""
         await self._session.message(
             handle,
             {"request": "remove_remote_publisher", "room": self._room, "secret": self._keys.secret, "id": feed},
@@ -164,7 +164,7 @@ class JanusRoom:
 
 @dataclass(frozen=True)
 class Inlet:
-    """Where a Janus expects a feed from another one."""
+    """Ports on which a Janus expects a feed from another one."""
 
     port: int
     control_port: int

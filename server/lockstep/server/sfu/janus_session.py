@@ -24,7 +24,7 @@ MAX_MESSAGE = 256 * 1024  # bytes
 
 @asynccontextmanager
 async def open_janus(url: str) -> AsyncIterator["JanusSession"]:
-    """Connected while entered. When the connection ends by itself, `ended` is set and every request fails.
+    """Hold a session while entered. If the connection is lost, `ended` is set and every request fails.
 
     Raises:
         RelayUnreachable, RelayRefused, RelaySilent: on entering.
@@ -43,7 +43,7 @@ async def open_janus(url: str) -> AsyncIterator["JanusSession"]:
         raise RelayUnreachable(str(error) or type(error).__name__) from error
     async with socket:
         session = JanusSession(socket)
-        # No TaskGroup: it would wrap what the caller's block raises, and these two raise nothing.
+        # No TaskGroup: it would wrap exceptions of the caller's block, and these two raise nothing.
         loop = asyncio.get_running_loop()
         running = [loop.create_task(session.listen()), loop.create_task(session.keep_alive())]
         try:
@@ -60,22 +60,22 @@ class JanusSession:
 
     def __init__(self, socket: ClientConnection) -> None:
         self.ended = asyncio.Event()
-        self.why = ""  # it ended
+        self.why = ""  # reason of the end
         self.malformed = 0  # messages that could not be read
         self._socket = socket
         self._session: int | None = None
         self._numbers = itertools.count(1)
         self._prefix = secrets.token_hex(4)
-        self._waiting: dict[str, tuple[asyncio.Future[Heard], bool]] = {}  # and whether an ack is answer enough
+        self._waiting: dict[str, tuple[asyncio.Future[Heard], bool]] = {}  # True: an ack is answer enough
         self._listeners: dict[int, Callable[[Heard], None]] = {}
 
     async def begin(self) -> None:
-        """Raises RelayRefused, RelaySilent, RelayUnreachable, as all requests do."""
+        """Create the session. Raises RelayRefused, RelaySilent, RelayUnreachable, as all requests do."""
         answer = await self._ask("create")
         self._session = _identifier(answer)
 
     async def attach(self, listener: Callable[[Heard], None]) -> int:
-        """A handle of the video room; `listener` hears its events."""
+        """Return a new handle of the video room; `listener` gets its events."""
         handle = _identifier(await self._ask("attach", plugin=VIDEO_ROOM))
         self._listeners[handle] = listener
         return handle
@@ -85,7 +85,7 @@ class JanusSession:
         await self._ask("detach", handle_id=handle)
 
     async def message(self, handle: int, body: Mapping[str, object], jsep: Mapping[str, str] | None = None) -> Heard:
-        """A request to the plugin; its answer."""
+        """Send a request to the plugin and return its answer."""
         return await self._ask("message", handle_id=handle, body=dict(body), jsep=jsep and dict(jsep))
 
     async def _ask(self, kind: str, **fields: Any) -> Heard:
@@ -109,7 +109,7 @@ class JanusSession:
         return heard
 
     async def listen(self) -> None:
-        """Until cancelled, or the connection ends."""
+        """Receive messages until cancelled, or the connection ends."""
         try:
             async for text in self._socket:
                 try:
@@ -121,7 +121,7 @@ class JanusSession:
         self._end("the connection was closed")
 
     async def keep_alive(self) -> None:
-        """Until cancelled; ends the session when the relay does not answer."""
+        """Send keepalives until cancelled; end the session when the relay does not answer."""
         while not self.ended.is_set():
             await asyncio.sleep(KEEPALIVE_SECONDS)
             if self._session is None:

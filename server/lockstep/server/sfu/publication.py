@@ -1,4 +1,4 @@
-"""The session in one relay, and what `SfuCoordinator` needs of the engine that brings it there."""
+"""The session in one relay, and the engine by which `SfuCoordinator` publishes it."""
 
 import asyncio
 from collections.abc import Callable
@@ -17,7 +17,7 @@ log = structlog.get_logger(__name__)
 
 
 class Watched(Protocol):
-    """Something that ends by itself one day."""
+    """A connection that may end unasked: `ended` is set then, and `why` holds the reason."""
 
     @property
     def ended(self) -> asyncio.Event: ...
@@ -26,7 +26,7 @@ class Watched(Protocol):
 
 
 class Publication:
-    """What a relay carries. It ends once."""
+    """The session as one relay carries it. It ends once."""
 
     def __init__(self, feed: int, streams: list[StreamInfo], send: Callable[[str], None]) -> None:
         """`send` takes feedback; the newest wins."""
@@ -37,34 +37,34 @@ class Publication:
         self._send = send
 
     def send_feedback(self, text: str) -> None:
-        """Raises nothing: relays are served among the observers."""
+        """Send feedback. Raises nothing: relays are served among the observers."""
         try:
             self._send(text)
         except Exception as error:
             self.failed("feedback", error)
 
     def failed(self, stage: str, error: Exception) -> None:
-        """Serving this relay raised `error`: the publication ends, and may begin anew. Raises nothing."""
+        """End the publication, since serving this relay raised `error`; it may begin anew. Raises nothing."""
         log.error("a relay could not be served", stage=stage, exc_info=error)
         self.end(f"internal error: {stage}")
 
     def end(self, why: str) -> None:
-        """The first reason counts."""
+        """End the publication. Only the first reason counts."""
         if not self.ended.is_set():
             self.why = why
             self.ended.set()
 
 
 class Engine(Protocol):
-    """A relay's client. What it raises is RelayError, MediaError or OSError."""
+    """A relay's client. It raises RelayError, MediaError or OSError."""
 
     def publish(self, station: SfuServer, feed: int) -> AbstractAsyncContextManager[Publication]:
-        """The session is in that relay while entered. Nobody who was told of an earlier feed gets in with that."""
+        """Publish the session in that relay while entered. A ticket for an earlier feed opens nothing."""
 
     def pass_on(
         self, origin: SfuServer, station: SfuServer, publication: Publication
     ) -> AbstractAsyncContextManager[Watched]:
-        """While entered, the first relay feeds another one."""
+        """Feed `station` from `origin` while entered."""
 
     def ticket(self, station: SfuServer) -> RelayTicket:
-        """For one observer, of a station that carries the session."""
+        """Return a ticket for one observer to a relay that carries the session."""

@@ -1,4 +1,4 @@
-"""Where a relay is: `janus:ws://host:8188/ROOM`."""
+"""Parses the address of a relay: `janus:ws://host:8188/ROOM`."""
 
 from typing import NamedTuple
 from urllib.parse import urlsplit
@@ -6,7 +6,7 @@ from urllib.parse import urlsplit
 __all__ = ["RelayUrl", "parse_relay_url"]
 
 WANTED = "janus:ws(s)://host[:port]/ROOM"
-MOST_ROOM = 2**53  # what a page can count to
+MOST_ROOM = 2**53  # JavaScript counts integers up to this
 
 
 class RelayUrl(NamedTuple):
@@ -19,7 +19,7 @@ class RelayUrl(NamedTuple):
 
 
 def parse_relay_url(text: str) -> RelayUrl:
-    """Raises ValueError, which says what is wrong and repeats nothing that could be a secret."""
+    """Parse a relay's address. Raises ValueError with the reason, and with nothing that could be a secret."""
     engine, _, rest = text.partition(":")
     if engine != "janus":
         raise ValueError(f"a relay is a Janus: {WANTED}")

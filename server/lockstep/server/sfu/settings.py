@@ -15,11 +15,11 @@ __all__ = ["RelaySettings"]
 class RelaySettings(BaseSettings):
     """Part of `Settings`."""
 
-    # "janus:ws://host:8188/ROOM", of several, the first feeds the others
+    # "janus:ws://host:8188/ROOM"; the first of several feeds the others
     relay: NameList = ()
     relay_public: NameList = ()  # the same relays as browsers reach them, "wss://relay.example.org"; empty: as above
-    relay_admin_key: SecretStr = SecretStr("")  # that Janus' video room asks of who creates a room
-    relay_codec: Literal["", "H264", "VP8"] = ""  # of cameras; "": what is being encoded already
+    relay_admin_key: SecretStr = SecretStr("")  # key that Janus' video room requires to create a room
+    relay_codec: Literal["", "H264", "VP8"] = ""  # codec of cameras; "": the one that is being encoded already
     observers_direct: Annotated[int, Field(ge=0)] = 10  # observers that the console serves itself, when it has relays
 
     max_relayed: Annotated[int, Field(ge=1)] = 1000  # observers behind relays that are connected for notes and STOP
@@ -56,7 +56,7 @@ class RelaySettings(BaseSettings):
 
     @property
     def relay_origins(self) -> tuple[str, ...]:
-        """What a page may connect to besides its own server."""
+        """Origins that a page may connect to besides its own server."""
         addresses = self.relay_public or tuple(each.address for each in self.relay_urls)
         parts = [urlsplit(address) for address in addresses]
         return tuple(dict.fromkeys(f"{part.scheme}://{part.netloc}" for part in parts))

@@ -1,4 +1,4 @@
-"""One relay as the console sees it: where it is, whether it carries the session now, and since when it does not."""
+"""The state of one relay: its address, the feed that it carries now, and its last failure."""
 
 from dataclasses import dataclass
 
@@ -10,15 +10,15 @@ __all__ = ["SfuServer"]
 
 @dataclass
 class SfuServer:
-    """State of one configured relay. `SfuCoordinator` changes it, nobody else."""
+    """State of one configured relay. Only `SfuCoordinator` changes it."""
 
     name: str  # its number among the settings: "0"
     url: RelayUrl
     public: str  # the address that observers use: "wss://relay.example.org"
-    feed: int = 0  # that observers subscribe to there; 0: it does not carry the session now
+    feed: int = 0  # feed that observers subscribe to; 0: the relay does not carry the session now
     streams: tuple[StreamInfo, ...] = ()
-    trouble: str = ""  # why it does not; "" before the first try
-    failed_at: float = float("-inf")  # when it was tried last in vain, s on the monotonic clock
+    trouble: str = ""  # reason that the relay does not carry it; "" before the first try
+    failed_at: float = float("-inf")  # last failure, s on the monotonic clock
 
     @property
     def live(self) -> bool:

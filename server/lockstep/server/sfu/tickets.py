@@ -1,4 +1,4 @@
-"""What an observer is told who watches through a relay: where, and what is there."""
+"""Messages that tell an observer its relay and the streams there."""
 
 import msgspec
 
@@ -8,12 +8,12 @@ __all__ = ["RelayAnswer", "RelayTicket", "without_key"]
 
 
 class RelayTicket(msgspec.Struct, frozen=True, kw_only=True, tag_field="engine", tag="janus"):
-    """All that it takes to watch, and nothing that would let anybody publish or change the room."""
+    """All that an observer needs to watch, and nothing that would let anybody publish or change the room."""
 
     relay: str  # its number here; for POST /whep?relay=
     url: str  # WebSocket
     room: int
-    pin: str  # lets in; "" for who takes no part in the session yet
+    pin: str  # opens the room; "" for a client that takes no part in the session yet
     feed: int  # the publisher to subscribe to; another one with every publication
     streams: list[StreamInfo]  # `mid` is the publisher's
 
@@ -25,5 +25,5 @@ class RelayAnswer(msgspec.Struct, frozen=True):
 
 
 def without_key(ticket: RelayTicket) -> RelayTicket:
-    """Where the relay is, and nothing that lets anybody in."""
+    """Return the ticket without the pin that opens the room."""
     return msgspec.structs.replace(ticket, pin="")

@@ -1,1 +1,1 @@
-"""What a console has of its own: its state directory's content, what its robots share, what routes depend on."""
+"""The state of a console: its state directory, the context that its robots share, the routes' dependencies."""

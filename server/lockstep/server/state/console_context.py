@@ -1,4 +1,4 @@
-"""What all robots of one console have in common: who may come in, how often anybody may ask, and how many fit."""
+"""The context that all robots of one console share: links, request rates, and the bound on peers."""
 
 import asyncio
 import time
@@ -28,13 +28,13 @@ log = structlog.get_logger(__name__)
 
 COMMAND_LINE = Actor("command line")
 CONSOLE = Actor("console")
-CHECK_SECONDS = 0.5  # how long a link that was revoked by another process, or has expired, still works at most
-RETRY_SECONDS = 5.0  # until what the disk did not take is written again
-KEEP_SECONDS = 60.0  # between two times that the time is written down
+CHECK_SECONDS = 0.5  # s for which a link that expired, or was revoked by another process, still works at most
+RETRY_SECONDS = 5.0  # until a write that the disk did not take is tried again
+KEEP_SECONDS = 60.0  # between two writes of the time
 
 
 class ContextMetrics(Protocol):
-    """Where it counts what concerns no robot."""
+    """The metrics for all that concerns no robot."""
 
     @property
     def bad_input(self) -> Metric: ...
@@ -43,11 +43,13 @@ class ContextMetrics(Protocol):
 
 
 class ConsoleContext:
-    """Every robot's session brings its warden. Run `run` as a task; call `enforce` after inviting or revoking here.
+    """The context of one console. Every robot's session adds its token revocation to `revocations`.
+
+    Run `run` as a task; call `enforce` after inviting or revoking here.
 
     Args:
-        max_peers: of all robots together; None: each robot's own bound is all there is
-        reserved: of those, that observers do not get
+        max_peers: of all robots together; None: only each robot's own bound applies
+        reserved: places among those that observers do not get
     """
 
     def __init__(
@@ -60,7 +62,7 @@ class ConsoleContext:
         reserved: int = 0,
     ) -> None:
         self.endpoint = endpoint
-        self._dropped: Counter[str] = Counter()  # datagrams, as far as the metrics know
+        self._dropped: Counter[str] = Counter()  # datagrams that are in the metrics
         self.state = state
         self.guard = guard
         self.metrics = metrics
@@ -70,18 +72,18 @@ class ConsoleContext:
         self._reserved = reserved
 
     async def run(self) -> None:
-        """Until cancelled: act on what other processes have changed about the links, and on links that expire."""
+        """Act on links that other processes change, and on links that expire, until cancelled."""
         async with asyncio.TaskGroup() as tasks:
             tasks.create_task(self._look_on(), name="links end")
-            tasks.create_task(self._keep_time(), name="newest time")  # a disk that hangs holds up no end of a link
+            tasks.create_task(self._keep_time(), name="newest time")  # a hanging disk must not delay the end of a link
             tasks.create_task(self._keep_ended(), name="revocations")
 
     def close(self) -> None:
-        """After all sessions have ended."""
+        """Close the media endpoint, after all sessions have ended."""
         self.endpoint.close()
 
     def collect(self) -> None:
-        """Bring into the metrics what is counted elsewhere."""
+        """Update the metrics with counts that are kept elsewhere."""
         dropped = self.endpoint.dropped
         for name, count in (dropped - self._dropped).items():
             self.metrics.bad_input.labels("transport", name).inc(count)
@@ -97,7 +99,7 @@ class ConsoleContext:
                 self.metrics.faults.caught("links", error)
 
     async def _keep_time(self) -> None:
-        """Once in a while, and whenever a link has expired."""
+        """Write down the time once in a while, and whenever a link has expired."""
         store, loop = self.state.invitations, asyncio.get_running_loop()
         looked = store.now()
         keep_at = loop.time()
@@ -116,7 +118,7 @@ class ConsoleContext:
                 self.metrics.faults.caught("links", error)
 
     async def _keep_ended(self) -> None:
-        """What the disk did not take when a link was revoked is written as soon as it does."""
+        """Write revocations that the disk did not take, as soon as it does."""
         store = self.state.invitations
         while True:
             await asyncio.sleep(RETRY_SECONDS)
@@ -130,29 +132,29 @@ class ConsoleContext:
                 self.metrics.faults.caught("links", error)
 
     def enforce(self, changed: list[Invitation], by: Actor) -> None:
-        """Act, at every robot, on what `by` has invited or revoked, and on what has expired."""
+        """Act, at every robot, on links that `by` has invited or revoked, and on links that have expired."""
         now = self.state.invitations.now()
         for revocation in self.revocations:
             revocation.enforce(changed, by, now)
 
     def connected(self) -> Counter[str]:
-        """Peers that are here, at any robot, by the ids of their links."""
+        """Count the connected peers of all robots, by the ids of their links."""
         return Counter(peer.identity.token_id for revocation in self.revocations for peer in revocation.peers)
 
     # silence
 
     def is_silenced(self, link: str) -> bool:
-        """Whether a supervisor has silenced the stops of this link, or of one that it was invited with."""
+        """True if a supervisor has silenced the stops of this link, or of one that it was invited with."""
         return self.silenced.holds(link, time.monotonic())
 
     def silences(self) -> dict[str, float]:
-        """The links that other consoles have to silence too, and until when, in s since 1970."""
+        """Return the links that other consoles have to silence too, with the ends in s since 1970."""
         now, ahead = time.monotonic(), self.state.invitations.now() - time.monotonic()
         known = [each.id for each in self.state.invitations.known.all]
         return {link: until + ahead for link, until in self.silenced.to_tell(known, now).items()}
 
     def silenced_elsewhere(self, console: str, links: Mapping[str, float]) -> None:
-        """Another console's `silences`; all that it has now."""
+        """Take another console's `silences`, all that it has now."""
         now, ahead = time.monotonic(), self.state.invitations.now() - time.monotonic()
         self.silenced.told_elsewhere(console, {link: until - ahead for link, until in links.items()}, now)
 
@@ -162,7 +164,7 @@ class ConsoleContext:
                 revocation.silence_ended(link)
 
     def check_room(self, identity: Identity) -> None:
-        """Raises TooManyPeers when there is no place for another peer at any robot."""
+        """Raise TooManyPeers when there is no place for another peer at any robot."""
         if self._max_peers is None:
             return
         held = sum(revocation.peers.taken_by(identity.token_id) for revocation in self.revocations)

@@ -20,21 +20,21 @@ ANY = ("0.0.0.0", "::")
 
 
 class ConsoleLinks(NamedTuple):
-    """The tokens stand in the fragment: no server and no log ever sees them."""
+    """The links of a console. The tokens are in the fragment, so no server and no log ever sees them."""
 
     console: str
     operator: str
     observer: str
     supervisor: str
-    robot: str  # where it is; "" in a fleet
-    robots: Mapping[str, str] = {}  # of a fleet, where each is, by name
+    robot: str  # address of the robot; "" in a fleet
+    robots: Mapping[str, str] = {}  # of a fleet: addresses by name
 
     def address(self, name: str) -> str:
-        """Where the robot of this name is; "" is the only one of a console."""
+        """Return the address of the robot of this name; "" is the only one of a console."""
         return self.robots.get(name, self.robot)
 
     def fields(self) -> dict[str, object]:
-        """What is printed for programs."""
+        """Return the fields that are printed for programs."""
         return {name: value for name, value in self._asdict().items() if value}
 
     def for_people(self) -> str:
@@ -59,7 +59,7 @@ def console_link(console: str, token: str) -> str:
 
 
 def listening_url(settings: Settings, listener: socket.socket) -> str:
-    """How others reach what `listener` really listens on, unless the settings say better."""
+    """Return the URL by which others reach `listener`, unless the settings say better."""
     host, port = listener.getsockname()[:2]
     shown = next(iter(settings.advertise), None) or _own_address() if host in ANY else host
     scheme = "https" if settings.encrypted else "http"
@@ -67,7 +67,7 @@ def listening_url(settings: Settings, listener: socket.socket) -> str:
 
 
 def console_links(settings: Settings, console: str, state: ConsoleState) -> ConsoleLinks:
-    """One link for each role: the same as at the last start, while they are good for long enough."""
+    """Return one link for each role: those of the last start, while they are good for long enough."""
     now = state.invitations.now()
 
     def for_start(known: Invitations) -> dict[Role, Invitation]:
@@ -83,7 +83,7 @@ def console_links(settings: Settings, console: str, state: ConsoleState) -> Cons
 
 
 def _own_address() -> str:
-    """The address that others most likely reach us at; sends nothing."""
+    """Return the address at which others most likely reach this machine. Sends nothing."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
         try:
             probe.connect(("192.0.2.1", 9))  # TEST-NET-1, RFC 5737

@@ -1,4 +1,4 @@
-"""What the routes of one robot need, made by its session."""
+"""The dependencies of one robot's routes, made by its session."""
 
 import math
 import shutil
@@ -34,13 +34,13 @@ __all__ = ["Dependencies", "TakesStops", "authorized", "known_caller", "dependen
 
 
 class TakesStops(Protocol):
-    """Whom a STOP of one robot is said to."""
+    """Receives the STOPs of one robot."""
 
     @property
     def access(self) -> Access: ...
 
     async def stop(self, press: Press) -> StopAnswer:
-        """Latched at once; returns when the robot has answered, or that it has not. Raises Silenced."""
+        """Latch a STOP at once; return the robot's answer, or that there is none. Raises Silenced."""
         ...
 
 
@@ -71,13 +71,13 @@ class Dependencies:
         return self.context.guard
 
     async def stop(self, press: Press) -> StopAnswer:
-        """Latched at once; returns when the robot has answered, or that it has not. Raises Silenced."""
+        """Latch a STOP at once; return the robot's answer, or that there is none. Raises Silenced."""
         self.console.stops.stop(press)
         outcome = await self.console.stops.outcome(press.id)
         return StopAnswer(outcome, self.console.clock.event, self.console.robot.up)
 
     def collect(self) -> None:
-        """Bring into the metrics what is counted elsewhere."""
+        """Update the metrics with counts that are kept elsewhere."""
         self.metrics.collect(self.console.robot.bad_input(), self.console.robot.drops())
         self.metrics.links_unreadable.set(bool(self.state.invitations.trouble))
         self.metrics.collect_audit(self.audit.lost, self.audit.failures)
@@ -87,14 +87,14 @@ class Dependencies:
         self.metrics.free_bytes.set(free_bytes(self.recorder.shelf.directory))
 
     def scene_or_error(self) -> SceneView:
-        """Raises SceneUnavailable when there is no 3D scene."""
+        """Return the 3D scene. Raises SceneUnavailable when there is none."""
         if self.scene is None:
             raise SceneUnavailable("the 3D scene is switched off")
         return self.scene
 
 
 def free_bytes(directory: Path) -> float:
-    """Where `directory` is, or is to be made; NaN when that cannot be known."""
+    """Return the free bytes of the disk on which `directory` is, or is to be made; NaN if not known."""
     for place in (directory, *directory.parents):
         with suppress(OSError):
             return float(shutil.disk_usage(place).free)
@@ -102,7 +102,7 @@ def free_bytes(directory: Path) -> float:
 
 
 def dependencies(connection: HTTPConnection) -> Dependencies:
-    """Raises RobotFailed while the session has failed and is started again."""
+    """Return the dependencies. Raises RobotFailed while the session has failed and is started again."""
     found = connection.app.state.dependencies
     if found is None:
         raise RobotFailed("the console's session of this robot has failed; it is started again")
@@ -112,17 +112,17 @@ def dependencies(connection: HTTPConnection) -> Dependencies:
 
 
 def takes_stops(connection: HTTPConnection) -> TakesStops:
-    """In a fleet there is somebody also while the session has failed."""
+    """Return the receiver of STOPs. A fleet has one also while the session has failed."""
     keeper: TakesStops | None = getattr(connection.app.state, "stop_keeper", None)
     return dependencies(connection) if keeper is None else keeper
 
 
 async def authorized(request: Request) -> Right:
-    """What whoever asks may do. Raises AccessError, StateUnavailable."""
+    """Return the caller's right. Raises AccessError, StateUnavailable."""
     return known_caller(request, dependencies(request).access.bearer(request.headers.get("authorization")))
 
 
 def known_caller(request: Request, caller: Right) -> Right:
-    """Whoever asks, on a route whose refusals are in the audit."""
+    """Return the caller, noted in the request so that the audit names it in refusals."""
     request.state.actor = caller.actor
     return caller

@@ -1,4 +1,4 @@
-"""What a console remembers between its runs, opened: the signing key, the invitations, and the access they give."""
+"""Opens the state that outlives a console's run: the signing key, the invitations, and the access they give."""
 
 import tempfile
 from pathlib import Path
@@ -24,10 +24,10 @@ class ConsoleState(NamedTuple):
     invitations: InvitationStore
     access: Access
     signer: Signer  # of the audit's heads and of recordings
-    lasts: bool = True  # False: what is kept here is gone when the console or its machine ends
+    lasts: bool = True  # False: the state is gone when the console or its machine ends
 
     def signing_key(self, settings: Settings) -> str:
-        """What everything is derived from that only this console may know."""
+        """Return the key from which all secrets of this console are derived."""
         return settings.secret.get_secret_value() if settings.secret is not None else self.directory.signing_key()
 
 
@@ -36,25 +36,25 @@ def state_path(settings: Settings) -> Path:
 
 
 def robot_directory(settings: Settings, robot: str) -> Path:
-    """Where a robot of a fleet keeps what is its own: audit, recordings. "" is the only robot of a console."""
+    """Return the directory of a robot's audit and recordings. "" is the only robot of a console."""
     return robot_place(state_path(settings), robot)
 
 
 def robot_place(directory: Path, robot: str) -> Path:
-    """As `robot_directory`, within a state directory."""
+    """Return the `robot_directory` within a state directory."""
     return directory / "robots" / robot if robot else directory
 
 
 def open_state(settings: Settings, *, fall_back: bool = False) -> ConsoleState:
-    """The state directory that the settings name.
+    """Open the state directory that the settings name.
 
     Args:
-        fall_back: when that cannot be made or written, and holds nothing yet, use a new one that nobody finds again.
-            One that links were given from is never passed over: another key would refuse all of them
+        fall_back: use a temporary one when that cannot be made or written, and holds nothing yet. A directory from
+            which links were given is never passed over: another key would refuse all of them
 
     Raises:
         StateDirUnusable: it cannot be used.
-        StateDamaged: what is in it cannot be understood; that is never passed over.
+        StateDamaged: its content cannot be understood; that is never passed over.
     """
     path = state_path(settings)
     try:
@@ -69,7 +69,7 @@ def open_state(settings: Settings, *, fall_back: bool = False) -> ConsoleState:
 
 
 def _is_used(path: Path) -> bool:
-    """Whether links may have been given from there; also when nobody can tell."""
+    """True if links may have been given from there, or if that cannot be known."""
     try:
         return any((path / name).exists() for name in (KEY_FILE, INVITATIONS))
     except OSError:

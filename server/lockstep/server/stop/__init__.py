@@ -1,1 +1,1 @@
-"""STOP and reset: kept until the robot has answered, over every restart."""
+"""STOP and reset. Stops are kept until the robot has answered, across restarts."""

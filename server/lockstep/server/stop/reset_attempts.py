@@ -1,4 +1,4 @@
-"""Resets that were sent and whose outcome is not known yet. No I/O, no clock: `now` is handed in.
+"""Resets that were sent and whose outcome is not known yet. No I/O, no clock: `now` is passed in.
 
 A reset that had effect shows in the feedback: not stopped, under the number that it named. Otherwise the bridge
 refuses it by that number, or a feedback shows a newer stop.
@@ -17,7 +17,7 @@ RESET_REASONS = frozenset({"stale_reset", "too_soon", "locked_out", "not_kept"})
 
 
 class ResetOutcome(NamedTuple, Generic[Asker]):
-    """What became of the reset that `asker` asked for. `reason`: why it had none; "" when it had effect."""
+    """The outcome of the reset that `asker` asked for. `reason`: None if it had effect, else the reason why not."""
 
     asker: Asker
     number: int
@@ -32,7 +32,7 @@ class _Attempt(Generic[Asker]):
 
 
 class ResetAttempts(Generic[Asker]):
-    """One attempt for each number; whoever asks for the same meanwhile has its outcome."""
+    """Keeps one attempt for each number; further askers for the same number share its outcome."""
 
     def __init__(self) -> None:
         self._attempts: dict[int, _Attempt[Asker]] = {}
@@ -41,7 +41,7 @@ class ResetAttempts(Generic[Asker]):
         return len(self._attempts)
 
     def ask(self, number: int, asker: Asker, now: float) -> bool:
-        """Whether to send it: nobody else has just done so."""
+        """Add `asker`; True if the reset is to be sent, False if that was just done for somebody else."""
         attempt = self._attempts.get(number)
         if attempt is not None:
             attempt.askers.append(asker)
@@ -59,13 +59,13 @@ class ResetAttempts(Generic[Asker]):
         return found
 
     def refused(self, refusal: Refusal) -> list[ResetOutcome[Asker]]:
-        """Also of refusals of something else."""
+        """End the attempt that was refused. A refusal of anything else is ignored."""
         if refusal.event or refusal.reason not in RESET_REASONS:
             return []
         return self._end(refusal.stop, refusal.reason, refusal.detail)
 
     def expire(self, now: float) -> list[ResetOutcome[Asker]]:
-        """Those that no answer came to in time."""
+        """End the attempts that got no answer in time."""
         late = [number for number, attempt in self._attempts.items() if now >= attempt.until]
         return [each for number in late for each in self._end(number, "link_down", "the robot has not answered")]
 

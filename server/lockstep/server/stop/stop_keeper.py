@@ -1,4 +1,4 @@
-"""What one robot's stops need to outlive: the link, the session, the console. Owns the presses and their files."""
+"""Keeps one robot's stops beyond the end of link, session and console. Owns the presses and their files."""
 
 import asyncio
 from collections.abc import Callable
@@ -18,20 +18,22 @@ log = structlog.get_logger(__name__)
 RETRY_SECONDS = 2.0  # after a write that failed
 KEPT = "the stop is kept and sent first when the link is back"
 KEPT_IN_MEMORY = "the stop is kept until this console ends and sent first when the link is back"
-WRITE_PATIENCE = 0.5  # s that whoever pressed waits for the disk
+WRITE_PATIENCE = 0.5  # s that the sender of a press waits for the disk
 
 
 class StopKeeper:
-    """Call `load`, then run `run` as a task. All else is called on the loop and returns at once, but for `written`.
+    """Keeps stops in memory and on disk. Call `load`, then run `run` as a task.
+
+    All else is called on the loop and returns at once, but for `written` and `kept_words`.
 
     Attributes:
         lasts: whether stops that are written outlive this console
-        trouble: why stops cannot be written at present; "" when they can
+        trouble: the reason if stops cannot be written at present, else ""
         on_trouble: called with `trouble` whenever it changes
     """
 
     def __init__(self, directory: Path, robot: str, *, lasts: bool = True) -> None:
-        """`directory`: of the robot, within the state directory. `robot`: the bridge's address.
+        """`directory`: the robot's, within the state directory. `robot`: the bridge's address.
 
         `lasts`: whether what is in the directory outlives this console.
         """
@@ -40,13 +42,13 @@ class StopKeeper:
         self.trouble = ""
         self.on_trouble: Callable[[str], None] = _ignore
         self._files = KeptStops(kept_stops_place(directory, robot))
-        self._wanted: dict[str, Press] = {}  # that belong on the disk
+        self._wanted: dict[str, Press] = {}  # presses that belong on the disk
         self._written: set[str] = set()
         self._wake = asyncio.Event()
         self._news = asyncio.Event()  # something was written, or could not be; replaced each time
 
     async def load(self) -> None:
-        """Presses that an earlier run has kept are pending again."""
+        """Make the presses that an earlier run has kept pending again."""
         try:
             found = await asyncio.to_thread(self._files.load)
         except OSError as error:
@@ -60,24 +62,24 @@ class StopKeeper:
             log.warning("kept stops", count=len(found))
 
     def keep(self, *presses: Press) -> None:
-        """Write those to disk: the robot cannot be told now."""
+        """Have `run` write those to disk: the robot cannot be told now."""
         self._wanted.update((press.id, press) for press in presses if self.presses.is_pending(press.id))
         self._wake.set()
 
     def settled(self, press: str) -> None:
-        """The robot has answered it, or another press has taken its place."""
+        """Have `run` delete a press: the robot has answered it, or another press has replaced it."""
         if self._wanted.pop(press, None) is not None or press in self._written:
             self._wake.set()
 
     async def kept_words(self, press: str) -> str:
-        """Returns when a press that is kept is on the disk, or soon: how it is kept, for whoever pressed."""
+        """Return how a press is kept, in words for its sender; wait briefly for it to be on the disk."""
         unwritten = await self.written(press)
         if unwritten:
             return f"{KEPT_IN_MEMORY}; it is not on the console's disk ({unwritten})"
         return KEPT if self.lasts else f"{KEPT_IN_MEMORY}; its state directory is a temporary one"
 
     async def written(self, press: str) -> str:
-        """Returns when a press that is kept is on the disk, or soon: why it is not; "" when it is."""
+        """Wait briefly for a kept press to be on the disk; return "", or the reason why it is not."""
         try:
             async with asyncio.timeout(WRITE_PATIENCE):
                 while press in self._wanted and press not in self._written and not self.trouble:
@@ -87,7 +89,7 @@ class StopKeeper:
         return "" if press not in self._wanted or press in self._written else self.trouble
 
     async def run(self) -> None:
-        """Until cancelled; then what no answer has come to is written, whatever the link did."""
+        """Keep the disk up to date until cancelled; then write all unanswered presses, whatever the link did."""
         try:
             while True:
                 await self._wake.wait()
@@ -98,7 +100,7 @@ class StopKeeper:
             self._write_last()
 
     async def _settle(self) -> bool:
-        """Make the disk what it should be. False: try again later. What fails for one press keeps no other from it."""
+        """Bring the disk up to date; False if that has to be tried again later. One press's failure stops no other."""
         missing = [press for press in self._wanted.values() if press.id not in self._written]
         over = [press for press in self._written if press not in self._wanted]
         trouble = ""
@@ -122,7 +124,7 @@ class StopKeeper:
         return not trouble
 
     def _write_last(self) -> None:
-        """Nothing else runs any more that a slow disk could hold up."""
+        """Write unanswered presses. This blocks: nothing else runs any more that a slow disk could hold up."""
         for press in self.presses.pending:
             if press.id not in self._written:
                 try:

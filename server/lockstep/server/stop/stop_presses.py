@@ -1,15 +1,15 @@
 """Presses of STOP: those that the robot has not answered yet, and the outcomes of those that it has. No I/O.
 
 A press is *pending* from when it is made until the bridge answers it (`StopTaken`). Neither the end of the link nor
-another epoch of the bridge ends that: whoever owns the link sends all that is pending, in order, whenever a link is
+another epoch of the bridge ends that: the owner of the link sends all pending presses, in order, whenever a link is
 up, before anything else. The bridge knows a press by its id, so sending it again makes no second stop.
 
-At most `MAX_PENDING` are kept. One more takes the place of the newest, which from then on has the outcome of the
-press that took its place: that one was made later, so its stop is the newer one.
+At most `MAX_PENDING` are kept. One more replaces the newest, which from then on has the outcome of its replacement:
+that one was made later, so its stop is the newer one.
 
 A link that presses faster than people do has its presses *held*: the first of them waits for `take_held`, and those
 that the link makes meanwhile share its outcome. It is sent after all of them were made, so its stop is as new as any
-of them. A press that is held is pending like any other.
+of them. A held press is pending like any other.
 """
 
 import hashlib
@@ -44,15 +44,15 @@ __all__ = [
 ]
 
 PRESS_ID = re.compile(r"[0-9a-f]{32}")
-MAX_GIVEN = 64  # characters of an id as a message holds it
+MAX_GIVEN = 64  # characters of an id in a message
 MAX_REASON = 500  # characters, as on the robot link
 MAX_PENDING = 64
-MAX_SAME = 256  # presses that share the outcome of another one; what is more gets no answer of its own
+MAX_SAME = 256  # presses that share the outcome of another one; further ones get no answer
 MAX_REMEMBERED = 512  # outcomes
 
 
 class Press(msgspec.Struct, frozen=True, kw_only=True):
-    """One press: who, where, why."""
+    """One press of STOP, with its author, channel and reason."""
 
     id: str  # "5f0c…", 32 lower-case hex digits
     by: Actor = Actor()
@@ -65,18 +65,18 @@ class Press(msgspec.Struct, frozen=True, kw_only=True):
 
 
 def new_press(by: Actor, where: str, reason: str, given: str = "") -> Press:
-    """A press of now. `given`: the id that whoever pressed has made; without one it gets one here.
+    """Make a press, timed now. `given`: the id that its sender has made; without it the press gets a new one.
 
-    Of the reason everybody sees what can be printed.
+    Everybody sees the reason, so only its printable characters are kept.
     """
     id_ = press_id(by.link, given) if given else secrets.token_hex(16)
     return Press(id=id_, by=by, where=where, reason=printable(reason)[:MAX_REASON], time=time.time())
 
 
 def press_id(link: str, given: str) -> str:
-    """What a press is called here of which its sender says `given`.
+    """Return the console's id for a press that its sender calls `given`.
 
-    No stop is refused for its id. One that is not 32 lower-case hex digits is replaced by one that is: the same for
+    No stop is refused for its id. An id that is not 32 lower-case hex digits is replaced by one that is: the same for
     every repeat by this link, and another one for any other link, so that nobody's stop passes for somebody else's.
     """
     if PRESS_ID.fullmatch(given):
@@ -86,37 +86,37 @@ def press_id(link: str, given: str) -> str:
 
 
 def stop_text(value: object) -> str:
-    """A field of a stop that should be text, and may be any JSON: no stop is refused for it."""
+    """Return a field of a stop as text. It may be any JSON: no stop is refused for it."""
     return value if isinstance(value, str) else json.dumps(value, sort_keys=True)
 
 
 def told_id(press: Press, given: str) -> str:
-    """What a press is called towards its sender, who said `given`: as it was said, unless that was longer than any."""
+    """Return the id that a press's sender is told: `given`, unless that is empty or longer than `MAX_GIVEN`."""
     return given if 0 < len(given) <= MAX_GIVEN else press.id
 
 
 class NewPress(NamedTuple):
-    """Send it. `replaced`: the press that it took the place of; None when there was room."""
+    """A press to be sent now. `replaced`: the press that it replaces; None if there was room."""
 
     press: Press
     replaced: Press | None
 
 
 class Held(NamedTuple):
-    """It goes with the next `take_held`. `replaced`: as in `NewPress`."""
+    """A press to be sent with the next `take_held`. `replaced`: as in `NewPress`."""
 
     press: Press
     replaced: Press | None
 
 
 class UnderWay(NamedTuple):
-    """The same press is pending, or one that is held for the same link: it has the outcome of that one."""
+    """A repeat of the pending `press`, or a press that shares the outcome of the one held for its link."""
 
     press: Press
 
 
 class AlreadyTaken(NamedTuple):
-    """The robot has answered this press."""
+    """A press that the robot has answered already."""
 
     taken: StopTaken
 
@@ -125,14 +125,14 @@ PressOutcome = NewPress | Held | UnderWay | AlreadyTaken
 
 
 class Settled(NamedTuple):
-    """A press that the robot has answered now; `taken` names it."""
+    """A press that the robot has answered just now; `taken` names it."""
 
     press: Press
     taken: StopTaken
 
 
 class StopPresses:
-    """Show it every press with `press` and every answer with `taken`; send `pending` when a link comes up."""
+    """Keeps presses. Pass it each press with `press`, each answer with `taken`; send `pending` when a link comes up."""
 
     def __init__(self) -> None:
         self._pending: dict[str, Press] = {}  # by id, oldest first
@@ -143,26 +143,26 @@ class StopPresses:
 
     @property
     def pending(self) -> list[Press]:
-        """Those that no answer came to, in the order in which they were made."""
+        """The presses without an answer, in the order in which they were made."""
         return list(self._pending.values())
 
     def is_pending(self, press: str) -> bool:
         return press in self._pending or press in self._leader
 
     def knows(self, press: str) -> bool:
-        """Whether it would be a repeat."""
+        """True if a press of this id would be a repeat."""
         return press in self._taken or self.is_pending(press)
 
     def outcome(self, press: str) -> StopTaken | None:
-        """The bridge's answer; None: there was none, or it was long ago."""
+        """Return the bridge's answer; None if there was no answer, or it was long ago."""
         return self._taken.get(press)
 
     def forget(self, press: str) -> None:
-        """What became of it: its id stands for a new press from now on, unless it is pending."""
+        """Forget the outcome: the id stands for a new press from now on, unless the press is pending."""
         self._taken.pop(press, None)
 
     def press(self, press: Press, *, hold: bool = False) -> PressOutcome:
-        """Somebody pressed, or what somebody pressed came once more. `hold`: its link presses too fast."""
+        """Add a press, or recognise a repeat of one. `hold`: its link presses too fast."""
         known = self._taken.get(press.id)
         if known is not None:
             return AlreadyTaken(known)
@@ -178,12 +178,12 @@ class StopPresses:
         return Held(press, replaced)
 
     def take_held(self) -> list[Press]:
-        """Those that are held; they are to be sent now."""
+        """Return the held presses, which are to be sent now, and hold them no longer."""
         held, self._held = self._held, {}
         return [self._pending[press] for press in held.values()]
 
     def again(self, press: Press) -> bool:
-        """A press that was answered and has to be said to another epoch of the bridge; whether that is news."""
+        """Make a press pending again, to tell it to another epoch of the bridge; False if it was pending already."""
         self._taken.pop(press.id, None)
         if self.is_pending(press.id):
             return False
@@ -191,7 +191,7 @@ class StopPresses:
         return True
 
     def taken(self, taken: StopTaken) -> list[Settled]:
-        """The bridge's answer; what is settled by it, the press itself first."""
+        """Take the bridge's answer; return all presses that it settles, first the one that it names."""
         self._remember(taken)
         press = self._pending.pop(taken.press, None)
         if press is None:

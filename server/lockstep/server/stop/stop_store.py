@@ -1,7 +1,7 @@
 """Stops on the console's disk: one file for each press that the robot could not be told of. Blocks; not for the loop.
 
-A press is written before anybody is told that it is kept, and its file goes when the robot has answered it. A file
-that cannot be read is a stop too: whoever pressed meant it.
+A press is written before anybody is told that it is kept, and its file is deleted when the robot has answered it. A
+file that cannot be read is a stop too: its sender meant it.
 """
 
 import hashlib
@@ -26,18 +26,18 @@ UNREADABLE = "a stop kept by this console, whose file cannot be read"
 
 
 def kept_stops_place(directory: Path, robot: str) -> Path:
-    """Where stops for the robot at this address are kept: two consoles for two robots may share one directory."""
+    """Return the directory of stops for the robot at this address: consoles for two robots may share `directory`."""
     return directory / FOLDER / hashlib.sha256(robot.encode()).hexdigest()[:16]
 
 
 class KeptStops:
-    """Raises OSError from every method but `load`."""
+    """The files of kept stops. Every method but `load` may raise OSError."""
 
     def __init__(self, place: Path) -> None:
         self._place = place
 
     def load(self) -> list[Press]:
-        """All that are kept, oldest first."""
+        """Return all kept presses, oldest first."""
         try:
             paths = sorted(path for path in self._place.iterdir() if path.suffix == SUFFIX)
         except FileNotFoundError:
@@ -48,7 +48,7 @@ class KeptStops:
         return sorted((self._read(path) for path in paths), key=lambda press: press.time)
 
     def keep(self, press: Press) -> None:
-        """On the disk when it returns, also after a power cut."""
+        """Write a press; when this returns, it survives even a power cut."""
         self._place.mkdir(mode=0o700, parents=True, exist_ok=True)
         path = self._path(press.id)
         fresh = path.with_suffix(".new")
@@ -62,23 +62,23 @@ class KeptStops:
         _sync(self._place.parent)
 
     def drop(self, press: str) -> None:
-        """It has arrived. A file that comes back after a power cut is a repeat of a press that the bridge knows."""
+        """Delete an answered press. If its file comes back after a power cut, it repeats one that the bridge knows."""
         self._path(press).unlink(missing_ok=True)
 
     def _read(self, path: Path) -> Press:
         try:
             with path.open("rb") as file:
                 press = _decoder.decode(file.read(MAX_BYTES))
-            if self._path(press.id) == path and len(press.id) <= MAX_GIVEN:  # of a bridge's own any text
+            if self._path(press.id) == path and len(press.id) <= MAX_GIVEN:  # a bridge's own may be any text
                 return press
         except (OSError, msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
             log.error("a kept stop cannot be read", error="kept_stop_unreadable", path=path.name, detail=str(error))
-        with suppress(OSError):  # then it is found, and said, at the next start too
+        with suppress(OSError):  # so that the next start finds and reports it too
             os.replace(path, self._path(press_id("", path.stem)))
         return Press(id=press_id("", path.stem), reason=UNREADABLE)
 
     def _path(self, press: str) -> Path:
-        """Press ids come from anybody, and name no path."""
+        """Return the path of a press. Ids come from anybody, so they are hashed."""
         return self._place / (hashlib.sha256(press.encode()).hexdigest()[:32] + SUFFIX)
 
 

@@ -1,1 +1,1 @@
-"""The loudspeaker at the robot that is attached to the console: plays the voice of who holds the control seat."""
+"""The loudspeaker at the robot, attached to the console: plays the voice of the holder of the control seat."""

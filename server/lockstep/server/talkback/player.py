@@ -1,7 +1,7 @@
 """The process of the loudspeaker: decodes Opus packets from standard input and plays them.
 
-A decoder takes what a peer sends, and a sound device may hang: here neither harms the console. Its output says how it
-does, in the words of `source_wire`.
+The decoder's input comes from a peer, and a sound device may hang: in this process neither harms the console. Standard
+output reports the state of the loudspeaker, in messages of `source_wire`.
 """
 
 import os
@@ -27,7 +27,7 @@ from lockstep.server.talkback.speaker_url import SpeakerSpec
 
 __all__ = ["HEAD", "Sink", "main", "open_sink"]
 
-HEAD = struct.Struct("!Hd")  # length of a packet, and when it came on the monotonic clock
+HEAD = struct.Struct("!Hd")  # length of a packet, and its arrival on the monotonic clock
 RATE = 48_000  # Hz
 BUFFER = int(0.1 * RATE)  # samples in the device
 RETRY = 2.0  # s until a device that failed is opened again
@@ -72,7 +72,7 @@ class _Alsa(Sink):
 
 
 class _File(Sink):
-    """All that was said, without the silence between."""
+    """Writes all that was said, without the silence between."""
 
     def __init__(self, path: str) -> None:
         self._file = wave.open(Path(path).open("wb", buffering=0), "wb")  # noqa: SIM115
@@ -89,7 +89,7 @@ class _File(Sink):
 
 
 def open_sink(spec: SpeakerSpec) -> Sink:
-    """Raises OSError."""
+    """Open the sink that `spec` names. Raises OSError."""
     if spec.scheme == "pulse":
         return _Pulse(spec.device)
     return _Alsa(spec.device) if spec.scheme == "alsa" else _File(spec.device)
@@ -101,7 +101,7 @@ class _Packet(NamedTuple):
 
 
 class Player:
-    """Plays what is worth it; a device that fails is opened again."""
+    """Plays the packets that are worth playing; opens a device again that failed."""
 
     def __init__(self, spec: SpeakerSpec, out: BinaryIO) -> None:
         self._spec = spec
@@ -157,7 +157,7 @@ def _decoder() -> AudioCodecContext:
 
 
 def _packet(console: BinaryIO) -> _Packet | None:
-    """The next one; None when the console has gone."""
+    """Read the next packet; None if the console has gone."""
     head = console.read(HEAD.size)
     if len(head) < HEAD.size:
         return None
@@ -169,13 +169,13 @@ def _packet(console: BinaryIO) -> _Packet | None:
 def main() -> None:
     spec = msgspec.json.Decoder(SpeakerSpec).decode(sys.stdin.buffer.readline())
     out = os.fdopen(os.dup(sys.stdout.fileno()), "wb")
-    os.dup2(sys.stderr.fileno(), sys.stdout.fileno())  # what a library prints is no message
+    os.dup2(sys.stderr.fileno(), sys.stdout.fileno())  # keeps the output of libraries out of the messages
     with suppress(OSError, KeyboardInterrupt):
         player = Player(spec, out)
         player.open()
         while (packet := _packet(sys.stdin.buffer)) is not None:
             player.play(packet)
-    os._exit(0)  # a device that hangs holds nobody up
+    os._exit(0)  # a device that hangs must not delay the exit
 
 
 if __name__ == "__main__":

@@ -1,20 +1,20 @@
-"""What is still worth playing of a voice, and how much waits. No I/O, no clock is read here."""
+"""Decides which packets of a voice are still worth playing. No I/O; reads no clock."""
 
 __all__ = ["CUSHION", "MOST_WAITING", "Playout"]
 
-CUSHION = 0.06  # s of silence ahead of what somebody begins to say: the network may be so unsteady
-MOST_WAITING = 0.2  # s; what is later than that is not said any more
+CUSHION = 0.06  # s of silence before somebody begins to speak: the network may be that unsteady
+MOST_WAITING = 0.2  # s; packets later than this are left out
 
 
 class Playout:
-    """Ask `admit` for every packet. The newest wins: what would wait too long is left out."""
+    """Call `admit` for every packet. A packet that came too long ago, or would wait too long, is left out."""
 
     def __init__(self) -> None:
-        self._end = float("-inf")  # when what was written will have been played
+        self._end = float("-inf")  # time at which all written audio will have been played
         self.dropped = 0
 
     def admit(self, length: float, sent: float, now: float) -> float | None:
-        """Seconds of silence to play before a packet of `length` s that came at `sent`; None: leave it out."""
+        """Return the s of silence to play before a packet of `length` s that came at `sent`; None to leave it out."""
         if now - sent > MOST_WAITING:
             self.dropped += 1
             return None

@@ -1,4 +1,4 @@
-"""The loudspeaker as the console sees it: a process that plays, and how it does."""
+"""Runs the process that plays on the loudspeaker, and follows its state."""
 
 import asyncio
 import sys
@@ -24,11 +24,11 @@ MAX_WORDS = 4096  # bytes
 
 
 class Speaker:
-    """Await `run`; `play` at any time. What the process does not take at once is left out."""
+    """Await `run`; call `play` at any time. Packets that the process does not take at once are left out."""
 
     def __init__(self, spec: SpeakerSpec, changed: Callable[[], None], command: tuple[str, ...] = COMMAND) -> None:
         """`changed` is called on the loop when `trouble` changed."""
-        self.trouble = ""  # why nothing is heard, in words
+        self.trouble = ""  # reason that nothing is heard, in words
         self.dropped = 0  # packets that the process did not take
         self.failures = 0
         self._spec = spec
@@ -37,7 +37,7 @@ class Speaker:
         self._writer: asyncio.StreamWriter | None = None
 
     def play(self, packet: bytes) -> bool:
-        """An Opus packet that just came; whether it was handed on."""
+        """Hand on an Opus packet that just came. Return whether the process took it."""
         writer = self._writer
         if writer is None or writer.transport.is_closing() or writer.transport.get_write_buffer_size() > 0:
             self.dropped += 1
@@ -46,7 +46,7 @@ class Speaker:
         return True
 
     async def run(self) -> None:
-        """Until cancelled. A process that dies is started again."""
+        """Run until cancelled. Restart a process that dies."""
         backoff = Backoff(0.5, 10.0)
         loop = asyncio.get_running_loop()
         while True:

@@ -1,4 +1,4 @@
-"""What `--speaker` says: `pulse:[sink]`, `alsa:device` or `file:path.wav`. No I/O."""
+"""Parses `--speaker`: `pulse:[sink]`, `alsa:device` or `file:path.wav`. No I/O."""
 
 from typing import NamedTuple
 from urllib.parse import unquote
@@ -9,16 +9,16 @@ SCHEMES = ("pulse", "alsa", "file")
 
 
 class BadSpeaker(ValueError):
-    """It cannot be meant like this."""
+    """The text names no loudspeaker."""
 
 
 class SpeakerSpec(NamedTuple):
     scheme: str  # "pulse"
-    device: str  # "" is the default one
+    device: str  # "": the default device
 
 
 def parse_speaker(text: str) -> SpeakerSpec:
-    """Raises BadSpeaker."""
+    """Parse the value of `--speaker`. Raises BadSpeaker."""
     scheme, colon, device = text.strip().partition(":")
     if not colon or scheme not in SCHEMES:
         raise BadSpeaker("not pulse:[sink], alsa:device or file:path.wav")

@@ -1,4 +1,4 @@
-"""The voice of who drives, from the media section it comes in to the loudspeaker at the robot."""
+"""Takes the driver's voice from its media section to the loudspeaker at the robot."""
 
 import asyncio
 import time
@@ -19,7 +19,7 @@ __all__ = ["VoiceLine", "Talkback"]
 
 
 class VoiceLine:
-    """One peer's way to the loudspeaker; made before the peer is, and useless until it is known."""
+    """Passes one peer's voice to the loudspeaker. Made before the peer; takes nothing until `peer` is set."""
 
     def __init__(self, service: "Talkback") -> None:
         self.peer: Peer | None = None
@@ -32,7 +32,7 @@ class VoiceLine:
 
 
 class Talkback:
-    """Await `run`. Without a loudspeaker nobody's voice is taken."""
+    """Plays the driver's voice at the robot. Await `run`. Without a loudspeaker nobody's voice is taken."""
 
     def __init__(
         self,
@@ -58,14 +58,14 @@ class Talkback:
         return self._speaker is not None
 
     def line(self, role: Role) -> VoiceLine | None:
-        """For a peer that may hold the seat; None: its voice is not taken."""
+        """Return the voice line of a peer that may hold the seat; None if its voice is not taken."""
         return VoiceLine(self) if self.enabled and role != "observer" else None
 
     def state(self) -> Voice:
         return self._arbiter.state(time.monotonic())
 
     async def run(self) -> None:
-        """Until cancelled."""
+        """Run until cancelled."""
         if self._speaker is None:
             return
         try:
@@ -90,7 +90,7 @@ class Talkback:
         self._announce()
 
     def _look(self) -> None:
-        """Whether somebody still speaks; again and again while so."""
+        """Announce the state, repeatedly while somebody speaks."""
         self._timer = None
         self._announce()
         if self._arbiter.speaks(time.monotonic()):

@@ -1,11 +1,11 @@
-"""Whose voice is heard at the robot: that of who holds the control seat, and of nobody else. No I/O.
+"""Decides which voice the robot plays: only that of the holder of the control seat. No I/O.
 
 | a packet | |
 |---|---|
-| of somebody else | left out: `no_seat` |
+| of a peer without the control seat | left out: `no_seat` |
 | longer than Opus allows | left out: `too_large` |
-| older than the last one, or that one again | left out: `late` |
-| more of them than speech needs | left out: `too_often` |
+| older than the last one, or the same again | left out: `late` |
+| beyond the rate that speech needs | left out: `too_often` |
 | any other | played |
 """
 
@@ -17,7 +17,7 @@ from lockstep.server.util.token_bucket import TokenBucket
 
 __all__ = ["SPEAKS_FOR", "TalkbackArbiter", "VoiceOutcome", "VoicePacket"]
 
-MAX_PACKET = 1275  # bytes, RFC 6716 3.4: the most of one frame
+MAX_PACKET = 1275  # bytes, RFC 6716 3.4: the maximum of one frame
 RATE, BURST = 110.0, 20.0  # packets a second; the shortest are 10 ms
 SPEAKS_FOR = 0.4  # s after the last packet
 
@@ -32,13 +32,13 @@ class VoicePacket(NamedTuple):
 
 
 class TalkbackArbiter:
-    """Call `packet` for each that comes; it is to be played when that says so. `state` is what people are told."""
+    """Call `packet` for each packet that comes; play it if the outcome is "played". `state` is for participants."""
 
     def __init__(self, holds: Callable[[str], bool]) -> None:
-        """`holds`: whether a peer has the control seat."""
-        self.trouble = ""  # why nobody can be heard
+        """`holds` returns whether a peer has the control seat."""
+        self.trouble = ""  # reason that nobody can be heard
         self._holds = holds
-        self._speaker = ""  # peer
+        self._speaker = ""  # id of the peer
         self._name = ""
         self._sequence: int | None = None  # of its last packet
         self._heard_at = float("-inf")
@@ -60,7 +60,7 @@ class TalkbackArbiter:
         return "played"
 
     def speaks(self, now: float) -> bool:
-        """Whether somebody does; who has lost the seat does not."""
+        """Return whether somebody speaks; a peer that has lost the seat does not."""
         return now - self._heard_at < SPEAKS_FOR and self._holds(self._speaker)
 
     def state(self, now: float) -> Voice:

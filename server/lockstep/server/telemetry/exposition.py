@@ -1,4 +1,4 @@
-"""A registry as text, made without holding up anything."""
+"""Renders a registry as text without blocking the event loop."""
 
 import asyncio
 from collections.abc import Callable, Iterable
@@ -11,7 +11,7 @@ __all__ = ["Exposition"]
 
 
 class Exposition:
-    """What /metrics answers: one family in each turn of the loop, and once for all who ask meanwhile.
+    """Renders /metrics: one family in each iteration of the loop, and once for all requests that come meanwhile.
 
     Anybody may ask, and all families together would take longer than an operator's message may wait.
     """
@@ -23,9 +23,9 @@ class Exposition:
         self._text = b""
 
     async def text(self, bring_up_to_date: Callable[[], None] = lambda: None) -> bytes:
-        """Exposition format, version 0.0.4; nothing in it is older than the question.
+        """Return the exposition format, version 0.0.4; nothing in it is older than the call.
 
-        `bring_up_to_date`: called before what is counted is read.
+        `bring_up_to_date`: called before the metrics are read.
         """
         begun_before = self._begun
         async with self._lock:
@@ -45,9 +45,9 @@ class Exposition:
 
 
 class _Only(Collector):
-    """One family where a registry is expected, without the times at which its counters were made.
+    """A registry of one family, without the times at which its counters were made.
 
-    They would double the page, and nothing here is made later than the console.
+    They would double the page, and all counters are as old as the console.
     """
 
     def __init__(self, family: Metric) -> None:

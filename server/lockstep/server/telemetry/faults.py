@@ -1,4 +1,4 @@
-"""Our own faults: each one is counted where it was caught, and logged, but never so often that the log is flooded."""
+"""Counts and logs the console's own faults, never so often that the log is flooded."""
 
 import time
 from collections.abc import Callable
@@ -18,7 +18,7 @@ log = structlog.get_logger(__name__)
 
 
 class Faults:
-    """Counts in `counter`, which has the label `where`."""
+    """Counts every fault in `counter`, which has the label `where`, and logs it within a rate."""
 
     def __init__(self, counter: Counter, clock: Callable[[], float] = time.monotonic) -> None:
         self._counter = counter
@@ -26,13 +26,13 @@ class Faults:
         self._logged = RateLimits(LOGGED_RATE, LOGGED_BURST)
 
     def caught(self, where: str, error: BaseException, **context: Any) -> None:
-        """`where`: a stable name; `context` goes into the log. Raises nothing."""
+        """Count and log a fault. `where`: a stable name; `context` goes into the log. Raises nothing."""
         self._counter.labels(where).inc()
         if self._logged.spend(where, self._clock()):
             log.error("a fault of the console's own", where=where, exc_info=error, **context)
 
     def uncaught(self, loop: object, context: dict[str, Any]) -> None:
-        """For `loop.set_exception_handler`: what nobody awaited, and what a callback of the loop raised."""
+        """Handle exceptions that nobody awaited or a callback raised, for `loop.set_exception_handler`."""
         error = context.get("exception")
         if not isinstance(error, BaseException):
             error = RuntimeError(str(context.get("message", "")))

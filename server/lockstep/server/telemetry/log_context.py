@@ -15,18 +15,18 @@ _robot: ContextVar[str] = ContextVar("lockstep_robot", default="")
 
 
 def follow_clock(clock: EventClock, robot: str = "") -> None:
-    """From now on in this task, and in those that it starts. `robot`: its name in a fleet."""
+    """Use `clock` from now on in this task, and in those that it starts. `robot`: its name in a fleet."""
     _clock.set(clock)
     _robot.set(robot)
 
 
 def name_robot(robot: str) -> None:
-    """As `follow_clock`, before there is a clock."""
+    """Set the robot's name as `follow_clock` does, before there is a clock."""
     _robot.set(robot)
 
 
 def add_session(logger: object, method: str, line: MutableMapping[str, Any]) -> MutableMapping[str, Any]:
-    """A structlog processor: `robot` in a fleet, `epoch`, and as `s` the event reference that holds."""
+    """Add `robot` in a fleet, `epoch`, and as `s` the current event reference; a structlog processor."""
     if robot := _robot.get():
         line.setdefault("robot", robot)
     clock = _clock.get()
@@ -37,7 +37,7 @@ def add_session(logger: object, method: str, line: MutableMapping[str, Any]) -> 
 
 
 class LogContext:
-    """Gives requests, and the peers that they begin, the clock that the app's lifespan made."""
+    """A middleware that gives requests, and the peers that they begin, the clock made by the app's lifespan."""
 
     def __init__(self, app: ASGIApp) -> None:
         self._app = app

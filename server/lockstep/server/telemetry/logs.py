@@ -1,4 +1,4 @@
-"""Log lines on standard error, for people or as JSON: standard output carries only what was asked for."""
+"""Configures log lines on standard error, as text or JSON: standard output carries only requested output."""
 
 import logging
 import sys
@@ -18,7 +18,7 @@ class LogFormat(StrEnum):
 
 
 def configure_logs(level: int = logging.INFO, form: LogFormat = LogFormat.TEXT) -> None:
-    """Process-wide; call once, from an entry point."""
+    """Configure logging process-wide; call once, from an entry point."""
     rendered = _json_lines() if form is LogFormat.JSON else _text_lines()
     structlog.configure(
         processors=[
@@ -45,7 +45,7 @@ def _text_lines() -> list[Processor]:
 
 
 def _json_lines() -> list[Processor]:
-    """`event` is the event reference; what happened is the `message`."""
+    """Return processors for JSON: `event` is the event reference, `message` says what happened."""
     return [
         structlog.processors.TimeStamper(fmt="iso", utc=True),
         structlog.processors.EventRenamer("message"),
@@ -61,7 +61,7 @@ def _name_event(logger: object, method: str, line: structlog.types.EventDict) ->
 
 
 def _formatter(form: LogFormat, rendered: list[Processor]) -> logging.Formatter:
-    """For what libraries log."""
+    """Return the formatter for the log records of libraries."""
     if form is LogFormat.TEXT:
         return logging.Formatter("%(levelname)s %(name)s: %(message)s")
     return structlog.stdlib.ProcessorFormatter(

@@ -1,4 +1,4 @@
-"""Counters and gauges of the console, in a registry of their own. Names: docs/console-api.md."""
+"""Counters and gauges of the console, in a separate registry. Names: docs/console-api.md."""
 
 import platform
 from collections import Counter as Totals
@@ -12,17 +12,17 @@ from lockstep.server.telemetry.faults import Faults
 
 __all__ = ["MAX_LIMITS", "Metrics", "certificate_end", "describe_process"]
 
-MAX_LIMITS = 300  # names of limits that are told apart, whatever robots there were
+MAX_LIMITS = 300  # names of limits that are counted apart, over all robots
 
 
 def describe_process(registry: CollectorRegistry) -> None:
-    """What runs, for dashboards and for whoever compares two consoles."""
+    """Add the running versions as a metric, for dashboards and to compare two consoles."""
     labels = {"version": version("lockstep-console"), "python": platform.python_version()}
     Gauge("lockstep_build_info", "1, with what runs as labels", list(labels), registry=registry).labels(**labels).set(1)
 
 
 def certificate_end(registry: CollectorRegistry) -> Gauge:
-    """Set by whoever serves TLS."""
+    """Return the gauge of the certificate's end, which is set where TLS is served."""
     return Gauge(
         "lockstep_tls_certificate_end_seconds",
         "When the certificate ends, s since 1970; 0 without TLS",
@@ -31,10 +31,10 @@ def certificate_end(registry: CollectorRegistry) -> Gauge:
 
 
 class Metrics:
-    """Everything that /metrics shows besides the media plane's, which shares the registry."""
+    """All metrics of /metrics but those of the media hub, which shares the registry."""
 
     def __init__(self, *, process: bool = True) -> None:
-        """`process`: with what the whole process uses."""
+        """`process`: include the metrics of the whole process."""
         self.registry = CollectorRegistry()
         self.exposition = Exposition(self.registry)
         self._robot_bad_input: Totals[str] = Totals()
@@ -69,7 +69,7 @@ class Metrics:
             ["limit"],
             registry=registry,
         )
-        self._limits: set[str] = set()  # that have a counter
+        self._limits: set[str] = set()  # names that have a counter
         self.stopped = Gauge("lockstep_stopped", "1 while the robot is stopped", registry=registry)
         self.recording_failed = Gauge(
             "lockstep_recording_failed", "1 while a recording is wanted and cannot be written", registry=registry
@@ -93,7 +93,7 @@ class Metrics:
         )
 
     def limits_acted(self, names: Sequence[str]) -> None:
-        """Count limits by name. Names are the robot's word: those beyond `MAX_LIMITS` are counted as `other`."""
+        """Count limits by name. The robot chooses the names: those beyond `MAX_LIMITS` are counted as `other`."""
         for name in names:
             if name not in self._limits and len(self._limits) >= MAX_LIMITS:
                 name = "other"
@@ -101,7 +101,7 @@ class Metrics:
             self.limited.labels(name).inc()
 
     def collect(self, bad_input: Totals[str], drops: Totals[str]) -> None:
-        """Bring up to date what the robot links count for themselves, as totals."""
+        """Update the counters from the totals that the robot links keep."""
         for name, total in bad_input.items():
             self.bad_input.labels("robot", name).inc(total - self._robot_bad_input[name])
         for name, total in drops.items():
@@ -109,7 +109,7 @@ class Metrics:
         self._robot_bad_input, self._robot_drops = bad_input.copy(), drops.copy()
 
     def collect_audit(self, lost: int, failures: int) -> None:
-        """The same for the audit log's writer."""
+        """Update the counters from the totals of the audit log's writer."""
         self.audit_lost.inc(lost - self._audit[0])
         self.audit_failures.inc(failures - self._audit[1])
         self._audit = (lost, failures)

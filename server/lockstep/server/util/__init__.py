@@ -1,1 +1,1 @@
-"""Small parts that know nothing of robots or consoles."""
+"""Small utilities that know nothing of robots or consoles."""

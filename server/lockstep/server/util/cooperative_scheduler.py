@@ -1,8 +1,9 @@
-"""Work for observers: one slice of it in each turn of the event loop, of whatever kind and for whichever robot.
+"""Schedules work for observers: one slice in each iteration of the event loop, for all kinds of work and all robots.
 
-Pictures for them, datagrams of them and feedback for them come in slices. A slice lasts until something comes that must
-not wait: from an operator, from the robot, or from a thread that has encoded a picture. So slices may be long, and the
-processor's time goes into them and not into turning the loop; whoever drives waits for one piece of work at most.
+Pictures for observers, datagrams from them and feedback for them are handled in slices. A slice lasts until something
+arrives that must not wait: from an operator, from the robot, or from a thread that has encoded a picture. So slices may
+be long, and processor time goes into work rather than into iterating the loop; the driver waits for one piece of work
+at most.
 """
 
 import asyncio
@@ -16,39 +17,39 @@ from weakref import WeakKeyDictionary, ref
 
 __all__ = ["SLICE", "HasFileno", "CooperativeScheduler", "turns_of_loop"]
 
-SLICE = 0.001  # s; what is not announced, a request by HTTP say, waits for one at each step of its way
+SLICE = 0.001  # s; anything unannounced, such as an HTTP request, waits for one at each of its steps
 
 
 class HasFileno(Protocol):
-    """A socket, or what stands for one."""
+    """A socket, or an object that stands for one."""
 
     def fileno(self) -> int: ...
 
 
 class CooperativeScheduler:
-    """First come, first served: whoever has more to do asks again, and comes after all who wait.
+    """Runs work first come, first served: work that has more to do asks again, and comes after all that waits.
 
-    Everything but `call_from_thread` is for the thread of the loop.
+    Every method but `call_from_thread` has to be called on the loop's thread.
     """
 
     def __init__(self, clock: Callable[[], float] = time.perf_counter, slice_seconds: float = SLICE) -> None:
-        """Of the running loop."""
-        self._loop = ref(asyncio.get_running_loop())  # which would not end while its own value holds it
+        """Schedule on the running loop."""
+        self._loop = ref(asyncio.get_running_loop())  # weak, or `_turns` would keep the loop alive
         self._clock = clock
         self._slice = slice_seconds
-        self._ends_at = 0.0  # s, the running slice
+        self._ends_at = 0.0  # s, end of the running slice
         self._waiting: deque[Callable[[], None]] = deque()
         self._is_scheduled = False
-        self._busy = 0.0  # s, until it last began or ended
-        self._busy_since: float | None = None  # None: nobody asks
-        self._coming: deque[Callable[[], None]] = deque()  # from threads
+        self._busy = 0.0  # s, up to the end of the last busy time
+        self._busy_since: float | None = None  # None: no work waits
+        self._coming: deque[Callable[[], None]] = deque()  # calls from threads
         self._sockets = select.epoll()
 
     def ask(self, work: Callable[[], None]) -> None:
-        """Call `work` in one of the next turns of the loop, in none with other work.
+        """Call `work` in one of the next iterations of the loop, without other work in the same one.
 
-        It does one piece at least, and leaves the rest to another turn when `is_over` says so. What it raises goes to
-        the loop's handler, and the others have their turns all the same.
+        It does one piece at least, and leaves the rest to another iteration when `is_over` is True. Its exceptions go
+        to the loop's handler, and other work goes on all the same.
         """
         self._waiting.append(work)
         if self._busy_since is None:
@@ -57,15 +58,15 @@ class CooperativeScheduler:
 
     @property
     def busy_seconds(self) -> float:
-        """The time so far in which work waited or was done; when that is all of it, there is more than can be done."""
+        """Total time in which work waited or ran; if it grows as fast as the clock, there is too much work."""
         return self._busy + (0.0 if self._busy_since is None else self._clock() - self._busy_since)
 
     def is_over(self) -> bool:
-        """Whether the running slice is: its time has passed, or somebody waits who must not."""
+        """True if the running slice is over: its time has passed, or something waits that must not."""
         return bool(self._coming) or self._clock() >= self._ends_at or bool(self._sockets.poll(0, 1))
 
     def yield_to(self, socket: HasFileno) -> None:
-        """End slices as soon as there is something to read here. A socket that closes is forgotten by itself."""
+        """End slices as soon as this socket is readable. A socket that closes is forgotten automatically."""
         number = socket.fileno()
         if number < 0:  # closed already
             return
@@ -73,7 +74,7 @@ class CooperativeScheduler:
             self._sockets.register(number, select.EPOLLIN)
 
     def call_from_thread(self, call: Callable[[], None]) -> None:
-        """Have the loop call this, and end the running slice for it. For any thread.
+        """Have the loop call this, and end the running slice for it. Thread-safe.
 
         Raises:
             RuntimeError: the loop is closed.
@@ -108,7 +109,7 @@ _turns: WeakKeyDictionary[asyncio.AbstractEventLoop, CooperativeScheduler] = Wea
 
 
 def turns_of_loop() -> CooperativeScheduler:
-    """Those of the running loop: all robots of a console share them, as they share the loop."""
+    """Return the running loop's scheduler: all robots of a console share it, as they share the loop."""
     loop = asyncio.get_running_loop()
     turns = _turns.get(loop)
     if turns is None:

@@ -1,4 +1,4 @@
-"""What people write: only what can be printed and seen. Names are of bounded length besides, and never two the same."""
+"""Reduces what people write to what can be printed and seen. Names are also bounded in length, and made unique."""
 
 import unicodedata
 from collections.abc import Iterator, Sequence
@@ -7,7 +7,7 @@ from enum import IntEnum
 __all__ = ["MAX_NAME", "clean_name", "escaped", "printable", "unique_names"]
 
 MAX_NAME = 40  # characters
-# Who stopped, where that was no person (`lockstep.robot_bridge.stop.stop_latch`, `lockstep.robot_bridge.bridge`).
+# Names for stops not made by a person (`lockstep.robot_bridge.stop.stop_latch`, `lockstep.robot_bridge.bridge`).
 _OURS = frozenset({"at the robot", "robot bridge", "console", "robot"})
 MAX_MARKS = 4  # on one character: more are drawn over the lines above and below
 
@@ -70,9 +70,9 @@ _BLANK |= {*range(0x180B, 0x1810), *range(0xFE00, 0xFE10), *range(0xE0100, 0xE01
 
 
 def printable(text: str) -> str:
-    """`text` in normal form C, without control, formatting, direction and invisible characters, and few marks on each.
+    """Return `text` in normal form C, without control, formatting, direction and invisible characters.
 
-    Any white space becomes one space.
+    Each character keeps few marks; any white space becomes one space.
     """
     return " ".join("".join(_shown(unicodedata.normalize("NFC", text))).split())
 
@@ -91,21 +91,21 @@ def _shown(text: str) -> Iterator[str]:
 
 
 def escaped(text: object) -> str:
-    """One line that a terminal only shows: a path, say, as it is but for what cannot be printed."""
+    """Return `text`, a path for example, as one line that is safe to print: unprintable characters are escaped."""
     return "".join(each if each.isprintable() else each.encode("unicode_escape").decode() for each in str(text))
 
 
 def clean_name(wanted: str, fallback: str) -> str:
-    """`wanted` as others may see it; `fallback` when nothing of it is left, or it is what the product calls itself."""
+    """Return `wanted` as others may see it; `fallback` if nothing of it is left, or it is a name of the product."""
     name = printable(wanted)[:MAX_NAME].strip()
     return name if name and _keys(name).isdisjoint(_OURS) else fallback
 
 
 def unique_names(people: Sequence[tuple[str, str]]) -> list[str]:
-    """What each of `people` is called, so that no two are called the same, or by what looks the same.
+    """Return a name for each of `people`, so that no two names are the same or look the same.
 
-    Each is given by the name that is wanted and the one that others see now, "" for a newcomer, in the order in which
-    they came. Nobody takes a name from who has it, and a number behind a name stays until the name itself is free.
+    Each is given by the name that is wanted and the one that others see now, "" for a newcomer, in order of arrival.
+    Nobody takes a name from its holder, and a number behind a name stays until the name itself is free.
     """
     taken: set[str] = set()
     numbers: dict[str, int] = {}  # last one given for a name; a crowd of one name costs no more than others
@@ -125,17 +125,17 @@ def unique_names(people: Sequence[tuple[str, str]]) -> list[str]:
 
 
 def _key(name: str) -> str:
-    """The same for names that differ in case, or in forms of the same characters."""
+    """Return a key that is the same for names that differ in case, or in forms of the same characters."""
     return unicodedata.normalize("NFKC", name).casefold()
 
 
 def _keys(name: str) -> set[str]:
-    """Names that have one in common are the same, or look the same: "Аda" with a Cyrillic letter and "Ada"."""
+    """Return a name's keys. Names that share one are the same or look so: "Аda" with a Cyrillic letter and "Ada"."""
     return {_key(name), _key(unicodedata.normalize("NFKC", name).translate(_LATIN))}
 
 
 class _Claim(IntEnum):
-    """Who comes first."""
+    """The order in which people get a name."""
 
     HAS_IT = 0
     NUMBERED = 1  # has it with a number

@@ -1,4 +1,4 @@
-"""Requests wait for their turn: a salvo of them must not stand before the operator's messages."""
+"""A fair queue for requests: a salvo of them must not delay the operator's messages."""
 
 import asyncio
 from collections import deque
@@ -8,32 +8,32 @@ from lockstep.server.util.token_bucket import TokenBucket
 
 __all__ = ["FairQueue"]
 
-OTHERS = 2  # pieces of work between two beginnings, where both wait
+OTHERS = 2  # pieces of other work between two beginnings, while both wait
 
 Work = Callable[[], None]
 
 
 class FairQueue:
-    """One piece of work in each turn of the loop; addresses take turns, and each one's work keeps its order.
+    """Runs one piece of work in each iteration of the loop; addresses take turns, and each one's work keeps its order.
 
-    Work that is `first` comes before all other, by turns among itself. The other has a pace, if there is one, and
-    beginnings have every third turn of it. The bound of what waits is that of connections, since each has one thing
-    under way.
+    Work that is `first` comes before all other work, with turns among its addresses. Other work keeps to the pace, if
+    there is one, and every third turn of it goes to a new connection (a beginning). The queue is bounded by the number
+    of connections, since each has one request under way.
     """
 
     def __init__(self, pace: Callable[[float], TokenBucket] | None = None) -> None:
         """`pace`: makes the budget of work that is not `first`, from the time on the loop's clock."""
-        self._is_free = True  # in this turn of the loop
+        self._is_free = True  # in this iteration of the loop
         self._make_pace = pace
         self._pace: TokenBucket | None = None
         self._first: dict[str, deque[Work]] = {}  # by address, the next first
         self._others: dict[str, deque[Work]] = {}
         self._beginnings: deque[Work] = deque()
-        self._since = 0  # others that had their turn since the last beginning
+        self._since = 0  # pieces of other work done since the last beginning
         self._timer: asyncio.TimerHandle | None = None  # while the pace holds others back
 
     async def take(self, address: str, *, first: bool = False) -> None:
-        """Returns when it is this request's turn: at once if there was no other in this turn of the loop."""
+        """Wait for this request's turn: it comes at once if there was no other in this iteration of the loop."""
         if self._may_begin(first):
             return
         turn: asyncio.Future[None] = asyncio.get_running_loop().create_future()
@@ -41,7 +41,7 @@ class FairQueue:
         await turn
 
     async def begin(self) -> None:
-        """As `take`, for a new connection: every third turn is one's, however much other work waits.
+        """Wait as `take` does, for a new connection: every third turn is for one, however much other work waits.
 
         The two turns between are for connections that have begun, so that they are served before newer ones need their
         places.
@@ -54,7 +54,7 @@ class FairQueue:
         await turn
 
     def ask(self, address: str, work: Work, *, first: bool = False) -> None:
-        """Call `work` in its turn, perhaps before this returns."""
+        """Call `work` in its turn, possibly before this returns."""
         if self._may_begin(first):
             work()
         else:
@@ -73,7 +73,7 @@ class FairQueue:
         self._come_back_soon()
 
     def _come_back_soon(self) -> None:
-        if self._is_free:  # nothing would come back for what waits
+        if self._is_free:  # otherwise nothing would call `_pass_on`
             self._is_free = False
             asyncio.get_running_loop().call_soon(self._pass_on)
 
@@ -100,7 +100,7 @@ class FairQueue:
 
     @property
     def _waits(self) -> bool:
-        """Work that is not `first`."""
+        """True if work waits that is not `first`."""
         return bool(self._others or self._beginnings)
 
     def _next_other(self) -> Work:
@@ -127,5 +127,5 @@ def _next(queues: dict[str, deque[Work]]) -> Work:
 
 
 def _settle(turn: "asyncio.Future[None]") -> None:
-    if not turn.done():  # who waited for it may be gone
+    if not turn.done():  # the waiting task may be gone
         turn.set_result(None)

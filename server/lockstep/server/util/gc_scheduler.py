@@ -1,9 +1,10 @@
-"""When to look for garbage: after people have left, and better while the robot is at rest.
+"""Schedules garbage collection: after peers have left, and preferably while the robot is at rest.
 
-A connection is a knot of objects that refer to each other, a few hundred kilobytes that only Python's collector unties.
-By itself it would come after hundreds of them; it holds everything up for some milliseconds, a command included.
+A connection is a reference cycle of a few hundred kilobytes that only Python's collector can free. Its own thresholds
+would trigger only after hundreds of connections, and a collection blocks everything, commands included, for some
+milliseconds.
 
-What was freed goes back to the system more often: people who come and go, and encoders that open for a bad path, leave
+Freed memory is returned to the system more often: peers that come and go, and encoders opened for a bad path, leave
 holes that glibc keeps, and the process would seem to grow. That takes less than a millisecond, on a thread.
 """
 
@@ -17,22 +18,22 @@ from lockstep.server.util.glibc_malloc import give_back
 
 __all__ = ["SweepPlan", "sweep_forever"]
 
-ENOUGH = 5  # connections that have ended
+ENOUGH = 5  # ended connections that call for a sweep
 INTERVAL = 10.0  # s between two sweeps
 PATIENCE = 30.0  # s that a sweep waits for a robot that moves all the time
-LOOK = 2.0  # s
-GIVE_BACK_LOOKS = 5  # looks between two times that memory is given back
+LOOK = 2.0  # s between two looks
+GIVE_BACK_LOOKS = 5  # looks between two calls of `give_back`
 
 
 class SweepPlan:
-    """Ask `due`; tell `swept`. No I/O."""
+    """Decides when to sweep: ask `due`, report with `swept`. No I/O."""
 
     def __init__(self, now: float) -> None:
         self._swept_at = now
         self._swept = 0
 
     def due(self, ended: int, moving: bool, now: float) -> bool:
-        """`ended`: connections so far, ever."""
+        """True if a sweep is due. `ended`: all connections that have ended so far."""
         waited = now - self._swept_at
         return ended - self._swept >= ENOUGH and waited >= (PATIENCE if moving else INTERVAL)
 
@@ -41,7 +42,7 @@ class SweepPlan:
 
 
 async def sweep_forever(ended: Callable[[], int], moving: Callable[[], bool]) -> None:
-    """Until cancelled."""
+    """Sweep whenever it is due, until cancelled."""
     plan = SweepPlan(time.monotonic())
     for look in itertools.count(1):
         await asyncio.sleep(LOOK)

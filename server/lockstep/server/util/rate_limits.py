@@ -8,7 +8,7 @@ MAX_KEYS = 10_000
 
 
 class RateLimits:
-    """Whether a key may do something once more. A key that was not seen for long is forgotten: its bucket is full.
+    """Limits how often each key may do something. A key that was not seen for long is forgotten: its bucket is full.
 
     With more keys than fit, the one that asked longest ago is forgotten too early. That favours an attacker with ten
     thousand addresses, whom only the network can stop.
@@ -24,7 +24,7 @@ class RateLimits:
         return len(self._buckets)
 
     def spend(self, key: str, now: float) -> bool:
-        """Take one; False when there is none."""
+        """Take one token; False if the bucket is empty."""
         level = self._level(key, now)
         allowed = level >= 1
         self._buckets[key] = (level - 1 if allowed else level, now)

@@ -1,4 +1,4 @@
-"""Files that somebody else may have put there: opened without waiting, and read in lines that fit in memory."""
+"""Opens files that somebody else may have put there without waiting, and reads them in lines that fit in memory."""
 
 import errno
 import os
@@ -9,14 +9,14 @@ from typing import BinaryIO
 
 __all__ = ["MAX_LINE", "bounded_lines", "open_regular"]
 
-MAX_LINE = 1 << 20  # bytes; what is written here has some hundred
+MAX_LINE = 1 << 20  # bytes; the console's own lines have some hundred
 
 
 def open_regular(path: Path) -> BinaryIO:
-    """To be read. A FIFO would wait for somebody to write to it, and a device may never end.
+    """Open a regular file for reading. A FIFO would wait for somebody to write to it, and a device may never end.
 
     Raises:
-        OSError: it cannot be opened, or is no regular file.
+        OSError: it cannot be opened, or is not a regular file.
     """
     file = open(path, "rb", opener=_without_waiting)  # noqa: SIM115
     if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
@@ -30,7 +30,7 @@ def _without_waiting(path: str, flags: int) -> int:
 
 
 def bounded_lines(file: BinaryIO) -> Iterator[bytes]:
-    """Without their ends; of one that is longer than `MAX_LINE` the beginning."""
+    """Yield the lines without their ends; only the beginning of a line longer than `MAX_LINE`."""
     while line := file.readline(MAX_LINE):
         yield line.rstrip(b"\n")
         while len(line) == MAX_LINE and not line.endswith(b"\n"):

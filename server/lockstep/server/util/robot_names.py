@@ -1,4 +1,4 @@
-"""What the robots of a fleet may be called, and how "NAME=address" is read. No I/O."""
+"""Checks the names of a fleet's robots, and parses "NAME=address". No I/O."""
 
 import re
 from collections.abc import Iterable
@@ -12,7 +12,7 @@ _NAME = re.compile(NAME_PATTERN)
 
 
 class BadFleet(ValueError):
-    """The robots that were named cannot be meant like this.
+    """The robots of a fleet are named wrongly.
 
     Attributes:
         name: stable, as in "bad_robot_name"
@@ -34,7 +34,7 @@ class NamedRobot(NamedTuple):
 
 
 def check_robot_name(name: str) -> str:
-    """`name` as it is. It stands in paths, in file names and in links, so it is plain.
+    """Return `name` as it is. It stands in paths, in file names and in links, so it has to be plain.
 
     Raises:
         BadFleet: bad_robot_name.
@@ -48,12 +48,12 @@ def check_robot_name(name: str) -> str:
 
 
 def is_named(text: str) -> bool:
-    """Whether it is NAME=address, not an address alone; an address has no = before its ://."""
+    """True for NAME=address, False for an address alone; an address has no = before its ://."""
     return "=" in text.partition("://")[0]
 
 
 def check_names(names: Iterable[str]) -> None:
-    """Raises BadFleet: bad_robot_name, robot_named_twice, too_many_robots."""
+    """Check all names. Raises BadFleet: bad_robot_name, robot_named_twice, too_many_robots."""
     seen: set[str] = set()
     for name in names:
         if check_robot_name(name) in seen:
@@ -64,7 +64,7 @@ def check_names(names: Iterable[str]) -> None:
 
 
 def parse_robots(texts: Iterable[str]) -> list[NamedRobot]:
-    """Robots as NAME=address. Addresses are not looked at.
+    """Parse robots given as NAME=address. Addresses are not checked.
 
     Raises:
         BadFleet: bad_robot_name, robot_named_twice, too_many_robots, robot_without_name.

@@ -1,4 +1,4 @@
-"""The directory that outlives the console: signing key, invitations, audit log. Only its owner can read it."""
+"""The state directory, which outlives the console: signing key, invitations, audit log. Only its owner can read it."""
 
 import fcntl
 import os
@@ -19,7 +19,7 @@ MAX_LOGS = 64  # consoles that share one directory
 
 
 class StateDirUnusable(Exception):
-    """It cannot be made, read or written.
+    """The state directory cannot be made, read or written.
 
     Attributes:
         path: the file or directory
@@ -36,17 +36,17 @@ class StateDirUnusable(Exception):
 
 
 class StateDamaged(StateDirUnusable):
-    """A file in it is not what it should be; nobody knows which links are good."""
+    """A file in the state directory is not what it should be; it is unknown which links are good."""
 
 
 def default_state_dir() -> Path:
-    """By the XDG base directory specification."""
+    """Return the default path, by the XDG base directory specification."""
     base = os.environ.get("XDG_STATE_HOME", "")
     return (Path(base) if os.path.isabs(base) else Path("~/.local/state").expanduser()) / "lockstep"
 
 
 class StateDir:
-    """Made when it is not there. Files are replaced in one step, so a reader never sees half of one.
+    """A state directory, made if it does not exist. Files are replaced in one step: a reader never sees half of one.
 
     Raises:
         StateDirUnusable: from every method.
@@ -59,7 +59,7 @@ class StateDir:
             _set_mode(path, 0o700)
 
     def signing_key(self) -> str:
-        """Made at the first call; two consoles that start at once agree on one."""
+        """Return the signing key. It is made at the first call; two consoles that start at once agree on one."""
         data = self.secret(KEY_FILE, lambda: secrets.token_urlsafe(KEY_BYTES).encode())
         key = data.decode(errors="replace").strip()
         if len(key.encode()) < KEY_BYTES:
@@ -67,7 +67,7 @@ class StateDir:
         return key
 
     def secret(self, name: str, fresh: Callable[[], bytes]) -> bytes:
-        """The file of this name, of mode 0600. It is made once: whoever is late takes what the first one made."""
+        """Return the content of a file of mode 0600. It is made once: a late process takes what the first one made."""
         path = self.path / name
         with _named(path):
             if not path.exists():
@@ -81,7 +81,7 @@ class StateDir:
             return _bytes_of(path)
 
     def read(self, name: str) -> bytes | None:
-        """None when there is no such file."""
+        """Return the file's content; None if there is no such file."""
         path = self.path / name
         with _named(path):
             try:
@@ -95,12 +95,12 @@ class StateDir:
             os.replace(self._temporary(data), path)
 
     def set_aside(self, name: str, size: int) -> None:
-        """A file of so many bytes, for what `overwrite` has to put on a disk that is full by then."""
+        """Reserve a file of `size` bytes, which `overwrite` can fill on a disk that is full by then."""
         if self.version(name) is None:
             self.write(name, bytes(size))
 
     def overwrite(self, name: str, data: bytes) -> None:
-        """In place, which takes no room; a crash meanwhile may leave a part. What was set aside is to be as long."""
+        """Write in place, which takes no room; a crash may leave a part. The reserved file has to be as long."""
         path = self.path / name
         with _named(path):
             handle = os.open(path, os.O_WRONLY | os.O_CLOEXEC | os.O_NOFOLLOW)
@@ -109,7 +109,7 @@ class StateDir:
                 os.fsync(handle)
 
     def version(self, name: str) -> tuple[int, int] | None:
-        """Another one whenever the file was replaced; None when there is no such file."""
+        """Return a value that changes whenever the file is replaced; None if there is no such file."""
         path = self.path / name
         with _named(path):
             try:
@@ -120,7 +120,7 @@ class StateDir:
 
     @contextmanager
     def locked(self) -> Iterator[None]:
-        """Only one process at a time is inside, for what reads, changes and writes."""
+        """Let one process at a time inside, to read, change and write files."""
         with _named(self.path / "lock"):
             handle = self._lock_file("lock")
             try:
@@ -135,7 +135,7 @@ class StateDir:
 
     @contextmanager
     def own_log(self, name: str) -> Iterator[Path]:
-        """A log that no other process writes: NAME.jsonl, or NAME-2.jsonl, … while another console has that."""
+        """Yield the path of a log that no other process writes: NAME.jsonl, or NAME-2.jsonl, … if that is taken."""
         for number in range(1, MAX_LOGS + 1):
             stem = name if number == 1 else f"{name}-{number}"
             with _named(self.path / f"{stem}.lock"):
@@ -153,7 +153,7 @@ class StateDir:
         raise StateDirUnusable(self.path, f"{MAX_LOGS} consoles write logs here already")
 
     def _lock_file(self, name: str) -> int:
-        """Opened. Of a name that somebody else put a link at, nothing is opened."""
+        """Open a lock file, made if it does not exist. A symbolic link that somebody else put there is not followed."""
         path, flags = self.path / name, os.O_RDWR | os.O_CLOEXEC | os.O_NOFOLLOW
         while True:
             try:
@@ -166,13 +166,13 @@ class StateDir:
                 return handle
 
     def _hand_over(self, handle: int) -> None:
-        """To the owner of the directory a new file that root has made: a console that is not root's has to read it."""
+        """Give a new file of root's to the directory's owner: a console that does not run as root has to read it."""
         owner = os.stat(self.path)
         if os.geteuid() == 0 and owner.st_uid != 0:
             os.fchown(handle, owner.st_uid, owner.st_gid)
 
     def _temporary(self, data: bytes) -> str:
-        """A file of this directory with `data`, safely on disk."""
+        """Write `data` safely to a new file in this directory; return its path."""
         handle, name = tempfile.mkstemp(dir=self.path, prefix=".new-")  # mode 0600
         try:
             with open(handle, "wb") as file:
@@ -192,7 +192,7 @@ def _bytes_of(path: Path) -> bytes:
 
 
 def _set_mode(path: Path, mode: int) -> None:
-    """Nothing is written where it is so already: evidence is also read on a disk that cannot be written."""
+    """Set the mode unless it is set already: evidence is also read on a disk that cannot be written."""
     if stat.S_IMODE(path.stat().st_mode) != mode:
         path.chmod(mode)
 

@@ -1,10 +1,10 @@
-"""How often something may be done. No I/O, no clock."""
+"""A token bucket, which limits how often something may be done. No I/O, no clock."""
 
 __all__ = ["TokenBucket"]
 
 
 class TokenBucket:
-    """`burst` times at once, then `rate` times a second; full at first."""
+    """Allows something `burst` times at once, then `rate` times a second; full at first."""
 
     def __init__(self, rate: float, burst: float, now: float) -> None:
         self._rate = rate
@@ -13,18 +13,18 @@ class TokenBucket:
         self._at = now
 
     def has(self, now: float) -> bool:
-        """Whether `take` would succeed."""
+        """True if `take` would succeed."""
         self._level = min(self._burst, self._level + max(0.0, now - self._at) * self._rate)
         self._at = now
         return self._level >= 1
 
     def is_full(self, now: float) -> bool:
-        """Whether it is as if nobody had ever taken anything."""
+        """True if the bucket is as full as at first."""
         self.has(now)
         return self._level >= self._burst
 
     def take(self, now: float) -> bool:
-        """Whether it may be done now; then it counts."""
+        """Take one token; False if the bucket is empty."""
         if not self.has(now):
             return False
         self._level -= 1

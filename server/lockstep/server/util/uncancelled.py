@@ -1,4 +1,4 @@
-"""What must not be cancelled in the middle, because it would leave something open."""
+"""Runs work that must not be cancelled in the middle, because it would leave something open."""
 
 import asyncio
 from collections.abc import Awaitable, Callable, Coroutine
@@ -10,18 +10,18 @@ __all__ = ["attempt", "in_thread", "to_the_end"]
 
 log = structlog.get_logger(__name__)
 
-DISK_SECONDS = 3.0  # then a disk does not answer, and the end waits for it no longer
+DISK_SECONDS = 3.0  # the longest that a cancelled caller waits for the disk
 
 Result = TypeVar("Result")
 
 
 async def attempt(work: Awaitable[Result]) -> Result:
-    """Await it, for a loop that goes on after an exception; returns or raises what it does.
+    """Await `work`, in a loop that goes on after an exception; return or raise what it does.
 
     A caller that is cancelled meanwhile gets CancelledError whatever the work raises as it ends, which is logged:
-    asyncio cancels only once, and an exception of clean-up would replace that. RuntimeError if the work was cancelled
-    and the caller was not. The work has a task of its own, for a TaskGroup (Python 3.11) leaves a cancellation of its
-    own counted, which nobody could tell from the caller's.
+    asyncio cancels only once, and an exception during clean-up would replace the cancellation. Raises RuntimeError if
+    the work was cancelled and the caller was not. The work runs in a separate task, because a TaskGroup (Python 3.11)
+    leaves its own cancellation counted, which could not be told from the caller's.
     """
     caller = asyncio.current_task()
     if caller is None:
@@ -44,22 +44,22 @@ async def attempt(work: Awaitable[Result]) -> Result:
 
 
 async def to_the_end(coroutine: Coroutine[Any, Any, object]) -> None:
-    """Await it. A caller that is cancelled meanwhile, as by a timeout, is cancelled when it has ended."""
+    """Await `coroutine`. A caller that is cancelled meanwhile, as by a timeout, is cancelled after it has ended."""
     task = asyncio.ensure_future(coroutine)
     try:
         await asyncio.shield(task)
     except asyncio.CancelledError:
         await asyncio.wait([task])
         if not task.cancelled():
-            task.exception()  # nobody asks for it any more
+            task.exception()  # marks it as retrieved
         raise
 
 
 async def in_thread(work: Callable[[], Result]) -> Result:
-    """Do `work`, which waits for the disk, in a thread; returns or raises what it does.
+    """Run `work`, which waits for the disk, in a thread; return or raise what it does.
 
-    A caller that is cancelled meanwhile ends when the thread has, so that nothing is written after its end; it waits
-    for a disk that does not answer for `DISK_SECONDS` at most.
+    A caller that is cancelled meanwhile ends after the thread, so that nothing is written after the caller's end; it
+    waits at most `DISK_SECONDS` for a disk that does not answer.
     """
     task = asyncio.ensure_future(asyncio.to_thread(work))
     try:
@@ -67,5 +67,5 @@ async def in_thread(work: Callable[[], Result]) -> Result:
     except asyncio.CancelledError:
         await asyncio.wait([task], timeout=DISK_SECONDS)
         if task.done() and not task.cancelled():
-            task.exception()  # nobody asks for it any more
+            task.exception()  # marks it as retrieved
         raise

@@ -1,4 +1,4 @@
-"""Observers' datagrams wait for their turn; operators and the robot never wait for them."""
+"""Queues observers' datagrams; operators and the robot never wait for them."""
 
 from collections import deque
 from collections.abc import Callable
@@ -10,14 +10,14 @@ __all__ = ["DriverQueue", "DatagramQueue", "Waiting"]
 
 
 class Waiting(Protocol):
-    """Somebody whose datagrams wait."""
+    """A peer whose datagrams wait."""
 
     def handle_next(self) -> bool:
-        """Handle one; whether more wait."""
+        """Handle one; True if more wait."""
 
 
 class DatagramQueue:
-    """One datagram of each in turn, for at most a slice in each turn of the loop: who floods waits for himself."""
+    """Handles one datagram of each peer in turn, at most a slice per loop iteration: a flood delays only its sender."""
 
     def __init__(self, turns: CooperativeScheduler) -> None:
         self._turns = turns
@@ -26,11 +26,11 @@ class DatagramQueue:
         self._is_scheduled = False
 
     def may_go_at_once(self) -> bool:
-        """Never."""
+        """False: datagrams always wait."""
         return False
 
     def add(self, waiting: Waiting) -> None:
-        """It has something to handle. Adding it again changes nothing."""
+        """Add a peer that has datagrams to handle. Adding it again changes nothing."""
         if waiting not in self._waiting:
             self._waiting.add(waiting)
             self._order.append(waiting)
@@ -56,11 +56,11 @@ class DatagramQueue:
 
 
 class DriverQueue:
-    """Of one peer that may drive: what it sends is handled at once while it does, and else within a bound."""
+    """The queue of one peer that may drive: its datagrams are handled at once while it drives, else within a bound."""
 
     def __init__(self, turns: DatagramQueue, may_go_at_once: Callable[[], bool]) -> None:
-        """`turns`: where datagrams wait; `may_go_at_once`: the bound for all that may drive and do not, together."""
-        self.drives = False  # whether it holds the control seat
+        """`turns`: the queue of datagrams that wait; `may_go_at_once`: the common bound of peers that do not drive."""
+        self.drives = False  # True while it holds the control seat
         self._turns = turns
         self._bound = may_go_at_once
 

@@ -1,7 +1,7 @@
 """STUN and TURN servers for browsers, and time-limited TURN credentials (draft-uberti-behave-turn-rest-00). No I/O.
 
-A credential is made of what the console and the TURN server both know, so nothing has to be told to the TURN server:
-the username is the time of its end and a name, the password its HMAC-SHA1 under the shared secret.
+A credential is made from a secret that the console and the TURN server share, so nothing has to be told to the server:
+the username is the expiry time and a name, the password its HMAC-SHA1 under the secret.
 """
 
 import base64
@@ -49,7 +49,7 @@ class IceServers(msgspec.Struct, frozen=True):
 
 
 def read_turn_uri(uri: str) -> TurnUri:
-    """Raises ValueError unless it is turn:host[:port][?transport=udp|tcp], or turns:."""
+    """Parse turn:host[:port][?transport=udp|tcp], or turns:. Raises ValueError for anything else."""
     match = TURN_URI.fullmatch(uri)
     if match is None:
         raise ValueError(f"{uri!r} is not turn:host[:port][?transport=udp|tcp]")
@@ -59,7 +59,7 @@ def read_turn_uri(uri: str) -> TurnUri:
 
 
 def turn_credential(secret: str, user: str, expires: int) -> tuple[str, str]:
-    """Username and password that the TURN server takes until `expires`."""
+    """Return the username and password that the TURN server accepts until `expires`."""
     username = f"{expires}:{user}"
     digest = hmac.new(secret.encode(), username.encode(), hashlib.sha1).digest()
     return username, base64.b64encode(digest).decode()
@@ -68,7 +68,7 @@ def turn_credential(secret: str, user: str, expires: int) -> tuple[str, str]:
 def ice_servers(
     stun: tuple[str, ...], turn: tuple[str, ...], secret: str, seconds: float, user: str, now: float
 ) -> IceServers:
-    """What `user` may use from `now` (s since 1970) on."""
+    """Return the servers that `user` may use from `now` (s since 1970) on."""
     servers = [IceServer(list(stun))] if stun else []
     if not turn:
         return IceServers(servers, None)
@@ -78,7 +78,7 @@ def ice_servers(
 
 
 def link_headers(servers: IceServers) -> list[str]:
-    """The same as Link headers (RFC 9725 4.6)."""
+    """Return the servers as Link headers (RFC 9725 4.6)."""
     lines = []
     for server in servers.ice_servers:
         for url in server.urls:

@@ -13,15 +13,15 @@ __all__ = ["IceSession"]
 
 
 class IceSession:
-    """What a PATCH of WHEP and WHIP is about.
+    """The ICE session that a PATCH of WHEP or WHIP changes.
 
     Attributes:
         tag: entity tag of the newest ICE session (RFC 9725 4.3.1); a restart changes it
-        username: the peer's, of the newest session
+        username: the peer's username fragment in the newest session
     """
 
     def __init__(self, connection: Connection, username: str) -> None:
-        """`username`: the offer's."""
+        """`username`: the offer's username fragment."""
         self.tag = _new_tag()
         self.username = username
         self._connection = connection
@@ -29,7 +29,7 @@ class IceSession:
 
     @property
     def connected(self) -> bool:
-        """Whether it is, or was until consent expired while a restart looks for another path."""
+        """True if connected, or connected until consent expired while a restart looks for another path."""
         return self._connection.peer.is_up
 
     @property
@@ -43,7 +43,7 @@ class IceSession:
         return tagged.kind, tagged.mid
 
     def add(self, candidates: Sequence[FragmentCandidate]) -> None:
-        """Raises BadSdpFragment: they are too many."""
+        """Add candidates of the peer. Raises BadSdpFragment: they are too many."""
         if self._candidates + len(candidates) > MAX_CANDIDATES:
             raise BadSdpFragment("too many candidates for one session")
         self._candidates += len(candidates)
@@ -51,7 +51,7 @@ class IceSession:
             self._connection.add_candidate(each.line)
 
     def restart(self, fragment: Fragment) -> Fragment:
-        """Our side of the session that the peer begins with `fragment`. Raises NotConnected."""
+        """Begin the peer's new session; return the console's fragment. Raises NotConnected."""
         try:
             ours = self._connection.answer_restart(fragment)
         except PeerNotReady as error:

@@ -19,7 +19,7 @@ LOOPBACK = "127.0.0.1"
 
 
 class MediaHostSettings(Protocol):
-    """The settings that say which they are."""
+    """The settings that determine the addresses."""
 
     @property
     def host(self) -> str: ...
@@ -34,7 +34,7 @@ class MediaHostSettings(Protocol):
 
 
 class MediaAddressUnusable(Exception):
-    """Media cannot be had where the settings say."""
+    """An address or port of the settings cannot be used for media."""
 
 
 class NoSuchAddress(MediaAddressUnusable):
@@ -66,10 +66,10 @@ class MediaPortTaken(MediaAddressUnusable):
 
 
 def check_media_addresses(settings: MediaHostSettings) -> None:
-    """Whether media can be had at the addresses and the port that were set; else browsers would be offered nothing.
+    """Check that media can use the addresses and the port of the settings; else browsers would be offered nothing.
 
     Raises:
-        NoSuchAddress: an address is none of this machine's.
+        NoSuchAddress: an address does not belong to this machine.
         MediaPortTaken: the port cannot be bound.
     """
     kinds = [("UDP", socket.SOCK_DGRAM)]
@@ -92,11 +92,11 @@ def check_media_addresses(settings: MediaHostSettings) -> None:
 
 
 def media_hosts(settings: MediaHostSettings) -> list[str]:
-    """Those that were set, or all that this machine has now; those to prefer first.
+    """Return the addresses of the settings, or all that this machine has now; preferred ones first.
 
-    A console bound to loopback offers loopback, and this machine's own addresses: Firefox pairs loopback with nothing
-    unless a hidden preference says so, and reaches the console by an own address. Only who got ICE credentials over the
-    loopback-bound signalling can use either.
+    A console bound to loopback offers loopback and this machine's other addresses: Firefox pairs loopback with nothing
+    unless a hidden preference says so, and reaches the console by another address. Only clients that got ICE
+    credentials over the loopback-bound signalling can use either.
     """
     if settings.ice_hosts:
         return list(settings.ice_hosts)

@@ -20,34 +20,34 @@ __all__ = ["MediaEndpoint"]
 
 log = structlog.get_logger(__name__)
 
-# Each robot has bounds of its own (`max_peers`); this one is for a fleet of twenty.
+# Each robot has its own bound (`max_peers`); this one is for a fleet of twenty.
 OF_ALL_ROBOTS = WebRtcSettings(peers=4096)
 
 
 class EndpointSettings(MediaHostSettings, Protocol):
-    """The settings that it needs."""
+    """The settings that the endpoint needs."""
 
     @property
     def advertise(self) -> tuple[str, ...]: ...
 
 
 class MediaEndpoint:
-    """Opens with the first peer, unless it is opened before. Whoever has it calls `close`."""
+    """The endpoint. It opens with the first peer, unless it is opened before. Its owner calls `close`."""
 
     def __init__(self, settings: EndpointSettings) -> None:
         self._settings = settings
         self._endpoint: Endpoint | None = None
         self._turns = turns_of_loop()  # work for observers ends as soon as something has come
-        self._asking = asyncio.Lock()  # what servers have told one negotiation is not given back by the next
+        self._asking = asyncio.Lock()  # one negotiation must not give back what servers have told another
 
     @property
     def dropped(self) -> Counter[str]:
-        """What came and was not used, by reason, since the start."""
+        """Count of dropped datagrams and packets since the start, by reason."""
         return Counter() if self._endpoint is None else self._endpoint.dropped
 
     @property
     def connections(self) -> int:
-        """Those that have not ended."""
+        """Number of connections that have not ended."""
         return 0 if self._endpoint is None else self._endpoint.connections
 
     async def connect(
@@ -59,11 +59,11 @@ class MediaEndpoint:
         settings: PeerSettings | None = None,
         controlling: bool = False,
     ) -> Connection:
-        """A connection at the addresses that this machine has now.
+        """Open a connection at the addresses that this machine has now.
 
         Args:
-            listener: as of `Endpoint.connect`; `turns`, `settings` and `controlling` too
-            servers: STUN and TURN servers that are asked for addresses of the console's own
+            listener: as in `Endpoint.connect`; `turns`, `settings` and `controlling` too
+            servers: STUN and TURN servers that are asked for addresses of the console
 
         Raises:
             TooManyPeers: the endpoint has as many as it may.
@@ -77,7 +77,7 @@ class MediaEndpoint:
             return endpoint.connect(controlling=controlling, settings=settings, listener=listener, turns=turns)
 
     def close(self) -> None:
-        """With all connections. Idempotent."""
+        """Close the endpoint with all connections. Idempotent."""
         if self._endpoint is not None:
             self._endpoint.close()
 
@@ -85,7 +85,7 @@ class MediaEndpoint:
         """Bind the sockets of the addresses that this machine has now, as far as they are not bound yet.
 
         Raises:
-            OSError: the port that was set cannot be bound.
+            OSError: the port of the settings cannot be bound.
         """
         settings = self._settings
         hosts = media_hosts(settings)
@@ -95,7 +95,7 @@ class MediaEndpoint:
             except OSError:
                 if settings.media_port:
                     raise
-                self._endpoint = self._bound([])  # an address that has just come may not be ready yet: without it
+                self._endpoint = self._bound([])  # a new address may not be ready yet: bind without it
         self._endpoint.use_hosts(hosts)
         for each in self._endpoint.sockets:
             self._turns.yield_to(each)

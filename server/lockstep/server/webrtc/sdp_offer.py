@@ -1,4 +1,4 @@
-"""Reads a WHEP or WHIP offer, and the fragments that follow it, with the console's bounds. No I/O."""
+"""Parses WHEP and WHIP offers, and the fragments that follow them, within the console's bounds. No I/O."""
 
 from dataclasses import replace
 
@@ -14,7 +14,8 @@ MAX_CANDIDATES = 100  # of the peer, in one session
 
 
 def parse_offer(text: str, max_sections: int = MAX_SECTIONS) -> SessionDescription:
-    """
+    """Parse an offer.
+
     Raises:
         TooManySections: more than `max_sections`.
         BadSdp: not an offer that can be answered.
@@ -28,10 +29,10 @@ def parse_offer(text: str, max_sections: int = MAX_SECTIONS) -> SessionDescripti
 
 
 def parse_fragment(text: str, first_mid: str) -> Fragment:
-    """The fragment in `text` (RFC 8840 9).
+    """Parse a fragment (RFC 8840 9).
 
-    Candidates with names are left out: the peer connects to us, so that its checks show its address (RFC 8445
-    7.3.1.3), and to resolve its `.local` names would cost a second of multicast.
+    Candidates with names are left out: the peer connects to the console, so its checks show its address (RFC 8445
+    7.3.1.3), and resolving its `.local` names would cost a second of multicast.
 
     Args:
         first_mid: for lines before the first media section; with BUNDLE all candidates are for it

@@ -1,1 +1,1 @@
-"""What a path does to packets: delay, loss, a bottleneck, outages. No I/O."""
+"""The impairments of packets on a path: delay, loss, a bottleneck, outages. No I/O."""

@@ -6,7 +6,7 @@ UNBOUNDED = 1 << 40  # bytes
 
 
 class Bottleneck:
-    """One direction, shared by everything that passes it.
+    """One direction of a bottleneck, shared by everything that passes it.
 
     Args:
         rate: bits a second
@@ -23,11 +23,11 @@ class Bottleneck:
         self._free_at = 0.0
 
     def wait(self, now: float) -> float:
-        """Seconds that a packet arriving now would wait."""
+        """Return the seconds that a packet arriving now would wait."""
         return max(0.0, self._free_at - now)
 
     def admit(self, now: float, size: int) -> float | None:
-        """When the packet's last byte is out; None when the queue is full."""
+        """Return the time at which the packet's last byte is out; None if the queue is full."""
         waits = self.wait(now)
         if waits * self._rate + size > self._queue:
             self.dropped += 1

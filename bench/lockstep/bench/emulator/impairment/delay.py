@@ -1,7 +1,7 @@
-"""How long a packet is under way: distributions given by their quantile function. No I/O.
+"""Distributions of a packet's delay, given by their quantile function. No I/O.
 
-A distribution turns one uniform number into one delay, so that every packet costs a seeded generator the same.
-All are bounded: a delay is never below zero, and never above a `max` that was given.
+A distribution turns one uniform number into one delay, so that every packet costs a seeded generator the same. All are
+bounded: a delay is never below zero, and never above a `max` that was given.
 """
 
 import math
@@ -19,7 +19,7 @@ STEPS = 200  # of a bisection: more than a float has bits
 
 
 class Delay(Protocol):
-    """One distribution. Times are in seconds."""
+    """A distribution. Times are in seconds."""
 
     @property
     def mean(self) -> float: ...
@@ -28,7 +28,7 @@ class Delay(Protocol):
     def max(self) -> float: ...
 
     def quantile(self, share: float) -> float:
-        """The delay below which this share (0 to 1) of all packets stays."""
+        """Return the delay below which this share (0 to 1) of all packets stays."""
 
 
 @dataclass(frozen=True)
@@ -64,7 +64,7 @@ class Uniform:
 
 
 class Normal:
-    """Cut off at `min` and at as far above the mean, so that the mean does not change."""
+    """A normal distribution, cut off at `min` and as far above the mean, so that the mean does not change."""
 
     def __init__(self, mean: float, deviation: float, min: float = 0.0) -> None:
         if not 0 <= min < mean or deviation <= 0:
@@ -80,7 +80,7 @@ class Normal:
 
 
 class Lognormal:
-    """Shifted to `min`, cut off at `max`, with exactly this mean: what min/avg/max of a ping usually come from."""
+    """A lognormal shifted to `min`, cut off at `max`, with exactly this mean: as of most pings' min/avg/max."""
 
     def __init__(self, min: float, mean: float, max: float) -> None:
         if not 0 <= min < mean < max:
@@ -93,7 +93,7 @@ class Lognormal:
         self._inside = _below((math.log(max - min) - self._mu) / self._sigma)
 
     def _fit(self, mean: float, log_max: float) -> float:
-        """The parameter with which the part below the cut has this mean."""
+        """Return the parameter with which the part below the cut has this mean."""
         low, high = math.log(mean) - 40 * self._sigma, log_max + 40 * self._sigma + 40
         for _ in range(STEPS):
             middle = (low + high) / 2
@@ -106,14 +106,14 @@ class Lognormal:
 
 
 def _sigma(ratio: float) -> float:
-    """With it an uncut lognormal has `ratio` between the quantile that `max` is and the mean, if it can have that."""
+    """Return the sigma for which an uncut lognormal has `ratio` between the quantile of `max` and the mean, if any."""
     z = STANDARD.inv_cdf(MAX_QUANTILE)
     inside = z * z - 2 * math.log(ratio)
     return z - math.sqrt(inside) if inside > 0 else z
 
 
 def _cut_mean(mu: float, sigma: float, log_max: float) -> float:
-    """Mean of a lognormal's part below exp(log_max)."""
+    """Return the mean of a lognormal's part below exp(log_max)."""
     cut = (log_max - mu) / sigma
     inside = _below(cut)
     if inside < 1e-300:
@@ -122,12 +122,12 @@ def _cut_mean(mu: float, sigma: float, log_max: float) -> float:
 
 
 def _below(value: float) -> float:
-    """The standard normal distribution; exact far below the mean, where `NormalDist.cdf` is 0."""
+    """Return the standard normal distribution; exact far below the mean, where `NormalDist.cdf` is 0."""
     return math.erfc(-value / math.sqrt(2)) / 2
 
 
 class Pareto:
-    """Bounded, with exactly this mean: most packets near `min`, and a tail heavier than a lognormal's."""
+    """A bounded Pareto with exactly this mean: most packets near `min`, and a tail heavier than a lognormal's."""
 
     def __init__(self, min: float, mean: float, max: float) -> None:
         if not 0 < min < mean < max:

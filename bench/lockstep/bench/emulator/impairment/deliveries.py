@@ -1,4 +1,4 @@
-"""What is under way: a heap of deliveries, woken by a timer that is finer than an event loop's own.
+"""Delivers packets at their times: a heap of deliveries, and a timer that is finer than an event loop's own.
 
 Event loops round their timers to whole milliseconds; a Linux timer descriptor does not.
 """
@@ -21,9 +21,9 @@ TFD_CLOEXEC = os.O_CLOEXEC
 
 
 def prefer_this_process() -> bool:
-    """Let the system run this process before others, where it may: a relay that waits for a processor adds delay.
+    """Let the system run this process before others, if it may: a relay that waits for a processor adds delay.
 
-    It needs a few percent of one. Processes that it starts are not preferred.
+    It needs a few percent of a processor. Processes that it starts are not preferred.
     """
     try:
         os.sched_setscheduler(0, os.SCHED_RR | os.SCHED_RESET_ON_FORK, os.sched_param(1))
@@ -60,7 +60,7 @@ class Deliveries:
             self._timer.arm(when - time.monotonic())
 
     def close(self) -> None:
-        """Forget everything that waits."""
+        """Drop everything that waits."""
         self._closed = True
         self._heap.clear()
         self._timer.close()
@@ -75,7 +75,7 @@ class Deliveries:
 
 
 class _Timer:
-    """A timer descriptor where there is one, else the loop's own timer."""
+    """A timer descriptor if the system has one, else the loop's own timer."""
 
     def __init__(self, loop: asyncio.AbstractEventLoop, due: Callable[[], None]) -> None:
         self._loop = loop
@@ -99,7 +99,7 @@ class _Timer:
         try:
             os.read(self._descriptor, 8)
         except BlockingIOError:
-            return  # armed again since
+            return  # armed again since then
         self._due()
 
     def close(self) -> None:

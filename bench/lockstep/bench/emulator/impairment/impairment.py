@@ -1,4 +1,4 @@
-"""What one direction of a path does to packets, as values; and how its delay moves with time. No I/O."""
+"""The impairments of one direction of a path as values, and the motion of its delay with time. No I/O."""
 
 from dataclasses import dataclass
 from random import Random
@@ -14,12 +14,12 @@ MAX_SKIPPED = 100_000  # draws after a pause; a longer one starts anew
 @dataclass(frozen=True)
 class Reordering:
     share: float  # 0 to 1 of all packets
-    late: float  # s that they come later than they would; others overtake them
+    late: float  # s of further delay; other packets overtake them
 
 
 @dataclass(frozen=True)
 class Impairment:
-    """Of one direction."""
+    """The impairments of one direction."""
 
     delay: Delay = NO_DELAY
     loss: Loss = NO_LOSS

@@ -1,8 +1,8 @@
-"""Which packets are lost: the Gilbert–Elliott model, of which independent loss is a case. No I/O.
+"""Decides about lost packets by the Gilbert–Elliott model, of which independent loss is a case. No I/O.
 
-The path is in a good or a bad state and changes between them with fixed probabilities at every packet; each state
-loses packets with a probability of its own. A burst is a matter of milliseconds: after a pause the state is drawn
-anew, else five packets of a path that has one every other second would be lost for ten seconds on end.
+The path is in a good or a bad state and changes between them with fixed probabilities at every packet; each state has
+its own probability of losing a packet. A burst lasts milliseconds: after a pause the state is drawn anew, or five
+packets of a path that has one every other second would be lost for ten seconds on end.
 """
 
 from dataclasses import dataclass
@@ -14,7 +14,7 @@ PAUSE = 0.5  # s
 
 @dataclass(frozen=True)
 class Loss:
-    """The four probabilities."""
+    """The four probabilities of the model."""
 
     to_bad: float = 0.0  # good → bad, at each packet
     to_good: float = 1.0  # bad → good
@@ -37,15 +37,15 @@ NO_LOSS = Loss()
 
 
 def independent(share: float) -> Loss:
-    """Each packet for itself."""
+    """Return the loss of each packet independently of the others."""
     return Loss(good=share, bad=share)
 
 
 def bursty(share: float, length: float, *, good: float = 0.0, bad: float = 1.0) -> Loss:
-    """`share` of all packets, and the bad state lasts `length` packets on average.
+    """Return the loss of `share` of all packets, with a bad state that lasts `length` packets on average.
 
     Args:
-        good, bad: share lost in each state; unless given, all of it is lost in the bad state and nothing in the good
+        good, bad: share lost in each state; by default all of it is lost in the bad state and nothing in the good
 
     Raises:
         ValueError: no such path exists.
@@ -63,14 +63,14 @@ def bursty(share: float, length: float, *, good: float = 0.0, bad: float = 1.0) 
 
 
 class LossState:
-    """Where one path is. Two uniform numbers a packet."""
+    """The state of one path. Each packet takes two uniform numbers."""
 
     def __init__(self) -> None:
         self._bad = False
         self._last = -float("inf")  # s, when the last packet came
 
     def loses(self, loss: Loss, change: float, fate: float, now: float) -> bool:
-        """Whether the packet that comes `now` (s) is lost."""
+        """Return whether the packet that comes `now` (s) is lost."""
         if now - self._last > PAUSE:
             self._bad = change < loss.in_bad
         else:

@@ -1,4 +1,4 @@
-"""When nothing passes: on a schedule, and on demand. No I/O."""
+"""Outages, in which nothing passes: on a schedule, and on demand. No I/O."""
 
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -8,11 +8,11 @@ __all__ = ["Outages", "PlannedOutage", "Silence"]
 
 @dataclass(frozen=True)
 class PlannedOutage:
-    """Times in seconds; the schedule's clock starts with `Outages.start`."""
+    """An outage of the schedule. Times in seconds; the schedule's clock starts with `Outages.start`."""
 
     at: float
     lasts: float
-    every: float | None = None  # again and again; None: once
+    every: float | None = None  # from the start of one to the start of the next; None: once
     hold: bool = False  # packets wait in the network until it is over; else they are lost
 
 
@@ -24,7 +24,7 @@ class Silence(NamedTuple):
 
 
 class Outages:
-    """Those of one place, shared by all paths that lead through it."""
+    """The outages of one place, shared by all paths that lead through it."""
 
     def __init__(self, planned: tuple[PlannedOutage, ...] = ()) -> None:
         self._planned = planned
@@ -41,12 +41,12 @@ class Outages:
         self._started = now
 
     def demand(self, now: float, seconds: float, *, hold: bool = False) -> None:
-        """One more from now on; it takes the place of the one demanded before."""
+        """Begin an outage now; it replaces the one demanded before."""
         self._demanded = Silence(now + seconds, hold)
         self._demanded_at = now
 
     def at(self, now: float) -> Silence | None:
-        """The outage that holds at `now`; of several the one that lasts longest."""
+        """Return the outage that holds at `now`; of several the one that lasts longest."""
         found = self._demanded if self._demanded_at <= now < self._demanded.until else None
         if self._started is not None:
             for planned in self._planned:

@@ -1,4 +1,4 @@
-"""What a datagram carries, by its first byte (RFC 7983), and the names in a STUN check (RFC 8489). No I/O."""
+"""Classifies datagrams by their first byte (RFC 7983), and reads the names in a STUN check (RFC 8489). No I/O."""
 
 import struct
 from typing import Literal
@@ -14,7 +14,7 @@ USERNAME = 0x0006
 
 
 def kind_of(data: bytes | memoryview) -> Kind:
-    """Control is DTLS, and everything that is neither STUN nor media."""
+    """Return the kind of a datagram. DTLS, and everything that is neither STUN nor media, is control."""
     first = data[0] if data else 255
     if 128 <= first <= 191:
         return "media"
@@ -22,7 +22,7 @@ def kind_of(data: bytes | memoryview) -> Kind:
 
 
 def stun_username(data: bytes) -> str | None:
-    """The USERNAME of a binding request, "theirs:ours"; None for another packet."""
+    """Return the USERNAME of a binding request, "theirs:ours"; None for another packet."""
     if len(data) < HEADER or data[4:8] != MAGIC or struct.unpack_from("!H", data)[0] != BINDING_REQUEST:
         return None
     position = HEADER

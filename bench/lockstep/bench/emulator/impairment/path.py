@@ -1,8 +1,8 @@
 """One direction of one path for packets. No I/O.
 
 A packet passes these in order: an outage, the bottleneck's queue, loss, delay, order. Every packet takes the same
-number of random numbers, at any fate and any setting: the fate of the n-th packet depends on the seed and n, on when it
-came if there is a bottleneck, an outage or a delay that wanders, and on nothing else.
+number of random numbers, with any fate and any setting: the fate of the n-th packet depends on the seed and n, on its
+time if there is a bottleneck, an outage or a delay that wanders, and on nothing else.
 """
 
 from dataclasses import dataclass
@@ -25,9 +25,9 @@ class PathStatistics:
     lost: int = 0
     queue_dropped: int = 0
     outage_dropped: int = 0
-    held: int = 0  # by an outage, and passed after it
+    held: int = 0  # held by an outage, and passed after it
     reordered: int = 0
-    bytes: int = 0  # that passed
+    bytes: int = 0  # of the packets that passed
     total_delay: float = 0.0
     max_delay: float = 0.0
 
@@ -36,7 +36,7 @@ class PathStatistics:
         return self.total_delay / self.passed if self.passed else 0.0
 
     def add(self, other: "PathStatistics") -> None:
-        """Count another path's in."""
+        """Add another path's counts."""
         for name in ("offered", "passed", "lost", "queue_dropped", "outage_dropped", "held", "reordered", "bytes"):
             setattr(self, name, getattr(self, name) + getattr(other, name))
         self.total_delay += other.total_delay
@@ -44,7 +44,7 @@ class PathStatistics:
 
 
 class ImpairedPath:
-    """Call `admit` for every packet, in order of time.
+    """One direction of a path. Call `admit` for every packet, in order of time.
 
     Args:
         seed: the same seed and the same packets at the same times meet the same fate
@@ -65,7 +65,7 @@ class ImpairedPath:
         self._last = 0.0  # arrival of the last packet that keeps the order
 
     def admit(self, now: float, size: int) -> float | None:
-        """When the packet arrives; None when it never does."""
+        """Return the time at which the packet arrives; None if it never does."""
         change, fate, share, swap = (self._random.random() for _ in range(4))
         counts, impairment = self.statistics, self.impairment
         counts.offered += 1
@@ -99,7 +99,10 @@ class ImpairedPath:
         return self.impairment.delay.quantile(share)
 
     def _ordered(self, arrives: float, swap: float) -> float:
-        """A real queue is first in, first out, at any delay; reordered packets are outside of it."""
+        """Return the time of arrival in order.
+
+        A real queue is first in, first out, at any delay; reordered packets are outside of it.
+        """
         reorder = self.impairment.reorder
         if reorder is not None and swap < reorder.share:
             self.statistics.reordered += 1

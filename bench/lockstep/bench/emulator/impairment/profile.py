@@ -1,4 +1,4 @@
-"""A network as a value, and how it is read from a TOML file. docs/networks.md describes the file."""
+"""A network as a value, and the reading of one from a TOML file. docs/networks.md describes the file."""
 
 import tomllib
 from dataclasses import dataclass
@@ -51,7 +51,7 @@ DEFAULT_QUEUE = 64_000  # bytes in front of a bottleneck
 
 @dataclass(frozen=True)
 class TwoWay:
-    """One path."""
+    """Both directions of one path."""
 
     to_operator: Impairment = PERFECT
     to_robot: Impairment = PERFECT
@@ -77,7 +77,7 @@ class Profile:
     control: TwoWay = TwoWay()  # DTLS: the data channels; STUN too
     signalling: TwoWay = TwoWay()  # HTTP
     robot_media: TwoWay = TwoWay()  # the robot link's media connection
-    robot_control: TwoWay = TwoWay()  # its operator's and subscribers' connections
+    robot_control: TwoWay = TwoWay()  # the robot link's operator and event connections
     bottleneck_to_operator: BottleneckSettings | None = None  # each client's own, shared by its media and control
     bottleneck_to_robot: BottleneckSettings | None = None
     client_outages: tuple[PlannedOutage, ...] = ()
@@ -89,20 +89,21 @@ class Profile:
 
 
 def even_profile(name: str, impairment: Impairment) -> Profile:
-    """The same each way on everything between a client and the console; the robot link stays perfect."""
+    """Return a profile that is the same each way between a client and the console; the robot link stays perfect."""
     path = TwoWay(impairment, impairment)
     return Profile(name, media=path, control=path, signalling=path)
 
 
 def profile_names() -> list[str]:
-    """Those that come with Lockstep."""
+    """Return the names of the profiles that come with Lockstep."""
     return sorted(each.name.removesuffix(ENDING) for each in FOLDER.iterdir() if each.name.endswith(ENDING))
 
 
 def load_profile(name_or_path: str | Path) -> Profile:
-    """One of `profile_names`, or a file: anything with a slash or the ending .toml.
+    """Load one of `profile_names`, or a file: anything with a slash or the ending .toml.
 
-    Raises: ProfileError: it does not exist, or cannot be used.
+    Raises:
+        ProfileError: it does not exist, or cannot be used.
     """
     source = str(name_or_path)
     is_file = isinstance(name_or_path, Path) or "/" in source or source.endswith(ENDING)
@@ -117,7 +118,11 @@ def load_profile(name_or_path: str | Path) -> Profile:
 
 
 def parse_profile(text: str, source: str) -> Profile:
-    """The profile in `text`; `source` names it. Raises ProfileError."""
+    """Return the profile in `text`; `source` names it.
+
+    Raises:
+        ProfileError: it cannot be used.
+    """
     try:
         table = msgspec.convert(tomllib.loads(text), ProfileTable)
     except tomllib.TOMLDecodeError as error:
@@ -154,7 +159,7 @@ class _Reader:
         return ProfileError(self._source, where, problem)
 
     def _path(self, name: str, general: PathTable, own: PathTable) -> TwoWay:
-        """Later layers replace single keys of earlier ones."""
+        """Return a path from tables, of which later ones replace single keys of earlier ones."""
         return TwoWay(
             *(
                 self._impairment(name, _merged(general, getattr(general, direction), own, getattr(own, direction)))
@@ -246,7 +251,11 @@ DIRECTION_KEYS = DirectionTable.__struct_fields__
 
 
 def _distribution(table: DelayTable, scale: float) -> Delay:
-    """Raises ValueError: the table does not make this shape."""
+    """Return the distribution of a table.
+
+    Raises:
+        ValueError: the table does not make this shape.
+    """
     given = {name: value for name in ("min", "mean", "max", "deviation") if (value := getattr(table, name)) is not None}
     needed, allowed = SHAPE_KEYS[table.shape]
     if not needed <= given.keys() <= allowed:

@@ -1,4 +1,4 @@
-"""The keys of a profile's TOML file. A key that is not here is refused."""
+"""The keys of a profile's TOML file. Any other key is refused."""
 
 from typing import Annotated, Literal
 
@@ -22,7 +22,7 @@ Bytes = Annotated[int, msgspec.Meta(ge=1500)]
 
 
 class DelayTable(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
-    """Milliseconds."""
+    """A delay distribution, in milliseconds."""
 
     shape: Literal["lognormal", "pareto", "uniform", "normal"] = "lognormal"
     min: NotNegative | None = None
@@ -32,13 +32,13 @@ class DelayTable(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
 
 
 class DirectionTable(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
-    """What one direction does. None: not said here."""
+    """The keys of one direction. None: not given here."""
 
     delay_ms: NotNegative | DelayTable | None = None  # one way
-    round_trip_ms: NotNegative | DelayTable | None = None  # instead: half of it each way
+    round_trip_ms: NotNegative | DelayTable | None = None  # instead of delay_ms: half of it each way
     vary_ms: NotNegative | None = None
     loss_percent: Percent | None = None  # one way
-    round_trip_loss_percent: Percent | None = None  # instead: as a ping counts
+    round_trip_loss_percent: Percent | None = None  # instead of loss_percent: as a ping counts
     burst_packets: Annotated[float, msgspec.Meta(ge=1)] | None = None
     good_loss_percent: Percent | None = None
     bad_loss_percent: Percent | None = None
@@ -47,7 +47,7 @@ class DirectionTable(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
 
 
 class PathTable(DirectionTable, forbid_unknown_fields=True, frozen=True):
-    """Both directions, and the differences of one."""
+    """The keys of both directions, and the differences of one."""
 
     to_operator: DirectionTable = DirectionTable()
     to_robot: DirectionTable = DirectionTable()
@@ -56,7 +56,7 @@ class PathTable(DirectionTable, forbid_unknown_fields=True, frozen=True):
 class BottleneckTable(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
     rate_kbps: Positive
     queue_bytes: Bytes | None = None
-    queue_ms: Positive | None = None  # instead: the bytes that the rate sends in that time
+    queue_ms: Positive | None = None  # instead of queue_bytes: the bytes that the rate sends in that time
 
 
 class TwoBottlenecks(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
@@ -87,11 +87,11 @@ class ExperimentTable(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
 class ProfileTable(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
     title: str
     about: str = ""
-    client: PathTable = PathTable()  # what media, control and signalling have in common
+    client: PathTable = PathTable()  # common to media, control and signalling
     media: PathTable = PathTable()
     control: PathTable = PathTable()
     signalling: PathTable = PathTable()
-    robot: PathTable = PathTable()  # what robot_media and robot_control have in common
+    robot: PathTable = PathTable()  # common to robot_media and robot_control
     robot_media: PathTable = PathTable()
     robot_control: PathTable = PathTable()
     bottleneck: TwoBottlenecks = TwoBottlenecks()

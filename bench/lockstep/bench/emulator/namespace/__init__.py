@@ -1,1 +1,1 @@
-"""A network between two namespaces of the kernel, for programs that know nothing of it."""
+"""Emulates a network between two namespaces of the kernel, for programs that know nothing of it."""

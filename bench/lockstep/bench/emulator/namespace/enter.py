@@ -15,7 +15,7 @@ def main() -> None:
     if libc.setns(descriptor, CLONE_NEWNET) != 0:
         sys.exit(f"cannot enter the network namespace: {os.strerror(ctypes.get_errno())}")
     os.close(descriptor)
-    # Nobody may be left in a namespace whose emulator was killed.
+    # No process may be left in a namespace whose emulator was killed.
     libc.prctl(PR_SET_PDEATHSIG, signal.SIGTERM, 0, 0, 0)
     try:
         os.execvp(command[0], command)

@@ -1,7 +1,7 @@
-"""Which path of a profile an IP packet belongs to. No I/O.
+"""Finds the path of a profile that an IP packet belongs to. No I/O.
 
-UDP shows it in its first byte (RFC 7983). A TCP connection shows it in the first bytes of who opened it: a robot link
-begins with a hello in a frame; everything else is taken for signalling.
+A UDP packet shows the path by its first byte (RFC 7983). A TCP connection shows it by the first bytes of the side that
+opened it: a robot link begins with a hello in a frame; everything else is taken for signalling.
 """
 
 import socket
@@ -24,13 +24,13 @@ Connection = tuple[bytes, bytes]  # both ends, the smaller first
 
 
 class IpSorter:
-    """Give it every packet, in order."""
+    """Sorts packets. Call `kind` for every packet, in order."""
 
     def __init__(self) -> None:
-        self._connections: OrderedDict[Connection, IpKind | None] = OrderedDict()  # None: not a byte of data yet
+        self._connections: OrderedDict[Connection, IpKind | None] = OrderedDict()  # None: no byte of data yet
 
     def kind(self, packet: bytes) -> IpKind | None:
-        """None: not an IPv4 packet."""
+        """Return the kind of a packet; None if it is not an IPv4 packet."""
         if len(packet) < 20 or packet[0] >> 4 != 4:
             return None
         header = (packet[0] & 15) * 4

@@ -28,7 +28,7 @@ from lockstep.bench.emulator.transport.address_translation import Firewall, OneT
 
 __all__ = ["OPERATOR_ADDRESS", "ROBOT_ADDRESS", "Namespaces", "Side"]
 
-# Of the block for tests of networks (RFC 2544).
+# From the block for tests of networks (RFC 2544).
 ROBOT_ADDRESS = "198.18.0.1"
 OPERATOR_ADDRESS = "198.18.0.2"
 ENTER = Path(__file__).with_name("enter.py")
@@ -40,7 +40,7 @@ Side = Literal["robot", "operator"]
 
 
 class Namespaces:
-    """Enter it, then `start` processes on its two sides. Leaving ends them.
+    """Two namespaces. Enter it, then `start` processes on its two sides; leaving ends them.
 
     The robot's side is `ROBOT_ADDRESS` and usually runs the console; the operator's side is `OPERATOR_ADDRESS`.
 
@@ -51,11 +51,10 @@ class Namespaces:
     def __init__(
         self, profile: Profile | str, *, seed: int = 1, cloud: str | None = None, passes_udp: bool = True
     ) -> None:
-        """`passes_udp`: False: a network that lets TCP alone out. `cloud`: the outer address of the robot's side, which
-        is reached by no other.
+        """`passes_udp`: False: the network lets out only TCP. `cloud`: the only address that reaches the robot's side.
 
-        It is then like a machine in a cloud, which only knows its inner address, and the operator's side stands behind
-        a firewall, like a browser at home.
+        With `cloud` the robot's side is like a machine in a cloud, which only knows its inner address, and the
+        operator's side is behind a firewall, like a browser at home.
         """
         self._nat = OneToOneNat(ROBOT_ADDRESS, cloud) if cloud is not None else None
         self._firewall = Firewall() if cloud is not None else None
@@ -113,7 +112,7 @@ class Namespaces:
         await self._stack.aclose()
 
     async def start(self, side: Side, command: Sequence[str], **options: Any) -> asyncio.subprocess.Process:
-        """A process that only knows its side's network; `options` are those of `create_subprocess_exec`."""
+        """Start a process that only knows its side's network; `options` are those of `create_subprocess_exec`."""
         descriptor = self._sides[side].namespace
         process = await asyncio.create_subprocess_exec(
             *(sys.executable, "-I", str(ENTER), str(descriptor), *command),
@@ -125,14 +124,14 @@ class Namespaces:
         return process
 
     def outage(self, seconds: float, *, hold: bool = False, robot: bool = False) -> None:
-        """As `Network.outage`."""
+        """Begin an outage as `Network.outage` does."""
         (self._robot_outages if robot else self._client_outages).demand(time.monotonic(), seconds, hold=hold)
 
     def cut_robot(self) -> None:
-        """Nothing here: connections belong to the processes on the two sides."""
+        """Do nothing: connections belong to the processes on the two sides."""
 
     def statistics(self) -> NetworkStatistics:
-        """What has happened to all packets so far."""
+        """Return the statistics of all packets so far."""
         found = NetworkStatistics()
         for (kind, direction), path in self._paths.items():
             found.count(kind, direction, path.statistics)
@@ -164,7 +163,7 @@ class Namespaces:
                 self._deliveries.at(arrives, _write, other.packets, packet)
 
     def _translated(self, side: Side, packet: bytes) -> bytes:
-        """As it arrives at the other side; b"": it does not."""
+        """Return the packet as it arrives at the other side; b"" if it does not."""
         if self._nat is None or self._firewall is None:
             return packet
         if side == "operator":
@@ -175,7 +174,7 @@ class Namespaces:
 
 
 def _write(descriptor: int, packet: bytes) -> None:
-    with suppress(OSError):  # its queue is full, or it is closed
+    with suppress(OSError):  # the queue is full, or the device is closed
         os.write(descriptor, packet)
 
 
@@ -184,7 +183,7 @@ def _packed(address: str) -> bytes:
 
 
 async def _end(process: asyncio.subprocess.Process) -> None:
-    """The process and all that it started."""
+    """End the process and all that it started."""
     for number in (signal.SIGTERM, signal.SIGKILL):
         with suppress(ProcessLookupError):
             os.killpg(process.pid, number)

@@ -29,7 +29,7 @@ OWN_METHODS = frozenset({"open_console", "outage", "begin", "cut_robot", "statis
 
 
 class NetworkProcess:
-    """As `Network`, which documents the arguments and methods; it has no `open_relay`.
+    """Has the arguments and methods of `Network`, which documents them, but no `open_relay`.
 
     As root on Linux its process runs before others, so that a busy machine does not disturb it.
     """
@@ -92,7 +92,7 @@ class NetworkProcess:
         return found
 
     def _ask(self, method: str, *arguments: Any, **named: Any) -> Any:
-        """Waits for the answer: a millisecond or so, but for `enter` and `open_console`."""
+        """Ask the process and wait for the answer: about a millisecond, except for `enter` and `open_console`."""
         if self._process is None or self._process.stdin is None or self._process.stdout is None:
             raise RuntimeError("enter the network first")
         try:
@@ -107,7 +107,7 @@ class NetworkProcess:
     def _end(self) -> None:
         if self._process is None:
             return
-        # The end of its input is the end of the process.
+        # The process ends at the end of its input.
         with self._process as process:
             if process.stdin is not None:
                 with suppress(OSError):
@@ -156,5 +156,5 @@ async def _call(network: Network, method: str, arguments: tuple[Any, ...], named
 
 
 def serve() -> None:
-    """The process' own side; ends with its input."""
+    """Run the network in the process; ends with its input."""
     uvloop.run(_serve())

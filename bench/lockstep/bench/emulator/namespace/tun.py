@@ -1,6 +1,6 @@
-"""A network namespace with one TUN device in it, made with system calls alone. Linux, root.
+"""Makes a network namespace with one TUN device in it, with system calls alone. Linux, root.
 
-The namespace has no name: it lives as long as a process in it, or a descriptor of it, and nothing is left to clean up.
+The namespace has no name: it lives as long as a process in it, or a descriptor of it, so nothing is left to clean up.
 """
 
 import ctypes
@@ -32,7 +32,7 @@ RTF_UP = 0x1  # linux/route.h
 
 @dataclass(frozen=True)
 class Tun:
-    """Close both descriptors at the end."""
+    """A TUN device and its namespace. Close both descriptors at the end."""
 
     address: str
     packets: int  # descriptor: each read and each write is one IP packet
@@ -64,7 +64,7 @@ class _Route(ctypes.Structure):
 
 
 def open_tun(address: str) -> Tun:
-    """A new namespace in which `address` is the machine's own, and everything else lies behind the device.
+    """Open a new namespace in which `address` is the machine's own, and everything else lies behind the device.
 
     Raises:
         NamespacesUnavailable: names the missing part.
@@ -75,7 +75,7 @@ def open_tun(address: str) -> Tun:
         raise NamespacesUnavailable("network namespaces need root; run this with sudo, or use the proxy without them")
     if not TUN_FILE.exists():
         raise NamespacesUnavailable(f"{TUN_FILE} does not exist; load the module tun, or give the container the device")
-    # unshare(2) moves the calling thread only, so that a thread of its own leaves everybody else where they are.
+    # unshare(2) moves only the calling thread, so a separate thread leaves all others in place.
     with ThreadPoolExecutor(1) as thread:
         return thread.submit(_open_here, address).result()
 

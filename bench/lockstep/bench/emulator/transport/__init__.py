@@ -1,1 +1,1 @@
-"""Relays through which UDP, TCP, HTTP and WebSockets pass a path."""
+"""Relays that lead UDP, TCP, HTTP and WebSockets over a path."""

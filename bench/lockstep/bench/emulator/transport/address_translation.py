@@ -1,4 +1,4 @@
-"""What stands between a machine and the Internet: one-to-one NAT, as in a cloud, and a firewall, as at home. No I/O."""
+"""Translates addresses as between a machine and the Internet: one-to-one NAT in a cloud, a firewall at home. No I/O."""
 
 import socket
 import struct
@@ -19,11 +19,11 @@ class OneToOneNat:
         self._inner, self._outer = IPv4Address(inner).packed, IPv4Address(outer).packed
 
     def outward(self, packet: bytes) -> bytes | None:
-        """An IPv4 packet from inside as it is seen outside; None: it has no outer address."""
+        """Return an IPv4 packet from inside as it is seen outside; None if it has no outer address."""
         return _with_address(packet, SOURCE, self._inner, self._outer)
 
     def inward(self, packet: bytes) -> bytes | None:
-        """An IPv4 packet from outside as it arrives; None: no host inside gets it, not even the inner address."""
+        """Return an IPv4 packet from outside as it arrives; None if no host gets it, not even the inner address."""
         return _with_address(packet, DESTINATION, self._outer, self._inner)
 
 
@@ -34,7 +34,7 @@ class Firewall:
         self._open: dict[tuple[int, bytes, bytes, bytes], None] = {}
 
     def leaving(self, packet: bytes) -> None:
-        """Opens the way for answers to an IPv4 packet."""
+        """Open the way for answers to an IPv4 packet."""
         protocol, source, destination, remote = packet[9], *_ports(packet), packet[DESTINATION:][:ADDRESS_BYTES]
         self._open[protocol, remote, destination, source] = None
         if len(self._open) > MOST_PATHS:
@@ -50,7 +50,7 @@ def _header(packet: bytes) -> int:
 
 
 def _ports(packet: bytes) -> tuple[bytes, bytes]:
-    """Source and destination port of TCP and UDP; for other protocols the bytes at that place."""
+    """Return source and destination port of TCP and UDP; for other protocols the bytes at that place."""
     at = _header(packet)
     return packet[at : at + PORT_BYTES], packet[at + PORT_BYTES : at + 2 * PORT_BYTES]
 
@@ -71,7 +71,7 @@ def _with_address(packet: bytes, at: int, old: bytes, new: bytes) -> bytes | Non
 
 
 def _update(packet: bytearray, at: int, old: bytes, new: bytes) -> None:
-    """The checksum at `at` after `new` took the place of `old` (RFC 1624 3)."""
+    """Update the checksum at `at` after `new` replaced `old` (RFC 1624 3)."""
     total = ~struct.unpack_from("!H", packet, at)[0] & 0xFFFF
     for before, after in zip(struct.unpack("!2H", old), struct.unpack("!2H", new), strict=True):
         total += (~before & 0xFFFF) + after

@@ -17,10 +17,10 @@ KEPT = 1000  # connections
 
 
 class ClientPaths:
-    """For each direction and kind of packet a path of its own, behind one bottleneck each way.
+    """The paths of one client: one for each direction and kind of packet, behind one bottleneck each way.
 
-    A STUN check meets what control meets, but with random numbers of its own: how many checks ICE makes depends on its
-    timers and must not shift the fate of commands.
+    A STUN check meets the same impairments as control, but with its own random numbers: the number of ICE's checks
+    depends on its timers and must not shift the fate of commands.
     """
 
     def __init__(self, profile: Profile, seed: str, outages: Outages) -> None:
@@ -38,16 +38,16 @@ class ClientPaths:
                 )
 
     def admit(self, kind: Kind, direction: Direction, now: float, size: int) -> float | None:
-        """When a datagram arrives; None when it never does. The first one starts the schedule of outages."""
+        """Return the time at which a datagram arrives, or None. The first one starts the schedule of outages."""
         if not self._outages.started:
             self._outages.start(now)
         return self.paths[kind, direction].admit(now, size + IP_UDP_BYTES)
 
 
 class SignallingPaths:
-    """HTTP: each connection keeps its own order, and all share a bottleneck each way.
+    """The paths of HTTP: each connection keeps its own order, and all share a bottleneck each way.
 
-    It is not the bottleneck of media and control: what TCP and they do to each other is not emulated.
+    It is not the bottleneck of media and control: the effect of TCP and those on each other is not emulated.
     """
 
     def __init__(self, profile: Profile, seed: str, outages: Outages) -> None:
@@ -64,7 +64,7 @@ class SignallingPaths:
         }
 
     def of(self, connection: Hashable) -> dict[Direction, StreamPath]:
-        """Its two directions; `connection` is what tells it from others."""
+        """Return both directions of a connection; `connection` tells it from others."""
         found = self._connections.get(connection)
         if found is None:
             self._count += 1

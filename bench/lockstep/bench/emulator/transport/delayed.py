@@ -1,4 +1,4 @@
-"""A stream of chunks that takes a path's time: read on at once, handed on when each has arrived."""
+"""Delays a stream of chunks by a path: reads on at once, and hands on each chunk when it has arrived."""
 
 import asyncio
 import time
@@ -14,12 +14,12 @@ UNDER_WAY = 64  # chunks; then the source waits, as for a full window
 
 
 async def sleep_until(when: float) -> None:
-    """Until a time of `time.monotonic`."""
+    """Sleep until a time of `time.monotonic`."""
     await asyncio.sleep(max(0.0, when - time.monotonic()))
 
 
 async def delayed(source: AsyncIterable[Chunk], path: StreamPath) -> AsyncGenerator[Chunk]:
-    """What comes from `source`, later. Close it: it has a task that reads ahead."""
+    """Yield the chunks of `source` later. Close it: it has a task that reads ahead."""
     queue: asyncio.Queue[tuple[float, Chunk | BaseException | None]] = asyncio.Queue(UNDER_WAY)
 
     async def read() -> None:

@@ -1,7 +1,7 @@
 """A reverse proxy in front of a console: through it an unmodified browser or client meets a network.
 
-HTTP and the 3D scene's WebSocket take the signalling path's time: one delay for a request and one for its answer,
-connections are taken as open. Each WHEP session gets a relay of its own that is written into offer and answer.
+HTTP and the 3D scene's WebSocket take the signalling path's time: one delay for a request and one for its answer;
+connections are taken as open. Each WHEP session gets its own relay, which is written into offer and answer.
 """
 
 import time
@@ -26,7 +26,7 @@ from lockstep.bench.emulator.transport.websocket_proxy import join
 
 __all__ = ["ConsoleProxy"]
 
-# Hop by hop (RFC 9110 7.6.1).
+# Hop-by-hop headers (RFC 9110 7.6.1).
 NOT_FORWARDED = frozenset(
     ("connection", "keep-alive", "proxy-authenticate", "proxy-connection", "te", "trailer", "transfer-encoding")
 )
@@ -38,7 +38,7 @@ HEADERS_SIZE = 400  # bytes, about, of a request's or an answer's headers
 
 
 class ConsoleProxy:
-    """`app` is the proxy; close it at the end.
+    """A proxy; `app` is its application. Close it at the end.
 
     `Host` and `Origin` pass unchanged: to the console its page comes from the proxy's address, and both agree.
     """
@@ -99,7 +99,7 @@ class ConsoleProxy:
         return response
 
     async def _more_candidates(self, request: Request, body: bytes) -> Response:
-        """Trickle ICE, whose candidates are left out, or an ICE restart, which is led through the relay as well."""
+        """Pass trickle ICE, without its candidates, or an ICE restart, which is led through the relay as well."""
         relay = self._sessions.find(request.url.path)
         fragment = body.decode("utf-8", "replace")
         sent = without_candidates(fragment) if relay is None else relay.offer(fragment)

@@ -1,4 +1,4 @@
-"""How much later than asked packets arrive: `python -m lockstep.bench.emulator.transport.own_delay [--clients N]`.
+"""Measures the relay's own delay: `python -m lockstep.bench.emulator.transport.own_delay [--clients N]`.
 
 The relay runs in this process, as it does in `lockstep network`; both ends of every connection are in another one. Each
 client gets 3 Mbit/s of media, thirty bursts of ten packets a second, over a path of 50 ms. A packet carries the time at
@@ -39,7 +39,7 @@ OFFER, ANSWER = "client", "console"
 
 
 async def measure(clients: int, seconds: float) -> dict[str, Any]:
-    """What packets took besides the path's delay, in ms; the same without a relay; the relay's share of a core."""
+    """Return the delay of packets besides the path's, in ms; the same without a relay; the relay's share of a core."""
     command = [
         sys.executable,
         "-m",
@@ -74,7 +74,7 @@ def _spread(values: list[float]) -> dict[str, float]:
 
 
 def _lead(relay: UdpRelay, client: int, console: int) -> int:
-    """Where the client finds the relay."""
+    """Lead a client and a console through the relay, and return the port at which the client finds it."""
     relay.offer(_description(OFFER, client))
     return int(relay.answer(_description(ANSWER, console)).split(" typ host")[0].rsplit(" ", 1)[1])
 
@@ -108,7 +108,7 @@ class _Ends:
         await self._play(behind, seconds)
 
     async def run_directly(self, seconds: float) -> None:
-        """Without a relay: the delay of the two ends and the system."""
+        """Send without a relay, for the delay of the two ends and the system."""
         await self._play([(console, client.getsockname()) for client, console in self._pairs], seconds)
 
     async def _play(self, behind: list[tuple[socket.socket, tuple[str, int]]], seconds: float) -> None:
@@ -148,7 +148,7 @@ def _socket() -> socket.socket:
 
 async def _be_the_ends(clients: int, seconds: float) -> None:
     ends = _Ends(clients)
-    prefer_this_process()  # so that it is the relay that is measured
+    prefer_this_process()  # so that the relay is what limits the figures
     print(json.dumps({"ports": ends.ports}), flush=True)
     doors = json.loads(await asyncio.to_thread(sys.stdin.readline))
     await (ends.run(doors, seconds) if doors else ends.run_directly(seconds))

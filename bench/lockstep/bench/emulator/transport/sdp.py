@@ -1,4 +1,4 @@
-"""What a relay reads and writes in an SDP so that both sides only know of it. Text in, text out."""
+"""Reads and changes an SDP for a relay, so that each side only knows the relay. Text in, text out."""
 
 import re
 from typing import NamedTuple
@@ -19,15 +19,15 @@ class Address(NamedTuple):
 
 
 def ice_names(sdp: str) -> set[str]:
-    """The username fragments."""
+    """Return the username fragments."""
     return set(UFRAG.findall(sdp))
 
 
 def console_addresses(sdp: str) -> list[Address]:
-    """Where the console's answer says that it listens, IPv4 only.
+    """Return the addresses at which the console's answer says that it listens, IPv4 only.
 
     Raises:
-        BadDescription: nowhere that a relay could reach.
+        BadDescription: none of them can be reached by a relay.
     """
     found = [Address(host, int(port)) for host, port in HOST.findall(sdp)]
     if not found:
@@ -36,26 +36,26 @@ def console_addresses(sdp: str) -> list[Address]:
 
 
 def reached_from(host: str, console: list[Address]) -> Address:
-    """The console's address for a client that finds the relay at `host`: the same if it has it, else the first.
+    """Return the console's address for a client that finds the relay at `host`: the same if it has it, else the first.
 
-    A check's answer tells the client from where the relay's other side sent it (RFC 8445 7.2.5.3.1). Firefox goes no
-    further when that is a loopback address and its own is not.
+    The answer to a check tells the client the address from which the relay's other side sent it (RFC 8445 7.2.5.3.1).
+    Firefox goes no further if that is a loopback address and its own is not.
     """
     return next((each for each in console if each.host == host), console[0])
 
 
 def without_candidates(sdp: str) -> str:
-    """The offer, or a fragment of trickle ICE, without a way around the relay.
+    """Return the offer, or a fragment of trickle ICE, without a way around the relay.
 
-    The console learns where to send from the checks that arrive. The end of candidates is removed too, or ICE would
-    give up at once.
+    The console learns the client's addresses from the checks that arrive. The end of candidates is removed too, or ICE
+    would give up at once.
     """
     kept = [line for line in sdp.splitlines() if not line.startswith(("a=candidate:", "a=end-of-candidates"))]
     return "\r\n".join(kept) + "\r\n"
 
 
 def candidates_replaced(sdp: str, addresses: list[Address]) -> str:
-    """The answer, with `addresses` in place of each section's own candidates."""
+    """Return the answer with `addresses` in place of each section's own candidates."""
     lines: list[str] = []
     replaced = False  # in this section
     for line in sdp.splitlines():

@@ -1,4 +1,4 @@
-"""The relays of all clients: one for each WHEP session."""
+"""The relays of all clients, one for each WHEP session."""
 
 import time
 from collections.abc import Sequence
@@ -11,17 +11,17 @@ from lockstep.bench.emulator.transport.udp_relay import UdpRelay
 
 __all__ = ["Sessions"]
 
-SILENCE = 60.0  # s; a client that has sent nothing for so long is gone
+SILENCE = 60.0  # s; a client that has sent nothing for this time is gone
 KEPT = 1000  # clients whose counts are kept after they have gone
 
 
 class Sessions:
-    """`open` a relay, `keep` it under its WHEP resource, `end` it; or `close` all."""
+    """All relays: `open` one, `keep` it under its WHEP resource, `end` it; or `close` all."""
 
     def __init__(
         self, profile: Profile, seed: int, outages: Outages, deliveries: Deliveries, hosts: Sequence[str]
     ) -> None:
-        self.all_paths: list[ClientPaths] = []  # of every client so far, in the order of their coming
+        self.all_paths: list[ClientPaths] = []  # of every client so far, in the order of their arrival
         self._profile = profile
         self._seed = seed
         self._outages = outages
@@ -34,7 +34,7 @@ class Sessions:
         return len(self._relays)
 
     def open(self) -> UdpRelay:
-        """A relay for the next client; its fate depends on the seed and on how many came before."""
+        """Open a relay for the next client; its fate depends on the seed and on the number of clients before."""
         self._end_silent()
         self._count += 1
         paths = ClientPaths(self._profile, f"{self._seed} client {self._count}", self._outages)

@@ -1,8 +1,8 @@
-"""One direction of one path for a byte stream that must arrive whole and in order: TCP as its user meets it. No I/O.
+"""One direction of a path for a byte stream that must arrive whole and in order: TCP as its user meets it. No I/O.
 
-A lost packet does not go missing, it comes late: by one round trip when later packets make the receiver notice (fast
-retransmit), by the retransmission timer when it was among the last (RFC 6298, with the floor of 0.2 s that is usual),
-and by twice the timer for each further loss. The sending rate is not reduced as congestion control would.
+A lost packet does not go missing, it comes late: by one round trip if later packets make the receiver notice (fast
+retransmit), by the retransmission timer if it was among the last (RFC 6298, with the usual floor of 0.2 s), and by
+twice the timer for each further loss. The sending rate is not reduced as congestion control would.
 """
 
 import math
@@ -16,14 +16,14 @@ from lockstep.bench.emulator.impairment.path import PathStatistics
 __all__ = ["StreamPath"]
 
 SEGMENT = 1448  # bytes that a TCP packet carries on an Ethernet
-FAST_RETRANSMIT = 4  # packets in a message, from which the others report a loss
+FAST_RETRANSMIT = 4  # packets in a message, from which on the others report a loss
 MIN_TIMEOUT = 0.2  # s
 MAX_TIMEOUT = 60.0  # s
 MAX_RETRIES = 15
 
 
 class StreamPath:
-    """Call `admit` for every message, in order. Arguments as for an `ImpairedPath`.
+    """One direction of a stream. Call `admit` for every message, in order. Arguments as for an `ImpairedPath`.
 
     Args:
         back: seconds that the acknowledgements take on average; with the path's own delay, the round trip
@@ -48,7 +48,7 @@ class StreamPath:
         self._last = 0.0
 
     def admit(self, now: float, size: int) -> float:
-        """When the whole message has arrived."""
+        """Return the time at which the whole message has arrived."""
         share, fate = self._random.random(), self._random.random()
         counts = self.statistics
         counts.offered += 1
@@ -70,7 +70,7 @@ class StreamPath:
         return self._last
 
     def _retries(self, size: int, fate: float) -> int:
-        """How often the unluckiest packet of the message is lost."""
+        """Return the number of times that the unluckiest packet of the message is lost."""
         loss = self.impairment.loss.mean
         if loss <= 0:
             return 0
@@ -100,11 +100,11 @@ class StreamPath:
         return self._backed_off(retries)
 
     def _backed_off(self, times: int) -> float:
-        """How long so many timeouts in a row take."""
+        """Return the duration of that many timeouts in a row."""
         return sum(min(math.ldexp(self._timeout, each), MAX_TIMEOUT) for each in range(times))
 
     def _after(self, silence: Silence, now: float) -> float:
-        """When data sent at `now` gets through: held packets at the end, lost ones with the first try after it."""
+        """Return the time when data sent at `now` gets through: held data at the end, lost data by the next try."""
         if silence.hold:
             return silence.until
         tried, timeout = now, self._timeout

@@ -1,7 +1,7 @@
-"""Stands between the console and a robot bridge: the robot link passes it over a stream path for each direction.
+"""Relays the robot link between the console and a robot bridge over a stream path for each direction.
 
-Which path a connection takes shows in its first frame, the hello (docs/robot-link.md). A message is one frame: a
-picture is late as a whole.
+The first frame of a connection, the hello, tells its path (docs/robot-link.md). A message is one frame: a picture is
+late as a whole.
 """
 
 import asyncio
@@ -26,13 +26,13 @@ __all__ = ["TcpRelay"]
 
 HEADER = 4  # bytes of a frame's length
 READ = 1 << 18  # bytes
-WINDOW = 4 << 20  # bytes under way in one direction; then the sender has to wait, as for TCP's window
+WINDOW = 4 << 20  # bytes under way in one direction; beyond it the sender has to wait, as for TCP's window
 CONNECT_TIMEOUT = 10.0  # s
 Name = str  # "robot_media" or "robot_control"
 
 
 class TcpRelay:
-    """Connect to `address` instead of to the bridge at `target`. Enter it before use."""
+    """A relay. Connect to `address` instead of to the bridge at `target`. Enter it before use."""
 
     def __init__(
         self, target: tuple[str, int], profile: Profile, seed: int, outages: Outages, deliveries: Deliveries
@@ -89,7 +89,7 @@ class TcpRelay:
                 ways.create_task(_Way(to_robot, bridge, self._deliveries).run(reader, cutter, begun))
                 ways.create_task(_Way(to_operator, writer, self._deliveries).run(from_bridge, _Cutter(), []))
         except (OSError, TimeoutError, ExceptionGroup):
-            pass  # one side broke off or was never there: the closing tells the other side
+            pass  # one side broke off or was never there: closing tells the other side
         finally:
             for each in (writer, bridge):
                 if each is not None:
@@ -137,7 +137,7 @@ class _Cutter:
             yield from self.rest()
 
     def rest(self) -> Iterator[bytes]:
-        """What is left when nothing more comes."""
+        """Yield the remaining bytes when nothing more comes."""
         if self._buffer:
             yield bytes(self._buffer)
             self._buffer.clear()
@@ -154,7 +154,7 @@ class _Way:
         self._landed = asyncio.Event()
 
     async def run(self, reader: asyncio.StreamReader, cutter: _Cutter, begun: list[bytes]) -> None:
-        """Until the sender closes; then the bytes under way arrive, and the receiver is closed too."""
+        """Relay until the sender closes; then the bytes under way arrive, and the receiver is closed too."""
         for message in begun:
             self._launch(message)
         while data := await reader.read(READ):
@@ -184,7 +184,7 @@ class _Way:
 
 
 async def _first_messages(reader: asyncio.StreamReader) -> tuple[_Cutter, list[bytes]]:
-    """Everything up to the first whole message."""
+    """Return everything up to the first whole message."""
     cutter = _Cutter()
     while True:
         data = await reader.read(READ)

@@ -1,8 +1,8 @@
-"""Stands between one client and the console: everything of theirs but HTTP passes it, through the paths of a profile.
+"""Relays everything but HTTP between one client and the console, over the paths of a profile.
 
 It puts itself into both descriptions. The console sees a client at the relay, the client sees a console there; neither
-learns another address. A client may try several of its addresses: each becomes a flow with a socket of its own towards
-the console, as at a NAT, so that ICE can tell them apart.
+learns another address. A client may try several of its addresses: each becomes a flow with its own socket towards the
+console, as at a NAT, so that ICE can tell them apart.
 """
 
 import asyncio
@@ -36,7 +36,7 @@ MAX_RESTARTS = 20
 
 
 class _Door:
-    """Where the client finds one ICE session of the console, on one of our addresses."""
+    """A socket of the relay at which the client finds one ICE session of the console."""
 
     def __init__(self, host: str, console: Address, names: set[str]) -> None:
         self.socket = _udp_socket(host)
@@ -49,29 +49,29 @@ class _Door:
 
 
 class _Flow:
-    """One address of the client that proved to know both ICE names."""
+    """An address of the client that proved to know both ICE names."""
 
     def __init__(self, door: _Door, client: tuple[str, int]) -> None:
-        self.door = door  # where the client sends to, and hears from
+        self.door = door  # the door that the client sends to and hears from
         self.client = client
         self.upstream = _udp_socket()
         self.upstream.connect(door.console)
 
 
 class UdpRelay:
-    """Order: `offer`, `answer`, then packets pass until `close`. Use inside a running loop.
+    """A relay. Call `offer`, then `answer`; packets pass until `close`. Use it inside a running loop.
 
-    An ICE restart is one more `offer` and `answer`, with fragments: the console's new session gets sockets of its own.
+    An ICE restart is one more `offer` and `answer`, with fragments: the console's new session gets its own sockets.
 
     Args:
-        paths: what happens to the packets
-        hosts: own addresses at which the client may find it
+        paths: impairments of the packets
+        hosts: this machine's addresses at which the client may find it
     """
 
     def __init__(self, paths: ClientPaths, deliveries: Deliveries, hosts: Sequence[str] = (LOOPBACK,)) -> None:
         self.strangers = 0  # packets from a sender that does not know the ICE names
-        self.unsent = 0  # packets that the system took no more
-        self.heard_at = time.monotonic()  # when the client sent last
+        self.unsent = 0  # packets that the system did not take
+        self.heard_at = time.monotonic()  # time of the client's last packet
         self._paths = paths
         self._deliveries = deliveries
         self._loop = asyncio.get_running_loop()
@@ -82,12 +82,12 @@ class UdpRelay:
         self._closed = False
 
     def offer(self, sdp: str) -> str:
-        """The client's offer as the console gets it."""
+        """Return the client's offer as the console gets it."""
         self._offered |= ice_names(sdp)
         return without_candidates(sdp)
 
     def answer(self, sdp: str) -> str:
-        """The console's answer as the client gets it.
+        """Return the console's answer as the client gets it.
 
         Raises:
             BadDescription: it names no address of the console.
@@ -104,7 +104,7 @@ class UdpRelay:
         return candidates_replaced(sdp, [door.address for door in opened])
 
     def close(self) -> None:
-        """Idempotent; packets under way do not arrive."""
+        """Close the relay; packets under way do not arrive. Idempotent."""
         self._closed = True
         for own in (*(door.socket for door in self._doors), *(flow.upstream for flow in self._flows.values())):
             self._loop.remove_reader(own)
@@ -126,7 +126,7 @@ class UdpRelay:
             self._pass(data, "to_robot", flow)
 
     def _admitted(self, door: _Door, address: tuple[str, int], data: bytes) -> _Flow | None:
-        """A new flow, if this is an ICE check between client and console (RFC 8445 7.2.2: "theirs:ours")."""
+        """Return a new flow if this is an ICE check between client and console (RFC 8445 7.2.2: "theirs:ours")."""
         theirs, _, ours = (stun_username(data) or "").partition(":")
         if theirs not in door.names or ours not in self._offered or len(self._flows) == MAX_FLOWS:
             return None
@@ -157,7 +157,7 @@ class UdpRelay:
                 flow.upstream.send(data)
             else:
                 flow.door.socket.sendto(data, flow.client)
-        except OSError:  # its buffer is full, or the socket is closed
+        except OSError:  # the buffer is full, or the socket is closed
             self.unsent += 1
 
 

@@ -23,7 +23,10 @@ GOING_AWAY = 1001
 
 
 async def join(browser: WebSocket, console: str, paths: Mapping[Direction, StreamPath]) -> None:
-    """Until one side closes. `console` is its URL; to it the request is for the host that the browser asked for."""
+    """Relay messages until one side closes.
+
+    `console`: the console's URL; the request to it names the host that the browser asked for.
+    """
     target = urlsplit(console)
     secure = target.scheme == "https"
     query = f"?{browser.url.query}" if browser.url.query else ""
@@ -59,7 +62,10 @@ async def join(browser: WebSocket, console: str, paths: Mapping[Direction, Strea
 
 
 def _unchecked() -> ssl.SSLContext:
-    """The console's own certificate may be self-signed, and no other host is between it and this process."""
+    """Return a context without checks.
+
+    The console's own certificate may be self-signed, and no other host is between it and this process.
+    """
     context = ssl.create_default_context()
     context.check_hostname = False
     context.verify_mode = ssl.CERT_NONE

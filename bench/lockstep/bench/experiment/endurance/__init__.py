@@ -1,1 +1,1 @@
-"""Sessions of hours: whether the console gives one up by itself."""
+"""Runs sessions of hours, to see whether the console gives one up without a cause."""

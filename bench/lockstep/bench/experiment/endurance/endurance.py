@@ -1,7 +1,7 @@
-"""What an endurance run counts: connections that ended, seats, pictures. No I/O.
+"""Counts the events of an endurance run: connections that ended, seats, pictures. No I/O.
 
-A connection outlives an outage of less than `SURVIVED_SECONDS` (docs/architecture.md), so that one which ends is the
-network's doing only in a longer one, or shortly after.
+A connection outlives an outage of less than `SURVIVED_SECONDS` (docs/architecture.md), so the network is the cause of
+its end only in a longer outage, or shortly after.
 """
 
 from collections import Counter
@@ -13,20 +13,20 @@ from lockstep.bench.emulator.impairment.outages import PlannedOutage
 
 __all__ = ["Endurance", "Lost", "cut_for_long"]
 
-SURVIVED_SECONDS = 20.0  # of silence, which a connection outlives
+SURVIVED_SECONDS = 20.0  # of silence that a connection outlives
 AFTERMATH_SECONDS = 30.0  # after an outage in which its consequence may still show
 
 
 class Lost(NamedTuple):
-    """One connection that ended before the run did."""
+    """A connection that ended before the run did."""
 
     at: float  # s after the run began
-    why: str  # as the console says
-    excused: bool  # the network was cut for so long that none outlives it
+    why: str  # the console's reason
+    excused: bool  # the network was cut for longer than a connection outlives
 
 
 def cut_for_long(outages: Sequence[PlannedOutage], at: float) -> bool:
-    """Whether an outage that no connection outlives held at `at`, or ended shortly before."""
+    """Return whether an outage that no connection outlives held at `at`, or ended shortly before."""
     for each in outages:
         since = at - each.at
         if each.lasts >= SURVIVED_SECONDS and since >= 0:
@@ -37,7 +37,7 @@ def cut_for_long(outages: Sequence[PlannedOutage], at: float) -> bool:
 
 
 class _Total:
-    """A count that begins at 0 again with every new connection, over all of them."""
+    """Sums a count that begins at 0 again with every new connection."""
 
     def __init__(self) -> None:
         self._before = self._now = 0
@@ -54,15 +54,15 @@ class _Total:
 
 @dataclass
 class Endurance:
-    """Give it the client's statistics (`look`) and the console's counts (`ended`), as time goes on."""
+    """Counts of a run, from the client's statistics (`look`) and the console's counts (`ended`) as time goes on."""
 
     outages: Sequence[PlannedOutage] = ()
     losses: list[Lost] = field(default_factory=list)
-    reconnections: int = 0  # the client was live again after it had not been
+    reconnections: int = 0  # times that the client was live again after it had not been
     seat_losses: int = 0
     longest_silence: float = 0.0  # s in which the client was not live
     refused: Mapping[str, float] = field(default_factory=dict)  # refused messages at the console, by reason
-    driven_seconds: float = 0.0  # the client was armed and had the seat
+    driven_seconds: float = 0.0  # for which the client was armed and had the seat
     _ended: Counter[str] = field(default_factory=Counter)
     _at: float | None = None
     _live_at: float = 0.0
@@ -73,7 +73,7 @@ class Endurance:
     def look(
         self, at: float, *, live: bool, mine: bool, driving: bool, streams: Mapping[str, Mapping[str, Any]]
     ) -> None:
-        """`streams`: of each its kind, renderings and violations so far."""
+        """Count the client's statistics. `streams`: by name; each has its kind, renderings and violations so far."""
         passed = 0.0 if self._at is None else at - self._at
         self._at = at
         if live:
@@ -89,7 +89,7 @@ class Endurance:
                 self._totals.setdefault((f"{each['kind']} {what}", name), _Total()).see(each[what])
 
     def ended(self, at: float, counts: Mapping[str, float]) -> list[Lost]:
-        """The console's count of connections that ended, by reason; only the new ones."""
+        """Count the console's ended connections, by reason, and return only the new ones."""
         new = [
             Lost(round(at, 1), why, cut_for_long(self.outages, at))
             for why, count in counts.items()

@@ -25,14 +25,14 @@ __all__ = ["PageHands", "driven_page"]
 Evaluate = Callable[[str], Awaitable[Any]]
 
 LOOK_SECONDS = 0.1
-PRESS_SECONDS = 0.08  # a finger is no faster
+PRESS_SECONDS = 0.08  # a press is no shorter
 STATS = "window.lockstep?.stats() ?? null"
 REQUEST = """[...document.querySelectorAll("button")]
   .find((each) => each.textContent.trim() === "Request control" && !each.disabled && each.offsetParent)?.click() ?? 0"""
 
 
 class PageHands:
-    """The hands on a pad, and the eyes on the page's statistics."""
+    """Operates a pad, and reads the page's statistics."""
 
     def __init__(self, evaluate: Evaluate, description: RobotDescription, seed: int) -> None:
         self._evaluate = evaluate
@@ -56,7 +56,7 @@ class PageHands:
             await asyncio.sleep(LOOK_SECONDS)
 
     async def _act(self, found: dict[str, Any], mine: bool, at: float) -> None:
-        """Asks for the seat, arms and moves the stick, whenever the page lets them."""
+        """Ask for the seat, arm and move the stick, whenever the page allows it."""
         if not found["connected"] or not mine or not found["armed"]:
             await self._press(RB, False)  # arming needs the deadman seen released first
         if not found["connected"]:
@@ -79,7 +79,7 @@ class PageHands:
 
 @asynccontextmanager
 async def driven_page(browser: Literal["chromium", "firefox"], link: str, choices: Choices) -> AsyncIterator[PageHands]:
-    """A page on `link`, with the choices' gate, pacing and tolerances. Raises the errors of the browser's driver."""
+    """Open a page with the choices' gate, pacing and tolerances. Raises the errors of the browser's driver."""
     async with AsyncExitStack() as stack:
         environment = None
         if shutil.which("pulseaudio") is not None:  # without a sound card the page has no sound to judge

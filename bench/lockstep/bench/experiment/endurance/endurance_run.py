@@ -1,4 +1,4 @@
-"""`lockstep experiment endurance`: an operator drives over one network for any time."""
+"""Runs `lockstep experiment endurance`: an operator drives over one network for any time."""
 
 import asyncio
 import contextlib
@@ -29,24 +29,24 @@ COUNT_SECONDS = 1.0  # between two looks at the console's counters
 NEWS_SECONDS = 60.0
 RETRY_SECONDS = 0.5
 LOOK_SECONDS = 0.25
-SILENCE_SECONDS = 30.0  # after which a headless client takes its console for lost: never before the connection itself
+SILENCE_SECONDS = 30.0  # until a headless client takes its console for lost: never before the connection itself
 
 
 class Driven(Protocol):
     """A client with an operator."""
 
     async def until_live(self) -> None:
-        """A picture was rendered."""
+        """Wait until a picture was rendered."""
 
     async def run(self, endurance: Endurance, clock: Callable[[], float]) -> None:
-        """Drive and look, until cancelled. `clock`: s since the run began."""
+        """Drive and watch until cancelled. `clock`: returns s since the run began."""
 
 
 async def run_endurance(choices: Choices, profile: Profile, client: EnduranceClient, say: Say) -> dict[str, Any]:
-    """Drive for `choices.seconds` over `profile`; what became of the connections.
+    """Drive for `choices.seconds` over `profile`, and return what became of the connections.
 
     Raises:
-        ProcessFailed, ConsoleError, TimeoutError: it did not begin.
+        ProcessFailed, ConsoleError, TimeoutError: the run did not begin.
     """
     endurance = Endurance(profile.client_outages)
     async with (
@@ -85,7 +85,7 @@ async def run_endurance(choices: Choices, profile: Profile, client: EnduranceCli
 
 
 async def _count(stage: Stage, endurance: Endurance, clock: Callable[[], float], say: Say) -> None:
-    """What the console says of connections that ended, past the network."""
+    """Read the console's counts of connections that ended, past the network."""
     url = stage.near_link.partition("/#")[0]
     news_at = NEWS_SECONDS
     async with httpx.AsyncClient(base_url=url, trust_env=False) as http:
@@ -126,7 +126,7 @@ class HeadlessHands:
         self._console: Console | None = None
 
     async def until_live(self) -> None:
-        """It has no window to open before: its first connection belongs to the run."""
+        """Return at once, because this client has no window to open: its first connection belongs to the run."""
 
     async def run(self, endurance: Endurance, clock: Callable[[], float]) -> None:
         async with asyncio.TaskGroup() as group:
@@ -138,7 +138,7 @@ class HeadlessHands:
                     self._console = None
 
     async def _live(self, clock: Callable[[], float]) -> None:
-        """One connection, until it is lost."""
+        """Drive over one connection until it is lost."""
         async with Console(
             self._link,
             tolerance=self._choices.tolerance,
@@ -177,7 +177,7 @@ class HeadlessHands:
 
 
 async def _watch(console: Console) -> None:
-    """Somebody has to take the pictures."""
+    """Take the pictures, which a client has to do."""
     async for _ in console.pictures(console.description.cameras[0].name):
         pass
 

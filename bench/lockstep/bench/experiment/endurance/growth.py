@@ -1,7 +1,7 @@
-"""Without a gate the gap has no bound: it grows with the event rate and with how late the pictures are.
+"""Measures the gap without a gate: it grows without a bound with the event rate and with the delay of the pictures.
 
-Somebody beside the robot drives at a fixed rate. Viewers look on through the profile's network (the robot's own link
-is short here); each player adds a delay of its own, as the players of the thesis did (its audio tool: up to 2 s).
+A client beside the robot drives at a fixed rate. Viewers look on through the profile's network (the robot's own link is
+short here); each player adds its own delay, as the players of the thesis did (its audio tool: up to 2 s).
 """
 
 import asyncio
@@ -27,7 +27,7 @@ __all__ = ["Growth", "Point", "later", "run_growth"]
 
 RATES = (2.0, 5.0, 10.0, 20.0)  # events a second
 DELAYS = (0.0, 0.25, 1.0, 2.0)  # s that a player adds
-# Every player is watched without a gate; the gates where it is hardest for them.
+# Every player is watched without a gate; the gates with the players that are hardest for them.
 VIEWERS: tuple[tuple[GateMode, float], ...] = (
     *(("off", delay) for delay in DELAYS),
     ("age", 0.0),
@@ -59,7 +59,7 @@ class Growth:
     points: list[Point]
 
     def fields(self) -> dict[str, Any]:
-        """For JSON."""
+        """Return the fields for JSON."""
         events = [point for point in self.points if point.gate == "event"]
         return {
             "experiment": "growth",
@@ -72,7 +72,7 @@ class Growth:
 
 @dataclass(frozen=True)
 class Later:
-    """A delay distribution, and so much more."""
+    """A delay distribution with a constant added."""
 
     usual: Delay
     more: float
@@ -90,7 +90,7 @@ class Later:
 
 
 def later(profile: Profile, seconds: float) -> Profile:
-    """The profile with media that come so much later."""
+    """Return the profile with media that come later by `seconds`."""
     towards = replace(profile.media.to_operator, delay=Later(profile.media.to_operator.delay, seconds))
     return replace(profile, media=TwoWay(towards, profile.media.to_robot))
 
@@ -103,10 +103,13 @@ async def run_growth(
     rates: Sequence[float] = RATES,
     viewers: Sequence[tuple[GateMode, float]] = VIEWERS,
 ) -> Growth:
-    """`choices.seconds` at each event rate. Raises ProcessFailed, ConsoleError.
+    """Drive for `choices.seconds` at each event rate.
 
     Args:
         viewers: each one's gate, and the seconds that its player adds
+
+    Raises:
+        ProcessFailed, ConsoleError: the run failed.
     """
     points: list[Point] = []
     async with (

@@ -1,1 +1,1 @@
-"""What runs come to: measures, tables, figures."""
+"""Evaluates runs: measures, tables, figures."""

@@ -1,4 +1,4 @@
-"""The thesis' figures, and further ones: SVG text. Needs matplotlib."""
+"""Draws the thesis' figures, and further ones, as SVG text. Needs matplotlib."""
 
 import io
 from collections.abc import Sequence
@@ -34,7 +34,7 @@ WIDTH, ROW = 9.0, 2.6  # inches
 STYLE: Any = {
     "font.family": "sans-serif",
     "font.size": 9,
-    "svg.fonttype": "none",  # text stays text: small, and it can be searched
+    "svg.fonttype": "none",  # text stays text: small, and searchable
     "svg.hashsalt": "lockstep",
     "axes.edgecolor": FAINT,
     "axes.labelcolor": INK,
@@ -56,7 +56,7 @@ STYLE: Any = {
 
 
 def new_figure(rows: int, columns: int) -> tuple[Figure, list[list[Axes]]]:
-    """A grid of axes. Call it, and `svg_text`, within STYLE."""
+    """Make a grid of axes. Call it, and `svg_text`, within STYLE."""
     height = ROW * rows
     figure = Figure(figsize=(WIDTH, height))
     # A layout engine would draw every figure twice.
@@ -98,7 +98,7 @@ def _label(axes: Axes, title: str, ylabel: str, run: Run) -> None:
 
 
 def robot_figure(run: Run) -> str:
-    """Event reference against time at the robot's side and at the operator's."""
+    """Draw the event reference against time at the robot's side and at the operator's."""
     with mpl.rc_context(STYLE):
         figure, ((server, client),) = new_figure(1, 2)
         _events(server, run.robot.answered, run.began, ROBOT, "")
@@ -110,7 +110,7 @@ def robot_figure(run: Run) -> str:
 
 
 def medium_figure(run: Run, client: ClientRecord, stream: str, what: str) -> str:
-    """Event reference and index against time where a medium is captured and where it is rendered."""
+    """Draw event reference and index against time where a medium is captured and where it is rendered."""
     captured = run.robot.captured.get(stream, [])
     rendered = _within(run, client.rendered.get(stream, []))
     with mpl.rc_context(STYLE):
@@ -131,7 +131,7 @@ def medium_figure(run: Run, client: ClientRecord, stream: str, what: str) -> str
 
 
 def client_against_medium(runs: Sequence[tuple[str, Run, ClientRecord]], stream_of: dict[str, str], what: str) -> str:
-    """Robot client and media client in one picture: without and with synchronisation, side by side."""
+    """Draw robot client and media client in one picture: without and with synchronisation, side by side."""
     with mpl.rc_context(STYLE):
         figure, (row,) = new_figure(1, len(runs))
         for axes, (title, run, client) in zip(row, runs, strict=True):
@@ -143,7 +143,7 @@ def client_against_medium(runs: Sequence[tuple[str, Run, ClientRecord]], stream_
 
 
 def gap_figure(run: Run, stream: str, tolerance: int) -> str:
-    """The gap of every rendering against time, for each gate mode that looked on, with the tolerance as a band."""
+    """Draw the gap of every rendering against time, for each gate mode that looked on, with the tolerance as a band."""
     clients = [client for client in run.clients if client.rendered.get(stream)]
     with mpl.rc_context(STYLE):
         figure, (row,) = new_figure(1, max(1, len(clients)))
@@ -169,7 +169,7 @@ def _gate_title(client: ClientRecord) -> str:
 
 
 def growth_figure(growth: Growth) -> str:
-    """Largest gap against event rate, a line for each delay that a player adds: without a gate, and with one."""
+    """Draw the largest gap against event rate, a line for each delay that a player adds, with and without a gate."""
     with mpl.rc_context(STYLE):
         figure, (row,) = new_figure(1, 3)
         top = max((point.max_gap for point in growth.points), default=1)

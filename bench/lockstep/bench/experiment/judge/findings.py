@@ -1,4 +1,4 @@
-"""Everything that one command found. No I/O."""
+"""The findings of one command. No I/O."""
 
 from dataclasses import dataclass, field
 from typing import Any
@@ -14,7 +14,7 @@ __all__ = ["Cell", "Findings"]
 
 @dataclass(frozen=True)
 class Cell:
-    """One run."""
+    """One run and its result."""
 
     choices: Choices
     profile: Profile
@@ -28,15 +28,15 @@ class Findings:
     growth: Growth | None = None
     outages: list[dict[str, Any]] = field(default_factory=list)
     endurances: list[dict[str, Any]] = field(default_factory=list)
-    failed: list[str] = field(default_factory=list)  # what did not come to an end, and why
+    failed: list[str] = field(default_factory=list)  # runs that did not come to an end, and why
     machine: dict[str, Any] = field(default_factory=dict)
 
     def results(self) -> list[dict[str, Any]]:
-        """For JSON."""
+        """Return the results for JSON."""
         growth = [] if self.growth is None else [self.growth.fields()]
         return [*(cell.result for cell in self.cells), *growth, *self.outages, *self.endurances]
 
     @property
     def broken(self) -> bool:
-        """A verdict is false."""
+        """True if a verdict is false."""
         return any(False in result["verdicts"].values() for result in self.results())

@@ -1,4 +1,4 @@
-"""Figures of a run, from what its clients saw. No I/O."""
+"""Computes the figures of a run from the records of its clients. No I/O."""
 
 from collections.abc import Iterable, Sequence
 
@@ -12,7 +12,7 @@ Spread = dict[str, float | None]
 
 
 def spread(samples: Iterable[float], scale: float = 1000.0) -> Spread:
-    """Percentiles, in ms of samples in s."""
+    """Return percentiles, in ms for samples in s."""
     found = [sample * scale for sample in samples]
     if not found:
         return {"p50": None, "p95": None, "p99": None, "max": None}
@@ -25,14 +25,14 @@ def spread(samples: Iterable[float], scale: float = 1000.0) -> Spread:
 
 
 def event_rate(feedbacks: Sequence[Arrival]) -> float:
-    """Events a second between the first and the last feedback."""
+    """Return the events a second between the first and the last feedback."""
     if len(feedbacks) < 2 or feedbacks[-1].at <= feedbacks[0].at:
         return 0.0
     return event_gap(feedbacks[-1].event, feedbacks[0].event) / (feedbacks[-1].at - feedbacks[0].at)
 
 
 def beyond(rendered: Iterable[Rendered], tolerance: int) -> int:
-    """Renderings outside the tolerance, counted again from feedback and stamp alone, without the gate's verdict."""
+    """Count the renderings outside the tolerance from feedback and stamp alone, without the gate's verdict."""
     return sum(
         abs(event_gap(each.feedback, each.stamp)) > tolerance
         for each in rendered
@@ -43,9 +43,9 @@ def beyond(rendered: Iterable[Rendered], tolerance: int) -> int:
 def share_within(
     feedbacks: Sequence[Arrival], rendered: Sequence[Rendered], tolerance: int, until: float
 ) -> float | None:
-    """Of the time from the first picture on, the share in which the picture on screen is within tolerance.
+    """Return the share of time from the first picture on in which the picture on screen is within tolerance.
 
-    A picture stays on screen until the next one; the feedback moves on beneath it. None without any picture.
+    A picture stays on screen until the next one, while newer feedback comes. None without any picture.
     """
     steps: list[tuple[float, int, bool]] = [(each.at, each.stamp, True) for each in rendered if each.stamp is not None]
     if not steps:

@@ -1,4 +1,4 @@
-"""The network is cut in mid-drive and comes back: the robot's motion, and the time until the operator drives again."""
+"""Cuts the network in mid-drive: measures the robot's motion, and the time until the operator drives again."""
 
 import asyncio
 import contextlib
@@ -35,15 +35,19 @@ RETURN_SECONDS = 2.0
 
 
 class Stick(Protocol):
-    """An operator who always holds the stick, and takes control again as soon as that is possible."""
+    """An operator who always holds the stick, and takes control again as soon as possible."""
 
-    intentions: list[tuple[float, float]]  # (time, value of the first axis); empty when they all are the same
+    intentions: list[tuple[float, float]]  # (time, value of the first axis); empty if all are the same
 
 
 async def run_outages(
     choices: Choices, profile: Profile, say: Callable[[str], None], ways: Sequence[bool] = (False, True)
 ) -> dict[str, Any]:
-    """An outage for each of `ways`: whether packets wait in the network, or are lost. Raises ProcessFailed."""
+    """Run an outage for each of `ways`: True if packets wait in the network, False if they are lost.
+
+    Raises:
+        ProcessFailed: the stage did not start.
+    """
     found = []
     round_trip = round_trip_of(profile)
     async with running_stage(choices.robot, profile, media_of(profile), choices.seed) as stage:
@@ -104,7 +108,7 @@ async def _cut(stage: Stage, choices: Choices, held: bool) -> tuple[Cut, Stick, 
         stage.network.outage(choices.seconds, hold=held)
         ended = began + choices.seconds
         await asyncio.sleep(choices.seconds)
-        with contextlib.suppress(TimeoutError):  # the judge says so
+        with contextlib.suppress(TimeoutError):  # the judge reports it
             async with asyncio.timeout(PATIENCE):
                 await _until_driven(stage, ended)
         await asyncio.sleep(AFTER)
@@ -113,7 +117,7 @@ async def _cut(stage: Stage, choices: Choices, held: bool) -> tuple[Cut, Stick, 
 
 
 async def _until_driven(stage: Stage, since: float) -> None:
-    """A moving command was executed, by the bridge's log, a little later."""
+    """Wait until a moving command was executed, by the bridge's log; returns a little later."""
     while True:
         found = await asyncio.to_thread(lambda: list(records(stage.event_log)))
         if any(each["kind"] == "executed" and each["time"] >= since and any(each["values"]) for each in found):
@@ -143,12 +147,12 @@ async def _stick(stage: Stage, choices: Choices) -> AsyncIterator[tuple[Stick, R
 
 
 class HeadlessStick:
-    """Every intention differs a little from the one before, so that the log tells when an executed one was formed."""
+    """Makes each intention differ a little from the last, so that the log tells when an executed one was formed."""
 
     def __init__(self, link: str, outage: float) -> None:
         self.intentions: list[tuple[float, float]] = []
         self._link = link
-        self._silence = outage + 5.0  # the connection is to survive
+        self._silence = outage + 5.0  # the connection should survive
         self._marks = itertools.count(1)
 
     async def describe(self) -> RobotDescription:

@@ -1,4 +1,4 @@
-"""What an outage did, judged by the bridge's own log alone. Times in s on one monotonic clock. No I/O."""
+"""Judges an outage by the bridge's own log alone. Times in s on one monotonic clock. No I/O."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -10,7 +10,7 @@ LATE_TICKS = 0.02  # s; the robot's tick is 4 ms, and a busy machine skips some
 
 
 class Cut(NamedTuple):
-    """The network, as it was."""
+    """The cut of the network."""
 
     began: float
     ended: float
@@ -19,13 +19,13 @@ class Cut(NamedTuple):
 
 @dataclass(frozen=True)
 class Finding:
-    """None where the log does not tell."""
+    """The figures of an outage; None if the log does not tell."""
 
     rest_seconds: float | None  # from the last command executed to the axes at rest
-    hold: float  # s that it may take
-    oldest_answer: float  # s between a feedback and the latest command that was executed as its answer, from then on
-    oldest_intention: float | None  # s between an intention and its execution after the outage, at most
-    max_event_age: float  # s that the two may be
+    hold: float  # s, the most that this may take
+    oldest_answer: float  # s from a feedback to the latest command executed as its answer, from the cut on
+    oldest_intention: float | None  # s from an intention to its execution after the outage, the longest
+    max_event_age: float  # s, the most that the two may be
     control_seconds: float | None  # from the network's return to the first command that moves
 
     @property
@@ -45,7 +45,10 @@ def judge_outage(
     max_event_age: float,
     intentions: Sequence[tuple[float, float]] = (),
 ) -> Finding:
-    """`log`: the bridge's records. `intentions`: (time, value of the first axis), each value once; empty: unknown."""
+    """Return the finding.
+
+    `log`: the bridge's records. `intentions`: (time, value of the first axis), each value once; empty: unknown.
+    """
     issued: dict[tuple[int, int], float] = {}
     executed: list[dict[str, Any]] = []
     rested: list[float] = []
@@ -74,6 +77,6 @@ def judge_outage(
 
 
 def _age(record: dict[str, Any], issued: dict[tuple[int, int], float]) -> float:
-    """Of the feedback that an executed command answers; endless when there was none of that issue."""
+    """Return the age of the feedback that an executed command answers; infinite if no issue has that number."""
     answered = [(event, issue) for event, issue in issued if issue == record["issue"] and event < record["event"]]
     return record["time"] - issued[max(answered)] if answered else float("inf")

@@ -1,10 +1,10 @@
-"""What the thesis' sound player would have played of the segments that came, and when. No I/O.
+"""Simulates the thesis' sound player on the segments that came. No I/O.
 
 The thesis heard sound with RAT, between 0 and 2000 ms late. Its rule, by its published source: a spurt of sound is
 played at capture + the transit of the spurt's first segment + an offset, the larger of the measured jitter and half the
 time between two segments, the latter within the two limits. A segment that comes after its moment is thrown away. After
 some of these in a row a new spurt begins, which is how the delay grows; within a spurt it does not change. Left out are
-what RAT does where the media time jumps (a new spurt too), its measure of a delay spike, and how it catches up when its
+RAT's reaction to a jump of the media time (a new spurt too), its measure of a delay spike, and its catching up when its
 sound card runs dry.
 """
 
@@ -26,22 +26,22 @@ SEGMENT = 0.020  # s from one to the next
 
 
 class Played(NamedTuple):
-    at: float  # s, the moment at which it is heard
+    at: float  # s, moment at which it is heard
     stamp: int
     delay: float  # s since its capture
 
 
 class SoundPlayer:
-    """Asked about each segment, in the order in which they come."""
+    """Decides about each segment, in the order in which they come."""
 
     def __init__(self) -> None:
         self._jitter = FIRST_JITTER
         self._offset: float | None = None  # s from capture to playing, of this spurt; None before the first
         self._last_transit = 0.0
-        self._late = 0  # in a row
+        self._late = 0  # segments in a row
 
     def delay(self, transit: float) -> float | None:
-        """s from a segment's capture until it is heard; None when that has passed. `transit`: s until it came."""
+        """Return s from a segment's capture until it is heard; None if that has passed. `transit`: s until it came."""
         if self._offset is None or self._late >= LATE_IN_A_ROW:
             variable = min(MAXIMUM, max(MINIMUM, SEGMENT / 2))
             self._offset, self._late = transit + max(self._jitter, variable), 0
@@ -56,7 +56,7 @@ class SoundPlayer:
 
 
 def played(segments: Iterable[tuple[float, int, float]]) -> list[Played]:
-    """Of segments that came, each (when, stamp, its age then), those that are heard."""
+    """Return the segments that are heard, of those that came, each (when, stamp, its age then)."""
     player = SoundPlayer()
     found = []
     for at, stamp, age in segments:
@@ -67,7 +67,7 @@ def played(segments: Iterable[tuple[float, int, float]]) -> list[Played]:
 
 
 class Heard(NamedTuple):
-    """Of all segments that came."""
+    """The figures of all segments that came."""
 
     max_gap: int
     beyond_tolerance: int
@@ -76,7 +76,7 @@ class Heard(NamedTuple):
 
 
 def heard(feedbacks: Sequence[Arrival], segments: Sequence[tuple[float, int, float]], tolerance: int) -> Heard:
-    """How far the robot was ahead of what such a player played, by the feedback that had come at each moment."""
+    """Return how far the robot was ahead of the played sound, by the feedback that had come at each moment."""
     times = [each.at for each in feedbacks]
     sounds = played(segments)
     gaps = [

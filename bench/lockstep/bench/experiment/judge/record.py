@@ -1,4 +1,4 @@
-"""What a run saw: at the robot, and at each client. Times are in s on this machine's monotonic clock. No I/O."""
+"""The record of a run, at the robot and at each client. Times are in s on this machine's monotonic clock. No I/O."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -29,7 +29,7 @@ class Rendered(NamedTuple):
 
 @dataclass
 class RobotRecord:
-    """From the bridge's own log."""
+    """The events at the robot, from the bridge's own log."""
 
     executed: list[Arrival] = field(default_factory=list)
     answered: list[Arrival] = field(default_factory=list)  # the first feedback of each event
@@ -38,7 +38,7 @@ class RobotRecord:
 
 @dataclass
 class ClientRecord:
-    """One client: its kind, its renderings, its statistics."""
+    """A client: its kind, its renderings, its statistics."""
 
     name: str
     kind: str  # "headless" or "chromium"
@@ -48,8 +48,8 @@ class ClientRecord:
     tolerance: int
     feedbacks: list[Arrival] = field(default_factory=list)
     rendered: dict[str, list[Rendered]] = field(default_factory=dict)  # by stream
-    statistics_before: dict[str, Any] = field(default_factory=dict)  # as the client gives them, when the run begins
-    statistics: dict[str, Any] = field(default_factory=dict)  # when it ends
+    statistics_before: dict[str, Any] = field(default_factory=dict)  # the client's own, when the run begins
+    statistics: dict[str, Any] = field(default_factory=dict)  # the client's own, when the run ends
     drawn_right: int = 0  # pictures whose pixels show the event that their stamp says
     drawn_wrong: int = 0
     drawn_unreadable: int = 0
@@ -58,7 +58,7 @@ class ClientRecord:
 
 @dataclass
 class Run:
-    """Everything of one run."""
+    """The whole record of one run."""
 
     began: float
     ended: float
@@ -74,5 +74,5 @@ class Run:
 
 
 def fresh(newest: float, entries: Sequence[Any]) -> list[Any]:
-    """Those of a log's entries that came after `newest`: it keeps the last thousand and is read repeatedly."""
+    """Return the entries of a log that came after `newest`: it keeps the last thousand and is read repeatedly."""
     return [entry for entry in entries if entry.at > newest]

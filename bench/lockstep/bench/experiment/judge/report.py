@@ -1,4 +1,4 @@
-"""One page with all figures and tables, in one file that needs nothing else."""
+"""Writes one page with all figures and tables, in one file that needs no other."""
 
 import html
 from collections.abc import Iterable, Iterator, Sequence
@@ -48,7 +48,7 @@ VERDICT_WORDS = {
 
 
 def write_report(findings: Findings, folder: Path) -> Path:
-    """Writes `index.html` there, and the figures that compare as files of their own."""
+    """Write `index.html` into `folder`, and the figures that compare as separate files; return the page."""
     figures = folder / "figures"
     figures.mkdir(parents=True, exist_ok=True)
     for name, svg in _comparisons(findings):
@@ -69,7 +69,7 @@ def _comparisons(findings: Findings) -> Iterator[tuple[str, str]]:
 
 
 def _standing_alone(svg: str) -> str:
-    """On white, on any background."""
+    """Return the figure on white, for any background."""
     head, _, rest = svg.partition(">")
     return f'{head}><rect width="100%" height="100%" fill="#fff"/>{rest}'
 
@@ -118,7 +118,7 @@ def _navigation(profiles: Sequence[tuple[str, list[Cell]]], report: Findings) ->
 
 
 def _table(head: Iterable[str], rows: Iterable[Sequence[str]]) -> str:
-    """Cells may hold markup of our own; the first column names the row."""
+    """Return a table. Cells may hold the report's own markup; the first column names the row."""
     body = "".join(
         "<tr>"
         + "".join(
@@ -232,7 +232,7 @@ def _figure(svg: str, caption: str) -> str:
 
 
 def _compared(cells: Sequence[Cell], what: str) -> str | None:
-    """The thesis' comparison, without and with: a panel for each mode that was run. None: there is no such medium."""
+    """Draw the thesis' comparison, without and with: a panel for each mode that was run. None without such a medium."""
     runs: list[tuple[str, Run, ClientRecord]] = []
     streams: dict[str, str] = {}
     for cell in cells:
@@ -254,7 +254,7 @@ def _comparison_figures(cells: Sequence[Cell]) -> str:
 
 
 def _drawn(cells: Sequence[Cell]) -> Sequence[Cell]:
-    """Those whose own figures are drawn: without and with, as in the thesis; all, when these were not run."""
+    """Return the cells whose figures are drawn: without and with, as in the thesis; all, if these were not run."""
     return [cell for cell in cells if cell.choices.mode in ("off", "feedback")] or cells
 
 

@@ -1,4 +1,4 @@
-"""What a run says: figures of each client and stream, and the verdicts. JSON's own types. No I/O."""
+"""Computes the result of a run: figures of each client and stream, and the verdicts. JSON's own types. No I/O."""
 
 from typing import Any
 
@@ -18,7 +18,7 @@ LONG_ROUND_TRIP = 0.35  # s; the two shares are promised up to here
 
 
 def result_of(choices: Choices, media: MediaChoice, run: Run, round_trip: float) -> Result:
-    """`round_trip`: mean of the control path, in s."""
+    """Return the result of a run. `round_trip`: mean of the control path, in s."""
     clients = {client.name: _client(client, run) for client in run.clients}
     return {
         "profile": choices.profile,
@@ -80,8 +80,10 @@ def _stream(client: ClientRecord, name: str, run: Run) -> Result:
 
 
 def _thesis_player(client: ClientRecord, rendered: list[Rendered]) -> Result | None:
-    """Sound as the thesis' player would have played it. None: a gate or a player of its own stands before it, or
-    nothing says when it was captured."""
+    """Return the figures of the sound as the thesis' player would have played it.
+
+    None if the client has a gate or its own player before it, or the times of capture are unknown.
+    """
     if client.gate != "off" or client.kind != "headless":
         return None
     segments = [(each.at, each.stamp, each.age) for each in rendered if each.stamp is not None and each.age is not None]
@@ -97,7 +99,7 @@ def _thesis_player(client: ClientRecord, rendered: list[Rendered]) -> Result | N
 
 
 def _said(statistics: dict[str, Any], name: str) -> dict[str, Any]:
-    """The headless client lists its streams, the page names them."""
+    """Return a stream's statistics: the headless client has a list of streams, the page has a map by name."""
     streams = statistics.get("streams", {})
     if isinstance(streams, dict):
         found: dict[str, Any] = streams.get(name, {})
@@ -110,7 +112,7 @@ def _rounded(percentiles: dict[str, Any]) -> Result:
 
 
 def _verdicts(choices: Choices, run: Run, clients: dict[str, Result], round_trip: float) -> Result:
-    """What has to repeat with the seed. None: the run does not ask that."""
+    """Return the verdicts that have to repeat with the seed. None: the run does not ask that."""
     gated = [client for client in clients.values() if client["gate"] == "event"]
     streams = [stream for client in gated for stream in client["streams"].values()]
     picture = clients[run.operator.name]["streams"].get(run.cameras[0])
@@ -125,7 +127,7 @@ def _verdicts(choices: Choices, run: Run, clients: dict[str, Result], round_trip
 
 
 def _pixels_agree(drawn: list[Result]) -> bool | None:
-    """None: no picture was read."""
+    """Return whether all read pixels agree with their stamps; None if no picture was read."""
     if any(each["wrong"] for each in drawn):
         return False
     return True if any(each["right"] for each in drawn) else None

@@ -11,14 +11,14 @@ __all__ = ["read_robot_log", "records"]
 
 
 def records(log: Path) -> Iterator[dict[str, Any]]:
-    """Whole lines: the last one may still be being written."""
+    """Yield the whole lines: the last one may still be being written."""
     text = log.read_text()
     for line in text[: text.rfind("\n") + 1].splitlines():
         yield json.loads(line)
 
 
 def read_robot_log(log: Path, since: float, until: float) -> RobotRecord:
-    """What happened between two moments on the monotonic clock."""
+    """Return the record of what happened between two moments on the monotonic clock."""
     found = RobotRecord()
     answered: set[int] = set()
     for record in records(log):

@@ -1,4 +1,4 @@
-"""Results as text, a line for each client and stream. No I/O."""
+"""Formats results as text, a line for each client and stream. No I/O."""
 
 from collections.abc import Iterable
 

@@ -7,5 +7,5 @@ __all__ = ["Micromanipulator", "create"]
 
 
 def create() -> Robot:
-    """The robot, with the needle above the slide and out of focus."""
+    """Return the robot, with the needle above the slide and out of focus."""
     return Micromanipulator()

@@ -1,4 +1,4 @@
-"""Planes of a picture at several degrees of being out of focus."""
+"""Blurs the planes of a picture by several degrees, for views out of focus."""
 
 import math
 from typing import Final
@@ -11,17 +11,17 @@ __all__ = ["SIGMAS", "BlurredPlanes", "blurred"]
 Plane = npt.NDArray[np.float32]
 
 SIGMAS: Final = (0.0, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0)  # pixels
-PASSES: Final = 3  # of a box, which together are a Gaussian to the eye
+PASSES: Final = 3  # of a box filter, which together look like a Gaussian
 
 
 class BlurredPlanes:
-    """Prepared at every degree of SIGMAS; what lies between is mixed."""
+    """Planes blurred in advance by every degree of SIGMAS; degrees in between are mixed."""
 
     def __init__(self, planes: dict[str, Plane]) -> None:
         self._degrees = [{name: blurred(plane, sigma) for name, plane in planes.items()} for sigma in SIGMAS]
 
     def at(self, sigma: float) -> dict[str, Plane]:
-        """The planes blurred by about `sigma` pixels of the picture."""
+        """Return the planes blurred by about `sigma` pixels of the picture."""
         if sigma <= SIGMAS[1]:
             low, share = 0, max(0.0, sigma / SIGMAS[1])
         else:
@@ -36,7 +36,7 @@ class BlurredPlanes:
 
 
 def blurred(plane: Plane, sigma: float) -> Plane:
-    """A Gaussian of `sigma` pixels, near enough; what lies outside is as the edge."""
+    """Blur by about a Gaussian of `sigma` pixels; beyond an edge the edge's pixels repeat."""
     if sigma <= 0.0:
         return plane
     # n boxes of width w have the variance n (w² - 1) / 12.

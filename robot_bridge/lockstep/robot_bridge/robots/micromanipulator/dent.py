@@ -1,4 +1,4 @@
-"""A drop under the needle: pressed in, dragged along, and so lit otherwise."""
+"""Draws a drop under the needle: pressed in, dragged along, and so lit differently."""
 
 import math
 from typing import TYPE_CHECKING, Any, Final
@@ -17,14 +17,14 @@ __all__ = ["draw_dent"]
 
 Plane = npt.NDArray[np.floating[Any]]
 
-REACH: Final = 34 * MICRO  # m around the tip in which a drop is seen to give way
+REACH: Final = 34 * MICRO  # m around the tip within which a drop is seen to give way
 SHADING: Final = 95.0  # luma per slope
-PULL: Final = 0.40  # how far the surface is drawn towards the tip, per depth of the dent
-LIGHT: Final = (0.63, 0.77)  # where it comes from, x and y
+PULL: Final = 0.40  # pull of the surface towards the tip, per depth of the dent
+LIGHT: Final = (0.63, 0.77)  # direction that it comes from, x and y
 
 
 def draw_dent(picture: Picture, slide: Picture, cover: Plane, state: "MicromanipulatorState", scale: float) -> None:
-    """Nothing where no drop is touched: glass does not give way."""
+    """Draw the dent in the touched drop. Without one draw nothing: glass does not give way."""
     contact = state.contact
     if contact is None or contact.sample is None:
         return
@@ -64,7 +64,7 @@ def draw_dent(picture: Picture, slide: Picture, cover: Plane, state: "Micromanip
 
 
 def _warp(target: npt.NDArray[np.uint8], source: npt.NDArray[np.uint8], rows: Plane, columns: Plane) -> None:
-    """Take each pixel from a place between four of `source`."""
+    """Fill `target` with pixels from places in `source`, each interpolated between four pixels."""
     height, width = source.shape
     rows, columns = np.clip(rows, 0, height - 1.001), np.clip(columns, 0, width - 1.001)
     top, left = rows.astype(np.intp), columns.astype(np.intp)

@@ -1,4 +1,4 @@
-"""What the micromanipulator tells a console about itself."""
+"""The micromanipulator's description for a console."""
 
 import math
 from typing import Final
@@ -46,9 +46,9 @@ MICROPHONE: Final = Microphone(name="microphone", label="Microphone", sample_rat
 
 START: Final = (-8 * MICRO, 0.0, 45 * MICRO)  # the tip
 HEADING: Final = math.radians(205.0)  # of the shaft from the tip to the holder, seen from above
-SLOPE: Final = math.tan(math.radians(20.0))  # how the shaft rises
+SLOPE: Final = math.tan(math.radians(20.0))  # rise of the shaft
 TAPER: Final = 0.09  # half width gained per length
-WINDOWS: Final = {  # where the joints may be, m
+WINDOWS: Final = {  # ranges of the joints, m
     "probe.x": (-90 * MICRO, 110 * MICRO),
     "probe.y": (-145 * MICRO, 145 * MICRO),
     "probe.z": (-16 * MICRO, 90 * MICRO),
@@ -72,14 +72,14 @@ def _axis(name: str, label: str, fastest: float, unit: str = "m/s") -> Axis:
 
 
 def _up(axis: str, stick: PadInput, touch: TouchPad | None, keys: tuple[str, str], scale: float) -> Binding:
-    """Stick up is positive; a pad says so with a negative number, a touch stick with a positive one."""
+    """Bind an axis so that stick up is positive; pads give that as a negative number, touch sticks as a positive."""
     return Binding(
         axis=axis, pad=stick, touch=touch, invert_pad=True, key_positive=keys[0], key_negative=keys[1], scale=scale
     )
 
 
 def _left(axis: str, stick: PadInput, touch: TouchPad | None, keys: tuple[str, str], scale: float) -> Binding:
-    """Stick left is positive, which both kinds of stick give as a negative number."""
+    """Bind an axis so that stick left is positive, which both kinds of stick give as a negative number."""
     return Binding(
         axis=axis,
         pad=stick,
@@ -126,7 +126,7 @@ def _limit(joint: str, axis: str, label: str) -> PositionLimit:
 
 
 def _needle() -> tuple[Geom, ...]:
-    """The shaft as capsules that get thicker away from the tip, and a block that holds it."""
+    """Return the shaft as capsules that get thicker away from the tip, and a block that holds it."""
     cos, sin = math.cos(HEADING), math.sin(HEADING)
     pitch = math.atan(SLOPE)
     # Turns a capsule's z onto the shaft: about y by the rest to the horizontal, then about z to the heading.
@@ -163,7 +163,7 @@ def _needle() -> tuple[Geom, ...]:
 
 
 def _slide() -> tuple[Geom, ...]:
-    """The glass, and each drop as rounds that get narrower with height."""
+    """Return the glass, and each drop as rounds that get narrower with height."""
     glass = Geom(
         shape="box",
         size=(135 * MICRO, 170 * MICRO, 4 * MICRO),

@@ -1,4 +1,4 @@
-"""The thread that draws: pictures take some milliseconds each, which the control tick has not."""
+"""Draws pictures in a thread: each takes some milliseconds, which the control tick does not have."""
 
 import asyncio
 import concurrent.futures
@@ -15,7 +15,7 @@ __all__ = ["Draughtsman"]
 
 
 class Draughtsman:
-    """Both pictures are drawn one after the other, each in yuv420p."""
+    """Draws both pictures one after the other, each in yuv420p."""
 
     def __init__(self) -> None:
         self._thread = concurrent.futures.ThreadPoolExecutor(max_workers=1, thread_name_prefix="draw")
@@ -29,5 +29,5 @@ class Draughtsman:
         return await asyncio.get_running_loop().run_in_executor(self._thread, self._side.draw, state, event)
 
     def close(self) -> None:
-        """Waits for the picture being drawn. May be called again."""
+        """End the thread after the picture that it draws. May be called again."""
         self._thread.shutdown()

@@ -20,25 +20,25 @@ __all__ = ["Microscope", "blur_at"]
 
 Plane = npt.NDArray[np.float32]
 
-DEPTH_OF_FIELD: Final = 3.5 * MICRO  # m, of a lens of 20x with the aperture of below
+DEPTH_OF_FIELD: Final = 3.5 * MICRO  # m, of a lens of 20x with the aperture below
 APERTURE: Final = math.tan(math.asin(0.28)) / 2  # m of unsharpness per m out of focus
-SHADOW: Final = (-0.42, -0.50)  # x and y that a shadow lies aside, per height of what casts it
+SHADOW: Final = (-0.42, -0.50)  # x and y by which a shadow is displaced, per height of what casts it
 SHADOW_SOFT: Final = (0.6 * MICRO, 0.10)  # m, and m per m of height
 SHADOW_DARK: Final = 0.34
-STEEL: Final = 62  # luma of the needle, and below, what its middle is brighter
+STEEL: Final = 62  # luma of the needle, and below, the excess of its middle
 GLEAM: Final = 150
 GRAINS: Final = 4
-FOCUS_STEP: Final = 0.5 * MICRO  # m, finer differences of focus are not seen
+FOCUS_STEP: Final = 0.5 * MICRO  # m; finer differences of focus cannot be seen
 
 
 class Microscope:
-    """`draw` belongs to one thread."""
+    """Draws the microscope's pictures. Call `draw` from one thread only."""
 
     def __init__(self, width: int, height: int) -> None:
         self._shape = (height, width)
         self._scale = MICROSCOPE.metres_per_pixel or MICRO
         self._slide = Slide(width, height, self._scale)
-        self._empty: Picture | None = None  # the slide alone, as it was last seen
+        self._empty: Picture | None = None  # the slide alone, as it was drawn last
         self._empty_key = (0, 0)
         random = np.random.default_rng(7)
         grains = np.round(random.normal(0.0, 1.3, (GRAINS, height, width))).astype(np.int8)
@@ -46,7 +46,7 @@ class Microscope:
         self._count = 0
 
     def draw(self, state: "MicromanipulatorState", event: int) -> bytes:
-        """A yuv420p picture of the state."""
+        """Return a yuv420p picture of the state."""
         slide = self._seen_slide(state)
         picture = slide.copy()
         draw_dent(picture, slide, self._slide.cover, state, self._scale)
@@ -86,7 +86,7 @@ class Microscope:
 
 
 def blur_at(away: Plane | np.float32) -> Plane:
-    """m of unsharpness at this distance from the focus."""
+    """Return the unsharpness in m at a distance `away` from the focus."""
     beyond = np.maximum(np.abs(away) - np.float32(DEPTH_OF_FIELD / 2), np.float32(0.0))
     soft: Plane = beyond * np.float32(APERTURE)
     return soft

@@ -1,7 +1,7 @@
 """The needle: a cantilever whose tip rests where its bending balances the contact. Quasi-static, no clock.
 
-Soft samples push back as Hertz has it for a blunt tip: F = 4/3 E* √R δ^1.5, along the surface's normal. The surface
-also sticks to the tip and is dragged along, until friction gives way.
+Soft samples push back by Hertz' law for a blunt tip: F = 4/3 E* √R δ^1.5, along the surface's normal. The surface also
+sticks to the tip and is dragged along, until friction gives way.
 """
 
 import math
@@ -17,27 +17,27 @@ STIFFNESS: Final = (14.0, 14.0, 20.0)  # N/m of the tip against the holder, alon
 FRICTION: Final = 0.5
 STICKING: Final = 4.0  # N/m, of a surface that sticks to the tip; well below the needle's, so that stepping is stable
 ROUNDS: Final = 6  # of Newton's method at most
-CLOSE: Final = 1e-10  # m, near enough
+CLOSE: Final = 1e-10  # m, change at which the method has converged
 
 Vector = tuple[float, float, float]
 
 
 class Contact(NamedTuple):
-    """What the tip is in, for pictures and sound."""
+    """The contact of the tip, for pictures and sound."""
 
-    sample: Sample | None  # the one it is deepest in; None: only the glass
+    sample: Sample | None  # the sample in which the tip is deepest; None: only the glass
     depth: float  # m, indentation along the normal
-    drag: tuple[float, float]  # m, how far the surface is dragged along x and y
+    drag: tuple[float, float]  # m, drag of the surface along x and y
 
 
 class Needle:
-    """`move` the holder, then read the tip's place and force.
+    """Call `move` with the holder's place, then read the tip's place and force.
 
     Attributes:
         tip: m, lowest point of the tip
-        bend: m, the tip against the place where it would be without a force
+        bend: m, from the place where the tip would be without a force
         force: N, on the needle, along x, y, z
-        contact: None when nothing is touched
+        contact: None if nothing is touched
     """
 
     def __init__(self, holder: Vector) -> None:
@@ -48,7 +48,7 @@ class Needle:
         self._drag = (0.0, 0.0)
 
     def move(self, holder: Vector) -> None:
-        """The holder is at the place where the tip would be if the needle were straight."""
+        """Move the holder to the place where the tip would be if the needle were straight."""
         if self.contact is None and not touches(*holder, TIP_RADIUS):
             self.tip = holder
             return
@@ -68,7 +68,7 @@ class Needle:
         self.contact = Contact(deepest.sample, deepest.depth, self._drag)
 
     def _settle(self, holder: Vector) -> None:
-        """Newton's method for the bending at which all forces on the tip add up to nothing."""
+        """Find the bending at which all forces on the tip add up to zero, by Newton's method."""
         bend = self.bend
         for _ in range(ROUNDS):
             x, y, z = (place + by for place, by in zip(holder, bend, strict=True))
@@ -93,7 +93,7 @@ class Needle:
         self.tip = _vector(place + by for place, by in zip(holder, bend, strict=True))
 
     def _stick(self, before: Vector, pressure: float) -> None:
-        """The tip's way along the surface drags it, as far as friction holds."""
+        """Drag the surface by the tip's way along it, as far as friction holds."""
         drag_x, drag_y = self._drag[0] + self.tip[0] - before[0], self._drag[1] + self.tip[1] - before[1]
         most, dragged = FRICTION * pressure / STICKING, math.hypot(drag_x, drag_y)
         if dragged > most:
@@ -102,7 +102,7 @@ class Needle:
 
 
 def _push(touch: Touch) -> tuple[float, float]:
-    """Force (N) and stiffness (N/m) along the normal."""
+    """Return force (N) and stiffness (N/m) along the normal."""
     if touch.sample is None:
         return GLASS_STIFFNESS * touch.depth, GLASS_STIFFNESS
     root = math.sqrt(TIP_RADIUS * touch.depth)
@@ -110,7 +110,7 @@ def _push(touch: Touch) -> tuple[float, float]:
 
 
 def _solved(matrix: list[list[float]], right: list[float]) -> Vector:
-    """Cramer's rule: a matrix of three rows that is never singular, since the needle's own stiffness is in it."""
+    """Solve for three unknowns by Cramer's rule. The needle's own stiffness keeps the matrix from being singular."""
     (a, b, c), (d, e, f), (g, h, i) = matrix
     u, v, w = right
     first, second, third = e * i - f * h, f * g - d * i, d * h - e * g

@@ -17,24 +17,24 @@ from lockstep.robot_bridge.robots.microphone_source import MicrophoneSource
 __all__ = ["MicromanipulatorState", "Micromanipulator"]
 
 LIGHT_RANGE: Final = (20.0, 130.0)  # %
-TOO_MUCH: Final = 300e-6  # N on the needle, from where on it is said so
+TOO_MUCH: Final = 300e-6  # N on the needle above which a fault reports it
 
 Vector = tuple[float, float, float]
 
 
 class MicromanipulatorState(NamedTuple):
-    """All that pictures need. Lengths in m, x forward, y left, z up from the glass."""
+    """The state that pictures need. Lengths in m, x forward, y left, z up from the glass."""
 
-    holder: Vector = START  # where the tip would be if the needle were straight
+    holder: Vector = START  # place of the tip if the needle were straight
     tip: Vector = START
     force: Vector = (0.0, 0.0, 0.0)  # N, on the needle
     contact: Contact | None = None
-    focus: float = 0.0  # height of the plane that is sharp
+    focus: float = 0.0  # m, height of the plane that is sharp
     light: float = 100.0  # %
 
 
 class Micromanipulator(Robot):
-    """Axes: the probe's velocity along x, y and z, the focus' velocity, and the change of the light."""
+    """The axes are the probe's velocity along x, y and z, the focus' velocity, and the change of the light."""
 
     tick_seconds = 0.004
     rests_from_thread = True
@@ -82,7 +82,7 @@ class Micromanipulator(Robot):
         return [drive.position for drive in self._drives]
 
     def state(self) -> MicromanipulatorState:
-        """The state now."""
+        """Return the state now."""
         needle = self._needle
         return MicromanipulatorState(
             holder=self._holder(),

@@ -1,4 +1,4 @@
-"""What lies under the microscope: drops of soft gel on a glass slide. Geometry and stiffness only.
+"""The samples under the microscope: drops of soft gel on a glass slide. Geometry and stiffness only.
 
 A drop is a paraboloid that the glass cuts off: height h (1 - r² / a²). All in metres, x forward, y left, z up from the
 glass.
@@ -20,13 +20,13 @@ class Sample(NamedTuple):
     name: str
     x: float
     y: float
-    radius: float  # m, where it meets the glass
+    radius: float  # m, at the glass
     height: float
     modulus: float  # Pa, reduced: E / (1 - ν²)
     rgb: tuple[float, float, float]  # 0 to 1
 
     def depth(self, x: float, y: float, z: float) -> tuple[float, Vector]:
-        """How deep a point is under the surface (m, negative above it), and the outward normal there."""
+        """Return the depth of a point under the surface (m, negative above it), and the outward normal there."""
         dx, dy, square = x - self.x, y - self.y, self.radius * self.radius
         slope = 2.0 * self.height / square
         nx, ny = slope * dx, slope * dy
@@ -36,7 +36,7 @@ class Sample(NamedTuple):
 
 
 class Touch(NamedTuple):
-    """The tip in something: how deep (m), along which outward normal, and in which sample (None: the glass)."""
+    """A touch of the tip: its depth (m), the outward normal, and the sample (None: the glass)."""
 
     depth: float
     normal: Vector
@@ -54,7 +54,7 @@ SAMPLES: Final = (
 
 
 def touches(x: float, y: float, z: float, radius: float) -> list[Touch]:
-    """All that a ball of `radius` (m) with its lowest point at (x, y, z) is in."""
+    """Return all touches of a ball of `radius` (m) with its lowest point at (x, y, z)."""
     found = []
     if z < 0.0:
         found.append(Touch(-z, (0.0, 0.0, 1.0), None))

@@ -1,4 +1,4 @@
-"""The needle's outline under the microscope: thin and sharp at the tip, wide and out of focus up the shaft."""
+"""Computes the needle's outline under the microscope: thin and sharp at the tip, wide and out of focus up the shaft."""
 
 import math
 from collections.abc import Callable
@@ -22,7 +22,7 @@ FREE_LENGTH: Final = 320e-6  # m, the shaft bends over this length
 
 
 class Window(NamedTuple):
-    """A part of the picture that is all there is to draw on; even numbers."""
+    """The part of the picture to draw on; its bounds are even numbers."""
 
     top: int
     left: int
@@ -45,9 +45,10 @@ def outline(
     *,
     shadow: bool = False,
 ) -> Outline | None:
-    """Of the needle, or of its shadow, which lies `shift` (x and y per metre of height) aside. None: out of sight.
+    """Return the outline of the needle or of its shadow; None if it is out of sight.
 
-    `blur`: m of unsharpness at a height above the glass. `scale`: m per pixel. `shape`: height, width in pixels.
+    `shift`: displacement of the shadow, x and y per metre of height. `blur`: returns the unsharpness in m at a height
+    above the glass. `scale`: m per pixel. `shape`: height, width in pixels.
     """
     height, width = shape
     reach = math.hypot(height, width) * scale
@@ -83,7 +84,7 @@ def outline(
 def _centre(
     state: "MicromanipulatorState", ways: Plane, shift: tuple[float, float] | None
 ) -> tuple[Plane, Plane, Plane]:
-    """Where the shaft's middle is seen, `ways` metres behind the tip, and how high it is there."""
+    """Return x, y and height of the shaft's middle as it is seen, `ways` metres behind the tip."""
     heights = np.maximum(np.float32(state.tip[2]) + ways * np.float32(SLOPE), 0.0)
     x, y = state.tip[0] + ways * np.float32(ALONG[0]), state.tip[1] + ways * np.float32(ALONG[1])
     if shift is not None:
@@ -97,14 +98,14 @@ def _half_width(ways: Plane) -> Plane:
 
 
 def _deflection(ways: Plane) -> Plane:
-    """Of a cantilever loaded at its end: 1 at the tip, 0 at the holder."""
+    """Return the deflection of a cantilever loaded at its end: 1 at the tip, 0 at the holder."""
     share = np.clip(ways / np.float32(FREE_LENGTH), 0.0, 1.0)
     bent: Plane = 1.0 - 1.5 * share + 0.5 * share**3
     return bent
 
 
 def _edge(distance: Plane) -> Plane:
-    """From 0 outside to 1 inside, smooth like a blurred edge, but cheap."""
+    """Return 0 outside to 1 inside, smooth like a blurred edge, but cheap."""
     cut = np.clip(distance * np.float32(0.5), -1.0, 1.0)
     rounded: Plane = np.float32(0.5) + cut * (np.float32(0.75) - np.float32(0.25) * cut * cut)
     return rounded

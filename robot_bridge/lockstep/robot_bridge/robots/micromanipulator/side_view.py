@@ -1,4 +1,4 @@
-"""What one sees from the side: a section through slide and drops where the tip is, ahead to the right."""
+"""Draws the view from the side: a section through slide and drops at the tip, ahead to the right."""
 
 import math
 from typing import TYPE_CHECKING, Final
@@ -23,13 +23,13 @@ SKY: Final[Colour] = (58, 132, 124)
 GLASS: Final[Colour] = (120, 134, 120)
 STEEL: Final[Colour] = (190, 128, 126)
 FOCUS: Final[Colour] = (150, 170, 90)
-FLOOR_ROW: Final = 0.72  # of the picture's height: where the glass begins
+FLOOR_ROW: Final = 0.72  # of the picture's height, at which the glass begins
 BENDING: Final = 200 * MICRO  # m, the shaft bends over this length
-SOFT: Final = 5 * MICRO  # m, how much wider than the tip a dent is
+SOFT: Final = 5 * MICRO  # m by which a dent is wider than the tip
 
 
 class SideView:
-    """`draw` belongs to one thread."""
+    """Draws the view from the side. Call `draw` from one thread only."""
 
     def __init__(self, width: int, height: int) -> None:
         self._scale = SIDE.metres_per_pixel or MICRO
@@ -40,7 +40,7 @@ class SideView:
         self._heights = (self._floor - np.arange(height, dtype=np.float32)[:, None]) * np.float32(self._scale)
 
     def draw(self, state: "MicromanipulatorState", event: int) -> bytes:
-        """A yuv420p picture of the state. The tip stays in the middle."""
+        """Return a yuv420p picture of the state. The tip stays in the middle."""
         x = self._from_middle + np.float32(state.tip[0])
         picture = self._picture
         picture.y[:], picture.u[:], picture.v[:] = SKY
@@ -58,7 +58,7 @@ class SideView:
         return picture.buffer.tobytes()
 
     def _needle(self, x: Plane, state: "MicromanipulatorState") -> npt.NDArray[np.bool_]:
-        """The shaft, whose bending dies out towards the holder."""
+        """Return the pixels of the shaft, whose bending dies out towards the holder."""
         behind = (np.float32(state.tip[0]) - x) / np.float32(-math.cos(HEADING))  # along the shaft, seen from above
         way = np.maximum(behind, 0.0)
         straight = np.float32(state.tip[2] - state.holder[2]) * np.clip(1.0 - way / BENDING, 0.0, 1.0) ** 2
@@ -70,7 +70,7 @@ class SideView:
         return seen
 
     def _fill(self, where: npt.NDArray[np.bool_], colour: Colour, every: int = 0) -> None:
-        """`every`: dashes of so many pixels."""
+        """Fill the pixels. `every`: length of dashes in pixels; 0 fills without dashes."""
         where = np.broadcast_to(where, self._picture.y.shape)
         if every:
             where = where & ((np.arange(where.shape[1]) // every) % 2 == 0)

@@ -1,4 +1,4 @@
-"""What the microscope sees of the slide without the needle: glass and drops of gel, in colour and out of focus."""
+"""Draws the slide under the microscope without the needle: glass and drops of gel, in colour and out of focus."""
 
 from typing import Final
 
@@ -14,16 +14,16 @@ Plane = npt.NDArray[np.float32]
 
 GLASS: Final = (0.74, 0.78, 0.76)  # red, green, blue
 RULING: Final = 50 * MICRO  # m between the lines on the glass
-RULED: Final = 0.07  # how much darker a line is
+RULED: Final = 0.07  # darkening of a line
 SUN: Final = np.array((0.45, 0.55, 0.70), np.float32)  # towards the light: ahead, left and above
-CORNERS: Final = 0.55  # light that is left in the corners
+CORNERS: Final = 0.55  # share of the light in the corners
 SCRATCHES: Final = 5
 SPECKS: Final = 45
-DROP_HEIGHT: Final = 6 * MICRO  # m, where drops are sharpest
+DROP_HEIGHT: Final = 6 * MICRO  # m, height at which drops are sharpest
 
 
 class Slide:
-    """`planes` are red, green and blue; `cover` is 1 on drops, 0 on glass."""
+    """The slide's picture. `cover` is 1 on drops, 0 on glass."""
 
     def __init__(self, width: int, height: int, scale: float) -> None:
         """`scale`: m per pixel; the middle of the picture is the origin."""
@@ -40,7 +40,7 @@ class Slide:
         self.vignette: Plane = 1.0 - (1.0 - np.float32(CORNERS)) * (2.0 * distance) ** 1.5
 
     def seen(self, glass_blur: float, drop_blur: float, light: float) -> tuple[Plane, Plane, Plane]:
-        """Red, green and blue, 0 to 1 and brighter, with the lens' shading; `light`: 1 is as usual."""
+        """Return red, green and blue, 0 to 1 and brighter, with the lens' shading; `light`: 1 is as usual."""
         glass, drops = self._glass_degrees.at(glass_blur), self._drop_degrees.at(drop_blur)
         through = (1.0 - drops["cover"]) * self.vignette * np.float32(light)
         shaded = self.vignette * np.float32(light)
@@ -79,7 +79,7 @@ class Slide:
         return {**colours, "cover": cover}
 
     def _drop(self, sample: Sample, grain: Plane) -> tuple[Plane, Plane]:
-        """Where it is (0 to 1), and how bright it is there."""
+        """Return the cover of a drop (0 to 1) and its brightness."""
         dx, dy = (self.x - sample.x) / sample.radius, (self.y - sample.y) / sample.radius
         angle = np.arctan2(dy, dx)
         ripple = 1.0 + 0.025 * np.sin(3 * angle + sample.x / MICRO) + 0.015 * np.sin(5 * angle)

@@ -35,9 +35,9 @@ class Sound:
         self._contact_pitch = CONTACT_HZ[0]
 
     def segment(self, step_rate: float, force: float) -> bytes:
-        """20 ms of pcm_s16le at so many steps per second and N."""
+        """Return 20 ms of pcm_s16le at a rate of steps per second and a force in N."""
         hum, self._hum = self._phases(self._hum, HUM_HZ)
-        # Steps come too fast to be heard one by one; a drive sounds with its rate, as a stepper does.
+        # Steps come too fast to be heard one by one; a drive sounds with its rate, as stepper motors do.
         step, self._step_phase = self._phases(self._step_phase, max(40.0, step_rate / 2))
         strength = _strength(force)
         pitch = CONTACT_HZ[0] + CONTACT_HZ[1] * strength
@@ -65,7 +65,7 @@ class Sound:
 
 
 def _strength(force: float) -> float:
-    """0 to 1, by the logarithm: a hundredth of full force is to be heard as well."""
+    """Return the loudness of a force, 0 to 1, by the logarithm: a hundredth of full force is to be heard as well."""
     if force <= LIGHTEST:
         return 0.0
     return min(1.0, 0.05 + 0.95 * math.log(force / LIGHTEST) / math.log(LOUDEST / LIGHTEST))

@@ -6,14 +6,14 @@ from typing import Final
 __all__ = ["STEP", "Stepper"]
 
 STEP: Final = 32e-9  # m
-TIME_CONSTANT: Final = 0.04  # s over which the speed is measured: single steps are no speed
+TIME_CONSTANT: Final = 0.04  # s over which the speed is measured: single steps are not a speed
 
 
 class Stepper:
-    """Velocities in, whole steps out; a fraction of a step waits for the next tick.
+    """Turns velocities into whole steps; a fraction of a step waits for the next tick.
 
     Attributes:
-        steps: where the drive is, in steps from its zero
+        steps: position of the drive, in steps from its zero
         rate: steps per second, either way, as a mean over some hundredths of a second
         speed: m/s, as such a mean
     """
@@ -22,15 +22,15 @@ class Stepper:
         self.steps = round(position / STEP)
         self.rate = 0.0
         self.speed = 0.0
-        self._rest = 0.0  # of a step, not yet made
+        self._rest = 0.0  # fraction of a step not made yet
 
     @property
     def position(self) -> float:
-        """m from its zero."""
+        """The position in m from the drive's zero."""
         return self.steps * STEP
 
     def tick(self, velocity: float, seconds: float) -> None:
-        """Go at `velocity` (m/s) for `seconds`."""
+        """Move at `velocity` (m/s) for `seconds`."""
         if velocity:
             wanted = self._rest + velocity * seconds / STEP
             made = math.floor(wanted + 0.5)

@@ -1,4 +1,4 @@
-"""From red, green and blue to planes Y, U, V of a 4:2:0 picture, BT.601 limited range."""
+"""Converts red, green and blue into planes Y, U, V of a 4:2:0 picture, BT.601 limited range."""
 
 import numpy as np
 import numpy.typing as npt
@@ -25,7 +25,7 @@ class Picture:
 
 
 def picture_of(red: Plane, green: Plane, blue: Plane) -> Picture:
-    """Values from 0 to 1; values beyond are clipped."""
+    """Return a picture of values from 0 to 1; values beyond are clipped."""
     height, width = red.shape
     picture = Picture(width, height)
     luma = 0.299 * red + 0.587 * green + 0.114 * blue

@@ -1,4 +1,4 @@
-"""A robot out of a MuJoCo model of the user's own, driven by its actuators, with its sensors and cameras."""
+"""Robots from the user's MuJoCo models, driven by their actuators, with their sensors and cameras."""
 
 from pathlib import Path
 
@@ -11,11 +11,11 @@ choose_graphics()  # before anything imports mujoco, which reads the choice once
 
 
 def create(path: Path) -> Robot:
-    """The robot of the model in that file, with its renderer running.
+    """Return the robot of the model in `path`, with its renderer running.
 
     Raises:
-        ModelError: the file is no model that can be driven; it says why.
-        RobotUnavailable: OpenGL cannot be used here, so that the robot would have no cameras.
+        ModelError: the file is not a model that can be driven; the text says why.
+        RobotUnavailable: OpenGL cannot be used here, so the robot would have no cameras.
     """
     try:
         from lockstep.robot_bridge.robots.mjcf.robot import MjcfRobot

@@ -1,4 +1,4 @@
-"""What an actuator of the model is, as far as driving it is concerned."""
+"""Classifies the actuators of the model by the way in which they are driven."""
 
 import math
 from enum import Enum
@@ -23,11 +23,11 @@ SAME: Final = 1e-3  # of the gain
 
 
 class Kind(Enum):
-    """How the control signal of an actuator acts."""
+    """The meaning of an actuator's control signal."""
 
-    POSITION = "position"  # it is where to be
-    VELOCITY = "velocity"  # it is how fast to go
-    MOTOR = "motor"  # it is a force or torque
+    POSITION = "position"  # the place to be at
+    VELOCITY = "velocity"  # the speed to go at
+    MOTOR = "motor"  # a force or torque
     OTHER = "other"  # muscles, adhesion, damping …
 
 
@@ -35,16 +35,16 @@ class Actuator(NamedTuple):
     number: int
     name: str
     kind: Kind
-    joint: int | None  # that it moves; None: a tendon, a site, or a joint with more than one degree of freedom
+    joint: int | None  # the joint it moves; None: a tendon, a site, or a joint with more than one degree of freedom
     tendon: int | None
     gear: float  # control per value of the axis
-    low: float  # of the axis: control divided by the gear; infinite without a range
+    low: float  # bound of the axis: control divided by the gear; infinite without a range
     high: float
     is_rotary: bool
 
 
 def actuators_of(model: Any) -> list[Actuator]:
-    """All of a model, in order."""
+    """Return all actuators of a model, in order."""
     return [_actuator(model, number) for number in range(model.nu)]
 
 

@@ -1,4 +1,4 @@
-"""The model's bodies and their shapes for the 3D view: the same tree, posed by the same joints."""
+"""Describes the model's bodies and their shapes for the 3D view: the same tree, posed by the same joints."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -26,7 +26,10 @@ Quaternion = tuple[float, float, float, float]
 
 
 def bodies_of(model: Any, joints: Sequence[ModelJoint]) -> tuple[Body, ...]:
-    """Parents first. Bodies that hang on a joint which is not described are left out, with all that hang on them."""
+    """Return the bodies, parents first.
+
+    Bodies that hang on a joint which is not described are left out, with all that hang on them.
+    """
     described = {joint.number: joint for joint in joints}
     left, found, lost = MOST_GEOMS, list[Body](), set[int]()
     for number in range(model.nbody):
@@ -42,7 +45,7 @@ def bodies_of(model: Any, joints: Sequence[ModelJoint]) -> tuple[Body, ...]:
 
 
 def _chain(model: Any, number: int, joints: Sequence[ModelJoint], geoms: tuple[Geom, ...]) -> Iterator[Body]:
-    """The body; before it a pivot for each joint that does not act at the body's origin from its zero on."""
+    """Yield the body, after a pivot for each joint that does not act at the body's origin or does not begin at zero."""
     name = name_of(model, "body", number)
     parent = int(model.body_parentid[number])
     above = name_of(model, "body", parent) if number and (parent or _has_geoms(model, 0)) else ""
@@ -56,7 +59,7 @@ def _chain(model: Any, number: int, joints: Sequence[ModelJoint], geoms: tuple[G
         return
     frame = f"{name}.frame"
     yield Body(name=frame, parent=above, position=position, orientation=orientation)
-    reached: Vector = (0.0, 0.0, 0.0)  # where the last pivot is, in the body's own frame
+    reached: Vector = (0.0, 0.0, 0.0)  # the last pivot, in the body's own frame
     for joint in joints:
         place, turn = _pivot(model, joint)
         step = (place[0] - reached[0], place[1] - reached[1], place[2] - reached[2])
@@ -78,7 +81,7 @@ def _is_simple(model: Any, joint: ModelJoint) -> bool:
 
 
 def _pivot(model: Any, joint: ModelJoint) -> tuple[Vector, Quaternion]:
-    """Where the joint acts, and the turn that takes away the angle at which the model begins."""
+    """Return the place where the joint acts, and the turn that takes away the angle at which the model begins."""
     place = _triple(model.jnt_pos[joint.number])
     if joint.is_ball or joint.moves[0].kind == "prismatic":
         return place, (1.0, 0.0, 0.0, 0.0)
@@ -88,7 +91,7 @@ def _pivot(model: Any, joint: ModelJoint) -> tuple[Vector, Quaternion]:
 
 
 def _zero(model: Any, joint: ModelJoint) -> Vector:
-    """A slide's place at zero, from where the model begins."""
+    """Return a slide's place at zero, relative to where the model begins."""
     if joint.is_ball or joint.moves[0].kind != "prismatic":
         return (0.0, 0.0, 0.0)
     x, y, z = joint.moves[0].axis

@@ -1,4 +1,4 @@
-"""The model's cameras as streams; a free one when it has none."""
+"""Describes the model's cameras as streams, or a free camera if it has none."""
 
 from typing import Any, Final
 
@@ -15,7 +15,7 @@ SMALLEST, LARGEST = 64, 1280  # pixels
 
 
 def cameras_of(model: Any) -> dict[Camera, int]:
-    """Each with its number in the model, the main one first."""
+    """Return each camera with its number in the model, the main one first."""
     if model.ncam == 0:
         width, height, rate = MAIN
         return {Camera(name="free", label="Overview", width=width, height=height, frame_rate=rate): FREE_CAMERA}
@@ -25,7 +25,7 @@ def cameras_of(model: Any) -> dict[Camera, int]:
 def _camera(model: Any, number: int) -> Camera:
     width, height, rate = MAIN if number == 0 else OTHERS
     wide, high = (int(pixels) for pixels in model.cam_resolution[number])
-    if min(wide, high) > 1:  # the model says so itself
+    if min(wide, high) > 1:  # the model has a resolution
         width, height = _fitting(wide), _fitting(high)
     name = name_of(model, "camera", number)
     return Camera(name=name, label=label_of(name), width=width, height=height, frame_rate=rate)

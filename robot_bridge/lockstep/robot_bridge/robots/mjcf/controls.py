@@ -1,7 +1,7 @@
-"""Which stick, key and button drives which axis: the bindings of a model that has none.
+"""Assigns sticks, keys and buttons to the axes of a model.
 
-Each layer has four axes on the two sticks, which pads, keys and fingers all have. Further inputs of a pad and of the
-keys go to the axes of the layers that follow, so that seven axes need no change of layer with them.
+Each layer has four axes on the two sticks, which pads, keys and touch screens all have. Further inputs of a pad and of
+the keys go to the axes of the following layers, so that seven axes need no change of layer with them.
 """
 
 from collections.abc import Sequence
@@ -32,7 +32,7 @@ MORE: Final[tuple[tuple[PadInput, tuple[str, str], bool], ...]] = (
     ("dpad_x", ("ArrowLeft", "ArrowRight"), True),
     ("dpad_y", ("KeyT", "KeyG"), True),
 )
-# What a joint along or about x, y or z (as the model begins) would best be driven with, the best first.
+# The sticks that suit a joint along or about x, y or z (as the model begins), the best first.
 SLIDES: Final = (("left_y", "right_y"), ("left_x", "right_x"), ("right_y", "left_y"))
 TURNS: Final = (("right_x", "left_x"), ("left_y", "right_y"), ("left_x", "right_x"))
 ANY: Final = ("left_y", "left_x", "right_y", "right_x")
@@ -40,7 +40,10 @@ MOST_LAYERS: Final = 12
 
 
 def layers_of(model: Any, data: Any, axes: Sequence[Axis], actuators: Sequence[Actuator]) -> tuple[ControlLayer, ...]:
-    """For axes and the actuators that belong to them, in the same order. `data` is in the model's first posture."""
+    """Return the layers for axes and the actuators that belong to them, in the same order.
+
+    `data` is in the model's first posture.
+    """
     wishes = [_wishes(data, each) for each in actuators]
     groups = [range(first, min(first + len(STICKS), len(axes))) for first in range(0, len(axes), len(STICKS))]
     return tuple(
@@ -54,7 +57,7 @@ def layers_of(model: Any, data: Any, axes: Sequence[Axis], actuators: Sequence[A
 
 
 def _label(axes: Sequence[Axis], group: range) -> str:
-    """By its first and last axis' number, as the axis bars have their names beside."""
+    """Return a label with the numbers of the first and last axis, which the axis bars show beside the names."""
     first, last = group.start + 1, group.stop
     return axes[group.start].label if first == last else f"Axes {first}–{last}"
 

@@ -1,7 +1,7 @@
-"""Drives one axis each: from the value of an axis to the control signal of an actuator.
+"""Turns the value of an axis into the control signal of an actuator, one drive for each.
 
 At rest nothing moves: a position servo keeps its posture, a velocity servo stands still, and a motor brakes and then
-holds the place with what force it has.
+holds the place as far as its force allows.
 """
 
 import math
@@ -23,12 +23,12 @@ FASTEST_TURN: Final = 1.5  # rad/s
 FASTEST_UNBOUND: Final = 1.0  # rad/s, without a range
 SHARE_OF_EXTENT: Final = 0.15  # of the model's size per second, for slides without a range
 FURTHEST_LEAD: Final = 0.25  # of the range, or rad, that a servo's goal may be ahead of a blocked joint
-HOLD_RATE: Final = 2 * math.pi * 3.0  # rad/s, how stiffly a motor at rest holds, independent of its load
+HOLD_RATE: Final = 2 * math.pi * 3.0  # rad/s, stiffness with which a motor at rest holds, independent of its load
 SLOW: Final = 0.05  # rad/s, or of the model's size per second: below it a motor at rest holds instead of braking
 
 
 class Drive(ABC):
-    """`drive` before each step of the simulation."""
+    """An axis and its actuator. Call `drive` before each step of the simulation."""
 
     def __init__(self, actuator: Actuator, axis: Axis) -> None:
         self.actuator = actuator
@@ -40,14 +40,14 @@ class Drive(ABC):
 
     @abstractmethod
     def measured(self, data: Any) -> float:
-        """The axis' value as it is."""
+        """Return the measured value of the axis."""
 
     def release(self, data: Any) -> None:
-        """The state was put back to its beginning: forget the held places."""
+        """Forget the held places, because the state was put back to its beginning."""
 
 
 class _JointDrive(Drive):
-    """Moves a joint with one degree of freedom, or something without any that has a length."""
+    """Moves a joint with one degree of freedom, or another transmission that has a length."""
 
     def __init__(self, model: Any, actuator: Actuator, axis: Axis) -> None:
         super().__init__(actuator, axis)
@@ -68,7 +68,7 @@ class _JointDrive(Drive):
 
 
 class PositionDrive(_JointDrive):
-    """The axis is the speed of the servo's goal, so that letting go keeps the posture."""
+    """Drives a position servo: the axis is the speed of its goal, so that letting go keeps the posture."""
 
     def __init__(self, model: Any, data: Any, actuator: Actuator, axis: Axis, low: float, high: float) -> None:
         super().__init__(model, actuator, axis)
@@ -91,14 +91,17 @@ class PositionDrive(_JointDrive):
 
 
 class VelocityDrive(_JointDrive):
-    """The axis is the servo's commanded velocity."""
+    """Drives a velocity servo: the axis is its commanded velocity."""
 
     def drive(self, data: Any, value: float, seconds: float) -> None:
         data.ctrl[self.actuator.number] = value * self.actuator.gear
 
 
 class MotorDrive(_JointDrive):
-    """The axis is a force or torque. At rest it brakes; slow enough, it holds the place against gravity."""
+    """Drives a motor: the axis is a force or torque.
+
+    At rest the motor brakes; once slow enough, it holds the place against gravity.
+    """
 
     def __init__(self, model: Any, actuator: Actuator, axis: Axis) -> None:
         super().__init__(model, actuator, axis)
@@ -106,7 +109,7 @@ class MotorDrive(_JointDrive):
         gain = float(model.actuator_gainprm[actuator.number, 0]) or 1.0
         self._ratio *= gain  # force on the joint per control
         self._slow = SLOW * (1.0 if actuator.is_rotary else float(model.stat.extent))
-        self._held: float | None = None  # the place; None while driving or still too fast
+        self._held: float | None = None  # the held place; None while driving or still too fast
         self._diagonal = None if self._dof is None else int(model.M_rowadr[self._dof] + model.M_rownnz[self._dof] - 1)
 
     def release(self, data: Any) -> None:
@@ -124,7 +127,7 @@ class MotorDrive(_JointDrive):
         data.ctrl[self.actuator.number] = min(max(control, self.axis.minimum), self.axis.maximum)
 
     def _holding(self, data: Any) -> float:
-        """Force on the joint that brakes it, then keeps it where it stands."""
+        """Return the force on the joint that brakes it and then keeps it where it stands."""
         speed, place = self._velocity(data), self._position(data)
         if self._held is None and abs(speed) < self._slow:
             self._held = place
@@ -134,7 +137,7 @@ class MotorDrive(_JointDrive):
 
 
 class PlainDrive(Drive):
-    """The axis is the control itself; it rests where the control is nearest to nothing."""
+    """Drives any other actuator: the axis is the control itself, and rests where the control is nearest to zero."""
 
     def drive(self, data: Any, value: float, seconds: float) -> None:
         data.ctrl[self.actuator.number] = value
@@ -144,9 +147,9 @@ class PlainDrive(Drive):
 
 
 def drives_of(model: Any, data: Any, actuators: list[Actuator]) -> list[Drive]:
-    """One for each actuator that gets an axis.
+    """Return a drive for each actuator that gets an axis.
 
-    A velocity servo on a joint that has a position servo as well only damps it; it gets none.
+    A velocity servo on a joint that also has a position servo only damps it, and gets none.
     """
     servoed = {each.joint for each in actuators if each.kind is Kind.POSITION and each.joint is not None}
     return [
@@ -208,7 +211,7 @@ def _axis(actuator: Actuator, unit: str, low: float, high: float, rest: float = 
 
 
 def _range(model: Any, actuator: Actuator) -> tuple[float, float]:
-    """Where a position servo's goal may be."""
+    """Return the range of a position servo's goal."""
     low, high = actuator.low, actuator.high
     if actuator.joint is not None and model.jnt_limited[actuator.joint]:
         lower, upper = (float(bound) for bound in model.jnt_range[actuator.joint])
@@ -217,7 +220,7 @@ def _range(model: Any, actuator: Actuator) -> tuple[float, float]:
 
 
 def _fastest(model: Any, actuator: Actuator) -> float:
-    """Of a joint whose speed the model does not bound."""
+    """Return the speed limit of a joint whose speed the model does not bound."""
     low, high = _range(model, actuator) if actuator.kind is Kind.POSITION else _joint_range(model, actuator)
     span = high - low
     if math.isfinite(span) and span > 0:

@@ -1,6 +1,6 @@
-"""The joints of a model, as the robot link knows them: one number each.
+"""The joints of a model as the robot link describes them: one number each.
 
-A joint that is free in space is six of them (x, y, z, yaw, pitch, roll) and a ball joint three, so that everything
+A joint that is free in space becomes six of them (x, y, z, yaw, pitch, roll) and a ball joint three, so that everything
 that moves can be posed.
 """
 
@@ -18,23 +18,23 @@ __all__ = ["ModelJoint", "joints_of"]
 FREE: Final = int(mujoco.mjtJoint.mjJNT_FREE)
 BALL: Final = int(mujoco.mjtJoint.mjJNT_BALL)
 SLIDE: Final = int(mujoco.mjtJoint.mjJNT_SLIDE)
-MOST_FREE: Final = 12  # free and ball joints; more of them are not described
+MOST_FREE: Final = 12  # free and ball joints; further ones are not described
 PLACES: Final = (("x", (1.0, 0.0, 0.0)), ("y", (0.0, 1.0, 0.0)), ("z", (0.0, 0.0, 1.0)))
 ANGLES: Final = (("yaw", (0.0, 0.0, 1.0)), ("pitch", (0.0, 1.0, 0.0)), ("roll", (1.0, 0.0, 0.0)))
 
 
 class ModelJoint(NamedTuple):
-    """A joint of the model with what stands for it."""
+    """A joint of the model, and the described joints that stand for it."""
 
     number: int
     parts: tuple[Joint, ...]
-    moves: tuple[BodyJoint, ...]  # how the parts move the body
-    qpos: int  # where its state begins
-    is_free: bool  # its place is in the world, not in its parent
+    moves: tuple[BodyJoint, ...]  # motions of the body by the parts
+    qpos: int  # index of its first value in qpos
+    is_free: bool  # its position is in the world, not in its parent
     is_ball: bool
 
     def values(self, qpos: Any) -> Iterator[float]:
-        """One for each part."""
+        """Yield the value of each part."""
         first = self.qpos
         if self.is_free:
             yield from map(float, qpos[first : first + 3])
@@ -46,7 +46,7 @@ class ModelJoint(NamedTuple):
 
 
 def joints_of(model: Any) -> list[ModelJoint]:
-    """All that are described, in the model's order."""
+    """Return the joints that are described, in the model's order."""
     found, loose = [], 0
     for number in range(model.njnt):
         kind = int(model.jnt_type[number])
@@ -89,7 +89,7 @@ def _move(joint: str, is_slide: bool, axis: Sequence[float]) -> BodyJoint:
 
 
 def _angles(quaternion: Any) -> tuple[float, float, float]:
-    """Yaw, pitch and roll, which turn one after the other, each about the axes as the former left them."""
+    """Return yaw, pitch and roll, which turn one after the other, each about the axes as the one before left them."""
     w, x, y, z = (float(part) for part in quaternion)
     length = math.sqrt(w * w + x * x + y * y + z * z) or 1.0
     w, x, y, z = w / length, x / length, y / length, z / length

@@ -16,10 +16,10 @@ LONGEST_REASON: Final = 400  # characters
 
 
 def load_model(path: Path) -> Any:
-    """The compiled MjModel.
+    """Return the compiled MjModel.
 
     Raises:
-        ModelError: it cannot be used.
+        ModelError: the model cannot be used.
     """
     if path.is_dir():
         raise ModelError(f"{path} is a folder, not an MJCF file")
@@ -46,7 +46,7 @@ def _compiled(path: Path) -> Any:
 
 
 def _reason(path: Path, text: str) -> str:
-    """MuJoCo's own words on one line, after their meaning."""
+    """Return MuJoCo's message on one line, after its meaning."""
     words = " ".join(text.split()).removeprefix("Error: ")[:LONGEST_REASON]
     if "Error opening file" in words:
         return f"{path} names a file that is missing: {words}"

@@ -1,4 +1,4 @@
-"""A robot out of a MuJoCo model: its drives, senses and cameras around one simulation."""
+"""A robot from a MuJoCo model: its drives, senses and cameras around one simulation."""
 
 import logging
 import math
@@ -33,21 +33,23 @@ BUSIEST: Final = 0.6  # share of a tick that the simulation may take
 TRIED_TICKS: Final = 25
 WATCHDOG: Final = 0.25  # s; a simulation hurts no person, and busy machines hold it up
 REST_SPEED: Final = 0.02  # rad/s, or of the model's size per second
-MARGIN: Final = 0.01  # of a joint's range, that servos run on
-LATENCY: Final = 0.03  # s that servos follow late
+MARGIN: Final = 0.01  # of a joint's range, by which servos run on
+LATENCY: Final = 0.03  # s by which servos follow late
 
 _logger = logging.getLogger(__name__)
 
 
 class MjcfRobot(Robot):
-    """Every actuator is an axis, but for velocity servos that only damp a position servo."""
+    """A robot with an axis for every actuator, except velocity servos that only damp a position servo."""
 
     rests_from_thread = True
 
     def __init__(self, path: Path) -> None:
-        """Raises:
-        ModelError: the file is no model that can be driven.
-        RobotUnavailable: OpenGL cannot be used here.
+        """Load the model and start the renderer.
+
+        Raises:
+            ModelError: the file is not a model that can be driven.
+            RobotUnavailable: OpenGL cannot be used here.
         """
         mujoco.set_mju_user_warning(warn)  # else MuJoCo writes a file into the working directory
         self.model = model = load_model(path)
@@ -129,12 +131,12 @@ class MjcfRobot(Robot):
         self._renderer.close()
 
     def snapshot(self) -> npt.NDArray[np.float64]:
-        """Everything a picture needs of the state now."""
+        """Return the part of the present state that a picture needs."""
         state: npt.NDArray[np.float64] = self.data.qpos.copy()
         return state
 
     def _begin(self) -> None:
-        """The model's first keyframe, if it has one, else its zero; nothing moves yet."""
+        """Set the model's first keyframe if it has one, else its zero; nothing moves yet."""
         if self.model.nkey:
             mujoco.mj_resetDataKeyframe(self.model, self.data, 0)
             self.data.qvel[:] = 0
@@ -155,7 +157,10 @@ class MjcfRobot(Robot):
             drive.drive(self.data, value, self.tick_seconds)
 
     def _keep_up(self) -> float:
-        """How many times slower than real time the simulation runs: its steps must leave the loop some time."""
+        """Reduce the steps of a tick if they would take too long; return how many times slower than real time they run.
+
+        The steps must leave the loop some time.
+        """
         began = time.process_time()
         self._drive()
         mujoco.mj_step(self.model, self.data, self._steps * TRIED_TICKS)
@@ -172,7 +177,7 @@ class MjcfRobot(Robot):
         return slowness
 
     def _moving_dofs(self) -> npt.NDArray[np.float64]:
-        """By degree of freedom: 0 where no actuator moves it, else the scale of its speed."""
+        """Return a weight for each degree of freedom: 0 if no actuator moves it, else the scale of its speed."""
         weights = np.zeros(self.model.nv)
         for drive in self._drives:
             joint = drive.actuator.joint
@@ -237,5 +242,5 @@ def warn(text: str) -> None:
 
 
 def short(value: float) -> float:
-    """Six significant digits at any scale; keeps messages small. Never -0."""
+    """Round to six significant digits at any scale, which keeps messages small; never -0."""
     return float(f"{value:.6g}") + 0.0

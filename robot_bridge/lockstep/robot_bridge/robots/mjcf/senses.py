@@ -1,4 +1,4 @@
-"""What the model's sensors say: force and torque, touch, and distances."""
+"""Reads the model's sensors: force and torque, touch, and distances."""
 
 import math
 from collections.abc import Sequence
@@ -20,14 +20,14 @@ FORCE, TORQUE, TOUCH, RANGE = (
 )
 SITE: Final = int(mujoco.mjtObj.mjOBJ_SITE)
 TIME_CONSTANT: Final = 0.03  # s of the low-pass
-FELT: Final = 0.03  # of full scale, from where on a force is felt
+FELT: Final = 0.03  # of full scale, from which on a force is felt
 LEAST_FORCE: Final = 1e-6  # N of full scale
 GRAVITY: Final = 9.81  # m/s², for a guess at the full scale
-EVEN: Final = 0.02  # rad, that rays may be off an even ring
+EVEN: Final = 0.02  # rad by which rays may be off an even ring
 
 
 class WrenchSense:
-    """Force and torque on a body of the robot, in that body's frame; `read` after each step."""
+    """Force and torque on a body of the robot, in that body's frame. Call `read` after each step."""
 
     def __init__(self, model: Any, body: int, full_scale: float) -> None:
         self.description = WrenchSensor(
@@ -56,7 +56,7 @@ class WrenchSense:
 
 
 class ForceSense(WrenchSense):
-    """A force sensor, and a torque sensor on the same site if there is one. The weight behind it is taken off."""
+    """Reads a force sensor, and a torque sensor on the same site if there is one, less the weight that hangs on it."""
 
     def __init__(self, model: Any, force: int, torque: int | None) -> None:
         self._site = int(model.sensor_objid[force])
@@ -69,7 +69,7 @@ class ForceSense(WrenchSense):
 
     def _now(self, data: Any) -> Array:
         turn = data.site_xmat[self._site].reshape(3, 3)
-        # What holds the hand is measured; what acts on it from outside is the opposite, less the weight.
+        # The sensor measures what holds the hand; the force from outside is the opposite, less the weight.
         force = -turn @ data.sensordata[self._force : self._force + 3] - self._weight
         if self._torque is None:
             return np.concatenate((self._in_body(data, force), np.zeros(3)))
@@ -79,7 +79,7 @@ class ForceSense(WrenchSense):
 
 
 class TouchSense(WrenchSense):
-    """Touch sensors say how hard; the contacts of their bodies say from where."""
+    """Reads touch sensors: the sensors tell the strength, the contacts of their bodies the direction."""
 
     def __init__(self, model: Any, sensors: Sequence[int]) -> None:
         sites = [int(model.sensor_objid[sensor]) for sensor in sensors]
@@ -107,11 +107,11 @@ class TouchSense(WrenchSense):
 
 
 class RangeSense:
-    """Rangefinders, as a ring where they stand evenly around one body, else the first of them alone.
+    """Reads rangefinders: a ring if they stand evenly around one body, else only the first.
 
     Attributes:
-        description: of the ring, or of a single ray
-        body: that it sits on, whose x is the direction of a single ray
+        description: describes the ring, or a single ray
+        body: the body that they sit on, whose x is the direction of a single ray
     """
 
     def __init__(self, ring: RangeRing, body: Body, values: Sequence[int]) -> None:
@@ -126,7 +126,7 @@ class RangeSense:
 
 
 def wrench_sense(model: Any) -> WrenchSense | None:
-    """None: the model feels nothing."""
+    """Return the sense of force or touch; None if the model has no such sensor."""
     forces, torques, touches = (_sensors(model, kind) for kind in (FORCE, TORQUE, TOUCH))
     if forces:
         site = model.sensor_objid[forces[0]]
@@ -135,7 +135,7 @@ def wrench_sense(model: Any) -> WrenchSense | None:
 
 
 def range_sense(model: Any, data: Any) -> RangeSense | None:
-    """None: the model has no rangefinder. `data` has the model's first posture."""
+    """Return the sense of distances; None if the model has no rangefinder. `data` has the model's first posture."""
     sensors = [each for each in _sensors(model, RANGE) if model.sensor_dim[each] == 1]
     if not sensors:
         return None
@@ -168,7 +168,7 @@ def range_sense(model: Any, data: Any) -> RangeSense | None:
 
 
 def _turned(direction: Array) -> tuple[float, float, float, float]:
-    """The shortest turn that takes x to `direction`, which is of length 1."""
+    """Return the shortest turn that takes x to `direction`, which has length 1."""
     x, y, z = (float(part) for part in direction)
     if x < -1 + 1e-9:
         return (0.0, 0.0, 0.0, 1.0)  # half a turn about z
@@ -181,5 +181,5 @@ def _sensors(model: Any, kind: int) -> list[int]:
 
 
 def _guess(model: Any) -> float:
-    """Half the weight of the heaviest moving part, for sensors without a range."""
+    """Return a full scale for sensors without a range: half the weight of all bodies."""
     return max(0.5 * float(model.body_mass[1:].sum()) * GRAVITY, LEAST_FORCE) if model.nbody > 1 else 1.0

@@ -9,10 +9,10 @@ choose_graphics()  # before anything imports mujoco, which reads the choice once
 
 
 def create() -> Robot:
-    """The robot, with its renderer running.
+    """Return the robot, with its renderer running.
 
     Raises:
-        RobotUnavailable: OpenGL cannot be used here, so that the robot would have no cameras.
+        RobotUnavailable: OpenGL cannot be used here, so the robot would have no cameras.
     """
     try:
         from lockstep.robot_bridge.robots.mobile_manipulator.robot import MobileManipulator

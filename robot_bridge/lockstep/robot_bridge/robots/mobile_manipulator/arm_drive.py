@@ -1,4 +1,4 @@
-"""Drives the arm: a twist of the tool in, position servos out, which hold their posture at rest."""
+"""Drives the arm: turns a twist of the tool into goals of position servos, which hold their posture at rest."""
 
 from collections.abc import Sequence
 from operator import sub
@@ -15,22 +15,22 @@ __all__ = ["ArmDrive"]
 Array = npt.NDArray[np.float64]
 
 FASTEST: Final = (1.5, 1.5, 1.8, 2.5, 2.5, 3.0)  # rad/s
-STEADY: Final = 0.002  # rad; an arm that has moved less makes the same of a twist, to within a hundredth
-LEAD: Final = (0.065, 0.065, 0.065, 0.08, 0.08, 0.08)  # rad, with the servos' stiffness the largest push
+STEADY: Final = 0.002  # rad; an arm that has moved less resolves a twist to the same velocities, to within a hundredth
+LEAD: Final = (0.065, 0.065, 0.065, 0.08, 0.08, 0.08)  # rad; with the servos' stiffness, this is the largest push
 STILL: Final = (0.0,) * len(FASTEST)
 
 
 class _Resolved(NamedTuple):
     twist: list[float]
-    joints: list[float]  # rad, in which posture
+    joints: list[float]  # rad, the posture
     resolution: Resolution
 
 
 class ArmDrive:
-    """Joint velocities are summed to a posture that the servos hold.
+    """Adds up joint velocities to a posture that the servos hold.
 
-    The posture never leads the measured one by more than LEAD, which bounds the push of an arm that is blocked and
-    keeps it from storing up motion. Plain numbers: for six joints numpy costs more, in every tick, than it saves.
+    The posture never leads the measured one by more than LEAD, which bounds the push of a blocked arm and keeps it from
+    storing up motion. Plain numbers: for six joints numpy costs more, in every tick, than it saves.
     """
 
     def __init__(self, simulation: Simulation) -> None:
@@ -41,7 +41,7 @@ class ArmDrive:
         lower, upper = model.jnt_range[ARM, 0].tolist(), model.jnt_range[ARM, 1].tolist()
         self._names = tuple(model.joint(index).name.removeprefix("arm.") for index in range(ARM.start, JOINTS))
         self._rates = ResolvedRates(lower, upper, FASTEST)
-        # What a servo follows with, kv / kp in seconds, the farthest it may lead, and its joint's range.
+        # For each servo: its lag (kv / kp, s), the farthest it may lead, and its joint's range.
         lags = (-model.actuator_biasprm[ARM, 2] / model.actuator_gainprm[ARM, 0]).tolist()
         self._servos = tuple(zip(lags, LEAD, lower, upper, strict=True))
         self._posture: list[float] = self._joints.tolist()
@@ -49,12 +49,12 @@ class ArmDrive:
         self.faults: list[str] = []
 
     def release(self) -> None:
-        """Hold the posture that the arm has now."""
+        """Hold the arm's present posture."""
         self._posture = self._joints.tolist()
         self.faults = []
 
     def rates(self, twist: Sequence[float]) -> Sequence[float]:
-        """Velocities of the joints, rad/s, that `twist` would cause in the posture of now."""
+        """Return the velocities of the joints, rad/s, that `twist` would cause in the present posture."""
         return self._resolve(twist).velocities if any(twist) else STILL
 
     def drive(self, twist: Sequence[float], seconds: float) -> None:

@@ -1,4 +1,4 @@
-"""Drives the holonomic base: velocities in the base frame in, wheel motors and a parking brake out."""
+"""Drives the holonomic base: turns velocities in the base frame into wheel motors and a parking brake."""
 
 import math
 from collections.abc import Sequence
@@ -19,7 +19,7 @@ PARKING_STIFFNESS: Final = np.array((30000.0, 30000.0, 2500.0))  # N/m, N/m, N m
 
 
 class BaseDrive:
-    """Velocity motors while driving. At rest a brake holds the place, else the arm's push would move the base."""
+    """Drives velocity motors. At rest a brake holds the place, or the arm's push would move the base."""
 
     def __init__(self) -> None:
         self._parked: Array | None = None  # pose that the brake holds; None while driving

@@ -1,9 +1,9 @@
-"""What the robot's skin feels: the forces of all outside contacts on base and arm, as one wrench.
+"""Senses the forces of all outside contacts on base and arm, as one wrench.
 
 The wrench is the sum over every contact between a body of the robot (base, arm, tool) and anything else, expressed in
-the frame of the arm's mount on the base (x forward, y left, z up, origin on top of the drum). So pushing an object
-with the tool and bumping the base into a wall are both felt, against the direction that the stick drives to. Contacts
-of the robot with itself and its own weight and inertia are no part of it.
+the frame of the arm's mount on the base (x forward, y left, z up, origin on top of the drum). So pushing an object with
+the tool and bumping the base into a wall are both felt, against the direction that the stick drives to. The wrench does
+not include contacts of the robot with itself, nor its own weight and inertia.
 """
 
 import math
@@ -19,14 +19,14 @@ __all__ = ["ContactReading", "ContactSense"]
 Array = npt.NDArray[np.float64]
 
 TIME_CONSTANT: Final = 0.03  # s of the wrench's low-pass
-FELT: Final = 1e-6  # N and N m, below which nothing is left of a contact
+FELT: Final = 1e-6  # N and N m, below which a contact counts as over
 NOTHING: Final = np.zeros(6)
 NOTHING.flags.writeable = False
 
 
 class ContactReading(NamedTuple):
     wrench: Array  # fx fy fz (N), tx ty tz (N m) on the robot in the mount's frame, unfiltered
-    normal: float  # N, sum of the normal forces of all contacts in the room, the weight of what sleeps among them
+    normal: float  # N, sum of the normal forces of all contacts in the room, including the weight of sleeping bodies
     rubbing: float  # N, sum of the friction forces on the robot
 
 
@@ -40,8 +40,8 @@ class ContactSense:
         moving = model.body_treeid >= 0
         masses = np.bincount(model.body_treeid[moving], model.body_mass[moving], model.ntree)
         self._weights = masses * float(np.linalg.norm(model.opt.gravity))  # N, of each free body
-        self._asleep = b""  # which of them slept at the last look
-        self._resting = 0.0  # N, what those weigh
+        self._asleep = b""  # the bodies that slept at the last look
+        self._resting = 0.0  # N, weight of those bodies
         self.wrench: Array = np.zeros(6)
 
     def clear(self) -> None:
@@ -57,7 +57,7 @@ class ContactSense:
         return reading
 
     def read(self, data: Any) -> ContactReading:
-        # What sleeps has no contacts: without its weight, waking it would be heard as a blow.
+        # A sleeping body has no contacts: without its weight, waking it would be heard as a blow.
         resting = self._resting_weight(data.tree_asleep)
         if not data.ncon:  # the robot stands on nothing but its own drives
             return ContactReading(NOTHING, resting, 0.0)
@@ -79,7 +79,7 @@ class ContactSense:
         return ContactReading(np.concatenate((force, torque)), normal, rubbing)
 
     def _resting_weight(self, asleep: Array) -> float:
-        """N; asked for in every tick, and another one only now and then."""
+        """Return the weight of the sleeping bodies, N; it is asked for in every tick and seldom changes."""
         if (now := asleep.tobytes()) != self._asleep:
             self._asleep, self._resting = now, float(self._weights @ (asleep >= 0))
         return self._resting

@@ -1,4 +1,4 @@
-"""The robot's axes, and what moves them: gamepad, touch sticks and keys, in two layers."""
+"""The robot's axes, and their bindings to gamepad, touch sticks and keys, in two layers."""
 
 from typing import Final
 
@@ -36,14 +36,14 @@ AXES: Final = (
 
 
 def forward(name: str, stick: PadInput, touch: TouchPad, keys: tuple[str, str]) -> Binding:
-    """Stick up is positive; a pad says so with a negative number, a touch stick with a positive one."""
+    """Bind an axis so that stick up is positive; pads give that as a negative number, touch sticks as a positive."""
     return Binding(
         axis=name, pad=stick, touch=touch, invert_pad=True, key_positive=f"Key{keys[0]}", key_negative=f"Key{keys[1]}"
     )
 
 
 def leftward(name: str, stick: PadInput, touch: TouchPad, keys: tuple[str, str]) -> Binding:
-    """Stick left is positive, which both kinds of stick give as a negative number."""
+    """Bind an axis so that stick left is positive, which both kinds of stick give as a negative number."""
     return Binding(
         axis=name,
         pad=stick,

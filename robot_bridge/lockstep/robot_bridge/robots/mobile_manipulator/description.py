@@ -1,4 +1,4 @@
-"""What the mobile manipulator tells a console about itself."""
+"""The mobile manipulator's description for a console."""
 
 from typing import Any, Final
 
@@ -33,7 +33,7 @@ TOOL_TWIST: Final = BodyTwist(
 
 
 def describe(model: Any) -> RobotDescription:
-    """The description that belongs to the compiled model."""
+    """Return the description that belongs to the compiled model."""
     joints = describe_joints(model)
     return RobotDescription(
         name="mobile-manipulator",

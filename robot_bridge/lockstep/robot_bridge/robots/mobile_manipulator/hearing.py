@@ -1,4 +1,4 @@
-"""What of the physics can be heard, gathered tick by tick until a segment of sound is made of it."""
+"""Gathers the audible events of the physics tick by tick until a segment of sound is made of them."""
 
 import math
 from typing import Any, Final, NamedTuple
@@ -13,11 +13,11 @@ __all__ = ["Heard", "Hearing"]
 DRUM_RADIUS: Final = 0.31  # m, turns the base's turning into the speed of its wheels
 KNOCK: Final = 6.0  # N, smaller jumps of contact force make no sound
 ARM_LENGTH: Final = 0.3  # m, turns joint speeds into a speed of the skin, roughly
-OBJECT_FRICTION: Final = 3.0  # N, movable objects are heard sliding alike
+OBJECT_FRICTION: Final = 3.0  # N, the same for all movable objects that slide
 
 
 class Heard(NamedTuple):
-    """Over one segment: means of the speeds and of the rubbing, the sum of the knocks."""
+    """The sounds of one segment: means of the speeds and of the rubbing, the sum of the knocks."""
 
     wheels: float = 0.0  # m/s
     arm: float = 0.0  # rad/s, the three large joints
@@ -27,7 +27,7 @@ class Heard(NamedTuple):
 
 
 class Hearing:
-    """`listen` after each tick, `take` once per segment."""
+    """Hears the physics. Call `listen` after each tick, `take` once per segment."""
 
     def __init__(self, model: Any) -> None:
         free = [index for index in range(model.njnt) if index >= JOINTS]
@@ -44,7 +44,7 @@ class Hearing:
         large, small = sum(arm[:3]), sum(arm[3:])
         rubbing = contacts.rubbing * (wheels + ARM_LENGTH * (large + small))
         others = speeds[JOINTS:]
-        if others.dot(others):  # mostly nothing but the robot moves, and that is the quickest way to see it
+        if others.dot(others):  # mostly nothing but the robot moves, and this is the quickest way to see it
             rubbing += OBJECT_FRICTION * float(np.sqrt((speeds[self._objects] ** 2).sum(axis=1)).sum())
         for index, level in enumerate((wheels, large, small, rubbing)):
             self._sums[index] += level
@@ -55,7 +55,7 @@ class Hearing:
         self._pressure = contacts.normal
 
     def take(self) -> Heard:
-        """What was heard since the last call; nothing when there was no tick in between."""
+        """Return the sounds since the last call; zeros if there was no tick in between."""
         if not self._ticks:
             return Heard()
         wheels, arm, wrist, rubbing = (each / self._ticks for each in self._sums)

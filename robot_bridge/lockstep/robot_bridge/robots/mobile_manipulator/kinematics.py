@@ -1,4 +1,4 @@
-"""The robot description's bodies and joints, read out of the compiled model so that both are one and the same."""
+"""Reads the description's bodies and joints from the compiled model, so that both agree."""
 
 from collections.abc import Iterator
 from typing import Any, Final
@@ -23,12 +23,12 @@ DIGITS: Final = 5
 
 
 def describe_joints(model: Any) -> tuple[Joint, ...]:
-    """The robot's joints in the order of the measurement."""
+    """Return the robot's joints in the order of the measurement."""
     return tuple(describe_joint(model, index) for index in range(JOINTS))
 
 
 def describe_bodies(model: Any) -> tuple[Body, ...]:
-    """The room's fixed bodies, then the robot's from the base to the tool, parents first.
+    """Return the room's fixed bodies, then the robot's from the base to the tool, parents first.
 
     Movable objects are left out: feedback does not say where they are.
     """
@@ -81,5 +81,5 @@ def describe_geoms(model: Any, body: int) -> Iterator[Geom]:
 
 
 def rounded(values: Any) -> Any:
-    """The values as a tuple of floats, short on the wire; never -0."""
+    """Return the values as a tuple of floats, short on the wire; never -0."""
     return tuple(round(float(value), DIGITS) + 0.0 for value in values)

@@ -1,4 +1,4 @@
-"""Where the robot may not go: the range of each arm joint, the room, and the charging corner."""
+"""The robot's limits: the range of each arm joint, the room, and the charging corner."""
 
 from collections.abc import Sequence
 from typing import Final
@@ -9,7 +9,7 @@ from lockstep.robot_bridge.robots.mobile_manipulator.simulation import ARM
 
 __all__ = ["BASE_ON_FLOOR", "GEOFENCES", "arm_limits"]
 
-SERVO_LEAD: Final = 0.02  # rad that a servo may run on when its target stops
+SERVO_LEAD: Final = 0.02  # rad by which a servo may run on when its target stops
 
 BASE_ON_FLOOR: Final = PlanarBase(
     x="base.x",
@@ -20,7 +20,7 @@ BASE_ON_FLOOR: Final = PlanarBase(
     turn="base.wz",
     radius=0.32,  # the drum; the arm may reach out of the zones
     margin=0.03,  # wheels slip
-    latency=0.02,  # the motors follow a falling command this much later
+    latency=0.02,  # s by which the motors follow a falling command later
 )
 
 GEOFENCES: Final = (
@@ -37,7 +37,7 @@ GEOFENCES: Final = (
 
 
 def arm_limits(joints: Sequence[Joint]) -> tuple[PositionLimit, ...]:
-    """One for each joint of the arm that has a range. The tool's twist moves all of them, as the posture has it."""
+    """Return a limit for each joint of the arm that has a range. The tool's twist moves all of them, by the posture."""
     tool = tuple(AxisGain(axis=axis.name, gain=None) for axis in AXES if axis.name.startswith("tool."))
     return tuple(
         PositionLimit(

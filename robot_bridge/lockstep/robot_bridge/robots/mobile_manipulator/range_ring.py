@@ -22,7 +22,7 @@ RING: Final = RangeRing(
 
 
 class RangeSensors:
-    """Distances from the ring's centre."""
+    """Measures distances from the ring's centre."""
 
     def __init__(self, model: Any) -> None:
         self._model = model
@@ -34,7 +34,7 @@ class RangeSensors:
         self._distances = np.zeros(RING.count)
 
     def read(self, data: Any) -> npt.NDArray[np.float64]:
-        """One distance per sensor; range_max where nothing is seen."""
+        """Return one distance per sensor; range_max if nothing is seen."""
         directions = (data.xmat[self._body].reshape(3, 3) @ self._rays).T.ravel()
         mujoco.mj_multiRay(
             self._model,

@@ -1,4 +1,4 @@
-"""From a twist of the tool to velocities of the arm's joints, near singularities and joint limits too. No physics."""
+"""Resolves a twist of the tool into velocities of the arm's joints, also near singularities and joint limits."""
 
 import contextlib
 import math
@@ -29,7 +29,7 @@ class Resolution(NamedTuple):
 
 
 class ResolvedRates:
-    """Damped least squares, with weights that fade out a joint that runs into its limit."""
+    """Solves by damped least squares, with weights that fade out a joint that runs into its limit."""
 
     def __init__(self, lower: Sequence[float], upper: Sequence[float], fastest: Sequence[float]) -> None:
         self._lower = tuple(lower)  # rad
@@ -37,7 +37,7 @@ class ResolvedRates:
         self._fastest = tuple(fastest)  # rad/s
 
     def resolve(self, jacobian: Array, twist: Array, joints: Sequence[float]) -> Resolution:
-        """Joint velocities that move the tool by `twist` (m/s, rad/s), as nearly as the arm can."""
+        """Return the joint velocities that move the tool by `twist` (m/s, rad/s), as nearly as the arm can."""
         scaled_jacobian = jacobian * SCALE[:, None]
         scaled_twist = twist * SCALE
         weights = [1.0] * len(joints)
@@ -62,7 +62,7 @@ class ResolvedRates:
         )
 
     def _freedom(self, places: Sequence[float], velocities: Array) -> list[float]:
-        """1 for a joint that may move on, falling to 0 at the limit that it moves to."""
+        """Return 1 for a joint that may move on, falling to 0 at the limit that it moves to."""
         freedom = []
         for place, velocity, lower, upper in zip(places, velocities.tolist(), self._lower, self._upper, strict=True):
             room = upper - place if velocity > 0.0 else place - lower
@@ -71,7 +71,7 @@ class ResolvedRates:
 
 
 def damped_inverse(jacobian: Array, twist: Array) -> Array:
-    """Least squares where only the directions that are nearly singular are damped, so that others stay exact."""
+    """Solve by least squares, damping only the directions that are nearly singular, so that others stay exact."""
     with contextlib.suppress(np.linalg.LinAlgError):
         inverse = np.linalg.inv(jacobian)
         if np.vdot(inverse, inverse) <= SMALL**-2:  # the sum of 1 / value² over all singular values: none is small

@@ -27,13 +27,15 @@ REST_SPEED: Final = 0.02  # m/s and rad/s, of every joint
 
 
 class MobileManipulator(Robot):
-    """Axes: the base's velocity in its own frame, then the tool's twist against the base, in the base frame."""
+    """The axes are the base's velocity in its own frame and the tool's twist against the base, in the base frame."""
 
     rests_from_thread = True
 
     def __init__(self) -> None:
-        """Raises:
-        RobotUnavailable: OpenGL cannot be used here.
+        """Start the simulation and the renderer.
+
+        Raises:
+            RobotUnavailable: OpenGL cannot be used here.
         """
         self.simulation = Simulation()
         model = self.simulation.model
@@ -87,7 +89,7 @@ class MobileManipulator(Robot):
         return joints
 
     def joint_rates(self, values: Sequence[float]) -> Sequence[float]:
-        """The base's rates are left out: no limit by posture needs them."""
+        """Return the rates of the arm's joints; the base's rates are left out: no limit by posture needs them."""
         return [0.0, 0.0, 0.0, *self._arm.rates(values[BASE.stop :])]
 
     def rest_from_thread(self) -> None:
@@ -116,5 +118,5 @@ class MobileManipulator(Robot):
 
 
 def on_wire(values: np.typing.NDArray[np.float64]) -> list[float]:
-    """Rounded to keep messages small; never -0."""
+    """Round values to keep messages small; never -0."""
     return [value + 0.0 for value in np.round(values, DIGITS).tolist()]

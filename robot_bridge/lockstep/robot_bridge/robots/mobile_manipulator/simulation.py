@@ -1,4 +1,4 @@
-"""The physics: the model, its state, and where the robot's parts are in MuJoCo's arrays."""
+"""The physics: the model, its state, and the places of the robot's parts in MuJoCo's arrays."""
 
 import logging
 import math
@@ -19,12 +19,12 @@ _logger = logging.getLogger(__name__)
 BASE: Final = slice(0, 3)  # x, y (m, world frame), yaw (rad)
 ARM: Final = slice(3, 9)  # waist, shoulder, elbow, roll, bend, twist (rad)
 JOINTS: Final = 9
-MOUNT: Final = "mount"  # where the arm stands on the base; axes as the base's
+MOUNT: Final = "mount"  # the arm's mount on the base; axes as the base's
 TOOL_TIP: Final = "tool_tip"
 
 
 def load_model() -> Any:
-    """The compiled MjModel."""
+    """Return the compiled MjModel."""
     return mujoco.MjModel.from_xml_string(files(__package__).joinpath("model.xml").read_text())
 
 
@@ -33,8 +33,8 @@ class Simulation:
 
     Attributes:
         joints: positions of the robot's joints, base first (a view)
-        joint_velocities: theirs (a view)
-        restarts: how often a diverged state had to be put back to its beginning
+        joint_velocities: velocities of the same joints (a view)
+        restarts: number of times that a diverged state was put back to its beginning
     """
 
     def __init__(self) -> None:
@@ -51,7 +51,7 @@ class Simulation:
         self.restart()
 
     def restart(self) -> None:
-        """Everything where it was at the beginning, at rest."""
+        """Put everything back to its beginning, at rest."""
         mujoco.mj_resetDataKeyframe(self.model, self.data, self._home)
         self.data.ctrl[ARM] = self.data.qpos[ARM]
         mujoco.mj_forward(self.model, self.data)
@@ -67,22 +67,22 @@ class Simulation:
         return False
 
     def snapshot(self) -> Array:
-        """Everything a picture needs of the state now."""
+        """Return the part of the present state that a picture needs."""
         return self.data.qpos.copy()  # type: ignore[no-any-return]
 
     def base_velocity(self) -> Array:
-        """vx, vy, wz of the base in its own frame."""
+        """Return vx, vy, wz of the base in its own frame."""
         return base_from_world(self.data.qpos[2]) @ self.data.qvel[BASE]  # type: ignore[no-any-return]
 
     def tool_jacobian(self) -> Array:
-        """Twist of the tool tip against the base, in the base frame, per velocity of each arm joint (6 x 6)."""
+        """Return the tool tip's twist against the base, in the base frame, per velocity of each arm joint (6 x 6)."""
         linear, angular = self._jacobian
         mujoco.mj_jacSite(self.model, self.data, linear, angular, self._tip)
         rotated: Array = base_from_world(self.data.qpos[2]) @ self._jacobian[:, :, ARM]
         return rotated.reshape(6, -1)
 
     def tool_twist(self) -> Array:
-        """The tool's measured twist against the base, in the base frame."""
+        """Return the tool's measured twist against the base, in the base frame."""
         return self.tool_jacobian() @ self.data.qvel[ARM]  # type: ignore[no-any-return]
 
 
@@ -91,6 +91,6 @@ def warn(text: str) -> None:
 
 
 def base_from_world(yaw: float) -> Array:
-    """Rotation that expresses a world vector in the base frame."""
+    """Return the rotation that expresses a world vector in the base frame."""
     cosine, sine = math.cos(yaw), math.sin(yaw)
     return np.array(((cosine, sine, 0.0), (-sine, cosine, 0.0), (0.0, 0.0, 1.0)))

@@ -1,7 +1,7 @@
-"""The robot's sound, from the events of the physics: motors, rubbing, knocks, and a fan that never stops.
+"""Makes the robot's sound from the events of the physics: motors, rubbing, knocks, and a fan that never stops.
 
 Every voice keeps its phase and lets its level and pitch glide, so that segments join without a click. Samples are
-single precision: sines are several times cheaper so, and the error is far below the last of sixteen bits.
+single precision: sines are several times cheaper that way, and the error is far below the last of sixteen bits.
 """
 
 import math
@@ -43,7 +43,7 @@ MOTORS: Final = (Motor(55.0, 190.0, 0.16, 0.6, 4), Motor(150.0, 420.0, 0.10, 1.5
 
 
 class Motors:
-    """All motors at once: the cost is in the number of calls, not of samples."""
+    """Plays all motors at once: the cost is in the number of calls, not of samples."""
 
     def __init__(self, motors: Sequence[Motor], steps: Signal, seconds: float) -> None:
         """`steps`: the part of a segment that has passed at each of its samples."""
@@ -62,7 +62,7 @@ class Motors:
         self._last = [0.0] * len(motors)  # share of full speed at the end of the last segment
 
     def play(self, speeds: Sequence[float]) -> Signal | float:
-        """The sound of the next segment; 0 for silence."""
+        """Return the sound of the next segment; 0 for silence."""
         shares = [min(1.0, speed / each.full_speed) for speed, each in zip(speeds, self._motors, strict=True)]
         if not any(shares) and not any(self._last):
             turned = (2 * math.pi * self._seconds * each.rest_pitch for each in self._motors)
@@ -84,7 +84,7 @@ def column(values: Sequence[float]) -> Signal:
 
 
 class Loop:
-    """Sound that goes round: its ends meet."""
+    """A sound that repeats without a click: its ends meet."""
 
     def __init__(self, loop: Signal) -> None:
         self._loop = loop
@@ -99,7 +99,7 @@ class Loop:
 
 
 def noise(rate: int, low: float, high: float, seed: int) -> Signal:
-    """Noise of a band, made in the frequency domain so that its ends meet; its mean square is 1."""
+    """Return noise of a band, made in the frequency domain so that its ends meet; its mean square is 1."""
     length = rate * LOOP_SECONDS
     frequencies = np.fft.rfftfreq(length, 1 / rate)
     shape = np.exp(-0.5 * (np.log(np.maximum(frequencies, 1.0) / np.sqrt(low * high)) / np.log(high / low)) ** 2)
@@ -109,13 +109,13 @@ def noise(rate: int, low: float, high: float, seed: int) -> Signal:
 
 
 def fan(rate: int) -> Signal:
-    """A hum in its own wind; whole turns of it fill the loop."""
+    """Return a hum in its own wind; whole turns of it fill the loop."""
     hum = np.sin(2 * np.pi * FAN_TONE / rate * np.arange(rate * LOOP_SECONDS))
     return (FAN_LEVEL * (0.5 * hum + 0.6 * noise(rate, 150.0, 900.0, seed=1))).astype(np.float32)  # type: ignore[no-any-return]
 
 
 class Sound:
-    """Makes one segment after the other; each takes the sounds of its time."""
+    """Makes one segment after the other, each from the sounds heard in its time."""
 
     def __init__(self, rate: int, samples: int) -> None:
         self._samples = samples
@@ -131,7 +131,7 @@ class Sound:
         self._rings = False
 
     def segment(self, heard: Heard) -> bytes:
-        """The next segment, pcm_s16le mono."""
+        """Return the next segment, pcm_s16le mono."""
         signal: Signal = self._fan.play(self._samples) + self._motors.play((heard.wheels, heard.arm, heard.wrist))
         level = min(0.14, 0.03 * math.sqrt(max(heard.rubbing - 0.05, 0.0)))
         if level or self._rubbing:

@@ -1,1 +1,1 @@
-"""Cameras of robots that MuJoCo simulates: OpenGL in a thread of its own. Importing this imports no MuJoCo."""
+"""Cameras of robots that MuJoCo simulates: OpenGL in a separate thread. Importing this imports no MuJoCo."""

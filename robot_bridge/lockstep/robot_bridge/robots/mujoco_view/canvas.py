@@ -11,11 +11,11 @@ from lockstep.robot_bridge.robots.mujoco_view.read_back import drop_stencil, rea
 
 __all__ = ["DEFAULT_LOOK", "FREE_CAMERA", "Canvas", "Look"]
 
-FREE_CAMERA: Final = -1  # looks at the middle of the model, from as far as its extent asks for
+FREE_CAMERA: Final = -1  # looks at the middle of the model, from a distance that fits its extent
 
 
 class Look(NamedTuple):
-    """What of a model is drawn."""
+    """The parts of a model that are drawn."""
 
     groups: tuple[int, ...] = (0, 1, 1, 0, 1, 0)  # of geoms: 1 for those that are drawn; group 3 is collision hulls
     max_geoms: int = 400
@@ -27,10 +27,10 @@ DEFAULT_LOOK: Final = Look()
 
 
 class Canvas:
-    """One OpenGL context, shared by all cameras, with a state of its own."""
+    """One OpenGL context and one simulation state, shared by all cameras."""
 
     def __init__(self, model: Any, width: int, height: int, look: Look = DEFAULT_LOOK) -> None:
-        """`width` and `height` of the largest picture."""
+        """`width` and `height`: of the largest picture."""
         self._look = look
         self._model = model
         self._data = mujoco.MjData(model)

@@ -1,4 +1,4 @@
-"""How OpenGL is reached, and what to say when it is not there. Imports nothing of MuJoCo."""
+"""Chooses the way to OpenGL, and says what to do if OpenGL is missing. Imports nothing of MuJoCo."""
 
 import logging
 import os
@@ -16,14 +16,14 @@ ADVICE = (
 def choose_graphics() -> None:
     """Render off screen through EGL unless the environment says otherwise; no effect after mujoco was imported."""
     os.environ.setdefault("MUJOCO_GL", "egl")
-    # Without a GPU Mesa rasterises on the CPU. Done in the thread that draws, a picture of this size costs a
-    # quarter less processor time than with one thread besides.
+    # Without a GPU Mesa rasterises on the CPU. Done in the thread that draws, a picture of this size costs a quarter
+    # less processor time than with one thread besides.
     os.environ.setdefault("LP_NUM_THREADS", "0")
-    # PyOpenGL tells every start that its optional accelerator is absent; nothing here would use it.
+    # PyOpenGL reports at every start that its optional accelerator is absent; nothing here would use it.
     logging.getLogger("OpenGL").setLevel(logging.WARNING)
 
 
 def graphics_unavailable(cause: BaseException) -> RobotUnavailable:
-    """The error for an OpenGL that failed with `cause`."""
+    """Return the error for an OpenGL that failed with `cause`."""
     choice = os.environ.get("MUJOCO_GL", "")
     return RobotUnavailable(f"OpenGL is not available (MUJOCO_GL={choice}: {type(cause).__name__}: {cause}). {ADVICE}")

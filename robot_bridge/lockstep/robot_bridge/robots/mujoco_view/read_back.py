@@ -1,4 +1,4 @@
-"""What MuJoCo's own calls for the picture buffer do at a higher cost: OpenGL directly.
+"""Sets up and reads MuJoCo's picture buffer directly by OpenGL, at a lower cost than MuJoCo's own calls.
 
 Call these in the thread of the context, while it is current.
 """
@@ -14,10 +14,10 @@ __all__ = ["drop_stencil", "read_rgba"]
 
 
 def drop_stencil(context: Any, width: int, height: int) -> None:
-    """Give the off-screen buffer, of that size and without multisampling, depth alone.
+    """Give the off-screen buffer, of that size and without multisampling, a depth buffer without a stencil.
 
-    Only reflections need the stencil. With it a depth takes twice the bytes, which on a CPU is a tenth of a picture.
-    Where OpenGL will not have it so, the buffer stays as it was.
+    Only reflections need the stencil. With it a depth takes twice the bytes, which on a CPU is a tenth of a picture. If
+    OpenGL does not accept that, the buffer stays as it was.
     """
     if context.offSamples or GL.glCheckFramebufferStatus(GL.GL_FRAMEBUFFER) != GL.GL_FRAMEBUFFER_COMPLETE:
         return
@@ -37,6 +37,6 @@ def _attach(context: Any, kind: int, width: int, height: int, *, stencil: bool) 
 def read_rgba(pixels: npt.NDArray[np.uint8], viewport: mujoco.MjrRect) -> None:
     """Fill `pixels` (height, width, 4) with the rows of the picture just drawn, the lowest first.
 
-    The framebuffer stores four bytes a pixel: three, which `mjr_readPixels` gives, are packed one by one.
+    The framebuffer stores four bytes a pixel; the three that `mjr_readPixels` gives are packed one by one.
     """
     GL.glReadPixels(0, 0, viewport.width, viewport.height, GL.GL_RGBA, GL.GL_UNSIGNED_BYTE, pixels)

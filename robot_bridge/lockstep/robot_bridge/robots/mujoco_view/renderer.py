@@ -1,4 +1,4 @@
-"""The render thread: OpenGL contexts belong to a thread, so all pictures are drawn and converted in this one."""
+"""Draws and converts all pictures in one thread, since an OpenGL context belongs to a thread."""
 
 import asyncio
 import concurrent.futures
@@ -22,7 +22,7 @@ class Renderer:
     """Draws one picture at a time. It releases the interpreter while it draws, so that the loop runs on."""
 
     def __init__(self, model: Any, width: int, height: int, look: Look = DEFAULT_LOOK) -> None:
-        """Returns when the context is there. `width` and `height` of the largest picture.
+        """Start the thread; returns when the context is there. `width` and `height`: of the largest picture.
 
         Raises:
             RobotUnavailable: OpenGL cannot be used here.
@@ -38,15 +38,15 @@ class Renderer:
             raise graphics_unavailable(error) from error
 
     async def picture(self, camera: Camera, positions: npt.NDArray[np.float64]) -> bytes:
-        """`camera`'s view of the state as yuv420p."""
+        """Return `camera`'s view of the state as yuv420p."""
         return await asyncio.get_running_loop().run_in_executor(self._thread, self._draw, camera, positions)
 
     def drawing(self, camera: Camera) -> Callable[[npt.NDArray[np.float64], int], Awaitable[bytes]]:
-        """As a source of pictures draws them; the event is not shown."""
+        """Return a function that draws a state for a source of pictures; it does not show the event."""
         return lambda positions, event: self.picture(camera, positions)
 
     def close(self) -> None:
-        """Waits for the picture being drawn. May be called again."""
+        """End the thread after the picture that it draws. May be called again."""
         if self._canvas is not None:
             self._thread.submit(self._canvas.close)
             self._canvas = None

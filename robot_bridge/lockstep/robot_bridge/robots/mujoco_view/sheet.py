@@ -1,4 +1,4 @@
-"""Where a picture is drawn, and how it is turned into planes."""
+"""A buffer for drawn pictures, and their conversion into planes."""
 
 import av
 import numpy as np
@@ -11,7 +11,7 @@ class Sheet:
     """Pixels of one size, used for one picture after the other in one thread.
 
     Attributes:
-        pixels: (height, width, RGBA), the lowest row first as OpenGL has it
+        pixels: (height, width, RGBA), the lowest row first, as OpenGL has it
     """
 
     def __init__(self, width: int, height: int) -> None:
@@ -20,7 +20,7 @@ class Sheet:
         self._reformatter = VideoReformatter()  # kept: it holds the prepared conversion
 
     def yuv420p(self) -> bytes:
-        """Planes Y, U, V without padding, the highest row first, BT.601 limited range."""
+        """Return planes Y, U, V without padding, the highest row first, BT.601 limited range."""
         converted = self._reformatter.reformat(self._frame, format="yuv420p", threads=1)
         planes = (
             np.frombuffer(memoryview(plane), np.uint8).reshape(-1, plane.line_size)[::-1, : plane.width]

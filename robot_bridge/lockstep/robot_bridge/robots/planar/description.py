@@ -1,4 +1,4 @@
-"""What the planar robot tells a console about itself."""
+"""The planar robot's description for a console."""
 
 import math
 

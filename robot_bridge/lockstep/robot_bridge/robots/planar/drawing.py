@@ -1,4 +1,4 @@
-"""The planar robot's pictures, in yuv420p, drawn with numpy alone."""
+"""Draws the planar robot's pictures in yuv420p, with numpy alone."""
 
 import math
 from typing import TYPE_CHECKING
@@ -21,7 +21,7 @@ Colour = tuple[int, int, int]  # y, u, v
 FLOOR: Colour = (52, 132, 124)
 GRID: Colour = (66, 132, 124)
 WALL: Colour = (150, 132, 124)
-FORBIDDEN: Colour = (78, 116, 168)  # a zone that the robot is not to enter
+FORBIDDEN: Colour = (78, 116, 168)  # a zone that the robot must not enter
 PILLAR: Colour = (140, 104, 158)
 BODY: Colour = (130, 168, 92)
 NOSE: Colour = (225, 128, 128)
@@ -63,7 +63,7 @@ class Picture:
                 plane[top:bottom, left:right][(columns - cx) ** 2 + (rows - cy) ** 2 <= r * r] = value
 
     def finish(self, event: int) -> bytes:
-        """The bytes, with the event strip on top."""
+        """Return the bytes, with the event strip on top."""
         rows = (strip_height(self.y.shape[0]) + 1) // 2
         self.u[:rows] = self.v[:rows] = 128
         draw_event_strip(self.y, event)
@@ -119,7 +119,7 @@ class OverviewDrawing:
 
 
 class FrontDrawing:
-    """What the robot sees ahead: one ray per pair of columns, walls and pillars by distance."""
+    """The view ahead of the robot: one ray per pair of columns, walls and pillars by distance."""
 
     def __init__(self, width: int, height: int) -> None:
         self._picture = Picture(width, height)

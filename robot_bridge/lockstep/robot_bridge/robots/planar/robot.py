@@ -33,7 +33,7 @@ class PlanarState(NamedTuple):
 
 
 class PlanarRobot(Robot):
-    """A robot for tests and for machines without GL. Moves exactly as commanded unless something is in the way."""
+    """A robot for tests and for machines without GL. It moves exactly as commanded unless something is in the way."""
 
     tick_seconds = 0.004
     rests_from_thread = True

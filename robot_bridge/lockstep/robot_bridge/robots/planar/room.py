@@ -10,13 +10,13 @@ __all__ = ["CHARGER", "HALF_LENGTH", "HALF_WIDTH", "PILLARS", "Contact", "contac
 HALF_LENGTH = 4.0  # m, walls at x = ±
 HALF_WIDTH = 3.0  # m, walls at y = ±
 PILLARS = np.array([[2.0, 1.2, 0.35], [-1.8, -1.0, 0.5], [-1.5, 1.8, 0.25]])  # x, y, radius (m)
-CHARGER = (2.8, -3.1, 4.1, -2.0)  # m, left, low, right, high: where the robot is not to go; reaches into the walls
+CHARGER = (2.8, -3.1, 4.1, -2.0)  # m, left, low, right, high: a zone that is forbidden; reaches into the walls
 
 FloatArray = npt.NDArray[np.float64]
 
 
 class Contact(NamedTuple):
-    """A place where the robot is in something: how deep (m), and the unit normal that points out of it."""
+    """A contact of the robot with an obstacle: its depth (m), and the unit normal that points out of the obstacle."""
 
     depth: float
     nx: float
@@ -24,7 +24,7 @@ class Contact(NamedTuple):
 
 
 def contacts(x: float, y: float, radius: float) -> list[Contact]:
-    """All contacts of a disc at (x, y)."""
+    """Return all contacts of a disc at (x, y)."""
     found = [
         Contact(depth, nx, ny)
         for depth, nx, ny in (
@@ -46,7 +46,7 @@ def contacts(x: float, y: float, radius: float) -> list[Contact]:
 
 
 def ray_hits(x: float, y: float, angles: FloatArray) -> tuple[FloatArray, npt.NDArray[np.bool_]]:
-    """Distance from (x, y) to the first wall or pillar along each angle (rad), and whether it is a pillar."""
+    """Return the distance from (x, y) to the first wall or pillar along each angle (rad), and True for pillars."""
     cos, sin = np.cos(angles), np.sin(angles)
     with np.errstate(divide="ignore"):
         to_x = (np.copysign(HALF_LENGTH, cos) - x) / np.where(cos == 0, 1e-12, cos)

@@ -26,7 +26,7 @@ class Synthesiser:
         self._steps = np.arange(1, SEGMENT_SAMPLES + 1)
 
     def segment(self, speed: float) -> bytes:
-        """20 ms of pcm_s16le at `speed` (m/s)."""
+        """Return 20 ms of pcm_s16le at `speed` (m/s)."""
         tone = self._tone_phase + self._steps * (math.tau * TONE_HZ / MICROPHONE.sample_rate)
         hum_step = math.tau * (HUM_HZ[0] + HUM_HZ[1] * speed) / MICROPHONE.sample_rate
         hum = self._hum_phase + self._steps * hum_step

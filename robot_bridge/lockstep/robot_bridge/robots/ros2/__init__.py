@@ -1,4 +1,4 @@
-"""Any robot that ROS 2 drives, described by one YAML file (docs/ros2.md). rclpy is imported when one is made."""
+"""Any robot that ROS 2 drives, described by one YAML file (docs/ros2.md). rclpy is imported when a robot is made."""
 
 from pathlib import Path
 
@@ -14,7 +14,7 @@ __all__ = ["create", "read_settings"]
 
 
 def create(path: Path) -> Robot:
-    """The robot that the file describes.
+    """Return the robot that the file describes.
 
     Raises:
         SettingsError: the file cannot be used; names the line and the key.
@@ -27,7 +27,11 @@ def create(path: Path) -> Robot:
 
 
 def read_settings(path: Path) -> tuple[Ros2Settings, RobotDescription]:
-    """Needs no ROS. Raises SettingsError as `create` does."""
+    """Read a robot's file, which needs no ROS.
+
+    Raises:
+        SettingsError: as for `create`.
+    """
     file = YamlFile(path)
     settings = file.convert(Ros2Settings)
     try:

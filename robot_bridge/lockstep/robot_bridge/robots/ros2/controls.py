@@ -1,4 +1,4 @@
-"""Which sticks and keys move which axes, unless the settings say so themselves."""
+"""Assigns sticks and keys to the axes, unless the settings do so themselves."""
 
 from collections.abc import Sequence
 from typing import Final, NamedTuple
@@ -11,11 +11,11 @@ __all__ = ["arm_layers", "base_layer"]
 class _Stick(NamedTuple):
     pad: PadInput
     touch: TouchPad
-    inverted_touch: bool  # where left is positive
+    inverted_touch: bool  # for sticks whose left is positive
     keys: tuple[str, str]
 
 
-# Pads say up and left with negative numbers; up, forward and left are positive here (ROS REP 103).
+# Pads report up and left as negative numbers; up, forward and left are positive here (ROS REP 103).
 _STICKS: Final = (
     _Stick("left_y", "left_y", False, ("KeyW", "KeyS")),
     _Stick("left_x", "left_x", True, ("KeyA", "KeyD")),
@@ -26,7 +26,7 @@ _FORWARD, _LEFT, _UP, _TURN = _STICKS
 
 
 def base_layer(forward: str, left: str | None, turn: str | None) -> ControlLayer:
-    """Forward and sideways on the left stick, turning on the right one."""
+    """Return a layer with forward and sideways on the left stick, turning on the right one."""
     bindings = [_binding(forward, _FORWARD)]
     if left is not None:
         bindings.append(_binding(left, _LEFT))
@@ -37,7 +37,7 @@ def base_layer(forward: str, left: str | None, turn: str | None) -> ControlLayer
 
 
 def arm_layers(axes: Sequence[Axis]) -> tuple[ControlLayer, ...]:
-    """Four joints to a layer, so that two touch sticks reach all of them."""
+    """Return layers of four joints each, so that two touch sticks reach all of them."""
     groups = [axes[start : start + len(_STICKS)] for start in range(0, len(axes), len(_STICKS))]
     return tuple(
         ControlLayer(

@@ -1,4 +1,4 @@
-"""From the settings of a ROS 2 robot to its description for a console."""
+"""Makes the description of a ROS 2 robot from its settings."""
 
 import math
 from typing import Final
@@ -32,8 +32,10 @@ _COLOUR = (0.25, 0.55, 0.85, 1.0)
 
 
 def describe(settings: Ros2Settings) -> RobotDescription:
-    """Raises:
-    SettingsPlace: the settings contradict each other.
+    """Return the description of the robot.
+
+    Raises:
+        SettingsPlace: the settings contradict each other.
     """
     base, arm = settings.base, settings.arm
     if base is None and arm is None:
@@ -168,7 +170,7 @@ def _planar_base(base: Base) -> PlanarBase:
 
 
 def _base_body(base: Base) -> Body:
-    """A disc with a mark at its front, where the odometry says the base is."""
+    """Return a disc with a mark at its front, at the pose of the odometry."""
     radius = max(base.radius, 0.05)
     x, y, yaw = BASE_JOINTS
     return Body(

@@ -18,14 +18,16 @@ __all__ = ["Ros2Robot"]
 
 
 class Ros2Robot(Robot):
-    """Drives its parts, and gathers their measurements and those of the sensors."""
+    """Drives the parts of the robot, and gathers their measurements and those of the sensors."""
 
     tick_seconds = 0.01
     rests_from_thread = True
 
     def __init__(self, settings: Ros2Settings, description: RobotDescription) -> None:
-        """Raises:
-        RobotUnavailable: ROS 2 is missing or does not start.
+        """Start the node.
+
+        Raises:
+            RobotUnavailable: ROS 2 is missing or does not start.
         """
         self._description = description
         self._ros = RosSide(settings)
@@ -90,7 +92,7 @@ class Ros2Robot(Robot):
         call_all([drive.rest_from_thread for drive in self._drives])
 
     def stop(self) -> None:
-        """Says zero to every part whose last word was another, and no motion until `reset`."""
+        """Publish zero to every part whose last message was another, and no motion until `reset`."""
         call_all([drive.stop for drive in self._drives])
 
     def reset(self) -> None:
@@ -108,7 +110,7 @@ class Ros2Robot(Robot):
 
 
 def call_all(calls: Sequence[Callable[[], None]]) -> None:
-    """Makes every call, also when one raises; raises the first exception."""
+    """Make every call, even if one raises; then raise the first exception."""
     errors: list[Exception] = []
     for call in calls:
         try:

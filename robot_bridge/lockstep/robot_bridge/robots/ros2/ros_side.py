@@ -1,4 +1,4 @@
-"""The only place that touches rclpy: one node in a context of its own, its callbacks in a thread of their own."""
+"""The only module that uses rclpy: one node in a separate context, with its callbacks in a separate thread."""
 
 import logging
 import threading
@@ -19,15 +19,17 @@ _logger = logging.getLogger(__name__)
 
 
 class RosSide:
-    """Publishes from any thread. Callbacks of subscriptions run in the node's thread and must not raise.
+    """A ROS 2 node. It publishes from any thread; callbacks of subscriptions run in its own thread and must not raise.
 
     Attributes:
-        failure: what ended the node's thread; None while it runs
+        failure: the exception that ended the node's thread; None while it runs
     """
 
     def __init__(self, settings: Ros2Settings) -> None:
-        """Raises:
-        RobotUnavailable: rclpy or a middleware is missing, or ROS cannot be initialised.
+        """Make the node.
+
+        Raises:
+            RobotUnavailable: rclpy or a middleware is missing, or ROS cannot be initialised.
         """
         try:
             rclpy = import_module("rclpy")
@@ -63,14 +65,14 @@ class RosSide:
         self._thread = threading.Thread(target=self._spin, name="ros", daemon=True)
 
     def start(self) -> None:
-        """After all subscriptions were made."""
+        """Start the callbacks, after all subscriptions were made."""
         self._thread.start()
 
     def message(self, package: str, name: str) -> Any:
-        """A message class, imported when it is asked for.
+        """Import and return a message class.
 
         Raises:
-            RobotUnavailable: it is not installed.
+            RobotUnavailable: the message is not installed.
         """
         try:
             return getattr(import_module(f"{package}.msg"), name)
@@ -78,25 +80,25 @@ class RosSide:
             raise RobotUnavailable(f"ROS 2 messages {package}/{name} are missing: {error}") from error
 
     def publisher(self, kind: Any, topic: str) -> Any:
-        """For commands: reliable, the newest only, nothing for those who come later."""
+        """Return a publisher for commands: reliable, the newest only, nothing for subscribers that come later."""
         publisher = self._node.create_publisher(kind, topic, self._profile("RELIABLE"))
         self._publishers.append(publisher)
         return publisher
 
     def subscribe(self, kind: Any, topic: str, callback: Callable[[Any], None]) -> None:
-        """For sensors: the newest only, from reliable and best-effort publishers alike."""
+        """Subscribe to a sensor: the newest message only, from reliable and best-effort publishers alike."""
         self._node.create_subscription(kind, topic, callback, self._profile("BEST_EFFORT"))
 
     def now_ns(self) -> int:
-        """The ROS clock, which header stamps are made with."""
+        """Return the time of the ROS clock, which header stamps are made with."""
         return int(self._node.get_clock().now().nanoseconds)
 
     def now_message(self) -> Any:
-        """The same as builtin_interfaces/Time."""
+        """Return the same time as builtin_interfaces/Time."""
         return self._node.get_clock().now().to_msg()
 
     def span_message(self, seconds: float) -> Any:
-        """builtin_interfaces/Duration."""
+        """Return a duration as builtin_interfaces/Duration."""
         return self._duration.Duration(seconds=seconds).to_msg()
 
     def flush(self) -> None:
@@ -106,7 +108,7 @@ class RosSide:
                 publisher.wait_for_all_acked(self._duration.Duration(seconds=FLUSH_SECONDS))
 
     def close(self) -> None:
-        """Blocks shortly. May be called again."""
+        """End the node; blocks shortly. May be called again."""
         if self._closed:
             return
         self._closed = True
@@ -135,5 +137,5 @@ class RosSide:
 
 
 def header_ns(header: Any) -> int:
-    """A std_msgs/Header's stamp; 0 when it is unset."""
+    """Return the stamp of a std_msgs/Header in ns; 0 if it is unset."""
     return int(header.stamp.sec) * 1_000_000_000 + int(header.stamp.nanosec)

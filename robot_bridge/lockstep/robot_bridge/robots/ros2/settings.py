@@ -1,4 +1,4 @@
-"""What the YAML file of a ROS 2 robot may say. docs/ros2.md explains it to its users."""
+"""The settings in the YAML file of a ROS 2 robot. docs/ros2.md explains them to users."""
 
 from typing import Annotated, Literal
 
@@ -38,7 +38,7 @@ class TwistCommand(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
 
 class Odometry(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     topic: Topic = "/odom"
-    timeout: Timeout = 0.5  # s without a new one until the base must not move
+    timeout: Timeout = 0.5  # s without a new message until the base must not move
     still: NotNegative = 0.01  # m/s and rad/s, below which the base counts as at rest
 
 
@@ -50,7 +50,7 @@ class BaseAxis(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
 
 
 class Base(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """A mobile base that takes twists and says where it is."""
+    """A mobile base that takes twists and reports its pose."""
 
     forward: BaseAxis
     left: BaseAxis | None = None
@@ -98,11 +98,11 @@ class Arm(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
 
 
 class Ranges(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """A LaserScan, gathered into `count` sectors all around: each shows the nearest thing in it."""
+    """A LaserScan, gathered into `count` sectors all around; each shows the nearest distance in it."""
 
     topic: Topic = "/scan"
     timeout: Timeout = 1.0
-    body: str | None = None  # it sits on; None: the base, or the world without one
+    body: str | None = None  # the body that it sits on; None: the base, or the world without one
     yaw: float = 0.0  # rad, of the scanner's frame in the body's
     count: Annotated[int, Meta(ge=3, le=720)] = 72
     range_min: NotNegative = 0.05  # m
@@ -119,7 +119,7 @@ class Wrench(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
 
 
 class CameraTopic(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Pictures of one topic."""
+    """Pictures from one topic."""
 
     name: Name
     label: str = ""
@@ -127,14 +127,14 @@ class CameraTopic(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
     message: Literal["Image", "CompressedImage"] = "Image"
     width: Annotated[int, Meta(ge=16, le=8192)]
     height: Annotated[int, Meta(ge=16, le=8192)]
-    frame_rate: Annotated[float, Meta(ge=0.1, le=120)] = 15.0  # Hz; more than that is left out
-    captured: Literal["header", "arrival"] = "header"  # what tells the time of capture
+    frame_rate: Annotated[float, Meta(ge=0.1, le=120)] = 15.0  # Hz; further pictures are left out
+    captured: Literal["header", "arrival"] = "header"  # source of the time of capture
     latency: Annotated[float, Meta(ge=0, le=5)] = 0.0  # s, taken off that time besides
     timeout: Timeout = 2.0
 
 
 class Lockout(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """std_msgs/Bool: true keeps everybody from driving. Silence for longer than `timeout` does too."""
+    """A std_msgs/Bool topic: true keeps everybody from driving, and so does silence for longer than `timeout`."""
 
     topic: Topic
     timeout: Timeout = 1.0
@@ -158,5 +158,5 @@ class Ros2Settings(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
     lockout: Lockout | None = None
     cameras: Annotated[tuple[CameraTopic, ...], Meta(max_length=8)] = ()
     geofences: Annotated[tuple[Geofence, ...], Meta(max_length=32)] = ()
-    bodies: tuple[Body, ...] = ()  # more of the kinematic model than the base
-    layers: tuple[ControlLayer, ...] = ()  # instead of those that are made for the axes
+    bodies: tuple[Body, ...] = ()  # of the kinematic model, besides the base
+    layers: tuple[ControlLayer, ...] = ()  # replace those that are made for the axes

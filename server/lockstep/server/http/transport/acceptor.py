@@ -1,4 +1,4 @@
-"""Takes connections off a listening socket: each is counted before anything is spent on it, TLS or a request."""
+"""Accepts connections: each is counted before anything is spent on it, such as TLS or a request."""
 
 import asyncio
 import errno
@@ -12,11 +12,11 @@ from lockstep.server.util.fair_queue import FairQueue
 
 __all__ = ["PROXIES", "Acceptor", "PlacedProtocol"]
 
-# Whose X-Forwarded-For is believed: uvicorn's default, and how IPv4 looks to a socket of both families.
+# Proxies whose X-Forwarded-For is believed: uvicorn's default, and 127.0.0.1 as a socket of both families sees it.
 PROXIES = frozenset({"127.0.0.1", "::1", "::ffff:127.0.0.1"})
 HANDSHAKE_SECONDS = 5.0  # for TLS
 PAUSE = 0.1  # s, when there is no descriptor left
-LOOK_AGAIN = 0.02  # s, when all places are taken by who has just come
+LOOK_AGAIN = 0.02  # s, when all places are taken by connections that have just come
 
 
 class PlacedProtocol(asyncio.Protocol):
@@ -26,7 +26,7 @@ class PlacedProtocol(asyncio.Protocol):
 
 
 class Acceptor:
-    """Run `run` as a task."""
+    """Accepts the connections of a listening socket. Run `run` as a task."""
 
     def __init__(
         self,
@@ -36,7 +36,7 @@ class Acceptor:
         make_protocol: Callable[[], PlacedProtocol],
         tls: ssl.SSLContext | None,
     ) -> None:
-        """`turns`: in which connections begin; what they send has its turns too."""
+        """`turns`: the queue in which connections begin; their input is in it too."""
         self._listener = listener
         self._places = places
         self._turns = turns
@@ -44,11 +44,12 @@ class Acceptor:
         self._tls = tls
 
     async def run(self) -> None:
-        """Until cancelled; connections that have begun by then go on.
+        """Accept connections until cancelled; those that have begun by then go on.
 
         Each has its turn before the next one is accepted: the others wait in the kernel, where they cost nothing and
-        where the newest cannot push out one that has not begun, or has had no time to speak. However many strangers'
-        requests wait, it has its turn: somebody who comes to say STOP is a stranger until the connection has begun.
+        where the newest cannot push out one that has not begun, or has had no time to send a request. However many
+        strangers' requests wait, it has its turn: a client that comes to send STOP is a stranger until its connection
+        has begun.
         """
         loop = asyncio.get_running_loop()
         async with asyncio.TaskGroup() as tasks:
@@ -71,7 +72,7 @@ class Acceptor:
                 _Beginning(self, connection, str(address[0]), tasks)
 
     async def _until_there_is_room(self) -> None:
-        """Or until whoever has to go has had the time to speak."""
+        """Return when there is room, or the connection that has to go has had time to send a request."""
         loop = asyncio.get_running_loop()
         while True:
             wait = self._places.wait(loop.time())
@@ -85,7 +86,11 @@ class Acceptor:
         return protocol
 
     async def connect(self, connection: socket.socket, protocol: PlacedProtocol) -> None:
-        """Through the handshake, if there is one; asyncio closes what ends there. Raises OSError or TimeoutError."""
+        """Do the TLS handshake, if there is one; asyncio closes the socket if it fails.
+
+        Raises:
+            OSError, TimeoutError: the handshake failed.
+        """
         await asyncio.get_running_loop().connect_accepted_socket(
             lambda: protocol,
             connection,
@@ -99,7 +104,7 @@ class Acceptor:
 
 
 class _Beginning:
-    """A connection that has no protocol yet: it can be closed all the same."""
+    """A connection that has no protocol yet, but can be closed all the same."""
 
     def __init__(self, acceptor: Acceptor, connection: socket.socket, address: str, tasks: asyncio.TaskGroup) -> None:
         self._acceptor = acceptor

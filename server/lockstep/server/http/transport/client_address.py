@@ -1,11 +1,11 @@
-"""Who counts as one client. No I/O."""
+"""Maps addresses to clients for counting. No I/O."""
 
 import ipaddress
 from functools import lru_cache
 
 __all__ = ["NO_ADDRESS", "counted_address"]
 
-NO_ADDRESS = "no address"  # all that are none, however a proxy wrote them, count as one
+NO_ADDRESS = "no address"  # the key of any text that is not an address, however a proxy wrote it
 LONGEST = 64  # characters of an address, with its scope
 HOST_BITS = 64  # of an IPv6 address: a client owns at least a /64
 
@@ -24,5 +24,5 @@ def _counted(text: str) -> str:
 
 
 def counted_address(text: str) -> str:
-    """The key under which a client's address is counted: an IPv6 one by its /64."""
+    """Return the key under which a client's address is counted: an IPv6 one by its /64."""
     return _counted(text) if len(text) <= LONGEST else NO_ADDRESS

@@ -1,8 +1,8 @@
-"""Which connections there may be. When there is no place it is never the newcomer who goes: a stranger does. No I/O.
+"""Decides which connections get a place. If all are taken, a stranger loses one, never the newcomer. No I/O.
 
-A connection is a stranger's until a request on it has brought a good token. Every connection begins as one, so where
-strangers were refused at the door, somebody who comes to say STOP would be refused with them. For the same reason who
-has just come keeps his place for a moment, in which he can say what he comes for: newcomers wait outside meanwhile.
+A connection is a stranger's until a request on it has brought a good token. Every connection begins as one, so if the
+console refused strangers, a client that comes to send STOP would be refused with them. For the same reason a new
+connection keeps its place for a moment, in which it can send its request; newcomers wait meanwhile.
 """
 
 from collections.abc import Callable
@@ -15,25 +15,25 @@ GRACE = 0.25  # s; a busy proxy has opened a connection well before it writes th
 
 
 class Place:
-    """One connection's. It may be given back, or be taken away: then `close` is called."""
+    """The place of one connection. It may be given back, or be taken away: then `close` is called."""
 
     __slots__ = ("address", "asked", "close", "group", "link", "refused", "since")
 
     def __init__(self, address: str, close: Callable[[], None], since: float) -> None:
         self.address = address  # as it is counted
         self.since = since
-        self.asked = False  # whether a request came on it
-        self.link = ""  # of the good token that the newest request on it brought; "": a stranger's
+        self.asked = False  # True once a request came on it
+        self.link = ""  # link of the newest request's good token; "": a stranger's
         self.refused = 0  # requests in a row that were turned away
         self.close = close
-        self.group: dict[Place, None] | None = None  # where it is counted; None: nowhere any more
+        self.group: dict[Place, None] | None = None  # the group that counts it; None: not counted any more
 
 
 class ConnectionPlaces:
-    """`on_refused` gets a stable name to count for each connection that has to go."""
+    """Gives places to connections. `on_refused` gets a stable name to count for each one that has to go."""
 
     def __init__(self, total: int, per_client: int, on_refused: Callable[[str], None]) -> None:
-        """`per_client`: of one address, and of one link."""
+        """`per_client`: bound for one address, and for one link."""
         self.on_refused = on_refused
         self._total = total
         self._per_client = per_client
@@ -54,15 +54,15 @@ class ConnectionPlaces:
         return sum(map(len, self._known.values()))
 
     def wait(self, now: float) -> float:
-        """For how long (s) a newcomer waits outside: its place is that of somebody who has had no time to speak yet.
+        """Return how long (s) a newcomer has to wait: as long as the next to go has had no time to send a request.
 
-        0 when there is room, and when who would have to go has asked something or kept silent for `GRACE`.
+        0 if there is room, or if the next to go has sent a request or been silent for `GRACE`.
         """
         oldest = self._oldest() if self._count >= self._total else None
         return 0.0 if oldest is None or oldest.asked else max(0.0, oldest.since + GRACE - now)
 
     def enter(self, address: str, close: Callable[[], None], now: float, *, proxy: bool = False) -> Place:
-        """A new connection of a stranger. `proxy`: many clients come from this address; it tells them apart later."""
+        """Add a stranger's new connection. `proxy`: many clients come from this address; it tells them apart later."""
         place = Place(address, close, now)
         self._count += 1
         self._join(place, bounded=not proxy)
@@ -71,9 +71,9 @@ class ConnectionPlaces:
         return place
 
     def serve(self, place: Place, address: str, link: str) -> bool:
-        """A request came on it, from this address, with a good token of this link ("": with none).
+        """Note that a request came on it, from this address, with a good token of this link ("": without one).
 
-        False: its place was taken away meanwhile.
+        False if its place was taken away meanwhile.
         """
         if place.group is None:
             return False
@@ -85,7 +85,7 @@ class ConnectionPlaces:
         return True
 
     def leave(self, place: Place) -> None:
-        """Idempotent."""
+        """Give a place back. Idempotent."""
         if place.group is not None:
             self._drop(place)
             self._count -= 1
@@ -111,7 +111,7 @@ class ConnectionPlaces:
         self._take_away(self._oldest(newcomer) or newcomer)
 
     def _oldest(self, newcomer: Place | None = None) -> Place | None:
-        """The oldest of who has most: of strangers first, then of the links. None: there is the newcomer alone."""
+        """Return the oldest place of the stranger, or else the link, with most; None if there is only the newcomer."""
         for groups in (self._strangers, self._known):
             most = max(groups.values(), key=len, default={})
             oldest = next(iter(most), newcomer)

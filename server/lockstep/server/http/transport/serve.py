@@ -1,4 +1,4 @@
-"""Runs the app on uvicorn, and says when it is ready."""
+"""Runs the app on uvicorn, and tells when it is ready."""
 
 import asyncio
 import contextlib
@@ -19,10 +19,10 @@ from lockstep.server.http.transport.uvicorn_websocket_limits import GuardedWebSo
 
 __all__ = ["PortTaken", "bind", "running", "wait_for_signal"]
 
-BACKLOG = 1024  # connections that wait to be accepted, a flood of them before somebody's STOP
+BACKLOG = 1024  # connections that wait to be accepted; a flood of them may come before a STOP
 SHUTDOWN_TIMEOUT = 3  # s for HTTP requests under way
 MAX_HEAD = 16 * 1024  # bytes of a request's head
-MAX_WEBSOCKET_MESSAGE = 64 * 1024  # bytes from a viewer of the scene, or from a watcher
+MAX_WEBSOCKET_MESSAGE = 64 * 1024  # bytes from a viewer of the scene, or from an observer
 
 
 class PortTaken(Exception):
@@ -37,10 +37,10 @@ class PortTaken(Exception):
 
 
 def bind(host: str, port: int) -> socket.socket:
-    """A listening socket; port 0 takes any free one.
+    """Return a listening socket; port 0 takes any free one.
 
     Raises:
-        PortTaken: somebody else has it, or the address is not ours.
+        PortTaken: the port is in use, or the address is not this machine's.
     """
     try:
         family, kind, protocol, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]
@@ -59,11 +59,11 @@ def bind(host: str, port: int) -> socket.socket:
 
 
 class _Server(uvicorn.Server):
-    """Says when it is ready, and leaves the signals to its caller."""
+    """A uvicorn server that tells when it is ready, and leaves the signals to its caller."""
 
     def __init__(self, config: uvicorn.Config, guarded: GuardedConnections | None, listener: socket.socket) -> None:
         super().__init__(config)
-        self.settled = asyncio.Event()  # it answers, or it has failed
+        self.settled = asyncio.Event()  # set when it answers, or has failed
         self._guarded = guarded
         self._listener = listener
         self._accepting: asyncio.Task[None] | None = None
@@ -77,7 +77,7 @@ class _Server(uvicorn.Server):
             self.settled.set()
 
     def _accept(self, guarded: GuardedConnections) -> None:
-        """Uvicorn's own way takes any number of connections, and does a TLS handshake before it tells anybody."""
+        """Accept connections in place of uvicorn, which takes any number, and tells of each after its TLS handshake."""
         loop = asyncio.get_running_loop()
 
         def make_protocol() -> PlacedProtocol:
@@ -111,16 +111,16 @@ async def running(
     http: GuardedConnections | None = None,
     tls: Certificate | None = None,
 ) -> AsyncIterator[None]:
-    """While entered, `app` answers on `listener`; on leaving it shuts down gracefully.
+    """Serve `app` on `listener` while entered; shut it down gracefully on leaving.
 
     Args:
-        http: its connections, within bounds; None: uvicorn's own, without
-        tls: what it encrypts with; None: nothing is encrypted
+        http: connections with bounds; None: uvicorn's own, without
+        tls: the certificate to encrypt with; None: nothing is encrypted
     """
     config = uvicorn.Config(
         app,
         access_log=False,  # a path can hold a ticket
-        log_level="error",  # uvicorn warns of every request that is not HTTP; we count them
+        log_level="error",  # uvicorn warns of every request that is not HTTP; the console counts them
         lifespan="on",
         ws=GuardedWebSocket,
         ws_max_size=MAX_WEBSOCKET_MESSAGE,
@@ -148,7 +148,7 @@ async def running(
 
 
 async def wait_for_signal() -> None:
-    """Until SIGINT, SIGTERM, or the end of the terminal unless that is ignored (`nohup`)."""
+    """Wait for SIGINT, SIGTERM, or the end of the terminal unless that is ignored (`nohup`)."""
     loop, asked = asyncio.get_running_loop(), asyncio.Event()
     signals = [signal.SIGINT, signal.SIGTERM]
     if signal.getsignal(signal.SIGHUP) is not signal.SIG_IGN:

@@ -1,4 +1,4 @@
-"""TLS: a self-signed certificate for the names and addresses that the console goes by, kept in the state directory."""
+"""TLS: a self-signed certificate for the console's names and addresses, kept in the state directory."""
 
 import datetime
 import ipaddress
@@ -15,21 +15,21 @@ from cryptography.x509.oid import ExtendedKeyUsageOID, NameOID
 __all__ = ["Certificate", "ends_at", "fingerprint", "own_names", "self_signed"]
 
 DAYS = 397  # more is refused by some browsers
-RENEW_DAYS = 30  # before its end it is made anew
+RENEW_DAYS = 30  # before its end, when it is renewed
 CERTIFICATE, KEY = "tls-cert.pem", "tls-key.pem"
 
 
 class Certificate(NamedTuple):
-    """Files in PEM."""
+    """The files of a certificate, in PEM."""
 
     chain: Path
     key: Path
 
 
 def self_signed(directory: Path, names: set[str], now: datetime.datetime) -> Certificate:
-    """The certificate kept in `directory`; a new one when there is none, it ends soon, or it lacks one of `names`.
+    """Return the certificate in `directory`; make a new one if it is missing, ends soon, or lacks one of `names`.
 
-    The same certificate at every start: who has told a browser to trust it is not asked again.
+    It is the same at every start, so a browser that was told to trust it does not ask again.
     """
     kept = Certificate(directory / CERTIFICATE, directory / KEY)
     if not _is_good(kept, names, now):
@@ -41,7 +41,7 @@ def self_signed(directory: Path, names: set[str], now: datetime.datetime) -> Cer
 
 
 def own_names(listening_on: str) -> set[str]:
-    """Names and addresses of this machine by which it may be asked for on `listening_on`."""
+    """Return the names and addresses by which clients may ask for this machine on `listening_on`."""
     names = {"localhost", "127.0.0.1", "::1", socket.gethostname().lower()}
     if listening_on not in ("", "0.0.0.0", "::"):
         names.add(listening_on)
@@ -55,7 +55,7 @@ def fingerprint(certificate: Certificate) -> str:
 
 
 def ends_at(certificate: Certificate) -> float:
-    """When the certificate is no longer good, s since 1970."""
+    """Return the time of the certificate's end, s since 1970."""
     return _load(certificate).not_valid_after_utc.timestamp()
 
 
@@ -106,7 +106,7 @@ def _pem(key: ec.EllipticCurvePrivateKey) -> bytes:
 
 
 def _write(path: Path, data: bytes) -> None:
-    """Whole or not at all, and for nobody else to read."""
+    """Write a file as a whole or not at all, readable by its owner alone."""
     beside = path.with_suffix(".new")
     descriptor = os.open(beside, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o600)
     with os.fdopen(descriptor, "wb") as file:

@@ -1,7 +1,7 @@
-"""HTTP connections with bounds: what each sends has its turn, and one deadline holds for all of an exchange.
+"""Bounds on HTTP connections: their input is handled in turns, and one deadline holds for a whole exchange.
 
-uvicorn bounds the size of a head and the time between two requests. It waits for ever for the rest of a request that
-has begun and for a client that does not read its answer, and handles whatever has come at once.
+uvicorn bounds the size of a head and the time between two requests. It waits forever for the rest of a request that
+has begun and for a client that does not read its answer, and handles all input at once.
 """
 
 import asyncio
@@ -23,16 +23,16 @@ from lockstep.server.util.token_bucket import TokenBucket
 __all__ = ["DEADLINE", "PLACE", "GuardedConnections", "guarded_by", "guarded_http"]
 
 DEADLINE, PLACE = "request_deadline", "place"  # keys of a request's `state`
-GRACE = 1.0  # s after the deadline, in which the answer that says so may leave
+GRACE = 1.0  # s after the deadline, in which the answer that reports it may leave
 LEAST_READ = 16 * 1024  # bytes of an answer that a client reads within the time of a request
-LINK_RATE, LINK_BURST = 50.0, 300  # Hz, of what one link sends before all others; a page that loads takes some thirty
-STOP_RATE, STOP_BURST = 50.0, 100  # the same for its stops, apart
+LINK_RATE, LINK_BURST = 50.0, 300  # Hz, of one link's input that goes first; a page's load takes some 30
+STOP_RATE, STOP_BURST = 50.0, 100  # the same for its stops, counted apart
 STOP = re.compile(rb"POST [!-~]{0,500}/api/(?:fleet/)?stop[ ?]")
 BEARER = re.compile(rb"\r\nauthorization:[ \t]*bearer[ \t]+([!-~]{1,4096})[ \t]*\r\n", re.IGNORECASE)
 
 
 class GuardedConnections(NamedTuple):
-    """What `lockstep.server.http.transport.serve.running` needs to take connections within bounds."""
+    """The parts that `lockstep.server.http.transport.serve.running` needs to bound connections."""
 
     protocol: type[PlacedProtocol]
     places: ConnectionPlaces
@@ -42,15 +42,15 @@ class GuardedConnections(NamedTuple):
 def guarded_http(
     places: ConnectionPlaces, turns: FairQueue, tokens: KnownTokens, seconds: float
 ) -> type[PlacedProtocol]:
-    """uvicorn's protocol within bounds. `seconds`: for a whole request, and for each part of its answer."""
-    budgets = {True: RateLimits(STOP_RATE, STOP_BURST), False: RateLimits(LINK_RATE, LINK_BURST)}  # whether of stops
+    """Return uvicorn's protocol with bounds. `seconds`: for a whole request, and for each part of its answer."""
+    budgets = {True: RateLimits(STOP_RATE, STOP_BURST), False: RateLimits(LINK_RATE, LINK_BURST)}  # by: is it a stop
 
     class GuardedHttp(H11Protocol, PlacedProtocol):
         place: Place
         _timer: asyncio.TimerHandle | None = None
         _asked = False  # for a turn
-        _read = True  # whether the client has read something of its answer since it was looked at
-        _unread = 0  # bytes, when it was looked at
+        _read = True  # whether the client has read something of its answer since the last look
+        _unread = 0  # bytes, at the last look
         _upgraded = False
         _awaited = True  # a whole request, or the rest of one
         _is_stop = False  # the request that is coming
@@ -75,7 +75,7 @@ def guarded_http(
                 turns.ask(known or self.place.address, self._take, first=first)
 
         def _known(self) -> str:
-            """The good token, or the link, that brings what has come; "": a stranger does."""
+            """Return the good token, or the link, of what has come; "" if it is a stranger's."""
             if self.conn.their_state is not h11.IDLE:
                 return self.place.link
             self._is_stop = STOP.match(self._arrived) is not None
@@ -84,7 +84,7 @@ def guarded_http(
             return token if token in tokens else ""
 
         def _take(self) -> None:
-            """In its turn: what has come so far."""
+            """Handle what has come so far; called in its turn."""
             self._asked = False
             if self.transport.is_closing():
                 return
@@ -102,7 +102,7 @@ def guarded_http(
         def send_400_response(self, msg: str) -> None:
             places.on_refused("bad_request")
             if self.cycle is not None and not self.cycle.response_complete:
-                self.cycle.disconnected = True  # what the app still answers goes nowhere; a stop is one all the same
+                self.cycle.disconnected = True  # the app's answer is discarded; a stop has effect all the same
                 self.cycle.message_event.set()
             if self.conn.our_state in (h11.IDLE, h11.SEND_RESPONSE):
                 super().send_400_response(msg)
@@ -118,7 +118,7 @@ def guarded_http(
             super().connection_lost(exc)
 
         def handle_websocket_upgrade(self, event: h11.Request) -> None:
-            self._leave()  # from here on another protocol has the connection; viewers are bounded by themselves
+            self._leave()  # another protocol takes over the connection; viewers have other bounds
             self._upgraded = True
             self.app_state = {key: value for key, value in self.app_state.items() if key != PLACE}
             super().handle_websocket_upgrade(event)
@@ -127,10 +127,10 @@ def guarded_http(
             super().on_response_complete()
             self._awaited = self.conn.their_state is h11.SEND_BODY  # else uvicorn's own timer runs, until the next one
             if self._awaited and self.loop.time() >= self.app_state[DEADLINE]:
-                self.transport.close()  # the answer was given without the rest of the body, and says or counts so
+                self.transport.close()  # answered without the rest of the body, which was reported or counted
 
         def _begin(self) -> None:
-            """An exchange: from its first byte, or from the connection on."""
+            """Begin an exchange, at its first byte or with the connection."""
             self._awaited = True
             self.app_state[DEADLINE] = self.loop.time() + seconds
             if self._timer is not None:
@@ -144,7 +144,7 @@ def guarded_http(
             self._timer = None
             now, unread = self.loop.time(), self.transport.get_write_buffer_size()
             if self.conn.their_state is h11.SEND_BODY and now < self.app_state[DEADLINE] + GRACE:
-                self._look_again(GRACE)  # whoever waits for the body says by name that it did not come
+                self._look_again(GRACE)  # the reader of the body reports by name that it did not come
             elif self._awaited and self.conn.their_state in (h11.IDLE, h11.SEND_BODY):
                 self._end("too_slow")
             elif unread and not self._read and unread > self._unread - LEAST_READ:
@@ -167,7 +167,7 @@ def guarded_http(
 
 
 def guarded_by(settings: LimitSettings, app: Starlette) -> GuardedConnections:
-    """Connections within the settings' bounds to an app that `guard_app` has seen."""
+    """Return connections within the settings' bounds, to an app that `guard_app` has prepared."""
     places: ConnectionPlaces = app.state.connection_places
     turns = FairQueue(lambda now: TokenBucket(settings.max_stranger_rate, settings.max_stranger_burst, now))
     protocol = guarded_http(places, turns, app.state.known_tokens, settings.request_timeout)

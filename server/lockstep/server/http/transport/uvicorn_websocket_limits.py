@@ -1,7 +1,7 @@
-"""WebSocket connections with bounds that uvicorn does not have: control frames, fragments, and how long an end takes.
+"""Bounds on WebSocket connections that uvicorn does not have: control frames, fragments, and the time of closing.
 
-Whoever sends pings and reads no answers would fill the write buffer; whoever sends empty fragments, the list of them;
-whoever reads nothing would keep a connection that has ended.
+A client that sends pings and reads no answers would fill the write buffer; one that sends empty fragments, the list of
+them; one that reads nothing would keep a connection that has ended.
 """
 
 import asyncio
@@ -16,11 +16,11 @@ from lockstep.server.util.token_bucket import TokenBucket
 
 __all__ = ["LINES", "TOO_MANY_FRAMES", "GuardedWebSocket"]
 
-LINES = "/watch/"  # paths of observers' lines (server/lockstep/server/routes/observer_websocket.py)
+LINES = "/watch/"  # paths of observers' WebSockets (server/lockstep/server/routes/observer_websocket.py)
 LINE_BUFFER = 64 * 1024  # bytes that the kernel keeps for one that does not read; Linux doubles it
 CONTROL_RATE, CONTROL_BURST = 5.0, 50.0  # Hz, of pings and pongs
 MAX_FRAGMENTS = 64  # of one message
-GOODBYE_SECONDS = 3.0  # from our end of a connection to its loss
+GOODBYE_SECONDS = 3.0  # from the console's end of a connection until it is aborted
 TOO_MANY_FRAMES = 1008  # RFC 6455 7.4.1
 NOT_UTF8 = 1007
 
@@ -81,7 +81,7 @@ class GuardedWebSocket(WebSocketsSansIOProtocol):
         return not self._control.take(now)
 
     def _refuse(self, code: int, reason: str) -> None:
-        """What came with it already is not looked at."""
+        """Close the connection for a fault; discard what has already come with it."""
         if not self.close_sent and not self.transport.is_closing():
             self.frames = []
             self.conn.fail(code, reason)
@@ -89,7 +89,7 @@ class GuardedWebSocket(WebSocketsSansIOProtocol):
             self._drop_soon()
 
     def _drop_soon(self) -> None:
-        """Who does not read keeps nothing."""
+        """Abort the connection in `GOODBYE_SECONDS`, even if the client does not read."""
         if self._goodbye is None:
             self._goodbye = self.loop.call_later(GOODBYE_SECONDS, self.transport.abort)
 

@@ -1,1 +1,1 @@
-"""Encoders, and what their output looks like on the wire."""
+"""Encoders, and the form of their output on the wire."""

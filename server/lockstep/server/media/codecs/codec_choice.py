@@ -1,4 +1,4 @@
-"""Which codec a section of an offer is answered with, and what the console offers to a relay."""
+"""Chooses the codec that answers a section of an offer, and the codecs that the console offers to a relay."""
 
 from collections.abc import Sequence
 
@@ -11,7 +11,7 @@ __all__ = ["OFFERED_PROFILE", "OPUS", "chosen_codecs", "h264_profile", "known_co
 FEEDBACK = ("nack", "nack pli", "goog-remb")
 H264 = {"packetization-mode": "1", "level-asymmetry-allowed": "1"}
 H264_PROFILES = ("42001f", "42e01f", "4d001f", "64001f")  # baseline, constrained baseline, main, high
-OFFERED_PROFILE = "42e01f"  # what every browser takes
+OFFERED_PROFILE = "42e01f"  # every browser takes it
 
 OPUS = Codec(111, "opus", 48_000, 2)
 VIDEO = (
@@ -27,14 +27,14 @@ SOUND = (OPUS, Codec(0, "PCMU", 8000), Codec(8, "PCMA", 8000), Codec(9, "G722", 
 
 
 def known_codecs(kind: str) -> Sequence[Codec]:
-    """All that an answer may name for "video" or "audio"."""
+    """Return all codecs that an answer may name for "video" or "audio"."""
     return VIDEO if kind == "video" else SOUND
 
 
 def chosen_codecs(section: MediaSection, names: Sequence[str], *, h264_first: bool = False) -> tuple[Codec, ...]:
-    """The first codec of the offer's that is among `names`, and what repairs it; empty when there is none.
+    """Return the offer's first codec that is among `names`, and its repair codec; empty when there is none.
 
-    `h264_first`: before all others H.264, of the largest profile that is offered.
+    `h264_first`: prefer H.264, of the largest profile that is offered.
     """
     known = {name.lower() for name in names}
     common = {each.payload_type: each for each in common_codecs(section.codecs, known_codecs(section.kind))}
@@ -47,7 +47,7 @@ def chosen_codecs(section: MediaSection, names: Sequence[str], *, h264_first: bo
 
 
 def offered_codecs(kind: str, name: str) -> tuple[Codec, ...]:
-    """One codec, and what repairs it, for an offer of the console's own. Raises ValueError: there is no such codec."""
+    """Return one codec, and its repair codec, for an offer of the console. Raises ValueError for an unknown codec."""
     for number, each in enumerate(known_codecs(kind)):
         profile = each.parameters.get("profile-level-id", OFFERED_PROFILE)
         if each.name.lower() == name.lower() and profile == OFFERED_PROFILE:
@@ -60,7 +60,7 @@ def offered_codecs(kind: str, name: str) -> tuple[Codec, ...]:
 
 
 def _profile_rank(codec: Codec) -> int:
-    """The larger, the more streams fit; equal ones come as they are offered."""
+    """Return a rank: the larger, the more streams fit the profile. Equal ranks keep the order of the offer."""
     profile = h264_profile(codec)
     if profile is None:
         return 0
@@ -68,7 +68,7 @@ def _profile_rank(codec: Codec) -> int:
 
 
 def h264_profile(codec: Codec) -> Profile | None:
-    """None: another codec."""
+    """Return the H.264 profile of `codec`; None for another codec."""
     if codec.name.lower() != "h264":
         return None
     return profile_of_fmtp(str(codec.parameters.get("profile-level-id", "")))

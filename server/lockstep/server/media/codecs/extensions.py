@@ -1,4 +1,4 @@
-"""RTP header extensions of what the console sends (RFC 8285): which of an offer's are answered."""
+"""Chooses the RTP header extensions of an offer (RFC 8285) that the console accepts for its streams."""
 
 from collections.abc import Collection
 
@@ -10,7 +10,7 @@ __all__ = ["choose_carrier", "wanted_uris"]
 
 
 def choose_carrier(offered: Collection[str], trailer: bool) -> Carrier:
-    """How the stamp travels to a peer that offers the extensions `offered` (URIs)."""
+    """Choose the carrier of the stamp for a peer that offers the extensions `offered` (URIs)."""
     if trailer:
         return "trailer"
     if EVENT_REFERENCE_URI in offered:
@@ -21,7 +21,7 @@ def choose_carrier(offered: Collection[str], trailer: bool) -> Carrier:
 
 
 def wanted_uris(kind: str, carrier: Carrier) -> tuple[str, ...]:
-    """Extensions that are answered if they are offered; all others are declined."""
+    """Return the extensions that are accepted if offered; all others are declined."""
     uris = [MID_URI]
     if kind == "video":
         uris += [PLAYOUT_DELAY_URI, ABS_SEND_TIME_URI]

@@ -11,7 +11,7 @@ MOST_BYTES = 16_000_000
 
 
 class GroupOfPictures:
-    """What does not fit goes with all that builds on it, until the next keyframe."""
+    """The pictures since the last keyframe. When one does not fit, all are dropped until the next keyframe."""
 
     def __init__(self) -> None:
         self._waiting: deque[Media] = deque()  # not decoded yet
@@ -32,7 +32,7 @@ class GroupOfPictures:
         self._bytes += len(media.payload)
 
     def take(self) -> tuple[Media, ...]:
-        """What is to be decoded, in order, to have the newest picture; nothing while that is not possible."""
+        """Return the pictures to decode, in order, for the newest one; empty while that is not possible."""
         found = tuple(self._waiting)
         self._clear()
         return found

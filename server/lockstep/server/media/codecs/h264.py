@@ -1,4 +1,4 @@
-"""What can be told from an H.264 byte stream without decoding it (ITU-T H.264, Annex B). Pure functions."""
+"""Inspects an H.264 byte stream without decoding it (ITU-T H.264, Annex B). Pure functions."""
 
 from typing import NamedTuple
 
@@ -14,7 +14,7 @@ HEAD = 16  # bytes of a slice that hold the two numbers we need
 
 
 class Profile(NamedTuple):
-    """As in a sequence parameter set and in profile-level-id (RFC 6184 8.1)."""
+    """A profile, as in a sequence parameter set and in profile-level-id (RFC 6184 8.1)."""
 
     idc: int
     constraints: int  # the byte of constraint_set flags
@@ -22,7 +22,7 @@ class Profile(NamedTuple):
 
     @property
     def constrained(self) -> bool:
-        """Constrained baseline: every decoder takes it (constraint_set1)."""
+        """True for constrained baseline, which every decoder takes (constraint_set1)."""
         return self.idc == BASELINE and bool(self.constraints & 0x40)
 
     def __str__(self) -> str:
@@ -30,7 +30,7 @@ class Profile(NamedTuple):
 
 
 class H264Access(NamedTuple):
-    """One access unit, as far as it matters here."""
+    """The relevant properties of one access unit."""
 
     keyframe: bool  # holds an IDR picture
     profile: Profile | None  # of its sequence parameter set; None without one
@@ -55,9 +55,9 @@ def inspect(stream: bytes) -> H264Access:
 
 
 def accepts(negotiated: Profile, stream: Profile) -> bool:
-    """Whether who negotiated a profile can decode a stream of another: each holds those before it.
+    """True if a peer that negotiated one profile can decode a stream of another: each holds those before it.
 
-    The level does not decide: browsers name 3.1 whatever they can do, and what we encode ourselves at the same size
+    The level does not decide: browsers name 3.1 whatever they can do, and the console's own encoding at the same size
     has the same level.
     """
     if stream.constrained:
@@ -68,7 +68,7 @@ def accepts(negotiated: Profile, stream: Profile) -> bool:
 
 
 def profile_of_fmtp(text: str) -> Profile:
-    """`text` is a profile-level-id; what is none counts as the default, constrained baseline 3.1 (RFC 6184 8.1)."""
+    """Parse a profile-level-id; an invalid one counts as the default, constrained baseline 3.1 (RFC 6184 8.1)."""
     try:
         value = bytes.fromhex(text)
     except ValueError:
@@ -77,7 +77,7 @@ def profile_of_fmtp(text: str) -> Profile:
 
 
 def _slice_type(nal: bytes) -> int:
-    """7.3.3: first_mb_in_slice, then slice_type, both in Exp-Golomb code."""
+    """Return slice_type; it follows first_mb_in_slice, both in Exp-Golomb code (7.3.3)."""
     head = nal[1:HEAD].replace(b"\x00\x00\x03", b"\x00\x00")
     bits = "".join(f"{byte:08b}" for byte in head)
     _, at = _exp_golomb(bits, 0)
@@ -85,7 +85,7 @@ def _slice_type(nal: bytes) -> int:
 
 
 def _exp_golomb(bits: str, at: int) -> tuple[int, int]:
-    """The number at `at`, and where the next begins; -1 when it is cut off (9.1)."""
+    """Return the number at `at`, -1 when it is cut off, and the position of the next (9.1)."""
     one = bits.find("1", at)
     if one == -1 or 2 * one - at + 1 > len(bits):
         return -1, len(bits)

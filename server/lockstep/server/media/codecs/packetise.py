@@ -79,8 +79,8 @@ def _fragment(nal: bytes) -> Iterator[bytes]:
 def packetise_vp8(frame: bytes, trailer: bytes = b"") -> list[bytes]:
     """Payloads of one VP8 frame (RFC 7741 4.2), without a picture id.
 
-    A browser takes the picture with the id before as the one that a picture builds on. Payloads are shared by peers
-    that come from different tiers; no numbering would be without gaps for all of them, and sequence numbers are.
+    A browser assumes that a picture builds on the one with the preceding id. Payloads are shared by peers that come
+    from different tiers; no numbering would be without gaps for all of them, and sequence numbers are.
     """
     first, rest = b"\x10", b"\x00"
     data = memoryview(frame + trailer)

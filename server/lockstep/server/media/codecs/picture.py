@@ -1,4 +1,4 @@
-"""Pictures from the robot link, as what encoders take."""
+"""Turns pictures from the robot link into frames for encoders."""
 
 from collections.abc import Sequence
 
@@ -16,7 +16,7 @@ from lockstep.server.media.errors import PayloadError, UnsupportedCodecError
 __all__ = ["PictureDecoder"]
 
 MIN_SIDE = 16  # pixels
-MAX_JPEG, MAX_H264 = 8192 * 4096, 4096 * 2304  # pixels; of H.264 a decoder keeps up to seventeen pictures
+MAX_JPEG, MAX_H264 = 8192 * 4096, 4096 * 2304  # pixels; an H.264 decoder keeps up to seventeen pictures
 
 Plane = npt.NDArray[np.uint8]
 
@@ -32,14 +32,14 @@ class PictureDecoder:
         self._h264: VideoCodecContext | None = None
 
     def decode(self, media: Media, group: Sequence[Media] = ()) -> av.VideoFrame:
-        """The picture.
+        """Decode a picture.
 
         Args:
-            group: for h264, all that has to be decoded for it, itself the last; the rest was decoded before
+            group: for h264, the pictures still to be decoded for it, itself the last
 
         Raises:
             PayloadError: the payload is not a picture of the size that `media` names.
-            UnsupportedCodecError: none of these.
+            UnsupportedCodecError: `media` has another codec.
         """
         if media.codec == "h264":
             return self._from_h264(group)
@@ -52,7 +52,7 @@ class PictureDecoder:
     def _from_mjpeg(self, media: Media) -> av.VideoFrame:
         if self._mjpeg is None:
             self._mjpeg = av.CodecContext.create("mjpeg", "r")
-            self._mjpeg.options = {"max_pixels": str(MAX_JPEG)}  # a few bytes can say that they are any number
+            self._mjpeg.options = {"max_pixels": str(MAX_JPEG)}  # a few bytes can claim to be any number
             self._mjpeg.thread_count = 1
         try:
             frames = self._mjpeg.decode(av.Packet(media.payload))
@@ -100,7 +100,7 @@ def _from_yuv420p(media: Media) -> av.VideoFrame:
 
 
 def _even(frame: av.VideoFrame) -> av.VideoFrame:
-    """Without the last row or column where there is an odd number: H.264 and VP8 encoders take even sides only."""
+    """Drop the last row or column of an odd number: H.264 and VP8 encoders take even sides only."""
     if frame.width % 2 == 0 and frame.height % 2 == 0:
         return frame
     luma, u, v = (_rows(plane)[: plane.height, : plane.width] for plane in frame.planes)
@@ -108,7 +108,7 @@ def _even(frame: av.VideoFrame) -> av.VideoFrame:
 
 
 def _frame(luma: Plane, u: Plane, v: Plane) -> av.VideoFrame:
-    """A frame of these planes, less what makes a side odd."""
+    """Make a frame of these planes, without the row or column that makes a side odd."""
     height, width = luma.shape
     frame = av.VideoFrame(width - width % 2, height - height % 2, "yuv420p")
     for plane, values in zip(frame.planes, (luma, u, v), strict=True):
@@ -117,7 +117,7 @@ def _frame(luma: Plane, u: Plane, v: Plane) -> av.VideoFrame:
 
 
 def _rows(plane: VideoPlane) -> Plane:
-    """The plane's memory, row by row with what pads each of them; writing to it changes the plane."""
+    """Return the plane's memory, row by row, padding included; writing to it changes the plane."""
     return np.frombuffer(memoryview(plane), np.uint8).reshape(-1, plane.line_size)
 
 

@@ -16,7 +16,7 @@ __all__ = ["VIDEO_CODECS", "EncodedPicture", "H264Encoder", "PictureEncoder", "V
 
 VIDEO_CODECS = ("H264", "VP8")
 NEVER = 1_000_000  # frames between keyframes that nobody asked for
-COARSE_BPS = 500_000  # below it the bitrate comes before the looks
+COARSE_BPS = 500_000  # below it the bitrate takes precedence over the picture's quality
 
 
 class EncodedPicture(NamedTuple):
@@ -28,24 +28,24 @@ class PictureEncoder(ABC):
     """Encodes the pictures of one stream. Used from one thread; follows changes of the picture's size.
 
     The libraries fix the bitrate when they open, and opening again costs a keyframe. So each subclass has a way to
-    `steer` a running encoder, within the range that `steers` tells.
+    `steer` a running encoder, within the range that `steers` accepts.
     """
 
     def __init__(self, bitrate_bps: int, frame_rate: float) -> None:
         self.bitrate_bps = bitrate_bps
         self.frame_rate = frame_rate
         self._context: VideoCodecContext | None = None
-        self._opened_bps = bitrate_bps  # when the running encoder was opened
+        self._opened_bps = bitrate_bps  # of the running encoder when it was opened
         self._opened_rate = frame_rate
-        self._pts = 0.0  # in 90 kHz; what the encoder believes
+        self._pts = 0.0  # in 90 kHz; the encoder's time
         self._last_time: int | None = None
 
     def aim(self, bitrate_bps: int, frame_rate: float) -> None:
-        """From the next picture on, make so many bits per second of so many pictures."""
+        """Set the bitrate and the frame rate from the next picture on."""
         self.bitrate_bps, self.frame_rate = bitrate_bps, frame_rate
 
     def encode(self, frame: av.VideoFrame, media_time: int, keyframe: bool) -> EncodedPicture:
-        """One picture in, one out. `media_time` is in 90 kHz and must increase.
+        """Encode one picture. `media_time` is in 90 kHz and must increase.
 
         Raises:
             EncodeError: the library refused; the next picture starts afresh with a keyframe.
@@ -63,7 +63,7 @@ class PictureEncoder(ABC):
         return EncodedPicture(b"".join(map(bytes, packets)), packets[0].is_keyframe)
 
     def _fit(self, frame: av.VideoFrame) -> VideoCodecContext:
-        """The context for pictures of this size and bitrate; where it is a new one, a keyframe follows."""
+        """Return the context for pictures of this size and bitrate; a new one begins with a keyframe."""
         context = self._context
         if (
             context is None
@@ -84,7 +84,7 @@ class PictureEncoder(ABC):
         return context
 
     def _steered(self, context: VideoCodecContext, media_time: int) -> int:
-        """The time to tell the encoder, and its bitrate, for the picture at `media_time`."""
+        """Steer the encoder for the picture at `media_time` and return the picture's time for it."""
         ratio = self.bitrate_bps / self._opened_bps
         passed = 0 if self._last_time is None else media_time - self._last_time
         self._last_time = media_time
@@ -92,20 +92,20 @@ class PictureEncoder(ABC):
         return round(self._pts)
 
     def _buffer_bits(self) -> int:
-        """What a keyframe may take at once: half a second of an ample bitrate, less of a scarce one."""
+        """Return the bits that a keyframe may take at once: half a second of an ample bitrate, less of a scarce one."""
         return int(self.bitrate_bps * (0.3 if self.bitrate_bps < COARSE_BPS else 0.5))
 
     @abstractmethod
     def steers(self, bitrate: float, frame_rate: float) -> bool:
-        """Whether a running encoder can be steered to so many times the bitrate and frame rate it was opened with."""
+        """True if a running encoder can be steered to so many times the bitrate and frame rate it was opened with."""
 
     @abstractmethod
     def steer(self, context: VideoCodecContext, ratio: float) -> float:
-        """Steer it there; returns how fast time is to pass for the encoder."""
+        """Steer the encoder to `ratio`; return the speed at which time is to pass for it."""
 
     @abstractmethod
     def _open(self) -> VideoCodecContext:
-        """A context with the codec's own options."""
+        """Create a context with the codec's own options."""
 
 
 class H264Encoder(PictureEncoder):
@@ -164,7 +164,7 @@ class Vp8Encoder(PictureEncoder):
 
 
 def create_picture_encoder(codec: str, bitrate_bps: int, frame_rate: float) -> PictureEncoder:
-    """An encoder for one of VIDEO_CODECS."""
+    """Create an encoder for one of VIDEO_CODECS."""
     if codec == "H264":
         return H264Encoder(bitrate_bps, frame_rate)
     if codec == "VP8":

@@ -84,10 +84,10 @@ class SoundEncoder(ABC):
         self._talkspurt = True
 
     def expect_loss(self, percent: int) -> None:
-        """So many packets may be lost on the way. Nothing for a codec without error correction."""
+        """Set the expected loss of packets. Does nothing for a codec without error correction."""
 
     def encode(self, segment: Segment) -> list[EncodedSound]:
-        """The packets that are complete with this segment: none, one or several.
+        """Encode a segment and return the packets that it completes: none, one or several.
 
         Raises:
             EncodeError: the library refused.
@@ -120,7 +120,7 @@ class SoundEncoder(ABC):
 
     @property
     def channels(self) -> int:
-        """Channels that are encoded."""
+        """The number of encoded channels."""
         return 1
 
     def _convert(self, segment: Segment) -> Samples:
@@ -157,14 +157,14 @@ class SoundEncoder(ABC):
         return packets
 
     def _mark(self, position: int) -> _Mark:
-        """The segment that `position` lies in; the first one for what lies before it."""
+        """Return the mark of the segment at `position`; the first one for an earlier position."""
         while len(self._marks) > 1 and self._marks[1].position <= position:
             self._marks.popleft()
         return self._marks[0]
 
     @abstractmethod
     def _compress(self, samples: Samples) -> bytes:
-        """One packet of exactly 20 ms."""
+        """Encode one packet of exactly 20 ms."""
 
 
 class OpusEncoder(SoundEncoder):
@@ -238,7 +238,7 @@ def _layout(channels: int) -> str:
 
 
 def create_sound_encoder(codec: str, bitrate_bps: int, packet_loss_percent: int) -> SoundEncoder:
-    """An encoder for one of AUDIO_CODECS."""
+    """Create an encoder for one of AUDIO_CODECS."""
     if codec == "opus":
         return OpusEncoder(bitrate_bps, packet_loss_percent)
     if codec == "PCMU":

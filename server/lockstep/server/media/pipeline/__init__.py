@@ -1,1 +1,1 @@
-"""The way of a picture or sound from its source to its subscribers."""
+"""The path of pictures and sound from their source to their subscribers."""

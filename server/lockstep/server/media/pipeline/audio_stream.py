@@ -1,4 +1,4 @@
-"""One microphone: sound is encoded once per codec that somebody needs; a crowd gets several packets in one."""
+"""The stream of a microphone: sound is encoded once per codec in use; a crowd gets several packets in one."""
 
 import time
 from collections import deque
@@ -33,7 +33,7 @@ __all__ = ["AudioStream"]
 QUEUE_SEGMENTS = 10
 MIN_RATE = 8_000  # Hz
 MAX_AHEAD = 2.0  # s of sound that may come at once
-FASTEST = 1.25  # s of it in a second, afterwards
+FASTEST = 1.25  # s of sound in a second, afterwards
 
 
 class SoundJob(NamedTuple):
@@ -57,7 +57,7 @@ class AudioStream(Stream[SoundJob]):
         self._bundles: dict[str, SoundBundle] = {}  # of the codecs that a crowd takes
         self._expected = ExpectedLoss(settings.opus_packet_loss_percent)
         self._room = MAX_AHEAD  # s of sound that may come now
-        self._came_at = 0.0  # s, the last of it
+        self._came_at = 0.0  # s, arrival of the last sound
 
     def _enqueue(self, media: Media, now: float, capture_time: float) -> None:
         if not self._has_room(media, now):
@@ -70,7 +70,7 @@ class AudioStream(Stream[SoundJob]):
         self._begin_next()
 
     def _has_room(self, media: Media, now: float) -> bool:
-        """Whether no more sound comes than time passes: each packet that is made of it costs the loop."""
+        """True unless more sound comes than time passes: each packet made of it costs the loop."""
         self._room = min(MAX_AHEAD, self._room + max(0.0, now - self._came_at) * FASTEST)
         self._came_at = now
         seconds = len(media.payload) / (2 * max(1, media.channels) * max(MIN_RATE, media.sample_rate))
@@ -87,7 +87,7 @@ class AudioStream(Stream[SoundJob]):
         return SoundJob(media, capture_time, outputs, self._expected.percent)
 
     def measured_loss(self, loss: float, now: float) -> None:
-        """What the peers that matter lose, 0 to 1: sound is protected against it."""
+        """Take the loss, 0 to 1, against which sound is to be protected."""
         self._expected.update(loss, now)
 
     def _work(self, job: SoundJob) -> list[Encoded]:
@@ -146,10 +146,10 @@ class AudioStream(Stream[SoundJob]):
         return Encoded(output, frames, seconds, whole=whole)
 
     def _admit(self, output: TierEncoding, frame: EncodedFrame) -> None:
-        """Nobody: `_finish` says when."""
+        """Admit nobody: `_finish` does it between bundles."""
 
     def _finish(self, encoded: Encoded) -> None:
-        """Who joins the crowd or leaves it does so between two bundles, when all of a codec have got the same sound."""
+        """Move peers into the crowd or out of it between two bundles, when all of a codec have got the same sound."""
         super()._finish(encoded)
         if encoded.output.tier == "crowd" and encoded.whole and encoded.error is None:
             for output in self._outputs.values():

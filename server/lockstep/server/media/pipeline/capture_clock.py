@@ -1,4 +1,4 @@
-"""From the bridge's monotonic clock to wall-clock capture times. No clock is read here."""
+"""Converts times of the bridge's monotonic clock to wall-clock capture times. No clock is read here."""
 
 __all__ = ["CaptureClock"]
 
@@ -19,7 +19,7 @@ class CaptureClock:
         self._previous = float("inf")  # least offset in the last window, s
 
     def observe(self, link_time: float, wall_time: float) -> None:
-        """A medium captured at `link_time` arrived at `wall_time` (s since 1970)."""
+        """Take the arrival at `wall_time` (s since 1970) of a medium captured at `link_time`."""
         if self._window_start is None:
             self._window_start = link_time
         elif link_time - self._window_start >= WINDOW_SECONDS:
@@ -28,5 +28,5 @@ class CaptureClock:
         self._current = min(self._current, wall_time - link_time)
 
     def wall_time(self, link_time: float) -> float:
-        """Capture time in s since 1970. Call after at least one `observe`."""
+        """Return the capture time in s since 1970. Call after at least one `observe`."""
         return link_time + min(self._current, self._previous)

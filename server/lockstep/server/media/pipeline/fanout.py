@@ -1,6 +1,6 @@
-"""Who is served when: the operator at once, observers in their turns of the event loop.
+"""Sends frames to targets: the operator's at once, observers' in their turns of the event loop.
 
-What serving a target raises is that target's: it is told so, gets nothing more, and all others are served.
+An exception while serving a target concerns that target alone: it is told and gets nothing more; all others are served.
 """
 
 from collections import deque
@@ -18,16 +18,16 @@ class Target(Protocol):
 
     @property
     def priority(self) -> bool:
-        """Whether it belongs to the operator."""
+        """True if it belongs to the operator."""
 
     def put(self, frame: EncodedFrame) -> None:
         """Queue a frame; never blocks."""
 
     def send_next(self) -> bool:
-        """Send one queued frame if there is one and the socket takes it; whether another can follow."""
+        """Send one queued frame if there is one and the socket takes it; True if another can follow."""
 
     def failed(self, error: Exception) -> None:
-        """Serving it raised `error`. It is not served again. Raises nothing."""
+        """Take the error that serving this target raised. It is not served again. Raises nothing."""
 
 
 class FanOut:
@@ -42,7 +42,7 @@ class FanOut:
     def publish(self, frame: EncodedFrame, targets: Iterable[Target]) -> None:
         """Hand a frame to its targets. Returns when the operator's is sent and the others are queued."""
         observers = []
-        for target in list(targets):  # one that fails leaves them
+        for target in list(targets):  # a target that fails is removed from them
             if target.priority:
                 if self._put(target, frame):
                     self._send_all(target)
@@ -65,7 +65,7 @@ class FanOut:
         target.failed(error)
 
     def serve_again(self, target: Target) -> None:
-        """What its pacer held back has left: the next frame may follow."""
+        """Serve a target whose pacer has sent all packets that it held back."""
         if target.priority:
             self._send_all(target)
         else:
@@ -85,7 +85,7 @@ class FanOut:
         self._ask()
 
     def forget(self, target: Target) -> None:
-        """A target is gone. Idempotent."""
+        """Remove a target. Idempotent."""
         if target in self._waiting:
             del self._waiting[target]
             self._order = deque(each for each in self._order if each is not target)

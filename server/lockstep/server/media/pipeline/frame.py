@@ -10,7 +10,7 @@ Packetise = Callable[[bytes, bytes], list[bytes]]  # encoded data, trailer -> RT
 
 
 def frame_trailer(stamp: int, capture_time: float) -> bytes:
-    """The trailer for a frame captured at `capture_time` (s since 1970)."""
+    """Return the trailer for a frame captured at `capture_time` (s since 1970)."""
     return append_trailer(b"", stamp, _without_start_code(max(0, int(capture_time * 1_000_000))))
 
 
@@ -68,7 +68,7 @@ class EncodedFrame:
         self._with_trailer: list[bytes] | None = None
 
     def payloads(self, trailer: bool) -> list[bytes]:
-        """RTP payloads, with or without the trailer behind the frame."""
+        """Return the RTP payloads, with or without the trailer behind the frame."""
         if trailer:
             if self._with_trailer is None:
                 self._with_trailer = self._packetise(self.data, frame_trailer(self.stamp, self.capture_time))

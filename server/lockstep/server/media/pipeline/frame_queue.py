@@ -8,7 +8,7 @@ __all__ = ["Outbox"]
 
 
 class Outbox:
-    """Nothing leaves before the first keyframe. When frames had to be dropped, nothing leaves until the next one.
+    """A queue that nothing leaves before the first keyframe or, when frames had to be dropped, before the next one.
 
     Every sound packet counts as a keyframe, so that for sound this is "keep the newest `capacity`".
     """

@@ -6,14 +6,14 @@ EARLY = 0.3  # of an interval that a picture may come before it is due: cameras 
 
 
 class FrameRateLimiter:
-    """Ask `admit` for every picture, with its capture time. None lets all pass."""
+    """Call `admit` for every picture, with its capture time. A rate of None lets all pass."""
 
     def __init__(self, frames_per_second: float | None) -> None:
         self._interval = 0.0 if frames_per_second is None else 1 / frames_per_second
         self._due: float | None = None
 
     def admit(self, time: float) -> bool:
-        """Whether the picture captured at `time` (s) is to be encoded."""
+        """True if the picture captured at `time` (s) is to be encoded."""
         if self._interval == 0:
             return True
         due = self._due

@@ -1,4 +1,4 @@
-"""When the next picture is encoded as a keyframe: requests of all peers, merged. No clock is read here."""
+"""Schedules keyframes, from the merged requests of all peers. No clock is read here."""
 
 __all__ = ["KeyframeScheduler"]
 
@@ -10,37 +10,37 @@ SPARING = 6.0  # times the interval
 
 
 class KeyframeScheduler:
-    """One per encoder. Order of calls: `join` and `request` at any time, `take` before each picture is encoded.
+    """The schedule of one encoder. Call `join` and `request` at any time, and `take` before each picture is encoded.
 
     A joining peer is served with the next picture. Many at once would make every picture a keyframe, which the
     operator would pay for, so joins beyond a burst of three wait for the spacing, as requests do.
 
-    A keyframe costs as much as many pictures, and where the path is full it brings the next loss: when requests keep
-    coming, the spacing between the keyframes that answer them grows, and it shrinks again with rest.
+    A keyframe costs as much as many pictures, and on a full path it causes the next loss: when requests keep coming,
+    the spacing between the keyframes that answer them grows, and it shrinks again when they cease.
     """
 
     def __init__(self, interval_seconds: float, spacing_seconds: float) -> None:
         self.sparing = False  # keyframes that nobody asked for come six times more rarely: the path has no room
-        self.longest: float | None = None  # s between two, twice that while sparing; None: the interval alone counts
+        self.longest: float | None = None  # s between keyframes, twice that while sparing; None: the interval counts
         self._interval = interval_seconds
         self._least_spacing = spacing_seconds
         self._spacing = spacing_seconds
         self._joined = False
         self._requested = False
-        self._last: float | None = None  # when the last keyframe was taken
+        self._last: float | None = None  # time of the last keyframe
         self._tokens = float(JOIN_BURST)
         self._tokens_at: float | None = None
 
     def join(self) -> None:
-        """A peer joined and shows nothing until it gets a keyframe."""
+        """Request a keyframe for a peer that joined and shows nothing without one."""
         self._joined = True
 
     def request(self) -> None:
-        """A peer lost the picture (PLI, FIR) or had frames dropped."""
+        """Request a keyframe for a peer that lost the picture (PLI, FIR) or had frames dropped."""
         self._requested = True
 
     def take(self, now: float) -> bool:
-        """Whether the picture about to be encoded must be a keyframe; if so all waiting requests are served by it."""
+        """True if the picture about to be encoded must be a keyframe, which then serves all waiting requests."""
         if not self._wanted(now):
             return False
         if self._requested and self._last is not None:

@@ -32,7 +32,7 @@ class SoundClock:
         self._next = 0  # index of the next sample
 
     def place(self, link_time: float, samples: int) -> tuple[int, bool]:
-        """Index of the first of `samples` captured from `link_time` on, and whether it continues the last sound.
+        """Return the index of the first of `samples` captured at `link_time`, and True if it continues the last sound.
 
         The bridge's clock jitters against its sound card; up to 40 ms of difference count as continuous. A card that
         is slower skips 40 ms then; one that is faster moves the time line.

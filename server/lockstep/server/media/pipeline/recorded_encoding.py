@@ -1,4 +1,4 @@
-"""Which of a stream's encodings is recorded. Nothing is encoded twice for it where somebody already takes it."""
+"""Chooses the encoding of a stream to record. An encoding that somebody already takes is not made twice."""
 
 from collections.abc import Mapping
 from typing import Protocol
@@ -12,7 +12,7 @@ __all__ = ["FrameTaker", "RecordedEncoding", "RecordedStream"]
 
 TIERS: tuple[PictureTier, ...] = ("operator", "high", "crowd", "low")
 HALF_A_PACKET = 0.010  # s of sound
-CLOCK_JUMPED = 1.0  # s; what is that much older than what was taken is no repetition
+CLOCK_JUMPED = 1.0  # s; sound older than the last recorded by that much is not a repetition
 
 
 class FrameTaker(Protocol):
@@ -22,7 +22,7 @@ class FrameTaker(Protocol):
 
 
 class RecordedStream(Protocol):
-    """What it needs of the stream."""
+    """The part of a stream that is needed here."""
 
     @property
     def name(self) -> str: ...
@@ -38,18 +38,19 @@ class RecordedStream(Protocol):
 class RecordedEncoding:
     """Call `choose` before each medium, `published` with each frame, `close` at the end.
 
-    The operator's encoding comes first; then what a camera encoded itself; then that of observers. Where nobody takes
-    the first codec it is what they take of the next one; one is made only where nothing is encoded. Another one is
-    taken from its next keyframe on. A camera cannot be asked for one: ours is recorded until it comes.
+    The operator's encoding is preferred, then the camera's own, then that of observers. If nobody takes the first
+    codec, an encoding in the next one is recorded; a separate one is made only if nothing is encoded. A change takes
+    effect at the new encoding's next keyframe. A camera takes no keyframe requests: the console's encoding is recorded
+    until its keyframe comes.
 
-    Of sound every packet is a keyframe. Where its codec changes, what the codec before brought is not taken again.
+    Every sound packet is a keyframe. When the codec changes, sound already recorded in the former is not taken again.
 
     Args:
-        codecs: in which it can be recorded; in the first one, where that is encoded or nothing is
-        own_tier: what is made for a recording alone
+        codecs: possible codecs of the recording; the first one is used if it, or nothing, is encoded
+        own_tier: tier of an encoding for the recording alone
         keyframe_seconds: longest time between two keyframes; twice that on a path without room
-        attached: whether the source is the console's own, and not the robot's
-        sound: whether it is a microphone's
+        attached: True for a source of the console, False for one of the robot
+        sound: True for a microphone
     """
 
     def __init__(
@@ -68,10 +69,10 @@ class RecordedEncoding:
         self._keyframe_seconds = keyframe_seconds
         self._attached = attached
         self._sound = sound
-        self._last: tuple[TierEncoding, float] | None = None  # what was taken, and its time
+        self._last: tuple[TierEncoding, float] | None = None  # encoding and time of the last recorded frame
         self._current: TierEncoding | None = None
         self._next: TierEncoding | None = None  # from its next keyframe on
-        self._meanwhile: TierEncoding | None = None  # ours, until the camera's own first keyframe
+        self._meanwhile: TierEncoding | None = None  # the console's, until the camera's first keyframe
 
     def choose(self, stream: RecordedStream) -> None:
         wanted = self._best(stream)
@@ -101,7 +102,7 @@ class RecordedEncoding:
         return stream.passed or self._ours(stream)
 
     def _ours(self, stream: RecordedStream) -> TierEncoding:
-        """What we encode for somebody; where that is nobody, for the recording."""
+        """Return an encoding of the console that somebody takes; without one, an encoding for the recording."""
         for codec in self._codecs:
             for tier in TIERS:
                 found = stream.outputs.get((codec, tier))
@@ -122,24 +123,24 @@ class RecordedEncoding:
             self._take(stream, codec, frame, attached=self._attached)
 
     def _was_taken(self, output: TierEncoding, frame: EncodedFrame) -> bool:
-        """Whether this sound is recorded already, in another codec."""
+        """True if this sound is recorded already, in another codec."""
         if not self._sound or self._last is None or self._last[0] is output:
             return False
         return 0 < self._last[1] + HALF_A_PACKET - frame.time < CLOCK_JUMPED
 
     def request_keyframe(self) -> None:
-        """A new file begins."""
+        """Request a keyframe for a new file."""
         if self._current is None:
             return
         if self._current.codec != PASSED:
             self._current.request_keyframe("record")
-        else:  # a camera's own: what is recorded is chosen afresh, and begins with ours
+        else:  # a camera's own: the encoding is chosen afresh, and the console's comes first
             for output in (self._current, self._next):
                 self._drop(output)
             self._current = self._next = None
 
     def close(self) -> None:
-        """Nothing is recorded any more."""
+        """Stop recording."""
         for output in (self._current, self._next, self._meanwhile):
             self._drop(output)
         self._current = self._next = self._meanwhile = None

@@ -21,7 +21,7 @@ __all__ = ["RtpSender", "SenderStats"]
 
 @dataclass(slots=True)
 class SenderStats:
-    """What was sent of one stream and what its peer reported."""
+    """Counters of one stream to one peer, and the peer's reports."""
 
     packets: int = 0  # sent, without retransmissions
     octets: int = 0  # of payload
@@ -33,12 +33,12 @@ class SenderStats:
     packets_lost: int = 0  # reported by the peer
     fraction_lost: float = 0.0  # reported by the peer, 0 to 1
     jitter_ms: float = 0.0  # reported by the peer
-    round_trip_ms: float | None = None  # None before the first report that answers ours
+    round_trip_ms: float | None = None  # None before the first answer to a sender report
     remb_bps: int | None = None  # the peer's bandwidth estimate; None before the first
 
 
 class RtpSender:
-    """A stage in front of `Connection.send_frame`: which stamps a frame has, and how many of its pictures wait."""
+    """Adds stamps to frames, hands them to `Connection.send_frame`, and keeps the statistics."""
 
     def __init__(self, connection: Connection, mid: str, carrier: Carrier, *, video: bool, wall_clock: float) -> None:
         """`wall_clock`: s since 1970 at which the clock of the event loop was 0."""
@@ -53,15 +53,15 @@ class RtpSender:
 
     @property
     def paced(self) -> bool:
-        """Whether part of the last frame waits for the pacer."""
+        """True while part of the last frame waits for the pacer."""
         return self._connection.peer.holds_back(self._mid)
 
     def transmit(self, frame: EncodedFrame) -> tuple[int, int] | None:
-        """Send a frame: packets and bytes of payload. None, and nothing is sent, while the network takes nothing."""
+        """Send a frame and return its packets and payload bytes; None, nothing sent, while the network is blocked."""
         if self._connection.is_blocked:
             return None
         payloads = frame.payloads(self._carrier == "trailer")
-        # A peer that changes its tier gets one picture of both: a frame of its own needs a time of its own.
+        # A peer that changes its tier gets one picture from both: each frame needs a different time.
         self._media_time = max(self._media_time + 1, frame.media_time)
         self._connection.send_frame(
             self._mid,
@@ -82,7 +82,7 @@ class RtpSender:
         return self._fixed
 
     def reported(self, report: Reception) -> None:
-        """A receiver report of the peer about this stream (RFC 3550 6.4.1)."""
+        """Take a receiver report of the peer about this stream (RFC 3550 6.4.1)."""
         stats, block = self._reported, report.block
         stats.fraction_lost = block.fraction_lost / 256
         stats.packets_lost = block.packets_lost
@@ -93,12 +93,12 @@ class RtpSender:
             stats.round_trip_ms = report.round_trip * 1000
 
     def estimated(self, bitrate_bps: int) -> None:
-        """The peer's estimate of what its path carries (REMB)."""
+        """Take the peer's estimate of the bitrate that its path carries (REMB)."""
         self._reported.remb_bps = bitrate_bps
 
     @property
     def stats(self) -> SenderStats:
-        """As of now."""
+        """The current statistics."""
         stats, stream = self._reported, self._stream
         stats.frames = self._frames
         if stream is not None:

@@ -1,4 +1,4 @@
-"""One camera or microphone: what is common to both."""
+"""The common base of camera and microphone streams."""
 
 import asyncio
 import logging
@@ -28,14 +28,14 @@ __all__ = ["Encoded", "Stream"]
 
 logger = logging.getLogger(__name__)
 
-MAX_RATE = 240.0  # Hz, of media of one stream; what is made of each costs the loop that all robots share
-MAX_AT_ONCE = 240.0  # of them, after a network that has held them back
+MAX_RATE = 240.0  # Hz, of media of one stream; sending each of them costs the loop that all robots share
+MAX_AT_ONCE = 240.0  # media, after a network that has held them back
 
 Job = TypeVar("Job")
 
 
 class Encoded:
-    """What the worker made for one output."""
+    """The worker's result for one output."""
 
     __slots__ = ("error", "frames", "output", "seconds", "whole")
 
@@ -52,11 +52,11 @@ class Encoded:
         self.frames = frames
         self.seconds = seconds
         self.error = error
-        self.whole = whole  # False: the worker keeps some of what it took for the next frame
+        self.whole = whole  # False: the worker keeps part of its input for the next frame
 
 
 class Stream(ABC, Generic[Job]):
-    """Feeds one worker thread and hands what it encodes to the fan-out.
+    """Feeds one worker thread and hands the encoded frames to the fan-out.
 
     `feed` and everything but `_work` run on the event loop; `_work` alone touches decoders and encoders.
     """
@@ -72,8 +72,8 @@ class Stream(ABC, Generic[Job]):
         self._metrics = metrics
         self._last_stamp: int | None = None
         self._rate = TokenBucket(MAX_RATE, MAX_AT_ONCE, 0.0)
-        self._reported = False  # that the worker failed
-        self._works = False  # the worker
+        self._reported = False  # True after the first failure of the worker
+        self._works = False  # True while the worker has a job
         self._turns: CooperativeScheduler | None = None  # None: not running
         self._thread = ThreadPoolExecutor(
             1, thread_name_prefix=f"media-{name}", initializer=name_thread, initargs=(f"media-{name}",)
@@ -86,32 +86,32 @@ class Stream(ABC, Generic[Job]):
 
     @property
     def full_plan(self) -> EncodingTarget:
-        """The best that a tier can get."""
+        """The best encoding target that a tier can get."""
         return EncodingTarget(self._settings.video_bitrate_bps, 1.0)
 
     @property
     def outputs(self) -> Mapping[tuple[str, PictureTier], TierEncoding]:
-        """By codec and tier, as far as they exist."""
+        """The existing outputs, by codec and tier."""
         return self._outputs
 
     @property
     def passed(self) -> TierEncoding | None:
-        """What goes on as its source encoded it, while it gives something that can; None for most."""
+        """The output of pictures passed on as the source encoded them, while it gives such; None for most streams."""
         return None
 
     def record(self, recorded: RecordedEncoding | None) -> None:
-        """Hand what `recorded` chooses to it from now on; None: no more."""
+        """Hand the encoding that `recorded` chooses to it from now on; None stops recording."""
         if self._recorded is not None:
             self._recorded.close()
         self._recorded = recorded
 
     def record_keyframe(self) -> None:
-        """The recording begins a new file."""
+        """Request a keyframe for a new file of the recording."""
         if self._recorded is not None:
             self._recorded.request_keyframe()
 
     def output(self, codec: str, tier: PictureTier) -> TierEncoding:
-        """Made when it is first asked for; it costs nothing while nobody is in it."""
+        """Return an output, created by the first call for it; it costs nothing while it has no targets."""
         found = self._outputs.get((codec, tier))
         if found is None:
             settings = self._settings
@@ -121,13 +121,13 @@ class Stream(ABC, Generic[Job]):
         return found
 
     def codec_in_use(self, wanted: str = "") -> str:
-        """`wanted` if it can be had; else one that is encoded already for peers, the best one if there is none."""
+        """Return `wanted` if available; else a codec that is already encoded for peers, or the best one."""
         if wanted in self.codecs:
             return wanted
         return next((output.codec for output in self._outputs.values() if output.targets), self.codecs[0])
 
     def outputs_of(self, tier: PictureTier) -> list[TierEncoding]:
-        """Of all codecs, as far as they exist."""
+        """Return the existing outputs of a tier, in all codecs."""
         return [output for output in self._outputs.values() if output.tier == tier]
 
     def join(self, codec: str, target: Subscription, tier: PictureTier = "operator") -> None:
@@ -136,9 +136,9 @@ class Stream(ABC, Generic[Job]):
         self._peers.inc()
 
     def move(self, codec: str, target: Subscription, tier: PictureTier) -> None:
-        """Give `target` another tier, from that one's next keyframe on. Nothing for who is not here, or there already.
+        """Give `target` another tier, from that tier's next keyframe on.
 
-        One that changes its mind on the way stays where it is.
+        Does nothing for a target that has left or is in that tier, except to cancel its pending move to another.
         """
         if target not in self._members:
             return
@@ -149,13 +149,13 @@ class Stream(ABC, Generic[Job]):
             self.output(codec, tier).expect(target, source)
 
     def request_keyframe(self, codec: str, target: Subscription, cause: str) -> None:
-        """For `target`; see `TierEncoding.request_keyframe`."""
+        """Request a keyframe for `target`; see `TierEncoding.request_keyframe`."""
         for output in self._outputs.values():
             if target in output.targets:
                 output.request_keyframe(cause)
 
     def leave(self, target: Subscription) -> None:
-        """Idempotent."""
+        """Remove a target. Idempotent."""
         if target in self._members:
             del self._members[target]
             self._peers.dec()
@@ -169,7 +169,7 @@ class Stream(ABC, Generic[Job]):
         if not self._rate.take(now):
             self._drop("too_often")
             return
-        # Without one, none that builds on it could be decoded; an older stamp than the last is no lie.
+        # Without an H.264 picture, none that builds on it could be decoded; a stamp older than the last is still true.
         in_order = media.codec == "h264" or self._last_stamp is None
         if not in_order and event_gap(media.stamp, self._last_stamp or media.stamp) < 0:
             self._drop("stale_stamp")
@@ -191,7 +191,7 @@ class Stream(ABC, Generic[Job]):
             self._recorded.published(self.name, output, frame)
 
     def _admit(self, output: TierEncoding, frame: EncodedFrame) -> None:
-        """Let those who come from another tier begin with this frame, if they can."""
+        """Let targets that come from another tier begin with this frame, if they can."""
         if frame.keyframe and output.arriving:
             output.arrive()
 
@@ -206,16 +206,16 @@ class Stream(ABC, Generic[Job]):
             await asyncio.to_thread(self._thread.shutdown)
 
     def _begin_next(self) -> None:
-        """Give the worker what it does next, unless it has something to do."""
+        """Give the worker its next job, unless it is busy."""
         if self._turns is not None and not self._works and (job := self._next_job()) is not None:
             self._works = True
             self._thread.submit(self._work_and_tell, job, self._turns)
 
     def _work_and_tell(self, job: Job, turns: CooperativeScheduler) -> None:
-        """In the thread. What it made goes out at once: it does not wait for a task to have its turn."""
+        """Run a job in the thread. Its results go out at once, without waiting for a task's turn."""
         try:
             tell = partial(self._worked, self._work(job))
-        except Exception as error:  # a codec library did what it never should; the stream must go on
+        except Exception as error:  # unexpected error of a codec library; the stream must go on
             tell = partial(self._worked, (), error)
         turns.call_from_thread(tell)
 
@@ -255,8 +255,8 @@ class Stream(ABC, Generic[Job]):
 
     @abstractmethod
     def _next_job(self) -> Job | None:
-        """What the worker does next, decided now; None when there is nothing."""
+        """Return the worker's next job, decided now; None when there is none."""
 
     @abstractmethod
     def _work(self, job: Job) -> list[Encoded]:
-        """Runs in the stream's thread. Raises nothing: errors of media come back as results."""
+        """Do a job in the stream's thread. Raises nothing: errors of media come back as results."""

@@ -1,4 +1,4 @@
-"""One tier of one codec of one stream: who gets it, how it is encoded, and when it needs a keyframe."""
+"""One tier of one codec of one stream: its targets, its encoding target, and its keyframes."""
 
 from lockstep.server.media.metrics import MediaMetrics
 from lockstep.server.media.pipeline.frame import EncodedFrame
@@ -13,7 +13,7 @@ KEYFRAME_CAUSES = ("join", "pli", "drop", "tier", "record")
 
 
 class TierEncoding:
-    """Nothing is encoded for an output that nobody needs.
+    """One output of a stream. Nothing is encoded for an output that nobody needs.
 
     A target that changes its tier goes on with the old output until the new one has a keyframe for it: it misses no
     picture.
@@ -34,10 +34,10 @@ class TierEncoding:
         self.keyframes = keyframes
         self.cadence = FrameDecimator()
         self.targets: dict[Subscription, None] = {}  # an ordered set
-        self.arriving: dict[Subscription, TierEncoding] = {}  # and where each comes from
-        self.recorded = False  # whether a recording takes it
+        self.arriving: dict[Subscription, TierEncoding] = {}  # and the output that each comes from
+        self.recorded = False  # True while a recording takes it
         self.paused_until = 0.0  # no picture before; on the clock of `Stream.feed`
-        self.encoded_at = 0.0  # when the last picture was taken, on the same clock
+        self.encoded_at = 0.0  # time of the last picture taken, on the same clock
         self._last_capture_time = 0.0
         self._encoded = metrics.encoded.labels(stream, codec)
         self._of_tier = metrics.tier_frames.labels(stream, tier)
@@ -51,11 +51,11 @@ class TierEncoding:
 
     @property
     def held_up(self) -> bool:
-        """Whether the operator's last picture has not left yet: another would only wait behind it."""
+        """True while the operator's last picture has not left yet: another would only wait behind it."""
         return any(target.priority and target.paced for target in self.targets)
 
     def variants(self) -> frozenset[bool]:
-        """Whether targets need the trailer: {False}, {True} or both."""
+        """Return the variants that targets need, without and with the trailer: {False}, {True} or both."""
         return frozenset(target.trailer for targets in (self.targets, self.arriving) for target in targets)
 
     def join(self, target: Subscription) -> None:
@@ -63,12 +63,12 @@ class TierEncoding:
         self._ask_for_join("join")
 
     def expect(self, target: Subscription, source: "TierEncoding") -> None:
-        """`target` comes over from `source` with the next keyframe."""
+        """Move `target` from `source` to this output with the next keyframe."""
         self.arriving[target] = source
         self._ask_for_join("tier")
 
     def arrive(self) -> None:
-        """A keyframe is about to be published: those who waited for it are targets from now on."""
+        """Make targets of the arriving ones: the keyframe that they waited for is about to be published."""
         for target, source in self.arriving.items():
             source.targets.pop(target, None)
             self.targets[target] = None
@@ -83,12 +83,12 @@ class TierEncoding:
         self._requests[cause].inc()
 
     def request_keyframe(self, cause: str) -> None:
-        """`cause`: "pli" when the peer asks, "drop" when it could not keep up, "record" for a recording."""
+        """Request a keyframe. `cause`: "pli" from the peer, "drop" if it could not keep up, "record" for recording."""
         self.keyframes.request()
         self._requests[cause].inc()
 
     def monotone(self, capture_time: float) -> float:
-        """`capture_time`, never earlier than the one before."""
+        """Return `capture_time`, but never a time earlier than the one before."""
         self._last_capture_time = max(self._last_capture_time, capture_time)
         return self._last_capture_time
 

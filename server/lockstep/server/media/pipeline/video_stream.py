@@ -1,4 +1,4 @@
-"""One camera: the newest picture is encoded once per tier and codec that somebody needs."""
+"""The stream of a camera: the newest picture is encoded once per tier and codec in use."""
 
 import time
 from typing import NamedTuple
@@ -27,15 +27,15 @@ from lockstep.server.media.subscription import Subscription
 __all__ = ["VideoStream"]
 
 PACKETISE = {"H264": packetise_h264, "VP8": packetise_vp8}
-# A camera gives nothing when none came for so long, and at least so many in a row are missing.
+# A camera gives nothing when no picture came for so long, and at least so many in a row are missing.
 QUIET_SECONDS, QUIET_PICTURES = 2.0, 3
 
 
 class SourcePicture:
-    """A picture from the robot, decoded and resized at most once for all that encode it."""
+    """A picture from the robot, decoded and resized at most once for all outputs."""
 
     def __init__(self, media: Media, capture_time: float, media_time: int, group: tuple[Media, ...] = ()) -> None:
-        """`group`: what has to be decoded for it, if it builds on others."""
+        """`group`: the pictures to decode for it, if it builds on others."""
         self.media = media
         self._group = group
         self.capture_time = capture_time
@@ -45,7 +45,7 @@ class SourcePicture:
         self._error: MediaError | None = None
 
     def frame(self, decoder: PictureDecoder, plan: EncodingTarget) -> av.VideoFrame:
-        """In the size of `plan`. Runs in the stream's thread; raises MediaError."""
+        """Return the picture in the size of `plan`. Runs in the stream's thread; raises MediaError."""
         if self._error is not None:
             raise self._error
         if self._whole is None:
@@ -80,7 +80,7 @@ class PictureJob(NamedTuple):
 
 
 class VideoStream(Stream[PictureJob]):
-    """Takes yuv420p, mjpeg and h264, encoded to H.264 and VP8; h264 goes on as it came where it can (`Passthrough`).
+    """Encodes yuv420p, mjpeg and h264 to H.264 and VP8; h264 is passed on unchanged where possible (`Passthrough`).
 
     The operator's tier is encoded first and sent before the next one begins. When the encoders are too slow for all
     tiers a newer picture takes the place of an older one, and the tier that waited longest comes next.
@@ -92,15 +92,15 @@ class VideoStream(Stream[PictureJob]):
     def __init__(self, camera: Camera, settings: MediaSettings, fan_out: FanOut, metrics: MediaMetrics) -> None:
         self.frame_rate = min(camera.frame_rate, settings.video_frames_per_second or camera.frame_rate)
         self.size = camera.width, camera.height  # of the newest picture
-        self.gives: str | None = None  # the codec that comes; None before the first picture
-        self._came_at: float | None = None  # the newest picture, on the clock of `feed`
+        self.gives: str | None = None  # codec of the camera; None before the first picture
+        self._came_at: float | None = None  # arrival of the newest picture, on the clock of `feed`
         super().__init__(camera.name, camera.label, settings, fan_out, metrics)
         self._clock = PictureClock()
         self._pace = FrameRateLimiter(settings.video_frames_per_second)
         self._newest: tuple[Media, float, float] | None = None  # medium, now, capture time
         self._source: SourcePicture | None = None  # of the orders
-        self._orders: list[TierEncoding] = []  # that are still to be encoded from it
-        self._began = 0.0  # when it came
+        self._orders: list[TierEncoding] = []  # outputs still to be encoded from it
+        self._began = 0.0  # arrival of that picture
         self._others_served = 0  # observers' tiers that were encoded from it
         self._taken = metrics.taken.labels(camera.name)
         self._decoder = PictureDecoder()
@@ -114,7 +114,7 @@ class VideoStream(Stream[PictureJob]):
         return EncodingTarget(self._settings.video_bitrate_bps, self.frame_rate)
 
     def is_giving(self, now: float) -> bool:
-        """Whether pictures come. One that gives none, or none any more, needs no share of a path."""
+        """True while pictures come. A camera that gives none, or none any more, needs no share of a path."""
         patience = max(QUIET_SECONDS, QUIET_PICTURES / self.frame_rate)
         return self._came_at is not None and now - self._came_at < patience
 
@@ -141,7 +141,7 @@ class VideoStream(Stream[PictureJob]):
         self._begin_next()
 
     def _take_h264(self, media: Media, capture_time: float) -> None:
-        """A picture that the camera encoded: for those who get it as it is, and kept for the decoder."""
+        """Pass on a picture that the camera encoded, and keep it for the decoder."""
         if media.keyframe:
             self._passing.begin(media, self._ours("H264"))
         self._group.add(media)
@@ -167,7 +167,7 @@ class VideoStream(Stream[PictureJob]):
         self._publish(output, frame)
 
     def _ours(self, codec: str | None = None) -> list[TierEncoding]:
-        """The outputs that we encode, of one codec or all."""
+        """Return the outputs that the console encodes, of one codec or all."""
         passed = self._passing.output
         return [each for each in self._outputs.values() if each is not passed and codec in (None, each.codec)]
 
@@ -188,7 +188,7 @@ class VideoStream(Stream[PictureJob]):
             super().request_keyframe(codec, target, cause)
 
     def hold_back(self, target: Subscription, wanted: bool) -> None:
-        """Whether `target` must not get a camera's own H.264, because its path has no room."""
+        """Set whether `target` must not get the camera's own H.264, because its path has no room."""
         self._passing.hold_back(target, wanted)
 
     @property
@@ -196,7 +196,7 @@ class VideoStream(Stream[PictureJob]):
         return None if self._passing.profile is None else self._passing.output
 
     def measured(self, target: Subscription) -> tuple[float, float] | None:
-        """Pictures and bits a second of the camera's own H.264, if `target` gets that."""
+        """Return the pictures and bits per second of the camera's own H.264, if `target` gets that."""
         return self._passing.measured if self._passing.holds(target) else None
 
     def leave(self, target: Subscription) -> None:
@@ -213,7 +213,7 @@ class VideoStream(Stream[PictureJob]):
         return None if self._newest is None else self._next_job()
 
     def _take_newest(self) -> None:
-        """Begin the newest picture. What is left of the one before was not encoded for all tiers."""
+        """Begin the newest picture; give up the tiers for which the one before was not encoded."""
         if self._newest is None:
             return
         media, now, capture_time = self._newest

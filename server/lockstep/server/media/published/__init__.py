@@ -1,1 +1,1 @@
-"""Pictures that a client publishes by WHIP: taken off RTP, timed, and decoded in a process of their own."""
+"""Pictures that a client publishes by WHIP: received over RTP, timed, and decoded in a separate process."""

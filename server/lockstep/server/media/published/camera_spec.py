@@ -1,4 +1,4 @@
-"""What `--whip` says: a camera of the console's own that somebody publishes. No I/O.
+"""Parses `--whip`: a camera of the console that a client publishes. No I/O.
 
 `NAME[#option=value,option=value]`, as in `phone#label=Ann%27s%20phone,latency=0.4`.
 """
@@ -11,14 +11,14 @@ __all__ = ["SCHEME", "parse_published"]
 
 SCHEME = "whip"
 LATENCY = 0.3  # s from capture until the quickest picture leaves the publisher
-MOST = 4  # cameras to publish to
+MOST = 4  # cameras that clients may publish
 
 
 def parse_published(texts: Iterable[str]) -> tuple[SourceSpec, ...]:
-    """Each with a name of its own.
+    """Parse the cameras that clients may publish; each has a different name.
 
     Raises:
-        BadSource: one cannot be meant like this.
+        BadSource: one is not valid, or there are too many.
     """
     given = list(texts)
     if len(given) > MOST:

@@ -1,7 +1,7 @@
-"""The process that decodes what one publisher sends: a decoder that fails takes neither the console with it nor a peer.
+"""The process that decodes one publisher's pictures: a decoder that fails harms neither the console nor a peer.
 
-The first line of its input is a `SourceSpec`, then come `Encoded` pictures; it says `Captured` pictures, in the way of
-every other source's process. The end of its input means that the publisher has gone.
+The first line of its input is a `SourceSpec`, then come `Encoded` pictures; it writes `Captured` pictures, as every
+other source's process does. The end of its input means that the publisher has gone.
 """
 
 import os
@@ -26,15 +26,15 @@ from lockstep.server.media.sources.source_wire import Captured, Said, Trouble, W
 __all__ = ["PublishedPictures", "main"]
 
 MAX_PIXELS = 1920 * 1088
-MAX_RATE = 30.0  # Hz, of pictures that go on
+MAX_RATE = 30.0  # Hz, of pictures passed on
 MIN_SIDE = 16  # pixels
-NICENESS = 10  # what a publisher sends may cost the console and its encoders nothing
+NICENESS = 10  # a publisher's pictures must not slow the console and its encoders
 REMEMBERED = 64  # capture times of pictures that a decoder holds back
 DECODERS = {"H264": "h264", "VP8": "vp8"}
 
 
 class PublishedPictures:
-    """Call `take` for each picture, in order. After one that cannot be decoded it waits for a keyframe."""
+    """Decodes pictures. Call `take` for each, in order; after one that cannot be decoded it waits for a keyframe."""
 
     def __init__(self, spec: SourceSpec, say: Callable[[Said], None]) -> None:
         self._spec = spec
@@ -107,7 +107,7 @@ def main() -> None:
     source = sys.stdin.buffer
     spec = msgspec.json.Decoder(SourceSpec).decode(source.readline())
     out = os.fdopen(os.dup(sys.stdout.fileno()), "wb")
-    os.dup2(sys.stderr.fileno(), sys.stdout.fileno())  # what a library prints is no message
+    os.dup2(sys.stderr.fileno(), sys.stdout.fileno())  # output that a library prints is not a message
     with suppress(OSError, KeyboardInterrupt):
         decode_all(iter(lambda: read_picture(source), None), spec, lambda said: write_said(out, said))
     os._exit(0)

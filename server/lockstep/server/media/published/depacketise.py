@@ -1,4 +1,4 @@
-"""Encoded pictures out of the RTP payloads of all their packets. Pure functions."""
+"""Joins the RTP payloads of all packets of a picture into an encoded picture. Pure functions."""
 
 from collections.abc import Sequence
 from typing import Literal
@@ -15,10 +15,10 @@ NAL_IDR, NAL_SPS, NAL_DELIMITER = 5, 7, 9
 
 
 def join_payloads(codec: PictureCodec, payloads: Sequence[bytes]) -> bytes:
-    """The picture in the payloads of all its packets, in their order; H.264 as a byte stream with start codes.
+    """Join the payloads of all packets of a picture, in order; H.264 becomes a byte stream with start codes.
 
     Raises:
-        PayloadError: one of them is none of this codec, or the picture does not begin with the first.
+        PayloadError: a payload is not of this codec, or the picture does not begin with the first.
     """
     parts: list[bytes] = []
     for number, payload in enumerate(payloads):
@@ -38,9 +38,9 @@ def join_payloads(codec: PictureCodec, payloads: Sequence[bytes]) -> bytes:
 
 
 def begins_picture(codec: PictureCodec, payload: bytes) -> bool:
-    """Whether a picture certainly begins with this packet, whatever came before it.
+    """True if a picture certainly begins with this packet, whatever came before it.
 
-    Of H.264 only a delimiter or a parameter set says so: pictures may consist of several slices.
+    In H.264 only a delimiter or a parameter set proves it: pictures may consist of several slices.
     """
     try:
         if codec == "VP8":
@@ -53,7 +53,7 @@ def begins_picture(codec: PictureCodec, payload: bytes) -> bool:
 
 
 def is_keyframe(codec: PictureCodec, picture: bytes) -> bool:
-    """Whether decoding can begin with it. Of H.264 that takes its parameter sets, too."""
+    """True if decoding can begin with `picture`; in H.264 that takes its parameter sets, too."""
     if codec == "VP8":
         return bool(picture) and not picture[0] & 0x01  # RFC 6386 9.1
     kinds = {nal[0] & NAL_TYPE for nal in picture.split(START_CODE) if nal}

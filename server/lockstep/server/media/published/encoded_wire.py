@@ -1,4 +1,4 @@
-"""What the console says to the process that decodes published pictures: 4 bytes of length, then MessagePack."""
+"""Messages of the console to the process that decodes published pictures: 4 bytes of length, then MessagePack."""
 
 import struct
 from typing import BinaryIO
@@ -17,7 +17,7 @@ class Encoded(msgspec.Struct, frozen=True, array_like=True):
     """One picture as it was published."""
 
     codec: PictureCodec
-    time: float | None  # s, when its capture began, on this machine's monotonic clock; None: decode, and show nobody
+    time: float | None  # s, start of its capture, on this machine's monotonic clock; None: decode, but do not show
     keyframe: bool
     data: bytes
 
@@ -32,7 +32,7 @@ def encode_picture(picture: Encoded) -> bytes:
 
 
 def read_picture(file: BinaryIO) -> Encoded | None:
-    """The next one; None when the console has gone, or makes no sense."""
+    """Read the next picture; None when the console has gone, or the message is not valid."""
     head = file.read(_LENGTH.size)
     if len(head) < _LENGTH.size:
         return None

@@ -1,4 +1,4 @@
-"""What one publisher sends, from packets to encoded pictures with the time of capture. No I/O, no clock is read."""
+"""Turns one publisher's packets into encoded pictures with the time of capture. No I/O, no clock is read."""
 
 from lockstep.server.media.published.depacketise import PictureCodec
 from lockstep.server.media.published.encoded_wire import Encoded
@@ -10,22 +10,22 @@ from lockstep.server.util.token_bucket import TokenBucket
 __all__ = ["IncomingPictures"]
 
 MAX_RATE, MAX_BURST = 2000.0, 4000.0  # Hz, of packets: 20 Mbit/s of full ones
-FIRST_ROUND_TRIP = 0.1  # s, while it is not known
-MOST_LAG = 5.0  # s behind the quickest; then what waits is given up by publishing anew
+FIRST_ROUND_TRIP = 0.1  # s, before the first measurement
+MOST_LAG = 5.0  # s behind the quickest; beyond it the backlog is given up by publishing anew
 
 
 class IncomingPictures:
-    """Call `take` for each packet, `look` some times a second, `round_trip` when one was measured.
+    """Call `take` for each packet, `look` some times a second, and `path.observe` for each measured round trip.
 
-    A picture without a time is to be decoded, since others build on it, and shown to nobody: its event is not known.
+    A picture without a time is to be decoded, since others build on it, but not shown: its event is not known.
 
     Attributes:
-        flooded: packets that were more than anybody may send
-        heard_at: when the last packet came; None before the first
+        flooded: packets dropped because they exceeded the allowed rate
+        heard_at: arrival of the last packet; None before the first
     """
 
     def __init__(self, codec: PictureCodec, latency: float, now: float) -> None:
-        """`latency`: s that the quickest picture takes at the publisher's, from capture until it leaves."""
+        """`latency`: s from capture until the quickest picture leaves the publisher."""
         self.flooded = 0
         self.heard_at: float | None = None
         self.path = PathBound()
@@ -41,12 +41,12 @@ class IncomingPictures:
 
     @property
     def malformed(self) -> int:
-        """Pictures that are none of their codec."""
+        """Pictures that are not valid in their codec."""
         return self._assembly.malformed
 
     @property
     def late(self) -> bool:
-        """Whether waiting for the publisher to catch up has no point."""
+        """True if the publisher is too late to catch up."""
         return self._timeline.lag > MOST_LAG
 
     def take(self, packet: MediaPacket, now: float) -> list[Encoded]:
@@ -57,15 +57,15 @@ class IncomingPictures:
         return self._timed(self._assembly.take(packet, now, self._round_trip), now)
 
     def look(self, now: float) -> list[Encoded]:
-        """What is whole since too much was missing for too long."""
+        """Return the pictures that are whole once packets missing for too long are given up."""
         return self._timed(self._assembly.look(now, self._round_trip), now)
 
     def wants_keyframe(self, now: float) -> bool:
-        """Whether to ask for one now; then it counts as asked for."""
+        """True if a keyframe is to be requested now; it then counts as requested."""
         return self._assembly.wants_keyframe(now)
 
     def lost_picture(self) -> None:
-        """One could not be decoded."""
+        """Note that a picture could not be decoded."""
         self._assembly.lost_picture()
 
     @property
@@ -76,7 +76,7 @@ class IncomingPictures:
         return [Encoded(self._codec, self._captured_at(each, now), each.keyframe, each.data) for each in pictures]
 
     def _captured_at(self, picture: AssembledPicture, now: float) -> float | None:
-        """Not later than its capture, if the quickest left the publisher within the latency; None: not known."""
+        """Return a time no later than the capture, if the quickest left within the latency; None: not known."""
         at = self._timeline.place(picture.media_time, 0.0, picture.arrival)
         path = self.path.seconds(now)
         return None if at is None or path is None else at - path

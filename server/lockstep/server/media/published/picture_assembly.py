@@ -1,7 +1,7 @@
-"""Whole pictures out of RTP packets that come late, twice, in another order or not at all. No I/O, no clock is read.
+"""Assembles pictures from RTP packets that come late, twice, in another order or not at all. No I/O, no clock is read.
 
-A picture goes on only if all of its packets are here, and all that it builds on went on. So a loss that is not repaired
-in time costs pictures until the next keyframe, and never shows a broken one.
+A picture is passed on only if all of its packets have arrived, and all pictures that it builds on were passed on. So a
+loss that is not repaired in time costs pictures until the next keyframe, and never shows a broken one.
 """
 
 from collections.abc import Iterator
@@ -12,16 +12,16 @@ from lockstep.server.media.published.depacketise import PictureCodec, begins_pic
 
 __all__ = ["AssembledPicture", "MediaPacket", "PictureAssembly"]
 
-CAPACITY = 1024  # packets that wait for others
+CAPACITY = 1024  # packets that wait for missing ones
 MOST_BYTES = 2_000_000  # of one picture
-LEAST_PATIENCE, MOST_PATIENCE = 0.1, 0.6  # s that a missing packet is waited for
+LEAST_PATIENCE, MOST_PATIENCE = 0.1, 0.6  # s of waiting for a missing packet
 MARGIN = 0.05  # s beyond one and a half round trips
-KEYFRAME_AGAIN = 0.5  # s until a keyframe is asked for again
+KEYFRAME_AGAIN = 0.5  # s until a keyframe is requested again
 HALF = 1 << 15
 
 
 class MediaPacket(NamedTuple):
-    """What matters of an RTP packet."""
+    """The relevant fields of an RTP packet."""
 
     sequence: int  # 16 bits
     timestamp: int  # 32 bits, 90 kHz
@@ -33,7 +33,7 @@ class AssembledPicture(NamedTuple):
     data: bytes
     keyframe: bool
     media_time: float  # s, from the RTP timestamp, on the sender's clock
-    arrival: float  # s, when the first of its packets came
+    arrival: float  # s, of its first packet
 
 
 class _Kept(NamedTuple):
@@ -42,11 +42,11 @@ class _Kept(NamedTuple):
 
 
 class PictureAssembly:
-    """Call `take` for each packet and `look` now and then; then ask whether it wants a keyframe.
+    """Call `take` for each packet and `look` at intervals, and `wants_keyframe` after each call.
 
     Attributes:
         lost: packets that never came, or came too late
-        malformed: pictures that are none of their codec
+        malformed: pictures that are not valid in their codec
     """
 
     def __init__(self, codec: PictureCodec) -> None:
@@ -54,24 +54,24 @@ class PictureAssembly:
         self.malformed = 0
         self._codec = codec
         self._kept: dict[int, _Kept] = {}  # by sequence number without wraps
-        self._next: int | None = None  # the first that no picture was made of
-        self._scanned = 0  # from the former up to this one, all are here and of one picture
+        self._next: int | None = None  # the first packet that is not part of a picture yet
+        self._scanned = 0  # from `_next` up to this one, all packets are here and of one picture
         self._newest = 0
-        self._missing: dict[int, float] = {}  # since when
+        self._missing: dict[int, float] = {}  # time from which each is missing
         self._broken = True  # until a keyframe
         self._tainted: int | None = None  # timestamp of a picture whose beginning may be missing
         self._asked_keyframe = float("-inf")
         self._clock = _MediaTime()
 
     def take(self, packet: MediaPacket, now: float, round_trip: float = 0.1) -> list[AssembledPicture]:
-        """One packet; the pictures that are whole by it. `round_trip` to the sender, in s."""
+        """Take a packet and return the pictures that it completes. `round_trip`: to the sender, in s."""
         number = self._unwrapped(packet.sequence)
         if self._next is None:
             self._next, self._scanned, self._newest = number, number, number - 1
             if not begins_picture(self._codec, packet.payload):
                 self._tainted = packet.timestamp
         if number < self._next or number in self._kept:
-            return self.look(now, round_trip)  # again, or too late
+            return self.look(now, round_trip)  # repeated, or too late
         if number >= self._next + CAPACITY:
             self._begin_anew(number, packet)
         self._kept[number] = _Kept(packet, now)
@@ -82,7 +82,7 @@ class PictureAssembly:
         return self.look(now, round_trip)
 
     def look(self, now: float, round_trip: float = 0.1) -> list[AssembledPicture]:
-        """The pictures that are whole now; what was missing for too long is given up."""
+        """Return the pictures that are whole now; packets missing for too long are given up."""
         found = [*self._whole_pictures()]
         patience = min(MOST_PATIENCE, max(LEAST_PATIENCE, 1.5 * round_trip + MARGIN))
         while (hole := self._missing.get(self._scanned)) is not None and now - hole > patience:
@@ -91,14 +91,14 @@ class PictureAssembly:
         return found
 
     def wants_keyframe(self, now: float) -> bool:
-        """Whether to ask for a keyframe now (RFC 4585 6.3.1); then it counts as asked for."""
+        """True if a keyframe is to be requested now (RFC 4585 6.3.1); it then counts as requested."""
         if not self._broken or self._next is None or now - self._asked_keyframe < KEYFRAME_AGAIN:
             return False
         self._asked_keyframe = now
         return True
 
     def lost_picture(self) -> None:
-        """One that went on could not be used: what builds on it cannot either."""
+        """Note that a picture could not be used: pictures that build on it cannot either."""
         self._broken = True
 
     def _unwrapped(self, sequence: int) -> int:
@@ -107,7 +107,7 @@ class PictureAssembly:
         return self._newest + ((sequence - self._newest + HALF) & 0xFFFF) - HALF
 
     def _begin_anew(self, number: int, packet: MediaPacket) -> None:
-        """So much is missing that nobody waits for it."""
+        """Begin anew at packet `number`: too many packets are missing to wait for them."""
         self.lost += len(self._missing)
         self._kept.clear()
         self._missing.clear()
@@ -115,12 +115,12 @@ class PictureAssembly:
         self._break(packet)
 
     def _break(self, first: MediaPacket) -> None:
-        """Something in front of `first` is missing for good."""
+        """Wait for a keyframe: a packet before `first` is missing for good."""
         self._broken = True
         self._tainted = None if begins_picture(self._codec, first.payload) else first.timestamp
 
     def _give_up(self) -> None:
-        """What is missing, and the picture that it is missing of."""
+        """Give up the missing packets and their picture."""
         for number in range(self._next or 0, self._scanned):
             del self._kept[number]
         while self._scanned in self._missing:
@@ -139,7 +139,7 @@ class PictureAssembly:
                 yield picture
 
     def _next_run(self) -> range | None:
-        """The packets of the next picture, when all of them are here."""
+        """Return the packets of the next picture, when all of them are here."""
         if self._next is None or self._next not in self._kept:
             return None
         timestamp = self._kept[self._next].packet.timestamp
@@ -171,7 +171,7 @@ class PictureAssembly:
         return AssembledPicture(data, keyframe, media_time, min(each.arrival for each in packets))
 
     def _joined(self, payloads: list[bytes]) -> bytes | None:
-        """None where they are none of this codec, or too much."""
+        """Join the payloads; None if they are not of this codec, or too large."""
         if sum(map(len, payloads)) > MOST_BYTES:
             return None
         try:

@@ -1,4 +1,4 @@
-"""A camera that somebody publishes, as the desk of sources sees it: there is always one, and at times nobody's."""
+"""A camera that a client publishes, as a source: it always exists, at times without a publisher."""
 
 from collections.abc import Callable
 
@@ -13,11 +13,11 @@ log = structlog.get_logger(__name__)
 
 
 class PublishedCamera:
-    """A publisher calls `begin`, then the others, and `end` at the end, each with what stands for it.
+    """A publisher calls `begin`, then the other methods, then `end`, and passes itself to each.
 
     Attributes:
-        state, detail: how it does, in words
-        publisher: what stands for the one who publishes now; None: nobody does
+        state, detail: its state, and a description in words
+        publisher: the current publisher; None: nobody publishes
     """
 
     def __init__(
@@ -37,24 +37,24 @@ class PublishedCamera:
         self._failed = failed
 
     def begin(self, publisher: object) -> None:
-        """From now on it is theirs; what others say counts no more."""
+        """Hand the camera over to `publisher`; from now on calls of others are ignored."""
         self.publisher = publisher
         self._enter("connecting", "")
 
     def captured(self, publisher: object, medium: Captured, name: str) -> None:
-        """A picture of theirs; `name` is what others call them."""
+        """Take a picture of `publisher`; `name` is the publisher's name for others."""
         if publisher is self.publisher:
             self._enter("live", f"published by {name}")
             self._captured(medium)
 
     def failed(self, publisher: object, reason: str, detail: str) -> None:
-        """Nothing can be shown now, and it may be again."""
+        """Note that nothing can be shown for now."""
         if publisher is self.publisher:
             self._failed(reason)
             self._enter("reconnecting", detail)
 
     def end(self, publisher: object, reason: str, detail: str) -> None:
-        """They publish no more. Idempotent."""
+        """End the publication of `publisher`. Idempotent."""
         if publisher is self.publisher:
             self.publisher = None
             self._failed(reason)

@@ -1,1 +1,1 @@
-"""Quality: how many pictures of which size and bitrate each tier of peers gets."""
+"""Quality control: the frame rate, picture size and bitrate that each tier of peers gets."""

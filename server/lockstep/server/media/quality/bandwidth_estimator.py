@@ -1,32 +1,32 @@
-"""How many bits per second of pictures one peer's path is given: the core of the quality controller. No I/O.
+"""Estimates the bitrate of pictures that one peer's path carries: the core of the quality controller. No I/O.
 
-The rules, looked at ten times a second; the first that holds decides. Between two decreases lies the time that the
-first needs to show: the round trip and half a second.
+The rules are evaluated ten times a second, and the first that holds decides. Two decreases are at least as far apart
+as the first needs to show its effect: the round trip and half a second.
 
 | when | the rate becomes | reason |
 |---|---|---|
 | pictures leave and nothing was heard for 2 s (at first 5 s) and a round trip | 70 %, every second | no feedback |
-| round trips grew beyond their spread | 85 % of what it carries, after a pause | round trip |
+| round trips grew beyond their spread | 85 % of the rate carried, after a pause | round trip |
 | the peer's estimate fell, and a queue, loss or the gap confirms it | the estimate | bandwidth |
-| the gap nears the tolerance and was smaller before, in two reports running | 80 % | gap |
+| the gap nears the tolerance and was smaller before, in two consecutive reports | 80 % | gap |
 | more than 10 % is lost | by half the loss; without a queue not below half of what it was | loss |
 | 2 to 10 % is lost, or the estimate fell, or a queue begins, or the console itself is late | stays | |
-| nothing of this for a second, the rate is used, and something was heard since the last increase | see below | |
+| none of these for a second, the rate is used, and something was heard since the last increase | see below | |
 
-The pause is as long as the queue, a second at most: meanwhile the pictures that wait in it arrive, and the next one
-finds an empty path.
+The pause is as long as the queue, a second at most: meanwhile the pictures that wait in the queue arrive, and the next
+one finds an empty path.
 
-Increase: by 35 % every second until the first limit was met; after that 12 % a second up to 85 % of the
-last limit, and 4 % beyond. What was lost to silence comes back at once, by half.
+The rate increases by 35 % every second until it meets its first limit; after that by 12 % a second up to 85 % of the
+last limit, and by 4 % beyond. After a silence it returns at once to half of the rate before.
 
-What a decrease does not cure is not caused by the rate: when three of them did not shorten the round trips by a fifth,
-and nothing is lost, the path has become longer and its new length counts; when two did not narrow the gap, the gap is
-left alone for half a minute; loss without a queue costs half the rate at most, and loss as usual nothing. A rate that
-an undemanding picture does not use is not raised, and not lowered either.
+A symptom that decreases do not cure is not caused by the rate: when three of them did not shorten the round trips by a
+fifth, and nothing is lost, the path has become longer and its new length counts; when two did not narrow the gap, the
+gap is ignored for half a minute; loss without a queue costs half the rate at most, and the usual loss nothing. A rate
+that an undemanding picture does not use is neither raised nor lowered.
 
 In the words of RFC 8836: round trips and the receiver's own delay-based estimate (REMB, which Chromium and aiortc make
-from abs-send-time) detect the standing queue, loss is only its last resort, and "no feedback" is its circuit breaker
-(RFC 8083 asks for one). Ours is what makes it an operator's: the gap in events, which is what the person can bear.
+from abs-send-time) detect the standing queue, loss is only the last resort, and "no feedback" is the circuit breaker
+(RFC 8083 asks for one). The gap in events is added for the operator: it measures the delay that a person can bear.
 """
 
 from typing import Literal, NamedTuple
@@ -42,12 +42,12 @@ SILENCE = 2.0  # s
 FIRST_ANSWER = 5.0  # s; a browser takes its time to start
 SILENT_STEP = 1.0  # s between two decreases in silence
 REACTION = 0.5  # s on top of a round trip until a decrease shows
-FRESH = 0.3  # s after a decrease from which on a round trip tells what it did
+FRESH = 0.3  # s after a decrease until round trips show its effect
 LOSS_EVERY = 2.0  # s
 LATENESS = 0.3  # s
-DRAINS = 0.8  # share of a queue that shows that it does
-EPISODE = 4.0  # s; decreases that follow one another so closely are of one queue
-CALM = 1.0  # s without any sign before an increase
+DRAINS = 0.8  # share of its former length below which a queue drains
+EPISODE = 4.0  # s; decreases that follow one another so closely belong to one queue
+CALM = 1.0  # s without any sign of a limit before an increase
 RAISE_EVERY = 1.0  # s
 HIGH_LOSS, SOME_LOSS = 0.10, 0.02
 FALL = 0.97  # an estimate below this share of the one before has fallen
@@ -55,14 +55,14 @@ NEAR_TOLERANCE = 0.75
 MOST_PAUSE = 1.0  # s
 START_GROWTH, FAR_GROWTH, NEAR_GROWTH = 1.35, 1.12, 1.04
 NEAR_LIMIT = 0.85
-USED = 0.7  # share of the rate that has to leave for it to count as tried
+USED = 0.7  # share of the rate that has to be sent for it to count as used
 GAP_TRIES, LENGTH_TRIES = 2, 3
 GAP_REST = 30.0  # s
 LIMIT_MEMORY = 60.0  # s that a limit is remembered
 
 
 class RateLimits(NamedTuple):
-    """Bits per second, of all pictures of a peer together."""
+    """The limits of a peer's rate, in bits per second of all its pictures together."""
 
     minimum: float
     start: float
@@ -70,7 +70,7 @@ class RateLimits(NamedTuple):
 
 
 class BandwidthEstimator:
-    """One per peer. Order of calls: the inputs at any time, `decide` at regular intervals.
+    """The rate of one peer's path. Call the inputs at any time and `decide` at regular intervals.
 
     `now` is on one monotonic clock.
     """
@@ -79,36 +79,36 @@ class BandwidthEstimator:
         self.limits = limits
         self.rate = limits.start
         self.reason: Reason = ""  # of the last decrease; "" when the rate is back at its maximum
-        self.paused_until = 0.0  # no picture is to leave before
+        self.paused_until = 0.0  # no picture may leave before
         self.round_trips = RoundTrips()
         self.losses = LossWindow()
         self.sent_bps = 0.0  # over the last second or so
-        self.limited_at: float | None = None  # when the path last showed a limit
-        self._ceiling: float | None = None  # rate at which it did
+        self.limited_at: float | None = None  # last time that the path showed a limit
+        self._ceiling: float | None = None  # rate at that limit
         self._heard_at = now
-        self._heard = False  # anything since the last increase
-        self._answered = False  # anything at all
+        self._heard = False  # True after feedback since the last increase
+        self._answered = False  # True after the peer's first feedback
         self._silent_from: float | None = None  # rate before the silence
         self._lowered_at = now - CALM
         self._raised_at = now
         self._sign_at = now - CALM  # of the last sign of a limit
-        self._sent: tuple[int, float] | None = None  # octets in all, when
+        self._sent: tuple[int, float] | None = None  # total octets, and the time
         self._estimate: float | None = None
         self._estimate_fell = False
         self._gap_base: list[int] = []  # the last reports' lags
-        self._gap_near = 0  # reports running
+        self._gap_near = 0  # consecutive reports
         self._lag = 0
-        self._gap_tries: list[int] = []  # lag at each decrease for it
+        self._gap_tries: list[int] = []  # lag at each decrease for the gap
         self._gap_rests_until = 0.0
-        self._length_tries: list[float] = []  # queue at each decrease for it
+        self._length_tries: list[float] = []  # queue at each decrease for the queue
         self._queue_then = 0.0  # at the last decrease
         self._loss_floor: float | None = None
         self._late_at = float("-inf")
 
-    # what comes in
+    # inputs
 
     def heard(self, now: float) -> None:
-        """The peer gave a sign of life."""
+        """Note a sign of life of the peer."""
         if self._silent_from is not None:
             self.rate = max(self.rate, min(self.limits.maximum, self._silent_from / 2))
             self._silent_from = None
@@ -116,14 +116,14 @@ class BandwidthEstimator:
         self._heard = self._answered = True
 
     def received(self, lost: int, expected: int, round_trip: float | None, now: float) -> None:
-        """A receiver report: packets since the last one, and the round trip in s if it tells one."""
+        """Take a receiver report: packets since the last one, and the round trip in s if it contains one."""
         self.heard(now)
         self.losses.add(lost, expected, now)
         if round_trip is not None and now - self._late_at > LATENESS:
             self.round_trips.add(round_trip, now)
 
     def estimated(self, bitrate_bps: float, now: float) -> None:
-        """The peer's own estimate of what it can receive (REMB)."""
+        """Take the peer's own estimate of the bitrate that it can receive (REMB)."""
         self.heard(now)
         # aiortc gives its first estimate when it finds the path overused.
         before = self.sent_bps if self._estimate is None else self._estimate
@@ -132,7 +132,7 @@ class BandwidthEstimator:
         self._estimate = bitrate_bps
 
     def lagged(self, lag: int, tolerance: int, now: float) -> None:
-        """The largest gap of pictures since the last report, and the tolerance; both in events."""
+        """Take the largest gap of pictures since the last report, and the tolerance; both in events."""
         self.heard(now)
         usual = min(self._gap_base, default=lag)
         near = tolerance > 0 and lag >= NEAR_TOLERANCE * tolerance and lag > usual
@@ -141,11 +141,11 @@ class BandwidthEstimator:
         self._gap_base = [*self._gap_base[-19:], lag]
 
     def late(self, now: float) -> None:
-        """This computer was busy: round trips measured now say nothing of the network."""
+        """Note that this computer was busy: round trips measured now say nothing about the network."""
         self._late_at = self._sign_at = now
 
     def sent(self, octets: int, now: float) -> None:
-        """So many bytes of pictures have been sent in all."""
+        """Take the total number of bytes of pictures that have been sent."""
         if self._sent is None:
             self._sent = octets, now
             return
@@ -156,7 +156,7 @@ class BandwidthEstimator:
         self.sent_bps += (rate - self.sent_bps) * min(1.0, passed / 0.7)
         self._sent = octets, now
 
-    # what follows
+    # decisions
 
     def decide(self, now: float) -> None:
         """Apply the rules."""
@@ -171,7 +171,7 @@ class BandwidthEstimator:
 
     @property
     def limited(self) -> bool:
-        """Whether the path showed a limit within the last minute."""
+        """True if the path showed a limit within the last minute."""
         return self.limited_at is not None
 
     def calm_for(self, now: float) -> float:
@@ -179,7 +179,7 @@ class BandwidthEstimator:
         return now - max(self._sign_at, self._lowered_at)
 
     def assume(self, rate: float, now: float) -> None:
-        """Try a rate that others are served with."""
+        """Try a rate at which others are served."""
         self.rate = max(self.limits.minimum, rate)  # a peer without a camera needs nothing, and may get one
         self._raised_at = self._lowered_at = self._sign_at = now
 
@@ -194,7 +194,7 @@ class BandwidthEstimator:
             self._set(0.7 * self.rate, "no feedback", now)
 
     def _lower(self, now: float) -> bool:
-        """Whether something speaks against an increase; the decrease that it asks for is made."""
+        """Make the decrease that is due, if any; True if something speaks against an increase."""
         queued = self.round_trips.queued and self.round_trips.at > self._lowered_at + FRESH
         loss = self.losses.unusual(now)
         fell, self._estimate_fell = self._estimate_fell, False
@@ -226,7 +226,7 @@ class BandwidthEstimator:
             return
         if self._length_tries and trips.queue < DRAINS * self._length_tries[0]:
             self._length_tries = []
-        if self.losses.fraction(now) <= SOME_LOSS:  # a queue that overflows is no longer path
+        if self.losses.fraction(now) <= SOME_LOSS:  # an overflowing queue is not a longer path
             self._length_tries.append(trips.queue)
         if len(self._length_tries) > LENGTH_TRIES:
             trips.accept()
@@ -234,7 +234,7 @@ class BandwidthEstimator:
             return
         self._queue_then = trips.queue
         carried = min(self.rate, self.sent_bps or self.rate) / (1 + trips.growth)
-        # What an undemanding picture left unused says little of the path, unless the queue is seen to grow or overflow.
+        # A rate that an undemanding picture left unused says little of the path, unless its queue grows or overflows.
         sure = trips.growth > 0.2 or self.losses.fraction(now) > SOME_LOSS
         self._limit(max(0.85 * carried, (0.4 if sure else 0.65) * self.rate), "round trip", now)
 
@@ -257,7 +257,7 @@ class BandwidthEstimator:
             self._set(wanted, "loss", now)
 
     def _limit(self, rate: float, reason: Reason, now: float) -> None:
-        """The path carries no more than about `rate`."""
+        """Lower the rate: the path carries no more than about `rate`."""
         self.limited_at = now
         if self._ceiling is None or now - self._lowered_at > EPISODE:
             self._ceiling = max(rate, min(self.rate, rate / 0.85))

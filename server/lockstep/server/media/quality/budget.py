@@ -1,24 +1,24 @@
-"""One peer's bits shared out among its cameras. No I/O."""
+"""Shares one peer's bitrate out among its cameras. No I/O."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
 
 __all__ = ["CameraNeed", "share_out"]
 
-FLOOR_BPS = 30_000  # of a camera: a small picture that keeps going
-LEAST_BPS = 10_000  # of the others when there is hardly enough for the main camera
+FLOOR_BPS = 30_000  # per camera: enough for small, continuous pictures
+LEAST_BPS = 10_000  # per other camera when there is hardly enough for the main one
 
 
 class CameraNeed(NamedTuple):
-    pixels_per_second: float  # of its full picture and rate
+    pixels_per_second: float  # at its full size and rate
     maximum_bps: float
 
 
 def share_out(total_bps: float, cameras: Sequence[CameraNeed]) -> list[float]:
-    """Bits per second of each camera; the first is the main one.
+    """Return the bits per second of each camera; the first is the main one.
 
-    The main camera's floor comes first, then the others' floors. The rest goes by pixels per second, and what a camera
-    cannot use goes to the main camera.
+    The main camera's floor comes first, then the others' floors. The rest is shared by pixels per second, and the part
+    that a camera cannot use goes to the main camera.
     """
     if not cameras:
         return []
@@ -33,7 +33,7 @@ def share_out(total_bps: float, cameras: Sequence[CameraNeed]) -> list[float]:
     ]
     unused = max(0.0, total_bps - sum(shares))
     shares[0] = min(max(cameras[0].maximum_bps, FLOOR_BPS), shares[0] + unused)
-    for i in range(1, len(shares)):  # and beyond the main camera's maximum to the others
+    for i in range(1, len(shares)):  # beyond the main camera's maximum, to the others
         unused = max(0.0, total_bps - sum(shares))
         shares[i] = min(cameras[i].maximum_bps, shares[i] + unused)
     return shares

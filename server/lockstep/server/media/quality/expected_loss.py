@@ -2,20 +2,20 @@
 
 __all__ = ["ExpectedLoss"]
 
-STEPS = (5, 10, 20, 30)  # percent; a change of step begins the encoder anew
-MARGIN = 1.5  # times the loss that was measured
+STEPS = (5, 10, 20, 30)  # percent; a change of step reopens the encoder
+MARGIN = 1.5  # times the measured loss
 PATIENCE = 30.0  # s of less loss before a step down
 
 
 class ExpectedLoss:
-    """Up at once, down a step at a time."""
+    """The expected loss, which rises at once and falls a step at a time."""
 
     def __init__(self, percent: int) -> None:
         self.percent = percent
-        self._needed_at: float | None = None  # when this much was last needed
+        self._needed_at: float | None = None  # last time that this much was needed
 
     def update(self, loss: float, now: float) -> int:
-        """The percentage to expect, with a loss of 0 to 1 measured."""
+        """Take a measured loss of 0 to 1 and return the percentage to expect."""
         needed = next((step for step in STEPS if step >= 100 * MARGIN * loss), STEPS[-1])
         if self._needed_at is None or needed >= self.percent:
             self._needed_at = now

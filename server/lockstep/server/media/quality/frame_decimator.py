@@ -1,16 +1,16 @@
-"""Which of a camera's pictures a tier takes, so that they come evenly. No clock is read here."""
+"""Selects the pictures of a camera that a tier takes, evenly spaced. No clock is read here."""
 
 __all__ = ["FrameDecimator"]
 
 
 class FrameDecimator:
-    """Ask `take` for every picture, in the order of their times."""
+    """Thins the pictures of one tier. Call `take` for every picture, in the order of their times."""
 
     def __init__(self) -> None:
         self._due = float("-inf")
 
     def take(self, time: float, wanted_rate: float, source_rate: float) -> bool:
-        """Whether to encode the picture captured at `time` (s), with pictures coming at `source_rate`."""
+        """True if the picture captured at `time` (s) is to be encoded; pictures come at `source_rate`."""
         if wanted_rate >= 0.95 * source_rate:
             self._due = time
             return True

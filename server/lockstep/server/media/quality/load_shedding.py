@@ -1,50 +1,50 @@
-"""How many of a camera's pictures each of many observers gets. No I/O.
+"""Reduces the number of a camera's pictures that each of many observers gets. No I/O.
 
 | observers | pictures |
 |---|---|
 | up to the size of a crowd | all |
 | more | every second |
 | more than two and a half times as many | every third |
-| more than the size, whose work fills the event loop | a step fewer for each two seconds of that, down to every sixth |
+| more than the size, while they fill the event loop | a step fewer for each two seconds of that, down to every sixth |
 
-Fewer pictures come at once, more only when for five seconds a fifth fewer watch than the step takes: somebody who comes
-and goes at the edge changes nothing. What was taken because the loop was full comes back a step at a time, when the
-loop would not be full with it; a step that has to be taken again soon doubles the wait for the next one.
+The frame rate falls at once, and rises only after five seconds with a fifth fewer observers than the step requires:
+somebody who comes and goes at the edge changes nothing. A step taken because the loop was full is undone when the loop
+has room for it, one step at a time; a step that has to be taken again soon doubles the wait for the next one.
 """
 
 __all__ = ["FULL", "LoadShedding"]
 
 HUGE = 2.5  # times the size
-EDGE = 0.8  # of a step's observers, below which it is left
+EDGE = 0.8  # share of a step's observers below which the step is undone
 AFTER = 5.0  # s
 MOST = 6  # one picture of so many
-FULL = 0.85  # of the loop's time: above it, what comes late is dropped, and asks for keyframes, which make more to do
-ROOM = 0.8  # of the loop's time, that may be filled with one step more
-PICTURES = 0.5  # of the work for observers; the rest are sound, feedback and what they send
-FULL_LOOKS = 2  # one after the other
-LONGEST = 160.0  # s of waiting
+FULL = 0.85  # of the loop's time: above it late frames are dropped, and the keyframes requested for them add work
+ROOM = 0.8  # of the loop's time, which may be filled after a step is undone
+PICTURES = 0.5  # share of the work for observers; the rest is sound, feedback and their own datagrams
+FULL_LOOKS = 2  # consecutive
+LONGEST = 160.0  # s, the longest wait
 
 
 class LoadShedding:
-    """One per media plane."""
+    """The load shedding of one media hub."""
 
     def __init__(self, size: int) -> None:
         self.size = size  # observers who still get everything
-        self._step = 1  # of the camera's rate, by the number of observers
+        self._step = 1  # divisor of the camera's rate, by the number of observers
         self._fewer_since: float | None = None
-        self._relief = 0  # steps besides, by the load
+        self._relief = 0  # further steps, by the load
         self._full_looks = 0
         self._room_since: float | None = None
-        self._wait = AFTER  # s of room before a step comes back
+        self._wait = AFTER  # s of room before a step is undone
         self._eased_at = float("-inf")
 
     @property
     def divisor(self) -> int:
-        """Each gets one picture of so many."""
+        """The divisor of the frame rate: each observer gets one picture of so many."""
         return 1 if self._step == 1 else min(MOST, self._step + self._relief)
 
     def watch(self, observers: int, now: float) -> int:
-        """So many watch now; returns the divisor."""
+        """Take the number of observers and return the divisor."""
         wanted = self._step_for(observers)
         if wanted > self._step:
             self._step = wanted
@@ -58,7 +58,7 @@ class LoadShedding:
         return self.divisor
 
     def loaded(self, load: float, now: float) -> None:
-        """Observers' work took this share of the loop's time since the last look, 0 to 1; to be told once a second."""
+        """Take the share of the loop's time that observers took since the last call, 0 to 1. Call it once a second."""
         if self._step == 1:
             self._relief, self._full_looks, self._room_since = 0, 0, None
             return

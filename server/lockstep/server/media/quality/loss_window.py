@@ -6,7 +6,7 @@ __all__ = ["LossWindow"]
 
 WINDOW = 3.0  # s
 ENOUGH = 30  # packets; of fewer, one lost packet says nothing
-USUAL_SECONDS = 8.0  # over which the usual loss is taken
+USUAL_SECONDS = 8.0  # over which the usual loss is averaged
 UNUSUAL = 1.5  # times the usual loss
 
 
@@ -14,9 +14,9 @@ class LossWindow:
     """Sums receiver reports, so that a stream of few packets does not count as much as one of many."""
 
     def __init__(self) -> None:
-        self.known = False  # whether any report came
+        self.known = False  # True after the first report
         self.usual = 0.0  # 0 to 1
-        self._reports: deque[tuple[float, int, int]] = deque()  # when, lost, expected
+        self._reports: deque[tuple[float, int, int]] = deque()  # time, lost, expected
         self._at: float | None = None
 
     def add(self, lost: int, expected: int, now: float) -> None:
@@ -29,13 +29,13 @@ class LossWindow:
         self._at = now
 
     def fraction(self, now: float) -> float:
-        """0 to 1; 0 while too little is known."""
+        """Return the loss, 0 to 1; 0 while too little is known."""
         while self._reports and now - self._reports[0][0] > WINDOW:
             self._reports.popleft()
         expected = sum(report[2] for report in self._reports)
         return 0.0 if expected < ENOUGH else sum(report[1] for report in self._reports) / expected
 
     def unusual(self, now: float) -> float:
-        """The loss, if it is more than a path that loses packets by itself has shown lately; else 0."""
+        """Return the loss if it is clearly above the usual loss of the path; else 0."""
         fraction = self.fraction(now)
         return fraction if fraction > UNUSUAL * self.usual else 0.0

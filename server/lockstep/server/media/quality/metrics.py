@@ -1,4 +1,4 @@
-"""Quality at /metrics, by tier: peers are too many to be labels. Each tier shows its worst peer."""
+"""Quality metrics at /metrics, by tier: peers are too many to be labels. Each tier shows its worst peer."""
 
 from collections.abc import Callable, Sequence
 
@@ -11,7 +11,7 @@ __all__ = ["QualityMetrics"]
 
 
 class QualityMetrics:
-    """One set per plane; refreshed once a second."""
+    """The quality metrics of one media hub; refreshed once a second."""
 
     def __init__(self, registry: CollectorRegistry) -> None:
         def gauge(name: str, text: str, *labels: str) -> Gauge:

@@ -1,10 +1,10 @@
-"""Which of the two observers' tiers a peer gets. No I/O.
+"""Chooses between the two observers' tiers for a peer. No I/O.
 
 | in | when | then |
 |---|---|---|
 | high | its path carries less than 60 % of what high needs | low |
-| low | it was patient, and its path without a sign of a limit, for 10 s | high, as a trial |
-| high | it falls back within 20 s of a trial | low, and twice as patient as before: 10 s to 160 s |
+| low | its patience is over, and its path showed no sign of a limit for 10 s | high, as a trial |
+| high | it falls back within 20 s of a trial | low, with twice the patience: 10 s to 160 s |
 """
 
 from lockstep.protocol.console import Tier
@@ -18,7 +18,7 @@ PATIENCE, MOST_PATIENCE = 10.0, 160.0  # s
 
 
 class ObserverTier:
-    """One per observer; begins in the high tier."""
+    """The tier of one observer; begins with the high tier."""
 
     def __init__(self, now: float) -> None:
         self.tier: Tier = "high"
@@ -27,7 +27,7 @@ class ObserverTier:
         self._tried = False
 
     def decide(self, path: BandwidthEstimator, high_bps: float, now: float) -> Tier:
-        """`high_bps` is what the high tier needs of a path."""
+        """Return the tier; `high_bps` is the bitrate that the high tier needs of a path."""
         if self.tier == "high":
             if path.rate < ENOUGH * high_bps:
                 hasty = self._tried and now - self._since < TRIAL

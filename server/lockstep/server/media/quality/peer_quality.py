@@ -1,4 +1,4 @@
-"""One peer's side of quality: what it says about its path, and what was decided for it."""
+"""The quality of one peer: its feedback about its path, and the decisions for it."""
 
 import time
 from collections.abc import Callable
@@ -18,18 +18,18 @@ if TYPE_CHECKING:
 
 __all__ = ["CameraLink", "PeerQuality", "SoundLink"]
 
-WIRE_SHARE = 0.92  # of what a receiver counts; the rest are headers
+WIRE_SHARE = 0.92  # share of payload in the bytes that a receiver counts; the rest are headers
 
 
 class Counted(Protocol):
-    """What it needs of what sends a stream."""
+    """The part of a stream's sender that is needed here."""
 
     @property
     def stats(self) -> SenderStats: ...
 
 
 class CameraLink(NamedTuple):
-    """One camera on its way to this peer."""
+    """The delivery of one camera to this peer."""
 
     stream: "VideoStream"
     codec: str
@@ -38,7 +38,7 @@ class CameraLink(NamedTuple):
 
 
 class SoundLink(NamedTuple):
-    """One microphone on its way to this peer."""
+    """The delivery of one microphone to this peer."""
 
     stream: "AudioStream"
     codec: str
@@ -46,7 +46,7 @@ class SoundLink(NamedTuple):
 
 
 class PeerQuality:
-    """Hears receiver reports, bandwidth estimates and the client's own reports."""
+    """Takes one peer's receiver reports, bandwidth estimates and the client's own reports."""
 
     def __init__(
         self, *, operator: bool, limits: RateLimits, tier: Tier, clock: Callable[[], float] = time.monotonic
@@ -54,31 +54,31 @@ class PeerQuality:
         self.operator = operator
         self.drives = False  # holds the control seat
         self.stays_low = False  # a thumbnail: never more than the lowest tier
-        self.relays = False  # a relay, with many behind it
+        self.relays = False  # a relay, with many peers behind it
         self.cameras: list[CameraLink] = []  # the main one first
         self.sounds: list[SoundLink] = []
         self.pace: Callable[[float | None], None] = lambda rate: None  # bit/s that the path carries; None: no limit
         self.path = BandwidthEstimator(limits, clock())
         self.choice = ObserverTier(clock())
-        self.tier = tier  # what its pictures are made for
-        self.encoded_as: PictureTier = tier  # whose pictures it gets: a tier may be served by another's encoder
-        self.hears_as: PictureTier = "operator"  # whose packets of sound it gets: a crowd's are longer
+        self.tier = tier  # tier that its pictures are planned for
+        self.encoded_as: PictureTier = tier  # tier whose pictures it gets: a tier may be served by another's encoder
+        self.hears_as: PictureTier = "operator"  # tier whose sound packets it gets: a crowd's are longer
         self.held_back = False  # from a camera's own pictures, which cannot be made smaller
         self.on_quality: Callable[[Quality], None] | None = None
-        self.quality: Quality | None = None  # last one told
+        self.quality: Quality | None = None  # the last one sent
         self._clock = clock
         self._estimates: dict[frozenset[int], int] = {}
 
     def stay_low(self) -> None:
-        """Nobody looks closely at this peer's pictures. Call before it joins."""
+        """Keep this peer in the low tier: nobody looks closely at its pictures. Call before it joins."""
         self.stays_low = True
         self.tier = self.encoded_as = "low"
 
     @property
     def in_crowd(self) -> bool:
-        """Whether it is one of those who get fewer pictures when there are many of them, as long as it does not drive.
+        """True for a peer that gets fewer pictures in a crowd, as long as it does not drive.
 
-        Who may drive at any moment, a relay and a thumbnail are not.
+        False for a peer that may drive at any moment, a relay and a thumbnail.
         """
         return bool(self.cameras) and not (self.operator or self.relays or self.stays_low)
 
@@ -89,31 +89,31 @@ class PeerQuality:
 
     @property
     def loss(self) -> float | None:
-        """0 to 1, of pictures; None before the first report."""
+        """The loss of pictures, 0 to 1; None before the first report."""
         return self.path.losses.fraction(self._clock()) if self.path.losses.known else None
 
     @property
     def round_trip_ms(self) -> float | None:
-        """None before the first that was measured."""
+        """The round trip in ms; None before the first measurement."""
         return next((ms for ms in (stats.round_trip_ms for stats in self.stats()) if ms is not None), None)
 
     def stats(self) -> list[SenderStats]:
         return [camera.sender.stats for camera in self.cameras]
 
     def reception(self, lost: int, expected: int, round_trip: float | None) -> None:
-        """A receiver report about one of its streams, sound included: each tells of the one path."""
+        """Take a receiver report about one of its streams, sound included: all of them share one path."""
         self.path.received(lost, expected, round_trip, self._clock())
 
     def bandwidth(self, bitrate_bps: int, ssrcs: frozenset[int]) -> None:
-        """A receiver estimates for all its streams together, or for each by itself."""
+        """Take a receiver's estimate, which is for all its streams together or for each by itself."""
         self._estimates = {known: bps for known, bps in self._estimates.items() if not known & ssrcs}
         self._estimates[ssrcs] = bitrate_bps
         self.path.estimated(WIRE_SHARE * sum(self._estimates.values()), self._clock())
 
     def report(self, report: Report, now: float) -> None:
-        """The client's own report. Its gaps count for the main camera, or the first that gives pictures.
+        """Take the client's own report. Only the gaps of the main camera count, or of the first that delivers pictures.
 
-        The gap of one that gives none grows with every event, which says nothing of the path.
+        The gap of a camera without pictures grows with every event, which says nothing about the path.
         """
         if not self.cameras:
             return
@@ -126,7 +126,7 @@ class PeerQuality:
             self.path.lagged(lag, stream.tolerance, now)
 
     def decide(self, now: float) -> Reason | None:
-        """Look at the path; the reason if its rate was lowered."""
+        """Evaluate the path; return the reason if its rate was lowered."""
         before = self.path.rate
         self.path.sent(sum(stats.octets for stats in self.stats()), now)
         self.path.decide(now)
@@ -134,7 +134,7 @@ class PeerQuality:
         return self.path.reason if self.path.rate < before else None
 
     def tell(self, streams: list[StreamQuality], crowd: int) -> None:
-        """Say what was decided, if it is news to the peer; `crowd` as in `Quality`."""
+        """Tell the peer its quality if that has changed; `crowd` as in `Quality`."""
         quality = Quality(streams=streams, reason=self.path.reason, crowd=crowd)
         if self.on_quality is not None and _differs(self.quality, quality):
             self.quality = quality
@@ -142,7 +142,7 @@ class PeerQuality:
 
 
 def _differs(old: Quality | None, new: Quality) -> bool:
-    """Whether a person would call it another quality."""
+    """True if a person would notice the difference in quality."""
     if old is None or (old.reason, old.crowd) != (new.reason, new.crowd) or len(old.streams) != len(new.streams):
         return True
     return any(

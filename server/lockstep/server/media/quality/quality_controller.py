@@ -1,18 +1,18 @@
-"""The quality of all peers: tiers, what each is encoded like, and who gets which.
+"""Controls the quality of all peers: the tiers, their encoding, and the tier of each peer.
 
-| tier | who | its bits per second |
+| tier | peers | bits per second |
 |---|---|---|
-| operator | who holds the control seat; while nobody does, all operators | of the one with the least |
+| operator | the holder of the control seat; while nobody holds it, all operators | those of the slowest path |
 | high | observers (and other operators) whose paths carry it | all |
-| low | the others, and thumbnails | of the one with the least, but no less than a floor and no more than half of high |
+| low | the others, and thumbnails | those of the slowest path, but no less than a floor and at most half of high |
 
 While the operator's pictures are whole and their path shows no limit, the high tier gets the same pictures: one
-encoder serves both. As soon as that ends it has an encoder of its own. So there are at most three encoders for a camera
-and codec, and one where the network is good.
+encoder serves both. As soon as that ends, the high tier has a separate encoder. So there are at most three encoders for
+a camera and codec, and one while the network is good.
 
-In a crowd (`LoadShedding`) the observers of the high tier get every second or third picture, fewer where the event
-loop has more to do than it can, from one more encoder, with as many bits for each picture as before, and their sound in
-longer packets. Who may drive, relays, recordings and thumbnails get what they got.
+In a crowd (`LoadShedding`) the observers of the high tier get every second or third picture, or fewer while the event
+loop is overloaded, from one more encoder, with as many bits for each picture as before, and their sound in longer
+packets. Nothing changes for peers that may drive, relays, recordings and thumbnails.
 """
 
 import asyncio
@@ -34,15 +34,15 @@ __all__ = ["QualityController"]
 
 TICK = 0.1  # s
 LATE = 0.03  # s by which a tick may be late
-LOAD_SECONDS = 1.0  # between two looks at the loop's load
-OBSERVER_TICKS = 10  # an observer is looked at once in so many
+LOAD_SECONDS = 1.0  # between two measurements of the loop's load
+OBSERVER_TICKS = 10  # an observer is evaluated once in so many
 SHARE_AFTER = 5.0  # s of an operator's path without a limit
 LOW_FLOOR_BPS = 120_000
 LOW_SHARE = 0.5  # of the high tier, at most
 
 
 class QualityController:
-    """One per media plane; runs on its loop. Switched off, everybody gets one tier with everything."""
+    """The quality controller of one media hub, on its loop. Switched off, all peers get one tier with full quality."""
 
     def __init__(
         self,
@@ -52,7 +52,7 @@ class QualityController:
         busy_seconds: Callable[[], float] = lambda: 0.0,
         on_fault: Callable[[Exception], None] | None = None,
     ) -> None:
-        """`busy_seconds`: as of `CooperativeScheduler`. `on_fault` hears what a tick raised; the next is tried."""
+        """`busy_seconds`: as in `CooperativeScheduler`. `on_fault` gets the exception of a tick; the next is tried."""
         self._settings = settings
         self._metrics = metrics
         self._clock = clock
@@ -63,10 +63,10 @@ class QualityController:
         self._low_divisor = 1  # the low tier gets one of so many pictures
         self._busy_seconds = busy_seconds
         self._on_fault = on_fault
-        self._load_at = clock(), busy_seconds()  # the last look at it
+        self._load_at = clock(), busy_seconds()  # time and busy seconds of the last measurement
         self._ticks = 0
-        self._common: object = None  # what decides for all observers, at the last tick
-        self._whole_since: float | None = None  # the operator's pictures; None: they are not
+        self._common: object = None  # the state that decides for all observers, at the last tick
+        self._whole_since: float | None = None  # time from which the operator's pictures are whole; None: they are not
 
     def join(self, peer: PeerQuality) -> None:
         self._peers[peer] = None
@@ -74,13 +74,13 @@ class QualityController:
             self.tick()
 
     def leave(self, peer: PeerQuality) -> None:
-        """Idempotent."""
+        """Remove a peer. Idempotent."""
         self._peers.pop(peer, None)
         self._common = None
         self._metrics.forget(peer)
 
     async def run(self) -> None:
-        """Until cancelled."""
+        """Tick until cancelled."""
         while self._settings.quality:
             due = self._clock() + TICK
             await asyncio.sleep(TICK)
@@ -99,7 +99,7 @@ class QualityController:
             self._on_fault(error)
 
     def tick(self) -> None:
-        """Look at the paths, plan the tiers, move who has to move, tell whom it concerns."""
+        """Evaluate the paths, plan the tiers, move peers between tiers and tell them about changes."""
         now = self._clock()
         self._ticks += 1
         leaders = self.leaders()
@@ -121,7 +121,7 @@ class QualityController:
         shared = self._whole_since is not None and now - self._whole_since >= SHARE_AFTER
         for peer in leaders:
             self._settle(peer, "operator", "operator")
-        # What concerns all of them is rare, and there may be hundreds: else only those whose turn it is.
+        # A change for all observers is rare, and there may be hundreds: otherwise settle only those whose turn it is.
         common = shared, self._crowd.divisor > 1, leaders, observers
         settled = turn if common == self._common else observers
         self._common = common
@@ -148,7 +148,7 @@ class QualityController:
             self._crowd.loaded((busy - before) / (now - since), now)
 
     def _thin(self, observers: list[PeerQuality], now: float) -> None:
-        """Look whether there is a crowd, and what it gets."""
+        """Count the crowd and, if there is one, plan its pictures."""
         members = [peer for peer in observers if peer.in_crowd]
         if self._crowd.watch(len(members), now) > 1:
             for stream in _streams(members):
@@ -156,7 +156,7 @@ class QualityController:
                     output.plan = self._plan_of(stream, "crowd")
 
     def _encoded_as(self, peer: PeerQuality, shared: bool) -> PictureTier:
-        """Whose pictures an observer gets; `shared`: the operator's serve the high tier."""
+        """Return the tier whose pictures an observer gets; `shared`: the operator's pictures serve the high tier."""
         if peer.tier != "high":
             return peer.tier
         if peer.in_crowd and self._crowd.divisor > 1:
@@ -164,11 +164,11 @@ class QualityController:
         return "operator" if shared else "high"
 
     def leaders(self) -> list[PeerQuality]:
-        """Whom the operator's tier is for."""
+        """Return the peers of the operator's tier."""
         return [peer for peer in self._peers if peer.drives] or [peer for peer in self._peers if peer.operator]
 
     def _step_back(self, peer: PeerQuality, now: float) -> None:
-        """An operator becomes one who watches; where its path has shown no limit, on trial with everything."""
+        """Make a former operator an observer; if its path has shown no limit, on trial with full quality."""
         if not peer.path.limited:
             peer.path.assume(self._needs(peer), now)
         peer.tier = peer.choice.decide(peer.path, self._needs(peer), now)
@@ -205,16 +205,16 @@ class QualityController:
             watched = [peer for peer in members if not peer.stays_low]
             least = min((peer.path.rate for peer in watched), default=LOW_FLOOR_BPS)
             most = LOW_SHARE * max(self._needs(peer) for peer in members)
-            # Whoever of a crowd cannot take what it gets does not get more pictures than it. The tier has one encoder:
-            # while somebody else is in it, who is owed all of them, all get them.
+            # A crowd's member whose path is too slow for the crowd's pictures gets no more of them than the crowd. The
+            # tier has one encoder: while it has a member outside the crowd, which is due all pictures, all get them.
             self._low_divisor = self._crowd.divisor if all(peer.in_crowd for peer in members) else 1
             self._plan("low", _streams(members), min(most, max(LOW_FLOOR_BPS, least)), now, self._low_divisor)
 
     def _plan(self, tier: Tier, streams: list[VideoStream], total_bps: float, now: float, divisor: int = 1) -> None:
-        """`divisor`: the tier gets one picture of so many, at most.
+        """Plan the cameras of a tier. `divisor`: the tier gets one picture of so many, at most.
 
-        A camera that gives nothing keeps the plan that it would have, so that it begins with no more than its share;
-        the others have all of it until then.
+        A camera without pictures keeps the plan that it would have, so that it begins with no more than its share;
+        until then the others share the whole bitrate.
         """
         shares = self._shares(total_bps, streams) | self._shares(total_bps, _giving(streams, now))
         for stream, bps in shares.items():
@@ -225,7 +225,7 @@ class QualityController:
                 output.plan = plan
 
     def _shares(self, total_bps: float, streams: list[VideoStream]) -> dict[VideoStream, float]:
-        """Bits per second of each of these cameras, the main one first."""
+        """Return the bits per second of each of these cameras, the main one first."""
         maximum = float(self._settings.video_bitrate_bps)
         needs = [CameraNeed(stream.size[0] * stream.size[1] * stream.frame_rate, maximum) for stream in streams]
         return dict(zip(streams, share_out(total_bps, needs), strict=True))
@@ -241,7 +241,7 @@ class QualityController:
                 output.plan = self._plan_of(camera.stream, encoded_as)
 
     def _sound_for(self, peer: PeerQuality) -> None:
-        """Also who gets small pictures in a crowd hears longer packets: their headers are a third of a small path."""
+        """Give a crowd longer sound packets, in the low tier too: their headers are a third of a narrow path."""
         hears_as: PictureTier = "crowd" if peer.in_crowd and not peer.drives and self._crowd.divisor > 1 else "operator"
         if peer.hears_as != hears_as:
             peer.hears_as = hears_as
@@ -280,7 +280,7 @@ class QualityController:
 
     @staticmethod
     def _protect_sound(peers: list[PeerQuality], now: float) -> None:
-        """Sound is encoded once for all: against the operator's loss, or the worst observer's without one."""
+        """Protect sound, encoded once for all, against the operator's loss, or the worst observer's without one."""
         losses: dict[AudioStream, float] = {}
         for peer in peers:
             for sound in peer.sounds:
@@ -307,5 +307,5 @@ def _streams(peers: Iterable[PeerQuality]) -> list[VideoStream]:
 
 
 def _giving(streams: list[VideoStream], now: float) -> list[VideoStream]:
-    """Those that give pictures; all where none does, as before the first picture."""
+    """Return the streams that deliver pictures; all if none does, as before the first picture."""
     return [stream for stream in streams if stream.is_giving(now)] or streams

@@ -1,4 +1,4 @@
-"""What round trips say about a queue in the network. No clock is read here."""
+"""Estimates the queue in the network from round trips. No clock is read here."""
 
 from collections import deque
 
@@ -9,22 +9,22 @@ LEAST_QUEUE = 0.060  # s that count as a queue on any path
 SHARE = 0.15  # of the empty path's round trip
 SPREADS = 3.0  # of the usual difference between two round trips
 MOST_FOR_SPREAD = 0.15  # s
-FEW, SURE = 2, 3  # round trips running that prove a long queue, and a short one
+FEW, SURE = 2, 3  # consecutive round trips that prove a long queue, and a short one
 KEEP = 4.0  # s
 MOST_GROWTH = 3.0
 
 
 class RoundTrips:
-    """The queue's delay is what round trips take longer than the shortest one.
+    """Measures the queue's delay: the excess of round trips over the shortest one.
 
-    One long round trip may be a computer that was busy: a queue lengthens all of them, so the shortest of the last few
+    One long round trip may come from a busy computer: a queue lengthens all of them, so the shortest of the last few
     counts.
     """
 
     def __init__(self) -> None:
-        self.at = float("-inf")  # when the newest one was measured
+        self.at = float("-inf")  # time of the newest measurement
         self.growth = 0.0  # s of queue per second, lately
-        self._recent: deque[tuple[float, float]] = deque(maxlen=SURE)  # when, round trip
+        self._recent: deque[tuple[float, float]] = deque(maxlen=SURE)  # time, round trip
         self._window_start: float | None = None
         self._current = float("inf")
         self._previous = float("inf")
@@ -38,21 +38,21 @@ class RoundTrips:
 
     @property
     def limit(self) -> float:
-        """Delay in s that is not yet a queue: paths differ by themselves."""
+        """The largest delay in s that is not yet a queue: round trips vary even on an empty path."""
         return max(LEAST_QUEUE, SHARE * self.base, min(MOST_FOR_SPREAD, SPREADS * self._spread))
 
     @property
     def queue(self) -> float:
-        """s that packets wait in the network; 0 before two round trips are known."""
+        """The time in s that packets wait in the network; 0 before two round trips are known."""
         return self._least(FEW)
 
     @property
     def queued(self) -> bool:
-        """Whether that is too much."""
+        """True if the queue is too long."""
         return self._least(SURE) > self.limit or self._least(FEW) > 2 * self.limit
 
     def add(self, seconds: float, now: float) -> None:
-        """A round trip was measured."""
+        """Add a measured round trip."""
         if self._window_start is None or now - self._window_start >= WINDOW:
             self._previous, self._current = self._current, float("inf")
             self._window_start = now
@@ -69,7 +69,7 @@ class RoundTrips:
         self.at = now
 
     def accept(self) -> None:
-        """The path itself became longer: what is measured now is the empty path."""
+        """Take the latest round trips as those of the empty path: the path itself became longer."""
         if self._recent:
             self._previous = float("inf")
             self._current = min(seconds for _, seconds in self._recent)

@@ -1,1 +1,1 @@
-"""Cameras and microphones attached to the console itself: read in processes of their own, stamped here."""
+"""Cameras and microphones attached to the console itself: read in separate processes, stamped here."""

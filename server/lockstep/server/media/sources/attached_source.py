@@ -1,4 +1,4 @@
-"""One attached source as the console sees it: its process, and how it does."""
+"""One attached source: its process and its state."""
 
 import asyncio
 import sys
@@ -16,7 +16,7 @@ __all__ = ["AttachedSource"]
 
 log = structlog.get_logger(__name__)
 
-PATIENCE = 30.0  # s without a word: a device hangs
+PATIENCE = 30.0  # s without a message: the device hangs
 COMMAND = (sys.executable, "-m", "lockstep.server.media.sources.reader")
 
 
@@ -24,8 +24,7 @@ class AttachedSource:
     """Await `run`; it ends when it is cancelled, with its process and thread.
 
     Attributes:
-        state, detail: how it does, in words without its address
-        failures: by reason, since the start
+        state, detail: its state, and a description in words without its address
     """
 
     def __init__(
@@ -51,7 +50,7 @@ class AttachedSource:
         return self._process.dropped
 
     async def run(self) -> None:
-        """Until cancelled. A process that dies is started again, and again more rarely."""
+        """Run until cancelled. A process that dies is started again, each time after a longer wait."""
         backoff = Backoff(0.5, 10.0)
         loop = asyncio.get_running_loop()
         while True:

@@ -1,8 +1,8 @@
-"""What can go wrong with a source, and how that is said without its address.
+"""Errors of a source, and their description without its address.
 
 SourceError
-├── NoSuchMedium   it has no pictures, or no sound
-├── FellBehind     what comes was captured too long ago
+├── NoSuchMedium   the source has no pictures, or no sound
+├── FellBehind     its media were captured too long ago
 └── NoSoundServer  PulseAudio is not there, or refused
 """
 
@@ -12,7 +12,7 @@ __all__ = ["FellBehind", "NoSoundServer", "NoSuchMedium", "SourceError", "reason
 
 
 class SourceError(Exception):
-    """Base of all. The text is for people and never holds the address.
+    """Base of all source errors. The text is for people and never holds the address.
 
     Attributes:
         name: stable, lower-case identifier; the `reason` of the failure counter
@@ -49,7 +49,7 @@ _WORDS = {"silent": "nothing comes any more", "ended": "it has ended", "not_medi
 
 
 def reason_of(error: Exception) -> tuple[str, str]:
-    """A stable name, and words for people. Texts of libraries hold the address, with its password: none is used."""
+    """Return a stable name, and words for people. Libraries' texts are not used: they hold the address and password."""
     if isinstance(error, SourceError):
         return error.name, str(error)
     reason = _REASONS.get(type(error).__name__, "failed")

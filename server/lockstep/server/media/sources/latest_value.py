@@ -1,4 +1,4 @@
-"""Between the thread that hears a source and the event loop: bounded, newest wins. No I/O."""
+"""A bounded buffer between the thread that reads a source and the event loop; the newest wins. No I/O."""
 
 import threading
 from collections import deque
@@ -7,16 +7,16 @@ from lockstep.server.media.sources.source_wire import Captured, Said
 
 __all__ = ["LatestValue"]
 
-MOST_WORDS = 8  # of what is no medium
+MOST_WORDS = 8  # messages that are not media
 MOST_SOUND = 25  # segments
 MOST_DEPENDENT = 60  # pictures that build on each other
 
 
 class LatestValue:
-    """`put` from one thread, `take` from another.
+    """Call `put` from one thread, `take` from another.
 
-    Of pictures that stand for themselves the newest is kept. When those that build on each other no longer fit, all of
-    them go and the next keyframe begins anew.
+    Of independent pictures the newest is kept. When pictures that build on each other no longer fit, all of them are
+    dropped until the next keyframe.
     """
 
     def __init__(self) -> None:
@@ -27,7 +27,7 @@ class LatestValue:
         self._broken = False  # until a keyframe
 
     def put(self, said: Said) -> bool:
-        """Whether somebody has to be told: the box was empty."""
+        """Add a message; True if the buffer was empty, so that the reader has to be told."""
         with self._lock:
             empty = not self._words and not self._media
             if isinstance(said, Captured):
@@ -59,7 +59,7 @@ class LatestValue:
         self._media.clear()
 
     def take(self) -> list[Said]:
-        """All there is; words first."""
+        """Return everything in the buffer, media last."""
         with self._lock:
             found = [*self._words, *self._media]
             self._words.clear()

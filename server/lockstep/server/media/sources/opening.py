@@ -13,13 +13,13 @@ from lockstep.server.media.sources.source_url import SourceSpec
 __all__ = ["Pace", "kernel_time", "opened", "settled_lag"]
 
 OPEN_TIMEOUT, READ_TIMEOUT = 8.0, 3.0  # s
-MOST_LAG = 5.0  # s behind the quickest; then what waits is given up by connecting anew
+MOST_LAG = 5.0  # s behind the quickest; beyond it the backlog is given up by connecting anew
 KERNEL_AGE = 10.0  # s; a time stamp of the kernel's monotonic clock is not older than that
 
 
 @contextmanager
 def opened(spec: SourceSpec) -> Iterator[InputContainer]:
-    """Raises FFmpegError or OSError, whose text holds the address."""
+    """Open a source. Raises FFmpegError or OSError, whose text holds the address."""
     form, options = _form(spec)
     timeout = (OPEN_TIMEOUT, READ_TIMEOUT) if spec.live else None
     with av.open(spec.address, format=form, options=options, timeout=timeout) as container:
@@ -40,7 +40,7 @@ def _form(spec: SourceSpec) -> tuple[str | None, dict[str, str]]:
         return "alsa", {"sample_rate": f"{spec.rate or 48000:.0f}", "channels": str(spec.channels)}
     if spec.scheme == "file":
         return None, {}
-    # What is analysed before the first picture would only wait.
+    # A longer analysis before the first picture would only delay it.
     options = {"fflags": "nobuffer", "analyzeduration": "1000000", "probesize": "1000000"}
     if spec.scheme in ("rtsp", "rtsps"):
         options["rtsp_transport"] = spec.transport
@@ -48,24 +48,24 @@ def _form(spec: SourceSpec) -> tuple[str | None, dict[str, str]]:
 
 
 def kernel_time(start: float | None, now: float) -> float | None:
-    """`start` where it is a time of the kernel's monotonic clock, which is also ours; else None."""
+    """Return `start` if it is a time of the kernel's monotonic clock, as used by `time.monotonic`; else None."""
     return start if start is not None and 0 <= now - start <= KERNEL_AGE else None
 
 
 def settled_lag(lag: float) -> None:
-    """Raises FellBehind when waiting for it to catch up has no point."""
+    """Raise FellBehind if the source is too late to catch up."""
     if lag > MOST_LAG:
         raise FellBehind(f"what came was {lag:.0f} s late")
 
 
 class Pace:
-    """Lets a file's media pass at the speed of their own time."""
+    """Paces a file's media at the speed of their own time."""
 
     def __init__(self) -> None:
         self._origin: float | None = None
 
     def wait(self, time_in_file: float) -> float:
-        """Sleep until it is due; the time now."""
+        """Sleep until a medium is due; return the time now."""
         now = time.monotonic()
         if self._origin is None:
             self._origin = now - time_in_file

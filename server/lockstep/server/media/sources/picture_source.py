@@ -1,4 +1,4 @@
-"""Reads the pictures of one source: H.264 and JPEG go on as they are where they can, all else is decoded."""
+"""Reads the pictures of one source: H.264 and JPEG are passed on unchanged where possible, all else is decoded."""
 
 import time
 from collections.abc import Callable, Iterator
@@ -21,7 +21,7 @@ from lockstep.server.media.sources.source_wire import Captured
 
 __all__ = ["read_pictures"]
 
-NO_KEYFRAME = 300  # pictures without one that begins a stream; then they are decoded here
+NO_KEYFRAME = 300  # pictures without a keyframe; then they are decoded here
 REMEMBERED = 64  # capture times of pictures that a decoder holds back
 
 Emit = Callable[[Captured], None]
@@ -29,8 +29,8 @@ VideoPacket: TypeAlias = "Packet[VideoStream]"
 
 
 def read_pictures(spec: SourceSpec, working: Callable[[str], None], captured: Emit) -> None:
-    """One connection, until it ends; a file begins again. Raises SourceError, FFmpegError, OSError."""
-    decoded = False  # what has B-frames, or no keyframes, is decoded from then on
+    """Read one connection until it ends; a file begins again. Raises SourceError, FFmpegError, OSError."""
+    decoded = False  # a stream with B-frames, or without keyframes, is decoded from then on
     while True:
         with opened(spec) as container:
             if not container.streams.video:
@@ -55,7 +55,7 @@ class _Connection:
         self._timeline = CaptureTimeline(spec.latency, settle=SETTLE if spec.live else 0.0)
         self._pace = Pace()
         self._thin = FrameRateLimiter(spec.rate if spec.scheme != "v4l2" else None)
-        self._times: dict[int, float] = {}  # capture time of what the decoder was given, by its time in the stream
+        self._times: dict[int, float] = {}  # capture times of the decoder's pictures, by their time in the stream
         self._sets = b""  # newest parameter sets
         self._begun = False  # a keyframe went on
         self._waited = 0  # pictures before the first keyframe
@@ -80,7 +80,7 @@ class _Connection:
         return f"{self._context.name} {self._context.width}x{self._context.height}{how}"
 
     def read(self) -> bool:
-        """Until it ends; whether it is to be opened again and decoded."""
+        """Read until the connection ends; True if it is to be opened again and decoded."""
         for packet in self._container.demux(self._stream):
             if packet.size == 0:
                 continue  # the end, for decoders
@@ -96,7 +96,7 @@ class _Connection:
         return False
 
     def _capture_time(self, packet: VideoPacket) -> float | None:
-        """On the monotonic clock; None while it is not known."""
+        """Return the capture time on the monotonic clock; None while it is not known."""
         own = None if packet.pts is None else float(packet.pts * packet.time_base)
         if not self._spec.live:
             order = packet.dts if packet.dts is not None else packet.pts
@@ -108,7 +108,7 @@ class _Connection:
         return self._timeline.place(own, 0.0, now)
 
     def _pass_on(self, packet: VideoPacket, at: float | None) -> bool:
-        """Whether it cannot go on like this: another picture is built on it than it looks like."""
+        """Pass H.264 on; True if that is not possible: pictures are reordered, or no keyframe comes."""
         for data in self._annex_b(packet):
             access = inspect(data)
             if access.reordered:
@@ -155,7 +155,7 @@ class _Connection:
         except av.error.InvalidDataError:
             return  # the first after a loss; the next keyframe helps
         for frame in frames:
-            # What a decoder puts in order was captured when its own packet came; a file is captured now.
+            # A picture that the decoder reorders was captured when its own packet came; a file's is captured now.
             taken = at if frame.pts is None or not self._spec.live else self._times.pop(frame.pts, None)
             if taken is not None and self._thin.admit(taken):
                 self._emit(frame, taken)

@@ -1,8 +1,8 @@
-"""The process of one attached source: opens it, reads it, tries again when it fails, and says what it captured.
+"""The process of one attached source: opens it, reads it, tries again when it fails, and writes the captured media.
 
-A demuxer and a decoder take whatever a network or a device sends them. Here they can neither hold up the console's
-event loop nor take the console with them. What is to be opened comes over standard input and not as an argument,
-which other users could read; its end means that the console has gone.
+A demuxer and a decoder take whatever a network or a device sends them. In this process they can neither block the
+console's event loop nor crash the console. The source to open comes over standard input and not as an argument, which
+other users could read; the end of the input means that the console has gone.
 """
 
 import os
@@ -30,7 +30,7 @@ HEALTHY = 10.0  # s that a source has to work until its next failure counts as t
 
 
 def read_source(spec: SourceSpec, say: Callable[[Said], None], sleep: Callable[[float], None] = time.sleep) -> None:
-    """Until `say` raises OSError: nobody listens any more."""
+    """Read a source until `say` raises OSError: nobody listens any more."""
     backoff = Backoff(FIRST_WAIT, LONGEST_WAIT)
     read = read_pictures if spec.kind == "video" else read_sound
     while True:
@@ -55,7 +55,7 @@ def read_source(spec: SourceSpec, say: Callable[[Said], None], sleep: Callable[[
             return
         except (SourceError, FFmpegError, OSError, ValueError) as error:
             say(Trouble(*reason_of(error)))
-        except Exception as error:  # a library did what it never should; its text may hold the address
+        except Exception as error:  # unexpected error of a library; its text may hold the address
             say(Trouble("failed", type(error).__name__))
         if began is not None and time.monotonic() - began > HEALTHY:
             backoff.healthy()
@@ -69,7 +69,7 @@ class _Unheard(Exception):
 def main() -> None:
     spec = msgspec.json.Decoder(SourceSpec).decode(sys.stdin.buffer.readline())
     out = os.fdopen(os.dup(sys.stdout.fileno()), "wb")
-    os.dup2(sys.stderr.fileno(), sys.stdout.fileno())  # what a library prints is no message
+    os.dup2(sys.stderr.fileno(), sys.stdout.fileno())  # output that a library prints is not a message
     threading.Thread(target=_end_with, args=(sys.stdin.buffer,), daemon=True).start()
     with suppress(OSError, KeyboardInterrupt):
         read_source(spec, lambda said: write_said(out, said))
@@ -77,7 +77,7 @@ def main() -> None:
 
 
 def _end_with(console: BinaryIO) -> None:
-    """A reading call into a device cannot be told to stop."""
+    """Exit when the console has gone: a call that reads a device cannot be interrupted."""
     console.read()
     os._exit(0)
 

@@ -1,4 +1,4 @@
-"""The process that reads one source, and the thread that hears it."""
+"""The process that reads one source, and the thread that reads its messages."""
 
 import asyncio
 import os
@@ -16,7 +16,7 @@ MOST_UNREAD = 4_000_000  # bytes that wait until the process reads them
 
 
 class ReaderProcess:
-    """Await `run`, again when it has ended; it ends with its process and thread."""
+    """Runs the process of a source. Await `run`, again when it has ended; it ends with its process and thread."""
 
     def __init__(
         self,
@@ -25,7 +25,7 @@ class ReaderProcess:
         said: Callable[[Said], None],
         patience: Callable[[], float] | None,
     ) -> None:
-        """`said` is called on the loop. `patience`: s without a word, then it hangs; None: it may be silent."""
+        """`said` is called on the loop. `patience`: s without a message until it counts as hung; None: no limit."""
         self._name = name
         self._command = command
         self._said = said
@@ -41,14 +41,14 @@ class ReaderProcess:
         return self._box.dropped
 
     def write(self, data: bytes) -> bool:
-        """Give the process more to read. False: it does not run, or does not keep up; then nothing was given."""
+        """Write to the process. False, and nothing written, if it does not run or does not keep up."""
         if self._input is None or self._input.transport.get_write_buffer_size() + len(data) > MOST_UNREAD:
             return False
         self._input.write(data)
         return True
 
     async def run(self, first: bytes) -> str:
-        """Start it with `first` to read. Returns why it ended: "died" or "hung"."""
+        """Start the process with `first` as its first input. Return why it ended: "died" or "hung"."""
         loop = asyncio.get_running_loop()
         reading, writing = os.pipe()
         output = os.fdopen(reading, "rb", buffering=1 << 20)
@@ -89,7 +89,7 @@ class ReaderProcess:
                     return "hung"
 
     def _hear(self, output: BinaryIO, loop: asyncio.AbstractEventLoop) -> None:
-        """In the thread."""
+        """Read messages, in the thread."""
         with output, suppress(RuntimeError):  # the loop has closed
             while (said := read_said(output)) is not None:
                 if self._box.put(said):

@@ -24,7 +24,7 @@ Emit = Callable[[Captured], None]
 
 
 def read_sound(spec: SourceSpec, working: Callable[[str], None], captured: Emit) -> None:
-    """One connection, until it ends; a file begins again. Raises SourceError, FFmpegError, OSError."""
+    """Read one connection until it ends; a file begins again. Raises SourceError, FFmpegError, OSError."""
     if spec.scheme == "pulse":
         _read_pulse(spec, working, captured)
         return
@@ -47,7 +47,7 @@ def _read_pulse(spec: SourceSpec, working: Callable[[str], None], captured: Emit
         read = 0
         while True:
             payload = stream.read(count)
-            # Samples come without a time of their own, but without gaps: their number is one.
+            # Samples have no time, but no gaps either: their number serves as one.
             at = timeline.place(read / rate, SEGMENT, time.monotonic())
             read += count
             settled_lag(timeline.lag)

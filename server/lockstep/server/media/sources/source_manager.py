@@ -1,4 +1,4 @@
-"""All attached sources: what they capture is stamped from the event clock and goes to the media plane."""
+"""Manages all attached sources: stamps their media from the event clock and hands them to the media hub."""
 
 import asyncio
 import time
@@ -19,20 +19,20 @@ __all__ = ["EventReferences", "LocalMedia", "SourceManager"]
 
 
 class EventReferences(Protocol):
-    """What is needed of the event clock."""
+    """The part of the event clock that is needed here."""
 
     def reference_at(self, time: float) -> int | None: ...
 
 
 class LocalMedia(Protocol):
-    """What is needed of the media plane."""
+    """The part of the media hub that is needed here."""
 
     def stream_of(self, source: str) -> str: ...
     def feed_local(self, media: Media, now: float) -> None: ...
 
 
 class SourceManager:
-    """Await `run`. A medium without a known event, because it is too old or no robot was reached, goes no further."""
+    """Await `run`. A medium without a known event, because it is too old or no robot was reached, is dropped."""
 
     def __init__(
         self,
@@ -45,7 +45,7 @@ class SourceManager:
         self._clock = clock
         self._media = media
         self._tell = tell
-        self._broken: set[str] = set()  # sources whose pictures build on one that went no further
+        self._broken: set[str] = set()  # sources whose pictures build on a dropped one
         self._failures = Counter(
             "lockstep_media_source_failures", "Failures of attached sources", ["source", "reason"], registry=registry
         )
@@ -71,7 +71,7 @@ class SourceManager:
     def _told_of(
         self, spec: SourceSpec
     ) -> tuple[Callable[[Captured], None], Callable[[], None], Callable[[str], None]]:
-        """What a source calls when it captured, when its state changed, and when it failed."""
+        """Return a source's callbacks for a captured medium, a changed state, and a failure."""
         return (
             lambda medium: self._deliver(spec, medium),
             self._changed,
@@ -79,13 +79,13 @@ class SourceManager:
         )
 
     async def run(self) -> None:
-        """Until cancelled."""
+        """Run all sources until cancelled."""
         async with asyncio.TaskGroup() as tasks:
             for source in self._read:
                 tasks.create_task(source.run(), name=f"source {source.spec.name}")
 
     def state(self) -> Sources:
-        """How they do, for people."""
+        """Return the state of all sources, for people."""
         return Sources(
             sources=[
                 SourceStatus(

@@ -1,4 +1,4 @@
-"""Settings of what is attached to the console itself. docs/media.md says how they are written."""
+"""Settings of the sources and the speaker attached to the console itself. docs/media.md describes their syntax."""
 
 from typing import Annotated, Self
 
@@ -15,12 +15,12 @@ Sources = Annotated[tuple[SecretStr, ...], NoDecode]
 
 
 class SourceSettings(BaseSettings):
-    """Part of `Settings`. In the environment several stand in one variable, separated by spaces."""
+    """Part of `Settings`. An environment variable holds several sources, separated by spaces."""
 
-    cameras: Sources = Field(default=(), repr=False)  # there may be passwords in them
+    cameras: Sources = Field(default=(), repr=False)  # they may hold passwords
     microphones: Sources = Field(default=(), repr=False)
-    whip: Annotated[tuple[str, ...], NoDecode] = ()  # cameras that somebody may publish; empty: nobody may
-    speaker: str | None = None  # at the robot, for the voice of who drives; None: nobody's voice is taken
+    whip: Annotated[tuple[str, ...], NoDecode] = ()  # cameras that clients may publish; empty: none
+    speaker: str | None = None  # at the robot, for the driver's voice; None: no voice is taken
 
     @field_validator("cameras", "microphones", "whip", mode="before")
     @classmethod
@@ -53,7 +53,7 @@ class SourceSettings(BaseSettings):
 
     @property
     def sources(self) -> tuple[SourceSpec, ...]:
-        """All attached cameras, those that are published among them, and microphones."""
+        """All attached cameras, including published ones, and microphones."""
         return (
             *parse_sources("video", _revealed(self.cameras)),
             *parse_published(self.whip),

@@ -1,4 +1,4 @@
-"""What `--camera` and `--microphone` say: where a medium comes from, and how it is to be taken. No I/O.
+"""Parses `--camera` and `--microphone`: the address of a medium, and the options for reading it. No I/O.
 
 `[name=]scheme:rest[#option=value,option=value]`, as in `front=rtsp://user:secret@10.0.0.7/main#latency=0.25`. The
 options stand where a URL has its fragment, which is never sent anywhere. A `#` of the address itself is written %23.
@@ -16,7 +16,7 @@ Kind = Literal["video", "audio"]
 NAME = re.compile(r"[A-Za-z][A-Za-z0-9_-]{0,31}")
 SCHEME = re.compile(r"[a-z][a-z0-9+.-]*")
 DEVICES: Mapping[str, Kind] = {"v4l2": "video", "alsa": "audio", "pulse": "audio"}
-# s that the quickest may take from capture to arrival. Too large only makes stamps older.
+# s that the quickest may take from capture to arrival. Too large a value only makes stamps older.
 LATENCY = {"v4l2": 0.05, "alsa": 0.02, "pulse": 0.02, "file": 0.0, "rtsp": 0.3, "rtsps": 0.3}
 NETWORK_LATENCY = 0.2
 MAX_LATENCY = 10.0
@@ -24,7 +24,7 @@ MOST = 8  # sources of one kind
 
 
 class BadSource(ValueError):
-    """It cannot be meant like this. The text never repeats what was given: there may be a password in it."""
+    """A source is not valid. The text never repeats the input, which may hold a password."""
 
 
 class SourceSpec(NamedTuple):
@@ -34,29 +34,29 @@ class SourceSpec(NamedTuple):
     name: str  # "front": of the stream
     label: str  # "Front": for people
     scheme: str  # "rtsp"
-    address: str  # what is opened: a path, a device, a whole URL. May hold a password: never to be logged or shown
+    address: str  # a path, a device, or a whole URL to open. May hold a password: never to be logged or shown
     latency: float  # s from capture to arrival, of the quickest
     rate: float | None = None  # pictures, or samples, per second; None: as they come
     size: tuple[int, int] | None = None  # of pictures; None: as they come
     channels: int = 1  # of a sound device
-    form: str = ""  # what a v4l2 device is asked for: "mjpeg", "h264", "yuyv422"; "": its own choice
+    form: str = ""  # requested of a v4l2 device: "mjpeg", "h264", "yuyv422"; "": its own choice
     transport: str = "tcp"  # of RTSP
-    passing: bool = True  # whether H.264 may go on to peers as it is
+    passing: bool = True  # True: H.264 may be passed on unchanged
 
     def __repr__(self) -> str:
         return f"SourceSpec({self.kind} {self.name!r} from {self.scheme})"
 
     @property
     def live(self) -> bool:
-        """Whether what comes was captured just before; a file was not."""
+        """True if media were captured just before they come, which those of a file were not."""
         return self.scheme != "file"
 
 
 def parse_sources(kind: Kind, texts: Iterable[str]) -> tuple[SourceSpec, ...]:
-    """All of one kind, each with a name of its own.
+    """Parse the sources of one kind; each has a different name.
 
     Raises:
-        BadSource: one cannot be meant like this.
+        BadSource: one is not valid, or there are too many.
     """
     given = list(texts)
     if len(given) > MOST:
@@ -74,10 +74,10 @@ def parse_sources(kind: Kind, texts: Iterable[str]) -> tuple[SourceSpec, ...]:
 
 
 def parse_source(kind: Kind, text: str, number: int = 1) -> SourceSpec:
-    """`number` makes a name for one that has none.
+    """Parse a source; `number` makes a name for one that has none.
 
     Raises:
-        BadSource: it cannot be meant like this.
+        BadSource: it is not valid.
     """
     name, separator, rest = text.strip().partition("=")
     if not separator or not NAME.fullmatch(name):

@@ -1,4 +1,4 @@
-"""What a source's process says to the console: 4 bytes of length, then MessagePack, on its standard output."""
+"""Messages of a source's process to the console: 4 bytes of length, then MessagePack, on its standard output."""
 
 import struct
 from typing import BinaryIO, Literal
@@ -18,7 +18,7 @@ class Captured(msgspec.Struct, frozen=True, tag="captured", array_like=True):
     """A picture or a segment of sound."""
 
     codec: Codec
-    time: float  # s, when its capture began, on this machine's monotonic clock
+    time: float  # s, start of its capture, on this machine's monotonic clock
     payload: bytes
     width: int = 0  # pixels
     height: int = 0
@@ -28,13 +28,13 @@ class Captured(msgspec.Struct, frozen=True, tag="captured", array_like=True):
 
 
 class Working(msgspec.Struct, frozen=True, tag="working", array_like=True):
-    """The source was opened; what it gives, in words without its address."""
+    """The source was opened; `detail` describes its media, in words without its address."""
 
     detail: str
 
 
 class Trouble(msgspec.Struct, frozen=True, tag="trouble", array_like=True):
-    """It failed and is tried again."""
+    """The source failed and is tried again."""
 
     reason: str  # stable, to be counted
     detail: str  # in words without its address
@@ -54,7 +54,7 @@ def write_said(file: BinaryIO, said: Said) -> None:
 
 
 def read_said(file: BinaryIO) -> Said | None:
-    """The next one; None when the other side has ended, or makes no sense."""
+    """Read the next message; None when the other side has ended, or the message is not valid."""
     head = file.read(_LENGTH.size)
     if len(head) < _LENGTH.size:
         return None
@@ -68,7 +68,7 @@ def read_said(file: BinaryIO) -> Said | None:
 
 
 def decode_said(data: bytes) -> Said | None:
-    """One message without its length; None when it makes no sense."""
+    """Decode one message without its length; None when it is not valid."""
     try:
         return _decoder.decode(data)
     except msgspec.DecodeError:

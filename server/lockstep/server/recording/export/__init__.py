@@ -1,1 +1,1 @@
-"""Recordings in the formats of other programs."""
+"""Exports recordings to the formats of other programs."""

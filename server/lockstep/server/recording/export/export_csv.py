@@ -11,7 +11,7 @@ __all__ = ["export"]
 
 
 def export(path: Path, out: Path | None, task: str) -> list[Path]:
-    """The file that was written: `out`, or beside `path`. Raises RecordingError, OSError."""
+    """Write and return the file: `out`, or one beside `path`. Raises RecordingError, OSError."""
     target = out or path.with_suffix(".csv")
     target.parent.mkdir(parents=True, exist_ok=True)
     with RecordingReader(path) as reader, target.open("w", newline="", encoding="utf-8") as file:
@@ -25,7 +25,7 @@ def export(path: Path, out: Path | None, task: str) -> list[Path]:
 
 
 def _cell(value: object) -> object:
-    """A text that a spreadsheet would calculate stands behind an apostrophe: people choose their names."""
+    """Put an apostrophe before a text that a spreadsheet would calculate: people choose their names."""
     if isinstance(value, str) and value.startswith(("=", "+", "-", "@")):
         return f"'{value}"
     return "" if value is None else value

@@ -38,14 +38,14 @@ from lockstep.server.recording.reading.reader import RecordingReader
 __all__ = ["aligned", "export"]
 
 FILE = "chunk-000/file-000"
-SAMPLES = 200  # pictures of a camera that its statistics are made from
-PIXEL_STEP = 4  # of their pixels, in both directions
+SAMPLES = 200  # pictures of a camera for its statistics
+PIXEL_STEP = 4  # between the pixels that are used, in both directions
 
 Array = npt.NDArray[Any]
 
 
 class Frame(NamedTuple):
-    """One event: what held, and what was done about it."""
+    """One event: the state of the robot, and the command that answered it."""
 
     feedback: FeedbackRecord
     action: list[float]
@@ -63,7 +63,7 @@ class ExportedCamera(NamedTuple):
 
 
 def export(path: Path, out: Path | None, task: str) -> list[Path]:
-    """The directory that was written: `out`, or beside `path`; a new one. Raises RecordingError, OSError."""
+    """Write and return a new directory: `out`, or one beside `path`. Raises RecordingError, OSError."""
     root = out or path.with_suffix(".lerobot")
     with RecordingReader(path) as reader:
         description = reader.description()
@@ -86,7 +86,7 @@ def export(path: Path, out: Path | None, task: str) -> list[Path]:
 
 
 def _rate(times: list[float]) -> int:
-    """Events per second as they happened: of the median interval, so that pauses do not count; at least 1 Hz.
+    """Return the events per second by the median interval, so that pauses do not count; at least 1 Hz.
 
     A dataset of this version has one rate for all its frames, in whole hertz.
     """
@@ -95,7 +95,7 @@ def _rate(times: list[float]) -> int:
 
 
 def _frames(reader: RecordingReader, description: RobotDescription) -> Iterator[Frame]:
-    """Events without an answer, as the last one, and events whose measurement is not whole are left out."""
+    """Yield a frame for each event, but for those without an answer, as the last one, or with an incomplete state."""
     length = len(_state_names(description))
     for row, following in pairwise(event_rows(reader)):
         command = following.command
@@ -115,7 +115,7 @@ def _state(feedback: FeedbackRecord) -> list[float]:
 
 
 def aligned(pictures: Iterable[Picture], events: Iterable[int]) -> Iterator[av.VideoFrame]:
-    """For each event the first picture stamped with it, or the newest older one. The first must not be newer."""
+    """Yield for each event the first picture with its stamp, or the newest older one. The first event must have one."""
     source = iter(pictures)
     current, upcoming = None, next(source, None)
     for event in events:
@@ -129,7 +129,7 @@ def aligned(pictures: Iterable[Picture], events: Iterable[int]) -> Iterator[av.V
 
 
 def _pictures(path: Path, topic: str) -> Iterator[Picture]:
-    """Decoded, from the first keyframe on."""
+    """Yield the decoded pictures, from the first keyframe on."""
     decoder = RecordedPictures()
     stamps: dict[int, int] = {}
     with RecordingReader(path) as reader:
@@ -152,7 +152,7 @@ def _write_video(path: Path, root: Path, topic: str, events: list[int], fps: int
     samples: list[Array] = []
     size = 0, 0
     with av.open(str(target), "w") as output:
-        # A keyframe every second picture: who learns from it reads frames in any order.
+        # A keyframe every second picture: training reads frames in any order.
         stream = output.add_stream("libx264", rate=fps, options={"crf": "23", "preset": "veryfast", "g": "2"})
         stream.pix_fmt = "yuv420p"
         for number, picture in enumerate(aligned(_pictures(path, topic), events)):

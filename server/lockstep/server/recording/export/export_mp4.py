@@ -1,7 +1,6 @@
 """`lockstep export --to mp4`: one file for each camera, with sound. Pictures and Opus are copied, not encoded again.
 
-Only where the size of the pictures changed on the way, or where there is VP8, which MP4 does not hold, they are encoded
-anew, all in the largest size.
+Pictures are encoded anew, all in the largest size, only if their size changed or some are VP8, which MP4 does not hold.
 """
 
 import re
@@ -26,7 +25,7 @@ __all__ = ["export"]
 VIDEO_BASE = Fraction(1, 90_000)
 SECOND = 1_000_000_000
 MILLISECOND = 1_000_000
-MAX_CAMERA = 60  # characters of its name that are taken into a file's
+MAX_CAMERA = 60  # characters of the camera's name in a file name
 
 
 class Timed(NamedTuple):
@@ -38,7 +37,7 @@ class Timed(NamedTuple):
 
 
 def export(path: Path, out: Path | None, task: str) -> list[Path]:
-    """The files that were written.
+    """Write and return the files.
 
     Args:
         out: with one camera the file, else the directory; None: beside `path`
@@ -56,7 +55,7 @@ def export(path: Path, out: Path | None, task: str) -> list[Path]:
         written = []
         for topic in cameras:
             target = _target(path, out, topic.removeprefix(CAMERA), len(cameras) == 1)
-            while target in written:  # names that differ in what no file's name has
+            while target in written:  # names that differ only in characters that file names lack
                 target = target.with_stem(f"{target.stem}_")
             target.parent.mkdir(parents=True, exist_ok=True)
             _write(reader, topic, sound, target)
@@ -65,7 +64,7 @@ def export(path: Path, out: Path | None, task: str) -> list[Path]:
 
 
 def _first_sound(reader: RecordingReader) -> str | None:
-    """Of the microphones the topic of the first one that was heard."""
+    """Return the topic of the first microphone with any sound, or None."""
     found = (each.topic for each in reader.index.topics if each.schema in SOUND)
     return next((topic for topic in found if reader.index.counts.get(topic)), None)
 
@@ -73,7 +72,7 @@ def _first_sound(reader: RecordingReader) -> str | None:
 def _target(path: Path, out: Path | None, camera: str, only: bool) -> Path:
     if out is not None and only and out.suffix == ".mp4":
         return out
-    # The camera's name is the robot's word, or of whoever made the file: it names no folder.
+    # The camera's name comes from the robot, or from the maker of the file: it must not name a folder.
     name = re.sub(r"[^\w. -]", "_", camera)[:MAX_CAMERA]
     return (out or path.parent) / f"{path.stem}-{name}.mp4"
 
@@ -103,11 +102,11 @@ def _write(reader: RecordingReader, topic: str, sound: str | None, target: Path)
 
 
 class _Copied:
-    """Pictures as they were recorded."""
+    """Writes pictures as they were recorded."""
 
     def __init__(self, output: OutputContainer, keyframe: bytes) -> None:
         self._output = output
-        # A muxer wants to be told of a stream by one that was read: that of the first picture alone.
+        # A muxer needs an input stream as a template: here that of the first picture alone.
         with av.open(BytesIO(keyframe), format="h264") as first:
             self._stream = output.add_stream_from_template(first.streams.video[0])
         self._stream.time_base = VIDEO_BASE
@@ -123,7 +122,7 @@ class _Copied:
 
 
 class _Encoded:
-    """Pictures of different sizes or formats, all in one."""
+    """Encodes pictures of different sizes or formats as one stream."""
 
     def __init__(self, output: OutputContainer, size: tuple[int, int]) -> None:
         self._output = output
@@ -149,7 +148,7 @@ class _Encoded:
 
 
 def _timed(reader: RecordingReader, *topics: str) -> Iterator[Timed]:
-    """In the order of arrival; pictures from the first keyframe on, times of each topic increasing."""
+    """Yield the media in order of arrival: pictures from the first keyframe on, times of each topic increasing."""
     newest: dict[str, int] = {}
     for record in reader.records(topics=topics):
         picture, sound = record.picture, record.sound

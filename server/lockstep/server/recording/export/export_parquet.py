@@ -17,7 +17,7 @@ TYPES = {int: pa.int64(), float: pa.float64(), bool: pa.bool_(), str: pa.string(
 
 
 def export(path: Path, out: Path | None, task: str) -> list[Path]:
-    """The file that was written: `out`, or beside `path`. Raises RecordingError, OSError."""
+    """Write and return the file: `out`, or one beside `path`. Raises RecordingError, OSError."""
     target = out or path.with_suffix(".parquet")
     target.parent.mkdir(parents=True, exist_ok=True)
     with RecordingReader(path) as reader:

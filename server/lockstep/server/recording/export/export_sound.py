@@ -1,4 +1,4 @@
-"""Sound of a recording on its way into an MP4 file."""
+"""Writes the sound of a recording into an MP4 file."""
 
 from collections.abc import Iterable
 from fractions import Fraction
@@ -15,17 +15,17 @@ from lockstep.server.recording.format.payload import RecordedSound
 __all__ = ["sound_writer"]
 
 SECOND = 1_000_000_000
-OPUS, G711 = "opus", "g711-ulaw"  # as a recording calls them; what is neither is left out
+OPUS, G711 = "opus", "g711-ulaw"  # formats as a recording names them; others are left out
 OPUS_RATE = 48_000  # Hz
 OPUS_STEREO = 0x04  # in the first byte of a packet (RFC 6716 3.1)
 G711_RATE = 8_000
 G711_PACKET = 160  # samples, one byte each: 20 ms
-APART = G711_RATE // 10  # samples: a gap longer than this is silence, less is how unsteadily packets came
+APART = G711_RATE // 10  # samples: a longer gap is silence, a shorter one is jitter
 AAC_BITS = OPUS_BITS = 32_000  # a second
 
 
 def sound_writer(output: OutputContainer, sounds: Iterable[RecordedSound]) -> "CopiedOpus | EncodedG711 | None":
-    """What takes all these packets, in turn; None: there is nothing to take."""
+    """Return a writer for all these packets; None if it could write none of them."""
     formats: set[str] = set()
     stereo = False
     for each in sounds:
@@ -37,18 +37,18 @@ def sound_writer(output: OutputContainer, sounds: Iterable[RecordedSound]) -> "C
 
 
 class CopiedOpus:
-    """Opus as it was recorded. Where there is G.711 in between, that is encoded as Opus, packet by packet."""
+    """Writes Opus as it was recorded. G.711 in between is encoded as Opus, packet by packet."""
 
     def __init__(self, output: OutputContainer, *, stereo: bool) -> None:
         self._output = output
-        # Of the encoder only its header is used.
+        # Only the encoder's header is used.
         self._stream: AudioStream = output.add_stream("libopus", rate=OPUS_RATE, layout="stereo" if stereo else "mono")
         self._stream.time_base = Fraction(1, OPUS_RATE)
         self._decoder = _g711_decoder()
         self._encoder: AudioCodecContext | None = None  # while there is G.711
 
     def take(self, sound: RecordedSound, passed: int) -> None:
-        """A packet that was captured so many ns after the film's beginning."""
+        """Write a packet that was captured `passed` ns after the film's beginning."""
         if sound.format == OPUS:
             self._encoder = None
             self._mux(sound.data, passed)
@@ -68,17 +68,17 @@ class CopiedOpus:
 
 
 class EncodedG711:
-    """G.711 µ-law, which MP4 does not hold, as AAC. What is missing between packets is silent."""
+    """Writes G.711 µ-law, which MP4 does not hold, as AAC. Gaps between packets become silence."""
 
     def __init__(self, output: OutputContainer) -> None:
         self._output = output
         self._decoder = _g711_decoder()
         self._stream: AudioStream = output.add_stream("aac", rate=G711_RATE, layout="mono")
         self._stream.bit_rate = AAC_BITS
-        self._until = 0  # samples that were given to the encoder
+        self._until = 0  # samples that the encoder was given
 
     def take(self, sound: RecordedSound, passed: int) -> None:
-        """As `CopiedOpus.take`."""
+        """Write a packet, as `CopiedOpus.take`."""
         if sound.format != G711:
             return
         at = passed * G711_RATE // SECOND
@@ -104,7 +104,7 @@ def _g711_decoder() -> AudioCodecContext:
 
 
 def _opus_encoder() -> AudioCodecContext:
-    """One packet for each that it is given, without any held back."""
+    """Return an encoder that gives one packet for each that it takes, and holds none back."""
     encoder = av.CodecContext.create("libopus", "w")
     encoder.format, encoder.layout, encoder.sample_rate = "s16", "mono", G711_RATE
     encoder.bit_rate, encoder.time_base = OPUS_BITS, Fraction(1, G711_RATE)

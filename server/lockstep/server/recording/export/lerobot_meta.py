@@ -1,4 +1,4 @@
-"""What a LeRobot dataset, version 3, says of itself: info, statistics, tasks, episodes. No I/O."""
+"""The metadata of a LeRobot dataset, version 3: info, statistics, tasks, episodes. No I/O."""
 
 import json
 from typing import Any
@@ -14,12 +14,12 @@ Statistics = dict[str, Any]
 Features = dict[str, dict[str, Any]]
 
 CHUNKS = 1000  # files of a folder
-DATA_MB, VIDEO_MB = 100, 200  # of a file, for who appends
+DATA_MB, VIDEO_MB = 100, 200  # of a file, for programs that append
 QUANTILES = (1, 10, 50, 90, 99)
 
 
 def info_of(robot: str, features: Features, frames: int, fps: int) -> dict[str, Any]:
-    """meta/info.json."""
+    """Return meta/info.json."""
     return {
         "codebase_version": "v3.0",
         "robot_type": robot,
@@ -38,7 +38,7 @@ def info_of(robot: str, features: Features, frames: int, fps: int) -> dict[str, 
 
 
 def statistics_of(values: Array) -> Statistics:
-    """Of one feature: a row for each frame. Numbers as lists, as meta/stats.json has them."""
+    """Return the statistics of one feature, a row for each frame, as lists like in meta/stats.json."""
     table = np.asarray(values, np.float64)
     table = table[:, None] if table.ndim == 1 else table
     found: Statistics = {
@@ -54,13 +54,13 @@ def statistics_of(values: Array) -> Statistics:
 
 
 def picture_statistics(pixels: Array) -> Statistics:
-    """The same of pictures: `pixels` is N x 3 of 0 to 1; each number is 3 x 1 x 1."""
+    """Return the statistics of pictures: `pixels` is N x 3 of 0 to 1; each number is 3 x 1 x 1."""
     found = statistics_of(pixels)
     return {name: value if name == "count" else np.reshape(value, (3, 1, 1)).tolist() for name, value in found.items()}
 
 
 def tasks_table(task: str) -> pa.Table:
-    """meta/tasks.parquet; pandas makes the words its index, which LeRobot looks them up by."""
+    """Return meta/tasks.parquet, with the tasks as the index of pandas, by which LeRobot looks them up."""
     columns = [
         {"name": name, "field_name": name, "pandas_type": kind, "numpy_type": numpy_type, "metadata": None}
         for name, kind, numpy_type in (("task_index", "int64", "int64"), ("task", "unicode", "object"))
@@ -71,7 +71,7 @@ def tasks_table(task: str) -> pa.Table:
 
 
 def episode_table(task: str, frames: int, fps: int, videos: list[str], statistics: dict[str, Statistics]) -> pa.Table:
-    """meta/episodes/…: where the one episode lies, and its statistics."""
+    """Return meta/episodes/…: the place of the one episode, and its statistics."""
     row: dict[str, Any] = {
         "episode_index": 0,
         "tasks": [task],

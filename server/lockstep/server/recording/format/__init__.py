@@ -1,1 +1,1 @@
-"""What is in a recording: topics, records, index, signatures. No I/O."""
+"""The contents of a recording: topics, records, index, signatures. No I/O."""

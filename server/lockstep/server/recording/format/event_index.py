@@ -1,4 +1,4 @@
-"""The index of a recording by event: which chunk has what. No I/O."""
+"""The index of a recording, which finds the chunks of an event. No I/O."""
 
 from collections.abc import Iterator
 from typing import Literal
@@ -36,7 +36,7 @@ class TopicEntry(msgspec.Struct, frozen=True):
 
 
 class ChunkEntry(msgspec.Struct, array_like=True):
-    offset: Whole  # bytes, where the chunk's record begins
+    offset: Whole  # bytes, beginning of the chunk's record
     first_event: Whole  # smallest of its records
     last_event: Whole
     started: Whole  # µs since 1970, arrival of its first record
@@ -69,13 +69,13 @@ class EventIndex(msgspec.Struct, kw_only=True):
     lost: Whole = 0
 
     def chunks_with(self, first_event: int, last_event: int) -> Iterator[int]:
-        """Numbers of the chunks that can hold records of these events."""
+        """Yield the numbers of the chunks that can hold records of these events."""
         for number, chunk in enumerate(self.chunks):
             if not is_newer(chunk.first_event, last_event) and not is_newer(first_event, chunk.last_event):
                 yield number
 
     def after(self, chunk: int) -> "EventIndex":
-        """What is known from that chunk on; the rest of the index is whole."""
+        """Return the index with its lists from that chunk on; the rest is unchanged."""
         if chunk == 0:
             return self
         begin = self.chunks[chunk].started if chunk < len(self.chunks) else self.ended + 1
@@ -90,7 +90,7 @@ class EventIndex(msgspec.Struct, kw_only=True):
         )
 
     def without_chunks_before(self, chunk: int) -> "EventIndex":
-        """As if it began with that chunk, but for the list of chunks itself, whose numbers stay."""
+        """Return the index as if it began with that chunk, but with all chunks, so that their numbers stay."""
         later = self.after(chunk)
         events = later.events
         return msgspec.structs.replace(
@@ -102,7 +102,7 @@ class EventIndex(msgspec.Struct, kw_only=True):
         )
 
     def sparse(self, spacing: int) -> "EventIndex":
-        """With events at least `spacing` µs apart, for who loads the chunks that it looks at anyway."""
+        """Return the index with events at least `spacing` µs apart, for a reader that loads the chunks anyway."""
         events: list[EventEntry] = []
         for each in self.events:
             if not events or each.arrived - events[-1].arrived >= spacing:
@@ -110,7 +110,7 @@ class EventIndex(msgspec.Struct, kw_only=True):
         return msgspec.structs.replace(self, events=events)
 
     def keyframe_before(self, topic: str, event: int) -> EventEntry | None:
-        """The newest keyframe stamped `event` or earlier; None: there is none."""
+        """Return the newest keyframe stamped `event` or earlier, or None."""
         entries = self.keyframes.get(topic, [])
         low, high = 0, len(entries)
         while low < high:
@@ -119,7 +119,7 @@ class EventIndex(msgspec.Struct, kw_only=True):
                 low = middle + 1
             else:
                 high = middle
-        # Of several stamped alike the first: pictures of an event begin there.
+        # The first of several with that stamp: the pictures of the event begin there.
         while low > 1 and entries[low - 2].event == event:
             low -= 1
         return entries[low - 1] if low else None
@@ -129,7 +129,7 @@ _decoder = msgspec.json.Decoder(EventIndex)
 
 
 def check_index(index: EventIndex) -> None:
-    """Whether a page can show it, whoever made the file. Raises RecordingDamaged."""
+    """Check that a page can show the index, whoever made the file. Raises RecordingDamaged."""
     counts = {
         "topics": (len(index.topics), MAX_TOPICS),
         "topics with keyframes": (len(index.keyframes), MAX_TOPICS),
@@ -144,7 +144,7 @@ def check_index(index: EventIndex) -> None:
 
 
 def decode_index(data: bytes) -> EventIndex:
-    """Raises RecordingDamaged."""
+    """Decode an index. Raises RecordingDamaged."""
     try:
         return _decoder.decode(data)
     except (msgspec.DecodeError, UnicodeError, RecursionError) as error:
@@ -152,14 +152,14 @@ def decode_index(data: bytes) -> EventIndex:
 
 
 class IndexBuilder:
-    """Grows with the file: `add` every record in the order of the file, `chunk_written` after each chunk."""
+    """Builds the index of a file: `add` every record in the order of the file, `chunk_written` after each chunk."""
 
     def __init__(self, index: EventIndex) -> None:
         self.index = index
-        self._chunk: ChunkEntry | None = None  # that is being filled
+        self._chunk: ChunkEntry | None = None  # the chunk that is being filled
 
     def add(self, topic: str, event: int, arrived: int, *, keyframe: bool, feedback: bool) -> None:
-        """`arrived` in µs; `keyframe` of a picture; `feedback`: it is one."""
+        """Add a record. `arrived`: µs; `keyframe`: it is a picture's keyframe; `feedback`: it is a feedback."""
         index = self.index
         if not index.started:
             index.started = arrived
@@ -192,14 +192,14 @@ class IndexBuilder:
             self.index.marks.append(mark)
 
     def chunk_written(self, offset: int) -> None:
-        """All that was added since the last time is one chunk, at `offset`."""
+        """Called when all records added since the last call are in one chunk, at `offset`."""
         if self._chunk is not None:
             self._chunk.offset = offset
             self.index.chunks.append(self._chunk)
             self._chunk = None
 
     def written(self) -> EventIndex:
-        """The index of what is in the file by now: a copy. May be called from another thread."""
+        """Return a copy of the index, for the chunks in the file by now. May be called from another thread."""
         index = self.index
         chunks = list(index.chunks)
         ended = chunks[-1].ended if chunks else index.started

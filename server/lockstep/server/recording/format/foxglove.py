@@ -32,13 +32,13 @@ def _stamp(time: int) -> Timestamp:
 
 
 def camera_message(stream: str, captured: int, picture: bytes, picture_format: str = "h264") -> bytes:
-    """One H.264 access unit in Annex B, or one frame of "vp8"."""
+    """Wrap one H.264 access unit in Annex B, or one frame of "vp8"."""
     found = CompressedVideo(timestamp=_stamp(captured), frame_id=stream, data=picture, format=picture_format)
     return found.SerializeToString()
 
 
 def sound_message(sound_format: str, captured: int, packet: bytes) -> bytes:
-    """A packet of "opus", or of "g711-ulaw": 8 kHz, mono."""
+    """Wrap a packet of "opus", or of "g711-ulaw": 8 kHz, mono."""
     return CompressedAudio(timestamp=_stamp(captured), data=packet, format=sound_format).SerializeToString()
 
 
@@ -50,7 +50,7 @@ def log_message(arrived: int, text: str, *, warning: bool = False) -> bytes:
 def feedback_messages(
     description: RobotDescription, feedback: FeedbackRecord, arrived: int, captured: int
 ) -> Iterator[Entry]:
-    """What a feedback says, for those who do not know Lockstep's own records."""
+    """Yield a feedback in Foxglove's schemas, for programs that do not know Lockstep's own records."""
     stamp = _stamp(captured)
 
     def entry(topic: str, data: bytes) -> Entry:

@@ -1,4 +1,4 @@
-"""What a recording says of itself at its beginning: MCAP metadata. No I/O."""
+"""The MCAP metadata at the beginning of a recording. No I/O."""
 
 from collections.abc import Mapping
 from typing import Annotated
@@ -12,25 +12,25 @@ __all__ = ["METADATA_NAME", "RecordingInfo"]
 METADATA_NAME = "lockstep"
 
 
-Text = Annotated[str, msgspec.Meta(max_length=1000)]  # everybody's list has it, whoever made the file
+Text = Annotated[str, msgspec.Meta(max_length=1000)]  # bounded: everybody's list shows it, whoever made the file
 
 
 class RecordingInfo(msgspec.Struct, frozen=True, kw_only=True):
-    """The same in all parts of a recording, but for part and epoch."""
+    """The metadata of a recording, the same in all its parts but for part and epoch."""
 
     recording: Text  # common to all parts
     part: int = 1
     epoch: Text = ""
     robot: Text = ""  # the description's label
-    name: Text = ""  # that somebody gave it
-    by: Text = ""  # who started it; "" when it was the command line
+    name: Text = ""  # given by a person
+    by: Text = ""  # person who started it; "" when it was the command line
 
     def metadata(self) -> dict[str, str]:
         return {name: str(value) for name, value in msgspec.structs.asdict(self).items()}
 
     @classmethod
     def parse(cls, metadata: Mapping[str, str]) -> "RecordingInfo":
-        """Raises RecordingDamaged."""
+        """Parse the metadata. Raises RecordingDamaged."""
         try:
             return _decoder.decode(msgspec.json.encode(metadata))
         except msgspec.ValidationError as error:

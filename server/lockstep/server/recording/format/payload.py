@@ -1,4 +1,4 @@
-"""What stands in a record: the bare picture or sound, or one of Lockstep's own records. No I/O."""
+"""Decodes the content of a record: a picture, a sound, or one of Lockstep's own records. No I/O."""
 
 from typing import NamedTuple, TypeVar
 
@@ -39,7 +39,7 @@ _decoders = {kind: msgspec.json.Decoder(kind) for kind in OWN_RECORDS.values()}
 
 
 def payload_of(schema: str, data: bytes) -> bytes:
-    """The bare encoded picture or sound; of every other schema the message itself.
+    """Return the bare encoded picture or sound; of every other schema the message itself.
 
     Raises:
         RecordingDamaged: it is not what the schema says.
@@ -60,7 +60,7 @@ class RecordedPicture(NamedTuple):
 
 
 def picture_of(data: bytes) -> RecordedPicture:
-    """What a message of the schema VIDEO holds. Raises RecordingDamaged."""
+    """Return the picture in a message of the schema VIDEO. Raises RecordingDamaged."""
     try:
         found = CompressedVideo.FromString(data)
     except DecodeError as error:
@@ -74,7 +74,7 @@ class RecordedSound(NamedTuple):
 
 
 def sound_of(schema: str, data: bytes) -> RecordedSound:
-    """What a message of one of the schemas SOUND holds. Raises RecordingDamaged."""
+    """Return the sound in a message of one of the schemas SOUND. Raises RecordingDamaged."""
     try:
         found = SOUND[schema].FromString(data)
     except DecodeError as error:
@@ -89,7 +89,7 @@ def _is_keyframe(picture_format: str, picture: bytes) -> bool:
 
 
 def own_record(kind: type[Kind], data: bytes) -> Kind:
-    """Raises RecordingDamaged."""
+    """Decode one of Lockstep's own records. Raises RecordingDamaged."""
     try:
         found: Kind = _decoders[kind].decode(data)  # type: ignore[assignment]
     except (msgspec.DecodeError, UnicodeError, RecursionError) as error:
@@ -98,13 +98,13 @@ def own_record(kind: type[Kind], data: bytes) -> Kind:
 
 
 def own_record_of(schema: str, data: bytes) -> OwnRecord | None:
-    """None: the schema is not one of Lockstep's own. Raises RecordingDamaged."""
+    """Decode one of Lockstep's own records; None for other schemas. Raises RecordingDamaged."""
     kind = OWN_RECORDS.get(schema)
     return None if kind is None else own_record(kind, data)
 
 
 def _has_idr(picture: bytes) -> bool:
-    """Whether an H.264 access unit in Annex B is a keyframe: its first slice is one of an IDR picture."""
+    """True if an H.264 access unit in Annex B is a keyframe: its first slice is one of an IDR picture."""
     at = picture.find(START_CODE)
     while 0 <= at < len(picture) - len(START_CODE):
         kind = picture[at + len(START_CODE)] & NAL_KIND

@@ -1,4 +1,4 @@
-"""What Lockstep itself writes into a recording: JSON, with a published JSON Schema for each kind.
+"""Lockstep's own records in a recording: JSON, with a published JSON Schema for each kind.
 
 The JSON Schemas are generated from this file (scripts/generate_wire.py). Pictures, sound, joints and so on have
 Foxglove's schemas; see `lockstep.server.recording.format.topics`.
@@ -34,9 +34,9 @@ __all__ = [
 ]
 
 Count = Annotated[int, msgspec.Meta(ge=0)]
-Whole = Annotated[int, msgspec.Meta(ge=0, le=2**53 - 1)]  # what a JavaScript number holds exactly
+Whole = Annotated[int, msgspec.Meta(ge=0, le=2**53 - 1)]  # integers that a JavaScript number holds exactly
 
-# What became of a command at the console. Only a forwarded one reached the robot bridge.
+# The outcome of a command at the console. Only a forwarded one reached the robot bridge.
 CommandOutcome = Literal["forwarded", "repeated", "refused", "undelivered"]
 
 
@@ -59,12 +59,12 @@ class CommandRecord(OwnRecord, frozen=True, kw_only=True):
     """A command that somebody sent; `event` is the one that it is to become."""
 
     issue: Annotated[int, msgspec.Meta(ge=1)]  # of the feedback that it answers
-    values: list[float]  # one per axis, in its unit; what was forwarded, else what was asked
+    values: list[float]  # one per axis, in its unit; as forwarded, else as asked
     peer: str
     name: str
     outcome: CommandOutcome
     reason: RefusalReason | Literal[""] = ""  # why it was refused
-    nonce: int = 0  # that the sender named; 0 in recordings of before there were any
+    nonce: int = 0  # as its sender named it; 0 in recordings from before there were nonces
 
 
 class FeedbackRecord(OwnRecord, frozen=True, kw_only=True):
@@ -81,7 +81,7 @@ class FeedbackRecord(OwnRecord, frozen=True, kw_only=True):
     faults: list[str] = []
     limits: list[str] = []
     unknown: list[str] = []
-    nonce: int = 0  # of this issue; 0 in recordings of before there were any
+    nonce: int = 0  # of this issue; 0 in recordings from before there were nonces
     neutral_needed: bool = False  # no moving command executes before a neutral one
     warning: float = 0.0  # s that the robot still warns before it may move
 
@@ -89,11 +89,11 @@ class FeedbackRecord(OwnRecord, frozen=True, kw_only=True):
 class RefusalRecord(OwnRecord, frozen=True, kw_only=True):
     """Something was refused; `event` is the current one."""
 
-    refused: Count  # the refused command's event; 0 for what is no command
+    refused: Count  # the refused command's event; 0 if it was no command
     reason: RefusalReason
     detail: str = ""
     by: Literal["console", "robot"]
-    peer: str = ""  # who was told; "" for nobody
+    peer: str = ""  # peer that was told; "" for nobody
     name: str = ""
 
 
@@ -122,8 +122,8 @@ class StopRecord(OwnRecord, frozen=True, kw_only=True):
     reason: str = ""
     delivered: bool = True  # False: there was no robot link
     press: str = ""  # id of the press; "" of a reset
-    number: int = 0  # of the stop that was taken or released; 0 where nobody knows it yet
-    kept: bool = True  # whether the stop that was taken is on the robot's disk
+    number: int = 0  # of the stop that was taken or released; 0 if not known yet
+    kept: bool = True  # the stop that was taken is on the robot's disk
 
 
 class ParticipantsRecord(OwnRecord, frozen=True, kw_only=True):
@@ -162,7 +162,7 @@ class SignatureRecord(OwnRecord, frozen=True, kw_only=True):
     part: Annotated[int, msgspec.Meta(ge=1)]
     number: Annotated[int, msgspec.Meta(ge=1)]  # counts the signatures of the file
     until: Count  # ns since 1970, arrival of the last record that it signs
-    final: bool  # nothing comes behind it
+    final: bool  # nothing follows it
     head: str  # of the hash chain, 64 hexadecimal digits
     previous: str  # head of the part before; "" in the first part
     audit: str  # newest signed head of the audit, JSON; "" when there was none

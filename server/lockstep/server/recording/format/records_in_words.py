@@ -22,7 +22,7 @@ class Words(NamedTuple):
 
 
 def in_words(record: OwnRecord) -> Words | None:
-    """None: it comes too often to be read, or says nothing."""
+    """Return the record in words; None if it comes too often to be read, or says nothing."""
     match record:
         case RobotRecord(link=link, detail=detail):
             return Words(f"robot link {link}{': ' + detail if detail else ''}", link == "down")

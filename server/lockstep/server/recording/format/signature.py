@@ -1,6 +1,6 @@
 """The hash chain over a recording and the signatures of its head. No I/O; writer and `lockstep verify` share it.
 
-The chain begins with what the file says of itself: its metadata and its topics. Every chunk makes the next head:
+The chain begins with the file's metadata and topics. Every chunk makes the next head:
 SHA-256 of the head before and of the SHA-256 over the chunk's messages. The last message of each chunk is a signature.
 """
 
@@ -34,7 +34,7 @@ class TopicText(NamedTuple):
 
 
 class RecordingChain:
-    """`add` each message that is no signature, `end_chunk` at the end of each chunk.
+    """The hash chain of a file: `add` each message that is no signature, `end_chunk` at the end of each chunk.
 
     Attributes:
         head: of the chain, 64 hexadecimal digits
@@ -55,18 +55,18 @@ class RecordingChain:
         self.waiting += 1
 
     def end_chunk(self) -> str:
-        """The new head."""
+        """End a chunk and return the new head."""
         self.head = hashlib.sha256(bytes.fromhex(self.head) + self._messages.digest()).hexdigest()
         self.drop_waiting()
         return self.head
 
     def drop_waiting(self) -> None:
-        """Go on as if what was added since the last head had not been there."""
+        """Drop the messages added since the last head."""
         self._messages, self.waiting = hashlib.sha256(), 0
 
 
 class RecordingSigning(NamedTuple):
-    """What a recording is signed with.
+    """The means to sign a recording.
 
     Attributes:
         newest_audit: the newest signed head of the audit as JSON; "" when there is none
@@ -77,7 +77,7 @@ class RecordingSigning(NamedTuple):
 
 
 class Signatures:
-    """Of one file that is written. `add` every message, `sign` at the end of each chunk."""
+    """Signs a file that is being written: `add` every message, `sign` at the end of each chunk."""
 
     def __init__(
         self, signing: RecordingSigning, info: RecordingInfo, topics: Iterable[TopicText], previous: str
@@ -95,14 +95,14 @@ class Signatures:
         return self._chain.head
 
     def add(self, topic: str, event: int, arrived: int, captured: int, data: bytes, *, feedback: bool) -> None:
-        """`feedback`: it is one. Other records may name an event that is still to come, or one long past."""
+        """Add a message. `feedback`: it is a feedback; other records may name an event to come, or one long past."""
         if feedback or not self._until:
             self._event = event
         self._chain.add(topic, event, arrived, captured, data)
         self._until = arrived
 
     def sign(self, *, final: bool) -> SignatureRecord:
-        """What ends the chunk; `final`: and the file."""
+        """Return the record that ends the chunk; `final`: and the file."""
         self._number += 1
         signer, newest_audit = self._signing
         unsigned = SignatureRecord(
@@ -123,10 +123,10 @@ class Signatures:
 
 
 def is_valid(record: SignatureRecord) -> bool:
-    """Whether the owner of its key has signed it."""
+    """True if the owner of its key has signed it."""
     return is_signed(record.key, _signed_bytes(record), record.signature)
 
 
 def _signed_bytes(record: SignatureRecord) -> bytes:
-    """The record as JSON as it stands in the file, with an empty signature."""
+    """Return the record as JSON as in the file, with an empty signature."""
     return SIGNATURE + msgspec.json.encode(msgspec.structs.replace(record, signature=""))

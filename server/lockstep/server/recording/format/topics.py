@@ -55,7 +55,7 @@ __all__ = [
 CAMERA, MICROPHONE = "/camera/", "/microphone/"  # and the stream's name
 JOINTS, SCAN, POSE, LOG = "/joint_states", "/scan", "/pose", "/log"
 
-# What a message says of itself, by codec. One topic can have several.
+# The names of formats in messages, by codec. One topic can have several.
 PICTURE_FORMATS = {"H264": "h264", "VP8": "vp8"}  # in CompressedVideo
 SOUND_FORMATS = {"opus": "opus", "PCMU": "g711-ulaw"}  # in CompressedAudio
 
@@ -86,7 +86,7 @@ class Topic(NamedTuple):
 
 
 def topics_of(description: RobotDescription, codecs: Mapping[str, str], *, signed: bool = False) -> list[Topic]:
-    """All that a recording of this robot can have; `codecs`: "H264", "opus" or "PCMU" by stream."""
+    """Return all topics that a recording of this robot can have; `codecs`: "H264", "opus" or "PCMU" by stream."""
     found = [_own(topic, kind) for kind, topic in OWN_TOPICS.items() if kind not in (WrenchRecord, SignatureRecord)]
     if signed:
         found.append(_own(SIGNATURE, SignatureRecord))
@@ -111,7 +111,7 @@ def media_topic(stream: str, codec: str) -> str:
 
 
 def stream_of(topic: str) -> str:
-    """The camera's or microphone's name; "" for other topics."""
+    """Return the camera's or microphone's name; "" for other topics."""
     for prefix in (CAMERA, MICROPHONE):
         if topic.startswith(prefix):
             return topic[len(prefix) :]
@@ -120,7 +120,7 @@ def stream_of(topic: str) -> str:
 
 @cache
 def own_schema(kind: type[OwnRecord]) -> dict[str, Any]:
-    """The JSON Schema of one kind, complete in itself."""
+    """Return the JSON Schema of one kind, complete in itself."""
     (reference,), components = msgspec.json.schema_components([kind], ref_template="#/$defs/{name}")
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
@@ -139,7 +139,7 @@ def _foxglove(topic: str, kind: type[Message]) -> Topic:
 
 
 def _descriptors(kind: type[Message]) -> bytes:
-    """The FileDescriptorSet that MCAP wants as the schema: the message's file and all that it builds on."""
+    """Return the FileDescriptorSet that MCAP wants as the schema: the message's file and all its dependencies."""
     files: dict[str, Any] = {}  # file descriptors, which the stubs give several types
 
     def add(file: Any) -> None:

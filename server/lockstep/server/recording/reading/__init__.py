@@ -1,1 +1,1 @@
-"""Recordings are read by event."""
+"""Reads recordings by event."""

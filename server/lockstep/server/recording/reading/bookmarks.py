@@ -1,4 +1,4 @@
-"""What somebody who looks at a recording wants to jump to: contacts, refusals, stops, hand-overs. No I/O."""
+"""Finds the marks of a recording that a viewer jumps to: contacts, refusals, stops, hand-overs. No I/O."""
 
 import math
 from typing import Literal
@@ -21,7 +21,7 @@ __all__ = ["Mark", "BookmarkFinder", "MarkKind"]
 MarkKind = Literal["contact", "refusal", "stop", "reset", "seat", "note", "fault", "link"]
 REFUSAL_SPACING = 1_000_000  # µs
 STOP_SPACING = 1_000_000  # µs between marks of further stops, while one holds
-RELEASE_SHARE = 0.6  # of the threshold: a contact ends below it, so that a trembling force is one
+RELEASE_SHARE = 0.6  # of the threshold: a contact ends below it, so that a trembling force is one contact
 
 
 class Mark(msgspec.Struct, frozen=True):
@@ -32,7 +32,7 @@ class Mark(msgspec.Struct, frozen=True):
 
 
 class BookmarkFinder:
-    """Show it every record of Lockstep's own, in order."""
+    """Finds the marks of a recording. Show it every record of Lockstep's own, in order."""
 
     def __init__(self, description: RobotDescription | None = None) -> None:
         self._threshold = _threshold(description)
@@ -46,7 +46,7 @@ class BookmarkFinder:
         self._last_refusal = -math.inf
 
     def find(self, record: OwnRecord, arrived: int) -> list[Mark]:
-        """The marks that `record`, arrived then (µs), stands for."""
+        """Return the marks of `record`, which arrived at `arrived` (µs)."""
         match record:
             case FeedbackRecord():
                 return self._feedback(record, arrived)
@@ -64,7 +64,7 @@ class BookmarkFinder:
                 return [Mark(record.event, arrived, "link", f"robot link {record.link}")] if changed else []
         return []
 
-    # When a stop or its reset held is in the feedback, not in the record of who asked for it.
+    # Feedback tells the times of a stop and its reset, not the records of the requests.
 
     def _feedback(self, record: FeedbackRecord, arrived: int) -> list[Mark]:
         found: list[Mark] = []

@@ -18,18 +18,18 @@ READ = {OWN_TOPICS[FeedbackRecord], OWN_TOPICS[CommandRecord], OWN_TOPICS[SeatRe
 
 
 class EventRow(NamedTuple):
-    """Times in ns since 1970."""
+    """One row: an event, with times in ns since 1970."""
 
     feedback: FeedbackRecord  # the first of the event
     arrived: int
     captured: int
-    command: CommandRecord | None  # that became the event; None for the file's first one
+    command: CommandRecord | None  # command that became the event; None for the file's first event
     driver: str  # name of the seat's holder
     stamps: dict[str, int]  # of the newest picture and sound that had arrived, by stream
 
 
 def event_rows(reader: RecordingReader) -> Iterator[EventRow]:
-    """In the order of their events. Raises RecordingError."""
+    """Yield the rows in the order of their events. Raises RecordingError."""
     event = 0
     command: CommandRecord | None = None
     driver = ""
@@ -52,7 +52,7 @@ def event_rows(reader: RecordingReader) -> Iterator[EventRow]:
 
 
 def columns_of(description: RobotDescription, streams: list[str]) -> dict[str, type]:
-    """Names and types, in order; units are SI, times say theirs."""
+    """Return the names and types of the columns, in order. Units are SI; names of times say theirs."""
     columns: dict[str, type] = {
         "event": int,
         "arrived_us": int,
@@ -76,7 +76,7 @@ def columns_of(description: RobotDescription, streams: list[str]) -> dict[str, t
 
 
 def values_of(row: EventRow, description: RobotDescription, streams: list[str]) -> list[Value]:
-    """In the order of `columns_of`; None: not known."""
+    """Return the values in the order of `columns_of`; None: not known."""
     feedback, command = row.feedback, row.command
     values: list[Value] = [
         feedback.event,

@@ -1,4 +1,4 @@
-"""Opens recordings, and remembers the indexes of those that were opened last. Blocks; from any thread."""
+"""Opens recordings and caches the indexes of those that were opened last. Blocks; for use from any thread."""
 
 import threading
 from collections import OrderedDict
@@ -13,14 +13,14 @@ MOST = 4  # files; the index of a long one takes megabytes
 
 
 class KnownIndexes:
-    """A player asks for one chunk after the other: its file's index need not be read for each."""
+    """Caches indexes: a player asks for one chunk after the other, and the index need not be read for each."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
         self._known: OrderedDict[Path, tuple[tuple[int, int], EventIndex, bool]] = OrderedDict()
 
     def open(self, path: Path) -> RecordingReader:
-        """Of a file that is not being written. Close it. Raises RecordingError, OSError."""
+        """Open a file that is not being written; close the reader. Raises RecordingError, OSError."""
         status = path.stat()
         version = status.st_size, status.st_mtime_ns
         with self._lock:

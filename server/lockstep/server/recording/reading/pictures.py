@@ -11,10 +11,10 @@ MAX_PIXELS = 4096 * 2304  # of a picture
 
 
 class RecordedPictures:
-    """`decode` each in turn, from a keyframe on; `flush` at the end.
+    """A decoder: `decode` each picture in turn, from a keyframe on; `flush` at the end.
 
     Raises:
-        av.FFmpegError: from both. It cannot be decoded.
+        av.FFmpegError: by both methods, when a picture cannot be decoded.
     """
 
     def __init__(self) -> None:
@@ -22,7 +22,7 @@ class RecordedPictures:
         self._decoder: VideoCodecContext | None = None
 
     def decode(self, picture: RecordedPicture, number: int = 0) -> list[av.VideoFrame]:
-        """What can be shown now. `number` comes back as the `pts` of this picture."""
+        """Return the pictures that can be shown now. `number` comes back as the `pts` of this picture."""
         found: list[av.VideoFrame] = []
         if self._decoder is None or picture.format != self._format:
             found += self.flush()
@@ -36,13 +36,13 @@ class RecordedPictures:
         return found + self._decoder.decode(packet)
 
     def flush(self) -> list[av.VideoFrame]:
-        """What the decoder still holds back."""
+        """Return the pictures that the decoder still holds back."""
         decoder, self._decoder = self._decoder, None
         return [] if decoder is None else decoder.decode(None)
 
 
 def picture_size(keyframe: RecordedPicture) -> tuple[int, int] | None:
-    """Width and height; None: it cannot be decoded."""
+    """Return width and height; None if the picture cannot be decoded."""
     pictures = RecordedPictures()
     try:
         frames = [*pictures.decode(keyframe), *pictures.flush()]

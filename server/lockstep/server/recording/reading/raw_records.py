@@ -1,4 +1,4 @@
-"""The records of an MCAP file in the order in which they lie there, without any index, and what a chunk holds."""
+"""Reads the records of an MCAP file in file order, without any index, and those in a chunk."""
 
 import os
 import struct
@@ -27,9 +27,9 @@ __all__ = [
 MAGIC = b"\x89MCAP0\r\n"
 HEAD = 9  # bytes of opcode and length
 MAX_RECORD = 256 * 1024 * 1024  # bytes; the index of a long recording is the largest
-MAX_UNPACKED = 32 * 1024 * 1024  # bytes, of a chunk; ours have one megabyte and one picture more
+MAX_UNPACKED = 32 * 1024 * 1024  # bytes, of a chunk; Lockstep writes at most one megabyte and one picture
 
-# What the mcap library raises where bytes are not what they should be.
+# The errors that the mcap library raises for malformed bytes.
 BROKEN = (McapError, CRCValidationError, ZstdError, struct.error, ValueError, KeyError, EOFError, RuntimeError)
 
 
@@ -44,7 +44,7 @@ class RawRecord(NamedTuple):
 
 
 def raw_records(file: BinaryIO) -> Iterator[RawRecord]:
-    """From where `file` stands on, as far as they are whole. Raises RecordingDamaged: one is too large."""
+    """Yield the whole records from the file's position on. Raises RecordingDamaged when one is too large."""
     size = os.fstat(file.fileno()).st_size
     while True:
         offset = file.tell()
@@ -52,13 +52,13 @@ def raw_records(file: BinaryIO) -> Iterator[RawRecord]:
         length = int.from_bytes(head[1:], "little")
         if len(head) < HEAD or offset + HEAD + length > size:
             return
-        if length > MAX_RECORD:  # a file with holes is as long as it says, and takes no room on the disk
+        if length > MAX_RECORD:  # a sparse file may be as long as it says without taking room on the disk
             raise RecordingDamaged(f"a record of {length} bytes at byte {offset}, the bound is {MAX_RECORD}")
         yield RawRecord(head[0], offset, file.read(length))
 
 
 def check_packed(chunk: Chunk) -> None:
-    """Whether it may be unpacked: no few bytes that would become more than fits in memory, and no lz4.
+    """Check that a chunk may be unpacked: no few bytes that would become more than fits in memory, and no lz4.
 
     Raises ValueError.
     """
@@ -70,6 +70,6 @@ def check_packed(chunk: Chunk) -> None:
 
 
 def chunk_records(chunk: Chunk) -> list[McapRecord]:
-    """What is in it. Raises one of BROKEN."""
+    """Return the records in a chunk. Raises one of BROKEN."""
     check_packed(chunk)
     return breakup_chunk(chunk, validate_crc=True)

@@ -57,26 +57,26 @@ class Record(NamedTuple):
 
     @property
     def picture(self) -> RecordedPicture | None:
-        """None: it is none. Raises RecordingDamaged."""
+        """The picture, or None. Raises RecordingDamaged."""
         return picture_of(self.data) if self.schema == VIDEO else None
 
     @property
     def sound(self) -> RecordedSound | None:
-        """As `picture`."""
+        """The sound, or None. Raises RecordingDamaged."""
         return sound_of(self.schema, self.data) if self.schema in SOUND else None
 
     @property
     def keyframe(self) -> bool:
-        """Whether it can be decoded without earlier ones: always, but for most pictures."""
+        """True if it can be decoded without earlier records: always, but for most pictures."""
         picture = self.picture
         return picture is None or picture.keyframe
 
 
 class RecordingReader:
-    """Close it, or use it as a context manager. Used from one thread at a time.
+    """Reads one file. Close it, or use it as a context manager. Use it from one thread at a time.
 
     Args:
-        index: of a file that is still written; None: read it from the file, or build it from what is there
+        index: of a file that is still written; None: read it from the file, or build it from the records
 
     Raises:
         RecordingDamaged: it is no recording.
@@ -85,7 +85,7 @@ class RecordingReader:
 
     def __init__(self, path: Path, index: EventIndex | None = None) -> None:
         self.path = path
-        self.interrupted = False  # neither closed nor still written: the index was made from what is there
+        self.interrupted = False  # neither closed nor still written: the index was built from the records
         self._file = open_regular(path)
         try:
             self.info = self._read_info()
@@ -115,7 +115,7 @@ class RecordingReader:
         return self.path.stat().st_size
 
     def description(self) -> RobotDescription:
-        """Of the robot. Raises RecordingDamaged when the file has none."""
+        """Return the robot's description. Raises RecordingDamaged when the file has none."""
         for number in range(min(2, len(self.index.chunks))):
             for record in self.chunk(number, {OWN_TOPICS[RobotRecord]}):
                 return _shown(own_record(RobotRecord, record.data).description)
@@ -129,7 +129,7 @@ class RecordingReader:
         *,
         decodable: bool = False,
     ) -> Iterator[Record]:
-        """In the order of arrival, those stamped with `first_event` to `last_event`.
+        """Yield the records stamped with `first_event` to `last_event`, in the order of arrival.
 
         Args:
             first_event, last_event: None: from the beginning, to the end
@@ -159,14 +159,14 @@ class RecordingReader:
         return {topic: entry for topic, entry in found.items() if entry is not None}
 
     def _chunks_from(self, starts: dict[str, EventEntry], event: int) -> Iterator[int]:
-        """From the earliest of the keyframes to the event."""
+        """Yield the chunks from the earliest of the keyframes to the event."""
         if starts:
             first = min(entry.chunk for entry in starts.values())
             until = next(iter(self.index.chunks_with(event, event)), first)
             yield from range(first, min(until + 1, len(self.index.chunks)))
 
     def chunk(self, number: int, topics: Collection[str] | None = None) -> Iterator[Record]:
-        """The records of one chunk.
+        """Yield the records of one chunk.
 
         Raises:
             IndexError: there is no such chunk.
@@ -191,7 +191,7 @@ class RecordingReader:
             yield Record(topic.topic, topic.schema, part.sequence, part.log_time, part.publish_time, part.data, number)
 
     def _record_at(self, offset: int, opcode: int) -> bytes:
-        """The content of one MCAP record, after its opcode and length."""
+        """Return the content of one MCAP record, after its opcode and length."""
         self._seek(offset)
         head = self._file.read(HEAD)
         length = int.from_bytes(head[1:], "little")
@@ -203,7 +203,7 @@ class RecordingReader:
         return content
 
     def _seek(self, offset: int) -> None:
-        """Where the file says that something stands; what it says may be any number."""
+        """Seek to an offset that the file names, which may be any number."""
         if not 0 <= offset <= self.size:
             raise RecordingDamaged(f"nothing stands at byte {offset} of {self.size}")
         self._file.seek(offset)
@@ -220,7 +220,7 @@ class RecordingReader:
         return RecordingInfo.parse(metadata.metadata)
 
     def _read_index(self) -> EventIndex | None:
-        """None: the file was not closed."""
+        """Return the index; None if the file was not closed."""
         end = self._file.seek(0, 2)
         if end < FOOTER:
             return None
@@ -235,7 +235,7 @@ class RecordingReader:
         return decode_index(attachment.data)
 
     def _attachment(self, footer: Footer, end: int) -> AttachmentIndex | None:
-        """Where the index is: the summary's last groups are short, so they are read from their own beginning."""
+        """Find the index. The summary's last groups are short, so they are read from their own beginning."""
         self._seek(footer.summary_offset_start or footer.summary_start)
         length = end - self._file.tell() - FOOTER
         if length > MAX_RECORD:
@@ -260,7 +260,7 @@ class RecordingReader:
 
 
 def _shown(description: RobotDescription) -> RobotDescription:
-    """Whoever made the file may have written anything. Raises RecordingDamaged."""
+    """Check the description: the maker of the file may have written anything. Raises RecordingDamaged."""
     try:
         check_bounds(description)
     except DescriptionError as error:

@@ -1,4 +1,4 @@
-"""Reads a file that was interrupted from its beginning, as far as it is whole, and completes it."""
+"""Reads an interrupted file from its beginning, as far as it is whole, and completes it."""
 
 import os
 import struct
@@ -39,11 +39,11 @@ __all__ = ["Scan", "complete_file", "scan_file"]
 
 
 class Scan:
-    """What is whole in a file."""
+    """The whole records of a file."""
 
     def __init__(self, info: RecordingInfo) -> None:
         self.index = EventIndex(epoch=info.epoch, recording=info.recording, part=info.part)
-        self.whole = len(MAGIC)  # bytes
+        self.whole = len(MAGIC)  # bytes that are whole
         self.schemas: dict[int, Schema] = {}
         self.channels: dict[int, Channel] = {}
         self.chunks: list[ChunkIndex] = []
@@ -53,7 +53,7 @@ class Scan:
         self._marks = BookmarkFinder()
 
     def take(self, raw: RawRecord) -> bool:
-        """The next record of the file; False when nothing behind it counts."""
+        """Take the next record of the file; False when nothing after it counts."""
         stream = ReadDataStream(BytesIO(raw.content))
         if raw.opcode == Opcode.CHUNK:
             self._chunk(raw, Chunk.read(stream))
@@ -62,7 +62,7 @@ class Scan:
         elif raw.opcode == Opcode.METADATA:
             self.metadata.append(MetadataIndex(raw.offset, HEAD + len(raw.content), METADATA_NAME))
         elif raw.opcode != Opcode.HEADER:
-            return False  # it was about to be closed
+            return False  # the file was about to be closed
         self.whole = raw.end
         return True
 
@@ -114,10 +114,10 @@ class Scan:
 
 
 def scan_file(path: Path, info: RecordingInfo) -> Scan:
-    """What is whole in it, from its beginning on.
+    """Read the whole records of a file, from its beginning on.
 
     Raises:
-        RecordingDamaged: nothing is.
+        RecordingDamaged: none is whole.
         OSError: it cannot be read.
     """
     scan = Scan(info)
@@ -129,12 +129,12 @@ def scan_file(path: Path, info: RecordingInfo) -> Scan:
                 if not scan.take(raw):
                     break
         except (*BROKEN, RecordingDamaged):
-            pass  # from here on it is broken
+            pass  # the rest of the file is broken
     return scan
 
 
 def complete_file(path: Path, info: RecordingInfo) -> EventIndex:
-    """Cut off what is broken, and write the index and the summary behind the rest.
+    """Cut off the broken end of a file, and write the index and the summary behind the rest.
 
     Raises:
         RecordingDamaged, OSError: as `scan_file`.
@@ -156,7 +156,7 @@ def complete_file(path: Path, info: RecordingInfo) -> EventIndex:
 
 
 def _ending(scan: Scan) -> bytes:
-    """All that comes behind the last chunk of a closed file (MCAP specification, "Summary Section")."""
+    """Return all that follows the last chunk of a closed file (MCAP specification, "Summary Section")."""
     builder = RecordBuilder()
     data = msgspec.json.encode(scan.index)
     attachment = Attachment(0, scan.index.ended * 1000, INDEX_NAME, "application/json", data)

@@ -1,1 +1,1 @@
-"""Whether a recording keeps the promises of Lockstep, and whether it was changed."""
+"""Checks that a recording keeps the promises of Lockstep, and that it was not changed."""

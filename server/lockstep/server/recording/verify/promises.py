@@ -1,4 +1,4 @@
-"""Checks a recording against what Lockstep promises (DESIGN: exactly once, never late, only from the seat). No I/O.
+"""Checks a recording against Lockstep's promises (DESIGN: exactly once, never late, only from the seat). No I/O.
 
 Show a `Verifier` every record in the order of the file, then ask for its `verdict`. It goes by events and by the robot
 bridge's own clock; the console's clock decides nothing.
@@ -33,10 +33,10 @@ CheckName = Literal[
     "once",  # every event comes from one forwarded command, and executes once
     "in_time",  # no command executes later than max_event_age after the feedback that it answers, and has seen
     "seat",  # commands are forwarded for the seat's holder alone
-    "stopped",  # and not while the robot is stopped, or a stop is on its way to it
+    "stopped",  # no command is forwarded while the robot is stopped, or a stop is on its way to it
     "stamps",  # no picture or sound is stamped newer than it is
     "rendered",  # the operator's page rendered nothing beyond its tolerance
-    "signed",  # everything is what was signed, to its end; or nothing is signed
+    "signed",  # the file is as it was signed, to its end; or nothing is signed
 ]
 CHECKS: tuple[CheckName, ...] = (
     "readable",
@@ -52,7 +52,7 @@ CHECKS: tuple[CheckName, ...] = (
 )
 TICK = 0.25  # s from the decision to execute until the feedback's own time: a tick and the measurement, with room
 ROUNDING = 2e-6  # s; times in the file are rounded to ns, capture times of sound to a sample
-MANY_PRESSES = 64  # on their way; of more some share an answer, and the oldest of them may have none of their own
+MANY_PRESSES = 64  # on their way; beyond that some share an answer, and the oldest may have none
 MOST = 50  # violations of a check that are listed
 
 
@@ -63,9 +63,9 @@ class Violation(msgspec.Struct, frozen=True):
 
 
 class Check(msgspec.Struct):
-    """One promise."""
+    """The check of one promise."""
 
-    looked: int = 0  # how often there was something to check
+    looked: int = 0  # number of cases that were checked
     count: int = 0  # of violations
     violations: list[Violation] = []  # the first ones
 
@@ -88,16 +88,16 @@ class _Answered(msgspec.Struct):
 
     times: dict[int, float]  # s, the bridge's clock
     stopped: dict[int, bool]
-    nonces: dict[int, int]  # 0 in recordings of before there were any
+    nonces: dict[int, int]  # 0 in recordings from before there were nonces
 
 
 class _Stops:
-    """Whether a stop is on its way to the robot. In recordings of before there were numbers, a stop has no press."""
+    """The stops on their way to the robot. In recordings from before stops had numbers, a stop has no press."""
 
     def __init__(self) -> None:
-        self.shown = 0  # number of the newest that a feedback has shown
+        self.shown = 0  # number of the newest stop that a feedback has shown
         self._asked: dict[str, None] = {}  # presses that the robot has not taken, oldest first
-        self._taken = 0  # number of the newest that it has
+        self._taken = 0  # number of the newest stop that the robot has taken
         self._asked_without_id = False
 
     @property
@@ -105,7 +105,7 @@ class _Stops:
         return bool(self._asked) or self._asked_without_id or self._taken > self.shown
 
     def record(self, record: StopRecord) -> str:
-        """What is wrong with it; "" for nothing."""
+        """Take a record and return its fault, or ""."""
         if record.kind == "stop":
             if record.press:
                 self._asked[record.press] = None
@@ -126,7 +126,7 @@ class _Stops:
         self._asked.pop(taken.press, None)
 
     def feedback(self, feedback: FeedbackRecord) -> str:
-        """As `record`."""
+        """Take a feedback and return its fault, or ""."""
         stop, shown = feedback.stop, self.shown
         self.shown = max(shown, stop.number)
         if stop.stopped:
@@ -154,21 +154,21 @@ class Verifier:
         self._signature = SignatureReport()
 
     def fail(self, check: CheckName, text: str, event: int = 0, time: int = 0) -> None:
-        """Something is not as promised."""
+        """Note a broken promise."""
         found = self._checks[check]
         found.count += 1
         if len(found.violations) < MOST:
             found.violations.append(Violation(event, time, text))
 
     def signed(self, report: SignatureReport) -> None:
-        """What the file's signatures say."""
+        """Take the report on the file's signatures."""
         self._signature = report
         self._checks["signed"].looked += report.signatures
         for fault in report.faults:
             self.fail("signed", fault.text, fault.event, fault.time)
 
     def record(self, record: OwnRecord, arrived: int, captured: int) -> None:
-        """One of Lockstep's own; times in ns since 1970."""
+        """Check one of Lockstep's own records; times in ns since 1970."""
         micros = arrived // 1000
         if record.epoch != self._epoch:
             self.fail("monotonic", f"a record of epoch {record.epoch!r}", record.event, micros)
@@ -213,7 +213,7 @@ class Verifier:
         self._in_flight = command
 
     def _judge_nonce(self, command: CommandRecord, micros: int) -> None:
-        """Whoever drives has seen what the command answers."""
+        """Check that the driver has seen the feedback that the command answers."""
         known = None if self._newest is None else self._answered.get(self._newest.event)
         nonce = 0 if known is None else known.nonces.get(command.issue, 0)
         if nonce and command.nonce != nonce:
@@ -244,7 +244,7 @@ class Verifier:
         self._settle_stamps(feedback.event)
 
     def _begin(self, feedback: FeedbackRecord) -> None:
-        """The first of the file: what was before is not known."""
+        """Begin with the first feedback of the file: the past is not known."""
         self._answered = {feedback.event: _Answered({}, {}, {})}
         if feedback.issue == 1:
             self._first_times[feedback.event] = feedback.time
@@ -268,7 +268,7 @@ class Verifier:
         command, self._in_flight = self._in_flight, None
         if command is not None and command.event == event:
             self._judge_age(before, command, feedback, micros)
-        elif self._commands > 0 or self._events > 1:  # the very first may have been sent before the file began
+        elif self._commands > 0 or self._events > 1:  # the very first command may have been sent before the file began
             self.fail("once", f"event {event} was executed without a forwarded command", event, micros)
         self._answered = {
             before.event: self._answered.get(before.event, _Answered({}, {}, {})),
@@ -297,7 +297,7 @@ class Verifier:
             self.fail("stopped", "it answers a feedback that says stopped", command.event, micros)
 
     def medium(self, stream: str, stamp: int, arrived: int, captured: int) -> None:
-        """A picture or a sound of the robot's; times in ns since 1970."""
+        """Check a picture or a sound of the robot; times in ns since 1970."""
         self._media += 1
         self._checks["stamps"].looked += 1
         micros = arrived // 1000
@@ -332,7 +332,7 @@ class Verifier:
             before = self._rendered.get(key)
             self._rendered[key] = stream
             if before is None or "off" in (before.gate, stream.gate) or "age" in (before.gate, stream.gate):
-                continue  # what it rendered before is not known, or was not promised
+                continue  # its earlier rendering is not known, or was not promised
             self._checks["rendered"].looked += 1
             more = stream.violations - before.violations
             if more > 0:
@@ -340,7 +340,7 @@ class Verifier:
                 self.fail("rendered", text, record.event, micros)
 
     def verdict(self, ended: int) -> Verdict:
-        """After the last record, which arrived then (µs)."""
+        """Return the verdict, after the last record, which arrived at `ended` (µs)."""
         for stream, stamp, micros, _ in self._waiting:
             if ended - micros > 2_000_000:  # a picture may overtake its feedback, but not by that much
                 self.fail("stamps", f"{stream}: stamped with an event that never came", stamp, micros)

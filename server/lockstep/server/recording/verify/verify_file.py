@@ -17,7 +17,7 @@ __all__ = ["verify_file"]
 
 
 def verify_file(path: Path, key: str = "") -> Verdict:
-    """What a recording keeps of Lockstep's promises.
+    """Check a recording against Lockstep's promises.
 
     Args:
         key: public key that has to have signed it; "": any, or none
@@ -47,7 +47,7 @@ def verify_file(path: Path, key: str = "") -> Verdict:
 
 
 def _show_signatures(verifier: Verifier, path: Path, reader: RecordingReader, key: str) -> None:
-    """Show it what the signatures say."""
+    """Check the signatures, and show `verifier` the report."""
     checker = SignatureChecker(reader.info, None if reader.interrupted else reader.index, key)
     with open_regular(path) as file:
         file.seek(len(MAGIC))
@@ -63,7 +63,7 @@ def _show_signatures(verifier: Verifier, path: Path, reader: RecordingReader, ke
 def _show(verifier: Verifier, record: Record, robots: set[str]) -> None:
     stream = stream_of(record.topic)
     if stream:
-        if stream in robots:  # those of the console's own go by another clock
+        if stream in robots:  # the console's own streams go by another clock
             verifier.medium(stream, record.event, record.arrived, record.captured)
         return
     own = own_record_of(record.schema, record.data)
@@ -79,7 +79,7 @@ def _show(verifier: Verifier, record: Record, robots: set[str]) -> None:
 
 
 def _compare(verifier: Verifier, reader: RecordingReader, counts: dict[str, int]) -> None:
-    """The index was written with the file: what is missing since then shows."""
+    """Compare the counts with the index, which was written with the file and shows later losses."""
     for topic in sorted({*reader.index.counts, *counts}):
         said, found = reader.index.counts.get(topic, 0), counts.get(topic, 0)
         if said != found:

@@ -1,4 +1,4 @@
-"""Checks the signatures of a recording, by the order in which its bytes lie, and by no index. No I/O.
+"""Checks the signatures of a recording by the order of its bytes, without an index. No I/O.
 
 Show a `SignatureChecker` every raw record of the file, then ask for its `report`.
 """
@@ -29,13 +29,13 @@ NO_CHECKSUM = bytes(4)
 
 
 class SignatureFault(NamedTuple):
-    event: int  # that the fault comes behind
+    event: int  # event before the fault
     time: int  # µs since 1970
     text: str
 
 
 class SignatureReport(msgspec.Struct, kw_only=True):
-    """What the signatures say."""
+    """The result of the check of the signatures."""
 
     state: Literal["unsigned", "signed", "open", "broken"] = "unsigned"  # open: all is signed, but how it ended
     signer: str = ""  # public key
@@ -48,10 +48,10 @@ class SignatureReport(msgspec.Struct, kw_only=True):
 
 
 class SignatureChecker:
-    """`take` each raw record in the order of the file, then `report`.
+    """Checks the signatures of a file: `take` each raw record in the order of the file, then `report`.
 
     Args:
-        index: of the file, to be held against where its chunks are; None: it was interrupted and has none
+        index: of the file, to be compared with its chunks; None: it was interrupted and has none
         key: public key that has to have signed it; "": any
     """
 
@@ -66,10 +66,10 @@ class SignatureChecker:
         self._last: SignatureRecord | None = None
         self._chunks: list[int] = []  # offsets
         self._index_chunks: list[int] = []  # as the summary has them
-        # Of the chunks: times of the first and last message, as they say; None: it cannot be read.
+        # Times of the first and last message, as each chunk says; None: it cannot be read.
         self._spans: list[tuple[int, int] | None] = []
         self._index_spans: list[tuple[int, int]] = []  # as the summary has them
-        # Of the last chunk's messages, by channel, as far as no index has named them; None: it could not be read.
+        # Messages of the last chunk, by channel, that no index has named yet; None: it could not be read.
         self._positions: dict[int, list[tuple[int, int]]] | None = {}
         self._metadata = 0
         self._behind_data = False
@@ -165,7 +165,7 @@ class SignatureChecker:
         self._end_chunk(number)
 
     def _check_span(self, number: int) -> None:
-        """A reader that looks for a time passes over chunks that say they have none of it."""
+        """Check a chunk's stated times: a reader that looks for a time passes over chunks by them."""
         times = [time for found in (self._positions or {}).values() for time, _ in found]
         if times and self._spans[number] != (min(times), max(times)):
             self._fault(f"chunk {number} says that it is of another time than its messages are")
@@ -193,7 +193,7 @@ class SignatureChecker:
             self._fault(f"signature {found.number} is not one of {found.key or 'any key'}: it was changed or forged")
             return
         self._judge(chain.end_chunk(), found, last, message)
-        chain.head = found.head  # what follows is held against what was signed
+        chain.head = found.head  # the following records are checked against the signed head
         self._last = found
         self._report.signer = self._report.signer or found.key
         self._report.until_event, self._report.until_time = found.event, found.until // 1000
@@ -238,7 +238,7 @@ class SignatureChecker:
             report.faults.append(SignatureFault(max(1, report.until_event), report.until_time, text))
 
     def compare(self, records: EventIndex) -> None:
-        """`records`: the index that the records themselves give. Lists and timelines show the one in the file."""
+        """Compare the file's index, which lists and timelines show, with `records`, the one built from the records."""
         if self._index is None or not self._report.signatures:
             return
         for name in ("first_event", "last_event", "started", "ended", "marks"):
@@ -246,7 +246,7 @@ class SignatureChecker:
                 self._fault(f"the index has other {name.replace('_', ' ')} than the records")
 
     def report(self) -> SignatureReport:
-        """After the last record."""
+        """Return the report, after the last record."""
         report, last = self._report, self._last
         if not report.signatures:
             faults = [SignatureFault(1, 0, "it is not signed at all")] if self._key else []

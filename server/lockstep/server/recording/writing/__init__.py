@@ -1,1 +1,1 @@
-"""The session is written to disk by a thread."""
+"""Writes the session to disk on a thread."""

@@ -1,4 +1,4 @@
-"""What the console hands to the recording thread. The thread encodes it. Times in ns since 1970."""
+"""The items that the console hands to the recording thread, which encodes them. Times in ns since 1970."""
 
 from collections.abc import Iterator, Mapping
 from typing import NamedTuple
@@ -17,7 +17,7 @@ __all__ = ["FeedbackItem", "Item", "MediaItem", "OwnItem", "RobotItem", "entries
 
 
 class RobotItem(NamedTuple):
-    """The robot, or the state of its link. Another epoch than before begins another file."""
+    """The robot, or the state of its link. A new epoch begins a new file."""
 
     arrived: int
     record: RobotRecord
@@ -51,7 +51,7 @@ Item = RobotItem | FeedbackItem | MediaItem | OwnItem
 
 
 def entries_of(item: Item, description: RobotDescription) -> Iterator[Entry]:
-    """The records that `item` becomes."""
+    """Yield the records that `item` becomes."""
     match item:
         case MediaItem():
             yield _media(item)

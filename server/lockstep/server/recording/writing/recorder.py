@@ -1,4 +1,4 @@
-"""The recorder: listens to the session, and hands what it hears to the thread that writes. Lives on the loop."""
+"""The recorder: listens to the session on the loop, and hands everything to the thread that writes."""
 
 import asyncio
 import secrets
@@ -55,7 +55,7 @@ class _Now(TypedDict):
 
 
 class RecordedMedia(Protocol):
-    """What the recorder needs of the media plane."""
+    """The part of the media hub that the recorder uses."""
 
     def record(self, take: FrameTaker | None, keyframe_seconds: float) -> None: ...
     def record_keyframes(self) -> None: ...
@@ -63,16 +63,13 @@ class RecordedMedia(Protocol):
 
 
 class Recorder(SessionListener):
-    """Run `run` as a task. All else but `stop` is called on the loop and returns at once.
+    """Records the session. Run `run` as a task; everything but `stop` is called on the loop and returns at once.
 
     Args:
-        clock: which event holds
+        clock: the current event
         tell: tells everyone
         signing: signs recordings; None: they are not signed
-        audited: hears what nobody asked for: what was done, and to which recording
-
-    Attributes:
-        seats: role of a peer, by its id
+        audited: called for what nobody asked for, with the action and its recording
     """
 
     def __init__(
@@ -102,13 +99,13 @@ class Recorder(SessionListener):
         self._thread: RecordingThread | None = None
         self._since = 0.0
         self._failure = ""
-        self._again_at = 0.0  # s, monotonic: not before that by itself
+        self._again_at = 0.0  # s, monotonic: earliest automatic start
         self._loop: asyncio.AbstractEventLoop | None = None
         self._stopping = asyncio.Lock()
         self._ended = asyncio.Event()  # the thread ended by itself
 
     async def run(self) -> None:
-        """Until cancelled; the file is closed then."""
+        """Run until cancelled; the file is closed then."""
         self._loop = asyncio.get_running_loop()
         try:
             self._tell_pruned(await asyncio.to_thread(self._prepare))
@@ -133,7 +130,7 @@ class Recorder(SessionListener):
             await asyncio.shield(self.close())
 
     def _prepare(self) -> list[str]:
-        """What was deleted to make room."""
+        """Prepare the directory. Return the recordings that were deleted to make room."""
         try:
             self.shelf.prepare()
             self.shelf.recover()
@@ -143,7 +140,7 @@ class Recorder(SessionListener):
             return []
 
     def _prune(self) -> list[str]:
-        """As `_prepare`; it is tried again."""
+        """Return the recordings that were deleted to make room. A failure is tried again."""
         try:
             return self.shelf.prune()
         except OSError as error:
@@ -164,7 +161,7 @@ class Recorder(SessionListener):
     # starting and stopping
 
     def state(self) -> RecordingState:
-        """What everyone is told."""
+        """Return the state as everyone is told it."""
         thread = self._thread
         if thread is None:
             return RecordingState(state="failed" if self._failure else "off", detail=self._failure)
@@ -183,7 +180,7 @@ class Recorder(SessionListener):
 
     @property
     def automatic(self) -> bool:
-        """Whether it records without being asked; until somebody ends that."""
+        """True if it records without being asked, until somebody ends that."""
         return self._settings.automatic
 
     @property
@@ -232,11 +229,11 @@ class Recorder(SessionListener):
         return self.state()
 
     async def stop(self) -> RecordingState:
-        """End the recording; returns when the file is closed. Nothing when none is running.
+        """End the recording, if one is running; returns when the file is closed.
 
-        The state says so when the end of it could not be written.
+        The state says so when the end of the file could not be written.
         """
-        self._settings = self._settings.model_copy(update={"automatic": False})  # whoever stops it means it
+        self._settings = self._settings.model_copy(update={"automatic": False})  # ends automatic recording too
         if self._thread is None:
             self._failure = ""
         await self.close()
@@ -244,7 +241,7 @@ class Recorder(SessionListener):
         return self.state()
 
     async def close(self) -> None:
-        """Idempotent."""
+        """Close the file. Idempotent."""
         async with self._stopping:
             thread = self._thread
             if thread is not None:
@@ -362,7 +359,7 @@ class Recorder(SessionListener):
     def report(self, by: Actor, report: Report) -> None:
         self._put_own(ReportRecord(**self._now(), peer=by.peer, name=by.name, report=report))
 
-    # what becomes of it
+    # handing over to the thread
 
     def _take_frame(self, stream: str, codec: str, frame: EncodedFrame, *, attached: bool) -> None:
         now = time.monotonic()

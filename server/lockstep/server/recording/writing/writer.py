@@ -21,7 +21,7 @@ from lockstep.server.recording.reading.bookmarks import BookmarkFinder
 
 __all__ = ["Entry", "RecordingWriter"]
 
-CHUNK_SECONDS = 0.9  # with the rest of the way to the disk less than a second
+CHUNK_SECONDS = 0.9  # together with the rest of the way to the disk less than a second
 CHUNK_BYTES = 1_000_000
 NEVER = 1 << 62  # bytes; chunks end when this file says so
 LIBRARY = "lockstep"
@@ -36,18 +36,18 @@ class Entry(NamedTuple):
     captured: int  # ns since 1970
     data: bytes
     keyframe: bool = False  # of a picture
-    record: OwnRecord | None = None  # what `data` says, for the index; None for media and the like
+    record: OwnRecord | None = None  # `data` decoded, for the index; None for media and the like
 
 
 class RecordingWriter:
-    """`write` and `flush_if_due` in turn, `close` at the end.
+    """Writes one file: `write` and `flush_if_due` in turn, `close` at the end.
 
     Args:
-        signing: signs each chunk; None: nothing does
+        signing: signs each chunk; None: chunks are not signed
         previous: head of the part before
 
     Raises:
-        DiskTrouble: from all of them. What was flushed before stays whole; `abandon` then.
+        DiskTrouble: by all of them. Flushed chunks stay whole; call `abandon` then.
     """
 
     def __init__(
@@ -73,7 +73,7 @@ class RecordingWriter:
         self._chunk_since: int | None = None  # ns, arrival of its first record
         try:
             self._file: BinaryIO = path.open("xb")
-            fcntl.flock(self._file, fcntl.LOCK_EX)  # being written; one who lists files lets go of it at once
+            fcntl.flock(self._file, fcntl.LOCK_EX)  # held while writing; a list of files takes it only for a moment
         except OSError as error:
             raise DiskTrouble(_reason(error)) from error
         self._writer = Writer(self._file, chunk_size=NEVER, compression=CompressionType.ZSTD)
@@ -100,7 +100,7 @@ class RecordingWriter:
 
     @property
     def head(self) -> str:
-        """Of the signed chain, as far as it is signed; "" without one."""
+        """The head of the chain, as far as it is signed; "" without signatures."""
         return "" if self._signatures is None else self._signatures.head
 
     @property
@@ -112,15 +112,15 @@ class RecordingWriter:
         return self._builder.index.lost
 
     def count_lost(self, count: int) -> None:
-        """So many records were left out."""
+        """Count records that were left out."""
         self._builder.index.lost += count
 
     def index(self) -> EventIndex:
-        """Of what is in the file now; a copy."""
+        """Return a copy of the index of the chunks in the file."""
         return self._builder.written()
 
     def write(self, entry: Entry) -> None:
-        """Put it into the chunk. A topic that the file does not have is left out, and counted as lost."""
+        """Put an entry into the chunk. An entry of a topic that the file lacks is left out, and counted as lost."""
         channel = self._channels.get(entry.topic)
         if channel is None:
             self.count_lost(1)
@@ -142,7 +142,7 @@ class RecordingWriter:
             self.flush()
 
     def flush_if_due(self, now: int) -> bool:
-        """Put the chunk on the disk when its first record is old enough; `now` in ns as arrivals. Whether it did."""
+        """Put the chunk on the disk, and return True, if its first record is old enough; `now`: ns, as arrivals."""
         if self._chunk_since is None or now - self._chunk_since < CHUNK_SECONDS * 1e9:
             return False
         self.flush()
@@ -163,7 +163,7 @@ class RecordingWriter:
         self._waiting, self._chunk_since = 0, None
 
     def _sign(self, signatures: Signatures, *, final: bool) -> None:
-        """The chunk's last message."""
+        """Write the chunk's last message, its signature."""
         record = signatures.sign(final=final)
         data = msgspec.json.encode(record)
         channel = self._channels[SIGNATURE]
@@ -176,7 +176,7 @@ class RecordingWriter:
         self._whole = self._file.tell()
 
     def close(self) -> EventIndex:
-        """Write what waits, the index and the summary. Idempotent."""
+        """Write the last chunk, the index and the summary. Idempotent."""
         if self._file.closed:
             return self._builder.index
         self.flush(final=True)
@@ -193,12 +193,12 @@ class RecordingWriter:
         return index
 
     def abandon(self) -> None:
-        """The disk took no more: cut off what is no whole record. `recover` can complete the rest. Raises nothing.
+        """Cut a file for which the disk has no room back to its whole records. Raises nothing.
 
-        A file that has none goes.
+        `recover` can complete the rest. A file without whole records is deleted.
         """
         with suppress(OSError):
-            self._file.close()  # what Python still had buffered may not fit
+            self._file.close()  # Python's buffered bytes may not fit
         with suppress(OSError):
             if self._whole:
                 os.truncate(self.path, self._whole)  # else readers stop at the broken record

@@ -27,17 +27,17 @@ log = structlog.get_logger(__name__)
 
 MAX_WAITING = 4096  # items, 15 s and more
 DRAIN_SECONDS = 0.05  # between two looks at the queue: nobody is woken for each item
-REMEMBERED = (SeatRecord, ParticipantsRecord)  # what every part begins with, besides robot and feedback
+REMEMBERED = (SeatRecord, ParticipantsRecord)  # every part begins with these, besides robot and feedback
 
 
 class RecordingThread:
-    """`put` from the loop at any rate; `close` from another thread, which waits for the end.
+    """Writes a recording. `put` from the loop at any rate; `close` from another thread, which waits for the end.
 
     Args:
         now: ns since 1970 on the recording's clock
         on_part: called from the thread when a file has begun
         on_end: called from the thread when it ends by itself
-        signing: signs what is written; None: nothing does
+        signing: signs the files; None: they are not signed
 
     Attributes:
         failure: why it ended by itself; "" while it runs, or when it was closed
@@ -61,9 +61,9 @@ class RecordingThread:
         self._on_part = on_part
         self._on_end = on_end
         self._signing = signing
-        self._head = ""  # of the signed chain of the part before
+        self._head = ""  # of the previous part's signed chain
         self._waiting: deque[Item] = deque()
-        self._lost = 0  # not told to the file yet; the loop adds, the thread takes
+        self._lost = 0  # not in the file yet; the loop adds, the thread takes
         self._lost_ever = 0
         self._closing = threading.Event()
         self._robot: RobotItem | None = None
@@ -71,7 +71,7 @@ class RecordingThread:
         self._feedback: FeedbackItem | None = None
         self._writer: RecordingWriter | None = None
         self._part = 0
-        self._newest = 0  # ns, arrival of what was taken last
+        self._newest = 0  # ns, arrival of the item taken last
         self._bytes_before = 0  # of earlier parts
         self._thread = threading.Thread(target=self._run, name="recording", daemon=True)
 
@@ -79,7 +79,7 @@ class RecordingThread:
         self._thread.start()
 
     def put(self, item: Item) -> None:
-        """Never blocks. When the disk is too slow the newest is left out, and counted."""
+        """Queue an item without blocking. When the disk is too slow, it is left out and counted."""
         if len(self._waiting) >= MAX_WAITING:
             self._lost += 1
             self._lost_ever += 1
@@ -87,7 +87,7 @@ class RecordingThread:
             self._waiting.append(item)
 
     def close(self) -> None:
-        """Write what waits, and end. Blocks; idempotent."""
+        """Write the waiting items, and end. Blocks; idempotent."""
         self._closing.set()
         if self._thread.ident is not None:
             self._thread.join()
@@ -98,7 +98,7 @@ class RecordingThread:
 
     @property
     def lost(self) -> int:
-        """Records that were left out."""
+        """The number of records that were left out."""
         return self._lost_ever
 
     @property
@@ -108,12 +108,12 @@ class RecordingThread:
 
     @property
     def path(self) -> Path | None:
-        """Of the file that is being written."""
+        """The path of the file that is being written, or None."""
         writer = self._writer
         return None if writer is None else writer.path
 
     def index(self) -> EventIndex | None:
-        """Of the file that is being written, as far as it is on the disk."""
+        """Return the index of the file that is being written, as far as it is on the disk."""
         writer = self._writer
         return None if writer is None else writer.index()
 
@@ -142,7 +142,7 @@ class RecordingThread:
             self._look_at_disk()
 
     def _take(self, item: Item) -> None:
-        """Records of another epoch than the file's belong into none."""
+        """Write an item. Records of another epoch than the file's belong into no file."""
         self._newest = max(self._newest, item.arrived)
         match item:
             case RobotItem():
@@ -175,8 +175,8 @@ class RecordingThread:
         self._begin_part(item)
 
     def _begin_part(self, robot: RobotItem) -> None:
-        """The file begins with what holds now."""
-        self._look_at_disk()  # else what records by itself, and tries again and again, fills the disk with beginnings
+        """Begin a file with the present state."""
+        self._look_at_disk()  # else automatic recording, which tries again and again, fills the disk with beginnings
         self._part += 1
         info = msgspec.structs.replace(
             self.info, part=self._part, epoch=robot.record.epoch, robot=robot.record.description.label
@@ -214,7 +214,7 @@ class RecordingThread:
         writer = self._writer
         if writer is not None:
             writer.close()
-            self._writer = None  # not before: what fails here is cut to what is whole
+            self._writer = None  # not before: `_fail` cuts a file that fails here to its whole records
             self._bytes_before += writer.bytes_written
             self._head = writer.head
 
@@ -232,7 +232,7 @@ class RecordingThread:
             raise DiskTrouble(f"only {free / 1e6:.0f} MB are free on the disk")
 
     def _fail(self, reason: str) -> None:
-        """What was written stays: closed if there is room for that, else cut to what is whole."""
+        """End after a failure. The file is closed if there is room for that, else cut to its whole records."""
         self.failure = reason
         log.error("the recording ended", reason=reason)
         writer, self._writer = self._writer, None

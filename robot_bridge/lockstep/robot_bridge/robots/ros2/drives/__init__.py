@@ -1,1 +1,1 @@
-"""Commands as ROS 2 messages."""
+"""Sends commands as ROS 2 messages."""

@@ -1,4 +1,4 @@
-"""An arm: joint positions out, ahead of the arm by a short horizon; joint states in."""
+"""Drives an arm: publishes joint positions, ahead of the arm by a short horizon, and reads joint states."""
 
 from typing import Any
 
@@ -15,9 +15,9 @@ __all__ = ["ArmDrive"]
 
 
 class ArmDrive(Drive):
-    """One axis per joint: its velocity.
+    """An arm with one axis per joint, the joint's velocity.
 
-    The last message of a motion names the setpoint itself with nothing ahead of it: the arm stays there.
+    The last message of a motion is the setpoint itself, not ahead by the horizon: the arm stays there.
     """
 
     def __init__(self, ros: RosSide, settings: Arm, tick_seconds: float) -> None:
@@ -56,7 +56,7 @@ class ArmDrive(Drive):
     def sense(self, now: float) -> Sensed:
         known = self._book.fresh(self._timeout, now)
         velocities = [joint.velocity for joint in known]
-        still = all(abs(velocity) <= self._still for velocity in velocities)  # not when one is NaN
+        still = all(abs(velocity) <= self._still for velocity in velocities)  # False if one is NaN
         return Sensed(velocities, [joint.position for joint in known], still)
 
     def joints(self, now: float) -> list[float]:
@@ -70,7 +70,7 @@ class ArmDrive(Drive):
         return found
 
     def _trajectory(self, said: Said, values: list[float]) -> Any:
-        """Positions alone: controllers refuse a trajectory that ends with a velocity."""
+        """Return a trajectory of positions alone: controllers refuse one that ends with a velocity."""
         message = self._kind()
         message.joint_names = self._names
         point = self._ros.message("trajectory_msgs", "JointTrajectoryPoint")()

@@ -1,4 +1,4 @@
-"""A mobile base: twists out, odometry in."""
+"""Drives a mobile base: publishes twists and reads odometry."""
 
 import math
 from typing import Any, NamedTuple
@@ -24,7 +24,11 @@ class BaseState(NamedTuple):
 
 
 def base_state(odometry: Any) -> BaseState:
-    """From nav_msgs/Odometry. Raises ValueError when a number is missing or the orientation is not a quaternion."""
+    """Return the state from nav_msgs/Odometry.
+
+    Raises:
+        ValueError: a number is missing or the orientation is not a quaternion.
+    """
     position, turn = odometry.pose.pose.position, odometry.pose.pose.orientation
     speed, spin = odometry.twist.twist.linear, odometry.twist.twist.angular
     length = turn.w * turn.w + turn.x * turn.x + turn.y * turn.y + turn.z * turn.z
@@ -40,7 +44,7 @@ def base_state(odometry: Any) -> BaseState:
 
 
 class BaseDrive(Drive):
-    """Axes forward, left and turn, as far as the base has them; joints x, y and yaw of the odometry."""
+    """A mobile base: axes forward, left and turn, as far as the base has them; joints x, y and yaw of the odometry."""
 
     def __init__(self, ros: RosSide, settings: Base, tick_seconds: float) -> None:
         command = settings.command

@@ -1,4 +1,4 @@
-"""When values go out to a command topic. No I/O, no clock.
+"""Decides when values are published to a command topic. No I/O, no clock.
 
 While the values move the robot they are repeated at a fixed rate, so that a base with its own timeout keeps going; the
 bridge's `hold` bounds how long. When they come to rest, for any reason, exactly one zero is published. Then the topic
@@ -25,7 +25,7 @@ class Step(NamedTuple):
 
 
 class CommandStream:
-    """Call `step` once a tick."""
+    """The messages of one command topic. Call `step` once a tick."""
 
     def __init__(self, rate: float, rest_values: Sequence[float], tick_seconds: float) -> None:
         self._interval = 1.0 / rate - tick_seconds / 2  # to the nearest tick
@@ -35,11 +35,11 @@ class CommandStream:
 
     @property
     def withheld(self) -> bool:
-        """Whether values are kept from the robot because its side was lost."""
+        """True if values are kept from the robot because its side was lost."""
         return self._withheld
 
     def step(self, values: Sequence[float], lost: bool, now: float) -> Step:
-        """`lost`: the robot cannot be seen or does not listen."""
+        """Return the step of this tick. `lost`: the robot cannot be seen or does not listen."""
         at_rest = list(values) == self._rest
         self._withheld = lost or (self._withheld and not at_rest)
         if at_rest or self._withheld:
@@ -52,6 +52,6 @@ class CommandStream:
         return Step(Said.VALUES, list(values))
 
     def end(self) -> bool:
-        """The bridge closes: whether a zero is still owed."""
+        """End the stream because the bridge closes. True if a zero is still owed."""
         owed, self._last = self._last is not None, None
         return owed

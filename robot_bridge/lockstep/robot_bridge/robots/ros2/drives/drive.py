@@ -1,4 +1,4 @@
-"""What the parts of a ROS 2 robot that take commands have in common."""
+"""The common base of the parts of a ROS 2 robot that take commands."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
@@ -10,11 +10,11 @@ from lockstep.robot_bridge.robots.ros2.ros_side import RosSide
 
 __all__ = ["Drive", "Sensed"]
 
-LOOK_INTERVAL = 0.2  # s between looks at who listens
+LOOK_INTERVAL = 0.2  # s between looks for subscribers
 
 
 class Sensed(NamedTuple):
-    """State of one part, NaN where it is not known."""
+    """State of one part; NaN for values that are not known."""
 
     axes: list[float]
     joints: list[float]
@@ -22,28 +22,28 @@ class Sensed(NamedTuple):
 
 
 class Drive(ABC):
-    """One command topic and the topic that says what became of the commands."""
+    """One command topic, and the topic that reports the state that the commands lead to."""
 
     def __init__(self, ros: RosSide, kind: Any, topic: str, rate: float, size: int, tick_seconds: float) -> None:
-        """`size`: how many axes."""
+        """`size`: number of axes."""
         self.size = size
         self._ros = ros
         self._kind = kind
         self._topic = topic
         self._publisher = ros.publisher(kind, topic)
         self._stream = CommandStream(rate, [0.0] * size, tick_seconds)
-        self._owes_zero = False  # the last word that got out was not zero
+        self._owes_zero = False  # the last published message was not zero
         self._stopped = False
-        self._heard = False  # whether a node listens
-        self._looked = float("-inf")  # s, when that was looked up
+        self._heard = False  # a node listens
+        self._looked = float("-inf")  # s, time of that look
 
     @property
     def full_topic(self) -> str:
-        """That commands go to, with namespace and node resolved."""
+        """The name of the command topic, with namespace and node resolved."""
         return str(self._publisher.topic_name)
 
     def step(self, values: Sequence[float], dt: float) -> None:
-        """One tick with these values."""
+        """Run one tick with these values."""
         now = clock.now()
         if now - self._looked >= LOOK_INTERVAL:
             self._heard, self._looked = self._publisher.get_subscription_count() > 0, now
@@ -52,18 +52,18 @@ class Drive(ABC):
         self._say(step.said, step.values, dt)
 
     def end(self) -> None:
-        """The bridge closes: say zero if the last word was another."""
+        """Publish zero if the last message was another, because the bridge closes."""
         self._stream.end()
         if self._owes_zero:
             self._say(Said.ZERO, [0.0] * self.size, 0.0)
 
     def rest_from_thread(self) -> None:
-        """Say zero if the last word was another; the bridge's own tick may hang anywhere in `step`."""
+        """Publish zero if the last message was another; the bridge's own tick may hang anywhere in `step`."""
         if self._owes_zero:
             self._publisher.publish(self.advance(Said.ZERO, [0.0] * self.size, 0.0))
 
     def stop(self) -> None:
-        """Say zero if the last word was another, and no moving values until `reset`."""
+        """Publish zero if the last message was another, and no moving values until `reset`."""
         self._stopped = True
         self.end()
 
@@ -78,7 +78,7 @@ class Drive(ABC):
             self._owes_zero = said is not Said.ZERO
 
     def faults(self, now: float) -> list[str]:
-        """What keeps this part from being driven, for a person."""
+        """Return the faults that keep this part from being driven, in words for a person."""
         found = self.sensor_faults(now)
         if not self._heard:
             found.append(f"{self._topic}: no subscriber for {self._kind.__name__}")
@@ -88,20 +88,20 @@ class Drive(ABC):
 
     @abstractmethod
     def seen(self, now: float) -> bool:
-        """Whether the state is known well enough to move."""
+        """Return whether the state is known well enough to move."""
 
     @abstractmethod
     def advance(self, said: Said, values: list[float], dt: float) -> Any:
-        """The message to publish; None for nothing. Called in every tick."""
+        """Return the message to publish; None for nothing. Called in every tick."""
 
     @abstractmethod
     def sense(self, now: float) -> Sensed:
-        """The state now."""
+        """Return the state now."""
 
     @abstractmethod
     def joints(self, now: float) -> list[float]:
-        """The joints' part of it, for limits: cheap."""
+        """Return the positions of the joints now, for limits; cheap."""
 
     @abstractmethod
     def sensor_faults(self, now: float) -> list[str]:
-        """What is wrong with the state's topic."""
+        """Return the faults of the state's topic."""

@@ -1,4 +1,4 @@
-"""What is known of each joint, from JointState messages that may each name only some of them. No I/O, no clock."""
+"""Remembers each joint's state from JointState messages that may each name only some joints. No I/O, no clock."""
 
 import math
 from collections.abc import Sequence
@@ -25,12 +25,12 @@ class JointStateMessage(Protocol):
 class JointKnown(NamedTuple):
     position: float = math.nan
     velocity: float = math.nan
-    time: float = -math.inf  # s, monotonic, suspended time included; of its arrival
+    time: float = -math.inf  # s of its arrival, monotonic, suspended time included
     header: int = 0  # ns of its stamp
 
 
 class JointCache:
-    """Written by one thread, read by another: the tuple of joints is replaced as a whole."""
+    """The last known state of each joint. One thread writes it, another reads it: the tuple is replaced as a whole."""
 
     def __init__(self, names: Sequence[str]) -> None:
         self._index = {name: number for number, name in enumerate(names)}
@@ -38,7 +38,7 @@ class JointCache:
         self._joints = (JointKnown(),) * len(names)
 
     def take(self, message: JointStateMessage, header: int, now: float) -> None:
-        """Other joints are passed over, and so are repeated positions.
+        """Take in a message; joints with other names and repeated positions are passed over.
 
         Raises:
             BadJointState: the message contradicts itself.
@@ -60,15 +60,15 @@ class JointCache:
         self._joints = tuple(joints)
 
     def fresh(self, timeout: float, now: float) -> list[JointKnown]:
-        """Every joint; all of it NaN where it is older than `timeout`."""
+        """Return the state of every joint; NaN for a joint whose state is older than `timeout`."""
         return [joint if now - joint.time <= timeout else JointKnown() for joint in self._joints]
 
     def missing(self, timeout: float, now: float) -> list[str]:
-        """Names of those that are older than that."""
+        """Return the names of the joints whose state is older than `timeout`."""
         return [name for name, joint in zip(self._names, self._joints, strict=True) if not now - joint.time <= timeout]
 
 
 def _difference(before: JointKnown, position: float, header: int, now: float) -> float:
-    """Velocity where the message has none: of the way since the last one."""
+    """Return a joint's velocity from its last two positions, for a message without velocities."""
     span = (header - before.header) / 1e9 if header and before.header else now - before.time
     return (position - before.position) / span if 1e-4 < span < 1.0 else math.nan

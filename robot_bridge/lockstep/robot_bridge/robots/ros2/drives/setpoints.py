@@ -1,4 +1,4 @@
-"""From joint velocities to joint positions, which is what arms take. No I/O, no clock."""
+"""Integrates joint velocities into the joint positions that arms take. No I/O, no clock."""
 
 import math
 from collections.abc import Sequence
@@ -7,10 +7,10 @@ __all__ = ["Setpoints"]
 
 
 class Setpoints:
-    """Call `begin` when motion begins, then `advance` once a tick.
+    """The setpoints of an arm. Call `begin` when motion begins, then `advance` once a tick.
 
-    A setpoint never runs further ahead of its joint than `leads`, so that an arm that is blocked does not leap when
-    it comes free.
+    A setpoint never runs further ahead of its joint than `leads`, so that a blocked arm does not leap when it comes
+    free.
     """
 
     def __init__(self, leads: Sequence[float]) -> None:
@@ -20,22 +20,22 @@ class Setpoints:
 
     @property
     def points(self) -> list[float]:
-        """Where the joints are wanted; empty before the first motion."""
+        """The wanted joint positions; empty before the first motion."""
         return list(self._points)
 
     def begin(self, measured: Sequence[float]) -> None:
-        """Motion begins where the arm is."""
+        """Begin a motion at the measured positions."""
         self._points = list(measured)
 
     def advance(self, velocities: Sequence[float], measured: Sequence[float], dt: float) -> None:
-        """Let a tick pass. A measured position that is not known (NaN) leaves its setpoint where it is."""
+        """Let a tick pass. An unknown measured position (NaN) leaves its setpoint where it is."""
         self._points = [
             _near(point + velocity * dt, position, lead) if math.isfinite(position) else point
             for point, velocity, position, lead in zip(self._points, velocities, measured, self._leads, strict=True)
         ]
 
     def ahead(self, velocities: Sequence[float], horizon: float) -> list[float]:
-        """Where the joints are wanted `horizon` seconds from now."""
+        """Return the wanted joint positions `horizon` seconds from now."""
         return [point + velocity * horizon for point, velocity in zip(self._points, velocities, strict=True)]
 
 

@@ -1,4 +1,4 @@
-"""The command messages of a base."""
+"""Makes the command messages of a base."""
 
 from typing import Any
 
@@ -22,7 +22,7 @@ class TwistMaker:
         self._frame = command.frame
 
     def make(self, vx: float, vy: float, wz: float) -> Any:
-        """m/s and rad/s, in the base's own frame."""
+        """Return a message with these velocities, m/s and rad/s, in the base's own frame."""
         message = self.kind()
         twist = message
         if self._stamped:

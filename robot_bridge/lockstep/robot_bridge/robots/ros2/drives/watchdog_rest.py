@@ -1,5 +1,6 @@
-"""Publishes zero to a ROS 2 base from the watchdog's process: by its own node, also when the bridge was killed. An arm
-gets no zero: it gets positions, and stays at the last one (docs/ros2.md).
+"""Publishes zero to a ROS 2 base from the watchdog's process, by a separate node, also when the bridge was killed.
+
+An arm gets no zero: it gets positions, and stays at the last one (docs/ros2.md).
 """
 
 import msgspec
@@ -17,7 +18,7 @@ _read_settings = msgspec.json.Decoder(Ros2Settings)
 
 
 def rest_arguments(settings: Ros2Settings, base: Base, topic: str) -> tuple[str, ...]:
-    """What `prepare` takes. `topic`: the full name, since the process has a node of another name."""
+    """Return the arguments of `prepare`. `topic`: the full name, since the process has a node of another name."""
     command = msgspec.structs.replace(base.command, topic=topic)
     own = Ros2Settings(
         name=settings.name,
@@ -30,7 +31,9 @@ def rest_arguments(settings: Ros2Settings, base: Base, topic: str) -> tuple[str,
 
 
 def prepare(encoded: str) -> Act:
-    """The publisher is made now: those who listen need time to find it.
+    """Return the function that publishes zero.
+
+    The publisher is made now, because subscribers need time to find it.
 
     Raises:
         RobotUnavailable: ROS 2 does not start.
@@ -43,7 +46,7 @@ def prepare(encoded: str) -> Act:
     publisher = ros.publisher(twists.kind, settings.base.command.topic)
 
     def rest() -> bool:
-        is_heard: bool = publisher.get_subscription_count() > 0  # of those that have found this publisher, and it them
+        is_heard: bool = publisher.get_subscription_count() > 0  # subscribers and this publisher have found each other
         publisher.publish(twists.make(0.0, 0.0, 0.0))
         ros.flush()
         return is_heard

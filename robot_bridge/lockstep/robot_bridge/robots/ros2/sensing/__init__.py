@@ -1,1 +1,1 @@
-"""ROS 2 messages as feedback and pictures."""
+"""Reads ROS 2 messages as feedback and pictures."""

@@ -28,7 +28,7 @@ class _Shot(NamedTuple):
 
 
 class CameraSource(MediaSource):
-    """Messages come in the node's thread; the newest waits; conversion has a thread of its own."""
+    """Receives messages in the node's thread, keeps the newest, and converts it in another thread."""
 
     def __init__(self, ros: RosSide, settings: CameraTopic) -> None:
         self._ros = ros
@@ -79,7 +79,7 @@ class CameraSource(MediaSource):
             self._loop = None
 
     def _take(self, message: Any) -> None:
-        """In the node's thread: the two clocks are read as close to each other as can be."""
+        """Receive a message in the node's thread; the two clocks are read as close to each other as possible."""
         settings, monotonic, now_ros = self._settings, time.monotonic(), self._ros.now_ns()
         now = clock.now()
         header = header_ns(message.header)

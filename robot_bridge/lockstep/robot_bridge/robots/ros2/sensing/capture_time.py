@@ -1,6 +1,6 @@
-"""When a picture that has just arrived was captured, on the bridge's own clock. No I/O, no clock.
+"""Computes the time of capture of a picture that has just arrived, on the bridge's own clock. No I/O, no clock.
 
-The answer may be too early, never too late: a picture that is stamped too late would pass for newer than it is.
+The result may be too early, never too late: a picture that is stamped too late would pass for newer than it is.
 """
 
 from typing import Literal
@@ -11,13 +11,15 @@ OLDEST = 10.0  # s; a picture that seems older has another clock
 
 
 class ClockMismatch(ValueError):
-    """A header stamp that this machine's clock cannot have given; the text names it, to be counted by."""
+    """A header stamp that this machine's clock cannot have given; the text names the fault, for counting."""
 
 
 def captured_at(
     source: Literal["header", "arrival"], *, arrived: float, arrived_ros: int, header: int, latency: float
 ) -> float:
-    """`arrived` (s, monotonic) and `arrived_ros` (ns, the ROS clock) are the same instant.
+    """Return the time of capture, s.
+
+    `arrived` (s, monotonic) and `arrived_ros` (ns, the ROS clock) are the same instant.
 
     Raises:
         ClockMismatch: the header's stamp is missing, in the future or far in the past.

@@ -1,4 +1,4 @@
-"""The size of a JPEG picture, from its header alone (ITU-T T.81, annex B)."""
+"""Reads the size of a JPEG picture from its header alone (ITU-T T.81, annex B)."""
 
 __all__ = ["jpeg_size"]
 
@@ -8,7 +8,7 @@ ALONE = {0x01, *range(0xD0, 0xD8)}  # TEM and RSTn have no length
 
 
 def jpeg_size(data: bytes) -> tuple[int, int] | None:
-    """Width and height; None when it is no JPEG."""
+    """Return width and height; None if `data` is not a JPEG."""
     if not data.startswith(START_OF_IMAGE):
         return None
     at = 2

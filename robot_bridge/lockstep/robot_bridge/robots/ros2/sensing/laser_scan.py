@@ -1,4 +1,4 @@
-"""From a sensor_msgs/LaserScan to the few rays that a console draws. No I/O."""
+"""Reduces a sensor_msgs/LaserScan to the few rays that a console draws. No I/O."""
 
 import math
 from collections.abc import Sequence
@@ -32,18 +32,20 @@ class Scan(Protocol):
 
 
 class Sectors:
-    """`count` sectors all around, the first centred on -pi; each shows the nearest thing within it."""
+    """`count` sectors all around, the first centred on -pi; each shows the nearest distance within it."""
 
     def __init__(self, count: int, range_min: float, range_max: float, yaw: float = 0.0) -> None:
-        """`yaw`: of the scanner's frame in the body's, rad."""
+        """`yaw`: rad, of the scanner's frame in the body's."""
         self._count = count
         self._range_min = range_min
         self._range_max = range_max
         self._yaw = yaw
 
     def gather(self, scan: Scan) -> list[float]:
-        """Raises:
-        BadScan: the scan contradicts itself.
+        """Return the distance of each sector, m.
+
+        Raises:
+            BadScan: the scan contradicts itself.
         """
         ranges: npt.NDArray[np.float64] = np.asarray(scan.ranges, np.float64)
         if not 0 < ranges.size <= MAX_RAYS:

@@ -1,4 +1,4 @@
-"""The newest message of a topic, and whether it is still of now. No I/O, no clock."""
+"""Keeps the newest message of a topic, and tells whether it is recent. No I/O, no clock."""
 
 from collections import Counter
 from dataclasses import dataclass
@@ -7,7 +7,7 @@ from typing import Generic, TypeVar
 __all__ = ["Arrived", "Newest"]
 
 Value = TypeVar("Value")
-BAD_SHOWN = 3.0  # s that a bad message is a fault after the last of them
+BAD_SHOWN = 3.0  # s for which a fault is shown after the last bad message
 
 
 @dataclass(frozen=True)
@@ -18,7 +18,7 @@ class Arrived(Generic[Value]):
 
 
 class Newest(Generic[Value]):
-    """Written by the thread that takes messages in, read by the bridge's loop: one reference changes at a time.
+    """The newest message. One thread writes it, the bridge's loop reads it: one reference changes at a time.
 
     A message that repeats its predecessor's header stamp brings nothing new: a driver that hangs may go on sending.
     """
@@ -28,10 +28,10 @@ class Newest(Generic[Value]):
         self.timeout = timeout
         self.bad: Counter[str] = Counter()  # by fault
         self._last: Arrived[Value] | None = None
-        self._bad: tuple[str, float] | None = None  # the last bad one: its fault, and its time
+        self._bad: tuple[str, float] | None = None  # fault and time of the last bad message
 
     def put(self, value: Value, now: float, header: int = 0) -> bool:
-        """False when it only repeats the last one."""
+        """Keep a message. False if it only repeats the last one."""
         last = self._last
         if last is not None and header != 0 and header == last.header:
             return False
@@ -39,21 +39,21 @@ class Newest(Generic[Value]):
         return True
 
     def refuse(self, what: str, now: float) -> None:
-        """A message that cannot be used."""
+        """Count a message that cannot be used."""
         self.bad[what] += 1
         self._bad = (what, now)
 
     def last(self) -> Arrived[Value] | None:
-        """However old it is; None before the first."""
+        """Return the newest message, however old it is; None before the first."""
         return self._last
 
     def fresh(self, now: float) -> Arrived[Value] | None:
-        """The newest one; None when it is too old to be taken for the present."""
+        """Return the newest message; None if it is too old to be taken for the present."""
         last = self._last
         return last if last is not None and now - last.time <= self.timeout else None
 
     def faults(self, now: float) -> list[str]:
-        """What is wrong with this topic, for a person."""
+        """Return the faults of this topic, in words for a person."""
         found = []
         last, bad = self._last, self._bad
         if last is None:

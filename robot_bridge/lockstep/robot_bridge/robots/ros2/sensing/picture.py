@@ -1,4 +1,4 @@
-"""From sensor_msgs/Image and CompressedImage to what travels on the robot link. No I/O."""
+"""Converts sensor_msgs/Image and CompressedImage into pictures for the robot link. No I/O."""
 
 from typing import TYPE_CHECKING, Final, Literal, NamedTuple, Protocol
 
@@ -14,7 +14,7 @@ __all__ = ["BadPicture", "CompressedMessage", "ImageMessage", "Payload", "from_c
 
 Pixels = npt.NDArray[np.uint8]
 
-# Encoding -> bytes per pixel, and where red, green and blue are (sensor_msgs/image_encodings.hpp).
+# Encoding -> bytes per pixel, and the places of red, green and blue (sensor_msgs/image_encodings.hpp).
 _COLOUR: Final = {
     "rgb8": (3, (0, 1, 2)),
     "bgr8": (3, (2, 1, 0)),
@@ -23,7 +23,7 @@ _COLOUR: Final = {
     "8UC3": (3, (2, 1, 0)),
 }
 _GREY: Final = ("mono8", "8UC1")
-# Encoding -> where in four bytes of two pixels the first Y, U and V are.
+# Encoding -> the places of the first Y, U and V in the four bytes of two pixels.
 _YUV422: Final = {
     "yuv422": (1, 0, 2),
     "uyvy": (1, 0, 2),
@@ -66,10 +66,10 @@ class Payload(NamedTuple):
 
 
 def from_image(image: ImageMessage, width: int, height: int) -> Payload:
-    """As planes Y, U, V in limited range.
+    """Convert a picture into planes Y, U, V in limited range.
 
     Raises:
-        BadPicture: another size than `width` x `height`, an encoding that is not supported, or too few bytes.
+        BadPicture: the size is not `width` x `height`, the encoding is not supported, or bytes are missing.
     """
     if (image.width, image.height) != (width, height):
         raise BadPicture(f"picture of another size than {width}x{height}")
@@ -85,10 +85,10 @@ def from_image(image: ImageMessage, width: int, height: int) -> Payload:
 
 
 def from_compressed(image: CompressedMessage, width: int, height: int) -> Payload:
-    """A JPEG as it is.
+    """Return a JPEG unchanged.
 
     Raises:
-        BadPicture: no JPEG, or of another size than `width` x `height`.
+        BadPicture: not a JPEG, or its size is not `width` x `height`.
     """
     data = bytes(image.data)
     size = jpeg_size(data)
@@ -100,7 +100,7 @@ def from_compressed(image: CompressedMessage, width: int, height: int) -> Payloa
 
 
 def _rows(image: ImageMessage, depth: int) -> Pixels:
-    """The pixels without what pads the rows: height x width x depth."""
+    """Return the pixels without the padding of the rows: height x width x depth."""
     step, data = image.step, memoryview(image.data)
     if step < image.width * depth or data.nbytes < step * image.height:
         raise BadPicture("picture with too few bytes")
@@ -109,7 +109,7 @@ def _rows(image: ImageMessage, depth: int) -> Pixels:
 
 
 def _from_rgb(pixels: Pixels, order: tuple[int, int, int]) -> bytes:
-    """BT.601 in integers; chroma is the mean of four pixels."""
+    """Convert by BT.601 in integers; chroma is the mean of four pixels."""
     red, green, blue = (pixels[:, :, channel].astype(np.uint16) for channel in order)
     luma = ((66 * red + 129 * green + 25 * blue + 128) >> 8) + 16
     r, g, b = (_quartered(channel).astype(np.int32) for channel in (red, green, blue))  # four times the mean
@@ -119,7 +119,7 @@ def _from_rgb(pixels: Pixels, order: tuple[int, int, int]) -> bytes:
 
 
 def _quartered(channel: npt.NDArray[np.uint16]) -> npt.NDArray[np.uint16]:
-    """Sums of two by two pixels; beyond an odd side the last pixel stands twice."""
+    """Return sums of two by two pixels; beyond an odd side the last pixel counts twice."""
     height, width = channel.shape
     if height % 2 or width % 2:
         channel = np.pad(channel, ((0, height % 2), (0, width % 2)), mode="edge")
@@ -135,10 +135,10 @@ def _from_grey(pixels: Pixels) -> bytes:
 
 
 def _from_yuv422(pixels: Pixels, order: tuple[int, int, int]) -> bytes:
-    """Two rows share their chroma.
+    """Convert a 4:2:2 picture; each two rows share their chroma.
 
     Raises:
-        BadPicture: an odd width, where two pixels share four bytes.
+        BadPicture: the width is odd, though two pixels share four bytes.
     """
     first, u_at, v_at = order
     height, width, _ = pixels.shape

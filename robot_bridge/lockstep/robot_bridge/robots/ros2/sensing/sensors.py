@@ -1,4 +1,4 @@
-"""Sensors beside the robot's state: ranges and a wrench, which a console draws, and the lock-out."""
+"""The sensors besides the robot's state: ranges and a wrench, which a console draws, and the lock-out."""
 
 import math
 import threading
@@ -16,7 +16,7 @@ FIRST_WORD = 3.0  # s for the first message of a lock-out, while the nodes find 
 
 
 class RangeSensor:
-    """sensor_msgs/LaserScan."""
+    """Reads ranges from sensor_msgs/LaserScan."""
 
     def __init__(self, ros: RosSide, settings: Ranges) -> None:
         self._sectors = Sectors(settings.count, settings.range_min, settings.range_max, settings.yaw)
@@ -24,7 +24,7 @@ class RangeSensor:
         ros.subscribe(ros.message("sensor_msgs", "LaserScan"), settings.topic, self._take)
 
     def values(self, now: float) -> list[float]:
-        """Empty when they are too old."""
+        """Return the ranges; empty if they are too old."""
         arrived = self._scans.fresh(now)
         return [] if arrived is None else arrived.value
 
@@ -40,14 +40,14 @@ class RangeSensor:
 
 
 class WrenchTopic:
-    """geometry_msgs/WrenchStamped."""
+    """Reads a wrench from geometry_msgs/WrenchStamped."""
 
     def __init__(self, ros: RosSide, settings: Wrench) -> None:
         self._wrenches: Newest[list[float]] = Newest(settings.topic, settings.timeout)
         ros.subscribe(ros.message("geometry_msgs", "WrenchStamped"), settings.topic, self._take)
 
     def values(self, now: float) -> list[float]:
-        """Empty when they are too old."""
+        """Return the wrench; empty if it is too old."""
         arrived = self._wrenches.fresh(now)
         return [] if arrived is None else arrived.value
 
@@ -65,7 +65,7 @@ class WrenchTopic:
 
 
 class LockoutTopic:
-    """std_msgs/Bool, from a key switch or a teach pendant."""
+    """Reads a lock-out from std_msgs/Bool, of a key switch or a teach pendant."""
 
     def __init__(self, ros: RosSide, settings: Lockout) -> None:
         self._topic = settings.topic
@@ -74,11 +74,11 @@ class LockoutTopic:
         ros.subscribe(ros.message("std_msgs", "Bool"), settings.topic, self._take)
 
     def wait(self) -> None:
-        """Blocks until something was heard, or for `FIRST_WORD`: a bridge that starts is not locked out for that."""
+        """Block until the first message, at most for `FIRST_WORD`: a bridge that starts is not locked out early."""
         self._heard.wait(FIRST_WORD)
 
     def reason(self, now: float) -> str:
-        """Why the robot is locked; "" while it is not. A silent switch may have locked it."""
+        """Return why the robot is locked; "" while it is not. A silent switch may have locked it."""
         said = self._said.fresh(now)
         if said is None:
             return f"nothing is heard of the lock-out ({self._topic})"
