@@ -38,6 +38,8 @@ class _Stream:
 
     expected: int = 0
     unordered: int = 0  # identifiers of I-DATA's unordered messages are near this
+    skipped: int = -1  # the last ordered message that the peer has given up
+    skipped_unordered: int = -1  # the last of I-DATA's unordered ones
     held: dict[int, MessageReceived] = field(default_factory=dict)
 
 
@@ -72,6 +74,8 @@ class Reassembly:
             sequence = self._unwrap(chunk)
             self._complete(MessageReceived(chunk.stream, chunk.protocol, chunk.payload), False, sequence)
             return
+        if self._is_late(chunk):
+            return
         run = self._join(chunk, tsn)
         if run.size > self._max_message:
             raise ProtocolViolation("message_too_large")
@@ -90,6 +94,14 @@ class Reassembly:
             stream.unordered = max(stream.unordered, found := unwrap(chunk.sequence, stream.unordered))
             return found
         return unwrap(chunk.sequence, stream.expected, self._sequence_mask)
+
+    def _is_late(self, chunk: Data | InterleavedData) -> bool:
+        """True for a fragment of a message that the peer has given up, which overtook it: it would wait for ever."""
+        sequence = self._unwrap(chunk)
+        stream = self._streams[chunk.stream]
+        if not chunk.flags & UNORDERED:
+            return sequence <= stream.skipped
+        return isinstance(chunk, InterleavedData) and sequence <= stream.skipped_unordered
 
     def _join(self, chunk: Data | InterleavedData, tsn: int) -> _Run:
         """Return the run that this fragment is in now, joined with the one before it and the one after it."""
@@ -156,8 +168,11 @@ class Reassembly:
         for skip in skips:
             latest[skip.stream, skip.unordered] = skip.sequence  # one each; a peer's repeats cost nothing
         for (number, unordered), sequence in latest.items():
+            stream = self._streams.setdefault(number, _Stream())
             if not unordered:
-                self._skip(self._streams.setdefault(number, _Stream()), sequence)
+                self._skip(stream, sequence)
+            else:
+                stream.skipped_unordered = max(stream.skipped_unordered, unwrap(sequence, stream.unordered))
         given_up = [run for run in self._starts.values() if _is_given_up(run, cumulative, latest)]
         for run in given_up:
             self._drop(run)
@@ -165,6 +180,7 @@ class Reassembly:
     def _skip(self, stream: _Stream, sequence: int) -> None:
         """Skip ordered messages up to this one, which do not arrive any more; those that have arrived are delivered."""
         expected = unwrap(sequence, stream.expected, self._sequence_mask) + 1
+        stream.skipped = max(stream.skipped, expected - 1)
         if expected <= stream.expected:
             return
         for early in sorted(each for each in stream.held if each < expected):
