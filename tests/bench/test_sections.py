@@ -39,7 +39,7 @@ async def test_every_trip_over_the_bare_link_is_one_event_that_the_robot_execute
 async def test_command_to_feedback_reports_each_figure_with_its_baseline(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(command_to_feedback, "QUICK_EVENTS", 20)
     results = await command_to_feedback.run(Context(quick=True, robots=["planar"], say=lambda _: None))
-    assert [result.target for result in results] == [8.0, 20.0, 2.0, None]
+    assert [result.target for result in results] == [8.0, 20.0, 1.0, None]
     assert all(result.value and result.baseline and result.samples == 20 for result in results)
     total, _, own, _ = results
     assert own.value is not None

@@ -21,7 +21,7 @@ __all__ = ["run"]
 SECTION = "command_to_feedback"
 EVENTS, QUICK_EVENTS = 600, 60
 LINK = "the robot link alone, without a console"
-MEDIAN_MS, P99_MS, OWN_MEDIAN_MS = 8.0, 20.0, 2.0
+MEDIAN_MS, P99_MS, OWN_MEDIAN_MS = 8.0, 20.0, 1.0
 
 
 async def run(context: Context) -> list[Result]:

@@ -43,8 +43,8 @@ CALM, QUICK_CALM = 20, 2  # s until the effect of hundreds of handshakes on the 
 ENCODE = 0.03  # s until the bridge's pictures are encoded
 LOOK, SAME, LOOKS = 0.01, 3, 40  # s between two looks at the observers; looks alike that settle it; looks at most
 ROBOT = "planar"  # the lightest: the machine's cores are for the console and the observers
-CPU_TARGET = 0.5  # % of a core for each of a hundred
-SLOWDOWN_TARGETS = {100: 2.0, 200: 1.2}
+CPU_TARGET = 0.25  # % of a core for each
+SLOWDOWN_TARGETS = {100: 1.1, 200: 1.1}
 TIERS = ("operator", "high", "crowd", "low")
 CORE = 100.0  # %: the most that two hundred may use
 
