@@ -1,7 +1,7 @@
 import type { StopFate } from "./stop_press";
 
-/** What the button itself says; short. */
-export const STOP_BUTTON_LABELS: Readonly<Record<StopFate, string>> = {
+/** The button's words while a press lasts; short. */
+const PRESSED: Readonly<Record<StopFate, string>> = {
   sending: "sending …",
   confirmed: "the robot confirmed it",
   not_kept: "confirmed, not kept",
@@ -21,6 +21,11 @@ const ADVICE: Readonly<Record<StopFate, string | null>> = {
   silenced:
     "Your STOP had no effect: a supervisor silenced your link. Use the hardware stop, or call the supervisor.",
 };
+
+/** The button's words while a press lasts. `heard`: the robot's state is known now; a confirmation is of then. */
+export function pressedStopLabel(fate: StopFate, heard: boolean): string {
+  return fate === "confirmed" && !heard ? "was confirmed; silent now" : PRESSED[fate];
+}
 
 /** What a person has to know and do beside the button; null: nothing. `said`: the page still says it. */
 export function stopAdvice(fate: StopFate, said: boolean): string | null {

@@ -11,7 +11,7 @@ import {
   tookStopTaken,
   type StopPress,
 } from "../../src/stop/stop_press";
-import { STOP_BUTTON_LABELS, stopAdvice } from "../../src/stop/stop_labels";
+import { pressedStopLabel, stopAdvice } from "../../src/stop/stop_labels";
 import { stopOf } from "../messages";
 
 const press = (first = 1): StopPress => createPress(new Uint8Array(16).fill(first), "stop key", 1000);
@@ -142,7 +142,7 @@ describe("a press of STOP", () => {
     expect([stopAdvice("sending", true), stopAdvice("confirmed", false)]).toEqual([null, null]);
     for (const fate of ["not_kept", "waiting", "unconfirmed", "silenced"] as const) {
       expect(stopAdvice(fate, true)).toContain("hardware stop");
-      expect(STOP_BUTTON_LABELS[fate]).not.toBe("");
+      expect(pressedStopLabel(fate, true)).not.toBe("");
     }
     expect(stopAdvice("unconfirmed", false)).toContain("Press STOP again");
   });

@@ -1,5 +1,5 @@
 import { robotIsUp } from "../../session/console_state";
-import { restingStopLabel, STOP_BUTTON_LABELS } from "../../stop/stop_labels";
+import { pressedStopLabel, restingStopLabel } from "../../stop/stop_labels";
 import type { ConsoleEngine } from "../../engine/console_engine";
 import { h, setData, setText, type Panel } from "../elements/dom";
 
@@ -22,20 +22,15 @@ export function createStopPanel(engine: ConsoleEngine): Panel {
   element.addEventListener("click", (event) => {
     if (event.detail === 0) press();
   });
-  const restingWords = (now: number): string => {
-    const heard = engine.hears(now) && robotIsUp(engine.state);
-    return restingStopLabel(
-      engine.state.stop.stopped,
-      heard,
-      document.documentElement.dataset["touch"] === "true",
-    );
-  };
+  const restingWords = (heard: boolean): string =>
+    restingStopLabel(engine.state.stop.stopped, heard, document.documentElement.dataset["touch"] === "true");
   return {
     element,
     update(now) {
       const fate = engine.stopping.fate(now);
       setData(element, "state", fate === null ? (engine.state.stop.stopped ? "stopped" : "ready") : fate);
-      setText(words, fate === null ? restingWords(now) : STOP_BUTTON_LABELS[fate]);
+      const heard = engine.hears(now) && robotIsUp(engine.state);
+      setText(words, fate === null ? restingWords(heard) : pressedStopLabel(fate, heard));
     },
   };
 }
