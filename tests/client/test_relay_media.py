@@ -4,10 +4,16 @@ import asyncio
 
 import msgspec
 import pytest
+from websockets.asyncio.client import connect
+from websockets.asyncio.server import ServerConnection, serve
 
 from lockstep.client.errors import ConnectFailed
 from lockstep.client.transport import sfu_media
 from lockstep.client.transport.sfu_media import RelayMedia, RelayTicket
+
+
+async def _nothing(socket: ServerConnection) -> None:
+    await socket.wait_closed()
 
 
 async def test_a_relay_that_is_no_janus_is_refused_by_name() -> None:
@@ -29,3 +35,17 @@ async def test_a_relay_that_says_nothing_is_given_up_by(late_from: float, monkey
         assert media.why == "nothing came from the relay for 0.02 s"
     finally:
         await media.close()
+
+
+async def test_a_close_that_is_cancelled_closes_the_websocket() -> None:
+    async with serve(_nothing, "127.0.0.1", 0) as server:
+        port = next(iter(server.sockets)).getsockname()[1]
+        told = {"engine": "janus", "relay": "0", "url": f"ws://127.0.0.1:{port}", "feed": 7, "room": 1, "streams": []}
+        media = RelayMedia(msgspec.convert(told, RelayTicket), lambda _: None)
+        media._socket = await connect(f"ws://127.0.0.1:{port}", proxy=None)
+        media._socket.transport.pause_reading()  # the answer to the close is not heard
+        closing = asyncio.create_task(media.close())
+        await asyncio.sleep(0)
+        closing.cancel()
+        await asyncio.wait({closing})
+        assert media._socket.transport.is_closing()

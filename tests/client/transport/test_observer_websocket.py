@@ -9,6 +9,7 @@ import pytest
 from websockets.asyncio.client import connect
 from websockets.asyncio.server import ServerConnection, serve
 from websockets.exceptions import InvalidStatus
+from websockets.protocol import State
 
 from lockstep.client.connection import Connection, ConnectionOptions
 from lockstep.client.console_url import ConsoleLink, parse_link
@@ -217,3 +218,16 @@ def _options(link: ConsoleLink) -> ConnectionOptions:
         silence_seconds=PATIENCE,
         route=None,
     )
+
+
+async def test_a_close_that_is_cancelled_closes_the_websocket() -> None:
+    async with running_rig(**RELAYED) as rig:
+        line = _line(parse_link(f"{rig.url}/#token={rig.access.issue('observer', 'ann')}"), _Heard())
+        await line.negotiate()
+        assert line._socket is not None
+        line._socket.transport.pause_reading()  # the answer to the close is not heard
+        closing = asyncio.create_task(line.close())
+        await eventually(lambda: line._socket is not None and line._socket.state is State.CLOSING)
+        closing.cancel()
+        await asyncio.wait({closing})
+        assert line._socket.transport.is_closing()

@@ -14,6 +14,7 @@ from lockstep.protocol.janus import Heard
 from lockstep.server.sfu import janus_session
 from lockstep.server.sfu.errors import RelayRefused, RelaySilent, RelayUnreachable
 from lockstep.server.sfu.janus_session import open_janus
+from tests.support.websockets_made import keep_websockets
 
 Answer = Callable[[ServerConnection, dict[str, Any]], Awaitable[None]]
 
@@ -125,3 +126,22 @@ async def test_where_nobody_listens_a_relay_is_unreachable() -> None:
     with pytest.raises(RelayUnreachable):
         async with open_janus(url):
             pass
+
+
+async def test_a_relay_that_does_not_answer_the_close_keeps_no_connection_open(monkeypatch: pytest.MonkeyPatch) -> None:
+    made, opened = keep_websockets(monkeypatch, janus_session), asyncio.Event()
+
+    async def hold(url: str) -> None:
+        async with open_janus(url):
+            made[0].transport.pause_reading()
+            opened.set()
+            await asyncio.Event().wait()
+
+    async with janus(_event) as url:
+        holding = asyncio.create_task(hold(url))
+        async with asyncio.timeout(20):
+            await opened.wait()
+            while not holding.done():  # the first cancellation begins the close, and the next ones end it
+                holding.cancel()
+                await asyncio.sleep(0)
+        assert made[0].transport.is_closing()

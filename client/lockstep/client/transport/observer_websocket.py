@@ -143,6 +143,8 @@ class ObserverWebSocket:
         except TimeoutError:
             pass  # the console notices without a message
         finally:
+            if self._socket is not None:
+                self._socket.transport.abort()  # websockets leaves it open when its close is cancelled
             await self._whep.aclose()
 
     async def _hear(self) -> None:

@@ -165,7 +165,10 @@ class RelayMedia:
         if self._endpoint is not None:
             self._endpoint.close()
         if self._socket is not None:
-            await self._socket.close()
+            try:
+                await self._socket.close()
+            finally:
+                self._socket.transport.abort()  # websockets leaves it open when its close is cancelled
 
     def _answer(self) -> str:
         offer, connection = self._offer, self._connection

@@ -41,18 +41,21 @@ async def open_janus(url: str) -> AsyncIterator["JanusSession"]:
         )
     except (OSError, TimeoutError, InvalidHandshake) as error:
         raise RelayUnreachable(str(error) or type(error).__name__) from error
-    async with socket:
-        session = JanusSession(socket)
-        # No TaskGroup: it would wrap exceptions of the caller's block, and these two raise nothing.
-        loop = asyncio.get_running_loop()
-        running = [loop.create_task(session.listen()), loop.create_task(session.keep_alive())]
-        try:
-            await session.begin()
-            yield session
-        finally:
-            for task in running:
-                task.cancel()
-            await asyncio.gather(*running, return_exceptions=True)
+    try:
+        async with socket:
+            session = JanusSession(socket)
+            # No TaskGroup: it would wrap exceptions of the caller's block, and these two raise nothing.
+            loop = asyncio.get_running_loop()
+            running = [loop.create_task(session.listen()), loop.create_task(session.keep_alive())]
+            try:
+                await session.begin()
+                yield session
+            finally:
+                for task in running:
+                    task.cancel()
+                await asyncio.gather(*running, return_exceptions=True)
+    finally:
+        socket.transport.abort()  # websockets leaves it open when its close is cancelled
 
 
 class JanusSession:

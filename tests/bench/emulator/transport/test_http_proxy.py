@@ -17,7 +17,10 @@ from websockets.exceptions import ConnectionClosed, InvalidStatus
 
 from lockstep.bench.emulator import Impairment, Network, Profile, even_profile
 from lockstep.bench.emulator.impairment.delay import Constant
+from lockstep.bench.emulator.transport import websocket_proxy
 from lockstep.server.http.transport.serve import bind, running
+from tests.server.rig import eventually
+from tests.support.websockets_made import keep_websockets
 
 SDP = {"Content-Type": "application/sdp", "Authorization": "Bearer t"}
 FRAGMENT = {"Content-Type": "application/trickle-ice-sdpfrag", "If-Match": "*"}
@@ -51,6 +54,11 @@ class Console:
             return Response(None, 302, {"Location": f"http://{request.headers['host']}/there"})
         return JSONResponse({"hello": "there"}, headers={"X-Own": "yes"})
 
+    async def flood(self, websocket: WebSocket) -> None:
+        await websocket.accept()
+        while True:
+            await websocket.send_bytes(bytes(100_000))
+
     async def _chunks(self) -> AsyncIterator[bytes]:
         for number in range(200):
             yield b"%d " % number
@@ -69,7 +77,8 @@ class Console:
     @property
     def app(self) -> Starlette:
         methods = ["GET", "POST", "PATCH", "DELETE"]
-        return Starlette(routes=[WebSocketRoute("/echo", self.echo), Route("/{path:path}", self.any, methods=methods)])
+        websockets = [WebSocketRoute("/echo", self.echo), WebSocketRoute("/flood", self.flood)]
+        return Starlette(routes=[*websockets, Route("/{path:path}", self.any, methods=methods)])
 
 
 @asynccontextmanager
@@ -216,3 +225,15 @@ async def test_a_websocket_that_the_console_refuses_is_refused() -> None:
     async with proxied() as (_, network, _):
         with pytest.raises(InvalidStatus):
             await connect(network.console_url.replace("http", "ws") + "/echo?no=1", proxy=None)
+
+
+async def test_a_websocket_whose_browser_reads_nothing_is_closed_with_the_network(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    made = keep_websockets(monkeypatch, websocket_proxy)
+    async with proxied() as (_, network, _):
+        browser = await connect(network.console_url.replace("http", "ws") + "/flood", proxy=None)
+        browser.transport.pause_reading()
+        await eventually(lambda: bool(made) and not made[0].transport.is_reading())
+    assert made[0].transport.is_closing()
+    browser.transport.abort()

@@ -20,6 +20,7 @@ __all__ = ["join"]
 MAX_MESSAGE = 64 << 20  # bytes
 POLICY_VIOLATION = 1008  # RFC 6455 7.4.1
 GOING_AWAY = 1001
+CLOSE_SECONDS = 1.0
 
 
 async def join(browser: WebSocket, console: str, paths: Mapping[Direction, StreamPath]) -> None:
@@ -40,25 +41,29 @@ async def join(browser: WebSocket, console: str, paths: Mapping[Direction, Strea
             origin=None if origin is None else Origin(origin),
             subprotocols=[Subprotocol(each) for each in browser.scope.get("subprotocols", [])] or None,
             compression=None,
+            close_timeout=CLOSE_SECONDS,
             max_size=MAX_MESSAGE,
             proxy=None,
         )
     except (OSError, TimeoutError, InvalidHandshake, ConnectionClosed):
         await browser.close(POLICY_VIOLATION)
         return
-    async with upstream:
-        await browser.accept(subprotocol=upstream.subprotocol)
-        loop = asyncio.get_running_loop()
-        ways = (
-            loop.create_task(_to_console(browser, upstream, paths["to_robot"])),
-            loop.create_task(_to_browser(upstream, browser, paths["to_operator"])),
-        )
-        try:
-            await asyncio.wait(ways, return_when=asyncio.FIRST_COMPLETED)
-        finally:
-            for way in ways:
-                way.cancel()
-            await asyncio.gather(*ways, return_exceptions=True)
+    try:
+        async with upstream:
+            await browser.accept(subprotocol=upstream.subprotocol)
+            loop = asyncio.get_running_loop()
+            ways = (
+                loop.create_task(_to_console(browser, upstream, paths["to_robot"])),
+                loop.create_task(_to_browser(upstream, browser, paths["to_operator"])),
+            )
+            try:
+                await asyncio.wait(ways, return_when=asyncio.FIRST_COMPLETED)
+            finally:
+                for way in ways:
+                    way.cancel()
+                await asyncio.gather(*ways, return_exceptions=True)
+    finally:
+        upstream.transport.abort()  # websockets leaves it open when its close is cancelled
 
 
 def _unchecked() -> ssl.SSLContext:
