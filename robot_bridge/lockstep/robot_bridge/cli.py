@@ -58,53 +58,63 @@ def run(
         str,
         typer.Argument(
             help=f"The robot: {', '.join(simulated_names())}, the name of an installed one, or module:Class. "
-            "Or `new`, with a name behind it: writes a folder with a robot of your own to begin with."
+            "Or `new` and a name: write a folder with a robot of your own, as a start."
         ),
     ] = "mobile-manipulator",
-    new_name: Annotated[str | None, typer.Argument(metavar="[NEW_NAME]", help="Behind `new` only: my_arm.")] = None,
-    ros2: Annotated[
-        Path | None, typer.Option(help="Instead: a robot behind ROS 2 topics, described by this YAML file.")
+    new_name: Annotated[
+        str | None, typer.Argument(metavar="[NEW_NAME]", help="Only after `new`: the name, such as my_arm.")
     ] = None,
-    mjcf: Annotated[Path | None, typer.Option(help="Instead: a MuJoCo model of your own, this MJCF file.")] = None,
+    ros2: Annotated[
+        Path | None, typer.Option(help="Use a robot behind ROS 2 topics instead; this YAML file describes it.")
+    ] = None,
+    mjcf: Annotated[Path | None, typer.Option(help="Use your own MuJoCo model instead, from this MJCF file.")] = None,
     host: Annotated[str, typer.Option(help="Address to listen on.")] = "127.0.0.1",
-    port: Annotated[int, typer.Option(min=0, max=65535, help="Port to listen on; 0 takes any free one.")] = 5600,
+    port: Annotated[int, typer.Option(min=0, max=65535, help="Port to listen on; 0: any free port.")] = 5600,
     state_dir: Annotated[
         Path | None,
         typer.Option(
-            help="Directory of this robot alone that keeps a latched STOP over restarts; by default one of the robot's "
-            "name below ~/.local/state/lockstep/stops. Two robots of the same name need one each.",
+            help="Directory that keeps a latched STOP across restarts, for this robot alone. Default: a directory with "
+            "the robot's name in ~/.local/state/lockstep/stops. Two robots of the same name need one each.",
         ),
     ] = None,
     lockout_file: Annotated[
         Path | None,
-        typer.Option(help="While this file exists the robot is locked; also while its folder cannot be read."),
+        typer.Option(help="Lock the robot while this file exists, and while its folder cannot be read."),
     ] = None,
     event_log: Annotated[
-        Path | None, typer.Option(help="Append a JSON line for each event, refusal and medium.")
+        Path | None,
+        typer.Option(
+            help="File to which the bridge appends a JSON line for each event, refusal, picture and sound segment."
+        ),
     ] = None,
     link_secret_file: Annotated[
         Path | None,
         typer.Option(
             envvar="LOCKSTEP_LINK_SECRET_FILE",
-            help="File with the secret that clients have to know; or LOCKSTEP_LINK_SECRET.",
+            help="File with the secret that clients must know; or set LOCKSTEP_LINK_SECRET.",
         ),
     ] = None,
-    link_tls_cert: Annotated[Path | None, typer.Option(help="Certificate: speak TLS.")] = None,
-    link_tls_key: Annotated[Path | None, typer.Option(help="Its key, if it stands in another file.")] = None,
+    link_tls_cert: Annotated[Path | None, typer.Option(help="Certificate chain; with it the link uses TLS.")] = None,
+    link_tls_key: Annotated[
+        Path | None, typer.Option(help="Private key of that certificate, if it is in another file.")
+    ] = None,
     link_tls_ca: Annotated[
-        Path | None, typer.Option(help="Ask clients for a certificate that this one signed.")
+        Path | None, typer.Option(help="CA certificate; clients must show a certificate that it signed.")
     ] = None,
     insecure_link: Annotated[
-        bool, typer.Option(help="Listen beyond loopback although any client there could drive the robot.")
+        bool,
+        typer.Option(help="Listen beyond loopback without a secret, although any client could then drive the robot."),
     ] = False,
     event_strip: Annotated[
-        bool, typer.Option(help="Draw each picture's event into it, for tests and measurements.")
+        bool, typer.Option(help="Draw the event's number into each picture, for tests and measurements.")
     ] = False,
     operator_grace: Annotated[
         float,
-        typer.Option(min=0, help="Seconds for which a console whose link broke keeps the robot from other consoles."),
+        typer.Option(min=0, help="Seconds for which the bridge keeps the robot for a console whose link broke."),
     ] = 10.0,
-    as_json: Annotated[bool, typer.Option("--json", help="Print the address as one JSON line once ready.")] = False,
+    as_json: Annotated[
+        bool, typer.Option("--json", help="Print the address as one JSON line when the bridge is ready.")
+    ] = False,
 ) -> None:
     """Run a robot and its bridge until interrupted."""
     if name == "new":

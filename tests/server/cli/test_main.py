@@ -9,9 +9,11 @@ import sys
 from collections.abc import Iterator
 from importlib.metadata import version
 from pathlib import Path
+from typing import Any
 
 import httpx
 import pytest
+from typer.core import TyperGroup
 from typer.main import get_group
 from typer.testing import CliRunner
 
@@ -279,3 +281,23 @@ def test_a_command_that_runs_no_console_loads_nothing_of_media_and_the_web(argum
     program = (sys.executable, "-c", look + "from lockstep.server.cli.main import main; main()", *arguments)
     done = subprocess.run(program, capture_output=True, text=True, timeout=60, check=True)
     assert done.stdout.splitlines()[-1] == "loaded []"
+
+
+def _commands(group: TyperGroup, *before: str) -> Iterator[tuple[tuple[str, ...], Any]]:
+    for name, command in group.commands.items():
+        if isinstance(command, TyperGroup) and not command.params:
+            yield from _commands(command, *before, name)
+        else:
+            yield (*before, name), command
+
+
+COMMANDS = dict(each for load in LOADERS for each in _commands(get_group(load())))
+
+
+@pytest.mark.parametrize("words", COMMANDS, ids=" ".join)
+def test_help_shows_the_text_of_each_option_in_full(words: tuple[str, ...]) -> None:
+    """Text in square brackets is markup to rich, which leaves it out unless it is escaped."""
+    said = CliRunner().invoke(app, [*words, "--help"], env={"COLUMNS": "2000"}).stdout
+    texts = [text for each in COMMANDS[words].params if (text := getattr(each, "help", None))]
+    for text in texts:
+        assert " ".join(text.replace("\\[", "[").split()) in said

@@ -33,17 +33,23 @@ def check(
         Path | None,
         typer.Option(
             envvar="LOCKSTEP_LINK_SECRET_FILE",
-            help="File with the secret that the bridge asks for; or LOCKSTEP_LINK_SECRET.",
+            help="File with the secret of the robot link; or set LOCKSTEP_LINK_SECRET.",
         ),
     ] = None,
-    link_tls_ca: Annotated[Path | None, typer.Option(help="What signed the bridge's certificate.")] = None,
-    link_tls_cert: Annotated[Path | None, typer.Option(help="Certificate to show to a bridge that asks.")] = None,
-    link_tls_key: Annotated[Path | None, typer.Option(help="Its key, if it stands in another file.")] = None,
+    link_tls_ca: Annotated[
+        Path | None, typer.Option(help="CA certificate that signed the bridge's certificate.")
+    ] = None,
+    link_tls_cert: Annotated[
+        Path | None, typer.Option(help="Client certificate for a bridge that asks for one.")
+    ] = None,
+    link_tls_key: Annotated[
+        Path | None, typer.Option(help="Private key of that certificate, if it is in another file.")
+    ] = None,
     fraction: Annotated[
-        float, typer.Option(min=0.001, max=1.0, help="How far each motion goes, of the axis' limit.")
+        float, typer.Option(min=0.001, max=1.0, help="Size of each motion, as a share of the axis' limit.")
     ] = FRACTION,
-    case: Annotated[list[str] | None, typer.Option(help="Only this case; may be given again.")] = None,
-    yes: Annotated[bool, typer.Option("--yes", help="Do not ask whether the robot may move.")] = False,
+    case: Annotated[list[str] | None, typer.Option(help="Run only this case; repeat for several.")] = None,
+    yes: Annotated[bool, typer.Option("--yes", help="Move the robot without asking first.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the results as one JSON object.")] = False,
 ) -> None:
     """Check whether a robot bridge, in any language, does what docs/robot-link.md asks. IT MOVES THE ROBOT."""

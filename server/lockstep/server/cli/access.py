@@ -49,13 +49,13 @@ def add_access_commands(app: typer.Typer, make_settings: MakeSettings) -> None:
     @app.command()
     def invite(
         role: Annotated[str, typer.Option(help="observer, operator or supervisor.")] = "observer",
-        expires: Annotated[str, typer.Option(help="How long the link is good: 30m, 8h, 2d.")] = "8h",
-        name: Annotated[str, typer.Option(help="The name that others see, unless its holder sets another.")] = "",
+        expires: Annotated[str, typer.Option(help="The time for which the link is valid: 30m, 8h, 2d.")] = "8h",
+        name: Annotated[str, typer.Option(help="The holder's name as others see it; the holder may change it.")] = "",
         for_robot: Annotated[
             list[str] | None,
-            typer.Option(help="A robot of a fleet that the link is good for; may be given again. Unset: all."),
+            typer.Option(help="A robot of the fleet that the link admits to; repeat for several. Unset: all robots."),
         ] = None,
-        url: Annotated[str, typer.Option(help="How the console is reached, https://robot.example.org.")] = "",
+        url: Annotated[str, typer.Option(help="The console's public address, https://robot.example.org.")] = "",
         state_dir: StateDirOption = None,
         as_json: Json = False,
     ) -> None:
@@ -100,7 +100,7 @@ def add_access_commands(app: typer.Typer, make_settings: MakeSettings) -> None:
 
     @app.command()
     def revoke(
-        invitation_id: Annotated[str, typer.Argument(help="As `lockstep invitations` shows it.")],
+        invitation_id: Annotated[str, typer.Argument(help="The link's id as `lockstep invitations` shows it.")],
         state_dir: StateDirOption = None,
     ) -> None:
         """End a link, those that were invited with it, and everything that is connected with them."""
@@ -120,23 +120,31 @@ def add_access_commands(app: typer.Typer, make_settings: MakeSettings) -> None:
 
     @app.command()
     def audit(
-        follow: Annotated[bool, typer.Option("--follow", "-f", help="Go on with what happens from now on.")] = False,
-        after: Annotated[int, typer.Option(help="Only records behind this number.")] = 0,
-        file: Annotated[Path | None, typer.Option(help="Another log than the state directory's audit.jsonl.")] = None,
+        follow: Annotated[
+            bool, typer.Option("--follow", "-f", help="Then print new records as they are written.")
+        ] = False,
+        after: Annotated[int, typer.Option(help="Print only records after this number.")] = 0,
+        file: Annotated[
+            Path | None, typer.Option(help="Read this log instead of audit.jsonl in the state directory.")
+        ] = None,
         directory: Annotated[
-            Path | None, typer.Argument(metavar="[DIR]", help="The audit of this directory.", show_default=False)
+            Path | None,
+            typer.Argument(metavar="[DIR]", help="The state directory whose audit log to read.", show_default=False),
         ] = None,
         verify: Annotated[
-            bool, typer.Option("--verify", help="Say whether it was cut, changed or reordered; then exit code 1.")
+            bool,
+            typer.Option(
+                "--verify", help="Check whether the log was cut, changed or reordered; exit code 1 if it was."
+            ),
         ] = False,
         anchors: Annotated[
             Path | None,
-            typer.Option(help="File or folder of its signed heads, or a recording; unset: as the settings say."),
+            typer.Option(help="A file or folder of signed heads, or a recording. Unset: the one in the settings."),
         ] = None,
         signed_by: Annotated[
-            str, typer.Option(help="Public key of the signed heads; unset: that of the state directory.")
+            str, typer.Option(help="The public key of the signed heads. Unset: the state directory's key.")
         ] = "",
-        key: Annotated[bool, typer.Option("--key", help="Print the public key that signs, and end.")] = False,
+        key: Annotated[bool, typer.Option("--key", help="Print the public key of the signatures and exit.")] = False,
         robot: RobotOption = "",
         state_dir: StateDirOption = None,
         as_json: Json = False,

@@ -73,34 +73,34 @@ class Switch(StrEnum):
 
 commands = typer.Typer()
 
-Host = Annotated[str | None, typer.Option(help="Address to listen on; 127.0.0.1 unless set.")]
-Port = Annotated[int | None, typer.Option(min=0, max=65535, help="Port of the console; 0 takes any free one.")]
-Json = Annotated[bool, typer.Option("--json", help="Print the links as one JSON line, once ready.")]
+Host = Annotated[str | None, typer.Option(help="Address to listen on. Default: 127.0.0.1.")]
+Port = Annotated[int | None, typer.Option(min=0, max=65535, help="Port of the console; 0: any free port.")]
+Json = Annotated[bool, typer.Option("--json", help="Print the links as one JSON line when the console is ready.")]
 IceHosts = Annotated[
     list[str] | None,
-    typer.Option("--ice-host", help="Address of this machine, offered to browsers for media; may be given again."),
+    typer.Option("--ice-host", help="Address of this machine that browsers get for media; repeat for several."),
 ]
 Advertise = Annotated[
     list[str] | None,
-    typer.Option(help="Outer address of this machine behind a one-to-one NAT, as in a cloud; may be given again."),
+    typer.Option(help="Public address of this machine behind a 1:1 NAT, as in a cloud; repeat for several."),
 ]
 MediaPort = Annotated[
     int | None,
     typer.Option(
-        min=0, max=65535, help="UDP port for pictures, sound and commands of everybody; 0: any free one, as unless set."
+        min=0, max=65535, help="UDP port for the media and data channels of all peers. Default: 0, any free port."
     ),
 ]
 MediaTcp = Annotated[
     bool | None,
     typer.Option(
-        "--media-tcp/--no-media-tcp", help="Let browsers come to that port by TCP too, where a network lets no UDP out."
+        "--media-tcp/--no-media-tcp", help="Accept media over TCP on the same port, for networks that block UDP."
     ),
 ]
 Quality = Annotated[
-    Switch | None, typer.Option(help="Whether bitrate, rate and size of pictures follow the network; on unless set.")
+    Switch | None, typer.Option(help="Adapt the bitrate, rate and size of pictures to the network. Default: on.")
 ]
-LogFormatOption = Annotated[LogFormat | None, typer.Option("--log-format", help="Log lines as text or as JSON.")]
-Quiet = Annotated[bool, typer.Option("--quiet", help="Log only warnings.")]
+LogFormatOption = Annotated[LogFormat | None, typer.Option("--log-format", help="Format of log lines: text or JSON.")]
+Quiet = Annotated[bool, typer.Option("--quiet", help="Log only warnings and errors.")]
 
 
 @commands.command()
@@ -109,25 +109,31 @@ def up(
         list[str] | None,
         typer.Option(
             help=f"The robot: {', '.join(simulated_names())}, the name of an installed one, or module:Class; "
-            f"{DEFAULT_ROBOT} unless set. Given again, or as NAME=robot: a fleet of several, docs/fleet.md."
+            f"default: {DEFAULT_ROBOT}. Repeat it, or give NAME=robot, for a fleet: docs/fleet.md."
         ),
     ] = None,
     ros2: Annotated[
-        Path | None, typer.Option(help="Instead: a robot behind ROS 2 topics, described by this YAML file.")
+        Path | None, typer.Option(help="Use a robot behind ROS 2 topics instead; this YAML file describes it.")
     ] = None,
-    mjcf: Annotated[Path | None, typer.Option(help="Instead: a MuJoCo model of your own, this MJCF file.")] = None,
+    mjcf: Annotated[Path | None, typer.Option(help="Use your own MuJoCo model instead, from this MJCF file.")] = None,
     robot_python: Annotated[
         str | None,
         typer.Option(
-            envvar="LOCKSTEP_ROBOT_PYTHON", help="Python that runs the bridge, as that of a ROS installation; or ours."
+            envvar="LOCKSTEP_ROBOT_PYTHON",
+            help="Python interpreter for the bridge, such as that of a ROS installation. Default: the console's own.",
         ),
     ] = None,
     robot_port: Annotated[
-        int, typer.Option(min=0, max=65535, help="Port of the bridge, and of the first of several; 0: any free one.")
+        int,
+        typer.Option(
+            min=0, max=65535, help="Port of the bridge, or of the first of several bridges; 0: any free port."
+        ),
     ] = 5600,
-    event_log: Annotated[Path | None, typer.Option(help="The bridge appends what happens to events here.")] = None,
+    event_log: Annotated[
+        Path | None, typer.Option(help="File to which the bridge appends a line for each event.")
+    ] = None,
     event_strip: Annotated[
-        bool, typer.Option(help="Draw each picture's event into it, for tests and measurements.")
+        bool, typer.Option(help="Draw the event's number into each picture, for tests and measurements.")
     ] = False,
     host: Host = None,
     port: Port = None,
@@ -212,19 +218,25 @@ def serve(
     robot: Annotated[
         list[str] | None,
         typer.Option(
-            help="Where the robot bridge is, tcp://host:port or tls://host:port. As NAME=tcp://…, which may be given "
-            "again: one robot of a fleet, docs/fleet.md.",
+            help="Address of the robot bridge, tcp://host:port or tls://host:port. NAME=tcp://… names a robot of a "
+            "fleet; repeat for several, docs/fleet.md.",
         ),
     ] = None,
     fleet: Annotated[
         Path | None, typer.Option(help="TOML file with a table for each robot of a fleet, docs/fleet.md.")
     ] = None,
     link_secret_file: Annotated[
-        Path | None, typer.Option(help="File with the secret that the bridge asks for; or LOCKSTEP_LINK_SECRET.")
+        Path | None, typer.Option(help="File with the secret of the robot link; or set LOCKSTEP_LINK_SECRET.")
     ] = None,
-    link_tls_ca: Annotated[Path | None, typer.Option(help="What signed the bridge's certificate.")] = None,
-    link_tls_cert: Annotated[Path | None, typer.Option(help="Certificate to show to a bridge that asks.")] = None,
-    link_tls_key: Annotated[Path | None, typer.Option(help="Its key, if it stands in another file.")] = None,
+    link_tls_ca: Annotated[
+        Path | None, typer.Option(help="CA certificate that signed the bridge's certificate.")
+    ] = None,
+    link_tls_cert: Annotated[
+        Path | None, typer.Option(help="Client certificate for a bridge that asks for one.")
+    ] = None,
+    link_tls_key: Annotated[
+        Path | None, typer.Option(help="Private key of that certificate, if it is in another file.")
+    ] = None,
     host: Host = None,
     port: Port = None,
     ice_host: IceHosts = None,

@@ -29,7 +29,7 @@ __all__ = [
 ]
 
 
-RobotOption = Annotated[str, typer.Option(help="Of this robot of a fleet.")]
+RobotOption = Annotated[str, typer.Option(help="The robot of the fleet that the command is about.")]
 StateDirOption = Annotated[Path | None, typer.Option(help="The console's state directory.")]
 
 
@@ -39,37 +39,42 @@ class SpeedCapChoice(StrEnum):
     OPERATOR = "operator"
 
 
-PublicUrl = Annotated[str | None, typer.Option(help="Where people find the console, as behind a proxy.")]
+PublicUrl = Annotated[str | None, typer.Option(help="The console's public address, such as that of a reverse proxy.")]
 AllowedHosts = Annotated[
     list[str] | None,
-    typer.Option("--allowed-host", help="Further name that requests may be for; may be given again."),
+    typer.Option("--allowed-host", help="Another host name that the console answers to; repeat for several."),
 ]
 Board = Annotated[
     str | None,
     typer.Option(
-        help="Redis that several consoles behind one entry share, redis[s]://:password@host:port/0. With a password "
-        "better in the environment or a file. docs/fleet.md",
+        help="Redis that several consoles behind one entry share, redis\\[s]://:password@host:port/0. The environment "
+        "or a file is a safer place for the password. docs/fleet.md",
         metavar="URL",
     ),
 ]
-Tls = Annotated[str | None, typer.Option(help="self-signed: encrypt with a certificate of the console's own making.")]
+Tls = Annotated[str | None, typer.Option(help="self-signed: encrypt with a certificate that the console makes itself.")]
 TlsCert = Annotated[Path | None, typer.Option(help="Certificate chain for TLS, PEM.")]
-TlsKey = Annotated[Path | None, typer.Option(help="Its private key, PEM.")]
-Stun = Annotated[list[str] | None, typer.Option(help="stun:host[:port]; may be given again.")]
+TlsKey = Annotated[Path | None, typer.Option(help="Private key of that certificate, PEM.")]
+Stun = Annotated[list[str] | None, typer.Option(help="STUN server, stun:host[:port]; repeat for several.")]
 Turn = Annotated[
-    list[str] | None, typer.Option(help="turn:host[:port][?transport=udp|tcp]; may be given again.", metavar="URI")
+    list[str] | None,
+    typer.Option(help="TURN server, turn:host[:port][?transport=udp|tcp]; repeat for several.", metavar="URI"),
 ]
-TurnSecret = Annotated[str | None, typer.Option(help="Secret shared with the TURN server. Better in the environment.")]
+TurnSecret = Annotated[
+    str | None, typer.Option(help="Secret shared with the TURN server. The environment is a safer place for it.")
+]
 SpeedCap = Annotated[
     SpeedCapChoice | None,
-    typer.Option(help="Cap the speed by the delay of what the operator sees: always, never, or as the operator wants."),
+    typer.Option(
+        help="Cap the speed by the delay of the operator's pictures: always, never, or as the operator chooses."
+    ),
 ]
 Cameras = Annotated[
     list[str] | None,
     typer.Option(
         "--camera",
-        help="A camera of the console's own, [name=]rtsp://…, v4l2:/dev/video0, udp://…, file:…; may be given again. "
-        "docs/media.md has the options.",
+        help="A camera attached to the console: \\[name=]rtsp://…, v4l2:/dev/video0, udp://…, file:…; repeat for "
+        "several. docs/media.md has the options.",
         metavar="SOURCE",
     ),
 ]
@@ -77,7 +82,7 @@ Microphones = Annotated[
     list[str] | None,
     typer.Option(
         "--microphone",
-        help="A microphone of the console's own, [name=]pulse:, alsa:hw:1, rtsp://…, file:…; may be given again.",
+        help="A microphone attached to the console: \\[name=]pulse:, alsa:hw:1, rtsp://…, file:…; repeat for several.",
         metavar="SOURCE",
     ),
 ]
@@ -85,29 +90,29 @@ Whip = Annotated[
     list[str] | None,
     typer.Option(
         "--whip",
-        help="A camera that operators may publish by WHIP, from a phone, OBS or GStreamer: NAME[#label=…,latency=s]; "
-        "may be given again. docs/media.md",
+        help="A camera that operators may publish by WHIP, from a phone, OBS or GStreamer: NAME\\[#label=…,latency=s]; "
+        "repeat for several. docs/media.md",
         metavar="NAME",
     ),
 ]
 Relay = Annotated[
     list[str] | None,
     typer.Option(
-        help="Observers beyond --observers-direct watch through it: janus:ws://host:8188/ROOM; "
-        "may be given again, then the first feeds the others. docs/relay.md",
+        help="Relay for the observers beyond --observers-direct: janus:ws://host:8188/ROOM; repeat for several, of "
+        "which the first feeds the others. docs/relay.md",
         metavar="janus:URL",
     ),
 ]
 ObserversDirect = Annotated[
-    int | None, typer.Option(min=0, help="Observers that the console serves itself when it has a relay; 10 unless set.")
+    int | None, typer.Option(min=0, help="Observers that the console serves itself when it has a relay. Default: 10.")
 ]
 Record = Annotated[
-    Path | None, typer.Option("--record", help="Record from the start on, into this directory.", metavar="DIR")
+    Path | None, typer.Option("--record", help="Record from the start, into this directory.", metavar="DIR")
 ]
 Speaker = Annotated[
     str | None,
     typer.Option(
-        help="Loudspeaker at the robot for the voice of who drives: pulse:[sink], alsa:device, file:path.wav.",
+        help="Loudspeaker at the robot, for the driver's voice: pulse:\\[sink], alsa:device, file:path.wav.",
         metavar="OUTPUT",
     ),
 ]

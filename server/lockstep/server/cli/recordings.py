@@ -36,9 +36,9 @@ EXIT_USAGE = 2
 HTTP_SECONDS = 30.0
 
 Json = Annotated[bool, typer.Option("--json", help="Print JSON.")]
-File = Annotated[Path, typer.Argument(help="A recording, or its id in the recordings' directory.")]
+File = Annotated[Path, typer.Argument(help="A recording: its file, or its id in the recordings' directory.")]
 DirectoryOption = Annotated[
-    Path | None, typer.Option("--dir", help="The recordings' directory; unset: that of the console's settings.")
+    Path | None, typer.Option("--dir", help="The recordings' directory. Unset: the one in the console's settings.")
 ]
 
 
@@ -56,7 +56,7 @@ def add_recording_commands(app: typer.Typer, make_settings: MakeSettings) -> Non
 
     @record.command("start")
     def record_start(
-        name: Annotated[str, typer.Option(help="What it is called in the list.")] = "",
+        name: Annotated[str, typer.Option(help="The recording's name in the list.")] = "",
         robot: RobotOption = "",
         state_dir: StateDirOption = None,
         as_json: Json = False,
@@ -93,7 +93,7 @@ def add_recording_commands(app: typer.Typer, make_settings: MakeSettings) -> Non
     def replay(
         file: File,
         host: Annotated[str, typer.Option(help="Address to listen on.")] = "127.0.0.1",
-        port: Annotated[int, typer.Option(min=0, max=65535, help="Port; 0 takes any free one.")] = 0,
+        port: Annotated[int, typer.Option(min=0, max=65535, help="Port; 0: any free port.")] = 0,
         directory: DirectoryOption = None,
         robot: RobotOption = "",
         state_dir: StateDirOption = None,
@@ -107,7 +107,10 @@ def add_recording_commands(app: typer.Typer, make_settings: MakeSettings) -> Non
     @app.command()
     def verify(
         file: File,
-        key: Annotated[str, typer.Option(help="Public key that has to have signed it; unset: any, or none.")] = "",
+        key: Annotated[
+            str,
+            typer.Option(help="The public key that must have signed the recording. Unset: any key, or no signature."),
+        ] = "",
         directory: DirectoryOption = None,
         robot: RobotOption = "",
         state_dir: StateDirOption = None,
@@ -131,9 +134,9 @@ def add_recording_commands(app: typer.Typer, make_settings: MakeSettings) -> Non
         file: File,
         to: Annotated[ExportFormat, typer.Option(help="mp4: pictures and sound; csv, parquet: tables; lerobot: v3.")],
         out: Annotated[
-            Path | None, typer.Option(help="File or directory to write; unset: beside the recording.")
+            Path | None, typer.Option(help="File or directory to write. Unset: beside the recording.")
         ] = None,
-        task: Annotated[str, typer.Option(help="lerobot: what was done, in words.")] = "",
+        task: Annotated[str, typer.Option(help="lerobot: the task, in words.")] = "",
         directory: DirectoryOption = None,
         robot: RobotOption = "",
         state_dir: StateDirOption = None,

@@ -22,9 +22,11 @@ class FleetMetrics:
         self._sessions: dict[str, Dependencies] = {}
         self._own = CollectorRegistry()
         self.bad_input = Counter(
-            "lockstep_bad_input", "Input refused, by where and why", ["where", "reason"], registry=self._own
+            "lockstep_bad_input", "Refused input, by place and reason", ["where", "reason"], registry=self._own
         )
-        self.internal_errors = Counter("lockstep_internal_errors", "Our own faults", ["where"], registry=self._own)
+        self.internal_errors = Counter(
+            "lockstep_internal_errors", "Faults of the console itself", ["where"], registry=self._own
+        )
         self.faults = Faults(self.internal_errors)
         self.registry = CollectorRegistry()
         self.exposition = Exposition(self.registry)
@@ -34,11 +36,11 @@ class FleetMetrics:
         self.robots = Gauge("lockstep_fleet_robots", "Robots of this console", registry=self.registry)
         self.session_failures = Counter(
             "lockstep_fleet_session_failures",
-            "Times a robot's session ended by a fault",
+            "Number of times that a fault ended a robot's session",
             ["robot"],
             registry=self.registry,
         )
-        self.stops = Counter("lockstep_fleet_stops", "Stops of all robots at once", registry=self.registry)
+        self.stops = Counter("lockstep_fleet_stops", "Stops of all robots together", registry=self.registry)
         self.registry.register(_Together(self._own, self._sessions))
 
     def watch(self, robot: str, session: Dependencies) -> None:

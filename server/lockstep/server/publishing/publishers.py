@@ -51,14 +51,14 @@ class Publishers:
         self._reserved: dict[PublishedCamera, str] = {}  # links that negotiate for a camera
         self._counted: dict[Publisher, dict[PacketOutcome, int]] = {}  # counts that the metrics have
         self._closing = False
-        self._publishers = Gauge("lockstep_whip_publishers", "Publishers that are here", registry=registry)
+        self._publishers = Gauge("lockstep_whip_publishers", "Connected publishers", registry=registry)
         self._ended = Counter("lockstep_whip_ended", "Publications that ended", ["why"], registry=registry)
         self._unused = Counter(
-            "lockstep_whip_unused", "Packets and pictures that could not be used", ["reason"], registry=registry
+            "lockstep_whip_unused", "Packets and pictures that were unusable", ["reason"], registry=registry
         )
         self._path = Gauge(
             "lockstep_whip_path_seconds",
-            "Shortest round trip to the publisher, by which its pictures are taken to be older",
+            "Shortest round trip to the publisher; its pictures count as older by this time",
             ["source"],
             registry=registry,
         )

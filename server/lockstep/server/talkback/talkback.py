@@ -47,10 +47,10 @@ class Talkback:
         self._told = Voice()
         self._timer: asyncio.TimerHandle | None = None
         self._packets = Counter(
-            "lockstep_voice_packets", "Opus packets of peers, by what became of them", ["outcome"], registry=registry
+            "lockstep_voice_packets", "Opus packets of peers, by outcome", ["outcome"], registry=registry
         )
-        self._speaking = Gauge("lockstep_voice_speaking", "1 while somebody is heard at the robot", registry=registry)
-        self._works = Gauge("lockstep_voice_speaker_works", "1 while the loudspeaker works", registry=registry)
+        self._speaking = Gauge("lockstep_voice_speaking", "1 if a voice plays at the robot, else 0", registry=registry)
+        self._works = Gauge("lockstep_voice_speaker_works", "1 if the loudspeaker works, else 0", registry=registry)
         self._works.set(spec is not None)
 
     @property

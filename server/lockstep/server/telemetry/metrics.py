@@ -18,14 +18,16 @@ MAX_LIMITS = 300  # names of limits that are counted apart, over all robots
 def describe_process(registry: CollectorRegistry) -> None:
     """Add the running versions as a metric, for dashboards and to compare two consoles."""
     labels = {"version": version("lockstep-console"), "python": platform.python_version()}
-    Gauge("lockstep_build_info", "1, with what runs as labels", list(labels), registry=registry).labels(**labels).set(1)
+    Gauge(
+        "lockstep_build_info", "Always 1; the labels name the versions that run", list(labels), registry=registry
+    ).labels(**labels).set(1)
 
 
 def certificate_end(registry: CollectorRegistry) -> Gauge:
     """Return the gauge of the certificate's end, which is set where TLS is served."""
     return Gauge(
         "lockstep_tls_certificate_end_seconds",
-        "When the certificate ends, s since 1970; 0 without TLS",
+        "The time at which the certificate expires, in seconds since 1970; 0 without TLS",
         registry=registry,
     )
 
@@ -46,48 +48,60 @@ class Metrics:
             describe_process(registry)
             self.certificate_end = certificate_end(registry)
         self.bad_input = Counter(
-            "lockstep_bad_input", "Input refused, by where and why", ["where", "reason"], registry=registry
+            "lockstep_bad_input", "Refused input, by place and reason", ["where", "reason"], registry=registry
         )
-        self.refusals = Counter("lockstep_refusals", "Commands and requests refused", ["reason"], registry=registry)
-        self.commands = Counter("lockstep_commands", "Commands from peers, by outcome", ["outcome"], registry=registry)
-        self.rests = Counter("lockstep_rests", "Rests forwarded, by why", ["why"], registry=registry)
-        self.stops = Counter("lockstep_stops", "Stops asked for, by where", ["where"], registry=registry)
-        self.resets = Counter("lockstep_resets", "Resets forwarded", registry=registry)
-        self.feedback = Counter("lockstep_feedback", "Feedback from the robot", registry=registry)
-        self.dropped = Counter("lockstep_dropped", "Messages dropped by a full queue", ["queue"], registry=registry)
-        self.peers = Gauge("lockstep_peers", "Peers connected", ["role"], registry=registry)
-        self.peers_ended = Counter("lockstep_peers_ended", "Peers gone, by why", ["why"], registry=registry)
+        self.refusals = Counter("lockstep_refusals", "Refused commands and requests", ["reason"], registry=registry)
+        self.commands = Counter("lockstep_commands", "Commands of peers, by outcome", ["outcome"], registry=registry)
+        self.rests = Counter("lockstep_rests", "Rests sent to the robot, by reason", ["why"], registry=registry)
+        self.stops = Counter("lockstep_stops", "Requests to stop, by the way they came", ["where"], registry=registry)
+        self.resets = Counter("lockstep_resets", "Resets sent to the robot", registry=registry)
+        self.feedback = Counter("lockstep_feedback", "Feedback messages of the robot", registry=registry)
+        self.dropped = Counter("lockstep_dropped", "Messages that a full queue dropped", ["queue"], registry=registry)
+        self.peers = Gauge("lockstep_peers", "Connected peers", ["role"], registry=registry)
+        self.peers_ended = Counter(
+            "lockstep_peers_ended", "Peers that have left, by reason", ["why"], registry=registry
+        )
         self.scene_viewers = Gauge("lockstep_scene_viewers", "Viewers of the 3D scene", registry=registry)
-        self.link_up = Gauge("lockstep_robot_link_up", "1 while the robot link is up", registry=registry)
-        self.link_losses = Counter("lockstep_robot_link_losses", "Times the robot link went down", registry=registry)
-        self.event = Gauge("lockstep_event", "Event reference", registry=registry)
-        self.speed_share = Gauge("lockstep_speed_share", "Share of full speed that the cap permits", registry=registry)
+        self.link_up = Gauge("lockstep_robot_link_up", "1 if the robot link is up, else 0", registry=registry)
+        self.link_losses = Counter(
+            "lockstep_robot_link_losses", "Number of times that the robot link went down", registry=registry
+        )
+        self.event = Gauge("lockstep_event", "The number of the newest event", registry=registry)
+        self.speed_share = Gauge(
+            "lockstep_speed_share", "Share of the full speed that the speed cap permits, 0 to 1", registry=registry
+        )
         self.speed_share.set(1)
         self.limited = Counter(
             "lockstep_limited_feedback",
-            "Feedback in which a limit or geofence slowed the robot",
+            "Feedback messages in which a limit or a geofence slowed the robot",
             ["limit"],
             registry=registry,
         )
         self._limits: set[str] = set()  # names that have a counter
-        self.stopped = Gauge("lockstep_stopped", "1 while the robot is stopped", registry=registry)
+        self.stopped = Gauge("lockstep_stopped", "1 if the robot is stopped, else 0", registry=registry)
         self.recording_failed = Gauge(
-            "lockstep_recording_failed", "1 while a recording is wanted and cannot be written", registry=registry
+            "lockstep_recording_failed", "1 if a recording is wanted but cannot be written, else 0", registry=registry
         )
         self.free_bytes = Gauge(
-            "lockstep_recording_free_bytes", "Free space where recordings are written", registry=registry
+            "lockstep_recording_free_bytes", "Free space in the recordings' directory", registry=registry
         )
         self.links_unreadable = Gauge(
-            "lockstep_links_unreadable", "1 while nobody gets in: which links are revoked is unknown", registry=registry
+            "lockstep_links_unreadable",
+            "1 if the console admits no one because it cannot read the list of revoked links, else 0",
+            registry=registry,
         )
-        self.audit_failing = Gauge("lockstep_audit_failing", "1 while the log cannot be written", registry=registry)
-        self.audit_lost = Counter("lockstep_audit_lost", "Audit records that were never written", registry=registry)
+        self.audit_failing = Gauge(
+            "lockstep_audit_failing", "1 if the audit log cannot be written, else 0", registry=registry
+        )
+        self.audit_lost = Counter("lockstep_audit_lost", "Audit records that are lost", registry=registry)
         self.audit_failures = Counter("lockstep_audit_failures", "Failed writes of the audit log", registry=registry)
-        self.internal_errors = Counter("lockstep_internal_errors", "Our own faults", ["where"], registry=registry)
+        self.internal_errors = Counter(
+            "lockstep_internal_errors", "Faults of the console itself", ["where"], registry=registry
+        )
         self.faults = Faults(self.internal_errors)
         self.robot_turnaround = Histogram(
             "lockstep_robot_turnaround_seconds",
-            "Command forwarded to its feedback received",
+            "Time from sending a command to the robot to receiving its feedback",
             buckets=(0.001, 0.002, 0.004, 0.006, 0.008, 0.012, 0.02, 0.05, 0.1, 0.5, 1.0),
             registry=registry,
         )

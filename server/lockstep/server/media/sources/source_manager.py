@@ -49,15 +49,24 @@ class SourceManager:
         self._failures = Counter(
             "lockstep_media_source_failures", "Failures of attached sources", ["source", "reason"], registry=registry
         )
-        self._live = Gauge("lockstep_media_source_live", "1 while it works", ["source"], registry=registry)
+        self._live = Gauge("lockstep_media_source_live", "1 if the source works, else 0", ["source"], registry=registry)
         self._captured = Counter(
-            "lockstep_media_source_captured", "Media of attached sources", ["source"], registry=registry
+            "lockstep_media_source_captured",
+            "Pictures and sound segments of attached sources",
+            ["source"],
+            registry=registry,
         )
         self._unstamped = Counter(
-            "lockstep_media_source_unstamped", "Media whose event is not known", ["source"], registry=registry
+            "lockstep_media_source_unstamped",
+            "Pictures and sound segments whose event is unknown",
+            ["source"],
+            registry=registry,
         )
         self._age = Gauge(
-            "lockstep_media_source_age_seconds", "From capture to here, the newest", ["source"], registry=registry
+            "lockstep_media_source_age_seconds",
+            "Time from capture to arrival of the newest picture or sound segment",
+            ["source"],
+            registry=registry,
         )
         for spec in specs:
             self._live.labels(spec.name).set(0)
