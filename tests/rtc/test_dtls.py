@@ -86,6 +86,35 @@ def test_application_data_right_behind_the_handshake_is_not_lost() -> None:
     assert [type(each) for each in pair.client.events()] == [DtlsConnected, DtlsData]
 
 
+def test_application_data_before_the_end_of_the_handshake_is_kept_whole() -> None:
+    pair = DtlsPair()
+    pair.start()
+    pair.server.receive_datagram(b"".join(pair.client.datagrams_to_send()), NOW)
+    for data in pair.server.datagrams_to_send():
+        pair.client.receive_datagram(data, NOW)
+    for data in pair.client.datagrams_to_send():
+        pair.server.receive_datagram(data, NOW)
+    handshake = pair.server.datagrams_to_send()
+    pair.server.send(bytes(5000), NOW)
+    for data in [*pair.server.datagrams_to_send(), *handshake]:
+        pair.client.receive_datagram(data, NOW)
+    assert len(max(handshake, key=len)) < 5000
+    assert pair.client.events()[1:] == [DtlsData(bytes(5000))]
+
+
+def test_a_datagram_of_data_with_a_record_that_was_changed_gives_the_others() -> None:
+    pair = DtlsPair()
+    pair.connect()
+    for text in (b"one", b"two", b"three"):
+        pair.client.send(text, NOW)
+    first, second, third = pair.client.datagrams_to_send()
+    pair.server.receive_datagram(first + second[:-1] + bytes((second[-1] ^ 1,)) + third, NOW)
+    assert pair.server.events() == [DtlsData(b"one"), DtlsData(b"three")]
+    pair.client.send(b"four", NOW)
+    pair.server.receive_datagram(pair.client.datagrams_to_send()[0], NOW)
+    assert pair.server.events() == [DtlsData(b"four")]
+
+
 @pytest.mark.parametrize("lost", range(8))
 def test_a_lost_datagram_of_the_handshake_is_sent_again(lost: int) -> None:
     pair = DtlsPair(settings=DtlsSettings(mtu=600))

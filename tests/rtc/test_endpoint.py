@@ -276,7 +276,7 @@ async def test_plain_packets_come_by_a_short_way_and_everything_else_by_its_own(
             f"message {number}" for number in range(3)
         ]
         assert watcher.peer.receive_plain(b"\x80\x60" + bytes(20)), "somebody else's: dropped"
-        assert watcher.peer.plain_packets() == []
+        assert watcher.peer.settled_events() == []
         watcher.close()
         assert not watcher.peer.receive_plain(b"\x80\x60" + bytes(20))
 

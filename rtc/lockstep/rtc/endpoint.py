@@ -152,7 +152,13 @@ class Connection:
 
     def send(self, channel: int, data: str | bytes) -> None:
         self.peer.send(channel, data, self._loop.time())
-        self.flush()
+        if self.fault is not None:
+            return
+        self._endpoint.send(self.peer.datagrams_to_send(), urgent=self.urgent)
+        if self.peer.has_events:
+            self.flush()
+        else:
+            self._set_timer_by(self.peer.channel_timer)
 
     def close_channel(self, channel: int) -> None:
         self.peer.close_channel(channel, self._loop.time())
@@ -197,9 +203,9 @@ class Connection:
         if self.fault is None:
             try:
                 self.peer.close(self._loop.time())
+                self.flush()
             except Exception as error:
                 self._fail(error)
-            self.settle()
 
     # Events
 
@@ -258,16 +264,17 @@ class Connection:
         """Note that the TCP connection of this path has ended."""
         try:
             self.peer.ice.path_closed(path, self._loop.time())
-        except Exception as error:
-            self._fail(error)
-        self.settle()
-
-    def settle(self) -> None:
-        """Do as `flush`; an exception ends this connection and no other."""
-        try:
             self.flush()
         except Exception as error:
             self._fail(error)
+
+    def settle(self) -> None:
+        """Do as `flush` after `receive`; an exception ends this connection and no other."""
+        if self.fault is None:
+            try:
+                self._finish(self.peer.settled_events())
+            except Exception as error:
+                self._fail(error)
 
     def _fail(self, error: Exception) -> None:
         """End this connection after unexpected input: a fault of this package, which other peers must not feel.
@@ -289,9 +296,11 @@ class Connection:
 
     def flush(self) -> None:
         """Send the due datagrams, hand out the events, and set the timer anew. Call it after using `peer` directly."""
-        if self.fault is not None:
-            return
-        self._hand_out(self.peer.events())
+        if self.fault is None:
+            self._finish(self.peer.events())
+
+    def _finish(self, events: Sequence[PeerEvent]) -> None:
+        self._hand_out(events)
         self._endpoint.send(self.peer.datagrams_to_send(), urgent=self.urgent)
         if self.peer.has_events:  # a channel is empty now
             self._hand_out(self.peer.events())
@@ -303,7 +312,7 @@ class Connection:
 
     def hand_out_plain(self) -> None:
         """Hand out plain packets, in place of `flush` where only `Peer.receive_plain` was called."""
-        self._hand_out(self.peer.plain_packets())
+        self._hand_out(self.peer.settled_events())
 
     def _hand_out(self, events: Sequence[PeerEvent]) -> None:
         if self._listener is not None:
@@ -408,6 +417,7 @@ class Endpoint:
         self._sockets: dict[Address, UdpSocket] = {}
         self._tcp: TcpPort | None = None
         self._flush_is_due = False
+        self._full = set[UdpSocket]()  # sockets for which the loop watches whether the kernel has room again
         self._dropped_before: Counter[str] = Counter()  # of connections that have ended
         self._connections: dict[Agent, Connection] = {}
         self._hosts = list(hosts)
@@ -702,5 +712,7 @@ class Endpoint:
             found.flush()
             if found.wants_write:
                 self._loop.add_writer(found.fileno(), self._flush)
-            else:
+                self._full.add(found)
+            elif found in self._full:
                 self._loop.remove_writer(found.fileno())
+                self._full.remove(found)

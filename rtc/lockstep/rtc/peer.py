@@ -339,7 +339,7 @@ class Peer:
         self._plain_packets = True
 
     def receive_plain(self, data: bytes) -> bool:
-        """Take a media datagram the short way, after `take_plain_packets`; drain `plain_packets`.
+        """Take a media datagram the short way, after `take_plain_packets`; drain `settled_events`.
 
         It came on a path of this peer. Return False for another datagram, which is for `receive_datagram`. This makes
         no timer and nothing to send.
@@ -352,11 +352,6 @@ class Peer:
         if plain is not None:
             self._events.append(PlainRtp(plain))
         return True
-
-    def plain_packets(self) -> list[PeerEvent]:
-        """Return the events, when nothing but `receive_plain` was called since the last."""
-        events, self._events = self._events, []
-        return events
 
     def send_rtcp(self, packet: bytes) -> None:
         """Send a compound packet of the application. Raises PeerNotReady before media are up, SrtpPacketTooLong."""
@@ -445,6 +440,11 @@ class Peer:
     def media_timer(self) -> float | None:
         """The time at which `handle_timer` is due for the sake of outgoing media."""
         return None if self._ended else self._media_due
+
+    @property
+    def channel_timer(self) -> float | None:
+        """The time at which `handle_timer` is due for the sake of data channels."""
+        return None if self._ended or self.channels is None else self.channels.timer()
 
     def _drained(self, stream: OutgoingStream) -> list[bytes]:
         if self._protect is None or self.streams is None:
@@ -577,10 +577,19 @@ class Peer:
     @property
     def has_events(self) -> bool:
         """True if sending has made events: `events` has more."""
-        return bool(self._events) or (self.channels is not None and self.channels.has_events)
+        return bool(
+            self._events
+            or (self.channels is not None and self.channels.has_events)
+            or (self._dtls is not None and self._dtls.has_events)
+        )
 
     def events(self) -> list[PeerEvent]:
         self._settle(self._now)
+        return self.settled_events()
+
+    def settled_events(self) -> list[PeerEvent]:
+        """Like `events`, for less, if `receive_datagram`, `receive_plain` or `handle_timer` was called last: those
+        leave no core with an event that another one must know."""
         events, self._events = self._events, []
         return events
 

@@ -153,6 +153,7 @@ class Peer:
         endpoint = self._endpoint = open_endpoint(self._hosts())
         await self._ask_servers(endpoint)
         connection = self._connection = endpoint.connect(controlling=True, listener=self._happened)
+        connection.urgent = True  # a command waits for no turn of the loop: nothing else leaves from this endpoint
         self._packets = Packets(connection)
         sdp = write_description(connection.offer(self._offered))
         sent = sdp if self._route is None else self._route.offer(sdp)
