@@ -18,18 +18,16 @@ from lockstep.protocol.console import Role, ServerMessage
 from lockstep.protocol.description import RobotDescription
 from lockstep.protocol.messages import Command, Feedback, LinkMessage, Refusal, Reset, Rest, Stop, StopTaken
 from lockstep.protocol.serial import event_after, is_newer
-from lockstep.server.audit.audit_tail import AuditTail
-from lockstep.server.audit.audit_trail import AuditTrail
 from lockstep.server.audit.records import Actor
 from lockstep.server.auth.tokens import Identity
 from lockstep.server.control import stop_service
 from lockstep.server.control.command_arbiter import CommandArbiter, Forward, ForwardRest
 from lockstep.server.control.seat import ControlSeat, SeatOutcome, SeatTimes
-from lockstep.server.control.session_listener import SessionListener
 from lockstep.server.control.stop_service import StopService
 from lockstep.server.errors import ConsoleError, Silenced
 from lockstep.server.event_clock import EventClock
 from lockstep.server.peers.peer_registry import PeerRegistry
+from lockstep.server.session_events import SessionEvents
 from lockstep.server.stop.stop_keeper import StopKeeper
 from lockstep.server.stop.stop_presses import Press
 from lockstep.server.stop.stop_store import KeptStops
@@ -162,7 +160,10 @@ class Promises:
 
 
 class ConsoleModel:
-    """One run of a console, as `lockstep.server.control.console.Console` puts its parts together."""
+    """One run of a console, as `lockstep.server.control.console.Console` puts its parts together.
+
+    Nobody subscribes to its events.
+    """
 
     def __init__(self, world: "World", disk: Disk) -> None:
         self.up = False
@@ -181,9 +182,7 @@ class ConsoleModel:
             cast(PeerRegistry, self.people),
             self.clock,
             lambda: self.seat.holder,
-            AuditTrail(self.clock, AuditTail()),
-            METRICS,
-            SessionListener(),
+            SessionEvents(METRICS.faults),
         )
         self._parts = [world.loop.create_task(part()) for part in (self.keeper.run, self.service.run)]
         self._requests: list[asyncio.Task[None]] = []

@@ -17,7 +17,8 @@ from lockstep.server.audit.records import Actor, AuditRecord
 from lockstep.server.auth.silenced_links import SILENCE_SECONDS
 from lockstep.server.auth.tokens import Identity
 from lockstep.server.control import stop_service
-from lockstep.server.control.session_listener import SessionListener
+from lockstep.server.control.notices import Notices
+from lockstep.server.control.session_audit import STOPS, SessionAudit
 from lockstep.server.control.stop_service import StopService
 from lockstep.server.errors import (
     ConsoleError,
@@ -34,6 +35,7 @@ from lockstep.server.errors import (
 from lockstep.server.event_clock import EventClock
 from lockstep.server.peers.peer import Peer
 from lockstep.server.peers.peer_registry import PeerRegistry
+from lockstep.server.session_events import SessionEvents
 from lockstep.server.stop.stop_keeper import StopKeeper
 from lockstep.server.stop.stop_presses import Press, new_press
 from lockstep.server.telemetry.metrics import Metrics
@@ -95,6 +97,9 @@ class FakePeers:
     def tell(self, channel: str, message: ServerMessage) -> None:
         self.told.append(message)
 
+    def announce(self, message: ServerMessage) -> None:
+        self.told.append(message)
+
 
 class Bench:
     """Ann holds the seat; the link is up."""
@@ -106,15 +111,17 @@ class Bench:
         self.holder = "ann-1"
         self.issue = 0
         self.audit = AuditTrail(self.clock, self.tail)
+        self.notices = Notices(cast(PeerRegistry, self.peers))
+        events = SessionEvents(Metrics(process=False).faults)
+        SessionAudit(self.audit).subscribe(events)
+        self.notices.subscribe(events)
         self.service = StopService(
             self.robot,
             self.keeper,
             cast(PeerRegistry, self.peers),
             self.clock,
             lambda: self.holder,
-            self.audit,
-            Metrics(process=False),
-            SessionListener(),
+            events,
         )
 
     def press(self, who: str, id_: str, where: str = "stop") -> Press:
@@ -158,7 +165,8 @@ class Bench:
 @pytest.fixture
 async def bench(tmp_path: Path) -> AsyncIterator[Bench]:
     made = Bench(tmp_path)
-    tasks = [asyncio.create_task(made.keeper.run()), asyncio.create_task(made.service.run())]
+    parts = (made.keeper.run, made.service.run, made.service.watch_disk)
+    tasks = [asyncio.create_task(part()) for part in parts]
     yield made
     for task in tasks:
         task.cancel()
@@ -366,7 +374,7 @@ async def test_a_failed_write_is_said_to_whoever_pressed_and_to_everybody(
     assert "not on the console's disk" in outcome.detail
     assert any("disk" in each.text for each in bench.peers.told if isinstance(each, Notice))
     assert [each.what for each in bench.records("stop")][-1] == "kept in memory only"
-    assert bench.service.trouble
+    assert len(list(bench.notices.for_newcomers())) == 1
 
 
 async def test_a_flood_of_presses_of_one_link_is_few_stops_with_all_answered_and_anothers_goes_at_once(
@@ -419,19 +427,19 @@ async def test_a_flood_of_presses_becomes_few_records(bench: Bench) -> None:
     bench.press("ann", "a")
     bench.take("a", 201)
     records = bench.records("stop")
-    assert len(records) <= stop_service.RECORDS + 4
+    assert len(records) <= STOPS + 4
     assert sum(record.count for record in records if record.who == "olga") >= 199
     assert [each.what for each in records if each.who == "ann"] == ["stop, stop 201"]
 
 
 async def test_a_flood_of_presses_becomes_few_lines_of_the_log(bench: Bench) -> None:
     with capture_logs() as logs:
-        for number in range(2 * stop_service.RECORDS):
+        for number in range(2 * stop_service.LINES):
             bench.press("olga", str(number))
             bench.take(str(number), number + 1)
         bench.press("sue", "f")
     written = [line["by"] for line in logs if line["event"] == "stop"]
-    assert 1 <= written.count("olga") < 2 * stop_service.RECORDS
+    assert 1 <= written.count("olga") < 2 * stop_service.LINES
     assert written.count("sue") == 1
 
 

@@ -13,10 +13,8 @@ import structlog
 
 from lockstep.protocol.console import Notice
 from lockstep.protocol.messages import Refusal, RefusalReason, Reset, Stop, StopState, StopTaken
-from lockstep.server.audit.audit_trail import AuditTrail
 from lockstep.server.audit.records import Actor
 from lockstep.server.auth.silenced_links import SilencedLinks
-from lockstep.server.control.session_listener import SessionListener
 from lockstep.server.errors import (
     LinkDown,
     LockedOut,
@@ -33,10 +31,23 @@ from lockstep.server.errors import (
 from lockstep.server.event_clock import EventClock
 from lockstep.server.peers.peer import Peer
 from lockstep.server.peers.peer_registry import PeerRegistry
+from lockstep.server.session_events import (
+    Refused,
+    ResetDone,
+    ResetRefused,
+    SessionEvents,
+    SilenceChanged,
+    StopAnswered,
+    StopAsked,
+    StopRepeated,
+    StopsDiskChanged,
+    StopSent,
+    StopSilenced,
+    StopUndelivered,
+)
 from lockstep.server.stop.reset_attempts import RESET_REASONS, ResetAttempts, ResetOutcome
 from lockstep.server.stop.stop_keeper import StopKeeper
 from lockstep.server.stop.stop_presses import AlreadyTaken, Held, NewPress, Press, Settled, told_id
-from lockstep.server.telemetry.metrics import Metrics
 from lockstep.server.util.rate_limits import RateLimits
 
 __all__ = ["SILENCED", "StopAnswer", "StopOutcome", "StopService", "StopsLink"]
@@ -48,13 +59,10 @@ AGAIN_SECONDS = 0.5  # until an unanswered press is sent again, on a link that i
 WATCH_SECONDS = 0.1  # between two checks, while something is unanswered
 MAX_LISTENERS = 16  # connections that are told of one press
 PRESSES, PRESS_RATE = 20, 20.0  # Hz, of one link by any path: new ones, and answers to repeats
-RECORDS, RECORD_RATE = 5, 0.2  # Hz, of stops of one link, in full and in the log; the audit counts the others
+LINES, LINE_RATE = 5, 0.2  # Hz, of the log, for stops of one link
 RESETS, RESET_RATE = 5, 1.0  # Hz, of one link
 ROBOT_RESETS, ROBOT_RESET_RATE = 10, 2.0  # Hz, of all links together
 
-UNDELIVERED = "The stop could not be delivered: there is no link to the robot. It is sent first when the link is back."
-UNWRITTEN = "Stops cannot be kept on this console's disk ({}). They are kept in memory, until this console ends."
-WRITTEN = "Stops can be kept on this console's disk again."
 SILENCED = (
     "A supervisor has silenced the STOP of your link, and of all links that you invited with it, for ten minutes. "
     "What you stopped stays stopped."
@@ -116,9 +124,9 @@ class _Asker(NamedTuple):
 
 
 class StopService:
-    """Handles the stops and resets of one robot. Run `run` as a task.
+    """Handles the stops and resets of one robot. Run `run` and `watch_disk` as tasks.
 
-    Everything but `outcome` and `reset` is called on the loop and returns at once.
+    Everything else but `outcome` and `reset` is called on the loop and returns at once.
     """
 
     def __init__(
@@ -128,9 +136,7 @@ class StopService:
         peers: PeerRegistry,
         clock: EventClock,
         holder: Callable[[], str],
-        audit: AuditTrail,
-        metrics: Metrics,
-        listener: SessionListener,
+        events: SessionEvents,
         silenced: SilencedLinks | None = None,
     ) -> None:
         """`holder`: the peer that holds the control seat, or "". `silenced`: of all robots; None: of this one alone."""
@@ -140,17 +146,14 @@ class StopService:
         self._peers = peers
         self._clock = clock
         self._holder = holder
-        self._audit = audit
-        self._metrics = metrics
-        self._listener = listener
+        self._events = events
         self._silenced = SilencedLinks() if silenced is None else silenced
         self._resets: ResetAttempts[_Asker] = ResetAttempts()
         self._link_resets = RateLimits(RESET_RATE, RESETS)
         self._robot_resets = RateLimits(ROBOT_RESET_RATE, ROBOT_RESETS)
         self._link_presses = RateLimits(PRESS_RATE, PRESSES)
         self._link_repeats = RateLimits(PRESS_RATE, PRESSES)
-        self._records = RateLimits(RECORD_RATE, RECORDS)
-        self._logged = RateLimits(RECORD_RATE, RECORDS)
+        self._logged = RateLimits(LINE_RATE, LINES)
         self._listeners: dict[str, list[tuple[str, str]]] = {}  # press -> (waiting peer, id that it knows)
         self._late = {press.id for press in self._presses.pending}  # "not delivered yet" is in the audit
         self._deadlines: dict[str, float] = {}  # press -> end of the wait for its answer
@@ -160,17 +163,12 @@ class StopService:
         if self._late:
             self._wake.set()  # another console may have the link for commands: then nothing else sends these
         self._news = asyncio.Event()  # replaced at every answer
-        keeper.on_trouble = self._trouble_changed
+        self._disk_trouble = keeper.trouble  # as it was published last
 
     @property
     def unconfirmed(self) -> bool:
         """True if a stop is on its way that the robot has not answered."""
         return bool(self._presses.pending)
-
-    @property
-    def trouble(self) -> str:
-        """The warning to newcomers about the disk; "" when nothing is wrong."""
-        return UNWRITTEN.format(self._keeper.trouble) if self._keeper.trouble else ""
 
     # STOP
 
@@ -182,9 +180,9 @@ class StopService:
         """
         press = msgspec.structs.replace(press, by=self._named(press.by))
         by, where = press.by, press.where
-        self._metrics.stops.labels(where).inc()
+        self._events.publish(StopAsked(by, where))
         if by.link and self._silenced.holds(by.link, time.monotonic()):
-            self._audit.refused(by, "silenced")
+            self._events.publish(StopSilenced(by))
             raise Silenced(SILENCED)
         if (taken := self._presses.outcome(press.id)) is not None and self._is_released(taken):
             self._presses.forget(press.id)  # the robot may move: it decides whether this is a repeat or a new stop
@@ -195,7 +193,7 @@ class StopService:
             self._listen(by.peer, press.id, told_id(press, given))
         match outcome:
             case AlreadyTaken(taken):
-                self._audit.again("stop", by, f"{where}, again")
+                self._events.publish(StopRepeated(by, where))
                 self._answer(press.id, taken)  # a sender that repeats too fast sees it in the state of the stop
             case NewPress(_, replaced):
                 self._await(press, replaced)
@@ -203,7 +201,7 @@ class StopService:
             case Held(_, replaced):
                 self._await(press, replaced)
             case _:
-                self._audit.again("stop", by, f"{where}, again")
+                self._events.publish(StopRepeated(by, where))
 
     def _named(self, by: Actor) -> Actor:
         """Return `by` with its name here, if only one person has the link: a request over HTTP carries no name."""
@@ -225,12 +223,10 @@ class StopService:
 
     def _send_new(self, press: Press) -> None:
         sent = self._robot.send_stop(press.message())
-        self._listener.stop_asked(press.by, press.where, press.reason, press.id, delivered=sent)
+        self._events.publish(StopSent(press, sent, alone=len(self._presses.pending) == 1))
         if self._logged.spend(press.by.link or press.by.name, time.monotonic()):
             log.warning("stop", by=press.by.name, where=press.where, reason=press.reason, sent=sent)
         if not sent:
-            if len(self._presses.pending) == 1:
-                self._peers.tell("session", Notice(level="error", text=UNDELIVERED))
             self._not_delivered(press)
 
     def _forget_settled(self) -> None:
@@ -245,7 +241,7 @@ class StopService:
         self._deadlines.pop(press.id, None)
         if press.id not in self._late:
             self._late.add(press.id)
-            self._record(press, f"{press.where}, not delivered yet")
+            self._events.publish(StopUndelivered(press))
 
     async def outcome(self, press: str) -> StopOutcome:
         """Return the outcome of a press. Waits a second for the bridge, and for the disk if the robot is away."""
@@ -329,10 +325,7 @@ class StopService:
             self._deadlines.pop(press.id, None)
             late = press.id in self._late
             self._late.discard(press.id)
-            more = "" if answer.kept else ", not on the robot's disk"
-            more += ", reset before" if self._is_released(answer) else ""
-            self._record(press, f"{press.where}{', sent again' if late else ''}, stop {answer.number}{more}")
-            self._listener.stop_taken(press.by, answer)
+            self._events.publish(StopAnswered(press, answer, again=late, released=self._is_released(answer)))
             self._answer(press.id, answer)
         self._spread()
 
@@ -374,13 +367,12 @@ class StopService:
 
         def tell(outcome: ResetOutcome[_Asker]) -> None:
             if outcome.reason is not None:
-                self._metrics.refusals.labels(outcome.reason).inc()
                 event = self._clock.event
                 refusal = Refusal(
                     event=0, reason=outcome.reason, current=event, detail=outcome.detail[:500], stop=outcome.number
                 )
-                self._listener.refused(peer.actor, refusal, "console")
                 peer.send("stop", refusal)
+                self._events.publish(Refused(peer.actor, "stop", refusal, "console"))
 
         self._ask_reset(_Asker(peer.actor, "stop", tell), number)
 
@@ -426,12 +418,10 @@ class StopService:
         for outcome in outcomes:
             by, where = outcome.asker.by, outcome.asker.where
             if outcome.reason is None:
-                self._metrics.resets.inc()
-                self._audit.record("reset", by, where, f"stop {outcome.number}")
-                self._listener.reset_done(by, where, outcome.number)
+                self._events.publish(ResetDone(by, where, outcome.number))
                 log.warning("reset", by=by.name, where=where, stop=outcome.number)
             else:
-                self._audit.again("reset", by, f"{where}, refused {outcome.reason}")
+                self._events.publish(ResetRefused(by, where, outcome.reason))
             outcome.asker.tell(outcome)
 
     def _reset_error(self, reason: str, detail: str) -> Exception:
@@ -463,9 +453,9 @@ class StopService:
         link, now = found.identity.token_id, time.monotonic()
         if silent:
             self._silenced.silence(link, now)
-            self._audit.record("silence", by.actor, "silenced", f"{found.name} ({link})")
+            self._events.publish(SilenceChanged(by.actor, found.name, link, silent=True))
         elif self._silenced.hear(link, now):
-            self._audit.record("silence", by.actor, "heard again", f"{found.name} ({link})")
+            self._events.publish(SilenceChanged(by.actor, found.name, link, silent=False))
         self.show_silence()
         return None
 
@@ -507,17 +497,11 @@ class StopService:
         self._settle(self._resets.expire(now))
         return bool(self._presses.pending or self._resets)
 
-    def _record(self, press: Press, what: str) -> None:
-        """Record the first stops of each link in full; a flood becomes one record a second."""
-        if self._records.spend(press.by.link or press.by.name, time.monotonic()):
-            self._audit.record("stop", press.by, what, press.reason)
-        else:
-            self._audit.again("stop", press.by, f"{press.where}, more")
-
-    def _trouble_changed(self, trouble: str) -> None:
-        self._audit.record("stop", what="kept in memory only" if trouble else "kept on disk again", detail=trouble)
-        notice = Notice(level="warning", text=self.trouble) if trouble else Notice(level="info", text=WRITTEN)
-        self._peers.tell("session", notice)
+    async def watch_disk(self) -> None:
+        """Publish whether stops can be kept on disk, whenever that changes, until cancelled."""
+        while True:
+            self._disk_trouble = await self._keeper.trouble_other_than(self._disk_trouble)
+            self._events.publish(StopsDiskChanged(self._disk_trouble))
 
     def _spread(self) -> None:
         self._news.set()

@@ -2,6 +2,7 @@
 
 import asyncio
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import structlog
@@ -148,7 +149,7 @@ class FleetSession:
     ) -> None:
         own = Metrics(process=False)
         async with running_session(self.settings, context, own, StateDir(directory), self.name, stops) as made:
-            made.audit.on_record = lambda record: told(self.name, record)
+            made.events.subscribe(AuditRecord, partial(told, self.name))
             attach_session(self.app, made)
             metrics.watch(self.name, made)
             self.settled.set()
