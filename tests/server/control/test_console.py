@@ -22,9 +22,11 @@ from lockstep.protocol.messages import (
 )
 from lockstep.server.audit.audit_tail import AuditTail
 from lockstep.server.audit.audit_trail import AuditTrail
+from lockstep.server.auth.silenced_links import SilencedLinks
 from lockstep.server.auth.tokens import Identity
 from lockstep.server.control.console import Console
 from lockstep.server.control.seat import ControlSeat, SeatOutcome, SeatTimes
+from lockstep.server.control.stop_silence import StopSilence
 from lockstep.server.event_clock import EventClock
 from lockstep.server.peers.peer_registry import PeerRegistry
 from lockstep.server.peers.websocket_peer import WebSocketPeer
@@ -62,7 +64,10 @@ def _console(settings: Settings, metrics: Metrics, stops: StopKeeper, events: Se
     clock, events = EventClock(), events or SessionEvents(metrics.faults)
     seat, audit = ControlSeat(SeatTimes(settings.seat_timeout)), AuditTrail(clock, AuditTail())
     peers = PeerRegistry(settings, metrics)
-    return Console(settings, events, metrics.faults, FakePlane(), peers, seat, audit, clock, stops=stops)
+    silence = StopSilence(SilencedLinks(), peers, events)
+    return Console(
+        settings, events, metrics.faults, FakePlane(), peers, seat, audit, clock, stops=stops, silence=silence
+    )
 
 
 async def test_a_background_task_that_fails_is_counted_and_runs_again(

@@ -12,6 +12,7 @@ from lockstep.server.control.notices import Notices
 from lockstep.server.control.seat import ControlSeat, SeatTimes
 from lockstep.server.control.session_audit import SessionAudit
 from lockstep.server.control.session_metrics import SessionMetrics
+from lockstep.server.control.stop_silence import StopSilence
 from lockstep.server.event_clock import EventClock
 from lockstep.server.evidence.anchors import anchor_text
 from lockstep.server.media.hub import MediaHub
@@ -117,6 +118,7 @@ async def _session(
     trail = AuditTrail(clock, audit)
     seat = ControlSeat(SeatTimes(settings.seat_timeout, settings.seat_idle_seconds, settings.seat_claim_seconds))
     peers = PeerRegistry(settings, metrics, [context.check_room])
+    silence = StopSilence(context.silenced, peers, events)
     media = MediaHub(settings.media, metrics.registry, settings.sources, on_fault=metrics.faults.caught)
     scene = SceneView(settings.scene_hz, settings.max_scene_viewers, metrics) if settings.scene else None
     shelf = RecordingStore(recordings_directory(settings.recording, directory.path), settings.recording)
@@ -142,7 +144,7 @@ async def _session(
         trail,
         clock,
         stops=stops,
-        silenced=context.silenced,
+        silence=silence,
         relays=[relays],
         further_news=notices.for_newcomers,
     )
@@ -153,7 +155,7 @@ async def _session(
     relays.subscribe(events)
     if scene is not None:
         scene.subscribe(events)
-    revocation = TokenRevocation(context.state.invitations, peers, trail, robot, console.stops.show_silence)
+    revocation = TokenRevocation(context.state.invitations, peers, trail, silence, robot)
     publishers = Publishers(sources.published, revocation.ended, trail, metrics.faults, metrics.registry)
     follow_clock(clock, robot)
     made = Dependencies(

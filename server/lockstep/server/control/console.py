@@ -42,7 +42,6 @@ from lockstep.protocol.messages import (
 )
 from lockstep.server.audit.audit_trail import AuditTrail
 from lockstep.server.audit.records import Actor
-from lockstep.server.auth.silenced_links import SilencedLinks
 from lockstep.server.control.command_arbiter import (
     Absorbed,
     Answer,
@@ -53,10 +52,12 @@ from lockstep.server.control.command_arbiter import (
     RestOutcome,
 )
 from lockstep.server.control.participants import ParticipantList
+from lockstep.server.control.reset_service import ResetService
 from lockstep.server.control.seat import ControlSeat, SeatRefusal
 from lockstep.server.control.seat_keeper import SeatKeeper
 from lockstep.server.control.speed_cap import SpeedCap
 from lockstep.server.control.stop_service import StopService
+from lockstep.server.control.stop_silence import StopSilence
 from lockstep.server.errors import ChannelError, Flood, Silenced
 from lockstep.server.event_clock import EventClock
 from lockstep.server.peers.channels import ChannelName
@@ -117,7 +118,7 @@ class Console:
         clock: EventClock,
         *,
         stops: StopKeeper,
-        silenced: SilencedLinks | None = None,
+        silence: StopSilence,
         relays: Sequence[FeedbackReceiver] = (),
         further_news: Callable[[], Iterable[ServerMessage]] = tuple,
     ) -> None:
@@ -125,7 +126,6 @@ class Console:
 
         Args:
             audit: the trail that the console runs
-            silenced: the silenced links of all robots of this console; None: this robot has its own
             relays: get feedback as observers do
             further_news: returns messages for newcomers, besides those of the console itself
         """
@@ -141,7 +141,9 @@ class Console:
         self.people = ParticipantList(peers, clock, events, self.seat.renamed)
         self.speed_cap = SpeedCap(settings.speed_cap)
         self._arbiter = CommandArbiter(clock, seat, stops.presses, self.speed_cap)
-        self.stops = StopService(self.robot, stops, peers, clock, self._holder, events, silenced)
+        self.silence = silence
+        self.stops = StopService(self.robot, stops, peers, clock, silence, events)
+        self.resets = ResetService(self.robot, self.stops, peers, clock, seat, events)
         self._fanout = FeedbackFanout(
             settings.observer_feedback_hz, self._is_driven_by, peers.drivers, peers.observers, relays
         )
@@ -158,6 +160,7 @@ class Console:
             tasks.create_task(self._guard("seat", self.seat.watch))
             tasks.create_task(self._guard("stops", self.stops.run))
             tasks.create_task(self._guard("disk of stops", self.stops.watch_disk))
+            tasks.create_task(self._guard("resets", self.resets.run))
             tasks.create_task(self._guard("audit", self.audit.run))
             tasks.create_task(self._guard("participants", self.people.share))
             tasks.create_task(self._guard("robot", self.robot.run))
@@ -182,7 +185,7 @@ class Console:
     # PeerHost
 
     def peer_joined(self, peer: Peer) -> None:
-        peer.silenced = self.stops.is_silenced(peer.identity.token_id)
+        peer.silenced = self.silence.holds(peer.identity.token_id)
         peer.drives(False)
         self.people.joined(peer)
 
@@ -222,7 +225,7 @@ class Console:
                 if (reason := self.people.write(peer, message.text)) is not None:
                     self._refuse_request(peer, reason, "note")
             case Reset():
-                self.stops.reset_by_peer(peer, message.number)
+                self.resets.reset_by_peer(peer, message.number)
             case SeatRequest() | SeatGrant() | SeatDecline() | SeatTake() | SilenceStops() | Rename() if (
                 not peer.asks.take(now)
             ):
@@ -270,6 +273,7 @@ class Console:
     def epoch_began(self, epoch: str, description: RobotDescription) -> None:
         """Begin an epoch. References of different epochs are never compared, so every peer starts anew."""
         self.stops.epoch_ends(self.clock.stop)
+        self.resets.link_down("the robot bridge was started anew")
         self._arbiter.epoch_ends()
         self.clock.begin(epoch)
         self.speed_cap.forget()
@@ -289,7 +293,8 @@ class Console:
     def link_down(self, detail: str) -> None:
         was_up, self._link_was_up = self._link_was_up, False
         self._arbiter.link_down()
-        self.stops.link_down(detail)
+        self.stops.link_down()
+        self.resets.link_down(detail)
         description = self.robot.description
         state = None if description is None else self.state_of_robot(description)
         self._events.publish(LinkDown(state, detail, was_up))
@@ -304,7 +309,7 @@ class Console:
             return
         had_command = self._arbiter.in_flight is not None
         self._arbiter.feedback(feedback)
-        self.stops.feedback(feedback.stop)
+        self.resets.feedback(feedback.stop)
         self._fanout.publish(encode_console_message(feedback))
         self.speed_cap.fed_back(feedback, now)
         is_answer = had_command and self._arbiter.in_flight is None
@@ -314,7 +319,7 @@ class Console:
             self._events.publish(StopShown(feedback.stop, feedback.event))
 
     def refusal_received(self, refusal: Refusal) -> None:
-        if self.stops.refused(refusal):
+        if self.resets.refused(refusal):
             return
         peer = self.peers.by_id(self._arbiter.refused(refusal))
         if peer is not None:
@@ -373,15 +378,12 @@ class Console:
             )
 
     def _silence(self, peer: Peer, message: SilenceStops) -> None:
-        reason = self.stops.silence(peer, message.peer, silent=message.silent)
+        reason = self.silence.silence(peer, message.peer, silent=message.silent)
         if reason is not None:
             self._refuse_request(peer, reason, "supervisors silence the stops of operators and observers")
 
     def _is_driven_by(self, peer: FeedbackReceiver) -> bool:
         return isinstance(peer, Peer) and self.seat.rules.holds(peer.id)
-
-    def _holder(self) -> str:
-        return self.seat.rules.holder
 
     def _refuse_request(self, peer: Peer, reason: RefusalReason, detail: str = "") -> None:
         self._refuse(peer, "session", Refusal(event=0, reason=reason, current=self.clock.event, detail=detail))

@@ -1,42 +1,23 @@
-"""Handles STOP at the console: takes it from everybody, keeps it until the bridge confirms it, and resets it.
+"""Handles STOP at the console: takes it from everybody, and keeps it until the bridge confirms it.
 
-The rules are in `stop_presses.py`, `reset_attempts.py` and `silenced_links.py`; this module does their I/O.
+The rules are in `stop_presses.py`; this module does their I/O.
 """
 
 import asyncio
 import time
-from collections.abc import Callable
 from typing import NamedTuple, Protocol
 
 import msgspec
 import structlog
 
-from lockstep.protocol.console import Notice
-from lockstep.protocol.messages import Refusal, RefusalReason, Reset, Stop, StopState, StopTaken
+from lockstep.protocol.messages import Stop, StopState, StopTaken
 from lockstep.server.audit.records import Actor
-from lockstep.server.auth.silenced_links import SilencedLinks
-from lockstep.server.errors import (
-    LinkDown,
-    LockedOut,
-    NoSeat,
-    NotAllowed,
-    ResetNotKept,
-    ResetTooSoon,
-    Silenced,
-    StaleReset,
-    TooManyRequests,
-    Unavailable,
-    Unconfirmed,
-)
+from lockstep.server.control.stop_silence import SILENCED, StopSilence
+from lockstep.server.errors import LinkDown, Silenced, Unavailable, Unconfirmed
 from lockstep.server.event_clock import EventClock
-from lockstep.server.peers.peer import Peer
 from lockstep.server.peers.peer_registry import PeerRegistry
 from lockstep.server.session_events import (
-    Refused,
-    ResetDone,
-    ResetRefused,
     SessionEvents,
-    SilenceChanged,
     StopAnswered,
     StopAsked,
     StopRepeated,
@@ -45,29 +26,20 @@ from lockstep.server.session_events import (
     StopSilenced,
     StopUndelivered,
 )
-from lockstep.server.stop.reset_attempts import RESET_REASONS, ResetAttempts, ResetOutcome
+from lockstep.server.stop.press_listeners import PressListeners
 from lockstep.server.stop.stop_keeper import StopKeeper
 from lockstep.server.stop.stop_presses import AlreadyTaken, Held, NewPress, Press, Settled, told_id
 from lockstep.server.util.rate_limits import RateLimits
 
-__all__ = ["SILENCED", "StopAnswer", "StopOutcome", "StopService", "StopsLink"]
+__all__ = ["StopAnswer", "StopOutcome", "StopService", "StopsLink"]
 
 log = structlog.get_logger(__name__)
 
 CONFIRM_SECONDS = 1.0  # wait for the bridge's answer to a press
 AGAIN_SECONDS = 0.5  # until an unanswered press is sent again, on a link that is up
 WATCH_SECONDS = 0.1  # between two checks, while something is unanswered
-MAX_LISTENERS = 16  # connections that are told of one press
 PRESSES, PRESS_RATE = 20, 20.0  # Hz, of one link by any path: new ones, and answers to repeats
 LINES, LINE_RATE = 5, 0.2  # Hz, of the log, for stops of one link
-RESETS, RESET_RATE = 5, 1.0  # Hz, of one link
-ROBOT_RESETS, ROBOT_RESET_RATE = 10, 2.0  # Hz, of all links together
-
-SILENCED = (
-    "A supervisor has silenced the STOP of your link, and of all links that you invited with it, for ten minutes. "
-    "What you stopped stays stopped."
-)
-HEARD = "The STOP of your link works again."
 
 
 class StopsLink(Protocol):
@@ -75,9 +47,6 @@ class StopsLink(Protocol):
 
     @property
     def up(self) -> bool: ...
-    @property
-    def detail(self) -> str: ...
-    def send(self, message: Reset) -> bool: ...
     def send_stop(self, stop: Stop) -> bool: ...
 
 
@@ -115,18 +84,10 @@ class StopAnswer(NamedTuple):
         return Unconfirmed(self.outcome.detail) if self.up else LinkDown(self.outcome.detail)
 
 
-class _Asker(NamedTuple):
-    """The sender of a reset, and how it learns the outcome."""
-
-    by: Actor
-    where: str
-    tell: "Callable[[ResetOutcome[_Asker]], None]"
-
-
 class StopService:
-    """Handles the stops and resets of one robot. Run `run` and `watch_disk` as tasks.
+    """Handles the stops of one robot. Run `run` and `watch_disk` as tasks.
 
-    Everything else but `outcome` and `reset` is called on the loop and returns at once.
+    Everything else but `outcome` is called on the loop and returns at once.
     """
 
     def __init__(
@@ -135,26 +96,20 @@ class StopService:
         keeper: StopKeeper,
         peers: PeerRegistry,
         clock: EventClock,
-        holder: Callable[[], str],
+        silence: StopSilence,
         events: SessionEvents,
-        silenced: SilencedLinks | None = None,
     ) -> None:
-        """`holder`: the peer that holds the control seat, or "". `silenced`: of all robots; None: of this one alone."""
         self._robot = robot
         self._keeper = keeper
         self._presses = keeper.presses
         self._peers = peers
         self._clock = clock
-        self._holder = holder
+        self._silence = silence
         self._events = events
-        self._silenced = SilencedLinks() if silenced is None else silenced
-        self._resets: ResetAttempts[_Asker] = ResetAttempts()
-        self._link_resets = RateLimits(RESET_RATE, RESETS)
-        self._robot_resets = RateLimits(ROBOT_RESET_RATE, ROBOT_RESETS)
         self._link_presses = RateLimits(PRESS_RATE, PRESSES)
         self._link_repeats = RateLimits(PRESS_RATE, PRESSES)
         self._logged = RateLimits(LINE_RATE, LINES)
-        self._listeners: dict[str, list[tuple[str, str]]] = {}  # press -> (waiting peer, id that it knows)
+        self._listeners = PressListeners()
         self._late = {press.id for press in self._presses.pending}  # "not delivered yet" is in the audit
         self._deadlines: dict[str, float] = {}  # press -> end of the wait for its answer
         self._newest: Settled | None = None  # newest stop of this epoch that was sent from here
@@ -170,7 +125,10 @@ class StopService:
         """True if a stop is on its way that the robot has not answered."""
         return bool(self._presses.pending)
 
-    # STOP
+    @property
+    def newest_number(self) -> int:
+        """The number of the newest stop of this epoch that was sent from here; 0 before the first."""
+        return 0 if self._newest is None else self._newest.taken.number
 
     def stop(self, press: Press, given: str = "") -> None:
         """Latch the stop. A repeat has the outcome of the first press with its id. `given`: the id from the sender.
@@ -181,7 +139,7 @@ class StopService:
         press = msgspec.structs.replace(press, by=self._named(press.by))
         by, where = press.by, press.where
         self._events.publish(StopAsked(by, where))
-        if by.link and self._silenced.holds(by.link, time.monotonic()):
+        if self._silence.holds(by.link):
             self._events.publish(StopSilenced(by))
             raise Silenced(SILENCED)
         if (taken := self._presses.outcome(press.id)) is not None and self._is_released(taken):
@@ -190,7 +148,7 @@ class StopService:
         too_fast = bool(by.link) and not rate.spend(by.link, time.monotonic())
         outcome = self._presses.press(press, hold=too_fast)
         if self._presses.is_pending(press.id) or not too_fast:
-            self._listen(by.peer, press.id, told_id(press, given))
+            self._listeners.add(press.id, by.peer, told_id(press, given))
         match outcome:
             case AlreadyTaken(taken):
                 self._events.publish(StopRepeated(by, where))
@@ -234,7 +192,7 @@ class StopService:
         pending = self._presses.is_pending
         self._late = {press for press in self._late if pending(press)}
         self._deadlines = {press: until for press, until in self._deadlines.items() if pending(press)}
-        self._listeners = {press: peers for press, peers in self._listeners.items() if pending(press)}
+        self._listeners.keep(pending)
 
     def _not_delivered(self, press: Press) -> None:
         self._keeper.keep(press)
@@ -265,16 +223,9 @@ class StopService:
     def _robot_may_answer(self, press: str) -> bool:
         return self._robot.up or press not in self._late
 
-    def _listen(self, peer: str, press: str, told: str) -> None:
-        """Register `peer` to be told of the robot's answer, by the id that it knows."""
-        if not peer:
-            return
-        listeners = self._listeners.setdefault(press, [])
-        if (peer, told) not in listeners and len(listeners) < MAX_LISTENERS:
-            listeners.append((peer, told))
-
     def _answer(self, press: str, taken: StopTaken) -> None:
-        for listener, told in self._listeners.pop(press, []):
+        """Tell those who wait for it of the robot's answer, by the id that each knows."""
+        for listener, told in self._listeners.take(press):
             peer = self._peers.by_id(listener)
             if peer is not None:
                 peer.send("stop", msgspec.structs.replace(taken, press=told))
@@ -288,12 +239,11 @@ class StopService:
         self._sent_at = time.monotonic()
         self._wake.set()
 
-    def link_down(self, detail: str) -> None:
+    def link_down(self) -> None:
         """Called when the link for commands is down: unanswered presses go by the other link, or are kept on disk."""
         for press in self._presses.pending:
             if not self._robot.send_stop(press.message()):
                 self._not_delivered(press)
-        self._settle(self._resets.link_down(detail))
         self._spread()
 
     def epoch_ends(self, held: StopState) -> None:
@@ -307,7 +257,6 @@ class StopService:
             self._say_again(Press(id=held.press, by=by, where="epoch", reason=held.reason, time=time.time()))
         if newest is not None and newest.taken.number > held.number:
             self._say_again(newest.press)
-        self._settle(self._resets.link_down("the robot bridge was started anew"))
 
     def _say_again(self, press: Press) -> None:
         if self._presses.again(press):
@@ -318,7 +267,7 @@ class StopService:
     def taken(self, taken: StopTaken) -> None:
         """Take the bridge's answer to a stop."""
         settled = self._presses.taken(taken)
-        if settled and (self._newest is None or taken.number > self._newest.taken.number):
+        if settled and taken.number > self.newest_number:
             self._newest = settled[0]
         for press, answer in settled:
             self._keeper.settled(press.id)
@@ -328,149 +277,6 @@ class StopService:
             self._events.publish(StopAnswered(press, answer, again=late, released=self._is_released(answer)))
             self._answer(press.id, answer)
         self._spread()
-
-    def feedback(self, stop: StopState) -> None:
-        if self._resets:
-            self._settle(self._resets.feedback(stop))
-
-    def refused(self, refusal: Refusal) -> bool:
-        """Take a refusal of the bridge. True if it refused a reset."""
-        outcomes = self._resets.refused(refusal)
-        self._settle(outcomes)
-        return bool(outcomes) or (not refusal.event and refusal.reason in RESET_REASONS)
-
-    # reset
-
-    async def reset(self, by: Actor, where: str, number: int) -> None:
-        """Release stop `number`; returns when the robot says that it is released.
-
-        Raises:
-            NotAllowed, NoSeat: neither the holder of the seat nor a supervisor.
-            TooManyRequests: of this link, or for this robot.
-            StaleReset: another stop is the newest.
-            ResetTooSoon, LockedOut, ResetNotKept: as the bridge says.
-            LinkDown, Unconfirmed: the robot cannot be told, or has not answered.
-        """
-        done: asyncio.Future[ResetOutcome[_Asker]] = asyncio.get_running_loop().create_future()
-
-        def tell(outcome: ResetOutcome[_Asker]) -> None:
-            if not done.done():
-                done.set_result(outcome)
-
-        self._ask_reset(_Asker(by, where, tell), number)
-        outcome = await done
-        if outcome.reason is not None:
-            raise self._reset_error(outcome.reason, outcome.detail)
-
-    def reset_by_peer(self, peer: Peer, number: int) -> None:
-        """Release stop `number` for a peer, which is sent a refusal."""
-
-        def tell(outcome: ResetOutcome[_Asker]) -> None:
-            if outcome.reason is not None:
-                event = self._clock.event
-                refusal = Refusal(
-                    event=0, reason=outcome.reason, current=event, detail=outcome.detail[:500], stop=outcome.number
-                )
-                peer.send("stop", refusal)
-                self._events.publish(Refused(peer.actor, "stop", refusal, "console"))
-
-        self._ask_reset(_Asker(peer.actor, "stop", tell), number)
-
-    def _ask_reset(self, asker: _Asker, number: int) -> None:
-        refused = self._refusal_of_reset(asker.by, number)
-        if refused is not None:
-            self._settle([ResetOutcome(asker, number, *refused)])
-            return
-        stop = self._clock.stop
-        if stop.number == number and not stop.stopped and self._clock.feedback is not None:
-            self._settle([ResetOutcome(asker, number, None)])
-        elif self._resets.ask(number, asker, time.monotonic()):
-            self._wake.set()
-            if not self._robot.send(Reset(by=asker.by.name[:500], number=number)):
-                self._settle(self._resets.link_down(self._robot.detail))
-
-    def _refusal_of_reset(self, by: Actor, number: int) -> tuple[RefusalReason, str] | None:
-        """Return the reason why `by` may not reset now; None: it may."""
-        if by.role != "supervisor":
-            if by.role == "observer":
-                return "not_allowed", "observers do not reset"
-            if not self._holds_seat(by):
-                return "no_seat", "the holder of the control seat resets, or a supervisor"
-        now = time.monotonic()
-        if not (self._link_resets.spend(by.link or by.peer, now) and self._robot_resets.spend("", now)):
-            return "too_often", "resets of this link, or for this robot, come too often"
-        if not self._robot.up:
-            return "link_down", self._robot.detail
-        if self._presses.pending:
-            return "stale_reset", "a stop is on its way to the robot"
-        newest = max(self._clock.stop.number, 0 if self._newest is None else self._newest.taken.number)
-        if number < newest:  # also when no feedback has shown it yet
-            return "stale_reset", f"the newest stop is number {newest}"
-        return None
-
-    def _holds_seat(self, by: Actor) -> bool:
-        holder = self._peers.by_id(self._holder()) if self._holder() else None
-        if holder is None:
-            return False
-        return by.peer == holder.id if by.peer else bool(by.link) and by.link == holder.identity.token_id
-
-    def _settle(self, outcomes: list[ResetOutcome[_Asker]]) -> None:
-        for outcome in outcomes:
-            by, where = outcome.asker.by, outcome.asker.where
-            if outcome.reason is None:
-                self._events.publish(ResetDone(by, where, outcome.number))
-                log.warning("reset", by=by.name, where=where, stop=outcome.number)
-            else:
-                self._events.publish(ResetRefused(by, where, outcome.reason))
-            outcome.asker.tell(outcome)
-
-    def _reset_error(self, reason: str, detail: str) -> Exception:
-        match reason:
-            case "not_allowed":
-                return NotAllowed(detail)
-            case "no_seat":
-                return NoSeat(detail)
-            case "too_often":
-                return TooManyRequests(detail)
-            case "too_soon":
-                return ResetTooSoon(detail)
-            case "locked_out":
-                return LockedOut(detail)
-            case "stale_reset":
-                return StaleReset(detail)
-            case "not_kept":
-                return ResetNotKept(detail)
-            case _:
-                return Unconfirmed(detail) if self._robot.up else LinkDown(detail)
-
-    # silence
-
-    def silence(self, by: Peer, peer: str, *, silent: bool) -> RefusalReason | None:
-        """Silence the stops of the link of `peer` for a supervisor, or end that. Return a refusal's reason, or None."""
-        found = self._peers.by_id(peer)
-        if by.role != "supervisor" or found is None or found.role == "supervisor":
-            return "not_allowed"
-        link, now = found.identity.token_id, time.monotonic()
-        if silent:
-            self._silenced.silence(link, now)
-            self._events.publish(SilenceChanged(by.actor, found.name, link, silent=True))
-        elif self._silenced.hear(link, now):
-            self._events.publish(SilenceChanged(by.actor, found.name, link, silent=False))
-        self.show_silence()
-        return None
-
-    def show_silence(self) -> None:
-        """Tell the peers whose stops were silenced, or are heard again, here or at another robot or console."""
-        now = time.monotonic()
-        for peer in self._peers:
-            silent = self._silenced.holds(peer.identity.token_id, now)
-            if silent != peer.silenced:
-                peer.silenced = silent
-                notice = Notice(level="warning", text=SILENCED) if silent else Notice(level="info", text=HEARD)
-                peer.send("session", notice)
-
-    def is_silenced(self, link: str) -> bool:
-        return self._silenced.holds(link, time.monotonic())
 
     # background
 
@@ -494,8 +300,7 @@ class StopService:
             self._spread()
         if now - self._sent_at >= AGAIN_SECONDS and self._presses.pending:
             self.link_up()
-        self._settle(self._resets.expire(now))
-        return bool(self._presses.pending or self._resets)
+        return bool(self._presses.pending)
 
     async def watch_disk(self) -> None:
         """Publish whether stops can be kept on disk, whenever that changes, until cancelled."""
