@@ -8,7 +8,7 @@ service on an event loop that never waits: its time is the world's. The disks ar
 import asyncio
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, Literal, cast
@@ -18,18 +18,19 @@ from lockstep.protocol.console import Role, ServerMessage
 from lockstep.protocol.description import RobotDescription
 from lockstep.protocol.messages import Command, Feedback, LinkMessage, Refusal, Reset, Rest, Stop, StopTaken
 from lockstep.protocol.serial import event_after, is_newer
-from lockstep.server.audit.audit_tail import AuditTail
-from lockstep.server.audit.audit_trail import AuditTrail
 from lockstep.server.audit.records import Actor
+from lockstep.server.auth.silenced_links import SilencedLinks
 from lockstep.server.auth.tokens import Identity
-from lockstep.server.control import stop_service
+from lockstep.server.control import reset_service, stop_service, stop_silence
 from lockstep.server.control.command_arbiter import CommandArbiter, Forward, ForwardRest
+from lockstep.server.control.reset_service import ResetService
 from lockstep.server.control.seat import ControlSeat, SeatOutcome, SeatTimes
-from lockstep.server.control.session_listener import SessionListener
 from lockstep.server.control.stop_service import StopService
+from lockstep.server.control.stop_silence import StopSilence
 from lockstep.server.errors import ConsoleError, Silenced
 from lockstep.server.event_clock import EventClock
 from lockstep.server.peers.peer_registry import PeerRegistry
+from lockstep.server.session_events import SessionEvents
 from lockstep.server.stop.stop_keeper import StopKeeper
 from lockstep.server.stop.stop_presses import Press
 from lockstep.server.stop.stop_store import KeptStops
@@ -162,7 +163,10 @@ class Promises:
 
 
 class ConsoleModel:
-    """One run of a console, as `lockstep.server.control.console.Console` puts its parts together."""
+    """One run of a console, as `lockstep.server.control.console.Console` puts its parts together.
+
+    Nobody subscribes to its events.
+    """
 
     def __init__(self, world: "World", disk: Disk) -> None:
         self.up = False
@@ -175,17 +179,18 @@ class ConsoleModel:
         self.keeper = MemoryKeeper(disk)
         world.loop.run_until_complete(self.keeper.load())
         self.arbiter = CommandArbiter(self.clock, self.seat, self.keeper.presses)
+        peers, events = cast(PeerRegistry, self.people), SessionEvents(METRICS.faults)
+        self.silence = StopSilence(SilencedLinks(), peers, events)
         self.service = StopService(
             self,
             self.keeper,
-            cast(PeerRegistry, self.people),
+            peers,
             self.clock,
-            lambda: self.seat.holder,
-            AuditTrail(self.clock, AuditTail()),
-            METRICS,
-            SessionListener(),
+            self.silence,
+            events,
         )
-        self._parts = [world.loop.create_task(part()) for part in (self.keeper.run, self.service.run)]
+        self.resets = ResetService(self, self.service, peers, self.clock, self.seat, events)
+        self._parts = [world.loop.create_task(part()) for part in (self.keeper.run, self.service.run, self.resets.run)]
         self._requests: list[asyncio.Task[None]] = []
         self._asker = Actor()
         self.proven = False  # a neutral command of the holder was executed since the last cause that came here
@@ -260,12 +265,12 @@ class ConsoleModel:
             self._requests.append(self._world.loop.create_task(self._reset(who.actor._replace(peer=""), number)))
             self._world.loop.turn()
         else:
-            self.service.reset_by_peer(cast(Any, who), number)
+            self.resets.reset_by_peer(cast(Any, who), number)
         self._asker = Actor()
 
     async def _reset(self, actor: Actor, number: int) -> None:
         with suppress(ConsoleError):
-            await self.service.reset(actor, "http", number)
+            await self.resets.reset(actor, "http", number)
 
     def command(self, person: str, command: Command) -> None:
         who = self.people.all[person]
@@ -291,6 +296,7 @@ class ConsoleModel:
         if epoch != self.epoch:
             self.epoch = epoch
             self.service.epoch_ends(self.clock.stop)
+            self.resets.link_down("the robot bridge was started anew")
             self.arbiter.epoch_ends()
             self.clock.begin(epoch)
 
@@ -302,7 +308,8 @@ class ConsoleModel:
     def link_down(self) -> None:
         self.up, self.detail, self.proven, self._neutral = False, "lost", False, None
         self.arbiter.link_down()
-        self.service.link_down("lost")
+        self.service.link_down()
+        self.resets.link_down("lost")
 
     def hear(self, message: LinkMessage) -> None:
         match message:
@@ -312,9 +319,9 @@ class ConsoleModel:
                     return
                 self._note(message, shown)
                 self.arbiter.feedback(message)
-                self.service.feedback(message.stop)
+                self.resets.feedback(message.stop)
             case Refusal():
-                if not self.service.refused(message):
+                if not self.resets.refused(message):
                     self.arbiter.refused(message)
                     self._neutral = None
             case StopTaken():
@@ -339,10 +346,10 @@ class World:
         self.wall = 10**6
         self.loop = WorldLoop(lambda: self.now)
         self.bridge = BridgeModel(first_event=first_event, wall=lambda: self.wall)
-        self._clock = patch.object(
-            stop_service, "time", SimpleNamespace(monotonic=lambda: self.now, time=lambda: self.now)
-        )
-        self._clock.start()
+        clock = SimpleNamespace(monotonic=lambda: self.now, time=lambda: self.now)
+        self._clock = ExitStack()
+        for module in (stop_service, reset_service, stop_silence):
+            self._clock.enter_context(patch.object(module, "time", clock))
         self.disk = Disk()
         self.promises = Promises(self.bridge.witness.given)
         self.presses: list[str] = []
@@ -356,7 +363,7 @@ class World:
 
     def close(self) -> None:
         self.console.end(killed=True)
-        self._clock.stop()
+        self._clock.close()
         self.loop.close()
 
     @property

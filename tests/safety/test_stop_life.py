@@ -229,7 +229,7 @@ class StopLife(RuleBasedStateMachine):
     @rule(person=people, silent=mostly)
     def sue_silences_somebody(self, person: str, silent: bool) -> None:
         people = self.world.console.people.all
-        self.world.console.service.silence(people["sue"], people[person].id, silent=silent)  # type: ignore[arg-type]
+        self.world.console.silence.silence(people["sue"], people[person].id, silent=silent)  # type: ignore[arg-type]
 
     @rule(link=links, count=st.integers(1, 3))
     def arrive(self, link: Link, count: int) -> None:

@@ -9,7 +9,7 @@ import pytest
 from lockstep.server.audit import audit_writer
 from lockstep.server.audit.audit_file import stored_records
 from lockstep.server.audit.audit_log import open_audit_log
-from lockstep.server.audit.records import AuditRecord
+from lockstep.server.audit.records import AuditRecord, AuditTrouble
 from lockstep.server.cli.audit import verify_audit
 from lockstep.server.evidence.signer import evidence_signer
 from lockstep.server.settings import Settings
@@ -39,8 +39,12 @@ async def test_an_audit_that_had_no_place_at_the_start_is_written_behind_what_is
     (tmp_path / "audit.lock").unlink()
     (tmp_path / "audit.lock").mkdir()  # nothing opens it for writing
     said: list[str] = []
-    with open_audit_log(directory, settings, signer=signer) as audit:
-        audit.on_trouble = said.append
+
+    def hear(event: AuditRecord | AuditTrouble) -> None:
+        if isinstance(event, AuditTrouble):
+            said.append(event.trouble)
+
+    with open_audit_log(directory, settings, signer=signer, publish=hear) as audit:
         audit.append(_record(1))
         await _said(["Is a directory"], said)
         audit.append(_record(2))

@@ -6,18 +6,41 @@ from typing import cast
 
 import pytest
 
-from lockstep.protocol.description import RobotDescription
-from lockstep.protocol.messages import Feedback, LinkMessage, Media, Refusal, Rest, Stop, StopTaken
+from lockstep.protocol.console import SeatRequest
+from lockstep.protocol.description import Axis, RobotDescription
+from lockstep.protocol.messages import (
+    Command,
+    Feedback,
+    LinkMessage,
+    Media,
+    Refusal,
+    Reset,
+    Rest,
+    Stop,
+    StopState,
+    StopTaken,
+)
 from lockstep.server.audit.audit_tail import AuditTail
+from lockstep.server.audit.audit_trail import AuditTrail
+from lockstep.server.auth.silenced_links import SilencedLinks
+from lockstep.server.auth.tokens import Identity
 from lockstep.server.control.console import Console
-from lockstep.server.control.seat import SeatOutcome
+from lockstep.server.control.seat import ControlSeat, SeatOutcome, SeatTimes
+from lockstep.server.control.stop_silence import StopSilence
+from lockstep.server.event_clock import EventClock
+from lockstep.server.peers.peer_registry import PeerRegistry
+from lockstep.server.peers.websocket_peer import WebSocketPeer
 from lockstep.server.robot.robot_connection import RobotConnection, RobotHost
+from lockstep.server.session_events import SessionEvent, SessionEvents
 from lockstep.server.settings import Settings
 from lockstep.server.stop.stop_keeper import StopKeeper
 from lockstep.server.telemetry.metrics import Metrics
+from lockstep.server.util.fair_queue import FairQueue
 from tests.server.rig import PATIENCE
 
 ROBOT = RobotDescription(name="r", label="R", axes=())
+AXIS = Axis(name="x", label="X", unit="m/s", minimum=-1.0, maximum=1.0, slew=1.0, brake=1.0)
+ONE_AXIS = RobotDescription(name="r", label="R", axes=(AXIS,))
 
 
 class FakePlane:
@@ -36,6 +59,17 @@ def _feedback(event: int) -> Feedback:
     return Feedback(event=event, issue=1, time=0.0, axes=[])
 
 
+def _console(settings: Settings, metrics: Metrics, stops: StopKeeper, events: SessionEvents | None = None) -> Console:
+    """A console to whose events nobody subscribes, unless `events` has subscribers."""
+    clock, events = EventClock(), events or SessionEvents(metrics.faults)
+    seat, audit = ControlSeat(SeatTimes(settings.seat_timeout)), AuditTrail(clock, AuditTail())
+    peers = PeerRegistry(settings, metrics)
+    silence = StopSilence(SilencedLinks(), peers, events)
+    return Console(
+        settings, events, metrics.faults, FakePlane(), peers, seat, audit, clock, stops=stops, silence=silence
+    )
+
+
 async def test_a_background_task_that_fails_is_counted_and_runs_again(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
@@ -43,7 +77,7 @@ async def test_a_background_task_that_fails_is_counted_and_runs_again(
     metrics = Metrics()
     wanted = Settings(robot="tcp://127.0.0.1:1", seat_timeout=0.01)
     stops = StopKeeper(tmp_path, wanted.robot)
-    console = Console(wanted, metrics, FakePlane(), None, AuditTail(), stops=stops)
+    console = _console(wanted, metrics, stops)
     failed: list[float] = []
     again = asyncio.Event()
 
@@ -61,6 +95,76 @@ async def test_a_background_task_that_fails_is_counted_and_runs_again(
     running.cancel()
     await asyncio.gather(running, return_exceptions=True)
     assert metrics.registry.get_sample_value("lockstep_internal_errors_total", {"where": "seat"}) == 2
+
+
+def _fails(event: SessionEvent) -> None:
+    raise RuntimeError("a fault of a subscriber")
+
+
+@pytest.mark.parametrize("subscribers_fail", [False, True])
+async def test_stop_seat_and_commands_need_no_subscriber_and_survive_subscribers_that_fail(
+    subscribers_fail: bool, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    settings, metrics = Settings(robot="tcp://127.0.0.1:1"), Metrics(process=False)
+    events = SessionEvents(metrics.faults)
+    for kind in SessionEvent.__subclasses__() if subscribers_fail else ():
+        events.subscribe(kind, _fails)
+    console = _console(settings, metrics, StopKeeper(tmp_path, settings.robot), events)
+    sent: list[LinkMessage] = []
+
+    def send(message: LinkMessage) -> bool:
+        sent.append(message)
+        return True
+
+    monkeypatch.setattr(console.robot, "send", send)
+    monkeypatch.setattr(console.robot, "send_stop", send)
+    console.robot.link_opened("operator", "epoch", ONE_AXIS)
+
+    def peer(name: str) -> WebSocketPeer:
+        made = WebSocketPeer("", Identity("operator", name, name, 1e12), console, settings, FairQueue())
+        console.peers.admit(made)
+        return made
+
+    ann, bob, issues = peer("ann"), peer("bob"), list[int]()
+
+    def command(by: WebSocketPeer, event: int, value: float) -> list[LinkMessage]:
+        sent.clear()
+        console.message_received(by, "control", Command(event=event, issue=issues[-1], nonce=7, values=[value]))
+        return [*sent]
+
+    def feedback(event: int, stop: StopState | None = None) -> None:
+        issues.append(len(issues) + 1)
+        shown = Feedback(event=event, issue=issues[-1], nonce=7, time=0.0, axes=[0.0], stop=stop or StopState())
+        console.robot.link_received("operator", shown)
+
+    feedback(1)
+    assert command(ann, 2, 0.0) == [], "nobody holds the seat"
+    console.message_received(ann, "session", SeatRequest())
+    assert command(ann, 2, 0.5) == [], "a new holder sends a neutral command first"
+    assert [type(each) for each in command(ann, 2, 0.0)] == [Command]
+    feedback(2)
+    assert command(bob, 3, 0.5) == []
+    assert [type(each) for each in command(ann, 3, 0.5)] == [Command]
+    feedback(3)
+    console.message_received(bob, "stop", Stop(press="1" * 32, reason="smoke"))
+    assert [type(each) for each in sent[1:]] == [Stop]
+    assert command(ann, 4, 0.5) == [], "the stop is on its way"
+    console.robot.link_received("operator", StopTaken(press="1" * 32, number=1))
+    feedback(3, StopState(stopped=True, number=1))
+    assert command(ann, 4, 0.5) == []
+    console.message_received(ann, "stop", Reset(number=1))
+    assert [type(each) for each in sent] == [Reset]
+    feedback(3, StopState(number=1))
+    sent.clear()
+    ann.end("gone")
+    assert (console.seat.rules.holder, [type(each) for each in sent]) == ("", [Rest])
+    await console.peers.close()
+    assert (sum(_faults(metrics)) > 0) == subscribers_fail
+
+
+def _faults(metrics: Metrics) -> list[float]:
+    families = metrics.internal_errors.collect()
+    return [each.value for family in families for each in family.samples if each.name.endswith("_total")]
 
 
 class FakeHost:

@@ -24,6 +24,8 @@ class _Host:
         self.ended: list[Peer] = []
         self.faults: list[tuple[str, Exception]] = []
 
+    def peer_joined(self, peer: Peer) -> None: ...
+
     def channel_opened(self, peer: Peer, channel: ChannelName) -> None:
         self.opened.append(channel)
 

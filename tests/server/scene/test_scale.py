@@ -16,6 +16,7 @@ from lockstep.server.scene.commanded_path import CommandedPath
 from lockstep.server.scene.kinematics import Pose
 from lockstep.server.scene.scale import SceneScale
 from lockstep.server.scene.view import SceneView, pause
+from lockstep.server.session_events import EpochBegan, FeedbackReceived, SessionEvents
 from lockstep.server.telemetry.metrics import Metrics
 from tests.server.rig import eventually
 
@@ -54,7 +55,8 @@ def test_sizes_that_make_no_sense_are_left_alone(size: float) -> None:
 
 async def test_a_shape_that_cannot_be_built_is_counted_and_the_next_robot_is_shown() -> None:
     metrics = Metrics()
-    scene = SceneView(15.0, 1, metrics)
+    scene, events = SceneView(15.0, 1, metrics), SessionEvents(metrics.faults)
+    scene.subscribe(events)
     tiny = Geom(shape="capsule", size=(1e-12, 1e-12, 0.0), position=(1.0, 0.0, 0.0))
     bad = msgspec.structs.replace(PLANAR, bodies=(Body(name="base", parent="", geoms=(tiny,)),), ranges=None)
 
@@ -69,9 +71,9 @@ async def test_a_shape_that_cannot_be_built_is_counted_and_the_next_robot_is_sho
     running = asyncio.create_task(scene.run())
     try:
         await scene.open()
-        scene.configure(bad)
+        events.publish(EpochBegan(bad))
         await eventually(lambda: failures() == 1)
-        scene.configure(msgspec.structs.replace(MICRO, joints=MICRO.joints))
+        events.publish(EpochBegan(msgspec.structs.replace(MICRO, joints=MICRO.joints)))
         await eventually(lambda: scene._model is not None and "holder" in scene._model.frames)
         assert not running.done()
     finally:
@@ -89,13 +91,16 @@ async def test_a_robot_of_many_parts_is_posed_away_from_the_loop(monkeypatch: py
         return poses(path)
 
     monkeypatch.setattr(CommandedPath, "poses", noted)
-    scene = SceneView(15.0, 1, Metrics())
+    metrics = Metrics()
+    scene, events = SceneView(15.0, 1, metrics), SessionEvents(metrics.faults)
+    scene.subscribe(events)
     running = asyncio.create_task(scene.run())
     try:
         await scene.open()
-        scene.configure(PLANAR)
+        events.publish(EpochBegan(PLANAR))
         with scene.viewer(SceneTicket("link", "observer", math.inf)):
-            scene.feedback(Feedback(event=1, issue=1, time=0.0, axes=[0.0] * 3, joints=[0.0] * 3))
+            feedback = Feedback(event=1, issue=1, time=0.0, axes=[0.0] * 3, joints=[0.0] * 3)
+            events.publish(FeedbackReceived(feedback, 0.0, None))
             await eventually(lambda: bool(threads))
         assert threading.get_ident() not in threads
     finally:

@@ -1,7 +1,9 @@
 """Who is told of a relay, and what a page may connect to."""
 
+import pytest
+
 from lockstep.server.sfu.coordinator import WAIT_SECONDS
-from tests.server.rig import running_rig
+from tests.server.rig import eventually, running_rig
 
 NOWHERE = "janus:ws://127.0.0.1:9/4711"  # nobody listens on the discard port
 
@@ -46,11 +48,13 @@ async def test_the_page_may_connect_to_its_relays_and_nowhere_else() -> None:
     assert "connect-src 'self' ws://127.0.0.1:9;" in policy
 
 
-async def test_an_observer_behind_a_relay_gets_no_feedback_from_the_console() -> None:
+async def test_an_observer_behind_a_relay_gets_no_feedback_from_the_console(monkeypatch: pytest.MonkeyPatch) -> None:
     async with running_rig(relay=NOWHERE) as rig, rig.peer("observer") as peer:
         known = next(iter(rig.dependencies.console.peers))
         assert known in rig.dependencies.console.peers.observers()
         known.relay = "0"
         assert known not in rig.dependencies.console.peers.observers()
-        assert rig.dependencies.relays in rig.dependencies.console.peers.observers()
+        passed_on: list[str] = []
+        monkeypatch.setattr(rig.dependencies.relays, "send_feedback", passed_on.append)
+        await eventually(lambda: bool(passed_on))
         await peer.feedback()

@@ -68,7 +68,7 @@ def _good(link: str, expires: float) -> bool:
 async def test_of_two_relays_that_failed_lately_the_one_that_failed_just_now_is_not_tried_first() -> None:
     relays, now = Relays(), [100.0]
     settings = RelaySettings(relay=("janus:ws://a.example/1", "janus:ws://b.example/1"), observers_direct=0)
-    coordinator = SfuCoordinator(settings, relays, lambda: [Watching()], _good, lambda: now[0])
+    coordinator = SfuCoordinator(settings, relays, [Watching()], _good, lambda: now[0])
     asked = asyncio.create_task(coordinator.ticket(None, ""))
     running = asyncio.create_task(coordinator.run())
     try:
@@ -89,7 +89,7 @@ async def test_of_two_relays_that_failed_lately_the_one_that_failed_just_now_is_
 async def test_a_relay_that_does_not_answer_the_farewell_does_not_keep_the_console_from_ending() -> None:
     relays = Relays()
     settings = RelaySettings(relay=("janus:ws://a.example/1",), observers_direct=0)
-    coordinator = SfuCoordinator(settings, relays, lambda: [Watching()], _good, lambda: 100.0)
+    coordinator = SfuCoordinator(settings, relays, [Watching()], _good, lambda: 100.0)
     asked = asyncio.create_task(coordinator.ticket(None, ""))
     running = asyncio.create_task(coordinator.run())
     await relays.until_carried_by("0")

@@ -41,7 +41,7 @@ class _Hall:
         self.ended: set[str] = set()
         self.now = 100.0
         settings = RelaySettings(relay=("janus:ws://a.example/1",), observers_direct=0)
-        self.coordinator = SfuCoordinator(settings, self.relays, lambda: self.here, self.has_ended, lambda: self.now)
+        self.coordinator = SfuCoordinator(settings, self.relays, self.here, self.has_ended, lambda: self.now)
 
     def has_ended(self, link: str, expires: float) -> bool:
         return link in self.ended or self.now >= expires

@@ -85,21 +85,13 @@ async def test_a_disk_that_does_not_take_stops_is_told_of_and_tried_again(
 
     monkeypatch.setattr(KeptStops, "keep", fail)
     async with _running(tmp_path) as keeper:
-        told: list[str] = []
-        again = asyncio.Event()
-
-        def tell(trouble: str) -> None:
-            told.append(trouble)
-            if not trouble:
-                again.set()
-
-        keeper.on_trouble = tell
+        waiting = asyncio.create_task(keeper.trouble_other_than(""))
         keeper.keep(_pressed(keeper, "a"))
         assert await keeper.written("a") == "No space left on device"
-        fails = False
         async with asyncio.timeout(PATIENCE):
-            await again.wait()
-        assert told == ["No space left on device", ""]
+            assert await waiting == "No space left on device"
+            fails = False
+            assert await keeper.trouble_other_than("No space left on device") == ""
         assert await keeper.written("a") == ""
         assert _on_disk(tmp_path) == 1
 

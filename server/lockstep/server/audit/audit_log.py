@@ -12,7 +12,7 @@ from lockstep.server.audit.audit_file import last_records
 from lockstep.server.audit.audit_store import AuditStore
 from lockstep.server.audit.audit_tail import AuditTail
 from lockstep.server.audit.audit_writer import AuditWriter, RecordFile
-from lockstep.server.audit.records import AuditRecord
+from lockstep.server.audit.records import AuditRecord, AuditTrouble
 from lockstep.server.evidence.anchors import ANCHORS_NAME, Anchor, AnchorFile
 from lockstep.server.evidence.signer import Signer
 from lockstep.server.recording.settings import recordings_directory
@@ -23,6 +23,12 @@ __all__ = ["AuditLog", "anchors_path", "open_audit_log"]
 
 log = structlog.get_logger(__name__)
 
+Publish = Callable[[AuditRecord | AuditTrouble], None]
+
+
+def _ignore(event: AuditRecord | AuditTrouble) -> None:
+    pass
+
 
 class AuditLog:
     """Keeps records in memory and on disk. Call `append` from the loop.
@@ -30,8 +36,6 @@ class AuditLog:
     Attributes:
         tail: the last records, those of earlier runs included
         trouble: the reason if it cannot be written at present, else ""
-        on_trouble: called on the loop whenever `trouble` changes
-        on_record: called with every record
         newest_anchor: returns the newest signed head, None before the first; thread-safe
     """
 
@@ -40,12 +44,13 @@ class AuditLog:
         file: RecordFile,
         earlier: list[AuditRecord],
         newest_anchor: Callable[[], Anchor | None] = lambda: None,
+        publish: Publish = _ignore,
     ) -> None:
+        """`publish`: called on the loop with every record, and whenever `trouble` changes."""
         self.tail = AuditTail(earlier)
         self.trouble = ""
         self.newest_anchor = newest_anchor
-        self.on_trouble: Callable[[str], None] = _ignore
-        self.on_record: Callable[[AuditRecord], None] = _ignore_record
+        self._publish = publish
         self._loop = asyncio.get_running_loop()
         self._writer = AuditWriter(file, self._changed)
         self._writer.start()
@@ -68,10 +73,10 @@ class AuditLog:
     def append(self, record: AuditRecord) -> None:
         self.tail.append(record)
         self._writer.append(record)
-        self.on_record(record)
+        self._publish(record)
 
     def close(self) -> None:
-        self.on_trouble = _ignore
+        self._publish = _ignore
         self._writer.close()
 
     def _changed(self, trouble: str) -> None:
@@ -87,12 +92,16 @@ class AuditLog:
             log.error("the audit log cannot be written", error="audit_unwritable", detail=trouble)
         else:
             log.info("the audit log is written again", lost=self.lost)
-        self.on_trouble(trouble)
+        self._publish(AuditTrouble(trouble, self.lost))
 
 
 @contextmanager
 def open_audit_log(
-    directory: StateDir, settings: Settings, robot: str = "", signer: Signer | None = None
+    directory: StateDir,
+    settings: Settings,
+    robot: str = "",
+    signer: Signer | None = None,
+    publish: Publish = _ignore,
 ) -> Iterator[AuditLog]:
     """Open the audit log, which continues the numbers of the last run.
 
@@ -100,6 +109,7 @@ def open_audit_log(
 
     Args:
         signer: signs its heads; None: they are not signed
+        publish: called on the loop with every record, and when the log cannot be written or can be again
     """
 
     def store_at(path: Path) -> AuditStore:
@@ -111,10 +121,10 @@ def open_audit_log(
             path = opened.enter_context(directory.own_log("audit"))
         except StateDirUnusable:
             late = _LateFile(directory, store_at)
-            found = AuditLog(late, [], lambda: late.newest_anchor)
+            found = AuditLog(late, [], lambda: late.newest_anchor, publish)
         else:
             store = store_at(path)
-            found = AuditLog(store, last_records(path), lambda: store.newest_anchor)
+            found = AuditLog(store, last_records(path), lambda: store.newest_anchor, publish)
         opened.callback(found.close)
         yield found
 
@@ -166,11 +176,3 @@ class _LateFile:
         with self._held:
             if self._store is not None:
                 self._store.close()
-
-
-def _ignore(trouble: str) -> None:
-    pass
-
-
-def _ignore_record(record: AuditRecord) -> None:
-    pass

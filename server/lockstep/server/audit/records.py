@@ -7,7 +7,7 @@ import msgspec
 
 from lockstep.server.util.token_bucket import TokenBucket
 
-__all__ = ["CHATTER", "Actor", "AuditBudget", "AuditKind", "AuditMerger", "AuditRecord"]
+__all__ = ["CHATTER", "Actor", "AuditBudget", "AuditKind", "AuditMerger", "AuditRecord", "AuditTrouble"]
 
 AuditKind = Literal[
     "start",  # the console, not the robot
@@ -71,6 +71,13 @@ class AuditRecord(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True)
     what: str = ""  # "granted", the refusal's reason, the channel of a stop
     detail: str = ""
     count: int = 1
+
+
+class AuditTrouble(msgspec.Struct, frozen=True):
+    """An event of the session: the log cannot be written now, or it can be again."""
+
+    trouble: str  # the reason; "": it can be written again
+    lost: int  # records lost for good since the start
 
 
 class AuditBudget:

@@ -4,12 +4,20 @@ import asyncio
 from collections.abc import AsyncIterator, Awaitable, Callable
 from contextlib import asynccontextmanager
 
+from lockstep.protocol.console import ServerMessage
 from lockstep.server.audit.audit_log import AuditLog, open_audit_log
+from lockstep.server.audit.audit_trail import AuditTrail
 from lockstep.server.control.console import Console
+from lockstep.server.control.notices import Notices
+from lockstep.server.control.seat import ControlSeat, SeatTimes
+from lockstep.server.control.session_audit import SessionAudit
+from lockstep.server.control.session_metrics import SessionMetrics
+from lockstep.server.control.stop_silence import StopSilence
 from lockstep.server.event_clock import EventClock
 from lockstep.server.evidence.anchors import anchor_text
 from lockstep.server.media.hub import MediaHub
 from lockstep.server.media.sources.source_manager import SourceManager
+from lockstep.server.peers.peer_registry import PeerRegistry
 from lockstep.server.peers.token_revocation import TokenRevocation
 from lockstep.server.publishing.publishers import Publishers
 from lockstep.server.recording.format.signature import RecordingSigning
@@ -19,8 +27,9 @@ from lockstep.server.recording.service import RecordingService
 from lockstep.server.recording.settings import recordings_directory
 from lockstep.server.recording.writing.recorder import Recorder
 from lockstep.server.scene.view import SceneView
+from lockstep.server.session_events import SessionEvents
 from lockstep.server.settings import Settings
-from lockstep.server.sfu.coordinator import RelayedMedia, SfuCoordinator
+from lockstep.server.sfu.coordinator import SfuCoordinator
 from lockstep.server.sfu.janus_engine import JanusEngine
 from lockstep.server.state.console_context import ConsoleContext
 from lockstep.server.state.dependencies import Dependencies
@@ -53,10 +62,11 @@ async def running_session(
         robot: its name in a fleet; "" is the only robot of a console
         stops: known stops that outlive the session, run by their owner; None: the session has its own
     """
-    with open_audit_log(directory, settings, robot, context.state.signer) as audit:
+    events = SessionEvents(metrics.faults)
+    with open_audit_log(directory, settings, robot, context.state.signer, events.publish) as audit:
         async with (
             _running_stops(settings, context, directory, stops, metrics) as keeper,
-            _session(settings, context, metrics, directory, robot, audit, keeper) as made,
+            _session(settings, context, metrics, directory, robot, events, audit, keeper) as made,
         ):
             context.revocations.append(made.revocation)
             try:
@@ -99,63 +109,60 @@ async def _session(
     metrics: Metrics,
     directory: StateDir,
     robot: str,
+    events: SessionEvents,
     audit: AuditLog,
     stops: StopKeeper,
 ) -> AsyncIterator[Dependencies]:
     access = context.state.access.at(robot)
+    clock = EventClock()
+    trail = AuditTrail(clock, audit)
+    seat = ControlSeat(SeatTimes(settings.seat_timeout, settings.seat_idle_seconds, settings.seat_claim_seconds))
+    peers = PeerRegistry(settings, metrics, [context.check_room])
+    silence = StopSilence(context.silenced, peers, events)
     media = MediaHub(settings.media, metrics.registry, settings.sources, on_fault=metrics.faults.caught)
     scene = SceneView(settings.scene_hz, settings.max_scene_viewers, metrics) if settings.scene else None
-    clock = EventClock()
     shelf = RecordingStore(recordings_directory(settings.recording, directory.path), settings.recording)
     signing = RecordingSigning(context.state.signer, lambda: anchor_text(audit.newest_anchor()))
-    recorder = Recorder(
-        settings.recording,
-        shelf,
-        clock,
-        media,
-        lambda news: console.peers.tell("session", news),
-        signing,
-        lambda what, detail: console.audit.record("recording", what=what, detail=detail),
-    )
+    recorder = Recorder(settings.recording, shelf, clock, media, peers.announce, trail, signing)
     engine = JanusEngine(settings, context.endpoint, media, context.state.signing_key(settings) + robot)
-    relays = SfuCoordinator(settings, engine, lambda: console.peers, context.state.invitations.has_ended)
+    relays = SfuCoordinator(settings, engine, peers, context.state.invitations.has_ended)
+    sources = SourceManager(settings.sources, clock, media, metrics.registry, peers.announce)
+    voice = Talkback(settings.speaker_spec, seat.holds, metrics.registry, peers.announce)
+    states: list[Callable[[], ServerMessage]] = [recorder.state]
+    if sources.sources:
+        states.append(sources.state)
+    if voice.enabled:
+        states.append(voice.state)
+    notices = Notices(peers, states, stops.trouble)
     console = Console(
         settings,
-        metrics,
-        RelayedMedia(media, relays),
-        scene,
-        audit,
+        events,
+        metrics.faults,
+        media,
+        peers,
+        seat,
+        trail,
         clock,
-        recorder,
         stops=stops,
-        silenced=context.silenced,
+        silence=silence,
+        relays=[relays],
+        further_news=notices.for_newcomers,
     )
-    console.peers.relays.append(relays)
-    console.peers.further_bounds.append(context.check_room)
-    console.further_news.append(recorder.state)
-    sources = SourceManager(
-        settings.sources, console.clock, media, metrics.registry, lambda news: console.peers.tell("session", news)
-    )
-    if sources.sources:
-        console.further_news.append(sources.state)
-    voice = Talkback(
-        settings.speaker_spec,
-        console.seat.rules.holds,
-        metrics.registry,
-        lambda news: console.peers.tell("session", news),
-    )
-    if voice.enabled:
-        console.further_news.append(voice.state)
-    revocation = TokenRevocation(
-        context.state.invitations, console.peers, console.audit, robot, console.stops.show_silence
-    )
-    publishers = Publishers(sources.published, revocation.ended, console.audit, metrics.faults, metrics.registry)
-    follow_clock(console.clock, robot)
-    audit.on_trouble = lambda trouble: console.audit_trouble(trouble, audit.lost)
+    SessionMetrics(metrics).subscribe(events)
+    SessionAudit(trail).subscribe(events)
+    notices.subscribe(events)
+    recorder.subscribe(events)
+    relays.subscribe(events)
+    if scene is not None:
+        scene.subscribe(events)
+    revocation = TokenRevocation(context.state.invitations, peers, trail, silence, robot)
+    publishers = Publishers(sources.published, revocation.ended, trail, metrics.faults, metrics.registry)
+    follow_clock(clock, robot)
     made = Dependencies(
         robot=robot,
         settings=settings,
         metrics=metrics,
+        events=events,
         console=console,
         media=media,
         context=context,
@@ -167,7 +174,7 @@ async def _session(
         relays=relays,
         voice=voice,
         publishers=publishers,
-        recordings=RecordingService(ConsoleLibrary(recorder), access, console.audit, console.link_holds_seat),
+        recordings=RecordingService(ConsoleLibrary(recorder), access, trail, console.link_holds_seat),
     )
     try:
         async with asyncio.TaskGroup() as tasks:

@@ -6,11 +6,18 @@ from collections.abc import Callable
 
 from lockstep.protocol.console import Participants, SharedNote
 from lockstep.protocol.messages import RefusalReason
-from lockstep.server.audit.audit_trail import AuditTrail
 from lockstep.server.control.notes import NoteBoard
 from lockstep.server.event_clock import EventClock
 from lockstep.server.peers.peer import Peer
 from lockstep.server.peers.peer_registry import PeerRegistry
+from lockstep.server.session_events import (
+    NoteWritten,
+    ParticipantsChanged,
+    PeerJoined,
+    PeerLeft,
+    PeerRenamed,
+    SessionEvents,
+)
 
 __all__ = ["ParticipantList"]
 
@@ -22,22 +29,19 @@ class ParticipantList:
 
     Args:
         renamed: called with the peers whose names have changed
-        refuse: tells a peer that something was refused
     """
 
     def __init__(
         self,
         peers: PeerRegistry,
         clock: EventClock,
-        audit: AuditTrail,
+        events: SessionEvents,
         renamed: Callable[[list[Peer]], None],
-        refuse: Callable[[Peer, RefusalReason, str], None],
     ) -> None:
         self._peers = peers
         self._clock = clock
-        self._audit = audit
+        self._events = events
         self._renamed = renamed
-        self._refuse = refuse
         self._board = NoteBoard(time.monotonic())
 
     def joined(self, peer: Peer) -> None:
@@ -45,11 +49,12 @@ class ParticipantList:
             peer.name = peer.wanted_name  # not in the list, but a stop names its sender
             return
         self._board.joined(time.monotonic())
-        self._audit.record("joined", peer.actor, ", ".join(sorted({stream.carrier for stream in peer.streams})))
+        carriers = ", ".join(sorted({stream.carrier for stream in peer.streams}))
+        self._events.publish(PeerJoined(peer.actor, carriers))
 
     def left(self, peer: Peer) -> None:
         if not peer.thumbnail:
-            self._audit.record("left", peer.actor, peer.ended)
+            self._events.publish(PeerLeft(peer.actor, peer.ended))
             if all(each.thumbnail or each.ended for each in self._peers):  # a peer that is closing no longer counts
                 self._board.left_empty(time.monotonic())
 
@@ -64,7 +69,7 @@ class ParticipantList:
         peer.rename(name)
         self.settle_names()
         if peer.name != before:
-            self._audit.record("renamed", peer.actor, detail=f"was {before}")
+            self._events.publish(PeerRenamed(peer.actor, before))
 
     def settle_names(self) -> None:
         """Give every peer a distinct name; a name is free again when its owner leaves."""
@@ -72,15 +77,14 @@ class ParticipantList:
         if changed:
             self._renamed(changed)
 
-    def write(self, peer: Peer, text: str) -> None:
-        """Send a note to everyone, or refuse it."""
+    def write(self, peer: Peer, text: str) -> RefusalReason | None:
+        """Send a note to everyone. Return the reason if it is refused, else None."""
         link, epoch, event = peer.identity.token_id, self._clock.epoch, self._clock.event
         note = self._board.write(link, peer.id, peer.name, peer.role, text, epoch, event, time.monotonic(), time.time())
-        if isinstance(note, SharedNote):
-            self._audit.record("note", peer.actor, detail=note.text)
-            self._peers.tell("session", note)
-        else:
-            self._refuse(peer, note, "note")
+        if not isinstance(note, SharedNote):
+            return note
+        self._events.publish(NoteWritten(peer.actor, note))
+        return None
 
     async def share(self) -> None:
         """Send everyone the list of participants whenever it has changed, until cancelled."""
@@ -91,4 +95,4 @@ class ParticipantList:
             current = self._peers.participants()
             if current != shown:
                 shown = current
-                self._peers.tell("session", current)
+                self._events.publish(ParticipantsChanged(current))

@@ -133,12 +133,13 @@ class ControlSeat:
     Attributes:
         holder: "" while the seat is free
         why: the input that decided on the holder, "" at first
+        times: its time limits
     """
 
     def __init__(self, times: SeatTimes) -> None:
         self.holder = ""
         self.why = ""
-        self._times = times
+        self.times = times
         self._heard_at = 0.0
         self._round_trip = 0.0  # s, of the holder
         self._moved_at = 0.0
@@ -226,7 +227,7 @@ class ControlSeat:
 
     def _patience(self) -> float:
         """Return the seconds of silence after which the holder is gone."""
-        return self._times.heartbeat + min(ROUND_TRIPS * self._round_trip, MOST_ROUND_TRIPS)
+        return self.times.heartbeat + min(ROUND_TRIPS * self._round_trip, MOST_ROUND_TRIPS)
 
     # the moves
 
@@ -273,8 +274,8 @@ class ControlSeat:
             return SeatOutcome(refusal=SeatRefusal(peer, "declined", "ask again a little later"))
         if len(self._claims) >= MAX_CLAIMS:
             return SeatOutcome(refusal=SeatRefusal(peer, "seat_taken", "too many are waiting for it"))
-        self._claims[peer] = now + self._times.claim
+        self._claims[peer] = now + self.times.claim
         return SeatOutcome(changed=True)
 
     def _idle_at(self) -> float:
-        return self._moved_at + self._times.idle
+        return self._moved_at + self.times.idle

@@ -5,11 +5,11 @@ import time
 from typing import Protocol
 
 from lockstep.protocol.console import Seat, SeatClaim, SeatDecline, SeatGrant, SeatRelease, SeatRequest, SeatTake
-from lockstep.server.audit.audit_trail import AuditTrail
 from lockstep.server.audit.records import Actor
-from lockstep.server.control.seat import ControlSeat, SeatOutcome, SeatRefusal, SeatTimes, Standing
+from lockstep.server.control.seat import ControlSeat, SeatOutcome, SeatRefusal, Standing
 from lockstep.server.peers.peer import Peer
 from lockstep.server.peers.peer_registry import PeerRegistry
+from lockstep.server.session_events import SeatChanged, SessionEvents
 
 __all__ = ["SeatHost", "SeatKeeper", "SeatMessage"]
 
@@ -29,12 +29,11 @@ class SeatHost(Protocol):
 class SeatKeeper:
     """Keeps the seat. Run `watch` as a task; everything else is called on the loop and returns at once."""
 
-    def __init__(self, times: SeatTimes, peers: PeerRegistry, host: SeatHost, audit: AuditTrail) -> None:
-        self.rules = ControlSeat(times)
-        self._times = times
+    def __init__(self, rules: ControlSeat, peers: PeerRegistry, host: SeatHost, events: SessionEvents) -> None:
+        self.rules = rules
         self._peers = peers
         self._host = host
-        self._audit = audit
+        self._events = events
 
     def message(self) -> Seat:
         """Return the seat's state as everyone is told it."""
@@ -88,12 +87,12 @@ class SeatKeeper:
     def renamed(self, peers: list[Peer]) -> None:
         """Tell everyone, if the seat's message names one of `peers`."""
         if any(self.rules.standing(peer.id) in (Standing.HOLDER, Standing.CLAIMANT) for peer in peers):
-            self._peers.tell("session", self.message())
+            self._publish(Actor())
 
     async def watch(self) -> None:
         """Act on time limits that run out, until cancelled."""
         while True:
-            await asyncio.sleep(min(self._times.heartbeat / CHECKS, 1.0))
+            await asyncio.sleep(min(self.rules.times.heartbeat / CHECKS, 1.0))
             for outcome in self.rules.expire(time.monotonic()):
                 self._act(outcome, None)
 
@@ -101,16 +100,17 @@ class SeatKeeper:
         if outcome.rest:
             self._host.rest_robot(self.rules.why)
         if outcome.changed:
-            seat = self.message()
-            holder = self._peers.by_id(seat.holder)
-            self._audit.seat(seat, _actor(holder), _actor(actor))
-            self._peers.tell("session", seat)
+            self._publish(_actor(actor))
             for peer in self._peers:
-                peer.drives(peer.id == seat.holder)
+                peer.drives(self.rules.holds(peer.id))
         if outcome.refusal is not None:
             refused = self._peers.by_id(outcome.refusal.peer)
             if refused is not None:
                 self._host.refuse(refused, outcome.refusal)
+
+    def _publish(self, by: Actor) -> None:
+        seat = self.message()
+        self._events.publish(SeatChanged(seat, _actor(self._peers.by_id(seat.holder)), by))
 
     def _name(self, peer_id: str) -> str:
         peer = self._peers.by_id(peer_id) if peer_id else None

@@ -2,6 +2,7 @@
 
 import asyncio
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import structlog
@@ -10,7 +11,8 @@ from lockstep.server.audit.records import AuditRecord
 from lockstep.server.auth.tokens import Access
 from lockstep.server.composition.robot_app import attach_session, session_app
 from lockstep.server.composition.robot_session import running_session
-from lockstep.server.control.stop_service import SILENCED, StopAnswer, StopOutcome
+from lockstep.server.control.stop_service import StopAnswer, StopOutcome
+from lockstep.server.control.stop_silence import SILENCED
 from lockstep.server.errors import Silenced
 from lockstep.server.fleet.event_rate import Pulse
 from lockstep.server.fleet.metrics import FleetMetrics
@@ -148,7 +150,7 @@ class FleetSession:
     ) -> None:
         own = Metrics(process=False)
         async with running_session(self.settings, context, own, StateDir(directory), self.name, stops) as made:
-            made.audit.on_record = lambda record: told(self.name, record)
+            made.events.subscribe(AuditRecord, partial(told, self.name))
             attach_session(self.app, made)
             metrics.watch(self.name, made)
             self.settled.set()

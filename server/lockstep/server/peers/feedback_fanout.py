@@ -66,12 +66,17 @@ class FeedbackFanout:
         drives: Callable[[FeedbackReceiver], bool],
         operators: Callable[[], Sequence[FeedbackReceiver]],
         observers: Callable[[], Sequence[FeedbackReceiver]],
+        relays: Sequence[FeedbackReceiver] = (),
     ) -> None:
-        """`drives` returns whether one of the `operators` drives; one link may have a hundred that do not."""
+        """`drives` returns whether one of the `operators` drives; one link may have a hundred that do not.
+
+        `relays`: each gets what an observer gets, once for all of its watchers.
+        """
         self._pace = FeedbackPace(rate)
         self._drives = drives
         self._operators = operators
         self._observers = observers
+        self._relays = relays
         self._offered = asyncio.Event()
         self._newest = ""
         self._behind: dict[FeedbackReceiver, None] = {}  # operators that have not got the newest yet, in order
@@ -121,7 +126,7 @@ class FeedbackFanout:
 
     async def _serve(self, text: str) -> None:
         turns = turns_of_loop()
-        waiting = deque(self._observers())
+        waiting = deque([*self._relays, *self._observers()])
         self._pace.share(len(waiting))
         served = asyncio.get_running_loop().create_future()
 

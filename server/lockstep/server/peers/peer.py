@@ -82,6 +82,7 @@ class PeerStreams(Protocol):
 class PeerHost(Protocol):
     """Takes the reports of peers. All methods are called on the loop and return at once."""
 
+    def peer_joined(self, peer: "Peer") -> None: ...
     def channel_opened(self, peer: "Peer", channel: ChannelName) -> None: ...
     def message_received(self, peer: "Peer", channel: ChannelName, message: ClientMessage) -> None: ...
     def input_refused(self, peer: "Peer", channel: str, error: ChannelError) -> None: ...
@@ -173,6 +174,10 @@ class Peer(ABC):
         finally:
             self.end("closed")
             await self._close()
+
+    def joined(self) -> None:
+        """Called when it was admitted."""
+        self._host.peer_joined(self)
 
     def end(self, why: str) -> None:
         """End the peer. Only the first reason counts."""

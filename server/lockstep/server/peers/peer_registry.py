@@ -2,7 +2,7 @@
 
 import asyncio
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import Protocol
 
@@ -12,7 +12,6 @@ from lockstep.protocol.console import Participant, Participants, ServerMessage, 
 from lockstep.server.auth.tokens import Identity
 from lockstep.server.errors import NotFound, ShuttingDown, TooManyRequests
 from lockstep.server.peers.channels import ChannelName
-from lockstep.server.peers.feedback_fanout import FeedbackReceiver
 from lockstep.server.peers.peer import Peer
 from lockstep.server.peers.peer_places import check_place
 from lockstep.server.peers.webrtc_peer import WebRtcPeer
@@ -51,21 +50,17 @@ class PeerRegistry:
         self,
         limits: PeerRegistryLimits,
         metrics: Metrics,
-        joined: Callable[[Peer], None],
-        told: Callable[[ServerMessage], None] = lambda message: None,
+        further_bounds: Sequence[Callable[[Identity], None]] = (),
     ) -> None:
-        """`joined` is called with newcomers, `told` with messages to everyone."""
+        """`further_bounds`: each raises TooManyPeers where there is no place for one more peer of this identity."""
         self._limits = limits
-        self._joined = joined
-        self._told = told
         self._metrics = metrics
+        self._further_bounds = further_bounds
         self._sessions: dict[Peer, asyncio.Task[None]] = {}
         self._reserved: Counter[str] = Counter()  # places of peers that are being negotiated, by token
         self._closing = False
         self.ended = 0  # connections so far that have ended
-        self.relays: list[FeedbackReceiver] = []
         self.turns = FairQueue()  # order of the writes to watchers
-        self.further_bounds: list[Callable[[Identity], None]] = []  # raise TooManyPeers where there is no place
 
     def __iter__(self) -> Iterator[Peer]:
         return iter(list(self._sessions))
@@ -92,10 +87,9 @@ class PeerRegistry:
         """Return the peers whose role may drive."""
         return [peer for peer in self._sessions if peer.role != "observer"]
 
-    def observers(self) -> list[FeedbackReceiver]:
-        """Return the observers that get feedback from here; a relay gets it once for all of its watchers."""
-        here = [peer for peer in self._sessions if peer.role == "observer" and not peer.relay]
-        return [*self.relays, *here]
+    def observers(self) -> list[Peer]:
+        """Return the observers that get feedback from here, and not from a relay."""
+        return [peer for peer in self._sessions if peer.role == "observer" and not peer.relay]
 
     def settle_names(self) -> list[Peer]:
         """Give everyone the name they asked for, or that with a number. Return the peers whose name changed."""
@@ -128,7 +122,7 @@ class PeerRegistry:
         held = sum(peer.identity.token_id == token_id for peer in alike) + self._reserved[token_id]
         taken = len(alike) + self._reserved.total()
         check_place(identity.role, held, taken, bound, 0 if thumbnail else limits.reserved_places)
-        for check in () if relayed else self.further_bounds:
+        for check in () if relayed else self._further_bounds:
             check(identity)
         waiting = sum(peer.identity.token_id == token_id and not peer.connected for peer in self._sessions)
         if waiting + self._reserved[token_id] >= limits.max_unconnected:
@@ -147,7 +141,7 @@ class PeerRegistry:
         self._metrics.peers.labels(peer.role).inc()
         with peer.contained("join"):
             self.settle_names()
-            self._joined(peer)
+            peer.joined()
         log.info("peer joined", peer=peer.id, role=peer.role, name=peer.name)
 
     def by_id(self, peer_id: str) -> Peer | None:
@@ -172,7 +166,10 @@ class PeerRegistry:
         text = encode_console_message(message)
         for peer in self._sessions:
             peer.send_text(channel, text)
-        self._told(message)
+
+    def announce(self, message: ServerMessage) -> None:
+        """Send a message of the session to everyone."""
+        self.tell("session", message)
 
     def participants(self) -> Participants:
         """Return all, those who may drive first. In a crowd only they have measured values: the list changes less."""

@@ -1,7 +1,7 @@
 """Ends the peers of a link at once when the link ends, and its viewers of the 3D scene too."""
 
 import asyncio
-from collections.abc import Callable
+from typing import Protocol
 
 from lockstep.server.audit.audit_trail import AuditTrail
 from lockstep.server.audit.records import Actor, AuditKind
@@ -16,6 +16,14 @@ __all__ = ["UNKNOWN_SECONDS", "TokenRevocation"]
 UNKNOWN_SECONDS = 10.0
 
 
+class ShownSilence(Protocol):
+    """The part of the silenced stops that is needed here."""
+
+    def show(self) -> None:
+        """Tell peers whether their stops are silenced."""
+        ...
+
+
 class TokenRevocation:
     """Ends access to one robot. The console context calls `enforce`."""
 
@@ -24,12 +32,11 @@ class TokenRevocation:
         invitations: InvitationStore,
         peers: PeerRegistry,
         audit: AuditTrail,
+        silence: ShownSilence,
         robot: str = "",
-        show_silence: Callable[[], None] = lambda: None,
     ) -> None:
-        """`show_silence` is called by every `enforce`; it tells peers whether their stops are silenced."""
         self.peers = peers
-        self._show_silence = show_silence
+        self._silence = silence
         self._audit = audit
         self._invitations = invitations
         self._robot = robot
@@ -50,7 +57,7 @@ class TokenRevocation:
                 peer.end("link revoked")
             elif now >= peer.identity.expires:
                 peer.end("link expired")
-        self._show_silence()
+        self._silence.show()
         self._looked.set()
         self._looked = asyncio.Event()
 

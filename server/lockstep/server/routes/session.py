@@ -128,7 +128,7 @@ async def reset(request: Request, caller: Caller) -> Response:
     wanted = await read_json(request, ResetRequest)
     caller = await authorized(request)
     console = dependencies(request).console
-    await console.stops.reset(caller.actor, "http", wanted.number)
+    await console.resets.reset(caller.actor, "http", wanted.number)
     return json_answer(Released(True, console.clock.event, wanted.number))
 
 

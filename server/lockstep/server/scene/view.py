@@ -11,12 +11,13 @@ from typing import TYPE_CHECKING, TypeVar
 import structlog
 
 from lockstep.protocol.description import RobotDescription
-from lockstep.protocol.messages import Command, Feedback
+from lockstep.protocol.messages import Feedback
 from lockstep.server.auth.tokens import SceneTicket
 from lockstep.server.errors import SceneUnavailable
 from lockstep.server.scene.commanded_path import CommandedPath
 from lockstep.server.scene.page import ScenePage
 from lockstep.server.scene.scale import SceneScale
+from lockstep.server.session_events import CommandForwarded, EpochBegan, FeedbackReceived, SessionEvents
 from lockstep.server.telemetry.metrics import Metrics
 from lockstep.server.util.rate_limits import RateLimits
 from lockstep.server.util.uncancelled import to_the_end
@@ -67,20 +68,24 @@ class SceneView:
         self._page: ScenePage | None = None
         self._news = asyncio.Event()
 
-    def configure(self, description: RobotDescription) -> None:
-        self._description = description
-        self._path = CommandedPath(description)
+    def subscribe(self, events: SessionEvents) -> None:
+        events.subscribe(EpochBegan, self._epoch_began)
+        events.subscribe(CommandForwarded, self._command_forwarded)
+        events.subscribe(FeedbackReceived, self._feedback_received)
+
+    def _epoch_began(self, event: EpochBegan) -> None:
+        self._description = event.description
+        self._path = CommandedPath(event.description)
         self._news.set()
 
-    def command(self, command: Command) -> None:
-        """Take a command that was forwarded to the robot."""
+    def _command_forwarded(self, event: CommandForwarded) -> None:
         if self._path is not None:
-            self._path.command(command.event, command.values)
+            self._path.command(event.command.event, event.command.values)
 
-    def feedback(self, feedback: Feedback) -> None:
-        self._feedback = feedback
+    def _feedback_received(self, event: FeedbackReceived) -> None:
+        self._feedback = event.feedback
         if self._path is not None:
-            self._path.feedback(feedback)
+            self._path.feedback(event.feedback)
         if self._viewers:
             self._news.set()
 

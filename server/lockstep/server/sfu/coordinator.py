@@ -10,10 +10,10 @@ from typing import NamedTuple, Protocol
 import structlog
 
 from lockstep.protocol.console import encode_console_message
-from lockstep.protocol.description import RobotDescription
-from lockstep.protocol.messages import Media, Pong
+from lockstep.protocol.messages import Pong
 from lockstep.server.auth.tokens import Identity
 from lockstep.server.media.errors import MediaError
+from lockstep.server.session_events import EpochBegan, SessionEvents
 from lockstep.server.sfu.assignment import Assignment
 from lockstep.server.sfu.errors import RelayError
 from lockstep.server.sfu.publication import Engine, Publication
@@ -23,7 +23,7 @@ from lockstep.server.sfu.tickets import RelayTicket
 from lockstep.server.util.backoff import Backoff
 from lockstep.server.util.uncancelled import attempt
 
-__all__ = ["SfuCoordinator", "RelayedMedia", "RelayedPeer"]
+__all__ = ["SfuCoordinator", "RelayedPeer"]
 
 log = structlog.get_logger(__name__)
 
@@ -66,7 +66,7 @@ class SfuCoordinator:
         self,
         settings: RelaySettings,
         engine: Engine,
-        peers: Callable[[], Iterable[RelayedPeer]],
+        peers: Iterable[RelayedPeer],
         has_ended: Callable[[str, float], bool],
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
@@ -87,16 +87,15 @@ class SfuCoordinator:
         self._holders: dict[str, _Holder] = {}  # of the present publication's key, by link
         self._published_at = float("-inf")
 
-    # Calls from the console
+    # From the console
 
-    def epoch_began(self) -> None:
-        """Start another publication, for the media of another epoch."""
-        self._restart(NEW_EPOCH)
+    def subscribe(self, events: SessionEvents) -> None:
+        events.subscribe(EpochBegan, self._epoch_began)
 
-    def _restart(self, why: str) -> None:
+    def _epoch_began(self, event: EpochBegan) -> None:
         """Publish anew: another feed with other keys shuts out observers that may no longer watch."""
         if self._publication is not None:
-            self._publication.end(why)
+            self._publication.end(NEW_EPOCH)
 
     def send_feedback(self, text: str) -> None:
         """Send feedback to all observers behind relays at once, as one receiver among the observers."""
@@ -113,7 +112,7 @@ class SfuCoordinator:
             lost: the "RELAY-FEED" that it lost, which is not given out again
         """
         now = self._clock()
-        direct = sum(not each.relay and each.role == "observer" for each in self._peers())
+        direct = sum(not each.relay and each.role == "observer" for each in self._peers)
         if not self.stations or (peer is None and not self._handout.full(now, direct)):
             self._handout.choose(now, direct, {})
             return None
@@ -121,7 +120,7 @@ class SfuCoordinator:
         self._wanted.set()
         usable = await self._usable(lost)
         watching = {station.name: 0 for station in usable}
-        for each in self._peers():
+        for each in self._peers:
             if each.relay in watching and each is not peer:
                 watching[each.relay] += 1
         choice = self._handout.choose(now, direct, watching)
@@ -189,7 +188,7 @@ class SfuCoordinator:
     def _in_demand(self) -> bool:
         now = self._clock()
         waiting = now - self._asked_at < WAIT_SECONDS or self._handout.expected(now)
-        return waiting or any(each.relay for each in self._peers())
+        return waiting or any(each.relay for each in self._peers)
 
     async def _carry(self, origin: SfuServer) -> None:
         """Publish to one relay, and from there to the others; return when that has ended or nobody watches."""
@@ -242,7 +241,7 @@ class SfuCoordinator:
     def _has_strays(self) -> bool:
         """Return whether somebody may watch without taking part; False for `RENEW_SECONDS` after a publication."""
         now = self._clock()
-        here = {each.identity.token_id for each in self._peers() if each.relay}
+        here = {each.identity.token_id for each in self._peers if each.relay}
         for link in here & self._holders.keys():
             self._holders[link] = self._holders[link]._replace(seen_at=now)
         gone = any(now - each.seen_at > STRAY_SECONDS for each in self._holders.values())
@@ -295,25 +294,3 @@ class SfuCoordinator:
     def _tell(self) -> None:
         self._changed.set()
         self._changed = asyncio.Event()
-
-
-class FedMedia(Protocol):
-    """The part of the console's media that `RelayedMedia` needs."""
-
-    def configure(self, description: RobotDescription) -> None: ...
-    def feed(self, media: Media, now: float) -> None: ...
-
-
-class RelayedMedia:
-    """Passes calls on to the console's media, and tells the relays when an epoch begins."""
-
-    def __init__(self, media: FedMedia, relays: SfuCoordinator) -> None:
-        self._media = media
-        self._relays = relays
-
-    def configure(self, description: RobotDescription) -> None:
-        self._media.configure(description)
-        self._relays.epoch_began()
-
-    def feed(self, media: Media, now: float) -> None:
-        self._media.feed(media, now)

@@ -22,6 +22,7 @@ from lockstep.server.publishing.publishers import Publishers
 from lockstep.server.recording.service import RecordingService
 from lockstep.server.recording.writing.recorder import Recorder
 from lockstep.server.scene.view import SceneView
+from lockstep.server.session_events import SessionEvents
 from lockstep.server.settings import Settings
 from lockstep.server.sfu.coordinator import SfuCoordinator
 from lockstep.server.state.console_context import ConsoleContext
@@ -49,6 +50,7 @@ class Dependencies:
     robot: str  # its name in a fleet; "" is the only robot of a console
     settings: Settings
     metrics: Metrics
+    events: SessionEvents
     console: Console
     media: MediaHub
     context: ConsoleContext

@@ -1,7 +1,6 @@
 """Keeps one robot's stops beyond the end of link, session and console. Owns the presses and their files."""
 
 import asyncio
-from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 
@@ -24,12 +23,11 @@ WRITE_PATIENCE = 0.5  # s that the sender of a press waits for the disk
 class StopKeeper:
     """Keeps stops in memory and on disk. Call `load`, then run `run` as a task.
 
-    All else is called on the loop and returns at once, but for `written` and `kept_words`.
+    All else is called on the loop and returns at once, but for `written`, `kept_words` and `trouble_other_than`.
 
     Attributes:
         lasts: whether stops that are written outlive this console
         trouble: the reason if stops cannot be written at present, else ""
-        on_trouble: called with `trouble` whenever it changes
     """
 
     def __init__(self, directory: Path, robot: str, *, lasts: bool = True) -> None:
@@ -40,7 +38,6 @@ class StopKeeper:
         self.presses = StopPresses()
         self.lasts = lasts
         self.trouble = ""
-        self.on_trouble: Callable[[str], None] = _ignore
         self._files = KeptStops(kept_stops_place(directory, robot))
         self._wanted: dict[str, Press] = {}  # presses that belong on the disk
         self._written: set[str] = set()
@@ -87,6 +84,12 @@ class StopKeeper:
         except TimeoutError:
             return "the disk has not answered"
         return "" if press not in self._wanted or press in self._written else self.trouble
+
+    async def trouble_other_than(self, known: str) -> str:
+        """Wait until `trouble` is not `known`; return it."""
+        while self.trouble == known:
+            await self._news.wait()
+        return self.trouble
 
     async def run(self) -> None:
         """Keep the disk up to date until cancelled; then write all unanswered presses, whatever the link did."""
@@ -136,11 +139,5 @@ class StopKeeper:
         changed, self.trouble = trouble != self.trouble, trouble
         self._news.set()
         self._news = asyncio.Event()
-        if changed:
-            if trouble:
-                log.error("stops cannot be kept on disk", error="stops_unwritable", detail=trouble)
-            self.on_trouble(trouble)
-
-
-def _ignore(trouble: str) -> None:
-    pass
+        if changed and trouble:
+            log.error("stops cannot be kept on disk", error="stops_unwritable", detail=trouble)

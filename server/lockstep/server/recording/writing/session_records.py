@@ -1,0 +1,274 @@
+"""Turns the events of a session into records, and hands them to the thread that writes."""
+
+import time
+from collections.abc import Mapping
+from typing import Literal, Protocol, TypedDict
+
+from lockstep.protocol.console import Participants, RobotState, Seat
+from lockstep.protocol.messages import Command, Feedback, RefusalReason
+from lockstep.server.audit.records import Actor
+from lockstep.server.event_clock import EventClock
+from lockstep.server.media.pipeline.frame import EncodedFrame
+from lockstep.server.recording.format.records import (
+    CommandOutcome,
+    CommandRecord,
+    NoteRecord,
+    OwnRecord,
+    ParticipantsRecord,
+    RefusalRecord,
+    ReportRecord,
+    RestRecord,
+    RobotRecord,
+    SeatRecord,
+    StopRecord,
+)
+from lockstep.server.recording.times import LinkTimes, RecordClock
+from lockstep.server.recording.writing.queue_items import FeedbackItem, Item, MediaItem, OwnItem, RobotItem
+from lockstep.server.session_events import (
+    CommandForwarded,
+    CommandRefused,
+    CommandRepeated,
+    FeedbackReceived,
+    LinkDown,
+    LinkUp,
+    NoteWritten,
+    ParticipantsChanged,
+    Refused,
+    ResetDone,
+    RestForwarded,
+    SeatChanged,
+    SessionEvents,
+    SpeedReported,
+    StopAnswered,
+    StopSent,
+)
+
+__all__ = ["SessionRecords"]
+
+
+class _Now(TypedDict):
+    epoch: str
+    event: int
+
+
+class ItemQueue(Protocol):
+    """The part of the writing thread that is needed here."""
+
+    def put(self, item: Item) -> None: ...
+
+
+class RecordedCodecs(Protocol):
+    """The part of the media hub that is needed here."""
+
+    def recorded_codecs(self) -> Mapping[str, str]: ...
+
+
+class SessionRecords:
+    """A subscriber to the events of a session. Between `begin` and `end` it makes records of them.
+
+    It always knows the newest state of robot, seat and participants, with which each recording begins.
+    """
+
+    def __init__(self, clock: EventClock, media: RecordedCodecs) -> None:
+        self._clock = clock
+        self._media = media
+        self._role_of: dict[str, str] = {}
+        self._times = RecordClock(time.time_ns(), time.monotonic_ns())
+        self._link_times = LinkTimes()
+        self._link_epoch = ""
+        self._robot: RobotState | None = None
+        self._seat = Seat()
+        self._participants = Participants(participants=[])
+        self._queue: ItemQueue | None = None  # None: nothing is recorded
+
+    def begin(self, queue: ItemQueue, times: RecordClock) -> None:
+        """Put everything into `queue` from now on, first the state that holds."""
+        self._queue, self._times = queue, times
+        self._put_own(self._participants_record(self._participants))
+        self._put_own(self._seat_record(self._seat))
+        if self._clock.feedback is not None:
+            self._put_feedback(self._clock.feedback, time.monotonic())
+        if self._robot is not None:
+            self._put_robot(self._robot)
+
+    def end(self) -> None:
+        self._queue = None
+
+    def subscribe(self, events: SessionEvents) -> None:
+        events.subscribe(LinkUp, self._link_changed)
+        events.subscribe(LinkDown, self._link_changed)
+        events.subscribe(SeatChanged, self._seat_changed)
+        events.subscribe(ParticipantsChanged, self._participants_changed)
+        events.subscribe(NoteWritten, self._note_written)
+        events.subscribe(CommandForwarded, self._command_forwarded)
+        events.subscribe(CommandRefused, self._command_refused)
+        events.subscribe(CommandRepeated, self._command_repeated)
+        events.subscribe(RestForwarded, self._rest_forwarded)
+        events.subscribe(FeedbackReceived, self._feedback_received)
+        events.subscribe(Refused, self._refused)
+        events.subscribe(StopSent, self._stop_sent)
+        events.subscribe(StopAnswered, self._stop_answered)
+        events.subscribe(ResetDone, self._reset_done)
+        events.subscribe(SpeedReported, self._speed_reported)
+
+    def _link_changed(self, event: LinkUp | LinkDown) -> None:
+        state = event.state
+        if state is None:
+            return
+        self._robot = state
+        if state.epoch != self._link_epoch:
+            self._link_epoch = state.epoch
+            self._link_times = LinkTimes()
+        self._put_robot(state)
+
+    def _seat_changed(self, event: SeatChanged) -> None:
+        changed = event.seat.holder != self._seat.holder
+        self._seat = event.seat
+        if changed:
+            self._put_own(self._seat_record(event.seat))
+
+    def _participants_changed(self, event: ParticipantsChanged) -> None:
+        self._participants = event.participants
+        self._role_of = {each.peer: each.role for each in event.participants.participants}
+        self._put_own(self._participants_record(event.participants))
+
+    def _note_written(self, event: NoteWritten) -> None:
+        note = event.note
+        self._put_own(NoteRecord(**self._now(), peer=note.peer, name=note.name, role=note.role, text=note.text))
+
+    def _command_forwarded(self, event: CommandForwarded) -> None:
+        self._put_command(event.by, event.command, "forwarded")
+
+    def _command_refused(self, event: CommandRefused) -> None:
+        outcome: CommandOutcome = "undelivered" if event.reason == "link_down" else "refused"
+        self._put_command(event.by, event.command, outcome, event.reason)
+
+    def _command_repeated(self, event: CommandRepeated) -> None:
+        self._put_command(event.by, event.command, "repeated")
+
+    def _put_command(
+        self, by: Actor, command: Command, outcome: CommandOutcome, reason: RefusalReason | Literal[""] = ""
+    ) -> None:
+        if self._queue is None:
+            return
+        self._put_own(
+            CommandRecord(
+                epoch=self._clock.epoch,
+                event=command.event,
+                issue=command.issue,
+                values=command.values,
+                nonce=command.nonce,
+                peer=by.peer,
+                name=by.name,
+                outcome=outcome,
+                reason=reason,
+            )
+        )
+
+    def _rest_forwarded(self, event: RestForwarded) -> None:
+        epoch = self._clock.epoch
+        self._put_own(RestRecord(epoch=epoch, event=event.rest.event, peer=event.by.peer, why=event.why))
+
+    def _feedback_received(self, event: FeedbackReceived) -> None:
+        self._link_times.observe(event.feedback.time, event.now)
+        self._put_feedback(event.feedback, event.now)
+
+    def _put_feedback(self, feedback: Feedback, now: float) -> None:
+        if self._queue is None:
+            return
+        captured = self._times.at(self._link_times.captured(feedback.time, now))
+        self._put(FeedbackItem(self._times.at(now), captured, self._clock.epoch, feedback))
+
+    def _refused(self, event: Refused) -> None:
+        refusal = event.refusal
+        self._put_own(
+            RefusalRecord(
+                epoch=self._clock.epoch,
+                event=refusal.current,
+                refused=max(0, refusal.event),
+                reason=refusal.reason,
+                detail=refusal.detail,
+                by=event.by,
+                peer=event.to.peer,
+                name=event.to.name,
+            )
+        )
+
+    def _stop_sent(self, event: StopSent) -> None:
+        press = event.press
+        self._put_own(
+            StopRecord(
+                **self._now(),
+                kind="stop",
+                by=press.by.name,
+                where=press.where,
+                reason=press.reason,
+                press=press.id,
+                delivered=event.delivered,
+            )
+        )
+
+    def _stop_answered(self, event: StopAnswered) -> None:
+        taken = event.taken
+        self._put_own(
+            StopRecord(
+                **self._now(),
+                kind="taken",
+                by=event.press.by.name,
+                where="robot",
+                press=taken.press,
+                number=taken.number,
+                kept=taken.kept,
+            )
+        )
+
+    def _reset_done(self, event: ResetDone) -> None:
+        self._put_own(StopRecord(**self._now(), kind="reset", by=event.by.name, where=event.where, number=event.number))
+
+    def _speed_reported(self, event: SpeedReported) -> None:
+        self._put_own(ReportRecord(**self._now(), peer=event.by.peer, name=event.by.name, report=event.report))
+
+    # handing over to the thread
+
+    def take_frame(self, stream: str, codec: str, frame: EncodedFrame, *, attached: bool) -> None:
+        now = time.monotonic()
+        captured = min(now, frame.time if attached else self._link_times.captured(frame.time, now))
+        self._put(
+            MediaItem(
+                self._times.at(now),
+                self._times.at(captured),
+                self._clock.epoch,
+                stream,
+                codec,
+                frame.stamp,
+                frame.keyframe,
+                frame.data,
+            )
+        )
+
+    def _now(self) -> _Now:
+        return {"epoch": self._clock.epoch, "event": self._clock.event}
+
+    def _seat_record(self, seat: Seat) -> OwnRecord:
+        role = self._role_of.get(seat.holder, "")
+        return SeatRecord(**self._now(), holder=seat.holder, name=seat.name, role=role, why=seat.why)
+
+    def _participants_record(self, message: Participants) -> OwnRecord:
+        return ParticipantsRecord(**self._now(), participants=message.participants)
+
+    def _put_robot(self, state: RobotState) -> None:
+        record = RobotRecord(
+            epoch=state.epoch,
+            event=self._clock.event,
+            link=state.link,
+            detail=state.detail,
+            description=state.description,
+        )
+        self._put(RobotItem(self._times.at(time.monotonic()), record, self._media.recorded_codecs()))
+
+    def _put_own(self, record: OwnRecord) -> None:
+        self._put(OwnItem(self._times.at(time.monotonic()), record))
+
+    def _put(self, item: Item) -> None:
+        if self._queue is not None:
+            self._queue.put(item)

@@ -1,0 +1,284 @@
+"""The events of a robot's session, and those who hear them: metrics, audit, recorder, notices, 3D scene, relays.
+
+The console decides and acts first: STOP, seat and commands need no subscriber. Then it publishes what has happened.
+"""
+
+from collections.abc import Callable
+from typing import Literal, TypeVar
+
+import msgspec
+
+from lockstep.protocol.console import Participants, Report, RobotState, Seat, SharedNote, SpeedCapState
+from lockstep.protocol.description import RobotDescription
+from lockstep.protocol.messages import Command, Feedback, Refusal, RefusalReason, Rest, StopState, StopTaken
+from lockstep.server.audit.records import Actor
+from lockstep.server.stop.stop_presses import Press
+from lockstep.server.telemetry.faults import Faults
+
+__all__ = [
+    "CommandForwarded",
+    "CommandRefused",
+    "CommandRepeated",
+    "EpochBegan",
+    "FeedbackReceived",
+    "InputRefused",
+    "LinkDown",
+    "LinkUp",
+    "NoteWritten",
+    "ParticipantsChanged",
+    "PeerJoined",
+    "PeerLeft",
+    "PeerRenamed",
+    "Refused",
+    "ResetDone",
+    "ResetRefused",
+    "RestForwarded",
+    "RobotTaken",
+    "SeatChanged",
+    "SessionBegan",
+    "SessionEvent",
+    "SessionEvents",
+    "SilenceChanged",
+    "SpeedCapChanged",
+    "SpeedReported",
+    "StopAnswered",
+    "StopAsked",
+    "StopRepeated",
+    "StopSent",
+    "StopShown",
+    "StopSilenced",
+    "StopUndelivered",
+    "StopsDiskChanged",
+]
+
+
+class SessionEvent(msgspec.Struct, frozen=True):
+    """Something that has happened. `Actor()` is the console itself."""
+
+
+# commands
+
+
+class CommandForwarded(SessionEvent, frozen=True):
+    by: Actor
+    command: Command  # as the robot got it
+
+
+class CommandRefused(SessionEvent, frozen=True):
+    """A `Refused` comes with it."""
+
+    by: Actor
+    command: Command
+    reason: RefusalReason
+
+
+class CommandRepeated(SessionEvent, frozen=True):
+    by: Actor
+    command: Command
+    answered: bool  # with the current feedback; False: it was absorbed
+
+
+class RestForwarded(SessionEvent, frozen=True):
+    by: Actor
+    rest: Rest
+    why: str  # the change of the seat that the console rests for; "": `by` asked for it
+
+
+class Refused(SessionEvent, frozen=True):
+    """A peer was sent a refusal."""
+
+    to: Actor  # Actor(): the robot refused, and there is no peer to tell
+    channel: str
+    refusal: Refusal
+    by: Literal["console", "robot"]
+
+
+class InputRefused(SessionEvent, frozen=True):
+    """A peer has sent something that is no message."""
+
+    channel: str
+    error: str  # its name
+
+
+class SpeedReported(SessionEvent, frozen=True):
+    """The seat's holder has sent a report."""
+
+    by: Actor
+    report: Report
+
+
+class SpeedCapChanged(SessionEvent, frozen=True):
+    state: SpeedCapState
+
+
+# the robot
+
+
+class SessionBegan(SessionEvent, frozen=True):
+    pass
+
+
+class EpochBegan(SessionEvent, frozen=True):
+    """The bridge was started anew. The peers of the last epoch are still there."""
+
+    description: RobotDescription
+
+
+class LinkUp(SessionEvent, frozen=True):
+    state: RobotState
+
+
+class LinkDown(SessionEvent, frozen=True):
+    """The link for commands is down, or could not be opened again for another reason than before."""
+
+    state: RobotState | None  # None: the robot was never reached
+    detail: str
+    was_up: bool
+
+
+class RobotTaken(SessionEvent, frozen=True):
+    """Another console has taken the robot."""
+
+    detail: str
+
+
+class FeedbackReceived(SessionEvent, frozen=True):
+    feedback: Feedback
+    now: float  # s on the monotonic clock
+    turnaround: float | None  # s since the command that it answers was forwarded; None: it answers none
+
+
+class StopShown(SessionEvent, frozen=True):
+    """A feedback has shown another state of the stop."""
+
+    stop: StopState
+    event: int
+
+
+# stops and resets
+
+
+class StopAsked(SessionEvent, frozen=True):
+    """Somebody asks for a STOP: a new press, a repeat, or one of a silenced link."""
+
+    by: Actor
+    where: str
+
+
+class StopSilenced(SessionEvent, frozen=True):
+    """A STOP was refused, because a supervisor has silenced its link."""
+
+    by: Actor
+
+
+class StopRepeated(SessionEvent, frozen=True):
+    by: Actor
+    where: str
+
+
+class StopSent(SessionEvent, frozen=True):
+    press: Press
+    delivered: bool  # there was a link to send it on
+    alone: bool  # no other press waits for the bridge's answer
+
+
+class StopUndelivered(SessionEvent, frozen=True):
+    """The bridge has not answered in time, or there is no link. The press is sent again."""
+
+    press: Press
+
+
+class StopAnswered(SessionEvent, frozen=True):
+    press: Press
+    taken: StopTaken
+    again: bool  # it was undelivered before
+    released: bool  # it was reset before
+
+
+class ResetDone(SessionEvent, frozen=True):
+    """The robot says that the stop is released."""
+
+    by: Actor
+    where: str
+    number: int
+
+
+class ResetRefused(SessionEvent, frozen=True):
+    by: Actor
+    where: str
+    reason: RefusalReason
+
+
+class SilenceChanged(SessionEvent, frozen=True):
+    """A supervisor has silenced the stops of a link, or ended that."""
+
+    by: Actor
+    name: str
+    link: str
+    silent: bool
+
+
+class StopsDiskChanged(SessionEvent, frozen=True):
+    trouble: str  # why stops cannot be kept on disk; "": they can again
+
+
+# people
+
+
+class SeatChanged(SessionEvent, frozen=True):
+    """The holder, the claims, the countdown or a name have changed."""
+
+    seat: Seat
+    holder: Actor  # Actor(): nobody
+    by: Actor
+
+
+class PeerJoined(SessionEvent, frozen=True):
+    peer: Actor
+    carriers: str  # of its media
+
+
+class PeerLeft(SessionEvent, frozen=True):
+    peer: Actor
+    why: str
+
+
+class PeerRenamed(SessionEvent, frozen=True):
+    peer: Actor
+    before: str
+
+
+class ParticipantsChanged(SessionEvent, frozen=True):
+    participants: Participants
+
+
+class NoteWritten(SessionEvent, frozen=True):
+    by: Actor
+    note: SharedNote
+
+
+Event = TypeVar("Event", bound=msgspec.Struct)
+
+
+class SessionEvents:
+    """Passes each event to the subscribers of its type, at once and in the order in which they have subscribed.
+
+    A subscriber returns at once. An event that it publishes itself is heard before the next subscriber hears the first
+    one. Its exceptions are counted as faults of the console and reach neither the publisher nor another subscriber.
+    """
+
+    def __init__(self, faults: Faults) -> None:
+        self._faults = faults
+        self._subscribers: dict[type[msgspec.Struct], tuple[Callable[[msgspec.Struct], None], ...]] = {}
+
+    def subscribe(self, kind: type[Event], hear: Callable[[Event], None]) -> None:
+        """Call `hear` with each event of exactly this type."""
+        # `publish` looks up the event's own type, so `hear` gets no other.
+        self._subscribers[kind] = (*self._subscribers.get(kind, ()), hear)  # type: ignore[arg-type]
+
+    def publish(self, event: msgspec.Struct) -> None:
+        for hear in self._subscribers.get(type(event), ()):
+            try:
+                hear(event)
+            except Exception as error:
+                self._faults.caught(f"hearing {type(event).__name__}", error)

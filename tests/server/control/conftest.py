@@ -1,0 +1,20 @@
+"""A bench for STOP, whose background tasks run."""
+
+import asyncio
+from collections.abc import AsyncIterator
+from pathlib import Path
+
+import pytest
+
+from tests.server.control.stop_bench import StopBench
+
+
+@pytest.fixture
+async def bench(tmp_path: Path) -> AsyncIterator[StopBench]:
+    made = StopBench(tmp_path)
+    parts = (made.keeper.run, made.service.run, made.service.watch_disk, made.resets.run)
+    tasks = [asyncio.create_task(part()) for part in parts]
+    yield made
+    for task in tasks:
+        task.cancel()
+    await asyncio.gather(*tasks, return_exceptions=True)
