@@ -20,7 +20,7 @@ from lockstep.server.recording.settings import recordings_directory
 from lockstep.server.recording.writing.recorder import Recorder
 from lockstep.server.scene.view import SceneView
 from lockstep.server.settings import Settings
-from lockstep.server.sfu.coordinator import RelayedMedia, SfuCoordinator
+from lockstep.server.sfu.coordinator import SfuCoordinator
 from lockstep.server.sfu.janus_engine import JanusEngine
 from lockstep.server.state.console_context import ConsoleContext
 from lockstep.server.state.dependencies import Dependencies
@@ -122,7 +122,7 @@ async def _session(
     console = Console(
         settings,
         metrics,
-        RelayedMedia(media, relays),
+        media,
         scene,
         audit,
         clock,

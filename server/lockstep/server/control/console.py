@@ -31,7 +31,6 @@ from lockstep.protocol.messages import (
     Command,
     Feedback,
     LinkRole,
-    Media,
     Ping,
     Pong,
     Refusal,
@@ -68,7 +67,7 @@ from lockstep.server.peers.channels import ChannelName
 from lockstep.server.peers.feedback_fanout import FeedbackFanout, FeedbackReceiver
 from lockstep.server.peers.peer import Peer
 from lockstep.server.peers.peer_registry import PeerRegistry
-from lockstep.server.robot.robot_connection import RobotConnection
+from lockstep.server.robot.robot_connection import MediaSink, RobotConnection
 from lockstep.server.settings import Settings
 from lockstep.server.stop.stop_keeper import StopKeeper
 from lockstep.server.stop.stop_presses import new_press
@@ -84,11 +83,10 @@ UNWRITTEN = "The audit log cannot be written ({}). The console goes on; what hap
 RESTART_AFTER = 1.0  # s until a background task that failed runs again
 
 
-class MediaFeed(Protocol):
-    """The part of the media hub that the console uses."""
+class MediaFeed(MediaSink, Protocol):
+    """The part of the media hub that the console uses. The robot's media go there without passing the console."""
 
     def configure(self, description: RobotDescription) -> None: ...
-    def feed(self, media: Media, now: float) -> None: ...
 
 
 class Console:
@@ -111,7 +109,7 @@ class Console:
         self.clock = clock or EventClock()
         self._listener = listener or SessionListener()
         self.audit = AuditTrail(self.clock, audit_log)
-        self.robot = RobotConnection(settings, self)
+        self.robot = RobotConnection(settings, self, media)
         self.peers = PeerRegistry(settings, metrics, self._joined, self._listener.told)
         times = SeatTimes(settings.seat_timeout, settings.seat_idle_seconds, settings.seat_claim_seconds)
         self.seat = SeatKeeper(times, self.peers, self, self.audit)
@@ -332,9 +330,6 @@ class Console:
     def stop_taken(self, taken: StopTaken) -> None:
         self._arbiter.stop_taken(taken)
         self.stops.taken(taken)
-
-    def media_received(self, media: Media) -> None:
-        self._media.feed(media, time.monotonic())
 
     def link_failed(self, role: LinkRole, error: Exception) -> None:
         self._metrics.faults.caught(f"robot link {role}", error)

@@ -57,6 +57,7 @@ class Subscriptions:
         self._has_left = False
         self._has_failed = False
         self._tell_failed: Callable[[str, Exception], None] = _log_failure
+        self._tell_ended: Callable[[], None] = lambda: None
 
     @property
     def streams(self) -> list[StreamInfo]:
@@ -164,6 +165,12 @@ class Subscriptions:
         """Call `tell` with the stage and the exception once this peer cannot be served; `tell` raises nothing."""
         self._tell_failed = tell
 
+    def on_ended(self, tell: Callable[[], None]) -> None:
+        """Call `tell` once the streams have ended, at once if they have; `tell` raises nothing."""
+        self._tell_ended = tell
+        if self._has_left:
+            tell()
+
     def failed(self, stage: str, error: Exception) -> None:
         """Stop serving this peer, because doing so raised `error`. Only the first error is told. Raises nothing."""
         if not self._has_failed:
@@ -172,7 +179,11 @@ class Subscriptions:
             self._tell_failed(stage, error)
 
     def detach(self) -> None:
-        """Take no more frames. Idempotent; raises nothing."""
+        """Take no more frames, because the streams have ended. Raises nothing."""
+        self._leave()
+        self._tell_ended()
+
+    def _leave(self) -> None:
         error = self._leave_all()
         if error is not None:
             self.failed("forget", error)
@@ -195,7 +206,7 @@ class Subscriptions:
 
     async def close(self) -> None:
         """Stop sending to this peer. Idempotent; does not close its connection."""
-        self.detach()
+        self._leave()
 
 
 def _log_failure(stage: str, error: Exception) -> None:

@@ -10,20 +10,19 @@ from typing import NamedTuple, Protocol
 import structlog
 
 from lockstep.protocol.console import encode_console_message
-from lockstep.protocol.description import RobotDescription
-from lockstep.protocol.messages import Media, Pong
+from lockstep.protocol.messages import Pong
 from lockstep.server.auth.tokens import Identity
 from lockstep.server.media.errors import MediaError
 from lockstep.server.sfu.assignment import Assignment
 from lockstep.server.sfu.errors import RelayError
-from lockstep.server.sfu.publication import Engine, Publication
+from lockstep.server.sfu.publication import NEW_EPOCH, Engine, Publication
 from lockstep.server.sfu.settings import RelaySettings
 from lockstep.server.sfu.sfu_server import SfuServer
 from lockstep.server.sfu.tickets import RelayTicket
 from lockstep.server.util.backoff import Backoff
 from lockstep.server.util.uncancelled import attempt
 
-__all__ = ["SfuCoordinator", "RelayedMedia", "RelayedPeer"]
+__all__ = ["SfuCoordinator", "RelayedPeer"]
 
 log = structlog.get_logger(__name__)
 
@@ -36,7 +35,7 @@ HEALTHY_SECONDS = 10.0
 LOOK_SECONDS = 0.25  # between two checks that the observers may still watch
 STRAY_SECONDS = 60.0  # then an observer with a key and no line to the console is thought to watch on without it
 RENEW_SECONDS = 600.0  # between two publications because of such observers
-NEW_EPOCH, ENDED, UNWATCHED, STRAY = "new epoch", "a link ended", "nobody watches", "somebody left with a key"
+ENDED, UNWATCHED, STRAY = "a link ended", "nobody watches", "somebody left with a key"
 OWN_REASONS = (NEW_EPOCH, ENDED, UNWATCHED, STRAY)  # reasons of the console to end a publication; no fault of a relay
 HEARTBEAT = encode_console_message(Pong(id=0))
 
@@ -88,15 +87,6 @@ class SfuCoordinator:
         self._published_at = float("-inf")
 
     # Calls from the console
-
-    def epoch_began(self) -> None:
-        """Start another publication, for the media of another epoch."""
-        self._restart(NEW_EPOCH)
-
-    def _restart(self, why: str) -> None:
-        """Publish anew: another feed with other keys shuts out observers that may no longer watch."""
-        if self._publication is not None:
-            self._publication.end(why)
 
     def send_feedback(self, text: str) -> None:
         """Send feedback to all observers behind relays at once, as one receiver among the observers."""
@@ -295,25 +285,3 @@ class SfuCoordinator:
     def _tell(self) -> None:
         self._changed.set()
         self._changed = asyncio.Event()
-
-
-class FedMedia(Protocol):
-    """The part of the console's media that `RelayedMedia` needs."""
-
-    def configure(self, description: RobotDescription) -> None: ...
-    def feed(self, media: Media, now: float) -> None: ...
-
-
-class RelayedMedia:
-    """Passes calls on to the console's media, and tells the relays when an epoch begins."""
-
-    def __init__(self, media: FedMedia, relays: SfuCoordinator) -> None:
-        self._media = media
-        self._relays = relays
-
-    def configure(self, description: RobotDescription) -> None:
-        self._media.configure(description)
-        self._relays.epoch_began()
-
-    def feed(self, media: Media, now: float) -> None:
-        self._media.feed(media, now)

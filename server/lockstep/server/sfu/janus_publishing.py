@@ -18,7 +18,7 @@ from lockstep.server.peers.channel_writer import ChannelWriter
 from lockstep.server.sfu.errors import RelayRefused, RelaySilent
 from lockstep.server.sfu.janus_room import JanusRoom
 from lockstep.server.sfu.janus_session import JanusSession
-from lockstep.server.sfu.publication import Publication
+from lockstep.server.sfu.publication import NEW_EPOCH, Publication
 
 __all__ = ["Connect", "PublishedMedia", "publish"]
 
@@ -77,6 +77,7 @@ async def publish(
         writer = ChannelWriter(connection, connection.open_channel(FEEDBACK, reliability=NEWEST_WINS))
         publication = Publication(feed, given.streams, writer.send_newest)
         given.on_failed(publication.failed)
+        given.on_ended(lambda: publication.end(NEW_EPOCH))
         found.append(publication)
         line = _Line(connection, given, writer, publication)
         connection.listen(line.heard)
