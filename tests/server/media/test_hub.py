@@ -161,8 +161,12 @@ async def test_a_peer_is_told_once_when_an_epoch_ends_its_streams_and_also_when_
         assert told == ["early", "late"]
 
 
-async def test_a_plane_that_was_never_configured_closes() -> None:
-    await MediaHub(MediaSettings(), CollectorRegistry()).close()
+async def test_a_plane_that_was_never_configured_ends() -> None:
+    running = asyncio.create_task(MediaHub(MediaSettings(), CollectorRegistry()).run())
+    await asyncio.sleep(0)
+    running.cancel()
+    with pytest.raises(asyncio.CancelledError):
+        await running
 
 
 async def test_bandwidth_estimates_are_kept_for_the_stream_they_are_about() -> None:

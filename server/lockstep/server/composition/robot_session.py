@@ -176,6 +176,7 @@ async def _session(
                 *(
                     tasks.create_task(run_on(name, run, metrics.faults), name=name)
                     for name, run in (
+                        ("media", media.run),
                         ("sources", sources.run),
                         ("voice", voice.run),
                         ("publishers", publishers.run),
@@ -191,6 +192,5 @@ async def _session(
                 task.cancel()
     finally:
         made.recordings.close()
-        await media.close()
         if scene is not None:
             await scene.close()

@@ -8,6 +8,7 @@ from lockstep.server.media.codecs.h264 import Profile
 from lockstep.server.media.metrics import MediaMetrics
 from lockstep.server.media.pipeline.frame import EncodedFrame
 from lockstep.server.media.pipeline.frame_queue import Outbox
+from lockstep.server.media.quality.encoding_target import PictureTier
 
 __all__ = ["FrameSender", "Subscription"]
 
@@ -44,6 +45,8 @@ class Subscription:
         self.priority = priority
         self.trailer = carrier == "trailer"
         self.h264: Profile | None = None  # negotiated profile; None for another codec
+        self.tier: PictureTier = "operator"  # of the console's encoding that it gets, or would get
+        self.held_back = False  # from the camera's own encoding, because its path has no room
         self.sender: FrameSender | None = None  # None before the transport is connected
         self._outbox = outbox
         self._on_dropped = on_dropped

@@ -22,7 +22,7 @@ class Delivery(NamedTuple):
     """One stream of one peer, with the objects that serve it."""
 
     info: StreamInfo
-    stream: Stream  # type: ignore[type-arg]  # the job type does not matter here
+    stream: Stream
     target: Subscription
     sender: RtpSender
 
@@ -104,7 +104,7 @@ class Subscriptions:
         for delivery in () if self._has_left else self.deliveries:
             delivery.target.sender = delivery.sender
             encoded_as = self.quality.encoded_as if delivery.info.kind == "video" else self.quality.hears_as
-            delivery.stream.join(delivery.info.codec, delivery.target, encoded_as)
+            delivery.stream.encodings.join(delivery.info.codec, delivery.target, encoded_as)
         if self.quality.cameras and not self._has_left:
             self._on_connected()
 
@@ -114,7 +114,7 @@ class Subscriptions:
         if delivery is None or self._has_left:
             return
         if isinstance(event, KeyframeRequested):
-            delivery.stream.request_keyframe(delivery.info.codec, delivery.target, "pli")
+            delivery.stream.encodings.request_keyframe(delivery.target, "pli")
         elif isinstance(event, Reception):
             delivery.sender.reported(event)
             self.quality.reception(event.lost, event.expected, event.round_trip)
@@ -159,7 +159,7 @@ class Subscriptions:
         """Request a keyframe for somebody behind this peer who cannot decode."""
         for delivery in self.deliveries:
             if delivery.info.mid == mid:
-                delivery.stream.request_keyframe(delivery.info.codec, delivery.target, "pli")
+                delivery.stream.encodings.request_keyframe(delivery.target, "pli")
 
     def on_failed(self, tell: Callable[[str, Exception], None]) -> None:
         """Call `tell` with the stage and the exception once this peer cannot be served; `tell` raises nothing."""
@@ -195,7 +195,7 @@ class Subscriptions:
         for delivery in self.deliveries:
             delivery.target.sender = None
             try:
-                delivery.stream.leave(delivery.target)
+                delivery.stream.encodings.leave(delivery.target)
             except Exception as error:
                 first = first or error
         try:

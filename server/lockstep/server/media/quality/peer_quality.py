@@ -13,8 +13,7 @@ from lockstep.server.media.quality.observer_tier import ObserverTier
 from lockstep.server.media.subscription import Subscription
 
 if TYPE_CHECKING:
-    from lockstep.server.media.pipeline.audio_stream import AudioStream
-    from lockstep.server.media.pipeline.video_stream import VideoStream
+    from lockstep.server.media.pipeline.stream import AudioStream, VideoStream
 
 __all__ = ["CameraLink", "PeerQuality", "SoundLink"]
 
