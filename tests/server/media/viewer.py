@@ -250,7 +250,7 @@ async def viewing(
 
 def sender_of(viewer: Viewer) -> RtpSender:
     """What sends the viewer's first stream over RTP."""
-    return viewer.media.deliveries[0].sender
+    return viewer.media.deliveries[0].target.sender
 
 
 def _notify_of_server_input(viewer: Viewer) -> None:

@@ -11,8 +11,9 @@ from lockstep.rtc.sdp import MID_URI, Codec, LocalMedia, MediaSection, SessionDe
 from lockstep.server.media.codecs.codec_choice import OPUS, chosen_codecs, known_codecs, offered_codecs
 from lockstep.server.media.codecs.extensions import choose_carrier, wanted_uris
 from lockstep.server.media.pipeline.stream import Stream, VideoStream
+from lockstep.server.media.pipeline.stream_encodings import StreamEncodings
 
-__all__ = ["MediaPlan", "PlannedStream", "plan_answer", "plan_publication"]
+__all__ = ["MediaPlan", "PlannedStream", "codec_in_use", "plan_answer", "plan_publication"]
 
 
 class PlannedStream(NamedTuple):
@@ -87,13 +88,20 @@ def plan_publication(streams: Sequence[Stream], camera_codec: str = "") -> tuple
     """
     plan, offered = MediaPlan({}, []), []
     for number, stream in enumerate(streams):
-        name = stream.encodings.codec_in_use(camera_codec if stream.kind == "video" else "")
+        name = codec_in_use(stream.encodings, camera_codec if stream.kind == "video" else "")
         planned = PlannedStream(str(number), stream, offered_codecs(stream.kind, name), "trailer")
         plan.streams.append(planned)
         # A relay forwards playout-delay, so that browsers show pictures at once.
         uris = (MID_URI, PLAYOUT_DELAY_URI) if stream.kind == "video" else (MID_URI,)
         offered.append(OfferedMedia(planned.mid, stream.kind, replace(_sent(planned), extensions=uris)))
     return plan, offered
+
+
+def codec_in_use(encodings: StreamEncodings, wanted: str = "") -> str:
+    """Return `wanted` if available; else a codec that is already encoded for peers, or the best one."""
+    if wanted in encodings.codecs:
+        return wanted
+    return next((each.codec for each in encodings.own if each.targets), encodings.codecs[0])
 
 
 def _inactive(section: MediaSection) -> LocalMedia:

@@ -99,8 +99,10 @@ class Subscribers:
         mid, stream, codecs, carrier = planned
         codec = next(name for name in stream.encodings.codecs if name.lower() == codecs[0].name.lower())
         video, settings = stream.kind == "video", self._settings
+        epoch = self._wall_clock() - asyncio.get_running_loop().time()
         target = Subscription(
             Outbox(settings.video_queue_frames if video else settings.audio_queue_frames, video=video),
+            RtpSender(connection, mid, carrier, video=video, wall_clock=epoch),
             priority=priority,
             stream=stream.name,
             carrier=carrier,
@@ -109,18 +111,16 @@ class Subscribers:
             on_failed=lambda error: peer.failed("media", error),
         )
         target.h264 = h264_profile(codecs[0])
-        epoch = self._wall_clock() - asyncio.get_running_loop().time()
-        sender = RtpSender(connection, mid, carrier, video=video, wall_clock=epoch)
         info = StreamInfo(
             mid=mid, stream=stream.name, label=stream.label, kind=stream.kind, codec=codec, carrier=carrier
         )
-        return Delivery(info, stream, target, sender)
+        return Delivery(info, stream, target)
 
     def _joined(self, peer: Subscriptions) -> Subscriptions:
         self._peers[peer] = None
         for each in peer.deliveries:
             if isinstance(each.stream, VideoStream):
-                peer.quality.cameras.append(CameraLink(each.stream, each.info.codec, each.target, each.sender))
+                peer.quality.cameras.append(CameraLink(each.stream, each.info.codec, each.target))
             elif isinstance(each.stream, AudioStream):
                 peer.quality.sounds.append(SoundLink(each.stream, each.info.codec, each.target))
         if peer.deliveries:

@@ -7,7 +7,7 @@ from typing import NamedTuple
 from lockstep.protocol.console import Quality, Report, StreamInfo, Tier
 from lockstep.rtc.endpoint import Connection
 from lockstep.rtc.rtp.stage import BandwidthEstimate, KeyframeRequested, PacketsLeft, Reception, StreamEvent
-from lockstep.server.media.pipeline.rtp_sender import RtpSender, SenderStats
+from lockstep.server.media.pipeline.rtp_sender import SenderStats
 from lockstep.server.media.pipeline.stream import Stream
 from lockstep.server.media.quality.peer_quality import PeerQuality
 from lockstep.server.media.subscription import Subscription
@@ -24,7 +24,6 @@ class Delivery(NamedTuple):
     info: StreamInfo
     stream: Stream
     target: Subscription
-    sender: RtpSender
 
 
 REPORTS_OFTEN = 1 / 3  # s
@@ -67,7 +66,7 @@ class Subscriptions:
     @property
     def stats(self) -> dict[str, SenderStats]:
         """Counters and the peer's reports, by mid."""
-        return {delivery.info.mid: delivery.sender.stats for delivery in self.deliveries}
+        return {delivery.info.mid: delivery.target.sender.stats for delivery in self.deliveries}
 
     @property
     def dropped(self) -> int:
@@ -102,7 +101,7 @@ class Subscriptions:
         """Start sending media: the connection is up."""
         self._set_pace()
         for delivery in () if self._has_left else self.deliveries:
-            delivery.target.sender = delivery.sender
+            delivery.target.sends = True
             encoded_as = self.quality.encoded_as if delivery.info.kind == "video" else self.quality.hears_as
             delivery.stream.encodings.join(delivery.info.codec, delivery.target, encoded_as)
         if self.quality.cameras and not self._has_left:
@@ -116,10 +115,10 @@ class Subscriptions:
         if isinstance(event, KeyframeRequested):
             delivery.stream.encodings.request_keyframe(delivery.target, "pli")
         elif isinstance(event, Reception):
-            delivery.sender.reported(event)
+            delivery.target.sender.reported(event)
             self.quality.reception(event.lost, event.expected, event.round_trip)
         elif isinstance(event, BandwidthEstimate):
-            delivery.sender.estimated(event.bitrate)
+            delivery.target.sender.estimated(event.bitrate)
             self.quality.bandwidth(event.bitrate, event.ssrcs)
         elif isinstance(event, PacketsLeft):
             self._on_paced(delivery.target)
@@ -193,7 +192,7 @@ class Subscriptions:
         self._has_left = True
         first: Exception | None = None
         for delivery in self.deliveries:
-            delivery.target.sender = None
+            delivery.target.sends = False
             try:
                 delivery.stream.encodings.leave(delivery.target)
             except Exception as error:

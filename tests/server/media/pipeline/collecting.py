@@ -1,6 +1,6 @@
 """The end of a chain of stages, for tests of one of them; and what it needs around it."""
 
-from typing import Any
+from typing import Any, cast
 
 from prometheus_client import CollectorRegistry
 
@@ -8,6 +8,7 @@ from lockstep.protocol.messages import Media
 from lockstep.server.media.metrics import DropCounter, MediaMetrics
 from lockstep.server.media.pipeline.frame import EncodedFrame
 from lockstep.server.media.pipeline.frame_queue import Outbox
+from lockstep.server.media.pipeline.rtp_sender import RtpSender
 from lockstep.server.media.pipeline.stage import FrameStage, SourceFrame
 from lockstep.server.media.pipeline.stream_encodings import StreamEncodings
 from lockstep.server.media.pipeline.tier_encoding import TierEncoding
@@ -53,8 +54,13 @@ class Counted:
 
     def subscription(self, **changes: Any) -> Subscription:
         fields: dict[str, Any] = {"priority": False, "stream": "camera0", "carrier": "none", "metrics": self.metrics}
+        sender = cast(RtpSender, None)  # these tests send nothing
         return Subscription(
-            Outbox(6, video=True), on_dropped=lambda: None, on_failed=lambda error: None, **{**fields, **changes}
+            Outbox(6, video=True),
+            sender,
+            on_dropped=lambda: None,
+            on_failed=lambda error: None,
+            **{**fields, **changes},
         )
 
 

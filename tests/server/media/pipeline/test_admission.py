@@ -46,7 +46,9 @@ def test_more_frames_than_any_source_makes_are_dropped() -> None:
 def test_the_newest_frame_is_known_even_if_nobody_takes_it() -> None:
     world = World()
     world.wanted = False
-    assert world.stage.newest is None
-    arrive(world.stage, picture(5, 0.0, width=64))
-    assert world.stage.newest is not None
-    assert (world.stage.newest.media.width, world.stage.newest.arrived_at) == (64, 0.0)
+    before = world.stage.newest
+    arrive(world.stage, picture(5, 0.25, width=64))
+    newest = world.stage.newest
+    assert before is None
+    assert newest is not None
+    assert (newest.media.width, newest.arrived_at) == (64, 0.25)

@@ -88,12 +88,6 @@ class StreamEncodings:
         """Return the existing encodings of the console for a tier, in all codecs."""
         return [each for each in self._own.values() if each.tier == tier]
 
-    def codec_in_use(self, wanted: str = "") -> str:
-        """Return `wanted` if available; else a codec that is already encoded for peers, or the best one."""
-        if wanted in self.codecs:
-            return wanted
-        return next((each.codec for each in self._own.values() if each.targets), self.codecs[0])
-
     def join(self, codec: str, target: Subscription, tier: PictureTier = "operator") -> None:
         target.tier = tier
         self.get(codec, tier).join(target)

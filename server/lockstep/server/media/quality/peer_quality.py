@@ -2,7 +2,7 @@
 
 import time
 from collections.abc import Callable
-from typing import TYPE_CHECKING, NamedTuple, Protocol
+from typing import TYPE_CHECKING, NamedTuple
 
 from lockstep.protocol.console import Quality, Report, StreamQuality, Tier
 from lockstep.protocol.serial import event_gap
@@ -20,20 +20,12 @@ __all__ = ["CameraLink", "PeerQuality", "SoundLink"]
 WIRE_SHARE = 0.92  # share of payload in the bytes that a receiver counts; the rest are headers
 
 
-class Counted(Protocol):
-    """The part of a stream's sender that is needed here."""
-
-    @property
-    def stats(self) -> SenderStats: ...
-
-
 class CameraLink(NamedTuple):
     """The delivery of one camera to this peer."""
 
     stream: "VideoStream"
     codec: str
     target: Subscription
-    sender: Counted
 
 
 class SoundLink(NamedTuple):
@@ -97,7 +89,7 @@ class PeerQuality:
         return next((ms for ms in (stats.round_trip_ms for stats in self.stats()) if ms is not None), None)
 
     def stats(self) -> list[SenderStats]:
-        return [camera.sender.stats for camera in self.cameras]
+        return [camera.target.sender.stats for camera in self.cameras]
 
     def reception(self, lost: int, expected: int, round_trip: float | None) -> None:
         """Take a receiver report about one of its streams, sound included: all of them share one path."""
