@@ -189,13 +189,13 @@ class FakeHost:
     def stop_taken(self, taken: StopTaken) -> None:
         self.calls.append(f"taken {taken.press}")
 
-    def media_received(self, media: Media) -> None:
+    def feed(self, media: Media, now: float) -> None:
         self.calls.append("media")
 
 
 def _connection() -> tuple[RobotConnection, FakeHost]:
     host = FakeHost()
-    return RobotConnection(Settings(), cast(RobotHost, host)), host
+    return RobotConnection(Settings(), cast(RobotHost, host), host), host
 
 
 def test_whichever_link_meets_the_new_bridge_first_begins_the_epoch() -> None:

@@ -19,7 +19,7 @@ from lockstep.server.composition.robot_session import running_session
 from lockstep.server.control.console import Console
 from lockstep.server.fleet import session
 from lockstep.server.fleet.summaries import FAILED
-from lockstep.server.media.hub import MediaHub
+from lockstep.server.recording.service import RecordingService
 from lockstep.server.state.dependencies import Dependencies
 from lockstep.server.stop.stop_presses import MAX_PENDING, new_press
 from tests.server.fleet.rig import FleetRig, drive_once, running_fleet, running_fleet_rig
@@ -218,13 +218,13 @@ async def test_a_robot_whose_directory_cannot_be_made_is_without_a_session_and_t
 async def test_a_fault_while_a_session_ends_does_not_keep_the_console_from_ending(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    close = MediaHub.close
+    close = RecordingService.close
 
-    async def fault(hub: MediaHub) -> None:
-        await close(hub)
+    def fault(recordings: RecordingService) -> None:
+        close(recordings)
         raise RuntimeError("a fault of ours")
 
-    monkeypatch.setattr(MediaHub, "close", fault)
+    monkeypatch.setattr(RecordingService, "close", fault)
     async with asyncio.timeout(3 * PATIENCE):
         async with running_fleet_rig("left", "right") as rig:
             pass

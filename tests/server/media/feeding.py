@@ -39,18 +39,18 @@ def value(hub: MediaHub, name: str, **labels: str) -> float:
 
 async def refused(hub: MediaHub, media: Media) -> None:
     """Feed a medium and wait until the stream's worker is through with it."""
-    stream = cast(Any, hub)._streams[media.stream]
-    finish, finished = stream._finish, asyncio.Event()
+    worker = cast(Any, hub)._streams[media.stream].worker
+    finish, finished = worker._finish, asyncio.Event()
 
     def spy(encoded: Any) -> None:
         finish(encoded)
         finished.set()
 
-    stream._finish = spy
+    worker._finish = spy
     hub.feed(media, media.time)
     async with asyncio.timeout(TIMEOUT):
         await finished.wait()
-    stream._finish = finish
+    worker._finish = finish
 
 
 def read_stamp(carrier: Carrier, received: Received) -> int | None:

@@ -150,8 +150,23 @@ async def test_a_new_epoch_gets_new_streams_and_starts_its_stamps_afresh() -> No
             assert value(hub, "frames_dropped_total", stream="camera0", stage="stale_stamp") == 0
 
 
-async def test_a_plane_that_was_never_configured_closes() -> None:
-    await MediaHub(MediaSettings(), CollectorRegistry()).close()
+async def test_a_peer_is_told_once_when_an_epoch_ends_its_streams_and_also_when_it_asks_late() -> None:
+    told: list[str] = []
+    async with running_plane() as hub, viewing(hub, ["video"]) as viewer, viewing(hub, ["video"]) as leaver:
+        viewer.media.on_ended(lambda: told.append("early"))
+        leaver.media.on_ended(lambda: told.append("left"))
+        await leaver.media.close()
+        hub.configure(description())
+        viewer.media.on_ended(lambda: told.append("late"))
+        assert told == ["early", "late"]
+
+
+async def test_a_plane_that_was_never_configured_ends() -> None:
+    running = asyncio.create_task(MediaHub(MediaSettings(), CollectorRegistry()).run())
+    await asyncio.sleep(0)
+    running.cancel()
+    with pytest.raises(asyncio.CancelledError):
+        await running
 
 
 async def test_bandwidth_estimates_are_kept_for_the_stream_they_are_about() -> None:

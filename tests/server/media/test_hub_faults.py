@@ -10,9 +10,9 @@ from lockstep.rtc.endpoint import Endpoint
 from lockstep.server.media.codecs.packetise import packetise_sound
 from lockstep.server.media.codecs.picture_encoder import H264Encoder
 from lockstep.server.media.codecs.sound_encoder import OpusEncoder
+from lockstep.server.media.pipeline.admission import MAX_AT_ONCE
 from lockstep.server.media.pipeline.frame import EncodedFrame
 from lockstep.server.media.pipeline.rtp_sender import RtpSender
-from lockstep.server.media.pipeline.stream import MAX_AT_ONCE
 from tests.server.media.feeding import refused, stream, value
 from tests.server.media.viewer import TIMEOUT, picture, running_plane, sender_of, sound, viewing
 
@@ -94,8 +94,8 @@ async def test_a_keyframe_that_failed_is_tried_again() -> None:
 
 async def test_a_worker_that_fails_is_reported_once_counted_and_goes_on(caplog: pytest.LogCaptureFixture) -> None:
     async with running_plane() as hub, viewing(hub, ["video"]) as viewer:
-        camera = cast(Any, hub)._streams["camera0"]
-        work, failed = camera._work, camera._failed
+        worker = cast(Any, hub)._streams["camera0"].worker
+        encode, failed = worker.encoder.encode, worker._failed
         failures = asyncio.Queue[None]()
 
         def fail(job: Any) -> Any:
@@ -105,15 +105,18 @@ async def test_a_worker_that_fails_is_reported_once_counted_and_goes_on(caplog: 
             failed(error)
             failures.put_nowait(None)
 
-        camera._work, camera._failed = fail, count
+        worker.encoder.encode, worker._failed = fail, count
         for i in range(1, 4):
             hub.feed(picture(i, i / 30), i / 30)
             async with asyncio.timeout(TIMEOUT):
                 await failures.get()
-        camera._work = work
+        worker.encoder.encode = encode
         await stream(hub, viewer, "video", picture, 2, first=50)
         assert value(hub, "frames_dropped_total", stream="camera0", stage="worker_failed") == 3
-        assert len([record for record in caplog.records if record.name == "lockstep.server.media.pipeline.stream"]) == 1
+        assert (
+            len([record for record in caplog.records if record.name == "lockstep.server.media.pipeline.encoder_worker"])
+            == 1
+        )
 
 
 async def test_an_unknown_stream_is_counted() -> None:

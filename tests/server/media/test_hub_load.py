@@ -109,7 +109,6 @@ async def test_closing_leaves_no_task_and_no_thread() -> None:
         await stream(hub, viewer, "audio", sound, 4, first=3)
         await viewer.media.close()
         await viewer.media.close()
-    await hub.close()
     await asyncio.sleep(0)
     assert asyncio.all_tasks() == tasks
     left = {thread for thread in threading.enumerate() if thread.name.startswith("media-")}
@@ -123,15 +122,15 @@ async def test_the_newest_picture_wins_and_the_newest_sound_is_kept_while_the_en
         started = asyncio.Event()
         loop = asyncio.get_running_loop()
         for name, stamps in seen.items():
-            source = cast(Any, hub)._streams[name]
+            encoder = cast(Any, hub)._streams[name].worker.encoder
 
-            def work(job: Any, stamps: list[int] = stamps, original: Any = source._work) -> Any:
+            def work(job: Any, stamps: list[int] = stamps, original: Any = encoder.encode) -> Any:
                 stamps.append(job.media.stamp)
                 loop.call_soon_threadsafe(started.set)
                 release.wait(TIMEOUT)
                 return original(job)
 
-            source._work = work
+            encoder.encode = work
             started.clear()
             for i in range(1, 17):
                 hub.feed(picture(i, i / 50) if name == "camera0" else sound(i, i / 50), i / 50)

@@ -1,10 +1,12 @@
-"""What an offer is answered, section by section."""
+"""What an offer is answered, section by section, and what a relay is offered."""
 
 import pytest
 
 from lockstep.rtc.endpoint import Endpoint
 from lockstep.rtc.sdp import SdpError, SessionDescription
+from lockstep.server.media.planning import codec_in_use
 from lockstep.server.webrtc.sdp_offer import parse_offer
+from tests.server.media.pipeline.collecting import Counted
 from tests.server.media.viewer import description, running_plane
 from tests.server.offers import offer, section
 
@@ -100,3 +102,14 @@ async def test_an_extension_whose_id_fits_no_packet_is_left_out_and_one_that_is_
     for number, ids in ((7, [7]), (256, []), (4352, []), (4096, [1])):
         (found,) = (await answered(offer(section("0", extra=f"a=extmap:{number} {uri}\r\n")))).sections
         assert [each.id for each in found.extensions] == ids, number
+
+
+def test_a_relay_is_offered_a_codec_in_use_and_never_the_name_of_the_cameras_own_encoding() -> None:
+    counted = Counted()
+    encodings = counted.encodings("H264", "VP8")
+    encodings.add_passed().targets[counted.subscription()] = None
+    assert codec_in_use(encodings) == "H264"
+    encodings.join("VP8", counted.subscription())
+    assert codec_in_use(encodings) == "VP8"
+    assert codec_in_use(encodings, "H264") == "H264"
+    assert codec_in_use(encodings, "AV1") == "VP8"

@@ -2,7 +2,7 @@
 
 import asyncio
 from collections.abc import AsyncIterator, Callable, Iterator, Sequence
-from contextlib import asynccontextmanager, contextmanager
+from contextlib import asynccontextmanager, contextmanager, suppress
 from dataclasses import replace
 from typing import Any, cast
 
@@ -163,10 +163,13 @@ async def running_plane(robot: RobotDescription | None = None, **settings: Any) 
     hub = MediaHub(MediaSettings(**settings), registry)
     cast(Any, hub).registry = registry  # for tests that read metrics
     hub.configure(robot or description())
+    running = asyncio.create_task(hub.run())
     try:
         yield hub
     finally:
-        await hub.close()
+        running.cancel()
+        with suppress(asyncio.CancelledError):
+            await running
 
 
 def with_extensions(offer: str, uris: dict[str, int]) -> str:
@@ -223,14 +226,14 @@ async def viewing(
         await pc.setLocalDescription(await pc.createOffer())
         offer = parse_description(with_extensions(pc.localDescription.sdp, uris or {}))
         async with Endpoint(["127.0.0.1"]) as endpoint:
-            turns = hub.turns_of(waits=not priority)
+            turns = hub.datagrams.create(waits=not priority)
             connection = endpoint.connect(controlling=False, turns=turns)
             plan = hub.plan(offer, trailer=trailer, thumbnail=thumbnail)
             answer = write_description(connection.answer(offer, plan.media))
             if relays:  # with what it asks for, and treated as a relay
-                media = hub.publish(connection, plan)
+                media = hub.subscribers.publish(connection, plan)
             else:
-                media = hub.attach(connection, plan, priority=priority, turns=turns)
+                media = hub.subscribers.attach(connection, plan, priority=priority, turns=turns)
             viewer = Viewer(pc, connection, media, answer)
             connection.listen(viewer.heard)
             _notify_of_server_input(viewer)
@@ -247,7 +250,7 @@ async def viewing(
 
 def sender_of(viewer: Viewer) -> RtpSender:
     """What sends the viewer's first stream over RTP."""
-    return viewer.media.deliveries[0].sender
+    return viewer.media.deliveries[0].target.sender
 
 
 def _notify_of_server_input(viewer: Viewer) -> None:

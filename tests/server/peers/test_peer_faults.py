@@ -97,7 +97,7 @@ def _stream(peer: WebRtcPeer) -> Any:
 
 
 def _answer(rig: Rig, peer: WebRtcPeer, patch: pytest.MonkeyPatch) -> None:
-    patch.setattr(_delivery(peer).stream, "join", _raise)
+    patch.setattr(_delivery(peer).stream.encodings, "join", _raise)
 
 
 def _queueing(rig: Rig, peer: WebRtcPeer, patch: pytest.MonkeyPatch) -> None:
@@ -121,7 +121,7 @@ def _receiving(rig: Rig, peer: WebRtcPeer, patch: pytest.MonkeyPatch) -> None:
 
 
 def _rtcp(rig: Rig, peer: WebRtcPeer, patch: pytest.MonkeyPatch) -> None:
-    patch.setattr(_delivery(peer).stream, "request_keyframe", _raise)
+    patch.setattr(_delivery(peer).stream.encodings, "request_keyframe", _raise)
 
 
 def _message_in(rig: Rig, peer: WebRtcPeer, patch: pytest.MonkeyPatch) -> None:
@@ -160,14 +160,14 @@ def _closing_connection(rig: Rig, peer: WebRtcPeer, patch: pytest.MonkeyPatch) -
 
 def _forgetting(rig: Rig, peer: WebRtcPeer, patch: pytest.MonkeyPatch) -> None:
     delivery = _delivery(peer)
-    leave, target = delivery.stream.leave, delivery.target
+    leave, target = delivery.stream.encodings.leave, delivery.target
 
     def fail_for_it(who: Any) -> None:
         leave(who)
         if who is target:
             _raise()
 
-    patch.setattr(delivery.stream, "leave", fail_for_it)
+    patch.setattr(delivery.stream.encodings, "leave", fail_for_it)
     peer.end("the test ends it")
 
 
@@ -266,7 +266,7 @@ async def test_a_fault_while_an_offer_is_answered_refuses_it_by_name_and_keeps_n
     async with running_rig() as rig, _watching(rig, "operator") as other:
         await other.goes_on()
         with pytest.MonkeyPatch.context() as patch:
-            patch.setattr(rig.dependencies.media, "attach", _raise)
+            patch.setattr(rig.dependencies.media.subscribers, "attach", _raise)
             refused = _Viewer()
             try:
                 answer = await rig.http.post(

@@ -31,7 +31,7 @@ async def test_it_waits_behind_the_crowd_on_its_channel_and_for_nobody_over_http
     """What the page does: it says each press on its channels and over HTTP at the same moment."""
     crowd = [_Talker() for _ in range(CROWD)]
     async with running_rig() as rig, rig.peer("observer") as peer:
-        turns = rig.dependencies.media._turns
+        turns = rig.dependencies.media.datagrams.observers
         monkeypatch.setattr(turns_of_loop(), "is_over", lambda: True)  # one datagram in each turn of the loop
         for each in crowd:
             turns.add(each)
@@ -56,7 +56,7 @@ async def test_of_whoever_may_drive_it_waits_for_no_crowd_on_its_channel_either(
 ) -> None:
     crowd = [_Talker() for _ in range(CROWD)]
     async with running_rig() as rig, rig.peer(role) as peer:
-        turns = rig.dependencies.media._turns
+        turns = rig.dependencies.media.datagrams.observers
         monkeypatch.setattr(turns_of_loop(), "is_over", lambda: True)
         for each in crowd:
             turns.add(each)
@@ -79,9 +79,11 @@ async def test_of_operators_who_flood_only_whoever_drives_does_not_wait_for_the_
         driver.send("session", SeatRequest())
         async with asyncio.timeout(PATIENCE):
             await driver.until(lambda each: isinstance(each, Seat) and each.holder != "")
-        turns = rig.dependencies.media._turns
+        turns = rig.dependencies.media.datagrams.observers
         monkeypatch.setattr(turns_of_loop(), "is_over", lambda: True)
-        monkeypatch.setattr(rig.dependencies.media._not_driving, "take", lambda now: False)  # others have sent too much
+        monkeypatch.setattr(
+            rig.dependencies.media.datagrams._not_driving, "take", lambda now: False
+        )  # others have sent too much
         for each in crowd:
             turns.add(each)
         rounds = []

@@ -93,7 +93,8 @@ async def measure(host: str, pid: int) -> list[tuple[int, float]]:
         open_janus(url) as session,
         publish(session, lambda each: JanusRoom(each, ROOM, KEYS), _Connect(endpoint), hub, FEED, "VP8") as publication,
     ):
-        feeding = [asyncio.create_task(feed(hub, camera.name)), asyncio.create_task(_talk(publication))]
+        running = (hub.run(), feed(hub, camera.name), _talk(publication))
+        feeding = [asyncio.create_task(each) for each in running]
         ticket = RelayTicket(
             engine="janus", relay="0", url=url, room=ROOM, pin=KEYS.pin, feed=FEED, streams=publication.streams
         )
@@ -110,7 +111,6 @@ async def measure(host: str, pid: int) -> list[tuple[int, float]]:
         await asyncio.gather(*feeding, return_exceptions=True)
         for watcher in watchers:
             await watcher.close()
-    await hub.close()
     return found
 
 

@@ -152,7 +152,6 @@ async def _session(
     SessionAudit(trail).subscribe(events)
     notices.subscribe(events)
     recorder.subscribe(events)
-    relays.subscribe(events)
     if scene is not None:
         scene.subscribe(events)
     revocation = TokenRevocation(context.state.invitations, peers, trail, silence, robot)
@@ -183,6 +182,7 @@ async def _session(
                 *(
                     tasks.create_task(run_on(name, run, metrics.faults), name=name)
                     for name, run in (
+                        ("media", media.run),
                         ("sources", sources.run),
                         ("voice", voice.run),
                         ("publishers", publishers.run),
@@ -198,6 +198,5 @@ async def _session(
                 task.cancel()
     finally:
         made.recordings.close()
-        await media.close()
         if scene is not None:
             await scene.close()

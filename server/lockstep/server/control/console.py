@@ -29,7 +29,6 @@ from lockstep.protocol.messages import (
     Command,
     Feedback,
     LinkRole,
-    Media,
     Ping,
     Pong,
     Refusal,
@@ -64,7 +63,7 @@ from lockstep.server.peers.channels import ChannelName
 from lockstep.server.peers.feedback_fanout import FeedbackFanout, FeedbackReceiver
 from lockstep.server.peers.peer import Peer
 from lockstep.server.peers.peer_registry import PeerRegistry
-from lockstep.server.robot.robot_connection import RobotConnection
+from lockstep.server.robot.robot_connection import MediaSink, RobotConnection
 from lockstep.server.session_events import (
     CommandForwarded,
     CommandRefused,
@@ -96,11 +95,10 @@ log = structlog.get_logger(__name__)
 RESTART_AFTER = 1.0  # s until a background task that failed runs again
 
 
-class MediaFeed(Protocol):
-    """The part of the media hub that the console uses."""
+class MediaFeed(MediaSink, Protocol):
+    """The part of the media hub that the console uses. The robot's media go there without passing the console."""
 
     def configure(self, description: RobotDescription) -> None: ...
-    def feed(self, media: Media, now: float) -> None: ...
 
 
 class Console:
@@ -136,7 +134,7 @@ class Console:
         self._faults = faults
         self._media = media
         self._further_news = further_news
-        self.robot = RobotConnection(settings, self)
+        self.robot = RobotConnection(settings, self, media)
         self.seat = SeatKeeper(seat, peers, self, events)
         self.people = ParticipantList(peers, clock, events, self.seat.renamed)
         self.speed_cap = SpeedCap(settings.speed_cap)
@@ -329,9 +327,6 @@ class Console:
     def stop_taken(self, taken: StopTaken) -> None:
         self._arbiter.stop_taken(taken)
         self.stops.taken(taken)
-
-    def media_received(self, media: Media) -> None:
-        self._media.feed(media, time.monotonic())
 
     def link_failed(self, role: LinkRole, error: Exception) -> None:
         self._faults.caught(f"robot link {role}", error)

@@ -2,7 +2,7 @@
 
 from prometheus_client import CollectorRegistry, Counter, Gauge, Histogram
 
-__all__ = ["MediaMetrics"]
+__all__ = ["DropCounter", "MediaMetrics"]
 
 ENCODE_BUCKETS = (0.0005, 0.001, 0.002, 0.004, 0.008, 0.016, 0.033, 0.066, 0.13, 0.5)  # s
 
@@ -38,3 +38,14 @@ class MediaMetrics:
             "lockstep_media_encoders", "Picture encoders that are open", ["stream", "codec"], registry=registry
         )
         self.peers = Gauge("lockstep_media_peers", "Peers that get a stream", ["stream"], registry=registry)
+
+
+class DropCounter:
+    """Counts the frames of one stream that went no further than a stage."""
+
+    def __init__(self, metrics: MediaMetrics, stream: str) -> None:
+        self._metrics = metrics
+        self._stream = stream
+
+    def count(self, stage: str, frames: int = 1) -> None:
+        self._metrics.dropped.labels(self._stream, stage).inc(frames)

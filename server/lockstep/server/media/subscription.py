@@ -1,29 +1,16 @@
 """The delivery of one stream to one peer."""
 
 from collections.abc import Callable
-from typing import Protocol
 
 from lockstep.protocol.carriers import Carrier
 from lockstep.server.media.codecs.h264 import Profile
 from lockstep.server.media.metrics import MediaMetrics
 from lockstep.server.media.pipeline.frame import EncodedFrame
 from lockstep.server.media.pipeline.frame_queue import Outbox
+from lockstep.server.media.pipeline.rtp_sender import RtpSender
+from lockstep.server.media.quality.encoding_target import PictureTier
 
-__all__ = ["FrameSender", "Subscription"]
-
-
-class FrameSender(Protocol):
-    """Sends frames over RTP."""
-
-    @property
-    def paced(self) -> bool:
-        """True while packets wait for the pacer."""
-
-    def transmit(self, frame: EncodedFrame) -> tuple[int, int] | None:
-        """Send a frame and return its packets and payload bytes; None, and nothing sent, while the network is blocked.
-
-        Packets that the pacer holds back wait; call it only when none waits.
-        """
+__all__ = ["Subscription"]
 
 
 class Subscription:
@@ -32,6 +19,7 @@ class Subscription:
     def __init__(
         self,
         outbox: Outbox,
+        sender: RtpSender,
         *,
         priority: bool,
         stream: str,
@@ -44,7 +32,10 @@ class Subscription:
         self.priority = priority
         self.trailer = carrier == "trailer"
         self.h264: Profile | None = None  # negotiated profile; None for another codec
-        self.sender: FrameSender | None = None  # None before the transport is connected
+        self.tier: PictureTier = "operator"  # of the console's encoding that it gets, or would get
+        self.held_back = False  # from the camera's own encoding, because its path has no room
+        self.sends = False  # True from the connection's begin to the peer's end
+        self.sender = sender
         self._outbox = outbox
         self._on_dropped = on_dropped
         self._on_failed = on_failed
@@ -60,7 +51,7 @@ class Subscription:
     @property
     def paced(self) -> bool:
         """True while part of the last frame has not left yet."""
-        return self.sender is not None and self.sender.paced
+        return self.sends and self.sender.paced
 
     def put(self, frame: EncodedFrame) -> None:
         before = self._outbox.dropped
@@ -72,7 +63,7 @@ class Subscription:
 
     def send_next(self) -> bool:
         sender = self.sender
-        if sender is None or sender.paced:
+        if not self.sends or sender.paced:
             return False
         frame = self._outbox.peek()
         if frame is None:
@@ -85,7 +76,7 @@ class Subscription:
         return self._outbox.peek() is not None and not sender.paced
 
     def failed(self, error: Exception) -> None:
-        self.sender = None
+        self.sends = False
         self._on_failed(error)
 
     def _count(self, packets: int, octets: int) -> None:

@@ -7,7 +7,7 @@ from typing import NamedTuple
 from lockstep.protocol.console import Quality, Report, StreamInfo, Tier
 from lockstep.rtc.endpoint import Connection
 from lockstep.rtc.rtp.stage import BandwidthEstimate, KeyframeRequested, PacketsLeft, Reception, StreamEvent
-from lockstep.server.media.pipeline.rtp_sender import RtpSender, SenderStats
+from lockstep.server.media.pipeline.rtp_sender import SenderStats
 from lockstep.server.media.pipeline.stream import Stream
 from lockstep.server.media.quality.peer_quality import PeerQuality
 from lockstep.server.media.subscription import Subscription
@@ -22,9 +22,8 @@ class Delivery(NamedTuple):
     """One stream of one peer, with the objects that serve it."""
 
     info: StreamInfo
-    stream: Stream  # type: ignore[type-arg]  # the job type does not matter here
+    stream: Stream
     target: Subscription
-    sender: RtpSender
 
 
 REPORTS_OFTEN = 1 / 3  # s
@@ -57,6 +56,7 @@ class Subscriptions:
         self._has_left = False
         self._has_failed = False
         self._tell_failed: Callable[[str, Exception], None] = _log_failure
+        self._tell_ended: Callable[[], None] = lambda: None
 
     @property
     def streams(self) -> list[StreamInfo]:
@@ -66,7 +66,7 @@ class Subscriptions:
     @property
     def stats(self) -> dict[str, SenderStats]:
         """Counters and the peer's reports, by mid."""
-        return {delivery.info.mid: delivery.sender.stats for delivery in self.deliveries}
+        return {delivery.info.mid: delivery.target.sender.stats for delivery in self.deliveries}
 
     @property
     def dropped(self) -> int:
@@ -101,9 +101,9 @@ class Subscriptions:
         """Start sending media: the connection is up."""
         self._set_pace()
         for delivery in () if self._has_left else self.deliveries:
-            delivery.target.sender = delivery.sender
+            delivery.target.sends = True
             encoded_as = self.quality.encoded_as if delivery.info.kind == "video" else self.quality.hears_as
-            delivery.stream.join(delivery.info.codec, delivery.target, encoded_as)
+            delivery.stream.encodings.join(delivery.info.codec, delivery.target, encoded_as)
         if self.quality.cameras and not self._has_left:
             self._on_connected()
 
@@ -113,12 +113,12 @@ class Subscriptions:
         if delivery is None or self._has_left:
             return
         if isinstance(event, KeyframeRequested):
-            delivery.stream.request_keyframe(delivery.info.codec, delivery.target, "pli")
+            delivery.stream.encodings.request_keyframe(delivery.target, "pli")
         elif isinstance(event, Reception):
-            delivery.sender.reported(event)
+            delivery.target.sender.reported(event)
             self.quality.reception(event.lost, event.expected, event.round_trip)
         elif isinstance(event, BandwidthEstimate):
-            delivery.sender.estimated(event.bitrate)
+            delivery.target.sender.estimated(event.bitrate)
             self.quality.bandwidth(event.bitrate, event.ssrcs)
         elif isinstance(event, PacketsLeft):
             self._on_paced(delivery.target)
@@ -158,11 +158,17 @@ class Subscriptions:
         """Request a keyframe for somebody behind this peer who cannot decode."""
         for delivery in self.deliveries:
             if delivery.info.mid == mid:
-                delivery.stream.request_keyframe(delivery.info.codec, delivery.target, "pli")
+                delivery.stream.encodings.request_keyframe(delivery.target, "pli")
 
     def on_failed(self, tell: Callable[[str, Exception], None]) -> None:
         """Call `tell` with the stage and the exception once this peer cannot be served; `tell` raises nothing."""
         self._tell_failed = tell
+
+    def on_ended(self, tell: Callable[[], None]) -> None:
+        """Call `tell` once the streams have ended, at once if they have; `tell` raises nothing."""
+        self._tell_ended = tell
+        if self._has_left:
+            tell()
 
     def failed(self, stage: str, error: Exception) -> None:
         """Stop serving this peer, because doing so raised `error`. Only the first error is told. Raises nothing."""
@@ -172,7 +178,11 @@ class Subscriptions:
             self._tell_failed(stage, error)
 
     def detach(self) -> None:
-        """Take no more frames. Idempotent; raises nothing."""
+        """Take no more frames, because the streams have ended. Raises nothing."""
+        self._leave()
+        self._tell_ended()
+
+    def _leave(self) -> None:
         error = self._leave_all()
         if error is not None:
             self.failed("forget", error)
@@ -182,9 +192,9 @@ class Subscriptions:
         self._has_left = True
         first: Exception | None = None
         for delivery in self.deliveries:
-            delivery.target.sender = None
+            delivery.target.sends = False
             try:
-                delivery.stream.leave(delivery.target)
+                delivery.stream.encodings.leave(delivery.target)
             except Exception as error:
                 first = first or error
         try:
@@ -195,7 +205,7 @@ class Subscriptions:
 
     async def close(self) -> None:
         """Stop sending to this peer. Idempotent; does not close its connection."""
-        self.detach()
+        self._leave()
 
 
 def _log_failure(stage: str, error: Exception) -> None:

@@ -2,6 +2,7 @@
 
 import asyncio
 import random
+import time
 from collections import Counter
 from pathlib import Path
 from typing import Protocol
@@ -26,7 +27,7 @@ from lockstep.server.robot.credentials import LinkSettings, link_access
 from lockstep.server.robot.reconnecting_link import ReconnectingLink
 from lockstep.server.util.backoff import Backoff
 
-__all__ = ["RobotConnection", "RobotHost", "RobotSettings"]
+__all__ = ["MediaSink", "RobotConnection", "RobotHost", "RobotSettings"]
 
 log = structlog.get_logger(__name__)
 
@@ -55,8 +56,13 @@ class RobotHost(Protocol):
     def feedback_received(self, feedback: Feedback) -> None: ...
     def refusal_received(self, refusal: Refusal) -> None: ...
     def stop_taken(self, taken: StopTaken) -> None: ...
-    def media_received(self, media: Media) -> None: ...
     def link_failed(self, role: LinkRole, error: Exception) -> None: ...
+
+
+class MediaSink(Protocol):
+    """Takes the robot's pictures and sound. Called on the loop, returns at once."""
+
+    def feed(self, media: Media, now: float) -> None: ...
 
 
 class RobotConnection:
@@ -69,12 +75,13 @@ class RobotConnection:
         detail: reason that it is down
     """
 
-    def __init__(self, settings: RobotSettings, host: RobotHost) -> None:
+    def __init__(self, settings: RobotSettings, host: RobotHost, media: MediaSink) -> None:
         self.epoch = ""
         self.description: RobotDescription | None = None
         self.reached = asyncio.Event()
         self.detail = "not connected yet"
         self._host = host
+        self._media = media
         self._epochs: dict[LinkRole, str] = {}  # of each link, open now or last
         access = link_access(settings)
         self._keepers = {
@@ -146,7 +153,7 @@ class RobotConnection:
         if self._epochs.get(role) != self.epoch:
             return  # last messages of the old bridge, while the other link has reached the new one already
         if isinstance(message, Media):
-            self._host.media_received(message)
+            self._media.feed(message, time.monotonic())
         elif isinstance(message, Feedback):
             self._host.feedback_received(message)
         elif isinstance(message, Refusal):

@@ -184,7 +184,7 @@ async def _negotiate(
     servers = servers_for(here.settings, identity).ice_servers if here.settings.relay_console else []
     channels = agreed_channels([each for section in offer.accepted for each in section.channel_maps])
     observes = identity.role == "observer"
-    turns = here.media.turns_of(waits=observes)
+    turns = here.media.datagrams.create(waits=observes)
     try:
         async with asyncio.timeout(NEGOTIATION_TIMEOUT):
             connection = await here.context.endpoint.connect(
@@ -198,7 +198,7 @@ async def _negotiate(
         line = here.voice.line(identity.role)
         plan = here.media.plan(offer, trailer=trailer, thumbnail=thumbnail, voice=line is not None)
         answer = connection.answer(offer, plan.media)
-        media = here.media.attach(connection, plan, priority=identity.role == "operator", turns=turns)
+        media = here.media.subscribers.attach(connection, plan, priority=identity.role == "operator", turns=turns)
         ice = IceSession(connection, offer.transport.ufrag)
         peer = WebRtcPeer(
             connection,

@@ -169,7 +169,9 @@ async def _negotiate(
     publisher = Publisher(camera, caller.identity, here.settings)
     try:
         async with asyncio.timeout(NEGOTIATION_TIMEOUT):
-            connection = await here.context.endpoint.connect(publisher.heard, turns=here.media.turns, servers=servers)
+            connection = await here.context.endpoint.connect(
+                publisher.heard, turns=here.media.datagrams.observers, servers=servers
+            )
     except TimeoutError as error:
         raise BadSdp("the offer cannot be answered in time") from error
     except TooManyPeers as error:

@@ -13,10 +13,9 @@ from lockstep.protocol.console import encode_console_message
 from lockstep.protocol.messages import Pong
 from lockstep.server.auth.tokens import Identity
 from lockstep.server.media.errors import MediaError
-from lockstep.server.session_events import EpochBegan, SessionEvents
 from lockstep.server.sfu.assignment import Assignment
 from lockstep.server.sfu.errors import RelayError
-from lockstep.server.sfu.publication import Engine, Publication
+from lockstep.server.sfu.publication import NEW_EPOCH, Engine, Publication
 from lockstep.server.sfu.settings import RelaySettings
 from lockstep.server.sfu.sfu_server import SfuServer
 from lockstep.server.sfu.tickets import RelayTicket
@@ -36,7 +35,7 @@ HEALTHY_SECONDS = 10.0
 LOOK_SECONDS = 0.25  # between two checks that the observers may still watch
 STRAY_SECONDS = 60.0  # then an observer with a key and no line to the console is thought to watch on without it
 RENEW_SECONDS = 600.0  # between two publications because of such observers
-NEW_EPOCH, ENDED, UNWATCHED, STRAY = "new epoch", "a link ended", "nobody watches", "somebody left with a key"
+ENDED, UNWATCHED, STRAY = "a link ended", "nobody watches", "somebody left with a key"
 OWN_REASONS = (NEW_EPOCH, ENDED, UNWATCHED, STRAY)  # reasons of the console to end a publication; no fault of a relay
 HEARTBEAT = encode_console_message(Pong(id=0))
 
@@ -88,14 +87,6 @@ class SfuCoordinator:
         self._published_at = float("-inf")
 
     # From the console
-
-    def subscribe(self, events: SessionEvents) -> None:
-        events.subscribe(EpochBegan, self._epoch_began)
-
-    def _epoch_began(self, event: EpochBegan) -> None:
-        """Publish anew: another feed with other keys shuts out observers that may no longer watch."""
-        if self._publication is not None:
-            self._publication.end(NEW_EPOCH)
 
     def send_feedback(self, text: str) -> None:
         """Send feedback to all observers behind relays at once, as one receiver among the observers."""

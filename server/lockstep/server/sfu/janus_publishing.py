@@ -12,13 +12,14 @@ from lockstep.rtc.endpoint import Connection, TooManyPeers
 from lockstep.rtc.peer import OfferedMedia
 from lockstep.rtc.peer_events import Connected, MediaEvent, PeerEnded, PeerEvent
 from lockstep.rtc.sdp import SdpError, parse_description, write_description
-from lockstep.server.media.hub import MediaPlan
+from lockstep.server.media.planning import MediaPlan
+from lockstep.server.media.subscribers import Subscribers
 from lockstep.server.media.subscriptions import Subscriptions
 from lockstep.server.peers.channel_writer import ChannelWriter
 from lockstep.server.sfu.errors import RelayRefused, RelaySilent
 from lockstep.server.sfu.janus_room import JanusRoom
 from lockstep.server.sfu.janus_session import JanusSession
-from lockstep.server.sfu.publication import Publication
+from lockstep.server.sfu.publication import NEW_EPOCH, Publication
 
 __all__ = ["Connect", "PublishedMedia", "publish"]
 
@@ -37,7 +38,8 @@ class PublishedMedia(Protocol):
     """The part of the media hub that publishing needs."""
 
     def plan_publication(self, camera_codec: str = "") -> tuple[MediaPlan, list[OfferedMedia]]: ...
-    def publish(self, connection: Connection, plan: MediaPlan) -> Subscriptions: ...
+    @property
+    def subscribers(self) -> Subscribers: ...
 
 
 @asynccontextmanager
@@ -66,7 +68,7 @@ async def publish(
     given: Subscriptions | None = None
     try:
         plan, offered = media.plan_publication(codec)
-        given = media.publish(connection, plan)
+        given = media.subscribers.publish(connection, plan)
         offer = write_description(connection.offer(offered))
         names = {stream.mid: stream.stream for stream in given.streams}
         answer = complete_description(await room.publish(handle, feed, offer, names))
@@ -77,6 +79,7 @@ async def publish(
         writer = ChannelWriter(connection, connection.open_channel(FEEDBACK, reliability=NEWEST_WINS))
         publication = Publication(feed, given.streams, writer.send_newest)
         given.on_failed(publication.failed)
+        given.on_ended(lambda: publication.end(NEW_EPOCH))
         found.append(publication)
         line = _Line(connection, given, writer, publication)
         connection.listen(line.heard)

@@ -11,9 +11,11 @@ from lockstep.protocol.console import StreamInfo
 from lockstep.server.sfu.sfu_server import SfuServer
 from lockstep.server.sfu.tickets import RelayTicket
 
-__all__ = ["Engine", "Publication", "Watched"]
+__all__ = ["NEW_EPOCH", "Engine", "Publication", "Watched"]
 
 log = structlog.get_logger(__name__)
+
+NEW_EPOCH = "new epoch"  # the reason for the end of a publication whose streams have ended
 
 
 class Watched(Protocol):

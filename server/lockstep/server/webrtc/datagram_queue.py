@@ -5,8 +5,11 @@ from collections.abc import Callable
 from typing import Protocol
 
 from lockstep.server.util.cooperative_scheduler import CooperativeScheduler
+from lockstep.server.util.token_bucket import TokenBucket
 
-__all__ = ["DriverQueue", "DatagramQueue", "Waiting"]
+__all__ = ["DatagramQueue", "DatagramQueues", "DriverQueue", "Waiting"]
+
+NOT_DRIVING_RATE = 1000.0  # Hz, datagrams of all peers that may drive but do not, before theirs wait as observers' do
 
 
 class Waiting(Protocol):
@@ -69,3 +72,27 @@ class DriverQueue:
 
     def add(self, waiting: Waiting) -> None:
         self._turns.add(waiting)
+
+
+class DatagramQueues:
+    """The datagram queues of all peers of one robot.
+
+    Attributes:
+        observers: the queue of observers' datagrams, which publishers' datagrams share
+    """
+
+    def __init__(self, turns: CooperativeScheduler, clock: Callable[[], float]) -> None:
+        self.observers = DatagramQueue(turns)
+        self._not_driving = TokenBucket(NOT_DRIVING_RATE, NOT_DRIVING_RATE, clock())
+        self._clock = clock
+
+    def create(self, *, waits: bool) -> DatagramQueue | DriverQueue:
+        """Return the datagram queue for a new peer.
+
+        `waits`: its datagrams wait in observers' turns; otherwise only those above the rate do, unless it drives.
+        """
+        return self.observers if waits else DriverQueue(self.observers, self._may_go_at_once)
+
+    def _may_go_at_once(self) -> bool:
+        """True if one more datagram of the peers that may drive but do not is handled before all waiting ones."""
+        return self._not_driving.take(self._clock())

@@ -11,6 +11,7 @@ from lockstep.protocol.messages import Media
 from lockstep.server.media.codecs.group_of_pictures import MOST_PICTURES, GroupOfPictures
 from lockstep.server.media.codecs.h264 import inspect
 from lockstep.server.media.hub import MediaHub
+from lockstep.server.media.pipeline.stream import VideoStream
 from tests.server.media.camera_h264 import camera_pictures
 from tests.server.media.feeding import read_stamp, timestamps, value
 from tests.server.media.viewer import Viewer, high_profiles, picture, running_plane, viewing
@@ -97,7 +98,7 @@ async def test_a_lost_picture_is_made_up_for_by_a_keyframe_of_ours() -> None:
     async with running_plane() as hub, viewing(hub, ["video"], uris=NATIVE) as viewer:
         await feed(hub, viewer, pictures[:2])
         delivery = viewer.media.deliveries[0]
-        delivery.stream.request_keyframe("H264", delivery.target, "pli")
+        delivery.stream.encodings.request_keyframe(delivery.target, "pli")
         await feed(hub, viewer, pictures[2:4])
         # The camera's own picture and ours come both while the keyframe is made.
         await viewer.until(lambda: any(inspect(frame).keyframe for frame in viewer.frames("video")[2:]))
@@ -114,12 +115,13 @@ async def test_a_path_without_room_gets_ours_and_nobody_else_does() -> None:
         narrow = await stack.enter_async_context(viewing(hub, ["video"], uris=NATIVE))
         wide = await stack.enter_async_context(viewing(hub, ["video"], uris=NATIVE))
         stream, target = narrow.media.deliveries[0].stream, narrow.media.deliveries[0].target
-        cast(Any, stream).hold_back(target, True)
+        cast(VideoStream, stream).passthrough.hold_back(target, True)
         await feed(hub, wide, pictures)
         await narrow.until(lambda: timestamps(narrow, "video") >= 2)  # ours: what is not encoded in time is left out
         assert encoded(hub, "H264-passed") == 11
         assert encoded(hub, "H264") >= 2
-        passed = cast(Any, stream)._passing.output
+        passed = stream.encodings.passed
+        assert passed is not None
         assert list(passed.targets) == [wide.media.deliveries[0].target]
 
 

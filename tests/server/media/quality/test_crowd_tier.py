@@ -93,7 +93,7 @@ async def test_a_crowd_gets_every_second_picture_and_the_operator_and_a_relay_al
         controller(hub).tick()
         await begin(hub, [operator, relay, *crowd], 20)
         await show(hub, [operator, relay], crowd, 30)
-        assert len(cast(Any, hub)._streams["camera0"]._encoders) == 2
+        assert len(cast(Any, hub)._streams["camera0"].worker.encoder._encoders) == 2
 
 
 async def test_when_a_crowd_has_dispersed_who_stays_gets_everything_and_has_missed_nothing() -> None:
@@ -202,8 +202,8 @@ async def test_what_is_recorded_is_not_thinned() -> None:
         assert far.media.quality.hears_as == "crowd"
         await taken.feed(hub, [picture(i, i / 30) for i in range(1, 21)])
         assert taken.stamps == list(range(1, 21))
-        assert len(cast(Any, hub)._streams["camera0"].output("H264", "high").targets) == 0
-        assert cast(Any, hub)._streams["camera0"].output("H264", "high").recorded
+        assert len(cast(Any, hub)._streams["camera0"].encodings.get("H264", "high").targets) == 0
+        assert cast(Any, hub)._streams["camera0"].encodings.get("H264", "high").recorded
 
 
 async def test_pictures_that_the_camera_encoded_reach_a_crowd_as_they_come() -> None:

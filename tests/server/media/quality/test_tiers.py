@@ -19,7 +19,7 @@ def controller(hub: MediaHub) -> Any:
 
 
 def encoders(hub: MediaHub) -> int:
-    return len(cast(Any, hub)._streams["camera0"]._encoders)
+    return len(cast(Any, hub)._streams["camera0"].worker.encoder._encoders)
 
 
 async def show(hub: MediaHub, viewers: list[Viewer], first: int, count: int = 1) -> None:

@@ -1,4 +1,4 @@
-"""Sends frames to targets: the operator's at once, observers' in their turns of the event loop.
+"""The last stage sends frames to targets: the operator's at once, observers' in their turns of the event loop.
 
 An exception while serving a target concerns that target alone: it is told and gets nothing more; all others are served.
 """
@@ -8,6 +8,8 @@ from collections.abc import Iterable
 from typing import Protocol
 
 from lockstep.server.media.pipeline.frame import EncodedFrame
+from lockstep.server.media.pipeline.stage import FrameStage, SourceFrame
+from lockstep.server.media.pipeline.tier_encoding import TierEncoding
 from lockstep.server.util.cooperative_scheduler import CooperativeScheduler
 
 __all__ = ["FanOut", "Target"]
@@ -30,14 +32,21 @@ class Target(Protocol):
         """Take the error that serving this target raised. It is not served again. Raises nothing."""
 
 
-class FanOut:
-    """Sends frames to targets. A slow target only fills its own outbox; an observer never delays the operator."""
+class FanOut(FrameStage):
+    """Ends all chains. A slow target fills only its own outbox; an observer never delays the operator."""
 
     def __init__(self, turns: CooperativeScheduler) -> None:
         self._turns = turns
         self._waiting: dict[Target, None] = {}  # observers with frames, in the order they are served
         self._order: deque[Target] = deque()
         self._asked = False  # for a turn of the loop
+
+    def source(self, frame: SourceFrame) -> None:
+        pass  # a stage before has encoded it, or dropped it
+
+    def encoded(self, frame: EncodedFrame, encoding: TierEncoding) -> None:
+        encoding.publishing(frame)
+        self.publish(frame, encoding.targets)
 
     def publish(self, frame: EncodedFrame, targets: Iterable[Target]) -> None:
         """Hand a frame to its targets. Returns when the operator's is sent and the others are queued."""

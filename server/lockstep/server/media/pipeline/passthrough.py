@@ -1,4 +1,4 @@
-"""Passes H.264 that a camera has encoded, unchanged, to the peers that can take it. No I/O.
+"""The stage that passes H.264 which a camera has encoded, unchanged, to the peers that can take it.
 
 | peer | gets |
 |---|---|
@@ -9,92 +9,126 @@
 """
 
 from collections import deque
-from collections.abc import Callable, Iterable
 
 from lockstep.protocol.messages import Media
+from lockstep.server.media.codecs.group_of_pictures import GroupOfPictures
 from lockstep.server.media.codecs.h264 import Profile, accepts, inspect
+from lockstep.server.media.codecs.packetise import packetise_h264
+from lockstep.server.media.errors import PayloadError
+from lockstep.server.media.metrics import DropCounter
+from lockstep.server.media.pipeline.frame import EncodedFrame
+from lockstep.server.media.pipeline.media_clock import PictureClock
+from lockstep.server.media.pipeline.stage import FrameStage, SourceFrame
+from lockstep.server.media.pipeline.stream_encodings import StreamEncodings
 from lockstep.server.media.pipeline.tier_encoding import TierEncoding
-from lockstep.server.media.quality.encoding_target import PictureTier
 from lockstep.server.media.subscription import Subscription
 
-__all__ = ["PASSED", "Passthrough"]
+__all__ = ["Passthrough"]
 
 MEASURED_SECONDS, MOST_MEASURED = 2.0, 240
-PASSED = "H264-passed"  # the codec in metrics of pictures passed on unchanged
 
 
-class Passthrough:
-    """The targets of the camera's own pictures. Part of one stream, which reports joins, moves and leaves."""
+class Passthrough(FrameStage):
+    """Makes encoded frames of a camera's H.264, and passes the pictures on only if the console has to encode them."""
 
-    def __init__(self, output: TierEncoding, encoded: Callable[[PictureTier], TierEncoding]) -> None:
-        """`output`: of the camera's own pictures. `encoded`: returns the console's H.264 encoding of a tier."""
-        self.output = output
-        self.profile: Profile | None = None  # of the camera's pictures; None while it gives no H.264
-        self._encoded = encoded
-        self._tiers: dict[Subscription, PictureTier] = {}  # of the console's encoding, for each target
-        self._held_back: set[Subscription] = set()
+    def __init__(
+        self,
+        following: FrameStage,
+        encodings: StreamEncodings,
+        passed: TierEncoding,
+        clock: PictureClock,
+        group: GroupOfPictures,
+        dropped: DropCounter,
+    ) -> None:
+        """`passed`: the camera's own encoding. `group` keeps its pictures for the decoder."""
+        super().__init__(following)
+        self._encodings = encodings
+        self._passed = passed
+        self._clock = clock
+        self._group = group
+        self._dropped = dropped
+        self._profile: Profile | None = None  # of the camera's pictures; None while it gives no H.264
         self._recent: deque[tuple[float, int]] = deque()  # time of capture and bytes
 
-    def holds(self, target: Subscription) -> bool:
-        return target in self.output.targets
+    def source(self, frame: SourceFrame) -> None:
+        if frame.media.codec == "h264":
+            self._pass(frame)
+            if not any(each.needed for each in self._encodings.own):
+                return
+        elif self._profile is not None:
+            self._end()
+        super().source(frame)
 
-    def came(self, media: Media) -> None:
-        """Measure a picture of the camera."""
+    def _pass(self, frame: SourceFrame) -> None:
+        media = frame.media
+        if media.keyframe:
+            self._begin(media)
+        self._group.add(media)
+        self._measure(media)
+        if not self._passed.needed:
+            return
+        encoded = EncodedFrame(
+            media.payload,
+            packetise_h264,
+            keyframe=media.keyframe,
+            marker=True,
+            stamp=media.stamp,
+            capture_time=self._passed.monotone(frame.capture_time),
+            media_time=self._clock.timestamp(media.time),
+            time=media.time,
+        )
+        if encoded.payloads(trailer=False):
+            self.following.encoded(encoded, self._passed)
+        else:
+            self._dropped.count(PayloadError.name)
+
+    def _measure(self, media: Media) -> None:
         self._recent.append((media.time, len(media.payload)))
         while len(self._recent) > MOST_MEASURED or media.time - self._recent[0][0] > MEASURED_SECONDS:
             self._recent.popleft()
 
-    @property
-    def measured(self) -> tuple[float, float]:
-        """Pictures and bits per second of the camera, over the last two seconds; 0 while they are not known."""
+    def measured(self, target: Subscription) -> tuple[float, float] | None:
+        """Return the pictures and bits per second of the last two seconds, if `target` gets the camera's own H.264.
+
+        Both are 0 while they are not known.
+        """
+        if target not in self._passed.targets:
+            return None
         span = self._recent[-1][0] - self._recent[0][0] if self._recent else 0.0
         if span <= 0:
             return 0.0, 0.0
         return (len(self._recent) - 1) / span, 8 * sum(size for _, size in self._recent) / span
 
-    def place(self, target: Subscription, tier: PictureTier) -> None:
-        """Set the tier in which `target` gets the console's encoding."""
-        self._tiers[target] = tier
-
-    def leave(self, target: Subscription) -> None:
-        self._tiers.pop(target, None)
-        self._held_back.discard(target)
-
     def hold_back(self, target: Subscription, wanted: bool) -> None:
         """Set whether `target` must get the console's encoding, because its path has no room."""
-        if not wanted:
-            self._held_back.discard(target)
-        elif target not in self._held_back:
-            self._held_back.add(target)
-            if self.holds(target):
-                self.return_to_ours(target)
+        if wanted and not target.held_back and target in self._passed.targets:
+            self._encodings.return_to_own(target)
+        target.held_back = wanted
 
-    def begin(self, keyframe: Media, outputs: Iterable[TierEncoding]) -> None:
+    def _begin(self, keyframe: Media) -> None:
         """Take a keyframe of the camera: targets that can decode it move here, those that no longer can move back."""
         access = inspect(keyframe.payload)
         if access.profile is not None:
-            self.profile = access.profile
-        for target in list(self.output.targets):
-            if not self._may(target):
-                self.return_to_ours(target)
-        for output in outputs:
-            for target in [*output.targets, *output.arriving]:
-                if self._may(target):
-                    output.leave(target)
-                    self.output.targets[target] = None
+            self._profile = access.profile
+        self._encodings.passes = self._profile is not None
+        for target in list(self._passed.targets):
+            if not self._may_pass_to(target):
+                self._encodings.return_to_own(target)
+        for encoding in self._encodings.own:
+            for target in [*encoding.targets, *encoding.arriving]:
+                if encoding.codec == "H264" and self._may_pass_to(target):
+                    encoding.leave(target)
+                    self._passed.targets[target] = None
 
-    def end(self) -> None:
+    def _end(self) -> None:
         """Move all targets to the console's encoding, from a keyframe on: the camera gives other pictures now."""
-        self.profile = None
-        for target in list(self.output.targets):
-            self.return_to_ours(target)
+        self._profile = None
+        self._encodings.passes = False
+        for target in list(self._passed.targets):
+            self._encodings.return_to_own(target)
 
-    def return_to_ours(self, target: Subscription) -> None:
-        """Move `target` to the console's encoding with its next keyframe, which comes at once; it misses nothing."""
-        self._encoded(self._tiers.get(target, "operator")).expect(target, self.output)
-
-    def _may(self, target: Subscription) -> bool:
+    def _may_pass_to(self, target: Subscription) -> bool:
         negotiated = target.h264
-        if negotiated is None or self.profile is None or target in self._held_back:
+        if negotiated is None or self._profile is None or target.held_back:
             return False
-        return accepts(negotiated, self.profile)
+        return accepts(negotiated, self._profile)

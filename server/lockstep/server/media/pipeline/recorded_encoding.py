@@ -1,14 +1,14 @@
-"""Chooses the encoding of a stream to record. An encoding that somebody already takes is not made twice."""
+"""The stage that chooses the encoding of a stream to record. One that somebody already takes is not made twice."""
 
-from collections.abc import Mapping
 from typing import Protocol
 
 from lockstep.server.media.pipeline.frame import EncodedFrame
-from lockstep.server.media.pipeline.passthrough import PASSED
+from lockstep.server.media.pipeline.stage import FrameStage
+from lockstep.server.media.pipeline.stream_encodings import PASSED, StreamEncodings
 from lockstep.server.media.pipeline.tier_encoding import TierEncoding
-from lockstep.server.media.quality.encoding_target import EncodingTarget, PictureTier
+from lockstep.server.media.quality.encoding_target import PictureTier
 
-__all__ = ["FrameTaker", "RecordedEncoding", "RecordedStream"]
+__all__ = ["FrameTaker", "RecordedEncoding"]
 
 TIERS: tuple[PictureTier, ...] = ("operator", "high", "crowd", "low")
 HALF_A_PACKET = 0.010  # s of sound
@@ -21,22 +21,8 @@ class FrameTaker(Protocol):
     def __call__(self, stream: str, codec: str, frame: EncodedFrame, *, attached: bool) -> None: ...
 
 
-class RecordedStream(Protocol):
-    """The part of a stream that is needed here."""
-
-    @property
-    def name(self) -> str: ...
-    @property
-    def full_plan(self) -> EncodingTarget: ...
-    @property
-    def outputs(self) -> Mapping[tuple[str, PictureTier], TierEncoding]: ...
-    @property
-    def passed(self) -> TierEncoding | None: ...
-    def output(self, codec: str, tier: PictureTier) -> TierEncoding: ...
-
-
-class RecordedEncoding:
-    """Call `choose` before each medium, `published` with each frame, `close` at the end.
+class RecordedEncoding(FrameStage):
+    """Between `record` and `stop`, hands the frames of the chosen encoding to the recorder, after the fan-out.
 
     The operator's encoding is preferred, then the camera's own, then that of observers. If nobody takes the first
     codec, an encoding in the next one is recorded; a separate one is made only if nothing is encoded. A change takes
@@ -45,37 +31,60 @@ class RecordedEncoding:
 
     Every sound packet is a keyframe. When the codec changes, sound already recorded in the former is not taken again.
 
-    Args:
+    Attributes:
         codecs: possible codecs of the recording; the first one is used if it, or nothing, is encoded
-        own_tier: tier of an encoding for the recording alone
-        keyframe_seconds: longest time between two keyframes; twice that on a path without room
-        attached: True for a source of the console, False for one of the robot
-        sound: True for a microphone
     """
 
     def __init__(
         self,
-        codecs: tuple[str, ...],
+        following: FrameStage,
+        encodings: StreamEncodings,
         own_tier: PictureTier,
-        take: FrameTaker,
         *,
-        keyframe_seconds: float,
         attached: bool,
         sound: bool = False,
     ) -> None:
-        self._codecs = codecs
+        """Recording begins with `record`.
+
+        Args:
+            own_tier: tier of an encoding for the recording alone
+            attached: True for a source of the console, False for one of the robot
+            sound: True for a microphone
+        """
+        super().__init__(following)
+        self.codecs = tuple(sorted(encodings.codecs, key=lambda codec: codec not in ("H264", "opus")))
+        self._encodings = encodings
         self._own_tier = own_tier
-        self._take = take
-        self._keyframe_seconds = keyframe_seconds
         self._attached = attached
         self._sound = sound
+        self._take: FrameTaker | None = None  # None: nothing is recorded
+        self._keyframe_seconds = 0.0
         self._last: tuple[TierEncoding, float] | None = None  # encoding and time of the last recorded frame
         self._current: TierEncoding | None = None
         self._next: TierEncoding | None = None  # from its next keyframe on
         self._meanwhile: TierEncoding | None = None  # the console's, until the camera's first keyframe
 
-    def choose(self, stream: RecordedStream) -> None:
-        wanted = self._best(stream)
+    def record(self, take: FrameTaker, keyframe_seconds: float) -> None:
+        """Hand frames to `take` from now on; keyframes come that often, half as often on a path without room."""
+        self.stop()
+        self._take, self._keyframe_seconds = take, keyframe_seconds
+
+    def stop(self) -> None:
+        """Stop recording."""
+        self._take = self._last = None
+        for encoding in (self._current, self._next, self._meanwhile):
+            self._drop(encoding)
+        self._current = self._next = self._meanwhile = None
+
+    def is_wanted(self) -> bool:
+        """Return whether the next medium is needed by anybody; choose the encoding that is recorded of it."""
+        if self._take is None:
+            return self._encodings.is_taken
+        self._choose()
+        return True
+
+    def _choose(self) -> None:
+        wanted = self._best()
         if wanted is self._next or (wanted is self._current and self._next is None):
             return
         self._drop(self._next)
@@ -83,48 +92,53 @@ class RecordedEncoding:
         if wanted is self._meanwhile:
             self._meanwhile = None
         if self._next is not None:
-            self._begin(self._next, stream)
-            if self._current is None and wanted is stream.passed:
-                self._meanwhile = self._ours(stream)
-                self._begin(self._meanwhile, stream)
+            self._begin(self._next)
+            if self._current is None and wanted is self._encodings.passed:
+                self._meanwhile = self._own()
+                self._begin(self._meanwhile)
 
-    def _begin(self, output: TierEncoding, stream: RecordedStream) -> None:
-        if not output.needed:
-            output.plan = stream.full_plan
-        output.recorded = True
-        output.keyframes.longest = self._keyframe_seconds
-        output.request_keyframe("record")
+    def _begin(self, encoding: TierEncoding) -> None:
+        if not encoding.needed:
+            encoding.plan = self._encodings.full
+        encoding.recorded = True
+        encoding.keyframes.longest = self._keyframe_seconds
+        encoding.request_keyframe("record")
 
-    def _best(self, stream: RecordedStream) -> TierEncoding:
-        operators = stream.outputs.get((self._codecs[0], "operator"))
+    def _best(self) -> TierEncoding:
+        operators = self._encodings.find(self.codecs[0], "operator")
         if operators is not None and operators.targets:
             return operators
-        return stream.passed or self._ours(stream)
+        if self._encodings.passed is not None and self._encodings.passes:
+            return self._encodings.passed
+        return self._own()
 
-    def _ours(self, stream: RecordedStream) -> TierEncoding:
+    def _own(self) -> TierEncoding:
         """Return an encoding of the console that somebody takes; without one, an encoding for the recording."""
-        for codec in self._codecs:
+        for codec in self.codecs:
             for tier in TIERS:
-                found = stream.outputs.get((codec, tier))
-                if found is not None and found.targets:
-                    return stream.output(codec, "high") if tier == "crowd" else found  # all pictures, not a crowd's
-        return stream.output(self._codecs[0], self._own_tier)
+                found = self._encodings.find(codec, tier)
+                if found is not None and found.targets:  # all pictures, not a crowd's
+                    return self._encodings.get(codec, "high") if tier == "crowd" else found
+        return self._encodings.get(self.codecs[0], self._own_tier)
 
-    def published(self, stream: str, output: TierEncoding, frame: EncodedFrame) -> None:
-        if frame.keyframe and output is self._next:
+    def encoded(self, frame: EncodedFrame, encoding: TierEncoding) -> None:
+        super().encoded(frame, encoding)
+        if self._take is None:
+            return
+        if frame.keyframe and encoding is self._next:
             self._drop(self._current)
             self._drop(self._meanwhile)
-            self._current, self._next, self._meanwhile = output, None, None
-        elif frame.keyframe and output is self._meanwhile:
-            self._current, self._meanwhile = output, None
-        if output is self._current and not self._was_taken(output, frame):
-            self._last = output, frame.time
-            codec = self._codecs[0] if output.codec == PASSED else output.codec
-            self._take(stream, codec, frame, attached=self._attached)
+            self._current, self._next, self._meanwhile = encoding, None, None
+        elif frame.keyframe and encoding is self._meanwhile:
+            self._current, self._meanwhile = encoding, None
+        if encoding is self._current and not self._was_taken(encoding, frame):
+            self._last = encoding, frame.time
+            codec = self.codecs[0] if encoding.codec == PASSED else encoding.codec
+            self._take(self._encodings.stream, codec, frame, attached=self._attached)
 
-    def _was_taken(self, output: TierEncoding, frame: EncodedFrame) -> bool:
+    def _was_taken(self, encoding: TierEncoding, frame: EncodedFrame) -> bool:
         """True if this sound is recorded already, in another codec."""
-        if not self._sound or self._last is None or self._last[0] is output:
+        if not self._sound or self._last is None or self._last[0] is encoding:
             return False
         return 0 < self._last[1] + HALF_A_PACKET - frame.time < CLOCK_JUMPED
 
@@ -135,18 +149,12 @@ class RecordedEncoding:
         if self._current.codec != PASSED:
             self._current.request_keyframe("record")
         else:  # a camera's own: the encoding is chosen afresh, and the console's comes first
-            for output in (self._current, self._next):
-                self._drop(output)
+            for encoding in (self._current, self._next):
+                self._drop(encoding)
             self._current = self._next = None
 
-    def close(self) -> None:
-        """Stop recording."""
-        for output in (self._current, self._next, self._meanwhile):
-            self._drop(output)
-        self._current = self._next = self._meanwhile = None
-
     @staticmethod
-    def _drop(output: TierEncoding | None) -> None:
-        if output is not None:
-            output.recorded = False
-            output.keyframes.longest = None
+    def _drop(encoding: TierEncoding | None) -> None:
+        if encoding is not None:
+            encoding.recorded = False
+            encoding.keyframes.longest = None

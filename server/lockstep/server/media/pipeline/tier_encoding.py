@@ -13,9 +13,9 @@ KEYFRAME_CAUSES = ("join", "pli", "drop", "tier", "record")
 
 
 class TierEncoding:
-    """One output of a stream. Nothing is encoded for an output that nobody needs.
+    """One encoding of a stream. Nothing is encoded that nobody needs.
 
-    A target that changes its tier goes on with the old output until the new one has a keyframe for it: it misses no
+    A target that changes its tier goes on with the old encoding until the new one has a keyframe for it: it misses no
     picture.
     """
 
@@ -27,18 +27,22 @@ class TierEncoding:
         plan: EncodingTarget,
         keyframes: KeyframeScheduler,
         metrics: MediaMetrics,
+        *,
+        moves_at_keyframes: bool,
     ) -> None:
+        """`moves_at_keyframes`: False for sound, see `StreamEncodings.move_all`."""
         self.codec = codec
         self.tier = tier
         self.plan = plan
         self.keyframes = keyframes
         self.cadence = FrameDecimator()
         self.targets: dict[Subscription, None] = {}  # an ordered set
-        self.arriving: dict[Subscription, TierEncoding] = {}  # and the output that each comes from
+        self.arriving: dict[Subscription, TierEncoding] = {}  # and the encoding that each comes from
         self.recorded = False  # True while a recording takes it
-        self.paused_until = 0.0  # no picture before; on the clock of `Stream.feed`
+        self.paused_until = 0.0  # no picture before; on the clock of `SourceFrame.arrived_at`
         self.encoded_at = 0.0  # time of the last picture taken, on the same clock
         self._last_capture_time = 0.0
+        self._moves_at_keyframes = moves_at_keyframes
         self._encoded = metrics.encoded.labels(stream, codec)
         self._of_tier = metrics.tier_frames.labels(stream, tier)
         self._keyframes_served = metrics.keyframes.labels(stream, codec)
@@ -63,7 +67,7 @@ class TierEncoding:
         self._ask_for_join("join")
 
     def expect(self, target: Subscription, source: "TierEncoding") -> None:
-        """Move `target` from `source` to this output with the next keyframe."""
+        """Move `target` from `source` to this encoding with the next keyframe."""
         self.arriving[target] = source
         self._ask_for_join("tier")
 
@@ -92,8 +96,11 @@ class TierEncoding:
         self._last_capture_time = max(self._last_capture_time, capture_time)
         return self._last_capture_time
 
-    def count(self, frame: EncodedFrame) -> None:
+    def publishing(self, frame: EncodedFrame) -> None:
+        """Count a frame that is about to go to the targets, and let those begin with it that wait for a keyframe."""
         self._encoded.inc()
         self._of_tier.inc()
         if frame.keyframe:
             self._keyframes_served.inc()
+            if self._moves_at_keyframes and self.arriving:
+                self.arrive()

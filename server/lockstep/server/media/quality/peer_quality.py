@@ -2,7 +2,7 @@
 
 import time
 from collections.abc import Callable
-from typing import TYPE_CHECKING, NamedTuple, Protocol
+from typing import TYPE_CHECKING, NamedTuple
 
 from lockstep.protocol.console import Quality, Report, StreamQuality, Tier
 from lockstep.protocol.serial import event_gap
@@ -13,19 +13,11 @@ from lockstep.server.media.quality.observer_tier import ObserverTier
 from lockstep.server.media.subscription import Subscription
 
 if TYPE_CHECKING:
-    from lockstep.server.media.pipeline.audio_stream import AudioStream
-    from lockstep.server.media.pipeline.video_stream import VideoStream
+    from lockstep.server.media.pipeline.stream import AudioStream, VideoStream
 
 __all__ = ["CameraLink", "PeerQuality", "SoundLink"]
 
 WIRE_SHARE = 0.92  # share of payload in the bytes that a receiver counts; the rest are headers
-
-
-class Counted(Protocol):
-    """The part of a stream's sender that is needed here."""
-
-    @property
-    def stats(self) -> SenderStats: ...
 
 
 class CameraLink(NamedTuple):
@@ -34,7 +26,6 @@ class CameraLink(NamedTuple):
     stream: "VideoStream"
     codec: str
     target: Subscription
-    sender: Counted
 
 
 class SoundLink(NamedTuple):
@@ -98,7 +89,7 @@ class PeerQuality:
         return next((ms for ms in (stats.round_trip_ms for stats in self.stats()) if ms is not None), None)
 
     def stats(self) -> list[SenderStats]:
-        return [camera.sender.stats for camera in self.cameras]
+        return [camera.target.sender.stats for camera in self.cameras]
 
     def reception(self, lost: int, expected: int, round_trip: float | None) -> None:
         """Take a receiver report about one of its streams, sound included: all of them share one path."""

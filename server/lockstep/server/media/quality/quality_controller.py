@@ -20,8 +20,7 @@ import time
 from collections.abc import Callable, Iterable
 
 from lockstep.protocol.console import StreamQuality, Tier
-from lockstep.server.media.pipeline.audio_stream import AudioStream
-from lockstep.server.media.pipeline.video_stream import VideoStream
+from lockstep.server.media.pipeline.stream import AudioStream, VideoStream
 from lockstep.server.media.quality.adaptation import Adaptation
 from lockstep.server.media.quality.budget import CameraNeed, share_out
 from lockstep.server.media.quality.encoding_target import EncodingTarget, PictureTier
@@ -134,7 +133,7 @@ class QualityController:
             if peer.held_back != (held_back := peer.path.limited or peer.tier == "low"):
                 peer.held_back = held_back
                 for camera in peer.cameras:
-                    camera.stream.hold_back(camera.target, held_back)
+                    camera.stream.passthrough.hold_back(camera.target, held_back)
         if self._ticks % OBSERVER_TICKS == 0:
             for peer in leaders:
                 self._tell(peer)
@@ -152,8 +151,8 @@ class QualityController:
         members = [peer for peer in observers if peer.in_crowd]
         if self._crowd.watch(len(members), now) > 1:
             for stream in _streams(members):
-                for output in stream.outputs_of("crowd"):
-                    output.plan = self._plan_of(stream, "crowd")
+                for encoding in stream.encodings.of_tier("crowd"):
+                    encoding.plan = self._plan_of(stream, "crowd")
 
     def _encoded_as(self, peer: PeerQuality, shared: bool) -> PictureTier:
         """Return the tier whose pictures an observer gets; `shared`: the operator's pictures serve the high tier."""
@@ -187,9 +186,9 @@ class QualityController:
         limited = any(peer.path.limited for peer in leaders)
         pause = max(peer.path.paused_until for peer in leaders)
         for stream in streams:
-            for output in stream.outputs_of("operator"):
-                output.paused_until = pause
-                output.keyframes.sparing = limited
+            for encoding in stream.encodings.of_tier("operator"):
+                encoding.paused_until = pause
+                encoding.keyframes.sparing = limited
         whole = not limited and all(
             plan.scale == 1.0 and plan.frame_rate >= stream.frame_rate
             for stream in streams
@@ -221,8 +220,8 @@ class QualityController:
             ladder = self._ladders.setdefault((tier, stream.name), Adaptation())
             plan = ladder.plan(bps, stream.frame_rate / divisor, stream.size, now)
             self._plans[tier, stream.name] = plan
-            for output in stream.outputs_of(tier):
-                output.plan = plan
+            for encoding in stream.encodings.of_tier(tier):
+                encoding.plan = plan
 
     def _shares(self, total_bps: float, streams: list[VideoStream]) -> dict[VideoStream, float]:
         """Return the bits per second of each of these cameras, the main one first."""
@@ -236,9 +235,9 @@ class QualityController:
             return
         peer.encoded_as = encoded_as
         for camera in peer.cameras:
-            camera.stream.move(camera.codec, camera.target, encoded_as)
-            for output in camera.stream.outputs_of(encoded_as):
-                output.plan = self._plan_of(camera.stream, encoded_as)
+            camera.stream.encodings.move(camera.codec, camera.target, encoded_as)
+            for encoding in camera.stream.encodings.of_tier(encoded_as):
+                encoding.plan = self._plan_of(camera.stream, encoded_as)
 
     def _sound_for(self, peer: PeerQuality) -> None:
         """Give a crowd longer sound packets, in the low tier too: their headers are a third of a narrow path."""
@@ -246,12 +245,12 @@ class QualityController:
         if peer.hears_as != hears_as:
             peer.hears_as = hears_as
             for sound in peer.sounds:
-                sound.stream.move(sound.codec, sound.target, hears_as)
+                sound.stream.encodings.move(sound.codec, sound.target, hears_as)
 
     def _plan_of(self, stream: VideoStream, tier: PictureTier) -> EncodingTarget:
         if tier == "crowd":
-            return stream.full_plan.thinned(self._crowd.divisor)
-        return stream.full_plan if tier == "high" else self._plans.get((tier, stream.name), stream.full_plan)
+            return stream.encodings.full.thinned(self._crowd.divisor)
+        return stream.encodings.full if tier == "high" else self._plans.get((tier, stream.name), stream.encodings.full)
 
     def _tell(self, peer: PeerQuality) -> None:
         streams, thinned = [], False
@@ -259,7 +258,7 @@ class QualityController:
             plan = self._plan_of(camera.stream, peer.encoded_as)
             width, height = plan.size(*camera.stream.size)
             rate, bps = plan.frame_rate, float(plan.bitrate_bps)
-            if (passed := camera.stream.measured(camera.target)) is not None:  # as the camera made it
+            if (passed := camera.stream.passthrough.measured(camera.target)) is not None:  # as the camera made it
                 (width, height), (rate, bps) = camera.stream.size, passed
             else:
                 thinned |= (
@@ -286,7 +285,7 @@ class QualityController:
             for sound in peer.sounds:
                 losses[sound.stream] = max(losses.get(sound.stream, 0.0), peer.loss or 0.0)
         for stream, loss in losses.items():
-            stream.measured_loss(loss, now)
+            stream.expected_loss.update(loss, now)
 
     def _measure(self, leaders: list[PeerQuality], observers: list[PeerQuality]) -> None:
         tiers: dict[PictureTier, list[PeerQuality]] = {

@@ -1,0 +1,51 @@
+"""The first stage bounds how often frames may come, and ends the way of frames that nobody takes."""
+
+from collections.abc import Callable
+
+from prometheus_client import Counter
+
+from lockstep.protocol.serial import event_gap
+from lockstep.server.media.metrics import DropCounter
+from lockstep.server.media.pipeline.stage import FrameStage, SourceFrame
+from lockstep.server.util.token_bucket import TokenBucket
+
+__all__ = ["MAX_AT_ONCE", "Admission"]
+
+MAX_RATE = 240.0  # Hz, of frames of one stream; sending each of them costs the loop that all robots share
+MAX_AT_ONCE = 240.0  # frames, after a network that has held them back
+
+
+class Admission(FrameStage):
+    """Passes frames on that come in order and not too often, while somebody takes the stream.
+
+    Attributes:
+        newest: the newest frame, also one that was dropped; None before the first
+    """
+
+    def __init__(
+        self, following: FrameStage, is_wanted: Callable[[], bool], arrived: Counter, dropped: DropCounter
+    ) -> None:
+        """`is_wanted` returns whether somebody takes the stream; it is called for each frame."""
+        super().__init__(following)
+        self.newest: SourceFrame | None = None
+        self._is_wanted = is_wanted
+        self._arrived = arrived
+        self._dropped = dropped
+        self._rate = TokenBucket(MAX_RATE, MAX_AT_ONCE, 0.0)
+        self._last_stamp: int | None = None
+
+    def source(self, frame: SourceFrame) -> None:
+        media = frame.media
+        self.newest = frame
+        self._arrived.inc()
+        if not self._rate.take(frame.arrived_at):
+            self._dropped.count("too_often")
+            return
+        # Without an H.264 picture, none that builds on it could be decoded; a stamp older than the last is still true.
+        in_order = media.codec == "h264" or self._last_stamp is None
+        if not in_order and event_gap(media.stamp, self._last_stamp or media.stamp) < 0:
+            self._dropped.count("stale_stamp")
+            return
+        self._last_stamp = media.stamp
+        if self._is_wanted() or media.codec == "h264":  # the camera's next keyframe may be far
+            super().source(frame)
