@@ -172,18 +172,23 @@ class Bridge:
         self._issue()
         atexit.register(self._rest_at_exit)
         self._liveness.start(self._keeper.note_end)
+        # No group of the caller: the ticks go on while the caller is cancelled, until `close` has brought the robot to
+        # rest; and a failure must not cancel the caller, which closes the bridge.
         self._running = asyncio.get_running_loop().create_task(self._run(), name="bridge")
 
-    async def wait(self) -> None:
-        """Wait until the bridge is closed.
+    async def wait(self, leave: asyncio.Event | None = None) -> None:
+        """Wait until the bridge is closed, or `leave` is set because the caller wants to close it.
 
         Raises:
             RobotFailed: the robot adapter or a part of the bridge raised; the robot rests and the bridge has ended.
         """
-        if self._running is not None:
-            await asyncio.wait([self._running])
-            if not self._running.cancelled() and (error := self._running.exception()) is not None:
-                raise error
+        running, leave = self._running, leave or asyncio.Event()
+        if running is None:
+            return
+        running.add_done_callback(lambda _: leave.set())
+        await leave.wait()
+        if running.done() and not running.cancelled() and (error := running.exception()) is not None:
+            raise error
 
     async def close(self) -> None:
         """Bring the robot to rest, end all links and the robot. May be called again."""

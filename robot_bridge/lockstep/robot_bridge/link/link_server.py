@@ -107,7 +107,7 @@ class LinkPeer(LinkTransport):
 
 
 class LinkServer:
-    """Owns the listening socket and every link. `run` must be running for heartbeats."""
+    """Owns the listening socket and every link. After `listen`, `run` accepts links and keeps them alive."""
 
     def __init__(
         self,
@@ -173,7 +173,6 @@ class LinkServer:
             max_handshakes=self._max_strangers,
             known=self._addresses,
         )
-        self._acceptor.start()
         return str(address[0]), int(address[1])
 
     def _new_peer(self) -> LinkPeer:
@@ -183,7 +182,13 @@ class LinkServer:
         self._counters.bad_input["tls"] += 1
 
     async def run(self) -> None:
-        """Run the heartbeats until cancelled."""
+        """Accept links until `close`, and run the heartbeats until cancelled."""
+        async with asyncio.TaskGroup() as tasks:
+            if self._acceptor is not None:
+                tasks.create_task(self._acceptor.run())
+            tasks.create_task(self._beat())
+
+    async def _beat(self) -> None:
         while True:
             await asyncio.sleep(TICK_INTERVAL)
             for peer in list(self._connections):
