@@ -22,11 +22,6 @@ from lockstep.protocol.console import Rename
 
 __all__ = ["Connection"]
 
-HEARTBEAT = 0.5  # s between two reports, and between two pings
-OBSERVER_HEARTBEAT = 1.0  # s, for a peer that cannot drive; there may be hundreds
-RELAYED_HEARTBEAT = 5.0  # s, for an observer, whose answers delay no command
-RELIABLE_HEARTBEAT = 15.0  # s, for an observer on a WebSocket, which loses nothing
-
 
 class Connection:
     """The connection to a console, from `open` to `close`. If it ends without `close`, `lost` has the reason and every
@@ -45,7 +40,7 @@ class Connection:
         self.driving = Driving(options, self.session, lambda message: self.transport.send("control", message))
         self.media = MediaReceiver(options.tolerance, options.gate, self.driving.rendered)
         self.relay: RelayMedia | None = None
-        self._heartbeat = Heartbeat(self.driving, options.silence_seconds)
+        self._heartbeat = Heartbeat(self.session, self.driving, options.silence_seconds)
         self._messages = MessageDispatcher(self.session, self.driving, self.media, self._heartbeat)
         self._loop = asyncio.get_running_loop()
         self._has_media = asyncio.Event()  # `media` is prepared
@@ -142,7 +137,7 @@ class Connection:
     ) -> None:
         """Start the media and the heartbeat once the media are known; add their tasks to `tasks`."""
         await self._has_media.wait()
-        work = [self.media.run(), self._heartbeat.run(transport, self.media, self._interval)]
+        work = [self.media.run(), self._heartbeat.run(transport, self.media, relayed=self.relay is not None)]
         if self.relay is not None:
             work += [self.relay.run(), self._end_with(self.relay, transport)]
         tasks += [group.create_task(each) for each in work]
@@ -150,12 +145,6 @@ class Connection:
     async def _end_with(self, relay: RelayMedia, transport: Transport) -> None:
         await relay.ended.wait()
         transport.lose(relay.why)
-
-    def _interval(self) -> float:
-        """Return the seconds between two reports."""
-        if self.relay is not None:
-            return RELIABLE_HEARTBEAT if self.transport.reliable else RELAYED_HEARTBEAT
-        return OBSERVER_HEARTBEAT if self.session.is_observer else HEARTBEAT
 
     def _end(self, lost: ConsoleLost) -> None:
         if self.lost is None:

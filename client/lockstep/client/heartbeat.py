@@ -1,10 +1,10 @@
 """Reports to the console and pings it: measures the path, and notices losses and silence."""
 
 import asyncio
-from collections.abc import Callable
 
 from lockstep.client.control.driving import Driving
 from lockstep.client.media.media_receiver import MediaReceiver
+from lockstep.client.session import Session
 from lockstep.client.transport.ping_ledger import PingLedger
 from lockstep.client.transport.transport import Transport
 from lockstep.protocol.console import Report
@@ -12,6 +12,10 @@ from lockstep.protocol.messages import Ping, Pong
 
 __all__ = ["Heartbeat"]
 
+INTERVAL = 0.5  # s between two reports, and between two pings
+OBSERVER_INTERVAL = 1.0  # s, for a peer that cannot drive; there may be hundreds
+RELAYED_INTERVAL = 5.0  # s, for an observer behind a relay, whose answers delay no command
+RELIABLE_INTERVAL = 15.0  # s, for one whose messages are never lost
 EARLY_PINGS = 5  # pings that measure the path before the first command
 EARLY_PING = 0.05  # s between them
 
@@ -19,8 +23,9 @@ EARLY_PING = 0.05  # s between them
 class Heartbeat:
     """The heartbeat of a connection. Call `heard` with every message, and `pong` with every answer to a ping."""
 
-    def __init__(self, driving: Driving, silence_seconds: float) -> None:
+    def __init__(self, session: Session, driving: Driving, silence_seconds: float) -> None:
         """`silence_seconds`: time without a message after which the connection counts as lost."""
+        self._session = session
         self._driving = driving
         self._silence_seconds = silence_seconds
         self._pings = PingLedger()
@@ -40,10 +45,10 @@ class Heartbeat:
         """Return the round trip of the ping that this answers, in s; None if it answers none."""
         return self._pings.answered(pong.id, self._loop.time())
 
-    async def run(self, transport: Transport, media: MediaReceiver, interval: Callable[[], float]) -> None:
-        """Send pings, and from the moment when the path is measured reports, until cancelled.
+    async def run(self, transport: Transport, media: MediaReceiver, *, relayed: bool) -> None:
+        """Send pings first, and reports once the path is measured, until cancelled.
 
-        `interval`: returns the time between two reports, in s.
+        `relayed`: media and feedback come from a relay.
         """
         self.heard()
         await self._driving.known.wait()
@@ -62,7 +67,12 @@ class Heartbeat:
                 continue
             transport.send("control", self._report(media, ping))
             media.reported()
-            await asyncio.sleep(interval())
+            await asyncio.sleep(self._interval(transport, relayed))
+
+    def _interval(self, transport: Transport, relayed: bool) -> float:
+        if relayed:
+            return RELIABLE_INTERVAL if transport.reliable else RELAYED_INTERVAL
+        return OBSERVER_INTERVAL if self._session.is_observer else INTERVAL
 
     def _report(self, media: MediaReceiver, ping: int) -> Report:
         driver = self._driving.driver

@@ -12,12 +12,9 @@ from websockets.asyncio.client import connect
 from websockets.asyncio.server import ServerConnection, serve
 from websockets.exceptions import InvalidStatus
 
-from lockstep.client.connection_options import ConnectionOptions
 from lockstep.client.console_url import ConsoleLink, parse_link
 from lockstep.client.errors import ConnectFailed, SignallingRefused
 from lockstep.client.transport.observer_websocket import LineBlocked, ObserverWebSocket
-from lockstep.client.transport.open_transport import open_transport
-from lockstep.client.transport.webrtc_peer import Peer
 from lockstep.client.transport.whep import Whep
 from lockstep.protocol.console import Welcome, decode_server_message
 from lockstep.protocol.messages import Ping, Pong, Stop
@@ -120,27 +117,6 @@ async def test_a_console_that_knows_no_lines_counts_as_blocked(monkeypatch: pyte
     await line.close()
 
 
-async def test_without_a_line_the_connection_has_data_channels_beside_the_relay(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    def blocked(*_: object, **__: object) -> None:
-        raise ConnectionRefusedError("a proxy")
-
-    monkeypatch.setattr("lockstep.client.transport.observer_websocket.connect", blocked)
-    async with running_rig(**RELAYED) as rig:
-        link = parse_link(f"{rig.url}/#token={rig.access.issue('observer', 'ann')}")
-        heard = _Heard()
-        deadline = asyncio.get_running_loop().time() + PATIENCE
-        transport, _ = await open_transport(_options(link), heard.take, deadline, beside="0")
-        try:
-            assert isinstance(transport, Peer)
-            await transport.connect(PATIENCE)
-            await eventually(lambda: heard.has(Welcome))
-            assert [peer.relay for peer in rig.dependencies.console.peers] == ["0"]
-        finally:
-            await transport.close()
-
-
 async def test_a_console_that_answers_no_ping_is_lost(monkeypatch: pytest.MonkeyPatch) -> None:
 
     async def ticket(*_: object) -> str:
@@ -196,23 +172,3 @@ async def test_a_line_is_encrypted_where_the_console_is_and_only_its_certificate
                     await doubting.negotiate()
         finally:
             await doubting.close()
-
-
-def _options(link: ConsoleLink) -> ConnectionOptions:
-    return ConnectionOptions(
-        link=link,
-        pacing="feedback",
-        tolerance={"video": 4, "audio": 6},
-        gate="event",
-        carrier="trailer",
-        video=0,
-        audio=False,
-        decode=False,
-        codec=None,
-        sound_codec=None,
-        event_rate=None,
-        name="ann",
-        connect_seconds=PATIENCE,
-        silence_seconds=PATIENCE,
-        route=None,
-    )
