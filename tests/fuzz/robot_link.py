@@ -58,7 +58,7 @@ class Rig:
         self.bridge = Bridge(self.robot, BridgeSettings(secret=secret), monotonic)
         self.links = self.bridge._links
         self.links._acceptor = cast(LinkAcceptor, self)  # it listens, as far as newcomers can tell
-        self.bridge._issue()
+        self.bridge._feedback.issue()
         self.executed_at = float("-inf")
 
     def admitted(self, address: str) -> None:
@@ -81,7 +81,7 @@ class Rig:
 
     def tick(self, now: float) -> None:
         before, executed = self.bridge.event, self.bridge._core.pending
-        self.bridge._tick(now)
+        self.bridge._ticks.tick()
         gap = event_gap(self.bridge.event, before)
         check(gap == (0 if executed is None else 1), f"the event reference went on by {gap}")
         for peer in list(self.links._connections):

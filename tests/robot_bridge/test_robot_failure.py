@@ -138,9 +138,13 @@ async def test_a_part_of_the_bridge_that_raises_leaves_the_robot_at_rest_and_sto
 ) -> None:
     broken = asyncio.Event()
 
-    async def fails(_: object) -> None:
-        await broken.wait()
-        raise OSError("broken")
+    run = LinkServer.run
+
+    async def fails(server: LinkServer) -> None:
+        async with asyncio.TaskGroup() as tasks:
+            tasks.create_task(run(server))
+            await broken.wait()
+            raise OSError("broken")
 
     def raises(_: object) -> None:
         raise OSError("broken")

@@ -86,7 +86,8 @@ async def _plain(link: str) -> AsyncIterator[Callable[[], Counts]]:
 
     try:
         await peer.negotiate()
-        peer.take_raw_rtp(count, lambda _: None)
+        assert peer.packets is not None  # a peer that is negotiated has them
+        peer.packets.plain(count, lambda _: None)
         await peer.connect(CONNECT_SECONDS)
         yield lambda: {"video": [counter.frames, counter.lost]}
     finally:

@@ -8,7 +8,8 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
-from lockstep.client.connection import Connection, ConnectionOptions
+from lockstep.client.connection import Connection
+from lockstep.client.connection_options import ConnectionOptions
 from lockstep.client.console_url import parse_link
 from lockstep.client.control.command_gate import GateState, Pacing
 from lockstep.client.errors import CommandError, CommandRefused, ConsoleError, ConsoleLost, NotArmed
@@ -132,12 +133,12 @@ class Console:
         try:
             if connection.session.holds_seat and connection.lost is None:
                 async with asyncio.timeout(LEAVE_SECONDS):
-                    await connection.driver.rest()
+                    await connection.driving.driver.rest()
         except (ConsoleError, TimeoutError):
             pass  # the bridge brings the robot to rest when its operator is gone
         finally:
             if connection.session.holds_seat:
-                connection.session.release_seat()
+                connection.requests.release_seat()
             await connection.close()
 
     # Known state
@@ -145,22 +146,22 @@ class Console:
     @property
     def description(self) -> RobotDescription:
         """The description of the robot: its axes, sensors and cameras."""
-        return self._live().robot.description
+        return self._live().driving.robot.description
 
     @property
     def epoch(self) -> str:
         """The id of the robot bridge's run; event references of two epochs are not comparable."""
-        return self._live().robot.epoch
+        return self._live().driving.robot.epoch
 
     @property
     def feedback(self) -> Feedback | None:
         """The newest feedback; None before the first."""
-        return self._live().driver.sender.newest
+        return self._live().driving.driver.sender.newest
 
     @property
     def gate_state(self) -> GateState:
         """The state of the gate: "open" if a command may leave now, otherwise the reason against it."""
-        return self._live().driver.sender.gate.state(asyncio.get_running_loop().time())
+        return self._live().driving.driver.sender.gate.state(asyncio.get_running_loop().time())
 
     @property
     def seat(self) -> Seat:
@@ -170,17 +171,20 @@ class Console:
     @property
     def peer(self) -> str:
         """This connection's id, as in `seat.holder`."""
-        return self._live().welcome.peer
+        return self._live().session.peer
 
     @property
     def relay(self) -> str:
         """The relay that media come through, as the console counts them ("0", …); "" if media come from the console."""
-        return self._live().relay
+        relay = self._live().relay
+        return "" if relay is None else relay.name
 
     @property
     def role(self) -> Role:
         """The role of this link."""
-        return self._live().welcome.role
+        role = self._live().session.role
+        assert role is not None  # `Connection.open` waits for it
+        return role
 
     @property
     def participants(self) -> list[Participant]:
@@ -202,7 +206,7 @@ class Console:
 
     def feedback_log(self) -> list[FeedbackArrival]:
         """Return the last thousand feedbacks and their arrival times (s, the loop's clock), oldest first."""
-        return list(self._live().feedback_log)
+        return list(self._live().driving.arrivals)
 
     async def restart_ice(self) -> None:
         """Look for a new path to the console, as after a change of networks; the connection lives on meanwhile.
@@ -215,7 +219,8 @@ class Console:
             ConnectFailed: no new path was found in time; the old one stays. An observer's WebSocket beside a relay is
                 TCP and has no other path.
         """
-        await self._live().restart_ice()
+        connection = self._live()
+        await connection.transport.restart_ice(connection.options.connect_seconds)
 
     # Driving
 
@@ -228,7 +233,7 @@ class Console:
             SeatRefused: another peer holds the seat, or this link is an observer's.
         """
         connection = self._live()
-        await connection.session.take_seat()
+        await connection.requests.take_seat()
         await self._arm_if_possible(connection)
 
     async def request_seat(self, seconds: float = 65.0) -> None:
@@ -240,15 +245,15 @@ class Console:
             SeatRefused: the holder declined or did not answer, or this link is an observer's.
         """
         connection = self._live()
-        await connection.session.request_seat(seconds)
+        await connection.requests.request_seat(seconds)
         await self._arm_if_possible(connection)
 
     async def _arm_if_possible(self, connection: Connection) -> None:
-        newest = connection.driver.sender.newest
-        if newest is None or newest.stop.stopped or connection.robot.link == "down":
+        newest = connection.driving.driver.sender.newest
+        if newest is None or newest.stop.stopped or connection.driving.robot.link == "down":
             return
         with suppress(CommandRefused):
-            await connection.driver.arm()
+            await connection.driving.driver.arm()
 
     async def arm(self) -> Feedback:
         """Let the robot move again: send one neutral command and return the feedback that answers it.
@@ -260,19 +265,19 @@ class Console:
             CommandRefused: the robot is stopped, this console does not hold the seat, …
             ConsoleLost: the connection ended.
         """
-        return await self._live().driver.arm()
+        return await self._live().driving.driver.arm()
 
     def grant(self, peer: str) -> None:
         """Hand the control seat to a peer that asked for it: one of `seat.claims`."""
-        self._live().session.answer(peer, grant=True)
+        self._live().requests.answer(peer, grant=True)
 
     def decline(self, peer: str) -> None:
         """Refuse a peer that asked for the control seat."""
-        self._live().session.answer(peer, grant=False)
+        self._live().requests.answer(peer, grant=False)
 
     def release_seat(self) -> None:
         """Release the control seat, or withdraw a request for it."""
-        self._live().session.release_seat()
+        self._live().requests.release_seat()
 
     async def drive(self, values: Mapping[str, float] | Sequence[float]) -> Feedback:
         """Send one command as soon as the gate is open; return the feedback that answers it.
@@ -289,12 +294,12 @@ class Console:
             ConsoleLost: the connection ended.
         """
         connection = self._live()
-        command, pilot = self._command(values), connection.driver.sender
+        command, pilot = self._command(values), connection.driving.driver.sender
         if connection.session.holds_seat and not pilot.ready:
             if pilot.newest is not None and pilot.newest.stop.stopped:
                 raise CommandRefused("stopped", pilot.newest.stop.reason)
             raise NotArmed
-        return await connection.driver.drive(command)
+        return await connection.driving.driver.drive(command)
 
     def _command(self, values: Mapping[str, float] | Sequence[float]) -> list[float]:
         axes = self.description.axes
@@ -314,7 +319,7 @@ class Console:
 
     async def rest(self) -> None:
         """Send a rest at once, past the gate, and repeat it until the robot is proven to be at rest. Disarms."""
-        await self._live().driver.rest()
+        await self._live().driving.driver.rest()
 
     async def stop(self, reason: str = "") -> StopState:
         """Latch the stop, from any role, at any time; over HTTP as well when the data channel does not confirm it.
@@ -324,7 +329,8 @@ class Console:
         Raises:
             StopUnconfirmed: the robot has not confirmed it; the console keeps the stop if it was reached.
         """
-        return await self._live().stop(reason)
+        connection = self._live()
+        return await connection.requests.stop(connection.options.name, reason)
 
     async def reset(self, number: int | None = None) -> StopState:
         """Release stop `number`, or the newest that this connection knows. Moves nothing; `arm` comes next.
@@ -334,8 +340,9 @@ class Console:
                 (`stale_reset`), the stop is less than a second old (`too_soon`), a person at the robot keeps the stop
                 (`locked_out`), …
         """
-        session = self._live().session
-        return await session.reset(self._live().options.name, session.newest_stop if number is None else number)
+        connection = self._live()
+        wanted = connection.session.newest_stop if number is None else number
+        return await connection.requests.reset(connection.options.name, wanted)
 
     async def note(self, text: str) -> SharedNote:
         """Write a note to everyone and return it; it keeps the event reference of that moment.
@@ -343,7 +350,7 @@ class Console:
         Raises:
             CommandRefused: there are too many notes, or nothing in this one can be printed.
         """
-        return await self._live().session.note(text)
+        return await self._live().requests.note(text)
 
     # Watching
 
@@ -351,7 +358,7 @@ class Console:
         """Yield every new feedback; a slow reader gets only the newest. Raises ConsoleLost when the connection ends."""
         connection = self._live()
         queue: NewestQueue[Feedback] = NewestQueue(1)
-        connection.feedback_readers.append(queue)
+        connection.driving.readers.append(queue)
         if connection.lost is not None:
             queue.close()
         try:
@@ -360,7 +367,7 @@ class Console:
         except QueueClosed:
             self._raise_lost(connection)
         finally:
-            connection.feedback_readers.remove(queue)
+            connection.driving.readers.remove(queue)
 
     async def pictures(self, camera: str = "", *, keep: int = 2) -> AsyncGenerator[Picture]:
         """Yield the pictures of a camera ("" is the main one) that pass the gate; each is checked again when taken.

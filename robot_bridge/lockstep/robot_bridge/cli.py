@@ -208,22 +208,15 @@ def _mjcf(path: Path) -> Robot:
 
 
 async def _serve(name: str, make: Callable[[], Robot], settings: BridgeSettings, as_json: bool) -> None:
-    stopping = asyncio.Event()
+    leave = asyncio.Event()
     loop = asyncio.get_running_loop()
     # SIGHUP: the terminal was closed; SIGQUIT: Ctrl-\ in the terminal.
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT):
-        loop.add_signal_handler(number, stopping.set)
+        loop.add_signal_handler(number, leave.set)
     liveness = Liveness(LIMIT, ServiceManager(os.environ))
     async with Bridge(make(), settings, liveness=liveness) as bridge:
         _announce(name, bridge, "tcp" if settings.tls is None else "tls", as_json)
-        waits = {loop.create_task(stopping.wait()), loop.create_task(bridge.wait())}
-        try:
-            done, _ = await asyncio.wait(waits, return_when=asyncio.FIRST_COMPLETED)
-        finally:
-            for task in waits:
-                task.cancel()
-        for task in done:
-            task.result()
+        await bridge.wait(leave)
         bridge.report()
 
 

@@ -27,6 +27,7 @@ __all__ = [
     "StateDirInUse",
     "StateDirUnusable",
     "UnknownRobot",
+    "named",
 ]
 
 
@@ -90,3 +91,8 @@ class StateDirUnusable(BridgeError):
 
 class RobotFailed(BridgeError):
     name = "robot_failed"
+
+
+def named(error: BaseException) -> str:
+    """Return the error as "OSError: no such device"; the detail of a RobotFailed, which has that form already."""
+    return error.detail if isinstance(error, RobotFailed) else f"{type(error).__name__}: {error}"

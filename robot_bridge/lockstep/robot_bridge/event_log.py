@@ -6,10 +6,11 @@ A separate thread writes the lines from a bounded queue, so the loop never block
 import logging
 import queue
 import threading
+import time
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
-from typing import Literal
+from typing import BinaryIO, Literal
 
 import msgspec
 
@@ -46,22 +47,31 @@ class EventLog:
     `record` may be called from the loop at any rate; `close` writes the waiting lines and blocks until that is done.
     """
 
-    def __init__(self, path: Path) -> None:
-        """Append to the file at `path`.
+    def __init__(self, path: Path | None) -> None:
+        """`path`: None records nothing."""
+        self.dropped = 0
+        self._path = path
+        self._waiting: queue.Queue[dict[str, Field] | None] = queue.Queue(MAX_WAITING)
+        self._file: BinaryIO | None = None
+        self._writer = threading.Thread(target=self._write, name="event-log", daemon=True)
+
+    def open(self) -> None:
+        """Append to the file from now on. What is recorded earlier is lost.
 
         Raises:
             OSError: the file cannot be opened.
         """
-        self.dropped = 0
-        self._waiting: queue.Queue[dict[str, Field] | None] = queue.Queue(MAX_WAITING)
-        self._file = path.open("ab")
-        self._writer = threading.Thread(target=self._write, name="event-log", daemon=True)
-        self._writer.start()
+        if self._path is not None:
+            self._file = self._path.open("ab")
+            self._writer.start()
 
-    def record(self, kind: EventKind, time: float, event: int, **fields: Field) -> None:
-        """Add a line; `time` is on the bridge's monotonic clock, as in feedback and media."""
+    def record(self, kind: EventKind, event: int, *, at: float | None = None, **fields: Field) -> None:
+        """Add a line. `at`: time on the bridge's monotonic clock, as in feedback and media; None: now."""
+        if self._file is None:
+            return
+        when = time.monotonic() if at is None else at
         try:
-            self._waiting.put_nowait({"kind": kind, "time": time, "event": event, **fields})
+            self._waiting.put_nowait({"kind": kind, "time": when, "event": event, **fields})
         except queue.Full:
             self.dropped += 1
 
@@ -73,18 +83,20 @@ class EventLog:
 
     def _write(self) -> None:
         name_thread("event-log")
+        file = self._file
+        assert file is not None  # `open` starts this thread once it has the file
         works = True
         while (line := self._waiting.get()) is not None:
             if works:
-                works = self._try(partial(self._append, line))
+                works = self._try(partial(self._append, file, line))
             else:
                 self.dropped += 1
-        self._try(self._file.close)
+        self._try(file.close)
 
-    def _append(self, line: dict[str, Field]) -> None:
-        self._file.write(msgspec.json.encode(line) + b"\n")
+    def _append(self, file: BinaryIO, line: dict[str, Field]) -> None:
+        file.write(msgspec.json.encode(line) + b"\n")
         if self._waiting.empty():
-            self._file.flush()
+            file.flush()
 
     def _try(self, work: Callable[[], None]) -> bool:
         try:

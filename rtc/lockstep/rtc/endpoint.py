@@ -498,26 +498,34 @@ class Endpoint:
         Earlier relayed addresses that carry no data are given back. Return the errors of servers without an answer.
         """
         self._give_back_unused()
-        uris = server_uris(servers, self.counts)
-        tasks = [self._loop.create_task(self._ask_turn(*each)) for each in uris if each[0].scheme == "turn"]
-        tasks += [self._loop.create_task(self._ask_stun(each[0])) for each in uris if each[0].scheme == "stun"]
-        begun, left = self._loop.time(), set(tasks)
+        uris = sorted(server_uris(servers, self.counts), key=lambda each: each[0].scheme, reverse=True)  # TURN first
+        begun = self._loop.time()
         deadline = begun + self.settings.ask_seconds
         try:
-            while left and self._loop.time() < deadline:
-                done, left = await asyncio.wait(
-                    left, timeout=deadline - self._loop.time(), return_when=asyncio.FIRST_COMPLETED
-                )
-                if any(each.exception() is None for each in done):
-                    now = self._loop.time()
-                    deadline = min(deadline, now + max(self.settings.ask_margin, SLOWEST * (now - begun)))
+            async with asyncio.TaskGroup() as group:
+                tasks = [group.create_task(self._ask_server(*each)) for each in uris]
+                left = set(tasks)
+                while left and self._loop.time() < deadline:
+                    done, left = await asyncio.wait(
+                        left, timeout=deadline - self._loop.time(), return_when=asyncio.FIRST_COMPLETED
+                    )
+                    if any(isinstance(each.result(), list) for each in done):
+                        now = self._loop.time()
+                        deadline = min(deadline, now + max(self.settings.ask_margin, SLOWEST * (now - begun)))
+                for task in left:
+                    task.cancel()
         finally:
-            for task in tasks:
-                task.cancel()
-            outcomes = await asyncio.gather(*tasks, return_exceptions=True)
             self._probes.clear()
+        outcomes = [task.result() for task in tasks if not task.cancelled()]
         self._told = [each for found in outcomes if isinstance(found, list) for each in found]
         return [each for each in outcomes if isinstance(each, OSError)]
+
+    async def _ask_server(self, uri: ServerUri, server: IceServer) -> list[LocalCandidate] | Exception:
+        """Return what a server answers, or its error, which does not end the questions to others."""
+        try:
+            return await (self._ask_turn(uri, server) if uri.scheme == "turn" else self._ask_stun(uri))
+        except Exception as error:
+            return error
 
     async def _ask_turn(self, uri: ServerUri, server: IceServer) -> list[LocalCandidate]:
         link = await open_relay(uri, server, self._relayed)

@@ -135,6 +135,7 @@ class TcpPort:
         connection.setblocking(False)
         with suppress(OSError):  # a system that has no such option
             connection.setsockopt(socket.IPPROTO_TCP, TCP_NOTSENT_LOWAT, KERNEL_UNSENT)
+        # No group: this is a callback of the loop. The task hands the connection to the loop, which takes one step.
         task: asyncio.Task[object] = self._loop.create_task(self._open(connection), name="ice-tcp")
         self._accepting.add(task)
         task.add_done_callback(self._accepting.discard)

@@ -2,6 +2,8 @@
 
 import asyncio
 import datetime
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
 from pathlib import Path
 from typing import Any
 
@@ -11,11 +13,9 @@ from websockets.asyncio.server import ServerConnection, serve
 from websockets.exceptions import InvalidStatus
 from websockets.protocol import State
 
-from lockstep.client.connection import Connection, ConnectionOptions
 from lockstep.client.console_url import ConsoleLink, parse_link
 from lockstep.client.errors import ConnectFailed, SignallingRefused
 from lockstep.client.transport.observer_websocket import LineBlocked, ObserverWebSocket
-from lockstep.client.transport.webrtc_peer import Peer
 from lockstep.client.transport.whep import Whep
 from lockstep.protocol.console import Welcome, decode_server_message
 from lockstep.protocol.messages import Ping, Pong, Stop
@@ -42,13 +42,25 @@ def _line(link: ConsoleLink, heard: _Heard) -> ObserverWebSocket:
     return ObserverWebSocket(link, "0", None, heard.take, PATIENCE)
 
 
+@asynccontextmanager
+async def _open(line: ObserverWebSocket) -> AsyncIterator[None]:
+    """Runs the line until it ends or the test is over."""
+    try:
+        assert await line.negotiate() == []
+        await line.connect(PATIENCE)
+        async with asyncio.TaskGroup() as tasks:
+            running = tasks.create_task(line.run())
+            yield
+            running.cancel()
+    finally:
+        await line.close()
+
+
 async def test_a_line_is_welcomed_asks_stops_and_says_how_it_ended() -> None:
     heard = _Heard()
     async with running_rig(**RELAYED) as rig:
         line = _line(parse_link(f"{rig.url}/#token={rig.access.issue('observer', 'ann')}"), heard)
-        try:
-            assert await line.negotiate() == []
-            await line.connect(PATIENCE)
+        async with _open(line):
             await eventually(lambda: heard.has(Welcome))
             line.send("control", Ping(id=5))
             await eventually(lambda: Pong(id=5) in heard.messages)
@@ -61,9 +73,7 @@ async def test_a_line_is_welcomed_asks_stops_and_says_how_it_ended() -> None:
                 await line.ended.wait()
             assert line.why == "the console closed the connection (link revoked)"
             line.send("control", Ping(id=6))
-        finally:
-            await line.close()
-            await line.close()
+        await line.close()
 
 
 async def test_a_refusal_is_no_blocked_line() -> None:
@@ -108,30 +118,6 @@ async def test_a_console_that_knows_no_lines_counts_as_blocked(monkeypatch: pyte
     await line.close()
 
 
-async def test_without_a_line_the_connection_has_data_channels_beside_the_relay(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    def blocked(*_: object, **__: object) -> None:
-        raise ConnectionRefusedError("a proxy")
-
-    monkeypatch.setattr("lockstep.client.transport.observer_websocket.connect", blocked)
-    async with running_rig(**RELAYED) as rig:
-        link = parse_link(f"{rig.url}/#token={rig.access.issue('observer', 'ann')}")
-        connection = Connection(_options(link))
-        connection._beside = "0"
-        await connection._peer.close()
-        connection._peer = ObserverWebSocket(link, "0", None, connection._received, PATIENCE)
-        try:
-            await connection._negotiate(asyncio.get_running_loop().time() + PATIENCE)
-            assert isinstance(connection._peer, Peer)
-            await connection._peer.connect(PATIENCE)
-            await eventually(lambda: connection.session.welcome is not None)
-            assert [peer.relay for peer in rig.dependencies.console.peers] == ["0"]
-        finally:
-            connection._relay = None
-            await connection.close()
-
-
 async def test_a_console_that_answers_no_ping_is_lost(monkeypatch: pytest.MonkeyPatch) -> None:
 
     async def ticket(*_: object) -> str:
@@ -145,15 +131,11 @@ async def test_a_console_that_answers_no_ping_is_lost(monkeypatch: pytest.Monkey
     async with serve(listen, "127.0.0.1", 0) as server:
         port = server.sockets[0].getsockname()[1]
         line = ObserverWebSocket(parse_link(f"http://127.0.0.1:{port}/#token=x"), "0", None, _Heard().take, 0.05)
-        try:
-            await line.negotiate()
-            await line.connect(PATIENCE)
+        async with _open(line):
             line.send("control", Ping(id=1))
             async with asyncio.timeout(PATIENCE):
                 await line.ended.wait()
             assert line.why.startswith("the console did not answer")
-        finally:
-            await line.close()
 
 
 async def test_a_line_goes_by_the_address_of_its_robot_in_a_fleet_and_opens_no_other_ones(
@@ -165,17 +147,12 @@ async def test_a_line_goes_by_the_address_of_its_robot_in_a_fleet_and_opens_no_o
         token = rig.state.access.issue("observer", "ann")
         whep = Whep(parse_link(f"{rig.url}/robots/right/#token={token}"))
         line = _line(parse_link(f"{rig.url}/robots/left/#token={token}"), heard)
-        try:
-            await line.negotiate()
-            await line.connect(PATIENCE)
+        async with whep, _open(line):
             await eventually(lambda: heard.has(Welcome))
             ticket = await whep.watch("0")
             with pytest.raises(InvalidStatus):
                 async with connect(f"{rig.url.replace('http', 'ws', 1)}/robots/left/watch/{ticket}", proxy=None):
                     pass
-        finally:
-            await line.close()
-            await whep.aclose()
 
 
 async def test_a_line_is_encrypted_where_the_console_is_and_only_its_certificate_is_trusted(tmp_path: Path) -> None:
@@ -190,34 +167,12 @@ async def test_a_line_is_encrypted_where_the_console_is_and_only_its_certificate
         line = ObserverWebSocket(link, "0", certificate.chain, heard.take, PATIENCE)
         doubting = ObserverWebSocket(link, "0", None, heard.take, PATIENCE)
         try:
-            await line.negotiate()
-            await line.connect(PATIENCE)
-            await eventually(lambda: heard.has(Welcome))
-            with pytest.raises(ConnectFailed):
-                await doubting.negotiate()
+            async with _open(line):
+                await eventually(lambda: heard.has(Welcome))
+                with pytest.raises(ConnectFailed):
+                    await doubting.negotiate()
         finally:
-            await line.close()
             await doubting.close()
-
-
-def _options(link: ConsoleLink) -> ConnectionOptions:
-    return ConnectionOptions(
-        link=link,
-        pacing="feedback",
-        tolerance={"video": 4, "audio": 6},
-        gate="event",
-        carrier="trailer",
-        video=0,
-        audio=False,
-        decode=False,
-        codec=None,
-        sound_codec=None,
-        event_rate=None,
-        name="ann",
-        connect_seconds=PATIENCE,
-        silence_seconds=PATIENCE,
-        route=None,
-    )
 
 
 async def test_a_close_that_is_cancelled_closes_the_websocket() -> None:

@@ -10,7 +10,7 @@ from lockstep.client.media.frame_assembler import MediaPacket
 from lockstep.client.transport.media_sections import receiving
 from lockstep.client.transport.packets import Packets
 from lockstep.client.transport.sdp import read_sections
-from lockstep.protocol.carriers import EVENT_REFERENCE_URI, pack_event_reference, unpack_event_reference
+from lockstep.protocol.carriers import EVENT_REFERENCE_URI, pack_event_reference
 from lockstep.rtc.endpoint import Connection, Endpoint
 from lockstep.rtc.peer import OfferedMedia
 from lockstep.rtc.peer_events import Connected, MediaEvent, PeerEvent
@@ -38,7 +38,7 @@ class Watching:
 
     def __init__(self, receiver: Connection, sender: Connection) -> None:
         self.receiver, self.sender = receiver, sender
-        self.packets = Packets(receiver)
+        self.packets = Packets(receiver, "native")
         self.text = ""
 
     def connect(self) -> None:
@@ -76,7 +76,7 @@ async def test_a_packet_reaches_its_sink_with_its_stamp_and_a_keyframe_is_asked_
     async with watching() as pair, asyncio.timeout(SECONDS):
         sink = Sink()
         sections = read_sections(pair.text)
-        pair.packets.to_sinks({"0": sink}, sections, EVENT_REFERENCE_URI, unpack_event_reference)
+        pair.packets.to_sinks({"0": sink}, sections)
         pair.receiver.accept(pair.answer)
         await until(pair.sender, Connected)
         await pair.sent(b"\x10picture", pack_event_reference(77))
@@ -122,7 +122,7 @@ async def test_plain_packets_are_handed_on_and_reports_of_our_own_arrive() -> No
 
 async def test_without_a_connection_there_is_nothing_to_take_from() -> None:
     async with Endpoint([HOST]) as endpoint:
-        packets = Packets(endpoint.connect(controlling=True))
+        packets = Packets(endpoint.connect(controlling=True), "trailer")
         packets.send_control(b"")
         assert packets.counts["control_not_sent"] == 1
         with pytest.raises(RuntimeError):

@@ -31,7 +31,7 @@ async def test_with_only_a_relay_the_robot_is_driven_seen_and_moved_to_another_r
         async for picture in console.pictures():
             assert picture.stamp is None or picture.stamp >= first.event - 4
             break
-        peer = console._live()._peer
+        peer = console._live().transport
         assert isinstance(peer, Peer)
         before = _relay_in_use(peer)
         await console.restart_ice()

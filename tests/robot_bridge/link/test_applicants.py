@@ -2,7 +2,7 @@
 
 import pytest
 
-from lockstep.robot_bridge.link.applicants import Applicants, address_group
+from lockstep.robot_bridge.link.applicants import Applicants, Strangers, address_group
 
 
 @pytest.mark.parametrize(
@@ -41,3 +41,20 @@ def test_who_is_admitted_makes_room() -> None:
     applicants.remove(1)
     applicants.remove(1)
     assert applicants.add(2, "a") is None
+
+
+def test_silent_connections_push_out_none_that_owes_the_proof() -> None:
+    strangers: Strangers[str] = Strangers(1)
+    assert strangers.silent("console", "192.0.2.1") is None
+    assert strangers.challenged("console", "192.0.2.1") is None
+    assert strangers.silent("a", "192.0.2.2") is None
+    assert strangers.silent("b", "192.0.2.3") == "a"
+    assert strangers.challenged("b", "192.0.2.3") == "console"
+
+
+def test_one_that_was_admitted_is_in_no_stage_any_more() -> None:
+    strangers: Strangers[str] = Strangers(1)
+    strangers.silent("console", "192.0.2.1")
+    strangers.forget("console")
+    assert strangers.challenged("console", "192.0.2.1") is None
+    assert strangers.silent("a", "192.0.2.2") is None

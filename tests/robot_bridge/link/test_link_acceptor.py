@@ -55,12 +55,13 @@ class Tls:
 @asynccontextmanager
 async def tls_acceptor(directory: Path, known: KnownAddresses | None = None) -> AsyncIterator[Tls]:
     tls = Tls(directory, known)
-    tls.acceptor.start()
-    try:
-        async with asyncio.timeout(PATIENCE):
-            yield tls
-    finally:
-        await tls.acceptor.close()
+    async with asyncio.TaskGroup() as tasks:
+        tasks.create_task(tls.acceptor.run())
+        try:
+            async with asyncio.timeout(PATIENCE):
+                yield tls
+        finally:
+            await tls.acceptor.close()
 
 
 @pytest.fixture
@@ -120,10 +121,18 @@ async def test_an_address_that_is_admitted_while_others_are_written_is_written_t
 async def test_a_closing_that_is_cancelled_leaves_no_socket_open(monkeypatch: pytest.MonkeyPatch) -> None:
     listener = listening_socket("127.0.0.1", 0)
     acceptor = LinkAcceptor(listener, None, asyncio.Protocol, lambda: None, max_handshakes=1)
-    acceptor.start()
-    closing = asyncio.create_task(acceptor.close())
-    await asyncio.sleep(0)  # it waits for the task that accepts
-    closing.cancel()
-    with pytest.raises(asyncio.CancelledError):
-        await closing
-    assert listener.fileno() == -1
+    async with asyncio.TaskGroup() as tasks:
+        tasks.create_task(acceptor.run())
+        await asyncio.sleep(0)  # it begins
+        closing = tasks.create_task(acceptor.close())
+        await asyncio.sleep(0)  # it waits for the task that accepts
+        closing.cancel()
+        with pytest.raises(asyncio.CancelledError):
+            await closing
+        assert listener.fileno() == -1
+
+
+async def test_an_acceptor_that_is_closed_before_it_runs_accepts_nothing() -> None:
+    acceptor = LinkAcceptor(listening_socket("127.0.0.1", 0), None, asyncio.Protocol, lambda: None, max_handshakes=1)
+    await acceptor.close()
+    await acceptor.run()

@@ -78,7 +78,7 @@ async def watch(link: str, count: int) -> None:
             async with gate:
                 console = await stack.enter_async_context(_connected(link, f"watcher {number}"))
             consoles.append(console)
-            relay: Any = console._live()._relay
+            relay: Any = console._live().relay
             counters.append(_Counter(relay.connection.peer))
 
         async with asyncio.TaskGroup() as tasks:

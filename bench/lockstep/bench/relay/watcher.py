@@ -25,7 +25,7 @@ async def watch(link: str, pictures: int) -> dict[str, object]:
         return {
             "event": statistics.event,
             "relay": console.relay,
-            "line": type(console._live()._peer).__name__,
+            "line": type(console._live().transport).__name__,
             "note": note.text,
             "stopped": stopped.stopped,
             "streams": {

@@ -3,9 +3,8 @@
 import asyncio
 import random
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from typing import Protocol
 
 from lockstep.client.errors import NoSuchStream
 from lockstep.client.media.media_gate import GateMode, MediaGate
@@ -15,26 +14,15 @@ from lockstep.client.media.rtp_counter import RtpCounter
 from lockstep.client.media.rtp_header import parse_rtp_header
 from lockstep.client.media.stream import Stream
 from lockstep.client.statistics import StreamStatistics
-from lockstep.client.transport.packets import PacketSink
+from lockstep.client.transport.packets import Packets, PacketSink, stamp_reader
 from lockstep.client.transport.sdp import Section
-from lockstep.client.transport.webrtc_peer import stamp_reader
 from lockstep.protocol.carriers import Carrier
 
-__all__ = ["PacketSource", "MediaReceiver"]
+__all__ = ["MediaReceiver"]
 
 DECODERS = 2  # threads
 REPORT_SECONDS = 1.0  # between two receiver reports, on average
 CLOCK_RATES = {"video": 90_000, "audio": 48_000}  # Hz; only the unit of the jitter
-
-
-class PacketSource(Protocol):
-    """A source of media packets: the connection to a console or a relay."""
-
-    def extension_id(self, sections: list[Section]) -> int | None: ...
-    def take_packets(self, sinks: Mapping[str, PacketSink], sections: list[Section]) -> None: ...
-    def take_raw_rtp(self, take: Callable[[bytes], None], control: Callable[[bytes], None]) -> None: ...
-    def send_control(self, packet: bytes) -> None: ...
-    def round_trip(self, seconds: float) -> None: ...
 
 
 class MediaReceiver:
@@ -42,24 +30,23 @@ class MediaReceiver:
 
     def __init__(
         self,
-        carrier: Carrier,
         tolerance: dict[str, int],
         gate: GateMode,
         on_render: Callable[[str, int], None],
     ) -> None:
-        self._carrier = carrier
+        self._carrier: Carrier = "native"  # of the source
         self._tolerance = tolerance
         self._gate = gate
         self._on_render = on_render
         self._streams: list[Stream] = []
         self._counters: dict[int, tuple[Section, RtpCounter]] = {}  # by SSRC
         self._executor: ThreadPoolExecutor | None = None
-        self._source: PacketSource | None = None
+        self._source: Packets | None = None
         self._reports = ReceiverReports(random.getrandbits(32))
 
-    def prepare(self, source: PacketSource, sections: list[Section], decode: bool) -> None:
+    def prepare(self, source: Packets, sections: list[Section], decode: bool) -> None:
         """Take the packets of `source`, to decode or only to count them."""
-        self._source = source
+        self._source, self._carrier = source, source.carrier
         received = [section for section in sections if section.receives]
         if not decode:
             extension_id = source.extension_id(sections)
@@ -68,13 +55,13 @@ class MediaReceiver:
                 ssrc = section.ssrcs[0] if section.ssrcs else 0
                 self._counters[ssrc] = (section, counter)
                 self._reports.add(ssrc, CLOCK_RATES[section.kind])
-            source.take_raw_rtp(self._count, lambda data: self._reports.control(data, time.monotonic()))
+            source.plain(self._count, lambda data: self._reports.control(data, time.monotonic()))
             return
         sinks: dict[str, PacketSink] = {}
         for section in received:
             sinks[section.mid] = stream = self._new_stream(section)
             self._streams.append(stream)
-        source.take_packets(sinks, sections)
+        source.to_sinks(sinks, sections)
         self._executor = ThreadPoolExecutor(DECODERS, thread_name_prefix="decoder")
 
     def _new_stream(self, section: Section) -> Stream:
@@ -104,7 +91,7 @@ class MediaReceiver:
             for stream in self._streams:
                 group.create_task(stream.run(self._executor))
 
-    async def _report(self, source: PacketSource) -> None:
+    async def _report(self, source: Packets) -> None:
         """Send receiver reports, spread in time (RFC 3550 6.2): without them the console takes the path for dead."""
         while True:
             await asyncio.sleep(REPORT_SECONDS * random.uniform(0.5, 1.5))

@@ -11,13 +11,12 @@ from websockets.exceptions import ConnectionClosed, WebSocketException
 
 from lockstep.client.console_url import ConsoleLink
 from lockstep.client.errors import ConnectFailed, ConsoleError, SignallingRefused
-from lockstep.client.shielded_close import cancel_all
+from lockstep.client.transport.packets import Packets
 from lockstep.client.transport.sdp import Section
-from lockstep.client.transport.sfu_media import RelayTicket
-from lockstep.client.transport.webrtc_peer import ChannelName
+from lockstep.client.transport.transport import ChannelName
 from lockstep.client.transport.whep import Whep
 from lockstep.protocol.console import ClientMessage, Report, encode_console_message
-from lockstep.protocol.messages import Ping, StopTaken
+from lockstep.protocol.messages import Ping
 
 __all__ = ["LineBlocked", "ObserverWebSocket"]
 
@@ -33,7 +32,7 @@ class LineBlocked(ConnectFailed):
 
 
 class ObserverWebSocket:
-    """An observer's WebSocket, used like `Peer`: `negotiate`, `connect`, `send` until `ended` is set, `close`."""
+    """A `Transport` by WebSocket, for an observer, whose media come from a relay."""
 
     def __init__(
         self,
@@ -44,6 +43,9 @@ class ObserverWebSocket:
         silence_seconds: float,
     ) -> None:
         """`silence_seconds`: time within which the console says something after a ping."""
+        self.whep = Whep(link, tls_ca)
+        self.packets: Packets | None = None
+        self.reliable = True
         self.ended = asyncio.Event()
         self.why = ""  # reason that it ended
         self.skipped = 0  # messages that did not fit
@@ -52,17 +54,11 @@ class ObserverWebSocket:
         self._tls_ca = tls_ca
         self._on_message = on_message
         self._silence_seconds = silence_seconds
-        self._whep = Whep(link, tls_ca)
         self._socket: ClientConnection | None = None
-        self._tasks: list[asyncio.Task[None]] = []
         self._waiting: deque[str] = deque()
         self._filled = asyncio.Event()
         self._answer_due: asyncio.TimerHandle | None = None
         self._closing = False
-
-    async def relay_ticket(self, peer: str = "") -> RelayTicket | None:
-        """Return the relay for this observer; None: the console itself. Raises like `Whep.offer`."""
-        return await self._whep.relay(peer)
 
     async def negotiate(self) -> list[Section]:
         """Open the WebSocket. There are no media sections.
@@ -72,7 +68,7 @@ class ObserverWebSocket:
             LineBlocked: the console takes a WebSocket, but none can be opened; or the console does not know them.
         """
         try:
-            ticket = await self._whep.watch(self._relay)
+            ticket = await self.whep.watch(self._relay)
         except SignallingRefused as error:
             if error.status in (404, 405):
                 raise LineBlocked("this console has no lines") from error
@@ -95,12 +91,14 @@ class ObserverWebSocket:
         return []
 
     async def connect(self, seconds: float) -> None:
-        """Start reading and writing. Returns at once: the WebSocket is open."""
-        loop = asyncio.get_running_loop()
-        self._tasks = [
-            loop.create_task(self._hear(), name="watch line in"),
-            loop.create_task(self._tell(), name="watch line out"),
-        ]
+        """Return at once: the WebSocket is open."""
+
+    async def run(self) -> None:
+        """Read and write until the WebSocket has closed."""
+        async with asyncio.TaskGroup() as tasks:
+            writing = tasks.create_task(self._tell())
+            await self._hear()
+            writing.cancel()
 
     def send(self, channel: ChannelName, message: ClientMessage) -> None:
         """Send a message; its kind says which channel it is for."""
@@ -124,10 +122,6 @@ class ObserverWebSocket:
         """Raise ConnectFailed: there is no ICE in TCP."""
         raise ConnectFailed("this observer's WebSocket to the console is TCP: for another path make a new Console")
 
-    async def stop_by_http(self, reason: str, press: str) -> StopTaken:
-        """Stop over HTTP, without the WebSocket; raises like `Whep.stop`."""
-        return await self._whep.stop(reason, press)
-
     async def close(self) -> None:
         """Close the WebSocket. Idempotent."""
         if self._closing:
@@ -136,7 +130,6 @@ class ObserverWebSocket:
         self.ended.set()
         self._heard()
         try:
-            await cancel_all(self._tasks)
             if self._socket is not None:
                 async with asyncio.timeout(CLOSE_SECONDS):
                     await self._socket.close()
@@ -145,7 +138,7 @@ class ObserverWebSocket:
         finally:
             if self._socket is not None:
                 self._socket.transport.abort()  # websockets leaves it open when its close is cancelled
-            await self._whep.aclose()
+            await self.whep.aclose()
 
     async def _hear(self) -> None:
         if self._socket is None:
@@ -189,6 +182,6 @@ class ObserverWebSocket:
     async def _give_back(self, ticket: str) -> None:
         try:
             async with asyncio.timeout(CLOSE_SECONDS):
-                await self._whep.decline(ticket)
+                await self.whep.decline(ticket)
         except (TimeoutError, ConsoleError):
             pass  # the ticket expires without being cancelled

@@ -7,14 +7,28 @@ from typing import Protocol
 from lockstep.client.media.frame_assembler import MediaPacket
 from lockstep.client.media.payloads import UNPACK
 from lockstep.client.transport.sdp import Section
-from lockstep.protocol.carriers import unpack_capture_moment
+from lockstep.protocol.carriers import (
+    CAPTURE_TIME_URI,
+    EVENT_REFERENCE_URI,
+    Carrier,
+    unpack_capture_moment,
+    unpack_capture_time,
+    unpack_event_reference,
+)
 from lockstep.rtc.endpoint import Connection
 from lockstep.rtc.peer import PeerNotReady
 from lockstep.rtc.peer_events import PacketReceived, PeerEvent, PlainRtcp, PlainRtp
 from lockstep.rtc.rtp.packet import RtpPacket
 from lockstep.rtc.rtp.payloads import PayloadError
 
-__all__ = ["PacketSink", "Packets"]
+__all__ = ["EXTENSION_URIS", "PacketSink", "Packets", "stamp_reader"]
+
+EXTENSION_URIS: dict[Carrier, str] = {"native": EVENT_REFERENCE_URI, "capture-time": CAPTURE_TIME_URI}
+
+
+def stamp_reader(carrier: Carrier) -> Callable[[bytes], int | None]:
+    """Return the function that reads the header extension of `carrier`."""
+    return unpack_capture_time if carrier == "capture-time" else unpack_event_reference
 
 
 class PacketSink(Protocol):
@@ -27,28 +41,27 @@ class PacketSink(Protocol):
 class Packets:
     """Passes packets to their consumers. `to_sinks` or `plain` before the answer, then `heard` with every event."""
 
-    def __init__(self, connection: Connection) -> None:
+    def __init__(self, connection: Connection, carrier: Carrier, *, of_relay: bool = False) -> None:
+        """`of_relay`: packets come from a relay, to which no round trip is measured; the assumed one suffices."""
+        self.carrier = carrier
         self.counts: Counter[str] = Counter()  # packets that were dropped, by reason
         self._connection = connection
+        self._of_relay = of_relay
         self._sinks: Mapping[str, PacketSink] = {}  # by mid
         self._codecs: dict[tuple[str, int], Callable[[bytes], bytes]] = {}  # by mid and payload type
-        self._stamp_uri: str | None = None
-        self._read_stamp: Callable[[bytes], int | None] = lambda value: None
+        self._stamp_uri = EXTENSION_URIS.get(carrier)
+        self._read_stamp = stamp_reader(carrier)
         self._take: Callable[[bytes], None] = lambda data: None
         self._control: Callable[[bytes], None] = lambda data: None
 
-    def to_sinks(
-        self,
-        sinks: Mapping[str, PacketSink],
-        sections: Sequence[Section],
-        stamp_uri: str | None = None,
-        read_stamp: Callable[[bytes], int | None] = lambda value: None,
-    ) -> None:
-        """Pass packets to `sinks`, by mid; ask again for lost ones, and report on received ones.
+    def extension_id(self, sections: Sequence[Section]) -> int | None:
+        """Return the id under which the carrier's header extension is sent; None: the stamp is behind the frame."""
+        uri = self._stamp_uri
+        return next((section.extensions[uri] for section in sections if uri and uri in section.extensions), None)
 
-        `stamp_uri`: the URI of the header extension that `read_stamp` understands.
-        """
-        self._sinks, self._stamp_uri, self._read_stamp = sinks, stamp_uri, read_stamp
+    def to_sinks(self, sinks: Mapping[str, PacketSink], sections: Sequence[Section]) -> None:
+        """Pass packets to `sinks`, by mid; ask again for lost ones, and report on received ones."""
+        self._sinks = sinks
         for section in sections:
             for number, name in section.codecs.items():
                 if name in UNPACK:
@@ -90,3 +103,8 @@ class Packets:
             self._connection.send_rtcp(packet)
         except PeerNotReady:
             self.counts["control_not_sent"] += 1
+
+    def round_trip(self, seconds: float) -> None:
+        """Take the round trip to the console; lost packets are asked for accordingly."""
+        if not self._of_relay:
+            self._connection.peer.note_round_trip(seconds)

@@ -3,7 +3,7 @@
 import asyncio
 import itertools
 import secrets
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from typing import Any
 
 import msgspec
@@ -14,7 +14,7 @@ from websockets.typing import Subprotocol
 from lockstep.client.errors import ConnectFailed
 from lockstep.client.transport.endpoints import open_endpoint
 from lockstep.client.transport.media_sections import receiving
-from lockstep.client.transport.packets import Packets, PacketSink
+from lockstep.client.transport.packets import Packets
 from lockstep.client.transport.sdp import Section, read_sections
 from lockstep.protocol.console import StreamInfo
 from lockstep.protocol.errors import MessageError
@@ -49,14 +49,15 @@ class RelayTicket(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class RelayMedia:
-    """The media of a session, from a Janus. Order: `negotiate`, then `take_packets` or `take_raw_rtp`, then `connect`;
-    `run` until `ended`, then `close`."""
+    """The media of a session, from a Janus. Order: `negotiate`, tell `packets` where they go, `connect`; `run` until
+    `ended`, then `close`."""
 
     def __init__(self, ticket: RelayTicket, on_message: Callable[[str | bytes], None]) -> None:
         if ticket.engine != "janus":
             raise ConnectFailed(f"this client watches through a Janus or directly, and not through a {ticket.engine}")
         self.ended = asyncio.Event()
         self.why = ""
+        self.packets: Packets | None = None  # the source of media packets, after `negotiate`
         self._ticket = ticket
         self._on_message = on_message
         self._socket: ClientConnection | None = None
@@ -67,7 +68,6 @@ class RelayMedia:
         self._heard = asyncio.Event()
         self._endpoint: Endpoint | None = None
         self._connection: Connection | None = None
-        self._packets: Packets | None = None
         self._offer: SessionDescription | None = None
 
     @property
@@ -111,24 +111,8 @@ class RelayMedia:
         # The client opens DTLS, because it knows first that ICE has found a path.
         settings = PeerSettings(setup="active")
         self._connection = self._endpoint.connect(controlling=False, settings=settings, listener=self._event)
-        self._packets = Packets(self._connection)
+        self.packets = Packets(self._connection, "trailer", of_relay=True)
         return _named(read_sections(offer), heard.data, {stream.mid: stream.stream for stream in streams})
-
-    def extension_id(self, sections: list[Section]) -> int | None:
-        """Return None: the stamp is behind the frame."""
-        return None
-
-    def take_packets(self, sinks: Mapping[str, PacketSink], sections: list[Section]) -> None:
-        self._need_packets().to_sinks(sinks, sections)
-
-    def take_raw_rtp(self, take: Callable[[bytes], None], control: Callable[[bytes], None]) -> None:
-        self._need_packets().plain(take, control)
-
-    def send_control(self, packet: bytes) -> None:
-        self._need_packets().send_control(packet)
-
-    def round_trip(self, seconds: float) -> None:
-        """Ignore the round trip to the console: that to the relay is not measured, and the assumed one suffices."""
 
     @property
     def connection(self) -> Connection:
@@ -136,11 +120,6 @@ class RelayMedia:
         if self._connection is None:
             raise RuntimeError("negotiate first")
         return self._connection
-
-    def _need_packets(self) -> Packets:
-        if self._packets is None:
-            raise RuntimeError("negotiate first")
-        return self._packets
 
     async def connect(self) -> None:
         """Connect; return when feedback can come. Raises ConnectFailed."""
@@ -193,8 +172,8 @@ class RelayMedia:
             self._on_message(event.data)
         elif isinstance(event, PeerEnded):
             self._lose("the relay closed the connection")
-        elif self._packets is not None:
-            self._packets.heard(event)
+        elif self.packets is not None:
+            self.packets.heard(event)
 
     def _lose(self, why: str) -> None:
         if not self.ended.is_set():
@@ -208,7 +187,8 @@ class RelayMedia:
             raise ConnectFailed("not connected to the relay")
         try:
             async with asyncio.timeout(ANSWER_SECONDS):
-                await self._socket.send(self._request(kind, transaction, **fields))
+                request = janus_request(kind, transaction, session_id=self._session, handle_id=self._handle, **fields)
+                await self._socket.send(request)
                 while True:
                     heard = parse_janus(await self._socket.recv())
                     if heard.transaction == transaction and heard.kind != "ack":
@@ -218,9 +198,6 @@ class RelayMedia:
         if heard.kind == "error":
             raise ConnectFailed(f"the relay refused: {heard.detail}")
         return heard
-
-    def _request(self, kind: str, transaction: str, **fields: Any) -> str:
-        return janus_request(kind, transaction, session_id=self._session, handle_id=self._handle, **fields)
 
     async def _listen_to_events(self) -> None:
         if self._socket is None:

@@ -3,25 +3,18 @@
 import asyncio
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Literal, Protocol
+from typing import Protocol
 
 from lockstep.client.console_url import ConsoleLink
 from lockstep.client.errors import ConnectFailed, ConsoleError, SignallingRefused
 from lockstep.client.transport.endpoints import open_endpoint
 from lockstep.client.transport.media_sections import receiving
-from lockstep.client.transport.packets import Packets, PacketSink
+from lockstep.client.transport.packets import EXTENSION_URIS, Packets
 from lockstep.client.transport.sdp import Section, read_sections
-from lockstep.client.transport.sfu_media import RelayTicket
+from lockstep.client.transport.transport import ChannelName
 from lockstep.client.transport.whep import Whep
-from lockstep.protocol.carriers import (
-    CAPTURE_TIME_URI,
-    EVENT_REFERENCE_URI,
-    Carrier,
-    unpack_capture_time,
-    unpack_event_reference,
-)
+from lockstep.protocol.carriers import Carrier
 from lockstep.protocol.console import ClientMessage, encode_console_message
-from lockstep.protocol.messages import StopTaken
 from lockstep.rtc.channels import ChannelClosed, ChannelMessage, ChannelNotOpen, ChannelOpened
 from lockstep.rtc.dcep import Reliability
 from lockstep.rtc.endpoint import Connection, Endpoint
@@ -32,9 +25,8 @@ from lockstep.rtc.sctp import AssociationClosed, SendQueueFull
 from lockstep.rtc.sdp import SdpError, parse_description, parse_fragment, write_description, write_fragment
 from lockstep.rtc.turn.servers import IceServer
 
-__all__ = ["ChannelName", "Peer", "Route", "stamp_reader"]
+__all__ = ["Peer", "Route"]
 
-ChannelName = Literal["control", "session", "stop"]
 CHANNELS: Mapping[ChannelName, Reliability] = {
     "control": Reliability(ordered=False, max_retransmits=0),
     "session": Reliability(),
@@ -42,7 +34,6 @@ CHANNELS: Mapping[ChannelName, Reliability] = {
 }
 CLOSE_SECONDS = 3.0
 LOOPBACK = "127.0.0.1"
-EXTENSION_URIS: dict[Carrier, str] = {"native": EVENT_REFERENCE_URI, "capture-time": CAPTURE_TIME_URI}
 ENDS = {
     "consent_expired": "the console answered nothing for 30 s",
     "no_path": "no way to the console was found: is UDP between here and the console blocked?",
@@ -57,13 +48,8 @@ class Route(Protocol):
     def answer(self, sdp: str) -> str: ...
 
 
-def stamp_reader(carrier: Carrier) -> Callable[[bytes], int | None]:
-    """Return the function that reads the header extension of `carrier`."""
-    return unpack_capture_time if carrier == "capture-time" else unpack_event_reference
-
-
 class Peer:
-    """One connection to a console. Order: `negotiate`, `connect`, then `send` until `ended` is set, then `close`."""
+    """A `Transport` by WebRTC, for messages and media."""
 
     def __init__(
         self,
@@ -80,8 +66,11 @@ class Peer:
         relay: str = "",
         sound_codec: str | None = None,
     ) -> None:
+        self.whep = Whep(link, tls_ca)
+        self.packets: Packets | None = None
         self.ended = asyncio.Event()
         self.why = ""  # reason that the connection ended
+        self.reliable = False
         self.skipped = 0  # messages on `control` that found others waiting
         self._link = link
         self._carrier = carrier
@@ -90,7 +79,6 @@ class Peer:
         self._relay_only = relay_only
         self._relay = relay  # the relay that media come from; "": the console
         self._ice_servers: list[IceServer] = []
-        self._whep = Whep(link, tls_ca)
         self._resource = ""
         self._answer = ""
         self._closing = False
@@ -100,7 +88,6 @@ class Peer:
         self._offered = [OfferedMedia(str(number), kind, own) for number, (kind, own) in enumerate(media)]
         self._endpoint: Endpoint | None = None
         self._connection: Connection | None = None
-        self._packets: Packets | None = None
         self._channels: dict[ChannelName, int] = {}
         self._open: set[int] = set()  # channels
         self._stepped = asyncio.Event()  # a channel opened, or the connection ended
@@ -128,8 +115,8 @@ class Peer:
                 if self._restarted is not None and not self._restarted.done():
                     self._restarted.set_result(isinstance(event, Restarted))
             case _:
-                if self._packets is not None:
-                    self._packets.heard(event)
+                if self.packets is not None:
+                    self.packets.heard(event)
 
     def lose(self, why: str) -> None:
         """Count the connection as lost; the first reason stands."""
@@ -138,10 +125,6 @@ class Peer:
             self.ended.set()
             self._stepped.set()
 
-    async def relay_ticket(self, peer: str = "") -> RelayTicket | None:
-        """Return the relay where the console wants this observer to watch; raises like `negotiate`."""
-        return await self._whep.relay(peer)
-
     async def negotiate(self) -> list[Section]:
         """Send an offer and take the answer; return its media sections.
 
@@ -149,15 +132,15 @@ class Peer:
             SignallingRefused, ConnectFailed: as `Whep.offer`.
             ConnectFailed: also when only relays may be used, and none gives an address.
         """
-        self._ice_servers = await self._whep.ice_servers()
+        self._ice_servers = await self.whep.ice_servers()
         endpoint = self._endpoint = open_endpoint(self._hosts())
         await self._ask_servers(endpoint)
         connection = self._connection = endpoint.connect(controlling=True, listener=self._happened)
         connection.urgent = True  # a command waits for no turn of the loop: nothing else leaves from this endpoint
-        self._packets = Packets(connection)
+        self.packets = Packets(connection, self._carrier)
         sdp = write_description(connection.offer(self._offered))
         sent = sdp if self._route is None else self._route.offer(sdp)
-        answer = await self._whep.offer(sent, trailer=self._carrier == "trailer", relay=self._relay)
+        answer = await self.whep.offer(sent, trailer=self._carrier == "trailer", relay=self._relay)
         self._resource = answer.resource
         self._answer = answer.sdp if self._route is None else self._route.answer(answer.sdp)
         return read_sections(self._answer)
@@ -168,37 +151,10 @@ class Peer:
             why = "; ".join(map(str, troubles)) or "the console knows none that answers"
             raise ConnectFailed(f"no TURN server gave an address: {why}")
 
-    def extension_id(self, sections: list[Section]) -> int | None:
-        """Return the id under which the console sends the carrier's header extension."""
-        uri = EXTENSION_URIS.get(self._carrier)
-        return next((section.extensions[uri] for section in sections if uri and uri in section.extensions), None)
-
-    def take_packets(self, sinks: Mapping[str, PacketSink], sections: list[Section]) -> None:
-        """Give packets to the sink of their section's mid. Between `negotiate` and `connect`."""
-        uri = EXTENSION_URIS.get(self._carrier)
-        self._need_packets().to_sinks(sinks, sections, uri, stamp_reader(self._carrier))
-
-    def take_raw_rtp(self, take: Callable[[bytes], None], control: Callable[[bytes], None]) -> None:
-        """Give every RTP packet to `take`, and to no other consumer. Between `negotiate` and `connect`."""
-        self._need_packets().plain(take, control)
-
-    def send_control(self, packet: bytes) -> None:
-        """Send an RTCP packet, if the connection is up."""
-        self._need_packets().send_control(packet)
-
-    def round_trip(self, seconds: float) -> None:
-        """Take the round trip to the console; lost packets are asked for accordingly."""
-        self._need_connection().peer.note_round_trip(seconds)
-
     def _need_connection(self) -> Connection:
         if self._connection is None:
             raise RuntimeError("negotiate first")
         return self._connection
-
-    def _need_packets(self) -> Packets:
-        if self._packets is None:
-            raise RuntimeError("negotiate first")
-        return self._packets
 
     async def connect(self, seconds: float) -> None:
         """Connect; return when the data channels are open.
@@ -222,6 +178,9 @@ class Peer:
             raise ConnectFailed(detail) from None
         if self.ended.is_set():
             raise ConnectFailed(self.why)
+
+    async def run(self) -> None:
+        await self.ended.wait()  # the endpoint does the work
 
     def send(self, channel: ChannelName, message: ClientMessage) -> None:
         """Send a message. On `control`, drop it if others wait: an old command must not leave after a newer one."""
@@ -252,7 +211,7 @@ class Peer:
         if self.ended.is_set():
             raise SignallingRefused(404, "not_found", self.why)  # as the console would say
         if self._ice_servers:  # their credentials may have ended
-            self._ice_servers = await self._whep.ice_servers()
+            self._ice_servers = await self.whep.ice_servers()
         restarted = self._restarted = asyncio.get_running_loop().create_future()
         try:
             async with asyncio.timeout(seconds):
@@ -273,13 +232,9 @@ class Peer:
         section = connection.peer.tagged
         fragment = write_fragment(connection.restart(), section.kind, section.mid)
         sent = fragment if self._route is None else self._route.offer(fragment)
-        answer = await self._whep.restart_ice(self._resource, sent)
+        answer = await self.whep.restart_ice(self._resource, sent)
         answer = answer if self._route is None else self._route.answer(answer)
         connection.accept_restart(parse_fragment(answer, section.mid))
-
-    async def stop_by_http(self, reason: str, press: str) -> StopTaken:
-        """Stop over HTTP, without a data channel; raises like `Whep.stop`."""
-        return await self._whep.stop(reason, press)
 
     async def close(self) -> None:
         """End the connection and say so to the console. Idempotent."""
@@ -290,10 +245,10 @@ class Peer:
         try:
             async with asyncio.timeout(CLOSE_SECONDS):
                 if self._resource:
-                    await self._whep.end(self._resource)
+                    await self.whep.end(self._resource)
         except (TimeoutError, ConsoleError):
             pass  # the console ends the session when no packet arrives any more
         finally:
             if self._endpoint is not None:
                 self._endpoint.close()
-            await self._whep.aclose()
+            await self.whep.aclose()

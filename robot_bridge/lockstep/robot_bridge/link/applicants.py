@@ -4,7 +4,7 @@ import ipaddress
 from collections import Counter
 from typing import Generic, TypeVar
 
-__all__ = ["Applicants", "address_group"]
+__all__ = ["Applicants", "Strangers", "address_group"]
 
 Applicant = TypeVar("Applicant")
 PREFIX = 64  # bits of an IPv6 address that one customer has; the same customer has all addresses with them
@@ -53,3 +53,32 @@ class Applicants(Generic[Applicant]):
     def remove(self, applicant: Applicant) -> None:
         """Forget an applicant that was admitted or is gone."""
         self._groups.pop(applicant, None)
+
+
+class Strangers(Generic[Applicant]):
+    """Applicants in two stages: silent ones, and those that have said a proper hello and owe the proof.
+
+    Silent ones cannot push out a client that has come further. `silent` and `challenged` return the applicant that has
+    to go; None while there is room.
+    """
+
+    def __init__(self, limit: int) -> None:
+        """`limit`: of each stage."""
+        self._silent: Applicants[Applicant] = Applicants(limit)
+        self._challenged: Applicants[Applicant] = Applicants(limit)
+
+    def silent(self, applicant: Applicant, address: str) -> Applicant | None:
+        """Add an applicant."""
+        return self._silent.add(applicant, address)
+
+    def challenged(self, applicant: Applicant, address: str) -> Applicant | None:
+        """Move an applicant to the second stage; nothing for one that is there, or was admitted."""
+        if applicant not in self._silent:
+            return None
+        self._silent.remove(applicant)
+        return self._challenged.add(applicant, address)
+
+    def forget(self, applicant: Applicant) -> None:
+        """Forget an applicant that was admitted or is gone."""
+        self._silent.remove(applicant)
+        self._challenged.remove(applicant)

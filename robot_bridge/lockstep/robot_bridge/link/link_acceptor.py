@@ -59,7 +59,9 @@ class _Pace:
 
 
 class LinkAcceptor:
-    """Accepts connections of a listening socket, which it owns. `close` ends the socket and the handshakes under way.
+    """Accepts connections of a listening socket, which it owns, while `run` runs.
+
+    `close` ends `run` with the handshakes under way, and the socket.
 
     TLS begins when the client's first record has arrived whole: a connection that sends less costs only a descriptor.
     Addresses from which a link was admitted before do not wait for the handshakes of others.
@@ -86,39 +88,53 @@ class LinkAcceptor:
         self._silent: Applicants[asyncio.Task[None]] = Applicants(max_handshakes)
         self._shaking: Applicants[asyncio.Task[None]] = Applicants(max_handshakes)
         self._accepting: asyncio.Task[None] | None = None
+        self._closed = False
         self._accepts = _Pace(RATE, BURST)
         self._strangers = _Pace(HANDSHAKE_RATE, HANDSHAKE_BURST)
         self._acquainted = _Pace(HANDSHAKE_RATE, HANDSHAKE_BURST)
         self._known = known or KnownAddresses(None)
-        self._writing: asyncio.Task[None] | None = None
-        self._is_unwritten = False
+        self._is_unwritten = False  # an address was added since the last write began
+        self._wake = asyncio.Event()  # there is something to write, or the end has come
+        self._ended = asyncio.Event()  # `run` has ended, or was never called
+        self._ended.set()
 
-    def start(self) -> None:
+    async def run(self) -> None:
+        """Accept connections until `close`."""
+        if self._closed:
+            return
         self._listener.setblocking(False)
-        self._accepting = asyncio.get_running_loop().create_task(self._accept(), name="link acceptor")
+        self._ended.clear()
+        try:
+            async with asyncio.TaskGroup() as tasks:
+                self._accepting = tasks.create_task(self._accept(), name="link acceptor")
+                await self._write_known()
+        finally:
+            self._ended.set()
 
     def admitted(self, address: str) -> None:
         """Remember that a link from `address` was admitted."""
-        if self._context is None or not self._known.add(address):
-            return
-        self._is_unwritten = True
-        if self._writing is None or self._writing.done():
-            self._writing = asyncio.get_running_loop().create_task(self._write_known(), name="known addresses")
+        if self._context is not None and self._known.add(address):
+            self._is_unwritten = True
+            self._wake.set()
 
     async def _write_known(self) -> None:
-        while self._is_unwritten:
-            self._is_unwritten = False
-            await asyncio.to_thread(self._known.write)
+        """Write the known addresses whenever there is a new one, until `close`."""
+        while self._is_unwritten or not self._closed:
+            if self._is_unwritten:
+                self._is_unwritten = False
+                await asyncio.to_thread(self._known.write)
+            else:
+                self._wake.clear()
+                await self._wake.wait()
 
     async def close(self) -> None:
         """Stop accepting and close the socket. May be called again."""
-        accepting, self._accepting = self._accepting, None
+        self._closed = True
         try:
-            if accepting is not None:
-                accepting.cancel()
-                await asyncio.wait([accepting])
-            if self._writing is not None:
-                await asyncio.wait([self._writing])
+            self._wake.set()
+            if self._accepting is not None:
+                self._accepting.cancel()
+            await self._ended.wait()
         finally:  # also if the closing is cancelled: no other code closes the socket
             self._listener.close()
 

@@ -1,7 +1,6 @@
 """The bridge's listening side: admits links, hands their messages on, and sends to them by role."""
 
 import asyncio
-import math
 import ssl
 import time
 from collections import Counter
@@ -28,9 +27,10 @@ from lockstep.protocol.messages import (
 )
 from lockstep.robot_bridge.counters import BridgeCounters
 from lockstep.robot_bridge.errors import ListenError
-from lockstep.robot_bridge.link.applicants import Applicants
+from lockstep.robot_bridge.link.applicants import Strangers
 from lockstep.robot_bridge.link.known_addresses import KnownAddresses
 from lockstep.robot_bridge.link.link_acceptor import LinkAcceptor, listening_socket
+from lockstep.robot_bridge.link.link_admission import LinkAdmission
 from lockstep.robot_bridge.link.link_session import BadInput, BridgeSession
 from lockstep.robot_bridge.link.link_transport import TICK_INTERVAL, LinkTransport
 from lockstep.robot_bridge.link.message_rate import MessageRate
@@ -107,7 +107,7 @@ class LinkPeer(LinkTransport):
 
 
 class LinkServer:
-    """Owns the listening socket and every link. `run` must be running for heartbeats."""
+    """Owns the listening socket and every link. After `listen`, `run` accepts links and keeps them alive."""
 
     def __init__(
         self,
@@ -127,29 +127,16 @@ class LinkServer:
         self._handler = handler
         self._hello = Hello(role="robot", name=description.name, epoch=epoch, description=description)
         self._counters = counters
-        self._max_links = max_links
         self._max_strangers = max_strangers
-        self._operator_grace = operator_grace
         self._addresses = KnownAddresses(addresses_file)
-        self._kept_for = ""  # name of the client whose operator link broke; "" if none has
-        self._kept_until = -math.inf  # s, end of that client's grace
         self._secret = secret
         self._tls = tls
         self._clock = clock
         self._connections: set[LinkPeer] = set()  # all sockets, those that are closing included
-        self._silent: Applicants[LinkPeer] = Applicants(max_strangers)  # have not said hello
-        self._challenged: Applicants[LinkPeer] = Applicants(max_strangers)  # have said hello and owe the proof
-        self._known: set[LinkPeer] = set()  # admitted
-        self._operator: LinkPeer | None = None
-        self._events: set[LinkPeer] = set()
-        self._media: set[LinkPeer] = set()
+        self._strangers: Strangers[LinkPeer] = Strangers(max_strangers)
+        self._admitted: LinkAdmission[LinkPeer] = LinkAdmission(max_links=max_links, operator_grace=operator_grace)
         self._acceptor: LinkAcceptor | None = None
         self._all_gone = asyncio.Event()
-
-    @property
-    def operator(self) -> LinkPeer | None:
-        """The operator link; None without one."""
-        return self._operator
 
     @property
     def links(self) -> int:
@@ -169,25 +156,24 @@ class LinkServer:
             raise ListenError(f"cannot listen on {host}:{port}: {error}") from error
         address = listener.getsockname()
         self._acceptor = LinkAcceptor(
-            *(listener, self._tls, self._new_peer, self._tls_failed),
+            listener,
+            self._tls,
+            factory=lambda: LinkPeer(self, self._clock, self._secret),
+            failed=lambda: self._counters.bad_input.update(["tls"]),
             max_handshakes=self._max_strangers,
             known=self._addresses,
         )
-        self._acceptor.start()
         return str(address[0]), int(address[1])
 
-    def _new_peer(self) -> LinkPeer:
-        return LinkPeer(self, self._clock, self._secret)
-
-    def _tls_failed(self) -> None:
-        self._counters.bad_input["tls"] += 1
-
     async def run(self) -> None:
-        """Run the heartbeats until cancelled."""
-        while True:
-            await asyncio.sleep(TICK_INTERVAL)
-            for peer in list(self._connections):
-                peer.tick()
+        """Accept links until `close`, and run the heartbeats until cancelled."""
+        async with asyncio.TaskGroup() as tasks:
+            if self._acceptor is not None:
+                tasks.create_task(self._acceptor.run())
+            while True:
+                await asyncio.sleep(TICK_INTERVAL)
+                for peer in list(self._connections):
+                    peer.tick()
 
     async def close(self, reason: str = "the bridge is closing") -> None:
         """Stop listening, say goodbye to all with this reason, and wait until they are gone."""
@@ -207,17 +193,17 @@ class LinkServer:
 
     def publish_feedback(self, feedback: Feedback) -> None:
         """Send a feedback to the operator link, and its event to the event links."""
-        if self._operator is not None:
-            self._operator.send(feedback)
-        if self._events:
+        if self._admitted.operator is not None:
+            self._admitted.operator.send(feedback)
+        if self._admitted.events:
             notice = encode_once(EventNotice(event=feedback.event, time=feedback.time))
-            for peer in self._events:
+            for peer in self._admitted.events:
                 peer.send_encoded("event", notice)
 
     def publish_media(self, media: Media) -> None:
         """Send a medium to every media link, newest wins per stream."""
         encoded = encode_once(media)
-        for peer in self._media:
+        for peer in self._admitted.media:
             peer.send_media(media, encoded)
 
     def drops(self) -> Counter[str]:
@@ -228,61 +214,31 @@ class LinkServer:
 
     def admit(self, peer: LinkPeer, hello: Hello) -> Hello | Goodbye:
         """Admit or refuse a link, after its peer has proven the secret if there is one."""
-        if not self._has_room(hello):
-            return Goodbye(error="full", detail=f"this bridge takes {self._max_links} links")
-        if hello.role == "operator" and self._operator is not None:
-            return Goodbye(error="taken", detail="another operator link is open")
-        if hello.role == "operator" and self._is_kept_from(hello.name):
-            left = self._kept_until - self._clock()
-            return Goodbye(error="taken", detail=f"kept for {self._kept_for}, whose link broke, for {left:.0f} s more")
-        self._forget_applicant(peer)
-        self._known.add(peer)
+        refused = self._admitted.refuses(hello, self._clock())
+        if refused is not None:
+            return refused
+        self._strangers.forget(peer)
+        self._admitted.add(peer, hello)
         if self._acceptor is not None:
             self._acceptor.admitted(peer.address)
-        match hello.role:
-            case "operator":
-                self._operator = peer
-                self._kept_for = ""
-            case "events":
-                self._events.add(peer)
-                return Hello(role="robot", name=self._hello.name, epoch=self._hello.epoch)
-            case _:
-                self._media.add(peer)
+        if hello.role == "events":
+            return Hello(role="robot", name=self._hello.name, epoch=self._hello.epoch)
         return self._hello
-
-    def _has_room(self, hello: Hello) -> bool:
-        """Return whether there is room for the link. The last place is the operator's.
-
-        So a console comes back, no matter how many links others open.
-        """
-        others = len(self._known) - (self._operator is not None)
-        return others < (self._max_links if hello.role == "operator" else self._max_links - 1)
-
-    def _is_kept_from(self, name: str) -> bool:
-        """Return whether another client's operator link broke just now: a stall gives the robot to no other client."""
-        return self._kept_for not in ("", name) and self._clock() < self._kept_until
 
     def connected(self, peer: LinkPeer) -> None:
         self._connections.add(peer)
         if self._acceptor is None:
             peer.end("closing", "the bridge is closing")
         else:
-            self._bound(self._silent, peer)
+            self._end_surplus(self._strangers.silent(peer, peer.address))
 
     def challenged(self, peer: LinkPeer) -> None:
-        """Move a peer that has said hello and owes the proof: silent connections cannot push it out any more."""
-        if peer in self._silent:
-            self._silent.remove(peer)
-            self._bound(self._challenged, peer)
+        """Note that a peer has said a proper hello and owes the proof."""
+        self._end_surplus(self._strangers.challenged(peer, peer.address))
 
-    def _bound(self, applicants: Applicants[LinkPeer], peer: LinkPeer) -> None:
-        gone = applicants.add(peer, peer.address)
+    def _end_surplus(self, gone: LinkPeer | None) -> None:
         if gone is not None:
             gone.end("full", "too many connections that have not been admitted")
-
-    def _forget_applicant(self, peer: LinkPeer) -> None:
-        self._silent.remove(peer)
-        self._challenged.remove(peer)
 
     def received(self, peer: LinkPeer, event: LinkMessage | BadInput) -> None:
         match event:
@@ -301,14 +257,8 @@ class LinkServer:
         if peer.session.ended is not None:
             error = peer.session.ended.error  # the peer may have made it up
             self._counters.endings[error if error in GOODBYES else "other"] += 1
-        self._forget_applicant(peer)
-        self._known.discard(peer)
-        self._events.discard(peer)
-        self._media.discard(peer)
-        if self._operator is peer:
-            self._operator = None
-            if not peer.session.left:
-                self._kept_for, self._kept_until = peer.name, self._clock() + self._operator_grace
+        self._strangers.forget(peer)
+        if self._admitted.remove(peer, peer.name, self._clock(), left=peer.session.left):
             self._handler.operator_lost()
 
     def disconnected(self, peer: LinkPeer) -> None:

@@ -89,6 +89,7 @@ class StopKeeper:
         """Write changes from now on. `written` is called after every write, on the loop, before the answers go out."""
         self._written = written
         if self._store is not None:
+            # No group: it goes on until `close`, also while the bridge's tasks fail and a group would cancel it.
             self._writing = asyncio.get_running_loop().create_task(self._run(self._store), name="stop keeper")
 
     def changed(self) -> None:

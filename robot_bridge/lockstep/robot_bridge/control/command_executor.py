@@ -1,0 +1,154 @@
+"""Executes commands: takes the messages of the links, and moves the robot at each tick."""
+
+import logging
+
+from lockstep.protocol.description import RobotDescription
+from lockstep.protocol.messages import Command, Feedback, Reset, Rest, Stop
+from lockstep.robot_bridge.control.axis_shaper import AxisShaper
+from lockstep.robot_bridge.control.clock import Clock
+from lockstep.robot_bridge.control.event_core import Answered, EventCore, Executed, Refused
+from lockstep.robot_bridge.control.feedback_issuer import FeedbackIssuer
+from lockstep.robot_bridge.control.motion_limits import MotionLimits
+from lockstep.robot_bridge.control.start_signal import StartSignal
+from lockstep.robot_bridge.counters import BridgeCounters
+from lockstep.robot_bridge.event_log import EventLog
+from lockstep.robot_bridge.link.link_server import LinkPeer
+from lockstep.robot_bridge.link.link_session import BadInput
+from lockstep.robot_bridge.link.refusals import Refusals
+from lockstep.robot_bridge.robots.base import Robot
+from lockstep.robot_bridge.stop.stop_handler import StopHandler
+from lockstep.robot_bridge.watchdog.watchdogs import Held, Watchdogs
+
+__all__ = ["CommandExecutor"]
+
+_logger = logging.getLogger(__name__)
+
+
+class CommandExecutor:
+    """The `LinkHandler` of the bridge, and one `tick` of the robot. Commands change what the next tick applies."""
+
+    def __init__(
+        self,
+        robot: Robot,
+        description: RobotDescription,
+        core: EventCore,
+        shaper: AxisShaper,
+        limits: MotionLimits,
+        watchdogs: Watchdogs,
+        stops: StopHandler,
+        feedback: FeedbackIssuer,
+        refusals: Refusals,
+        counters: BridgeCounters,
+        log: EventLog,
+        now: Clock,
+    ) -> None:
+        self._robot = robot
+        self._core = core
+        self._shaper = shaper
+        self._limits = limits
+        self._watchdogs = watchdogs
+        self._stops = stops
+        self._feedback = feedback
+        self._refusals = refusals
+        self._counters = counters
+        self._log = log
+        self._now = now
+        self._signal = StartSignal(description)
+        self._blind: frozenset[str] = frozenset()  # limits that slowed the robot because its position was unknown
+        self._rested = True  # nothing was driven at the last tick
+
+    # LinkHandler
+
+    def link_opened(self, peer: LinkPeer) -> None:
+        if peer.session.role == "operator":
+            self._need_neutral()
+        self._core.want_issue()
+
+    def link_message(self, peer: LinkPeer, message: Command | Rest | Stop | Reset) -> None:
+        match message:
+            case Command():
+                self._command(peer, message)
+            case Rest():
+                applied = self._core.rest(message.event)
+                if applied:
+                    self._shaper.rest()
+                self._log.record("rest", message.event, applied=applied)
+            case Stop():
+                self._stops.stop(peer, message)
+            case Reset():
+                self._stops.reset(peer, message)
+
+    def link_bad_input(self, peer: LinkPeer, bad: BadInput) -> None:
+        if bad.name == "malformed" or bad.name == "not_allowed":
+            self._refusals.send(peer, self._core.refusal(bad.event, bad.name, bad.detail))
+
+    def operator_lost(self) -> None:
+        self._shaper.rest()
+
+    def _command(self, peer: LinkPeer, command: Command) -> None:
+        now = self._now()
+        outcome = self._core.command(command, now)
+        if isinstance(outcome, Executed):
+            self._feedback.rested_why = ""
+            self._shaper.drive(outcome.values, now)
+            self._counters.executed += 1
+            self._log.record("executed", outcome.event, issue=command.issue, values=outcome.values)
+        elif isinstance(outcome, Answered):
+            peer.send(outcome.feedback)
+        elif isinstance(outcome, Refused):
+            self._refusals.send(peer, outcome.refusal)
+
+    def _need_neutral(self) -> None:
+        """Bring the axes to rest; they move on only after a neutral command."""
+        self._shaper.rest()
+        self._core.need_neutral()
+
+    # The tick
+
+    def tick(self, now: float) -> Feedback | None:
+        """Move the robot for one tick. Return a feedback if one is due.
+
+        Raises:
+            BaseException: the adapter raised.
+        """
+        self._stops.look(now)
+        moved = not self._shaper.at_rest
+        values = self._shaper.step(now, self._robot.tick_seconds)  # asks for positions, which may hang too
+        if (held := self._watchdogs.begin(now, moved)) is not None:
+            self._held_up(held)
+            values = self._shaper.values
+        self._watchdogs.ticked(now, not self._shaper.at_rest)
+        self._robot.apply(self._signal.on(values) if self._core.warns(now) else values)
+        self._robot.tick()
+        self._feedback.limits_act(self._limits.acting)
+        self._note_blind(self._limits.blind)
+        if self._shaper.at_rest:
+            self._stops.rests()
+        self.note_motion()
+        return self._feedback.issue() if self._core.issue_due(now) else None
+
+    def note_motion(self) -> None:
+        """Record whether the robot is driven, if that has changed."""
+        if self._shaper.at_rest != self._rested:
+            self._rested = self._shaper.at_rest
+            self._log.record("at_rest" if self._rested else "driven", self._core.current)
+
+    def _held_up(self, held: Held) -> None:
+        """Make the operator begin anew after too long without a tick: the robot's motion meanwhile is unknown."""
+        self._shaper.cut()
+        self._core.need_neutral()
+        self._counters.stalls += 1
+        self._counters.watchdog += held.acted
+        why = self._feedback.rested_why = f"came to rest: the bridge was held up for {held.seconds:.2f} s"
+        _logger.error("%s%s", why, "; a watchdog brought the robot to rest meanwhile" if held.acted else "")
+        self._log.record("stall", self._core.current, seconds=held.seconds, watchdog=held.acted)
+
+    def _note_blind(self, blind: frozenset[str]) -> None:
+        """Bring the axes to rest if a position is unknown.
+
+        A deadman that is held until the position is known again must not start the robot.
+        """
+        begun, self._blind = blind - self._blind, blind
+        if begun:
+            self._need_neutral()
+            self._feedback.rested_why = f"came to rest: the position is unknown ({', '.join(sorted(begun))})"

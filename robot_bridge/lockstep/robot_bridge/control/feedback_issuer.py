@@ -1,0 +1,98 @@
+"""Issues feedback: measures the robot, and adds the faults and limits that came up since the last feedback."""
+
+import math
+import time
+
+from lockstep.protocol.description import RobotDescription
+from lockstep.protocol.messages import MAX_FAULTS, Feedback
+from lockstep.robot_bridge.control.axis_shaper import AxisShaper
+from lockstep.robot_bridge.control.clock import Clock
+from lockstep.robot_bridge.control.event_core import EventCore
+from lockstep.robot_bridge.control.event_times import EventTimes
+from lockstep.robot_bridge.control.last_known import LastKnown
+from lockstep.robot_bridge.counters import BridgeCounters
+from lockstep.robot_bridge.event_log import EventLog
+from lockstep.robot_bridge.robots.base import Measurement, Robot
+
+__all__ = ["FeedbackIssuer"]
+
+MAX_FAULT = 500  # characters in one fault
+
+
+class FeedbackIssuer:
+    """Issues the feedback of an event. Call `issue` whenever the core says that one is due.
+
+    Attributes:
+        times: the event that held at each time
+        rested_why: why the robot came to rest on its own, until a command executes; "": it did not
+    """
+
+    def __init__(
+        self,
+        robot: Robot,
+        description: RobotDescription,
+        core: EventCore,
+        shaper: AxisShaper,
+        counters: BridgeCounters,
+        log: EventLog,
+        now: Clock,
+    ) -> None:
+        self.times = EventTimes()
+        self.rested_why = ""
+        self._robot = robot
+        self._description = description
+        self._core = core
+        self._shaper = shaper
+        self._counters = counters
+        self._log = log
+        self._now = now
+        self._last_known = LastKnown(description)
+        self._acting: frozenset[str] = frozenset()  # limits that slowed the robot in the last tick
+        self._acted: set[str] = set()  # limits that slowed it since the last feedback
+        self._source_faults: list[str] = []  # "media: OSError: no camera"
+
+    def issue(self) -> Feedback:
+        taken = time.monotonic()
+        return self._issue(self._robot.measure(), taken)
+
+    def issue_failed(self, failure: str) -> Feedback:
+        """Issue that the robot failed, with the last measured values if it cannot be measured any more."""
+        try:
+            measured = self._robot.measure()
+        except BaseException:  # the robot is not to be trusted any more
+            axes, joints = ([math.nan] * len(each) for each in (self._description.axes, self._description.joints))
+            measured = Measurement(axes=axes, joints=joints, wrench=[], ranges=[], at_rest=False, faults=[])
+        return self._issue(measured._replace(faults=[*measured.faults, failure]), time.monotonic())
+
+    def limits_act(self, acting: frozenset[str]) -> None:
+        """Note the limits that slow the robot in this tick; count each spell once, and record its begin and end."""
+        if acting == self._acting:
+            return
+        self._counters.limits.update(acting - self._acting)
+        self._acted |= acting | self._acting
+        self._acting = acting
+        self._log.record("limit", self._core.current, acting=sorted(acting))
+
+    def source_failed(self, fault: str) -> None:
+        """Name this fault in all feedback from now on."""
+        self._source_faults.append(fault)
+        self._core.want_issue()
+
+    def _issue(self, measured: Measurement, taken: float) -> Feedback:
+        """`taken`: time of the measurement on the clock of capture times."""
+        measured, unknown = self._last_known.settle(measured)
+        if self._source_faults or self.rested_why:
+            rested = [self.rested_why] if self.rested_why else []
+            measured = measured._replace(faults=[*measured.faults, *rested, *self._source_faults])
+        measured = measured._replace(
+            at_rest=measured.at_rest and self._shaper.at_rest,
+            faults=[fault[:MAX_FAULT] for fault in measured.faults[-MAX_FAULTS:]],
+        )
+        limits = sorted(self._acted | self._acting)
+        feedback = self._core.issue(measured, self._now(), limits, unknown, time=taken)
+        measured_by = time.monotonic()  # a picture that was captured before may show less than this feedback has
+        self.times.changed(feedback.event, measured_by)
+        self._acted.clear()
+        self._counters.issued += 1
+        self._log.record("feedback", feedback.event, at=measured_by, issue=feedback.issue, at_rest=feedback.at_rest)
+        return feedback

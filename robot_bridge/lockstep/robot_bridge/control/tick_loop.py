@@ -1,0 +1,139 @@
+"""Runs the ticks of a robot. However they end, the robot is brought to rest and stopped."""
+
+import asyncio
+import contextlib
+import logging
+import time
+
+from lockstep.robot_bridge.control.axis_shaper import AxisShaper
+from lockstep.robot_bridge.control.clock import Clock
+from lockstep.robot_bridge.control.coming_to_rest import ComingToRest
+from lockstep.robot_bridge.control.command_executor import CommandExecutor
+from lockstep.robot_bridge.control.ticker import Ticker
+from lockstep.robot_bridge.counters import BridgeCounters
+from lockstep.robot_bridge.errors import RobotFailed, RobotUnavailable, named
+from lockstep.robot_bridge.link.link_server import LinkServer
+from lockstep.robot_bridge.robots.base import Robot
+from lockstep.robot_bridge.stop.stop_handler import StopHandler
+from lockstep.robot_bridge.watchdog.liveness import Liveness
+from lockstep.robot_bridge.watchdog.watchdogs import Watchdogs
+
+__all__ = ["TickLoop"]
+
+REST_MARGIN = 0.5  # s on top of hold for the robot to come to rest when the bridge closes
+MAX_CATCH_UP = 3  # ticks made good after the loop was blocked; the rest are skipped
+
+_logger = logging.getLogger(__name__)
+
+
+class TickLoop:
+    """Owns the robot's motion while `run` runs, and at its end."""
+
+    def __init__(
+        self,
+        robot: Robot,
+        hold: float,
+        shaper: AxisShaper,
+        executor: CommandExecutor,
+        stops: StopHandler,
+        watchdogs: Watchdogs,
+        liveness: Liveness,
+        links: LinkServer,
+        counters: BridgeCounters,
+        now: Clock,
+    ) -> None:
+        self._robot = robot
+        self._hold = hold
+        self._shaper = shaper
+        self._executor = executor
+        self._stops = stops
+        self._watchdogs = watchdogs
+        self._liveness = liveness
+        self._links = links
+        self._counters = counters
+        self._now = now
+        self._at_rest = asyncio.Event()  # nothing is driven
+
+    async def run(self) -> None:
+        """Run the ticks. However they end, this brings the robot to rest and stops it before it ends itself.
+
+        Raises:
+            RobotFailed: the adapter raised.
+        """
+        try:
+            await self._tick_on()
+        except GeneratorExit:  # the loop is gone: nothing can be awaited any more
+            self.rest_at_exit()
+            raise
+        except asyncio.CancelledError:
+            await self._leave()
+            raise
+        except BaseException as error:
+            self._stops.fail(error)
+            await self._leave()
+            raise
+
+    async def come_to_rest(self, running: asyncio.Task[None]) -> None:
+        """Let the ticks go on until nothing is driven; give up if they have ended or take too long.
+
+        `running`: the task that ends when the ticks have ended.
+        """
+        self._shaper.rest()
+        running.add_done_callback(lambda _: self._at_rest.set())
+        with contextlib.suppress(TimeoutError):
+            async with asyncio.timeout(self._hold + REST_MARGIN):
+                while not (self._shaper.at_rest or running.done()):
+                    self._at_rest.clear()
+                    await self._at_rest.wait()
+
+    def rest_at_exit(self) -> None:
+        """Bring the robot to rest when the event loop is gone."""
+        leaving = self._coming_to_rest()
+        leaving.at_once()
+        leaving.stop()
+
+    def tick(self) -> None:
+        """Run one tick, and send a feedback if one is due."""
+        feedback = self._executor.tick(self._now())
+        if self._shaper.at_rest:
+            self._at_rest.set()
+        if feedback is not None:
+            self._links.publish_feedback(feedback)
+
+    async def _tick_on(self) -> None:
+        metronome = Ticker(self._robot.tick_seconds, time.monotonic(), catch_up=MAX_CATCH_UP)
+        while True:
+            await asyncio.sleep(metronome.wait(time.monotonic()))
+            self._counters.skipped_ticks = metronome.skipped
+            try:
+                self.tick()
+                self._liveness.ticked()
+            except BaseException as error:  # an adapter may raise one that ends the loop or cancels the task
+                raise RobotFailed(named(error)) from error
+
+    async def _leave(self) -> None:
+        leaving = self._coming_to_rest()
+        try:
+            while True:
+                self._tell_watchdogs()
+                done = leaving.step(self._now())
+                self._liveness.ticked()
+                if done:
+                    break
+                await asyncio.sleep(self._robot.tick_seconds)
+        finally:  # also when this is cancelled once more
+            if not leaving.rests:
+                leaving.at_once()
+            leaving.stop()
+            self._tell_watchdogs()
+            self._executor.note_motion()
+
+    def _tell_watchdogs(self) -> None:
+        """Tell the watchdogs of a tick on the way to rest, where a call may hang too."""
+        try:
+            self._watchdogs.ticked(self._now(), not self._shaper.at_rest)
+        except RobotUnavailable as error:
+            _logger.error("%s", error)
+
+    def _coming_to_rest(self) -> ComingToRest:
+        return ComingToRest(self._robot, self._shaper, self._hold, self._now())

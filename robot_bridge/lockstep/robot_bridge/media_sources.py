@@ -1,0 +1,93 @@
+"""Runs the robot's cameras and microphones: stamps what they capture, and sends it to the media links."""
+
+import asyncio
+import logging
+import time
+from collections.abc import Callable
+
+from lockstep.protocol.messages import Media
+from lockstep.robot_bridge.control.event_core import EventCore
+from lockstep.robot_bridge.control.event_times import EventTimes
+from lockstep.robot_bridge.control.feedback_issuer import FeedbackIssuer
+from lockstep.robot_bridge.counters import BridgeCounters
+from lockstep.robot_bridge.event_log import EventLog
+from lockstep.robot_bridge.link.link_server import LinkServer
+from lockstep.robot_bridge.robots.base import MediaSource, Robot, Stamp
+
+__all__ = ["MediaSources"]
+
+_logger = logging.getLogger(__name__)
+
+
+class MediaSources:
+    """All media sources of a robot. A source that fails is a fault of the robot, and does not end the bridge."""
+
+    def __init__(
+        self,
+        robot: Robot,
+        core: EventCore,
+        feedback: FeedbackIssuer,
+        links: LinkServer,
+        counters: BridgeCounters,
+        log: EventLog,
+        *,
+        event_strip: bool,
+    ) -> None:
+        """`event_strip`: draw the event into pictures, for measurements."""
+        self._robot = robot
+        self._stamper = _Stamper(core, feedback.times)
+        self._feedback = feedback
+        self._links = links
+        self._counters = counters
+        self._log = log
+        self._mark = _marker() if event_strip else None
+
+    async def run(self) -> None:
+        """Run the sources until cancelled, or until all have ended."""
+        try:
+            sources = list(self._robot.sources())
+        except BaseException as error:
+            self._failed(error)
+            return
+        async with asyncio.TaskGroup() as group:
+            for source in sources:
+                group.create_task(self._run(source))
+
+    async def _run(self, source: MediaSource) -> None:
+        try:
+            await source.run(self._stamper, self._emit)
+        except GeneratorExit:
+            raise
+        except BaseException as error:
+            task = asyncio.current_task()
+            if isinstance(error, asyncio.CancelledError) and task is not None and task.cancelling():
+                raise
+            self._failed(error)
+
+    def _failed(self, error: BaseException) -> None:
+        _logger.error("a media source failed: %s", error, exc_info=error)
+        self._feedback.source_failed(f"media: {type(error).__name__}: {error}"[:200])
+
+    def _emit(self, media: Media) -> None:
+        self._counters.media += 1
+        self._log.record("media", media.stamp, stream=media.stream, captured=media.time)
+        self._links.publish_media(media if self._mark is None else self._mark(media))
+
+
+class _Stamper:
+    def __init__(self, core: EventCore, times: EventTimes) -> None:
+        self._core = core
+        self._times = times
+
+    def __call__(self) -> Stamp:
+        return Stamp(self._core.current, time.monotonic())
+
+    def at(self, time: float) -> Stamp | None:
+        return self._times.at(time)
+
+
+def _marker() -> Callable[[Media], Media]:
+    """Drawing needs numpy, which a robot's own bridge may not have."""
+    from lockstep.robot_bridge.robots.event_strip import with_event_strip
+
+    return with_event_strip
