@@ -38,7 +38,7 @@ class ParticipantList:
         self._audit = audit
         self._renamed = renamed
         self._refuse = refuse
-        self._board = NoteBoard(time.monotonic())
+        self._board = NoteBoard()
 
     def joined(self, peer: Peer) -> None:
         if peer.thumbnail:

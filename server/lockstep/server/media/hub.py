@@ -17,6 +17,7 @@ from lockstep.protocol.messages import Media
 from lockstep.rtc.endpoint import Connection, Turns
 from lockstep.rtc.peer import OfferedMedia
 from lockstep.rtc.sdp import MID_URI, Codec, LocalMedia, MediaSection, SessionDescription
+from lockstep.rtc.token_bucket import TokenBucket
 from lockstep.server.media.codecs.codec_choice import OPUS, chosen_codecs, h264_profile, known_codecs, offered_codecs
 from lockstep.server.media.codecs.extensions import choose_carrier, wanted_uris
 from lockstep.server.media.metrics import MediaMetrics
@@ -36,7 +37,6 @@ from lockstep.server.media.sources.source_url import SourceSpec
 from lockstep.server.media.subscription import Subscription
 from lockstep.server.media.subscriptions import Delivery, Subscriptions
 from lockstep.server.util.cooperative_scheduler import turns_of_loop
-from lockstep.server.util.token_bucket import TokenBucket
 from lockstep.server.webrtc.datagram_queue import DatagramQueue, DriverQueue
 
 __all__ = ["MediaPlan", "MediaHub", "MediaSettings", "Subscriptions"]
@@ -94,7 +94,7 @@ class MediaHub:
         self._loop_turns = turns_of_loop()
         self._fan_out = FanOut(self._loop_turns)
         self._turns = DatagramQueue(self._loop_turns)
-        self._not_driving = TokenBucket(NOT_DRIVING_RATE, NOT_DRIVING_RATE, time.monotonic())
+        self._not_driving = TokenBucket(NOT_DRIVING_RATE, NOT_DRIVING_RATE)
         self._quality = QualityController(
             settings,
             QualityMetrics(metrics_registry),

@@ -75,7 +75,7 @@ class Publisher:
         self.ended = ""
         self._limits = limits
         self._loop = asyncio.get_running_loop()
-        self._requests = MessageBudget(MAX_REQUESTS, self._loop.time())
+        self._requests = MessageBudget(MAX_REQUESTS)
         self._end = asyncio.Event()
         self._connected = asyncio.Event()
         self._connection: Connection | None = None  # None before the answer
@@ -130,7 +130,7 @@ class Publisher:
     def receives(self, connection: Connection, username: str, mid: str, codec: PictureCodec) -> None:
         """Take its pictures from section `mid`. Call once, with the answer; `username` is of the offer."""
         self._connection, self._mid = connection, mid
-        self._incoming = IncomingPictures(codec, self.camera.spec.latency, time.monotonic())
+        self._incoming = IncomingPictures(codec, self.camera.spec.latency)
         self.ice = IceSession(connection, username)
         connection.limit(mid, MOST_BPS)
 

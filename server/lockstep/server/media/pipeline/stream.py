@@ -11,6 +11,7 @@ from typing import Generic, Literal, TypeVar
 from lockstep.protocol.messages import Media
 from lockstep.protocol.serial import event_gap
 from lockstep.robot_bridge.thread_name import name_thread
+from lockstep.rtc.token_bucket import TokenBucket
 from lockstep.server.media.errors import MediaError
 from lockstep.server.media.metrics import MediaMetrics
 from lockstep.server.media.pipeline.fanout import FanOut
@@ -22,7 +23,6 @@ from lockstep.server.media.quality.encoding_target import EncodingTarget, Pictur
 from lockstep.server.media.settings import MediaSettings
 from lockstep.server.media.subscription import Subscription
 from lockstep.server.util.cooperative_scheduler import CooperativeScheduler, turns_of_loop
-from lockstep.server.util.token_bucket import TokenBucket
 
 __all__ = ["Encoded", "Stream"]
 
@@ -71,7 +71,7 @@ class Stream(ABC, Generic[Job]):
         self._fan_out = fan_out
         self._metrics = metrics
         self._last_stamp: int | None = None
-        self._rate = TokenBucket(MAX_RATE, MAX_AT_ONCE, 0.0)
+        self._rate = TokenBucket(MAX_RATE, MAX_AT_ONCE)
         self._reported = False  # True after the first failure of the worker
         self._works = False  # True while the worker has a job
         self._turns: CooperativeScheduler | None = None  # None: not running
