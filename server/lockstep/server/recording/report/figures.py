@@ -6,8 +6,8 @@ from typing import NamedTuple
 import matplotlib as mpl
 from matplotlib.axes import Axes
 
-from lockstep.bench.experiment.judge.figures import BAD, BAND, FAINT, MEDIUM, ROBOT, STYLE, new_figure, svg_text
-from lockstep.bench.session_report.session import Series, Session, Shown
+from lockstep.server.recording.report.drawing import BAD, BAND, FAINT, MEDIUM, ROBOT, STYLE, new_figure, svg_text
+from lockstep.server.recording.report.session import Series, Session, Shown
 
 __all__ = ["Figure", "session_figures"]
 

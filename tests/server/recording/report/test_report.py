@@ -2,8 +2,8 @@
 
 from pathlib import Path
 
-from lockstep.bench.session_report.cli import write_report
-from lockstep.bench.session_report.session import read_session
+from lockstep.server.recording.report.report import write_report
+from lockstep.server.recording.report.session import read_session
 from tests.server.recording.makers import Story
 
 

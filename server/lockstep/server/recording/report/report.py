@@ -1,42 +1,16 @@
-"""`lockstep report FILE`: the thesis' figures from a recorded session, in one HTML file."""
+"""Writes the report of a recorded session: what was kept, and figures, in one HTML file."""
 
 import html
 from datetime import UTC, datetime
-from importlib.resources import files
 from pathlib import Path
-from typing import Annotated
 
-import typer
-
-from lockstep.bench.session_report.figures import Figure, session_figures
-from lockstep.bench.session_report.session import Session, read_session
-from lockstep.server.cli.options import RobotOption, StateDirOption
-from lockstep.server.cli.recordings import DirectoryOption, File, recording_file
-from lockstep.server.recording.errors import RecordingError
+from lockstep.server.recording.report.drawing import PAGE_STYLE
+from lockstep.server.recording.report.figures import Figure, session_figures
+from lockstep.server.recording.report.session import Session, read_session
 from lockstep.server.recording.verify.promises import Verdict
 from lockstep.server.recording.verify.verify_file import verify_file
-from lockstep.server.settings import Settings
 
-__all__ = ["report_command", "write_report"]
-
-STYLE = files("lockstep.bench.experiment") / "report.css"
-
-
-def report_command(
-    file: File,
-    out: Annotated[Path | None, typer.Option(help="HTML file to write; unset: beside the recording.")] = None,
-    directory: DirectoryOption = None,
-    robot: RobotOption = "",
-    state_dir: StateDirOption = None,
-) -> None:
-    """Draw the thesis' figures from a recorded session."""
-    settings = Settings() if state_dir is None else Settings(state_dir=state_dir)
-    path = recording_file(file, settings, robot, directory)
-    try:
-        print(write_report(path, out or path.with_suffix(".html")))
-    except (RecordingError, OSError) as error:
-        typer.echo(f"lockstep: {error}", err=True)
-        raise typer.Exit(2) from error
+__all__ = ["write_report"]
 
 
 def write_report(recording: Path, target: Path) -> Path:
@@ -57,7 +31,7 @@ def _page(recording: Path, session: Session, verdict: Verdict, figures: list[Fig
     parts = [
         "<!doctype html><html lang='en'><head><meta charset='utf-8'>",
         "<meta name='viewport' content='width=device-width, initial-scale=1'>",
-        f"<title>Lockstep: {_text(title)}</title><style>{STYLE.read_text()}</style></head><body>",
+        f"<title>Lockstep: {_text(title)}</title><style>{PAGE_STYLE.read_text()}</style></head><body>",
         f"<header><h1>{_text(title)}</h1>",
         f"<p class='lead'>{_text(session.info.robot)}, {began:%Y-%m-%d %H:%M:%S} UTC, {session.seconds:.1f} s, ",
         f"{verdict.events} events, {verdict.commands} commands, {verdict.pictures_and_sounds} pictures and sounds.</p>",
