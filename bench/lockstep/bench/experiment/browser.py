@@ -16,6 +16,7 @@ from lockstep.bench.browsers.chromium import open_page, running_chromium
 from lockstep.bench.browsers.console_page import RB, ConsolePage
 from lockstep.bench.browsers.sound_card import running_sound_card
 from lockstep.bench.experiment.choices import Choices
+from lockstep.bench.experiment.judge.age_gate import client_gate
 from lockstep.bench.experiment.judge.record import Arrival, ClientRecord, Rendered
 from lockstep.bench.experiment.observation import Look, Observation
 from lockstep.bench.experiment.operator_script import OperatorScript
@@ -151,7 +152,7 @@ async def browser_client(link: str, choices: Choices) -> AsyncIterator[BrowserCl
         tolerance = {"video": choices.tolerance, "audio": choices.tolerance}
         await page.evaluate(
             "(settings) => window.lockstep.configure(settings)",
-            {"gate": choices.gate, "pacing": choices.pacing, "tolerance": tolerance},
+            {"gate": client_gate(choices.gate), "pacing": choices.pacing, "tolerance": tolerance},
         )
         record = ClientRecord("operator", "chromium", choices.gate, choices.pacing, True, choices.tolerance)
         description = await robot_description(link)
