@@ -11,7 +11,7 @@ from playwright.async_api import Browser
 
 from lockstep.bench.browsers.chromium import running_chromium
 from lockstep.bench.browsers.console_page import ConsolePage
-from lockstep.bench.free_port import free_port
+from lockstep.bench.harness.free_port import free_port
 from tests.support.stack import Stack, running_stack
 
 pytestmark = pytest.mark.browser

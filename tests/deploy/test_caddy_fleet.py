@@ -7,7 +7,7 @@ from pathlib import Path
 
 import httpx
 
-from lockstep.bench.free_port import free_port
+from lockstep.bench.harness.free_port import free_port
 from tests.support.fleet_entry import running_entry
 
 READY_SECONDS = 20.0

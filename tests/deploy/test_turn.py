@@ -16,7 +16,7 @@ from typing import Any
 import pytest
 from aioice import stun, turn
 
-from lockstep.bench.free_port import free_port
+from lockstep.bench.harness.free_port import free_port
 from lockstep.rtc.interfaces import own_addresses
 
 START_TURN = Path(__file__).resolve().parents[2] / "deploy" / "start-turn"

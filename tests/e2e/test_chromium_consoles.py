@@ -11,7 +11,7 @@ import pytest_asyncio
 from playwright.async_api import Browser, Response, expect
 
 from lockstep.bench.browsers.chromium import open_page
-from lockstep.bench.free_port import free_port
+from lockstep.bench.harness.free_port import free_port
 from tests.e2e.overview import in_view, stats, until
 from tests.support.fleet_entry import running_entry
 from tests.support.redis_server import RedisServer

@@ -6,7 +6,7 @@ from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from pathlib import Path
 
-from lockstep.bench.free_port import free_port
+from lockstep.bench.harness.free_port import free_port
 
 __all__ = ["running_entry"]
 

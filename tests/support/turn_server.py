@@ -7,7 +7,7 @@ from contextlib import asynccontextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-from lockstep.bench.free_port import free_port
+from lockstep.bench.harness.free_port import free_port
 
 __all__ = ["TURN_SECRET", "TurnServer", "running_turn_server"]
 

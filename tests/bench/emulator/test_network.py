@@ -7,8 +7,8 @@ from urllib.parse import urlsplit
 import pytest
 import pytest_asyncio
 
-from lockstep.bench.driving import drive_on
 from lockstep.bench.emulator import Constant, Impairment, Network, even_profile, profile_names
+from lockstep.bench.harness.driving import drive_on
 from lockstep.client import Console
 from tests.support.stack import Stack, running_stack
 

@@ -21,8 +21,8 @@ from lockstep.bench.experiment.judge.results import result_of
 from lockstep.bench.experiment.judge.table import render_table
 from lockstep.bench.experiment.matrix import GROWTH_SECONDS, OUTAGE_SECONDS, matrix_of, thesis_matrix_of
 from lockstep.bench.experiment.run import run_experiment
-from lockstep.bench.machine import machine_facts
-from lockstep.bench.processes import ProcessFailed
+from lockstep.bench.figures.machine import machine_facts
+from lockstep.bench.harness.processes import ProcessFailed
 from lockstep.client.errors import ConsoleError
 from lockstep.robot_bridge.robots.registry import robot_names
 

@@ -9,12 +9,12 @@ from typing import Any
 import msgspec
 import numpy as np
 
-from lockstep.bench.driving import drive_on
 from lockstep.bench.experiment.choices import Choices
 from lockstep.bench.experiment.judge.age_gate import client_gate
 from lockstep.bench.experiment.judge.record import Arrival, ClientRecord, Gate, Rendered
 from lockstep.bench.experiment.observation import Look, Observation
 from lockstep.bench.experiment.operator_script import OperatorScript
+from lockstep.bench.harness.driving import drive_on
 from lockstep.client import Console, ConsoleLost, Picture
 from lockstep.client.control.command_gate import Pacing
 from lockstep.robot_bridge.robots.event_strip import read_event_strip

@@ -11,7 +11,7 @@ from tempfile import TemporaryDirectory
 from lockstep.bench.emulator.impairment.profile import Profile
 from lockstep.bench.emulator.namespace.network_process import NetworkProcess
 from lockstep.bench.experiment.choices import MediaChoice
-from lockstep.bench.processes import Running, running_process
+from lockstep.bench.harness.processes import Running, running_process
 
 __all__ = ["Stage", "running_stage"]
 

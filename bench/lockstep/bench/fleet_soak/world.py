@@ -8,7 +8,7 @@ from types import TracebackType
 from typing import Self
 
 from lockstep.bench.fleet_soak.records import Record, read_records
-from lockstep.bench.processes import Running, running_process
+from lockstep.bench.harness.processes import Running, running_process
 
 __all__ = ["DOWN_SECONDS", "FleetWorld"]
 

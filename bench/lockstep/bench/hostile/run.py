@@ -18,10 +18,10 @@ from urllib.parse import urlsplit
 
 import httpx
 
-from lockstep.bench.free_port import free_port
-from lockstep.bench.machine import busy_percent, machine_facts
-from lockstep.bench.processes import Running, running_process
-from lockstep.bench.stack import Stack, running_stack
+from lockstep.bench.figures.machine import busy_percent, machine_facts
+from lockstep.bench.harness.free_port import free_port
+from lockstep.bench.harness.processes import Running, running_process
+from lockstep.bench.harness.stack import Stack, running_stack
 from lockstep.client import Console
 
 __all__ = ["FRONTS", "hostile", "memory_of"]

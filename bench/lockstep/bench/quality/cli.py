@@ -9,7 +9,7 @@ from typing import Annotated, Any
 import typer
 
 from lockstep.bench.emulator import Profile, load_profile, parse_profile
-from lockstep.bench.machine import busy_percent
+from lockstep.bench.figures.machine import busy_percent
 from lockstep.bench.quality.repair import simulate
 from lockstep.bench.quality.stage import driving, running_console
 from lockstep.bench.quality.summary import summarise, timeline

@@ -8,10 +8,10 @@ from contextlib import asynccontextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 
-from lockstep.bench.driving import drive_on, round_and_round
 from lockstep.bench.emulator import NetworkProcess, Profile
-from lockstep.bench.processes import running_process
-from lockstep.bench.stack import Stack, running_bridge
+from lockstep.bench.harness.driving import drive_on, round_and_round
+from lockstep.bench.harness.processes import running_process
+from lockstep.bench.harness.stack import Stack, running_bridge
 from lockstep.client import Console, ConsoleLost
 from lockstep.protocol.serial import event_gap
 

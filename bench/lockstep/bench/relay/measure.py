@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from lockstep.bench.browsers.console_page import ConsolePage, open_console
+from lockstep.bench.figures.samples import median
 from lockstep.bench.relay.stage import Process, RelayStage, relay_stage
-from lockstep.bench.samples import median
 
 __all__ = ["Crowd", "Killing", "crowd", "hop_delays", "killings"]
 

@@ -9,7 +9,7 @@ from lockstep.bench.emulator.impairment.profile import load_profile
 from lockstep.bench.experiment.choices import Choices
 from lockstep.bench.experiment.endurance.growth import Point, run_growth
 from lockstep.bench.experiment.judge.record import Gate
-from lockstep.bench.results import Result
+from lockstep.bench.figures.results import Result
 
 __all__ = ["run"]
 

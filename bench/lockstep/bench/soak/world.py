@@ -15,7 +15,7 @@ from typing import Any, Self
 
 import httpx
 
-from lockstep.bench.processes import Running, running_process
+from lockstep.bench.harness.processes import Running, running_process
 
 __all__ = ["World"]
 

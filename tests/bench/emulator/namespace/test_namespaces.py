@@ -21,7 +21,7 @@ LOCKSTEP = str(Path(sys.executable).with_name("lockstep"))
 
 DRIVE = """
 import asyncio, json, sys
-from lockstep.bench.driving import drive_on
+from lockstep.bench.harness.driving import drive_on
 from lockstep.client import Console
 
 async def main():
@@ -164,7 +164,7 @@ CLOUD = "203.0.113.7"
 
 WATCH = """
 import asyncio, sys
-from lockstep.bench.driving import drive_on
+from lockstep.bench.harness.driving import drive_on
 from lockstep.client import Console
 
 async def main():

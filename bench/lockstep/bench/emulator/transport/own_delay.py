@@ -23,8 +23,8 @@ from lockstep.bench.emulator.impairment.impairment import Impairment
 from lockstep.bench.emulator.impairment.profile import even_profile
 from lockstep.bench.emulator.network import Network
 from lockstep.bench.emulator.transport.udp_relay import UdpRelay
-from lockstep.bench.processes import running_process
-from lockstep.bench.samples import quantile
+from lockstep.bench.figures.samples import quantile
+from lockstep.bench.harness.processes import running_process
 
 __all__ = ["measure"]
 

@@ -11,7 +11,6 @@ from contextlib import AsyncExitStack, asynccontextmanager
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
-from lockstep.bench.driving import drive_on
 from lockstep.bench.emulator.impairment.delay import Delay
 from lockstep.bench.emulator.impairment.profile import Profile, TwoWay
 from lockstep.bench.emulator.namespace.network_process import NetworkProcess
@@ -21,6 +20,7 @@ from lockstep.bench.experiment.judge.age_gate import count_by_age
 from lockstep.bench.experiment.judge.measures import event_rate
 from lockstep.bench.experiment.judge.record import ClientRecord, Gate
 from lockstep.bench.experiment.stage import Stage, running_stage
+from lockstep.bench.harness.driving import drive_on
 from lockstep.client import Console
 
 __all__ = ["Growth", "Point", "later", "run_growth"]

@@ -8,7 +8,6 @@ from collections.abc import AsyncIterator, Callable, Sequence
 from contextlib import asynccontextmanager
 from typing import Any, Protocol
 
-from lockstep.bench.driving import drive_on
 from lockstep.bench.emulator.impairment.delay import Constant
 from lockstep.bench.emulator.impairment.impairment import Impairment
 from lockstep.bench.emulator.impairment.profile import Profile, TwoWay
@@ -16,6 +15,7 @@ from lockstep.bench.experiment.choices import Choices, media_of, round_trip_of
 from lockstep.bench.experiment.judge.outage_judge import Cut, Finding, judge_outage
 from lockstep.bench.experiment.judge.robot_log import records
 from lockstep.bench.experiment.stage import Stage, running_stage
+from lockstep.bench.harness.driving import drive_on
 from lockstep.client import CommandRefused, Console, ConsoleError
 from lockstep.protocol.description import RobotDescription
 

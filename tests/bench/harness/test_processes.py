@@ -2,7 +2,7 @@ import sys
 
 import pytest
 
-from lockstep.bench.processes import ProcessFailed, running_process
+from lockstep.bench.harness.processes import ProcessFailed, running_process
 
 
 async def test_a_process_is_ready_after_its_first_line_and_gone_on_leaving() -> None:

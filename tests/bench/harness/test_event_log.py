@@ -1,7 +1,7 @@
 import json
 from pathlib import Path
 
-from lockstep.bench.event_log import capture_times, robot_times
+from lockstep.bench.harness.event_log import capture_times, robot_times
 
 
 def write(path: Path, *records: dict[str, object], tail: str = "") -> Path:

@@ -2,8 +2,8 @@ import socket
 
 import pytest
 
-from lockstep.bench import free_port as module
-from lockstep.bench.free_port import free_port
+from lockstep.bench.harness import free_port as module
+from lockstep.bench.harness.free_port import free_port
 
 
 def test_a_port_that_is_used_for_either_is_not_free(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -1,5 +1,5 @@
-from lockstep.bench.results import Result
-from lockstep.bench.table import render_markdown, render_table
+from lockstep.bench.figures.results import Result
+from lockstep.bench.figures.table import render_markdown, render_table
 
 
 def figure(value: float | None, **fields: object) -> Result:

@@ -1,8 +1,8 @@
 """Viewers of the 3D scene in a separate process, which read everything and draw nothing.
 
-`python -m lockstep.bench.scene_viewers LINK COUNT` prints a JSON line once all viewers receive something, then answers
-each line on standard input with the number of bytes that they have received. It ends at the end of its input. The
-process runs at a low priority, because a viewer's own computer would not be the operator's.
+`python -m lockstep.bench.viewers.scene_viewers LINK COUNT` prints a JSON line once all viewers receive something, then
+answers each line on standard input with the number of bytes that they have received. It ends at the end of its input.
+The process runs at a low priority, because a viewer's own computer would not be the operator's.
 """
 
 import asyncio

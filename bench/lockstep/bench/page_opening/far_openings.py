@@ -42,13 +42,13 @@ async def far_baseline(profile: Profile | str, robot: str) -> AsyncIterator[tupl
         async with Namespaces(profile) as network:
             # Both are in one network; the link between them does not pass the emulated path.
             found = await _started(network, bridge)
-            server = (sys.executable, "-m", "lockstep.bench.baseline_server", found["robot"], ROBOT_ADDRESS)
+            server = (sys.executable, "-m", "lockstep.bench.baseline.baseline_server", found["robot"], ROBOT_ADDRESS)
             yield network, (await _started(network, server))["console"]
 
 
 async def open_far(network: Namespaces, link: str, expression: str, count: int) -> list[dict[str, Any]]:
-    """Run `lockstep.bench.openings` on the operator's side, and return its results."""
-    command = (sys.executable, "-m", "lockstep.bench.openings", link, expression, str(count))
+    """Run `lockstep.bench.page_opening.openings` on the operator's side, and return its results."""
+    command = (sys.executable, "-m", "lockstep.bench.page_opening.openings", link, expression, str(count))
     process = await network.start("operator", command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE)
     assert process.stdout is not None
     async with asyncio.timeout(OPENING_SECONDS * count):

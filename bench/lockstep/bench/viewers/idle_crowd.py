@@ -6,7 +6,7 @@ from collections.abc import AsyncIterator
 from contextlib import AsyncExitStack, asynccontextmanager
 
 from lockstep.bench.context import Context
-from lockstep.bench.processes import Running, running_process
+from lockstep.bench.harness.processes import Running, running_process
 
 __all__ = ["idle_crowd"]
 
@@ -18,11 +18,11 @@ IDLE = ("chrt", "--idle", "0") if shutil.which("chrt") else ("nice", "-n", "19")
 
 @asynccontextmanager
 async def idle_crowd(link: str, count: int, context: Context) -> AsyncIterator[list[Running]]:
-    """Connect observers (`bench/lockstep/bench/audience.py`) in processes that run when no other process wants to."""
+    """Connect observers, each an audience process that runs when no other process wants to."""
     async with AsyncExitStack() as stack:
         audiences: list[Running] = []
         for size in [min(AT_MOST, count - first) for first in range(0, count, AT_MOST)]:
-            command = (*IDLE, sys.executable, "-m", "lockstep.bench.audience", link, str(size))
+            command = (*IDLE, sys.executable, "-m", "lockstep.bench.viewers.audience", link, str(size))
             audience, ready = await stack.enter_async_context(running_process(*command, ready_seconds=CONNECT_SECONDS))
             context.say(f"{size} observers connected within {ready['seconds']} s")
             audiences.append(audience)

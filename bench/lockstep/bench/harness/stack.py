@@ -14,7 +14,7 @@ from urllib.parse import urlsplit
 import httpx
 from prometheus_client.parser import text_string_to_metric_families
 
-from lockstep.bench.processes import ProcessFailed, Running, running_process
+from lockstep.bench.harness.processes import ProcessFailed, Running, running_process
 from lockstep.server.http.transport.tls import self_signed
 
 __all__ = ["DEFAULT_ROBOT", "Bridge", "Metrics", "Stack", "available_robots", "running_bridge", "running_stack"]

@@ -2,7 +2,7 @@ import random
 
 import pytest
 
-from lockstep.bench.page_clock import clock_between
+from lockstep.bench.browsers.page_clock import clock_between
 
 
 def test_many_looks_bound_the_clock_more_narrowly_than_one() -> None:

@@ -1,8 +1,8 @@
 """Many observers in a separate process, which count RTP and decode nothing.
 
-`python -m lockstep.bench.audience LINK COUNT [plain]` connects them, prints a JSON line, then answers each line on
-standard input with each observer's counts so far. It ends at the end of its input. With `plain` the link is a
-`lockstep.bench.baseline_server`.
+`python -m lockstep.bench.viewers.audience LINK COUNT [plain]` connects them, prints a JSON line, then answers each
+line on standard input with each observer's counts so far. It ends at the end of its input. With `plain` the link is a
+`lockstep.bench.baseline.baseline_server`.
 """
 
 import asyncio

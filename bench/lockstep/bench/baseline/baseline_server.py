@@ -1,6 +1,6 @@
 """The baseline: a server that takes an afternoon to write with aiortc.
 
-`python -m lockstep.bench.baseline_server tcp://HOST:PORT [HOST]`
+`python -m lockstep.bench.baseline.baseline_server tcp://HOST:PORT [HOST]`
 
 It serves the same pictures of the same robot bridge, from its robot link; each peer has its own `VideoStreamTrack`,
 which gives out the newest picture as soon as there is one, and aiortc encodes it for each peer alone. No stamps, no
@@ -21,7 +21,7 @@ from aiortc import RTCConfiguration, RTCPeerConnection, RTCSessionDescription, V
 from fastapi import FastAPI, Request, Response
 from fastapi.responses import FileResponse
 
-from lockstep.bench.aioice_hosts import use_hosts
+from lockstep.bench.harness.aioice_hosts import use_hosts
 from lockstep.protocol.messages import Media
 from lockstep.robot_bridge.link.link_client import RobotLink
 from lockstep.server.http.transport.serve import bind, running, wait_for_signal

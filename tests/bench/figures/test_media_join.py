@@ -2,7 +2,7 @@ import random
 
 import pytest
 
-from lockstep.bench.media_join import join_pictures
+from lockstep.bench.figures.media_join import join_pictures
 
 CLOCK_RATE = 90_000
 

@@ -1,6 +1,6 @@
 """Opens a page repeatedly, each time with nothing cached.
 
-`python -m lockstep.bench.openings LINK EXPRESSION COUNT`
+`python -m lockstep.bench.page_opening.openings LINK EXPRESSION COUNT`
 
 It prints one JSON line for each opening: the time of the first picture by EXPRESSION, the times of the steps before it
 (ms since the navigation began), and the number of bytes asked for until then.
@@ -12,8 +12,8 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from lockstep.bench.browser import open_probed_page
 from lockstep.bench.browsers.chromium import running_chromium
+from lockstep.bench.browsers.probed_page import open_probed_page
 
 __all__ = ["main"]
 

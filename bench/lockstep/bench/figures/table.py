@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Sequence
 from itertools import groupby
 
-from lockstep.bench.results import Result
+from lockstep.bench.figures.results import Result
 
 __all__ = ["render_markdown", "render_table"]
 

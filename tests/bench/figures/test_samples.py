@@ -1,6 +1,6 @@
 import pytest
 
-from lockstep.bench.samples import median, quantile
+from lockstep.bench.figures.samples import median, quantile
 
 
 def test_a_quantile_is_always_one_of_the_samples() -> None:
