@@ -22,6 +22,8 @@ REAL = (
     "lockstep.bench.experiment.headless",
     "lockstep.bench.experiment.stage",
     "lockstep.bench.fleet_soak.run",
+    "lockstep.bench.harness.caddy",
+    "lockstep.bench.harness.lives",
     "lockstep.bench.harness.processes",
     "lockstep.bench.quality.stage",
     "lockstep.bench.relay.stage",

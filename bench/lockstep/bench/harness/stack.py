@@ -9,6 +9,7 @@ from contextlib import asynccontextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Any
 from urllib.parse import urlsplit
 
 import httpx
@@ -17,9 +18,20 @@ from prometheus_client.parser import text_string_to_metric_families
 from lockstep.bench.harness.processes import ProcessFailed, Running, running_process
 from lockstep.server.http.transport.tls import self_signed
 
-__all__ = ["DEFAULT_ROBOT", "Bridge", "Metrics", "Stack", "available_robots", "running_bridge", "running_stack"]
+__all__ = [
+    "DEFAULT_ROBOT",
+    "LOCKSTEP",
+    "Bridge",
+    "Metrics",
+    "Stack",
+    "available_robots",
+    "running_bridge",
+    "running_console",
+    "running_stack",
+]
 
 DEFAULT_ROBOT = "mobile-manipulator"
+LOCKSTEP = str(Path(sys.executable).with_name("lockstep"))
 ROBOTS = (DEFAULT_ROBOT, "planar")
 HTTP_SECONDS = 30.0
 TRIES = 30  # for the counters, each after a Retry-After
@@ -101,15 +113,25 @@ def _security(folder: Path) -> tuple[tuple[str, ...], dict[str, str]]:
 
 
 @asynccontextmanager
+async def running_console(
+    *robots: str, port: int = 0, environment: Mapping[str, str]
+) -> AsyncIterator[tuple[Running, dict[str, Any]]]:
+    """Start a console for robots, "tcp://host:port" or, of a fleet, "name=tcp://host:port"; yield its links too."""
+    named = (f"--robot={robot}" for robot in robots)
+    command = (LOCKSTEP, "serve", *named, "--port", str(port), "--json", "--quiet")
+    async with running_process(*command, environment=environment) as started:
+        yield started
+
+
+@asynccontextmanager
 async def running_stack(
     robot: str, *, is_logged: bool = True, is_secured: bool = False, **more: str
 ) -> AsyncIterator[Stack]:
     """Start a bridge, as `running_bridge` does, and a console. `more`: further settings of the console, LOCKSTEP_…"""
     async with running_bridge(robot, is_logged=is_logged, is_secured=is_secured) as bridge:
-        lockstep = str(Path(sys.executable).with_name("lockstep"))
-        command = (lockstep, "serve", "--robot", bridge.address, "--port", "0", "--json", "--quiet")
         settings = {"LOCKSTEP_STATE_DIR": str(bridge.event_log.parent / "state"), "LOCKSTEP_MAX_PEERS": str(MAX_PEERS)}
-        async with running_process(*command, environment=settings | dict(bridge.settings) | more) as (console, links):
+        settings |= dict(bridge.settings) | more
+        async with running_console(bridge.address, environment=settings) as (console, links):
             yield Stack(bridge, console, links["console"], links["operator"], links["observer"])
 
 
