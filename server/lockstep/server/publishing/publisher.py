@@ -19,7 +19,7 @@ from lockstep.server.audit.records import Actor
 from lockstep.server.auth.tokens import Identity
 from lockstep.server.errors import Flood, TooManyRequests
 from lockstep.server.media.published.depacketise import PictureCodec
-from lockstep.server.media.published.encoded_wire import Encoded, encode_picture
+from lockstep.server.media.published.encoded_wire import PICTURES, Encoded
 from lockstep.server.media.published.incoming_pictures import IncomingPictures
 from lockstep.server.media.published.picture_assembly import MediaPacket
 from lockstep.server.media.published.published_camera import PublishedCamera
@@ -253,7 +253,7 @@ class Publisher:
 
     def _pass_on(self, pictures: list[Encoded]) -> None:
         for picture in pictures:
-            if not self._decoder.write(encode_picture(picture)) and self._incoming is not None:
+            if not self._decoder.write(PICTURES.encode(picture)) and self._incoming is not None:
                 self._incoming.lost_picture()  # the decoder is too slow; it goes on with a keyframe
 
     def _decoded(self, said: Said) -> None:
