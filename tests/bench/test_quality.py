@@ -6,13 +6,13 @@ import json
 import pytest
 from typer.testing import CliRunner
 
-from lockstep.bench.emulator import load_profile
 from lockstep.bench.harness.stack import running_stack
 from lockstep.bench.quality.cli import app
 from lockstep.bench.quality.freezes import freezes
 from lockstep.bench.quality.repair import simulate
 from lockstep.bench.quality.stage import driving
 from lockstep.bench.quality.summary import summarise
+from lockstep.emulator import load_profile
 
 
 def test_an_interval_much_longer_than_usual_is_a_freeze() -> None:

@@ -3,9 +3,9 @@
 from dataclasses import dataclass
 from typing import Literal
 
-from lockstep.bench.emulator.impairment.profile import Profile
 from lockstep.bench.experiment.judge.record import Gate
 from lockstep.client.control.command_gate import Pacing
+from lockstep.emulator.impairment.profile import Profile
 
 __all__ = ["MODES", "PROFILES", "THESIS_ROBOTS", "Choices", "MediaChoice", "Mode", "media_of", "round_trip_of"]
 

@@ -10,8 +10,6 @@ from typing import Annotated, Any, TypeVar
 import typer
 import uvloop
 
-from lockstep.bench.emulator.errors import ProfileError
-from lockstep.bench.emulator.impairment.profile import Profile, load_profile
 from lockstep.bench.experiment.choices import PROFILES, Choices, Mode, media_of, round_trip_of
 from lockstep.bench.experiment.endurance.endurance_run import EnduranceClient, run_endurance
 from lockstep.bench.experiment.endurance.growth import run_growth
@@ -24,6 +22,8 @@ from lockstep.bench.experiment.run import run_experiment
 from lockstep.bench.figures.machine import machine_facts
 from lockstep.bench.harness.processes import ProcessFailed
 from lockstep.client.errors import ConsoleError
+from lockstep.emulator.errors import ProfileError
+from lockstep.emulator.impairment.profile import Profile, load_profile
 from lockstep.robot_bridge.robots.registry import robot_names
 
 __all__ = ["experiment_command"]

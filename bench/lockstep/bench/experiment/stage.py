@@ -6,11 +6,11 @@ from contextlib import asynccontextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-from lockstep.bench.emulator.impairment.profile import Profile
-from lockstep.bench.emulator.namespace.network_process import NetworkProcess
 from lockstep.bench.experiment.choices import MediaChoice
 from lockstep.bench.harness.processes import Running
 from lockstep.bench.harness.stack import running_bridge, running_console
+from lockstep.emulator.impairment.profile import Profile
+from lockstep.emulator.namespace.network_process import NetworkProcess
 
 __all__ = ["Stage", "running_stage"]
 

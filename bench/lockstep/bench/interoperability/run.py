@@ -12,10 +12,10 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from lockstep.bench.emulator.errors import NamespacesUnavailable
 from lockstep.bench.harness.processes import ProcessFailed
 from lockstep.bench.interoperability.cells import Cell, Found
 from lockstep.bench.interoperability.world import World, running_world
+from lockstep.emulator.errors import NamespacesUnavailable
 
 __all__ = ["run_cell"]
 

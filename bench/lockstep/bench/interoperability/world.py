@@ -9,16 +9,16 @@ from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from lockstep.bench.emulator.impairment.delay import Constant
-from lockstep.bench.emulator.impairment.impairment import Impairment
-from lockstep.bench.emulator.impairment.profile import Profile, even_profile
-from lockstep.bench.emulator.namespace.namespaces import ROBOT_ADDRESS, Namespaces, Side
 from lockstep.bench.harness.processes import Running, Spawn, spawn_here, started
 from lockstep.bench.harness.stack import LOCKSTEP
 from lockstep.bench.harness.turn_server import turn_command
 from lockstep.bench.interoperability.names import Client, Way
 from lockstep.bench.relay.janus import JANUS_READY, janus_command
 from lockstep.bench.relay.stage import FIRST_PORT, ROOM
+from lockstep.emulator.impairment.delay import Constant
+from lockstep.emulator.impairment.impairment import Impairment
+from lockstep.emulator.impairment.profile import Profile, even_profile
+from lockstep.emulator.namespace.namespaces import ROBOT_ADDRESS, Namespaces, Side
 
 __all__ = ["World", "running_world"]
 

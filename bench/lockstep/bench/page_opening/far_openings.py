@@ -10,8 +10,8 @@ from contextlib import asynccontextmanager
 from pathlib import Path
 from typing import Any
 
-from lockstep.bench.emulator.impairment.profile import Profile
-from lockstep.bench.emulator.namespace.namespaces import ROBOT_ADDRESS, Namespaces
+from lockstep.emulator.impairment.profile import Profile
+from lockstep.emulator.namespace.namespaces import ROBOT_ADDRESS, Namespaces
 
 __all__ = ["far_baseline", "far_console", "open_far"]
 

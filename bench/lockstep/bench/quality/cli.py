@@ -8,12 +8,12 @@ from typing import Annotated, Any
 
 import typer
 
-from lockstep.bench.emulator import Profile, load_profile, parse_profile
 from lockstep.bench.figures.machine import busy_percent
 from lockstep.bench.harness.stack import running_stack
 from lockstep.bench.quality.repair import simulate
 from lockstep.bench.quality.stage import driving
 from lockstep.bench.quality.summary import summarise, timeline
+from lockstep.emulator import Profile, load_profile, parse_profile
 
 __all__ = ["app"]
 

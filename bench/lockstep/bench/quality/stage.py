@@ -5,10 +5,10 @@ import time
 from contextlib import suppress
 from dataclasses import dataclass
 
-from lockstep.bench.emulator import NetworkProcess, Profile
 from lockstep.bench.harness.driving import drive_on, round_and_round
 from lockstep.bench.harness.stack import Stack
 from lockstep.client import Console, ConsoleLost
+from lockstep.emulator import NetworkProcess, Profile
 from lockstep.protocol.serial import event_gap
 
 __all__ = ["Drive", "Picture", "Sight", "driving"]

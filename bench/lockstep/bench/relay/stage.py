@@ -11,10 +11,10 @@ from pathlib import Path
 from playwright.async_api import Browser
 
 from lockstep.bench.browsers.chromium import chromium_program, running_chromium
-from lockstep.bench.emulator.namespace.namespaces import OPERATOR_ADDRESS, ROBOT_ADDRESS, Namespaces, Side
 from lockstep.bench.harness.processes import Running, started
 from lockstep.bench.harness.stack import LOCKSTEP
 from lockstep.bench.relay.janus import JANUS_READY, janus_command
+from lockstep.emulator.namespace.namespaces import OPERATOR_ADDRESS, ROBOT_ADDRESS, Namespaces, Side
 
 __all__ = ["FIRST_PORT", "ROOM", "RelayStage", "relay_stage"]
 

@@ -11,12 +11,12 @@ import sys
 from lockstep.bench.browsers.chromium import running_chromium
 from lockstep.bench.browsers.probed_page import open_probed_page
 from lockstep.bench.context import Context
-from lockstep.bench.emulator.errors import NamespacesUnavailable
 from lockstep.bench.figures.results import Result
 from lockstep.bench.figures.samples import median
 from lockstep.bench.harness.processes import running_process
 from lockstep.bench.harness.stack import running_stack
 from lockstep.bench.page_opening.far_openings import far_baseline, far_console, open_far
+from lockstep.emulator.errors import NamespacesUnavailable
 
 __all__ = ["run"]
 

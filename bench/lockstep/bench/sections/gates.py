@@ -5,11 +5,11 @@ with another gate. `lockstep experiment growth` shows the same at more rates, wi
 """
 
 from lockstep.bench.context import Context
-from lockstep.bench.emulator.impairment.profile import load_profile
 from lockstep.bench.experiment.choices import Choices
 from lockstep.bench.experiment.endurance.growth import Point, run_growth
 from lockstep.bench.experiment.judge.record import Gate
 from lockstep.bench.figures.results import Result
+from lockstep.emulator.impairment.profile import load_profile
 
 __all__ = ["run"]
 

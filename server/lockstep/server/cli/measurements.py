@@ -25,7 +25,7 @@ COMMANDS = {
         "Drive several robots while their bridges die in turn.",
     ),
     "network": (
-        "lockstep.bench.emulator.cli",
+        "lockstep.emulator.cli",
         "network_command",
         "Put a bad network between a console and whoever uses it.",
     ),

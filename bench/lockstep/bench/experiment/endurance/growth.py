@@ -11,9 +11,6 @@ from contextlib import AsyncExitStack, asynccontextmanager
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
-from lockstep.bench.emulator.impairment.delay import Delay
-from lockstep.bench.emulator.impairment.profile import Profile, TwoWay
-from lockstep.bench.emulator.namespace.network_process import NetworkProcess
 from lockstep.bench.experiment.choices import Choices, MediaChoice
 from lockstep.bench.experiment.headless import HeadlessClient, headless_client
 from lockstep.bench.experiment.judge.age_gate import count_by_age
@@ -22,6 +19,9 @@ from lockstep.bench.experiment.judge.record import ClientRecord, Gate
 from lockstep.bench.experiment.stage import Stage, running_stage
 from lockstep.bench.harness.driving import drive_on
 from lockstep.client import Console
+from lockstep.emulator.impairment.delay import Delay
+from lockstep.emulator.impairment.profile import Profile, TwoWay
+from lockstep.emulator.namespace.network_process import NetworkProcess
 
 __all__ = ["Growth", "Point", "later", "run_growth"]
 
