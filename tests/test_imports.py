@@ -15,7 +15,8 @@ PARTS = {
     "robot_bridge": {"protocol"},
     "client": {"protocol", "rtc"},
     "server": {"protocol", "rtc", "robot_bridge"},
-    "bench": {"protocol", "rtc", "robot_bridge", "client", "server"},
+    "emulator": {"protocol", "server"},  # it lies beside the measurements, in `bench/`
+    "bench": {"protocol", "rtc", "robot_bridge", "client", "server", "emulator"},
 }
 # Of the bridge the console has the link's client, the commands, and what a bridge beside it says when it cannot start.
 FROM_THE_BRIDGE = {"link", "cli", "conformance", "description", "errors", "robots", "stop", "thread_name", "watchdog"}

@@ -8,11 +8,11 @@ import sys
 
 import pytest
 
-from lockstep.bench.driving import drive_on
+from lockstep.bench.harness.driving import drive_on
+from lockstep.bench.harness.processes import running_process
+from lockstep.bench.harness.stack import Stack, running_stack
 from lockstep.bench.hostile.crowd import KINDS
 from lockstep.bench.hostile.run import memory_of
-from lockstep.bench.processes import running_process
-from lockstep.bench.stack import Stack, running_stack
 from lockstep.client import Console
 
 SECONDS = 240.0  # a busy machine; never waited for in full

@@ -6,12 +6,13 @@ import json
 import pytest
 from typer.testing import CliRunner
 
-from lockstep.bench.emulator import load_profile
+from lockstep.bench.harness.stack import running_stack
 from lockstep.bench.quality.cli import app
 from lockstep.bench.quality.freezes import freezes
 from lockstep.bench.quality.repair import simulate
-from lockstep.bench.quality.stage import driving, running_console
+from lockstep.bench.quality.stage import driving
 from lockstep.bench.quality.summary import summarise
+from lockstep.emulator import load_profile
 
 
 def test_an_interval_much_longer_than_usual_is_a_freeze() -> None:
@@ -54,7 +55,7 @@ def test_the_command_writes_json() -> None:
 
 
 async def test_a_drive_ends_with_its_console_and_says_when() -> None:
-    async with running_console("planar", quality=True) as stack:
+    async with running_stack("planar", LOCKSTEP_MEDIA__QUALITY="true") as stack:
 
         async def kill_once_it_drives() -> None:
             # Each command waits for the answer to the last, so that the third shows two answers at the operator's.

@@ -7,10 +7,10 @@ import pytest
 from lockstep.bench import sections
 from lockstep.bench.cli import SECTIONS, measure
 from lockstep.bench.context import Context
-from lockstep.bench.driving import console_trips, link_trips
-from lockstep.bench.event_log import robot_times
+from lockstep.bench.harness.driving import console_trips, link_trips
+from lockstep.bench.harness.event_log import robot_times
+from lockstep.bench.harness.stack import running_bridge, running_stack
 from lockstep.bench.sections import command_to_feedback, datagrams, scene
-from lockstep.bench.stack import running_bridge, running_stack
 from lockstep.client import Console
 from lockstep.robot_bridge.link.link_client import RobotLink
 

@@ -8,9 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from lockstep.bench.driving import drive_on
-from lockstep.bench.emulator import Constant, Impairment, Network, Uniform, even_profile, independent
+from lockstep.bench.harness.driving import drive_on
 from lockstep.client import CommandRefused, Console, ConsoleLost, StopUnconfirmed
+from lockstep.emulator import Constant, Impairment, Network, Uniform, even_profile, independent
 from tests.client.truth import collecting, drawn_event, executed_after, until_logged
 from tests.support.stack import Stack, running_stack
 

@@ -4,7 +4,7 @@ import asyncio
 
 import pytest
 
-from lockstep.bench.driving import drive_on
+from lockstep.bench.harness.driving import drive_on
 from lockstep.client import (
     CommandError,
     CommandRefused,

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from lockstep.bench.driving import drive_on
+from lockstep.bench.harness.driving import drive_on
 from lockstep.client import CommandRefused, Console, SeatRefused
 from lockstep.protocol.serial import event_after
 from tests.client.truth import until_logged

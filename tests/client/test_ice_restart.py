@@ -6,7 +6,7 @@ import socket
 
 import pytest
 
-from lockstep.bench.driving import drive_on
+from lockstep.bench.harness.driving import drive_on
 from lockstep.client import Console
 from lockstep.client.errors import ConnectFailed, SignallingRefused
 from lockstep.client.transport.whep import Whep

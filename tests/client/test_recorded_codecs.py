@@ -9,7 +9,7 @@ from pathlib import Path
 import av
 import httpx
 
-from lockstep.bench.driving import drive_on
+from lockstep.bench.harness.driving import drive_on
 from lockstep.client import Console
 from lockstep.robot_bridge.robots.event_strip import read_event_strip
 from lockstep.server.recording.export import export_mp4

@@ -9,9 +9,9 @@ from typing import Any, NamedTuple
 import av
 import pytest
 
-from lockstep.bench.driving import drive_on
-from lockstep.bench.emulator import Network, load_profile
+from lockstep.bench.harness.driving import drive_on
 from lockstep.client import Console
+from lockstep.emulator import Network, load_profile
 from lockstep.robot_bridge.robots.event_strip import read_event_strip
 from lockstep.server.cli.audit import verify_audit
 from lockstep.server.evidence.anchors import parse_anchor

@@ -5,7 +5,7 @@ import signal
 import time
 from pathlib import Path
 
-from lockstep.bench.driving import drive_on
+from lockstep.bench.harness.driving import drive_on
 from lockstep.client import Console
 from lockstep.server.recording.reading.reader import RecordingReader
 from lockstep.server.recording.recording_store import RecordingStore

@@ -1,7 +1,5 @@
 """A real Caddy with our Caddyfile in front of a real console: TLS, the page, signalling, and what stays inside."""
 
-import asyncio
-import os
 from collections.abc import AsyncIterator
 from pathlib import Path
 
@@ -11,13 +9,11 @@ from playwright.async_api import Browser
 
 from lockstep.bench.browsers.chromium import running_chromium
 from lockstep.bench.browsers.console_page import ConsolePage
-from lockstep.bench.free_port import free_port
+from lockstep.bench.harness.caddy import running_caddy
+from lockstep.bench.harness.free_port import free_port
 from tests.support.stack import Stack, running_stack
 
 pytestmark = pytest.mark.browser
-
-CADDYFILE = Path(__file__).resolve().parents[2] / "deploy" / "Caddyfile"
-READY_SECONDS = 20.0
 
 
 @pytest.fixture
@@ -35,34 +31,8 @@ async def chromium() -> AsyncIterator[Browser]:
 @pytest.fixture
 async def site(stack: Stack, tmp_path: Path) -> AsyncIterator[str]:
     """Caddy's address, as people type it."""
-    https, port = free_port(), stack.console.rsplit(":", 1)[1]
-    settings = {"LOCKSTEP_SITE": "localhost", "LOCKSTEP_PORT": port}
-    ports = {"LOCKSTEP_HTTPS_PORT": str(https), "LOCKSTEP_HTTP_PORT": str(free_port())}
-    folders = {"HOME": str(tmp_path), "XDG_DATA_HOME": str(tmp_path), "XDG_CONFIG_HOME": str(tmp_path)}
-    process = await asyncio.create_subprocess_exec(
-        *("caddy", "run", "--config", str(CADDYFILE), "--adapter", "caddyfile"),
-        env=os.environ | settings | ports | folders,
-        stderr=asyncio.subprocess.DEVNULL,
-    )
-    try:
-        url = f"https://localhost:{https}"
-        async with asyncio.timeout(READY_SECONDS):
-            await _until_it_answers(url)
+    async with running_caddy("Caddyfile", tmp_path, free_port(), LOCKSTEP_PORT=stack.console.rsplit(":", 1)[1]) as url:
         yield url
-    finally:
-        process.terminate()
-        await process.wait()
-
-
-async def _until_it_answers(url: str) -> None:
-    async with _http(url) as http:
-        while True:
-            try:
-                await http.get("/healthz")
-            except httpx.TransportError:
-                await asyncio.sleep(0.05)
-            else:
-                return
 
 
 def _http(url: str) -> httpx.AsyncClient:

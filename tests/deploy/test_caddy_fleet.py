@@ -7,8 +7,8 @@ from pathlib import Path
 
 import httpx
 
-from lockstep.bench.free_port import free_port
-from tests.support.fleet_entry import running_entry
+from lockstep.bench.harness.caddy import running_caddy
+from lockstep.bench.harness.free_port import free_port
 
 READY_SECONDS = 20.0
 
@@ -35,7 +35,7 @@ def _address(server: asyncio.Server) -> str:
 async def _entry(directory: Path, one: asyncio.Server, two: asyncio.Server) -> AsyncIterator[httpx.AsyncClient]:
     https = free_port()
     async with (
-        running_entry(directory, _address(one), _address(two), https),
+        running_caddy("Caddyfile.fleet", directory, https, LOCKSTEP_ONE=_address(one), LOCKSTEP_TWO=_address(two)),
         httpx.AsyncClient(base_url=f"https://localhost:{https}", verify=False, trust_env=False) as http,
         asyncio.timeout(READY_SECONDS),
     ):

@@ -16,7 +16,8 @@ from typing import Any
 import pytest
 from aioice import stun, turn
 
-from lockstep.bench.free_port import free_port
+from lockstep.bench.harness.free_port import free_port
+from lockstep.bench.harness.processes import started
 from lockstep.rtc.interfaces import own_addresses
 
 START_TURN = Path(__file__).resolve().parents[2] / "deploy" / "start-turn"
@@ -44,26 +45,9 @@ async def _turn_server(folder: Path, **environment: str) -> AsyncIterator[int]:
     secret.write_text(SECRET)
     given = {"REALM": REALM, "TURN_SECRET_FILE": str(secret), "TURN_PORT": str(port)}
     ports = {"TURN_MIN_PORT": "49500", "TURN_MAX_PORT": "49560"}
-    with (folder / "turn.log").open("wb") as log:
-        process = await asyncio.create_subprocess_exec(
-            "/bin/sh", str(START_TURN), env=os.environ | given | ports | environment, stdout=log, stderr=log
-        )
-    try:
-        async with asyncio.timeout(PATIENCE):
-            while True:
-                assert process.returncode is None, (folder / "turn.log").read_text()
-                try:
-                    _, writer = await asyncio.open_connection("127.0.0.1", port)
-                except OSError:
-                    await asyncio.sleep(0.05)
-                    continue
-                writer.close()
-                break
+    async with started(("/bin/sh", str(START_TURN)), environment=given | ports | environment) as server:
+        await server.listening(port)
         yield port
-    finally:
-        if process.returncode is None:
-            process.terminate()
-        await process.wait()
 
 
 class _Echo(asyncio.DatagramProtocol):

@@ -8,8 +8,8 @@ from typing import Any
 import pytest
 
 from lockstep.bench.cli import SECTIONS
-from lockstep.bench.results import Result
-from lockstep.bench.table import render_markdown
+from lockstep.bench.figures.results import Result
+from lockstep.bench.figures.table import render_markdown
 
 ROOT = Path(__file__).resolve().parents[2]
 TEXT = (ROOT / "docs" / "performance.md").read_text()

@@ -11,7 +11,7 @@ import pytest
 from playwright.async_api import Browser, Locator, expect
 
 from lockstep.bench.browsers.console_page import RB, ConsolePage, open_console
-from lockstep.bench.processes import running_process
+from lockstep.bench.harness.processes import running_process
 from lockstep.protocol.description import Axis, RobotDescription, StartWarning
 from lockstep.robot_bridge.bridge import Bridge
 from lockstep.robot_bridge.robots.base import Measurement

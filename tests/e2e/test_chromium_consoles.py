@@ -11,9 +11,9 @@ import pytest_asyncio
 from playwright.async_api import Browser, Response, expect
 
 from lockstep.bench.browsers.chromium import open_page
-from lockstep.bench.free_port import free_port
+from lockstep.bench.harness.caddy import running_caddy
+from lockstep.bench.harness.free_port import free_port
 from tests.e2e.overview import in_view, stats, until
-from tests.support.fleet_entry import running_entry
 from tests.support.redis_server import RedisServer
 from tests.support.stack import Stack, running_fleet
 
@@ -58,7 +58,9 @@ async def consoles(tmp_path: Path) -> AsyncIterator[Consoles]:
         ]
         one, two = await asyncio.gather(*map(opened.enter_async_context, started))
         at_one, at_two = (f"127.0.0.1:{each}" for each in ports.values())
-        await opened.enter_async_context(running_entry(tmp_path, at_one, at_two, port, tls=False))
+        await opened.enter_async_context(
+            running_caddy("Caddyfile.fleet", tmp_path, port, tls=False, LOCKSTEP_ONE=at_one, LOCKSTEP_TWO=at_two)
+        )
         yield Consoles(entry, redis, one, two)
 
 

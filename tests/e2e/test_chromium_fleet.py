@@ -12,7 +12,7 @@ from playwright.async_api import Browser, Page, expect
 
 from lockstep.bench.browsers.chromium import open_page
 from lockstep.bench.browsers.console_page import ConsolePage
-from lockstep.bench.driving import drive_on
+from lockstep.bench.harness.driving import drive_on
 from lockstep.client import Console
 from tests.e2e.overview import in_view, stats, until
 from tests.support.stack import Stack, running_fleet

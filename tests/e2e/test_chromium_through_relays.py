@@ -8,8 +8,8 @@ import pytest
 import pytest_asyncio
 
 from lockstep.bench.browsers.console_page import ConsolePage, open_console
-from lockstep.bench.emulator.errors import NamespacesUnavailable
 from lockstep.bench.relay.stage import FIRST_PORT, RelayStage, relay_stage
+from lockstep.emulator.errors import NamespacesUnavailable
 
 # As behind a proxy that lets no WebSocket of the console pass; those of relays do.
 NO_LINES = """

@@ -4,7 +4,7 @@ import pytest
 
 from lockstep.bench.browsers.firefox import Firefox
 from lockstep.bench.browsers.sound_card import SoundCard
-from lockstep.bench.emulator import Network
+from lockstep.emulator import Network
 from tests.support.stack import Stack
 
 pytestmark = [pytest.mark.browser, pytest.mark.full_rate]

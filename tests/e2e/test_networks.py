@@ -4,7 +4,7 @@ import pytest
 from playwright.async_api import Browser
 
 from lockstep.bench.browsers.console_page import open_console
-from lockstep.bench.emulator import Network
+from lockstep.emulator import Network
 from tests.support.stack import Stack
 
 pytestmark = [pytest.mark.browser, pytest.mark.full_rate]

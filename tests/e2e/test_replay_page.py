@@ -11,7 +11,7 @@ from playwright.async_api import Browser, Page, expect
 
 from lockstep.bench.browsers.chromium import open_page
 from lockstep.bench.browsers.console_page import READ_STRIP, ConsolePage, open_console
-from lockstep.bench.emulator import Network
+from lockstep.emulator import Network
 from lockstep.server.recording.reading.reader import Record, RecordingReader
 from tests.support.stack import Stack
 

@@ -12,7 +12,7 @@ from playwright.async_api import Browser, Page, expect
 
 from lockstep.bench.browsers.chromium import open_page
 from lockstep.bench.browsers.console_page import READ_STRIP, ConsolePage
-from lockstep.bench.driving import drive_on
+from lockstep.bench.harness.driving import drive_on
 from lockstep.client import Console
 from lockstep.server.recording.reading.reader import RecordingReader
 from tests.support.stack import Stack

@@ -18,7 +18,7 @@ from aiortc.rtcdtlstransport import RTCDtlsFingerprint
 from cryptography.hazmat.primitives import serialization
 from cryptography.hazmat.primitives.asymmetric import rsa
 
-from lockstep.bench.free_port import free_port
+from lockstep.bench.harness.free_port import free_port
 from lockstep.rtc.certificate import Certificate
 from lockstep.rtc.dtls import DtlsClosed, DtlsConnected, DtlsConnection, DtlsData, DtlsEvent, DtlsRole, dtls_context
 from lockstep.rtc.fingerprint import Fingerprint

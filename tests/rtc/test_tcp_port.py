@@ -6,7 +6,7 @@ import socket
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 
-from lockstep.bench.free_port import free_port
+from lockstep.bench.harness.free_port import free_port
 from lockstep.rtc.addresses import Datagram, Path
 from lockstep.rtc.channels import ChannelMessage, ChannelOpened
 from lockstep.rtc.endpoint import Connection, Endpoint, EndpointSettings

@@ -5,7 +5,7 @@ from contextlib import contextmanager
 
 import aioice.ice
 
-from lockstep.bench.aioice_hosts import use_hosts
+from lockstep.bench.harness.aioice_hosts import use_hosts
 
 __all__ = ["aioice_at"]
 

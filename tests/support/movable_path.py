@@ -8,11 +8,11 @@ from contextlib import asynccontextmanager
 
 from playwright.async_api import Page, Route
 
-from lockstep.bench.emulator.impairment.deliveries import Deliveries
-from lockstep.bench.emulator.impairment.outages import Outages
-from lockstep.bench.emulator.impairment.profile import load_profile
-from lockstep.bench.emulator.transport.client_paths import ClientPaths
-from lockstep.bench.emulator.transport.udp_relay import LOOPBACK, UdpRelay
+from lockstep.emulator.impairment.deliveries import Deliveries
+from lockstep.emulator.impairment.outages import Outages
+from lockstep.emulator.impairment.profile import load_profile
+from lockstep.emulator.transport.client_paths import ClientPaths
+from lockstep.emulator.transport.udp_relay import LOOPBACK, UdpRelay
 from lockstep.rtc.interfaces import own_addresses
 
 __all__ = ["MovablePath", "movable_path"]

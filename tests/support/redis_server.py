@@ -11,7 +11,7 @@ from types import TracebackType
 
 import redis.asyncio
 
-from lockstep.bench.free_port import free_port
+from lockstep.bench.harness.free_port import free_port
 
 __all__ = ["RedisServer"]
 

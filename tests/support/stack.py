@@ -1,27 +1,23 @@
 """`lockstep up` as its user runs it: a process of its own on free ports, ended by its signal."""
 
 import asyncio
-import json
 import os
-import shutil
 import signal
-import sys
 from collections.abc import AsyncIterator, Iterator, Mapping
 from contextlib import asynccontextmanager, contextmanager, suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
+from lockstep.bench.harness.processes import Running, running_process
+from lockstep.bench.harness.stack import LOCKSTEP
 from lockstep.server.fleet.simulated import own_event_log
 from tests.support.event_logs import PATIENCE, written
 
 __all__ = ["Stack", "running_console", "running_fleet", "running_stack"]
 
-START_SECONDS = 40.0  # a loaded two-core machine importing everything and opening GL
-STOP_SECONDS = 15.0
 # Root's Chromium gives itself and its sound a higher priority than all others, which no robot's machine has to share.
 FIRST = ("nice", "-n", "-12") if os.geteuid() == 0 else ()
-WITH_US = ("setpriv", "--pdeathsig", "TERM") if shutil.which("setpriv") else ()  # ended also when the tests are killed
 
 
 @dataclass(kw_only=True)
@@ -39,7 +35,7 @@ class Stack:
         skipped: how many of them were there before this test began
     """
 
-    process: asyncio.subprocess.Process
+    running: Running
     console: str
     operator: str
     observer: str
@@ -48,7 +44,15 @@ class Stack:
     robots: dict[str, str] = field(default_factory=dict)
     event_log: Path
     skipped: int = 0
-    output: list[str] = field(default_factory=list)  # its last lines on standard error
+
+    @property
+    def process(self) -> asyncio.subprocess.Process:
+        return self.running.process
+
+    @property
+    def output(self) -> list[str]:
+        """Its last lines on standard error."""
+        return self.running.errors
 
     def bridge_pid(self, robot: str = "") -> int:
         """The bridge's process: the child of `lockstep up` that writes this robot's log."""
@@ -149,50 +153,11 @@ async def _running(
     lockstep: Path | None = None,
 ) -> AsyncIterator[Stack]:
     # One state directory for all runs of a test: the key in it lets a page's token outlive a restart of the console.
-    environment = os.environ | {"PYTHONWARNINGS": "default", "LOCKSTEP_STATE_DIR": str(directory / "state")}
-    process = await asyncio.create_subprocess_exec(
-        *(*FIRST, *WITH_US),
-        *(str(lockstep or Path(sys.executable).with_name("lockstep")), *arguments),
-        stdout=asyncio.subprocess.PIPE,
-        stderr=asyncio.subprocess.PIPE,
-        env=environment | dict(settings or {}),
-    )
-    output: list[str] = []
-    reader = asyncio.create_task(_keep_last_lines(process, output))
-    try:
-        links = await _ready_line(process, output)
-        yield Stack(process=process, event_log=event_log, output=output, **links)
-    finally:
-        await _end(process)
-        await reader
-
-
-async def _ready_line(process: asyncio.subprocess.Process, output: list[str]) -> dict[str, Any]:
-    if process.stdout is None:
-        raise RuntimeError("the process has no output to read")
-    async with asyncio.timeout(START_SECONDS):
-        line = await process.stdout.readline()
-    if not line:
-        raise RuntimeError("lockstep up ended before it was ready:\n" + "\n".join(output))
-    links: dict[str, Any] = json.loads(line)
-    return links
-
-
-async def _keep_last_lines(process: asyncio.subprocess.Process, output: list[str]) -> None:
-    if process.stderr is None:
-        return
-    async for line in process.stderr:
-        output.append(line.decode(errors="replace").rstrip())
-        del output[:-200]
-
-
-async def _end(process: asyncio.subprocess.Process) -> None:
-    if process.returncode is None:
-        process.send_signal(signal.SIGTERM)
-    try:
-        async with asyncio.timeout(STOP_SECONDS):
-            await process.wait()
-    except TimeoutError:
-        process.kill()
-        await process.wait()
-        raise RuntimeError("lockstep up did not end on SIGTERM") from None
+    environment = {"PYTHONWARNINGS": "default", "LOCKSTEP_STATE_DIR": str(directory / "state"), **(settings or {})}
+    command = (*FIRST, str(lockstep or LOCKSTEP), *arguments)
+    async with running_process(*command, environment=environment) as (running, links):
+        try:
+            yield Stack(running=running, event_log=event_log, **links)
+        finally:
+            if not await running.end():
+                raise RuntimeError("lockstep did not end on SIGTERM")

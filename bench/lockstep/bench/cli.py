@@ -13,10 +13,10 @@ from typing import Annotated, Any
 import typer
 
 from lockstep.bench.context import Context
-from lockstep.bench.machine import busy_percent, machine_facts
-from lockstep.bench.results import Result
-from lockstep.bench.stack import available_robots
-from lockstep.bench.table import render_markdown, render_table
+from lockstep.bench.figures.machine import busy_percent, machine_facts
+from lockstep.bench.figures.results import Result
+from lockstep.bench.figures.table import render_markdown, render_table
+from lockstep.bench.harness.stack import available_robots
 
 __all__ = ["SECTIONS", "Measured", "main", "measure"]
 

@@ -37,9 +37,7 @@ class Console:
         pacing: "feedback": the next command waits for the feedback of the last; "media": also for its picture
         tolerance: largest gap of a rendered picture, in events
         audio_tolerance: the same for sound
-        gate: "event": the rule. "off": renders everything. "age": renders media that are at most 0.5 s old by
-            synchronised clocks, as other consoles do; needs the carrier "capture-time" or "trailer". The last two are
-            for comparison
+        gate: "event": the rule. "off": renders everything, for comparison
         carrier: the way in which the event reference travels with media; no other carrier is offered
         video: number of cameras, at most; True: four, False: none
         audio: True to receive sound
@@ -57,7 +55,7 @@ class Console:
 
     Raises:
         LinkFormatError: the link is not one that `lockstep up` prints.
-        ValueError: pacing by media without decoded pictures, or the gate "age" with a carrier without capture times.
+        ValueError: pacing by media without decoded pictures.
     """
 
     def __init__(
@@ -85,8 +83,6 @@ class Console:
     ) -> None:
         if pacing == "media" and not (decode and video):
             raise ValueError("pacing by media needs decoded pictures")
-        if gate == "age" and carrier not in ("capture-time", "trailer"):
-            raise ValueError("ages need a carrier that says when a medium was captured: capture-time or trailer")
         self._options = ConnectionOptions(
             link=parse_link(link),
             pacing=pacing,

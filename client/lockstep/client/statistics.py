@@ -44,7 +44,7 @@ class StreamStatistics(msgspec.Struct, frozen=True, kw_only=True):
     rendered: int = 0
     discarded: int = 0
     held: int = 0
-    violations: int = 0  # rendered with |gap| > tolerance: 0 unless the gate is off or goes by age
+    violations: int = 0  # rendered with |gap| > tolerance: 0 unless the gate is off
     gate: GateMode = "event"
     packets: int = 0
     frames: int = 0  # complete encoded frames

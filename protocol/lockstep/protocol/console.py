@@ -99,7 +99,7 @@ class StreamReport(msgspec.Struct, frozen=True, kw_only=True):
     tolerance: Count = 0  # events; the tolerance of the person at the client
     lag: Difference = 0  # largest feedback - stamp among what arrived since the last report, rendered or not
     violations: Count = 0  # rendered with |gap| > tolerance: 0 unless the gate is off or goes by age
-    gate: Literal["event", "off", "age"] = "event"  # how it is gated now
+    gate: Literal["event", "off"] = "event"  # how it is gated now
 
 
 class Report(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", tag="report"):

@@ -472,7 +472,7 @@ class Peer:
     def pace(self, bitrate: float | None) -> None:
         """Spread pictures over a path that is believed to carry `bitrate` (bit/s). None: no limit was seen."""
         if self.streams is not None:
-            self.streams.share.bucket.limit(bitrate)
+            self.streams.share.path_budget.limit(bitrate)
 
     def report_every(self, seconds: float) -> None:
         """Send sender reports every `seconds` (RFC 3550 6.2), from the report after the next on."""

@@ -15,7 +15,7 @@ from typing import cast
 
 from lockstep.rtc.addresses import Address, Datagram, Path
 from lockstep.rtc.ice.tcp import TcpFraming, frame
-from lockstep.rtc.ice.token_bucket import TokenBuckets
+from lockstep.rtc.token_bucket import TokenBucket
 
 __all__ = ["TcpPort", "TcpPortSettings"]
 
@@ -61,7 +61,7 @@ class TcpPort:
         self._loop = asyncio.get_running_loop()
         self._listeners: dict[Address, socket.socket] = {}
         self._accepting: set[asyncio.Task[object]] = set()
-        self._accepts = TokenBuckets(self.settings.accept_rate, self.settings.accept_burst)
+        self._accepts = TokenBucket(self.settings.accept_rate, self.settings.accept_burst)
         self._connections: dict[Path, _TcpPath] = {}
         self._strangers: dict[Path, _TcpPath] = {}  # the oldest first; some may be used by now
 

@@ -4,8 +4,7 @@ from dataclasses import replace
 from typing import Any
 
 from lockstep.bench.experiment.choices import Choices
-from lockstep.bench.experiment.judge.record import Arrival, ClientRecord, Rendered, RobotRecord, Run
-from lockstep.client.media.media_gate import GateMode
+from lockstep.bench.experiment.judge.record import Arrival, ClientRecord, Gate, Rendered, RobotRecord, Run
 
 __all__ = ["choices", "client", "run"]
 
@@ -23,7 +22,7 @@ def statistics(received: int, rendered: int, violations: int) -> dict[str, Any]:
     return {"streams": streams, "command_to_picture_ms": {"count": 9, "median": 30.0, "p95": 50.04, "p99": 60.0}}
 
 
-def client(name: str = "operator", gate: GateMode = "event", lag: int = 1, *, drives: bool = True) -> ClientRecord:
+def client(name: str = "operator", gate: Gate = "event", lag: int = 1, *, drives: bool = True) -> ClientRecord:
     """Everything it renders is `lag` events behind."""
     record = ClientRecord(name, "headless", gate, "feedback", drives, 2)
     record.feedbacks = [Arrival(100 + number / 10, 10 + number) for number in range(11)]

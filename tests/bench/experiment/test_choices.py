@@ -1,8 +1,8 @@
 import pytest
 
-from lockstep.bench.emulator.impairment.profile import load_profile
 from lockstep.bench.experiment.choices import MODES, PROFILES, media_of, round_trip_of
 from lockstep.bench.experiment.matrix import matrix_of, thesis_matrix_of
+from lockstep.emulator.impairment.profile import load_profile
 from tests.bench.experiment.made_up import choices
 
 

@@ -6,8 +6,6 @@ import json
 import pytest
 from typer.testing import CliRunner
 
-from lockstep.bench.emulator.impairment.profile import load_profile
-from lockstep.bench.emulator.network import Network
 from lockstep.bench.experiment.choices import PROFILES
 from lockstep.bench.experiment.endurance.growth import MEDIA
 from lockstep.bench.experiment.headless import headless_client
@@ -15,6 +13,8 @@ from lockstep.bench.experiment.judge.measures import beyond
 from lockstep.bench.experiment.judge.outage import OUTAGE_PROFILE, run_outages
 from lockstep.bench.experiment.operator_script import OperatorScript
 from lockstep.bench.experiment.stage import running_stage
+from lockstep.emulator.impairment.profile import load_profile
+from lockstep.emulator.network import Network
 from lockstep.server.cli.main import app
 from tests.bench.experiment.made_up import choices
 

@@ -1,5 +1,5 @@
 from lockstep.bench.fleet_soak.progress import Progress
-from lockstep.bench.fleet_soak.records import Record
+from lockstep.bench.harness.event_log import Record
 
 
 def _executed(event: int, time: float) -> Record:

@@ -1,8 +1,8 @@
 from collections import Counter
 
 from lockstep.bench.fleet_soak.driver import FleetDriver, Trip
-from lockstep.bench.fleet_soak.records import Record
 from lockstep.bench.fleet_soak.verdict import MUST_BE_ZERO, Span, fleet_verdict, robot_verdict
+from lockstep.bench.harness.event_log import Record
 
 LIFE: list[Record] = [
     {"kind": "start"},

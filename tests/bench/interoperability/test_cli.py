@@ -7,10 +7,10 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
-from lockstep.bench.emulator.errors import NamespacesUnavailable
-from lockstep.bench.emulator.namespace.namespaces import ROBOT_ADDRESS
-from lockstep.bench.emulator.namespace.tun import open_tun
 from lockstep.bench.interoperability.cli import interoperability_command
+from lockstep.emulator.errors import NamespacesUnavailable
+from lockstep.emulator.namespace.namespaces import ROBOT_ADDRESS
+from lockstep.emulator.namespace.tun import open_tun
 
 SIX_SECONDS = "0.1"  # of a minute
 

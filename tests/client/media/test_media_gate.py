@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lockstep.client.media.media_gate import GateMode, MediaGate, verdict
+from lockstep.client.media.media_gate import MediaGate, verdict
 from lockstep.protocol.serial import MAX_EVENT, event_gap
 from tests.client.vectors import load_vectors
 
@@ -13,13 +13,9 @@ events = st.integers(1, 40) | st.integers(MAX_EVENT - 40, MAX_EVENT)
 steps = st.lists(st.tuples(st.booleans(), events), max_size=60)
 
 
-def _age(case: dict[str, Any]) -> float | None:
-    return None if case["age_ms"] is None else case["age_ms"] / 1000
-
-
 @pytest.mark.parametrize("case", CASES, ids=[case["name"] for case in CASES])
 def test_the_verdict_is_that_of_the_shared_table(case: dict[str, Any]) -> None:
-    decision, gap = verdict(case["feedback"], case["stamp"], case["tolerance"], case["mode"], _age(case))
+    decision, gap = verdict(case["feedback"], case["stamp"], case["tolerance"], case["mode"])
     assert (decision, gap) == (case["verdict"], case["gap"])
 
 
@@ -28,7 +24,7 @@ def test_a_stream_does_what_the_shared_table_says(case: dict[str, Any]) -> None:
     gate: MediaGate[str] = MediaGate(case["tolerance"], case["mode"])
     if case["feedback"] is not None:
         gate.feedback(case["feedback"])
-    shown = gate.offer("medium", case["stamp"], _age(case))
+    shown = gate.offer("medium", case["stamp"])
     counts = {"render": gate.rendered, "discard": gate.discarded, "hold": gate.held}
     assert counts == {name: int(name == case["verdict"]) for name in counts}
     assert (shown is not None) == (case["verdict"] == "render")
@@ -123,13 +119,12 @@ def test_every_medium_is_counted_once(history: list[tuple[bool, int]], tolerance
     assert waiting <= gate.held
 
 
-@pytest.mark.parametrize("mode", ["off", "age"])
-def test_what_the_baselines_render_beyond_the_tolerance_is_counted(mode: GateMode) -> None:
-    gate: MediaGate[str] = MediaGate(4, mode)
-    gate.offer("before any feedback", 1, 0.0)
+def test_without_the_gate_what_is_rendered_beyond_the_tolerance_is_counted() -> None:
+    gate: MediaGate[str] = MediaGate(4, "off")
+    gate.offer("before any feedback", 1)
     gate.feedback(100)
-    gate.offer("within", 96, 0.0)
-    gate.offer("beyond", 90, 0.0)
+    gate.offer("within", 96)
+    gate.offer("beyond", 90)
     assert (gate.rendered, gate.violations, gate.max_gap, gate.mean_gap) == (3, 1, 10, 7.0)
 
 

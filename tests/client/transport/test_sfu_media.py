@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from lockstep.bench.driving import drive_on
+from lockstep.bench.harness.driving import drive_on
 from lockstep.client import Console
 from lockstep.client.errors import ConnectFailed
 from lockstep.client.transport.webrtc_peer import Peer

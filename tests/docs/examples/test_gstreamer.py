@@ -15,7 +15,7 @@ import pytest
 from cryptography.hazmat.primitives.asymmetric import rsa
 from cryptography.x509 import load_pem_x509_certificate
 
-from lockstep.bench.driving import drive_on
+from lockstep.bench.harness.driving import drive_on
 from lockstep.client import Console
 from lockstep.robot_bridge.robots.event_strip import read_event_strip
 from tests.support.stack import Stack, running_stack

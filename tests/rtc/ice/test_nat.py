@@ -15,8 +15,8 @@ from contextlib import AsyncExitStack, asynccontextmanager
 
 import pytest
 
-from lockstep.bench.emulator.errors import NamespacesUnavailable
-from lockstep.bench.emulator.namespace.tun import Tun, open_tun
+from lockstep.emulator.errors import NamespacesUnavailable
+from lockstep.emulator.namespace.tun import Tun, open_tun
 from lockstep.rtc.addresses import Address, Datagram, Path
 from lockstep.rtc.ice.agent import Agent
 from lockstep.rtc.ice.events import Ended, PathChanged

@@ -12,7 +12,7 @@ from lockstep.rtc.rtp.feedback import FullIntraRequest, Nack, PictureLoss, Remb,
 from lockstep.rtc.rtp.history import History, HistorySettings, RepairStream
 from lockstep.rtc.rtp.losses import Losses, LossSettings
 from lockstep.rtc.rtp.numbers import Unwrapper, is_after
-from lockstep.rtc.rtp.pacer import Pacer, PacerSettings, TokenBucket
+from lockstep.rtc.rtp.pacer import Pacer, PacerSettings, PathBudget
 from lockstep.rtc.rtp.receiver_reports import ReceiverReports
 from lockstep.rtc.rtp.repairs import Repairs
 from lockstep.rtc.rtp.requests import Requests
@@ -178,14 +178,14 @@ def test_a_nack_of_another_stream_does_nothing() -> None:
 # Pacer
 
 
-def pacer(**settings: float) -> tuple[Pacer, Sink, TokenBucket]:
-    sink, bucket = Sink(), TokenBucket(PacerSettings(**settings))  # type: ignore[arg-type]
-    return Pacer(sink, bucket), sink, bucket
+def pacer(**settings: float) -> tuple[Pacer, Sink, PathBudget]:
+    sink, budget = Sink(), PathBudget(PacerSettings(**settings))  # type: ignore[arg-type]
+    return Pacer(sink, budget), sink, budget
 
 
 def test_a_burst_leaves_at_once_and_the_rest_by_and_by_in_order() -> None:
-    stage, sink, bucket = pacer(burst=1000, headroom=1.0)
-    bucket.limit(80_000)  # 10,000 bytes a second
+    stage, sink, budget = pacer(burst=1000, headroom=1.0)
+    budget.limit(80_000)  # 10,000 bytes a second
     for number in range(6):
         stage.rtp(packet(number, bytes(500)), 0)
     assert numbers(sink) == [0, 1]

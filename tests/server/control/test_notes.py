@@ -8,7 +8,6 @@ from hypothesis import strategies as st
 from lockstep.protocol.console import SharedNote
 from lockstep.server.control.notes import BOARD_BURST, BURST, KEPT, LINK_RATE, SESSION_GAP, NoteBoard
 from lockstep.server.util.display_names import MAX_NAME, clean_name, printable, unique_names
-from lockstep.server.util.token_bucket import TokenBucket
 
 
 def _write(
@@ -18,7 +17,7 @@ def _write(
 
 
 def test_a_note_keeps_who_when_and_at_which_event() -> None:
-    note = _write(NoteBoard(0.0), " mind\tthe \x00step\n")
+    note = _write(NoteBoard(), " mind\tthe \x00step\n")
     assert note == SharedNote(
         id=1, peer="a", name="Ada", role="observer", text="mind the step", epoch="e1", event=7, time=1000.0
     )
@@ -26,13 +25,13 @@ def test_a_note_keeps_who_when_and_at_which_event() -> None:
 
 @pytest.mark.parametrize("text", ["", "\x00", " \n\t ", "\u202e\u200b"])
 def test_nothing_that_can_be_printed_is_no_note(text: str) -> None:
-    board = NoteBoard(0.0)
+    board = NoteBoard()
     assert _write(board, text) == "malformed"
     assert list(board) == []
 
 
 def test_a_link_that_writes_too_often_is_refused_and_others_are_not() -> None:
-    board = NoteBoard(0.0)
+    board = NoteBoard()
     for _ in range(int(BURST)):
         assert isinstance(_write(board), SharedNote)
     assert _write(board) == "too_often"
@@ -41,20 +40,20 @@ def test_a_link_that_writes_too_often_is_refused_and_others_are_not() -> None:
 
 
 def test_all_together_are_limited_too() -> None:
-    board = NoteBoard(0.0)
+    board = NoteBoard()
     results = [_write(board, link=str(number)) for number in range(int(BOARD_BURST) + 5)]
     assert results.count("too_often") == 5
 
 
 def test_the_last_hundred_are_kept() -> None:
-    board = NoteBoard(0.0)
+    board = NoteBoard()
     for number in range(KEPT + 10):
         assert isinstance(_write(board, f"note {number}", now=number * 10.0), SharedNote)
     assert [note.text for note in board] == [f"note {number}" for number in range(10, KEPT + 10)]
 
 
 def test_further_connections_of_a_link_write_no_more_than_one() -> None:
-    board = NoteBoard(0.0)
+    board = NoteBoard()
     results = [_write(board, peer=str(number)) for number in range(2 * BURST)]
     assert results.count("too_often") == BURST
     assert isinstance(_write(board, link="another"), SharedNote)
@@ -100,14 +99,6 @@ def test_no_two_are_ever_called_the_same(people: list[tuple[str, str]]) -> None:
     assert len({name.casefold() for name in names}) == len(people)
     for name, (wanted, _) in zip(names, people, strict=True):
         assert name == wanted or name.rpartition(" ")[0].casefold() == wanted.casefold()
-
-
-def test_a_bucket_gives_a_burst_and_then_its_rate() -> None:
-    bucket = TokenBucket(2.0, 3.0, 0.0)
-    assert [bucket.take(0.0) for _ in range(4)] == [True, True, True, False]
-    assert [bucket.take(0.5) for _ in range(2)] == [True, False]
-    assert [bucket.take(100.0) for _ in range(4)] == [True, True, True, False]
-    assert not bucket.has(100.0)
 
 
 @pytest.mark.parametrize(
@@ -160,7 +151,7 @@ def test_a_crowd_of_names_that_look_alike_is_counted_as_one() -> None:
 
 
 def test_newcomers_do_not_get_the_notes_of_a_session_that_is_over_and_whoever_comes_back_soon_does() -> None:
-    board = NoteBoard(0.0)
+    board = NoteBoard()
     _write(board, "the code of the door is 4711")
     board.left_empty(100.0)
     board.joined(100.0 + SESSION_GAP - 1)

@@ -12,8 +12,8 @@ import pytest
 import pytest_asyncio
 from pydantic import SecretStr
 
-from lockstep.bench.driving import drive_on
-from lockstep.bench.free_port import free_port
+from lockstep.bench.harness.driving import drive_on
+from lockstep.bench.harness.free_port import free_port
 from lockstep.client import Console
 from lockstep.client.errors import ConsoleLost
 from lockstep.protocol.console import Notice, Role, SilenceStops, Welcome

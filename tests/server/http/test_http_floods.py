@@ -13,7 +13,7 @@ from typing import Any
 import httpx
 import pytest
 
-from lockstep.bench.free_port import free_port
+from lockstep.bench.harness.free_port import free_port
 from lockstep.server.http.transport.tls import Certificate, self_signed
 from tests.server.rig import PATIENCE, Rig, eventually, running_bridge, running_console
 

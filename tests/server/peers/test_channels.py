@@ -120,7 +120,7 @@ def test_no_change_in_the_text_raises_anything_else(
 
 
 def test_a_burst_is_allowed_and_a_flood_is_not() -> None:
-    budget = MessageBudget(10, 0.0)
+    budget = MessageBudget(10)
     for _ in range(10):
         budget.spend(0.0)
     with pytest.raises(Flood):
@@ -129,7 +129,7 @@ def test_a_burst_is_allowed_and_a_flood_is_not() -> None:
 
 
 def test_silence_saves_up_no_more_than_one_burst() -> None:
-    budget = MessageBudget(10, 0.0)
+    budget = MessageBudget(10)
     for _ in range(10):
         budget.spend(1000.0)
     with pytest.raises(Flood):

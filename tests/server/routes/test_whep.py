@@ -10,7 +10,7 @@ from aiortc import RTCConfiguration, RTCPeerConnection
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from lockstep.bench.free_port import free_port
+from lockstep.bench.harness.free_port import free_port
 from lockstep.protocol.console import Role
 from lockstep.protocol.messages import Ping, Pong
 from lockstep.server.webrtc.sdp_offer import parse_fragment

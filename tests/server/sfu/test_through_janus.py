@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from lockstep.bench.emulator.errors import NamespacesUnavailable
 from lockstep.bench.relay.stage import RelayStage, relay_stage
+from lockstep.emulator.errors import NamespacesUnavailable
 
 
 async def _watch(stage: RelayStage, pictures: int = 20) -> dict[str, object]:

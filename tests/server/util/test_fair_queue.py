@@ -3,8 +3,8 @@
 import asyncio
 from functools import partial
 
+from lockstep.rtc.token_bucket import TokenBucket
 from lockstep.server.util.fair_queue import FairQueue
-from lockstep.server.util.token_bucket import TokenBucket
 
 
 class Rig:
@@ -82,7 +82,7 @@ async def test_what_is_first_comes_before_a_salvo_that_waits() -> None:
 
 async def test_a_pace_holds_all_back_but_what_is_first() -> None:
     """Two pieces at once, the next when the budget has one again: never, in this test."""
-    turns = FairQueue(lambda now: TokenBucket(1e-6, 2, now))
+    turns = FairQueue(TokenBucket(1e-6, 2))
     done: list[str] = []
     for name in ("a", "b", "c", "d"):
         turns.ask("x", partial(done.append, name))
@@ -94,7 +94,7 @@ async def test_a_pace_holds_all_back_but_what_is_first() -> None:
 
 
 async def test_what_the_pace_held_back_comes_when_there_is_budget_again() -> None:
-    turns, served = FairQueue(lambda now: TokenBucket(1000.0, 1, now)), asyncio.Event()
+    turns, served = FairQueue(TokenBucket(1000.0, 1)), asyncio.Event()
     turns.ask("x", lambda: None)
     turns.ask("x", served.set)
     async with asyncio.timeout(20):
@@ -128,7 +128,7 @@ async def test_a_beginning_gets_every_third_turn_however_many_others_wait() -> N
 
 
 async def test_a_beginning_keeps_to_the_pace_and_comes_when_there_is_budget_again() -> None:
-    turns = FairQueue(lambda now: TokenBucket(20, 1, now))
+    turns = FairQueue(TokenBucket(20, 1))
     async with asyncio.timeout(20):
         await turns.begin()
         waiting = asyncio.create_task(turns.begin())

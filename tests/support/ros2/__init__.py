@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from lockstep.bench.processes import Running, running_process
+from lockstep.bench.harness.processes import Running, running_process
 from tests.support.event_logs import whole_lines, written
 
 __all__ = [

@@ -12,7 +12,7 @@ export interface GateCounters {
   rendered: number;
   discarded: number;
   held: number;
-  violations: number; // rendered with |gap| > tolerance; 0 unless the gate is off or goes by age
+  violations: number; // rendered with |gap| > tolerance; 0 unless the gate is off
 }
 
 /** What the gate judges against. */
@@ -20,7 +20,7 @@ export interface GateContext {
   readonly feedback: number | null; // newest event
   readonly tolerance: number; // of this kind of medium
   readonly gate: GateMode;
-  readonly wallMs: number; // since 1970, for the mode `age` alone
+  readonly wallMs: number; // since 1970, for the age of what is rendered
 }
 
 /** What is known of one received frame. */

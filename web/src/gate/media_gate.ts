@@ -2,11 +2,8 @@ import { eventGap } from "./serial";
 
 export type Verdict = "render" | "discard" | "hold";
 
-/** `event` is the rule. What it is compared with: `off` renders everything, `age` goes by synchronised clocks. */
-export type GateMode = "event" | "off" | "age";
-
-/** Of the mode `age`. */
-export const MAX_AGE_MS = 500;
+/** `event` is the rule; `off` renders everything. */
+export type GateMode = "event" | "off";
 
 /** What the gate says of one picture or sound segment. */
 export interface Judgement {
@@ -16,28 +13,20 @@ export interface Judgement {
 
 /**
  * The media gate: one rule for pictures and sound (docs/architecture.md, "The gate").
- * `feedback` and `stamp` are null while unknown; `ageMs`, for the mode `age` alone, when the medium does not say.
+ * `feedback` and `stamp` are null while unknown.
  */
 export function judge(
   feedback: number | null,
   stamp: number | null,
   tolerance: number,
   mode: GateMode,
-  ageMs: number | null,
 ): Judgement {
   const gap = feedback === null || stamp === null ? null : eventGap(feedback, stamp);
-  return { verdict: verdictOf(mode, stamp, gap, tolerance, ageMs), gap };
+  return { verdict: verdictOf(mode, stamp, gap, tolerance), gap };
 }
 
-function verdictOf(
-  mode: GateMode,
-  stamp: number | null,
-  gap: number | null,
-  tolerance: number,
-  ageMs: number | null,
-): Verdict {
+function verdictOf(mode: GateMode, stamp: number | null, gap: number | null, tolerance: number): Verdict {
   if (mode === "off") return "render";
-  if (mode === "age") return ageMs !== null && ageMs <= MAX_AGE_MS ? "render" : "discard";
   if (stamp === null) return "discard";
   if (gap === null) return "hold";
   if (gap > tolerance) return "discard";

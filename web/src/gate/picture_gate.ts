@@ -65,8 +65,7 @@ export function settlePicture<P extends Closable>(
   const mark = found ?? UNMARKED;
   const { stamp } = mark;
   if (stamp !== null) counts.stamp = stamp;
-  const ageMs = ageOf(mark, context);
-  const { verdict, gap } = judge(context.feedback, stamp, context.tolerance, context.gate, ageMs);
+  const { verdict, gap } = judge(context.feedback, stamp, context.tolerance, context.gate);
   noteSeen(counts, gap);
   if (verdict === "hold") {
     if (!kept.counted) counts.held += 1;
@@ -75,7 +74,7 @@ export function settlePicture<P extends Closable>(
   }
   gate.kept = null;
   if (verdict === "render") {
-    draw(kept.picture, stamp, gap, ageMs);
+    draw(kept.picture, stamp, gap, ageOf(mark, context));
     gate.shown = stamp;
     noteRendered(counts, gap, context);
   } else counts.discarded += 1;

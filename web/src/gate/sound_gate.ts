@@ -2,7 +2,6 @@ import { judge } from "./media_gate";
 import { MOST_MS } from "./sound_backlog";
 import {
   UNMARKED,
-  ageOf,
   createGateCounters,
   noteRendered,
   noteSeen,
@@ -65,13 +64,7 @@ export function observeSound(
   if (found === undefined && context.gate !== "off") return false;
   const mark = found ?? UNMARKED;
   const { stamp } = mark;
-  const { verdict, gap } = judge(
-    context.feedback,
-    stamp,
-    context.tolerance,
-    context.gate,
-    ageOf(mark, context),
-  );
+  const { verdict, gap } = judge(context.feedback, stamp, context.tolerance, context.gate);
   if (stamp !== null) counts.stamp = stamp;
   gate.isTooOld = verdict === "discard";
   gate.starting &&= verdict === "discard" && waiting > MOST_MS && now - gate.playsSinceMs < START_MS;

@@ -481,7 +481,7 @@ export interface StreamReport {
   readonly tolerance?: number;
   readonly lag?: number;
   readonly violations?: number;
-  readonly gate?: "age" | "event" | "off";
+  readonly gate?: "event" | "off";
 }
 
 /** Who is heard at the robot now; sent to everyone when it changes. */

@@ -26,7 +26,7 @@ import { REFUSAL_LABELS } from "./refusal_labels";
 export interface Settings {
   tolerance: { video: number; audio: number }; // events; 4 and 6
   pacing: Pacing;
-  gate: GateMode; // "off" and "age" are what the rule is compared with
+  gate: GateMode; // "event" is the rule
   speedCap: boolean; // slower the later the picture
   contactTone: boolean;
   rumble: boolean;

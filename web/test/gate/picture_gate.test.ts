@@ -132,14 +132,6 @@ describe("the picture gate", () => {
     expect(gate.counts).toMatchObject({ received: 2, violations: 1, gapSum: 98, gapsKnown: 1 });
   });
 
-  it("by age draws what is young, however far behind, and nothing that is old", () => {
-    stamps.set(90, 2).set(600, 100);
-    offer(90, contextOf(100, "age"));
-    offer(600, contextOf(100, "age"));
-    expect(drawn).toEqual([[90, 2, 98]]);
-    expect(gate.counts).toMatchObject({ rendered: 1, discarded: 1, violations: 1 });
-  });
-
   it("remembers the largest lag of all that came, drawn or not, until it is reported", () => {
     stamps.set(90, 10).set(91, 99);
     offer(90, contextOf(100));

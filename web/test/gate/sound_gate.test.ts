@@ -74,11 +74,6 @@ describe("the sound gate", () => {
     expect(observeSound(gate, 1920, 1, contextOf(100, "off"), true, 0)).toBe(true);
     expect(gate.counts).toMatchObject({ received: 2, rendered: 2, violations: 1 });
     expect(meanGap(gate.counts)).toBe(99);
-  });
-
-  it("by age lets young sound through, and none that is old", () => {
-    expect(observeSound(gate, 300, 1, contextOf(100, "age"), true, 0)).toBe(true);
-    expect(observeSound(gate, 960, 100, contextOf(100, "age"), true, 0)).toBe(false);
     expect(meanGap(createSoundGate().counts)).toBeNull();
   });
 

@@ -14,12 +14,13 @@ import msgspec
 
 from lockstep.bench.browsers.chromium import open_page, running_chromium
 from lockstep.bench.browsers.console_page import RB, ConsolePage
+from lockstep.bench.browsers.page_clock import PageClock, read_page_clock
 from lockstep.bench.browsers.sound_card import running_sound_card
 from lockstep.bench.experiment.choices import Choices
+from lockstep.bench.experiment.judge.age_gate import client_gate
 from lockstep.bench.experiment.judge.record import Arrival, ClientRecord, Rendered
 from lockstep.bench.experiment.observation import Look, Observation
 from lockstep.bench.experiment.operator_script import OperatorScript
-from lockstep.bench.page_clock import PageClock, read_page_clock
 from lockstep.protocol.description import Axis, ControlLayer, RobotDescription
 
 __all__ = ["BrowserClient", "browser_client", "pad_axes", "robot_description"]
@@ -151,7 +152,7 @@ async def browser_client(link: str, choices: Choices) -> AsyncIterator[BrowserCl
         tolerance = {"video": choices.tolerance, "audio": choices.tolerance}
         await page.evaluate(
             "(settings) => window.lockstep.configure(settings)",
-            {"gate": choices.gate, "pacing": choices.pacing, "tolerance": tolerance},
+            {"gate": client_gate(choices.gate), "pacing": choices.pacing, "tolerance": tolerance},
         )
         record = ClientRecord("operator", "chromium", choices.gate, choices.pacing, True, choices.tolerance)
         description = await robot_description(link)

@@ -3,9 +3,9 @@
 from dataclasses import dataclass
 from typing import Literal
 
-from lockstep.bench.emulator.impairment.profile import Profile
+from lockstep.bench.experiment.judge.record import Gate
 from lockstep.client.control.command_gate import Pacing
-from lockstep.client.media.media_gate import GateMode
+from lockstep.emulator.impairment.profile import Profile
 
 __all__ = ["MODES", "PROFILES", "THESIS_ROBOTS", "Choices", "MediaChoice", "Mode", "media_of", "round_trip_of"]
 
@@ -88,7 +88,7 @@ class Choices:
     watchers: bool = True  # clients in the other gate modes beside the operator, in the same session
 
     @property
-    def gate(self) -> GateMode:
+    def gate(self) -> Gate:
         return self.mode if self.mode == "off" or self.mode == "age" else "event"
 
     @property
@@ -96,7 +96,7 @@ class Choices:
         return "media" if self.mode == "media" else "feedback"
 
     @property
-    def watching(self) -> tuple[GateMode, ...]:
+    def watching(self) -> tuple[Gate, ...]:
         """The gate modes of the watchers: those that the operator does not have."""
-        every: tuple[GateMode, ...] = ("off", "age", "event")
+        every: tuple[Gate, ...] = ("off", "age", "event")
         return tuple(mode for mode in every if mode != self.gate) if self.watchers else ()

@@ -10,8 +10,6 @@ from typing import Annotated, Any, TypeVar
 import typer
 import uvloop
 
-from lockstep.bench.emulator.errors import ProfileError
-from lockstep.bench.emulator.impairment.profile import Profile, load_profile
 from lockstep.bench.experiment.choices import PROFILES, Choices, Mode, media_of, round_trip_of
 from lockstep.bench.experiment.endurance.endurance_run import EnduranceClient, run_endurance
 from lockstep.bench.experiment.endurance.growth import run_growth
@@ -21,9 +19,11 @@ from lockstep.bench.experiment.judge.results import result_of
 from lockstep.bench.experiment.judge.table import render_table
 from lockstep.bench.experiment.matrix import GROWTH_SECONDS, OUTAGE_SECONDS, matrix_of, thesis_matrix_of
 from lockstep.bench.experiment.run import run_experiment
-from lockstep.bench.machine import machine_facts
-from lockstep.bench.processes import ProcessFailed
+from lockstep.bench.figures.machine import machine_facts
+from lockstep.bench.harness.processes import ProcessFailed
 from lockstep.client.errors import ConsoleError
+from lockstep.emulator.errors import ProfileError
+from lockstep.emulator.impairment.profile import Profile, load_profile
 from lockstep.robot_bridge.robots.registry import robot_names
 
 __all__ = ["experiment_command"]

@@ -9,14 +9,14 @@ from typing import Any
 import msgspec
 import numpy as np
 
-from lockstep.bench.driving import drive_on
 from lockstep.bench.experiment.choices import Choices
-from lockstep.bench.experiment.judge.record import Arrival, ClientRecord, Rendered
+from lockstep.bench.experiment.judge.age_gate import client_gate
+from lockstep.bench.experiment.judge.record import Arrival, ClientRecord, Gate, Rendered
 from lockstep.bench.experiment.observation import Look, Observation
 from lockstep.bench.experiment.operator_script import OperatorScript
+from lockstep.bench.harness.driving import drive_on
 from lockstep.client import Console, ConsoleLost, Picture
 from lockstep.client.control.command_gate import Pacing
-from lockstep.client.media.media_gate import GateMode
 from lockstep.robot_bridge.robots.event_strip import read_event_strip
 
 __all__ = ["HeadlessClient", "headless_client"]
@@ -106,7 +106,7 @@ def _drawn_event(picture: Picture) -> int | None:
 
 @asynccontextmanager
 async def headless_client(
-    link: str, choices: Choices, name: str, gate: GateMode, pacing: Pacing, *, drives: bool
+    link: str, choices: Choices, name: str, gate: Gate, pacing: Pacing, *, drives: bool
 ) -> AsyncIterator[HeadlessClient]:
     """Connect a client with the main camera and the first microphone.
 
@@ -114,7 +114,7 @@ async def headless_client(
     """
     async with Console(
         link,
-        gate=gate,
+        gate=client_gate(gate),
         pacing=pacing,
         tolerance=choices.tolerance,
         audio_tolerance=choices.tolerance,

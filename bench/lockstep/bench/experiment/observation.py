@@ -4,6 +4,7 @@ import asyncio
 from collections.abc import Awaitable, Callable, Sequence
 from typing import Any, NamedTuple
 
+from lockstep.bench.experiment.judge.age_gate import passes
 from lockstep.bench.experiment.judge.record import Arrival, ClientRecord, Rendered, fresh
 
 __all__ = ["Look", "Observation"]
@@ -32,8 +33,9 @@ class Observation:
         self._record.statistics_before = look.statistics
         self._take(look)
         self._record.feedbacks[:-1] = []  # the run begins with the newest event
-        for entries in self._record.rendered.values():
+        for stream, entries in self._record.rendered.items():
             entries[:-1] = []  # keeps the picture on screen as well
+            self._record.earlier[stream] = len(entries)
 
     async def run(self) -> None:
         while True:
@@ -50,4 +52,4 @@ class Observation:
         record.feedbacks += fresh(record.feedbacks[-1].at if record.feedbacks else float("-inf"), look.feedbacks)
         for stream, entries in look.rendered.items():
             known = record.rendered.setdefault(stream, [])
-            known += fresh(known[-1].at if known else float("-inf"), entries)
+            known += passes(record.gate, fresh(known[-1].at if known else float("-inf"), entries))

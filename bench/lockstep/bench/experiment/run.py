@@ -6,13 +6,13 @@ from collections.abc import AsyncIterator, Callable
 from contextlib import AbstractAsyncContextManager, AsyncExitStack, asynccontextmanager
 from typing import Protocol
 
-from lockstep.bench.emulator.impairment.profile import Profile
 from lockstep.bench.experiment.choices import Choices, media_of
 from lockstep.bench.experiment.headless import headless_client
 from lockstep.bench.experiment.judge.record import ClientRecord, Run
 from lockstep.bench.experiment.judge.robot_log import read_robot_log
 from lockstep.bench.experiment.operator_script import OperatorScript
 from lockstep.bench.experiment.stage import Stage, running_stage
+from lockstep.emulator.impairment.profile import Profile
 from lockstep.protocol.description import RobotDescription
 
 __all__ = ["RunningClient", "run_experiment"]

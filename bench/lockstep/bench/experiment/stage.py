@@ -1,17 +1,16 @@
 """Starts, connects and ends the robot, console and network of one run."""
 
 import secrets
-import sys
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from tempfile import TemporaryDirectory
 
-from lockstep.bench.emulator.impairment.profile import Profile
-from lockstep.bench.emulator.namespace.network_process import NetworkProcess
 from lockstep.bench.experiment.choices import MediaChoice
-from lockstep.bench.processes import Running, running_process
+from lockstep.bench.harness.processes import Running
+from lockstep.bench.harness.stack import running_bridge, running_console
+from lockstep.emulator.impairment.profile import Profile
+from lockstep.emulator.namespace.network_process import NetworkProcess
 
 __all__ = ["Stage", "running_stage"]
 
@@ -39,22 +38,16 @@ async def running_stage(
     Raises:
         ProcessFailed: a process did not start.
     """
-    lockstep = str(Path(sys.executable).with_name("lockstep"))
-    with TemporaryDirectory(prefix="lockstep-experiment-") as directory:
-        log = Path(directory) / "events.jsonl"
+    async with running_bridge(robot) as bridge:
         environment = {
             **media.environment(),
-            "LOCKSTEP_STATE_DIR": directory,
+            "LOCKSTEP_STATE_DIR": str(bridge.event_log.parent),
             "LOCKSTEP_SECRET": secrets.token_urlsafe(32),
             "LOCKSTEP_SCENE": "false",
         }
-        robot_command = (lockstep, "robot", robot, "--port", "0", "--event-log", str(log), "--event-strip", "--json")
-        state = ("--state-dir", str(Path(directory) / "bridge"))
-        async with running_process(*robot_command, *state) as (bridge, ready):
-            host, _, port = ready["robot"].removeprefix("tcp://").rpartition(":")
-            async with NetworkProcess(profile, robot=(host, int(port)) if robot_link else None, seed=seed) as network:
-                address = network.robot_address or ready["robot"]
-                serve = (lockstep, "serve", "--robot", address, "--port", "0", "--json", "--quiet")
-                async with running_process(*serve, environment=environment) as (console, links):
-                    await network.open_console(links["console"])
-                    yield Stage(network, bridge, console, log, links["operator"])
+        through = ("127.0.0.1", bridge.port) if robot_link else None
+        async with NetworkProcess(profile, robot=through, seed=seed) as network:
+            address = network.robot_address or bridge.address
+            async with running_console(address, environment=environment) as (console, links):
+                await network.open_console(links["console"])
+                yield Stage(network, bridge.process, console, bridge.event_log, links["operator"])

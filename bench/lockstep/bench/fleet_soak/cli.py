@@ -10,7 +10,7 @@ import uvloop
 
 from lockstep.bench.fleet_soak.run import FleetPlan, fleet_soak
 from lockstep.bench.fleet_soak.verdict import MUST_BE_ZERO
-from lockstep.bench.processes import ProcessFailed
+from lockstep.bench.harness.processes import ProcessFailed
 
 __all__ = ["fleet_soak_command"]
 

@@ -5,7 +5,7 @@ import time
 from collections import Counter
 from typing import NamedTuple
 
-from lockstep.bench.driving import drive_on, round_and_round
+from lockstep.bench.harness.driving import drive_on, round_and_round
 from lockstep.client import Console
 from lockstep.client.errors import CommandRefused, ConsoleError
 

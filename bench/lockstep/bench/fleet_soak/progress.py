@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable
 
-from lockstep.bench.fleet_soak.records import Record
+from lockstep.bench.harness.event_log import Record
 
 __all__ = ["Progress"]
 

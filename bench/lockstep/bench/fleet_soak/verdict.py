@@ -3,10 +3,10 @@
 from collections.abc import Iterable, Sequence
 from typing import Any, NamedTuple
 
+from lockstep.bench.figures.samples import median, quantile
 from lockstep.bench.fleet_soak.driver import FleetDriver, Trip
 from lockstep.bench.fleet_soak.progress import Progress
-from lockstep.bench.fleet_soak.records import Record
-from lockstep.bench.samples import median, quantile
+from lockstep.bench.harness.event_log import Record
 from lockstep.bench.soak.judge import Judge
 
 __all__ = ["MUST_BE_ZERO", "Span", "fleet_verdict", "robot_verdict"]

@@ -8,9 +8,9 @@ from typing import Annotated, Any
 import typer
 import uvloop
 
+from lockstep.bench.harness.processes import ProcessFailed
 from lockstep.bench.hostile.crowd import KINDS
 from lockstep.bench.hostile.run import FRONTS, hostile
-from lockstep.bench.processes import ProcessFailed
 
 __all__ = ["hostile_command"]
 

@@ -13,7 +13,7 @@ from aiortc import RTCConfiguration, RTCDataChannel, RTCPeerConnection, RTCSessi
 from aiortc.rtp import RtcpReceiverInfo, RtcpRrPacket, RtpPacket
 from aiortc.sdp import SessionDescription
 
-from lockstep.bench.aioice_hosts import use_hosts
+from lockstep.bench.harness.aioice_hosts import use_hosts
 from lockstep.bench.hostile.target import Target
 from lockstep.protocol.console import decode_server_message, encode_console_message
 from lockstep.protocol.messages import Command, Feedback, Ping, Reset, Rest

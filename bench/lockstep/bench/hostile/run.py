@@ -4,7 +4,6 @@ The crowd comes directly, with TLS, or through a real Caddy with deploy/Caddyfil
 """
 
 import asyncio
-import os
 import sys
 import time
 from collections.abc import AsyncIterator, Callable
@@ -16,12 +15,11 @@ from tempfile import TemporaryDirectory
 from typing import Any
 from urllib.parse import urlsplit
 
-import httpx
-
-from lockstep.bench.free_port import free_port
-from lockstep.bench.machine import busy_percent, machine_facts
-from lockstep.bench.processes import Running, running_process
-from lockstep.bench.stack import Stack, running_stack
+from lockstep.bench.figures.machine import busy_percent, machine_facts
+from lockstep.bench.harness.caddy import running_caddy
+from lockstep.bench.harness.free_port import free_port
+from lockstep.bench.harness.processes import Running, running_process
+from lockstep.bench.harness.stack import Stack, running_stack
 from lockstep.client import Console
 
 __all__ = ["FRONTS", "hostile", "memory_of"]
@@ -31,7 +29,6 @@ FRONTS = ("direct", "tls", "caddy")  # the crowd's ways to the console
 WARM_UP = 3.0  # s
 INTERVAL = (0.046, 0.054)  # s between commands: spread over two ticks of the robot, or each waits for its tick alike
 ALLOWED = 1.2  # times the undisturbed median
-CADDYFILE = Path(__file__).resolve().parents[4] / "deploy" / "Caddyfile"
 CROWD_SECONDS = 60.0  # until the crowd has an answer
 
 
@@ -99,32 +96,9 @@ async def _entry(stack: Stack, front: str) -> AsyncIterator[str]:
         yield stack.observer
         return
     with TemporaryDirectory(prefix="lockstep-caddy-") as folder:
-        port, http_port = free_port(), free_port()
-        ports = {"LOCKSTEP_HTTPS_PORT": str(port), "LOCKSTEP_HTTP_PORT": str(http_port)}
-        site = {"LOCKSTEP_SITE": "localhost", "LOCKSTEP_PORT": str(urlsplit(stack.url).port)}
-        homes = dict.fromkeys(("HOME", "XDG_DATA_HOME", "XDG_CONFIG_HOME"), folder)
-        process = await asyncio.create_subprocess_exec(
-            *("caddy", "run", "--config", str(CADDYFILE), "--adapter", "caddyfile"),
-            env=os.environ | ports | site | homes,
-            stderr=asyncio.subprocess.DEVNULL,
-        )
-        try:
-            await _until_open(port)
-            yield stack.observer.replace(stack.url, f"https://localhost:{port}")
-        finally:
-            process.terminate()
-            await process.wait()
-
-
-async def _until_open(port: int) -> None:
-    async with asyncio.timeout(CROWD_SECONDS), httpx.AsyncClient(verify=False, trust_env=False) as http:
-        while True:
-            try:
-                await http.get(f"https://localhost:{port}/healthz")
-            except httpx.TransportError:
-                await asyncio.sleep(0.05)
-            else:
-                return
+        port = str(urlsplit(stack.url).port)
+        async with running_caddy("Caddyfile", Path(folder), free_port(), LOCKSTEP_PORT=port) as address:
+            yield stack.observer.replace(stack.url, address)
 
 
 async def _drive(console: Console, seconds: float) -> list[float]:

@@ -7,10 +7,10 @@ import msgspec
 import typer
 import uvloop
 
-from lockstep.bench.emulator.errors import NamespacesUnavailable
 from lockstep.bench.interoperability.cells import Found, seconds_of, table_of, wanted
 from lockstep.bench.interoperability.names import Client, Way
 from lockstep.bench.interoperability.run import run_cell
+from lockstep.emulator.errors import NamespacesUnavailable
 
 __all__ = ["interoperability_command"]
 

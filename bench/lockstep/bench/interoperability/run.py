@@ -12,9 +12,10 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from lockstep.bench.emulator.errors import NamespacesUnavailable
+from lockstep.bench.harness.processes import ProcessFailed
 from lockstep.bench.interoperability.cells import Cell, Found
 from lockstep.bench.interoperability.world import World, running_world
+from lockstep.emulator.errors import NamespacesUnavailable
 
 __all__ = ["run_cell"]
 
@@ -39,7 +40,7 @@ async def run_cell(cell: Cell, seconds: float, say: Callable[[str], None]) -> Fo
             )
     except (FileNotFoundError, NamespacesUnavailable):
         raise
-    except (RuntimeError, OSError, ValueError, TimeoutError) as error:
+    except (ProcessFailed, RuntimeError, OSError, ValueError, TimeoutError) as error:
         return Found(seconds=seconds, trouble=_short(str(error) or type(error).__name__), commit=_commit())
     worst = min(results, key=lambda found: found["pictures"])
     return Found(
@@ -71,12 +72,10 @@ async def _visit(world: World, cell: Cell, number: int, seconds: float) -> dict[
 async def _last_json(world: World, command: list[str], seconds: float) -> dict[str, Any]:
     visitor = await world.visit(command)
     async with asyncio.timeout(seconds + SLACK_SECONDS):
-        await visitor.process.wait()
-        if visitor.reader is not None:
-            await visitor.reader
+        status = await visitor.wait()
     said = visitor.said()
-    if visitor.process.returncode != 0 or not said:
-        raise RuntimeError(visitor.lines[-1] if visitor.lines else f"it ended with {visitor.process.returncode}")
+    if status != 0 or not said:
+        raise RuntimeError(visitor.lines[-1] if visitor.lines else f"it ended with {status}")
     return said[-1]
 
 
@@ -100,7 +99,7 @@ async def _gstreamer(world: World, link: str, seconds: float) -> dict[str, Any]:
                 await visitor.grew.wait()
     if visitor.process.returncode is not None:
         raise RuntimeError(f"it ended with {visitor.process.returncode}")
-    visitor.process.send_signal(signal.SIGINT)
+    visitor.signal(signal.SIGINT)
     return {"pictures": shown, "events": newest, "violations": violations, "reconnections": 0}
 
 

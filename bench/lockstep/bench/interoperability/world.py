@@ -1,24 +1,24 @@
 """The world of a cell without its client: a robot, a console and a way between them, each in its own network."""
 
-import asyncio
 import json
-import os
-import shutil
-import signal
 import sys
 from collections.abc import AsyncIterator
-from contextlib import AsyncExitStack, asynccontextmanager, suppress
+from contextlib import AsyncExitStack, asynccontextmanager
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from lockstep.bench.emulator.impairment.delay import Constant
-from lockstep.bench.emulator.impairment.impairment import Impairment
-from lockstep.bench.emulator.impairment.profile import Profile, even_profile
-from lockstep.bench.emulator.namespace.namespaces import ROBOT_ADDRESS, Namespaces, Side
+from lockstep.bench.harness.processes import Running, Spawn, spawn_here, started
+from lockstep.bench.harness.stack import LOCKSTEP
+from lockstep.bench.harness.turn_server import turn_command
 from lockstep.bench.interoperability.names import Client, Way
 from lockstep.bench.relay.janus import JANUS_READY, janus_command
-from lockstep.bench.relay.stage import FIRST_PORT, ROOM, Process
+from lockstep.bench.relay.stage import FIRST_PORT, ROOM
+from lockstep.emulator.impairment.delay import Constant
+from lockstep.emulator.impairment.impairment import Impairment
+from lockstep.emulator.impairment.profile import Profile, even_profile
+from lockstep.emulator.namespace.namespaces import ROBOT_ADDRESS, Namespaces, Side
 
 __all__ = ["World", "running_world"]
 
@@ -26,7 +26,6 @@ CLOUD = "203.0.113.7"  # from the block for documentation (RFC 5737)
 ONE_WAY = 0.3  # s
 PORT = 8000
 TURN_PORT, TURN_SECRET = 3478, "only between these two namespaces"
-STOP_SECONDS = 5.0
 
 
 class _Starter:
@@ -36,20 +35,9 @@ class _Starter:
         self._stack = stack
         self._spaces = spaces
 
-    async def start(self, side: Side, command: list[str], **environment: str) -> Process:
-        own = os.environ | environment
-        pipe, both = asyncio.subprocess.PIPE, asyncio.subprocess.STDOUT
-        if self._spaces is None:
-            process = await asyncio.create_subprocess_exec(
-                *command, env=own, start_new_session=True, stdout=pipe, stderr=both
-            )
-            self._stack.push_async_callback(_end, process)
-        else:
-            process = await self._spaces.start(side, command, env=own, stdout=pipe, stderr=both)
-        started = Process(process)
-        started.reader = asyncio.get_running_loop().create_task(started.read())
-        self._stack.callback(started.reader.cancel)
-        return started
+    async def start(self, side: Side, command: list[str], **environment: str) -> Running:
+        spawn: Spawn = spawn_here if self._spaces is None else partial(self._spaces.start, side)
+        return await self._stack.enter_async_context(started(command, environment=environment, spawn=spawn))
 
 
 @dataclass(frozen=True)
@@ -63,7 +51,7 @@ class World:
     doors: tuple[str, ...]  # host:port of each console; "": the link is at loopback
     starter: _Starter
 
-    async def visit(self, command: list[str]) -> Process:
+    async def visit(self, command: list[str]) -> Running:
         """Start the client's process, on its side of the way."""
         return await self.starter.start("operator", command)
 
@@ -81,7 +69,7 @@ async def running_world(way: Way, client: Client) -> AsyncIterator[World]:
     Raises:
         NamespacesUnavailable: this machine or user cannot have network namespaces.
         FileNotFoundError: a program is missing.
-        RuntimeError: something did not start.
+        ProcessFailed: something did not start.
     """
     async with AsyncExitStack() as stack:
         folder = Path(stack.enter_context(TemporaryDirectory(prefix="lockstep-interoperability-")))
@@ -111,7 +99,7 @@ async def _start_console(starter: _Starter, way: Way, client: Client, number: in
     host = {"ipv6": "::1", "nat": "0.0.0.0"}.get(way, ROBOT_ADDRESS)
     port = 0 if way == "ipv6" else PORT + number
     command = [
-        *(str(Path(sys.executable).with_name("lockstep")), "up", "--json", "--robot", "planar", "--robot-port", "0"),
+        *(LOCKSTEP, "up", "--json", "--robot", "planar", "--robot-port", "0"),
         *("--host", host, "--port", str(port), "--state-dir", str(folder), "--quiet"),
     ]
     command += ["--media-port", str(40000 + number), "--media-tcp"] if way == "tcp" else []
@@ -129,23 +117,6 @@ async def _start_console(starter: _Starter, way: Way, client: Client, number: in
 
 
 async def _start_turn(starter: _Starter, folder: Path) -> None:
-    program = shutil.which("turnserver")
-    if program is None:
-        raise FileNotFoundError("coturn is not installed: Debian's package is called coturn")
-    command = [
-        *(program, "-n", f"--listening-ip={ROBOT_ADDRESS}", f"--relay-ip={ROBOT_ADDRESS}"),
-        *(f"--listening-port={TURN_PORT}", "--use-auth-secret", f"--static-auth-secret={TURN_SECRET}"),
-        *("--realm=lockstep.example", "--fingerprint", "--no-tls", "--no-dtls", "--no-cli", "--log-file=stdout"),
-        *(f"--pidfile={folder / 'turn.pid'}", f"--userdb={folder / 'turn.db'}", "--verbose"),
-    ]
+    command = turn_command(folder, ROBOT_ADDRESS, TURN_PORT, TURN_SECRET, "--log-file=stdout")
     server = await starter.start("robot", command)
     await server.line("(?i)listener opened on|IPv4. UDP listener")
-
-
-async def _end(process: asyncio.subprocess.Process) -> None:
-    for number in (signal.SIGTERM, signal.SIGKILL):
-        with suppress(ProcessLookupError):
-            os.killpg(process.pid, number)
-        with suppress(TimeoutError):
-            async with asyncio.timeout(STOP_SECONDS):
-                await process.wait()

@@ -8,11 +8,12 @@ from typing import Annotated, Any
 
 import typer
 
-from lockstep.bench.emulator import Profile, load_profile, parse_profile
-from lockstep.bench.machine import busy_percent
+from lockstep.bench.figures.machine import busy_percent
+from lockstep.bench.harness.stack import running_stack
 from lockstep.bench.quality.repair import simulate
-from lockstep.bench.quality.stage import driving, running_console
+from lockstep.bench.quality.stage import driving
 from lockstep.bench.quality.summary import summarise, timeline
+from lockstep.emulator import Profile, load_profile, parse_profile
 
 __all__ = ["app"]
 
@@ -127,7 +128,7 @@ def _say_machine() -> None:
 async def _drive(
     profile: Profile, quality: bool, seconds: float, tolerance: int, seed: int, robot: str, codec: str | None
 ) -> dict[str, Any]:
-    async with running_console(robot, quality) as stack:
+    async with running_stack(robot, LOCKSTEP_MEDIA__QUALITY=str(quality).lower()) as stack:
         drive = await driving(stack, profile, seconds=seconds, tolerance=tolerance, seed=seed, codec=codec)
     return {"summary": summarise(drive, seconds), "timeline": timeline(drive, seconds)}
 

@@ -1,21 +1,17 @@
 """Runs robot, console, network and a driving client for one measurement."""
 
 import asyncio
-import sys
 import time
-from collections.abc import AsyncIterator
-from contextlib import asynccontextmanager, suppress
+from contextlib import suppress
 from dataclasses import dataclass
-from pathlib import Path
 
-from lockstep.bench.driving import drive_on, round_and_round
-from lockstep.bench.emulator import NetworkProcess, Profile
-from lockstep.bench.processes import running_process
-from lockstep.bench.stack import Stack, running_bridge
+from lockstep.bench.harness.driving import drive_on, round_and_round
+from lockstep.bench.harness.stack import Stack
 from lockstep.client import Console, ConsoleLost
+from lockstep.emulator import NetworkProcess, Profile
 from lockstep.protocol.serial import event_gap
 
-__all__ = ["Drive", "Picture", "Sight", "driving", "running_console"]
+__all__ = ["Drive", "Picture", "Sight", "driving"]
 
 SAMPLE = 0.05  # s between two looks at the screen and the queue
 
@@ -69,15 +65,6 @@ class Drive:
     def look(self, event: int, queue: float) -> None:
         gap = None if self._shown is None else event_gap(event, self._shown)
         self.sights.append(Sight(time.monotonic() - self.began, gap, queue))
-
-
-@asynccontextmanager
-async def running_console(robot: str, quality: bool) -> AsyncIterator[Stack]:
-    async with running_bridge(robot) as bridge:
-        lockstep = str(Path(sys.executable).with_name("lockstep"))
-        options = ("--port", "0", "--json", "--quiet", "--quality", "on" if quality else "off")
-        async with running_process(lockstep, "serve", "--robot", bridge.address, *options) as (console, links):
-            yield Stack(bridge, console, links["console"], links["operator"], links["observer"])
 
 
 async def driving(

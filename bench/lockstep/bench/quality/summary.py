@@ -2,9 +2,9 @@
 
 from collections.abc import Sequence
 
+from lockstep.bench.figures.samples import quantile
 from lockstep.bench.quality.freezes import freezes
 from lockstep.bench.quality.stage import Drive
-from lockstep.bench.samples import quantile
 
 __all__ = ["summarise", "timeline"]
 

@@ -10,7 +10,7 @@ import math
 import sys
 import time
 
-from lockstep.bench.driving import drive_on
+from lockstep.bench.harness.driving import drive_on
 from lockstep.client import Console
 
 __all__ = ["main"]

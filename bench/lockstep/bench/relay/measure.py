@@ -8,8 +8,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from lockstep.bench.browsers.console_page import ConsolePage, open_console
-from lockstep.bench.relay.stage import Process, RelayStage, relay_stage
-from lockstep.bench.samples import median
+from lockstep.bench.figures.samples import median
+from lockstep.bench.harness.processes import Running
+from lockstep.bench.relay.stage import RelayStage, relay_stage
 
 __all__ = ["Crowd", "Killing", "crowd", "hop_delays", "killings"]
 
@@ -42,7 +43,7 @@ async def hop_delays(folder: Path, seconds: float) -> dict[str, list[float]]:
         return found
 
 
-async def _delays(stage: RelayStage, mode: str) -> Process:
+async def _delays(stage: RelayStage, mode: str) -> Running:
     watcher = await stage.start(
         "robot", [sys.executable, "-m", "lockstep.bench.relay.delays", stage.links["observer"], mode]
     )
@@ -52,7 +53,7 @@ async def _delays(stage: RelayStage, mode: str) -> Process:
 
 @dataclass(frozen=True)
 class Crowd:
-    """Processor time in % of a core, and the operator's command → feedback times in ms, for a number of observers."""
+    """Runningor time in % of a core, and the operator's command → feedback times in ms, for a number of observers."""
 
     observers: int
     console: float
@@ -86,7 +87,7 @@ async def crowd(folder: Path, counts: Sequence[int], seconds: float, say: Callab
         await asyncio.sleep(SETTLE)
         found = [await _look(stage, driver, None, 0, seconds)]
         say(f"relay: {found[-1].summary}")
-        audience: Process | None = None
+        audience: Running | None = None
         for count in counts:
             if audience is not None:
                 await audience.end()
@@ -106,7 +107,7 @@ async def crowd(folder: Path, counts: Sequence[int], seconds: float, say: Callab
         return found
 
 
-async def _look(stage: RelayStage, driver: Process, audience: Process | None, count: int, seconds: float) -> Crowd:
+async def _look(stage: RelayStage, driver: Running, audience: Running | None, count: int, seconds: float) -> Crowd:
     if stage.console is None:
         raise RuntimeError("no console")
     processes = [stage.console, *stage.janus, *([audience] if audience else [])]
@@ -175,7 +176,7 @@ async def _watching(page: ConsolePage) -> None:
         await page.page.reload()
 
 
-async def _kill(stage: RelayStage, driver: Process, page: ConsolePage, seconds: float) -> Killing:
+async def _kill(stage: RelayStage, driver: Running, page: ConsolePage, seconds: float) -> Killing:
     relay = str((await page.stats())["relay"])
     number = int(relay)
     driven, began = len(driver.said()), time.monotonic()

@@ -5,7 +5,6 @@ subscribers count the packets of their sockets. The cost is the slope, without t
 """
 
 import asyncio
-import os
 import sys
 import time
 from pathlib import Path
@@ -15,6 +14,7 @@ from typing import Any
 import numpy as np
 from prometheus_client import CollectorRegistry
 
+from lockstep.bench.harness.processes import Running, started
 from lockstep.bench.relay.janus import JANUS_READY, janus_command
 from lockstep.client.transport.sfu_media import RelayMedia, RelayTicket
 from lockstep.protocol.description import Camera, RobotDescription
@@ -33,11 +33,6 @@ PORT, ROOM, FEED = 8197, 1, 77
 WIDTH, HEIGHT, RATE = 320, 240, 25.0
 STEPS, SECONDS = (1, 6, 12), 12.0
 KEYS = RoomKeys("", "secret", "publisher", "pin")
-
-
-def cpu_seconds(pid: int) -> float:
-    fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
-    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 
 
 async def feed(hub: MediaHub, camera: str) -> None:
@@ -81,7 +76,7 @@ class _Connect:
         return self._endpoint.connect(controlling=controlling)
 
 
-async def measure(host: str, pid: int) -> list[tuple[int, float]]:
+async def measure(host: str, janus: Running) -> list[tuple[int, float]]:
     """Return packets and seconds of processor time, for each number of subscribers."""
     camera = Camera(name="noise", label="Noise", width=WIDTH, height=HEIGHT, frame_rate=RATE)
     hub = MediaHub(MediaSettings(), CollectorRegistry())
@@ -102,9 +97,9 @@ async def measure(host: str, pid: int) -> list[tuple[int, float]]:
             while len(watchers) < step:
                 watchers.append(await subscribe(ticket, counts))
             await asyncio.sleep(2.0)
-            before, used = counts[0], cpu_seconds(pid)
+            before, used = counts[0], janus.cpu_seconds()
             await asyncio.sleep(SECONDS)
-            found.append((counts[0] - before, cpu_seconds(pid) - used))
+            found.append((counts[0] - before, janus.cpu_seconds() - used))
             print(f"{step} subscribers: {found[-1][0]} packets, {found[-1][1]:.2f} s of processor", flush=True)
         for task in feeding:
             task.cancel()
@@ -122,21 +117,9 @@ async def _talk(publication: Any) -> None:
 
 async def run(host: str) -> None:
     with TemporaryDirectory() as folder:
-        janus = await asyncio.create_subprocess_exec(
-            *janus_command(Path(folder), host, PORT), stdout=asyncio.subprocess.PIPE
-        )
-        if janus.stdout is None:
-            raise RuntimeError("no output")
-        async for line in janus.stdout:
-            if JANUS_READY in line.decode():
-                break
-        draining = asyncio.create_task(janus.stdout.read())
-        try:
-            found = await measure(host, janus.pid)
-        finally:
-            janus.terminate()
-            await janus.wait()
-            await draining
+        async with started(janus_command(Path(folder), host, PORT)) as janus:
+            await janus.line(JANUS_READY)
+            found = await measure(host, janus)
     packets, seconds = found[-1][0] - found[0][0], found[-1][1] - found[0][1]
     print(f"{seconds / packets * 1e6:.1f} µs a packet")
 

@@ -19,17 +19,17 @@ from typing import Any, NamedTuple
 
 from playwright.async_api import Page
 
-from lockstep.bench.browser import DRAW_PROBE, open_probed_page
 from lockstep.bench.browsers.chromium import PAD, running_chromium
 from lockstep.bench.browsers.console_page import LEFT_Y, RB, ConsolePage
+from lockstep.bench.browsers.page_clock import PageClock, read_page_clock
+from lockstep.bench.browsers.probed_page import DRAW_PROBE, open_probed_page
 from lockstep.bench.context import Context
-from lockstep.bench.event_log import capture_times
-from lockstep.bench.media_join import join_pictures
-from lockstep.bench.page_clock import PageClock, read_page_clock
-from lockstep.bench.processes import running_process
-from lockstep.bench.results import Result
-from lockstep.bench.samples import median, quantile
-from lockstep.bench.stack import Bridge, Stack, running_stack
+from lockstep.bench.figures.media_join import join_pictures
+from lockstep.bench.figures.results import Result
+from lockstep.bench.figures.samples import median, quantile
+from lockstep.bench.harness.event_log import capture_times
+from lockstep.bench.harness.processes import running_process
+from lockstep.bench.harness.stack import Bridge, Stack, running_stack
 
 __all__ = ["run"]
 
@@ -107,7 +107,7 @@ async def _driving(console: ConsolePage) -> AsyncIterator[None]:
 
 
 async def _bare(bridge: Bridge, seconds: float) -> Delays:
-    command = (sys.executable, "-m", "lockstep.bench.baseline_server", bridge.address)
+    command = (sys.executable, "-m", "lockstep.bench.baseline.baseline_server", bridge.address)
     async with (
         running_process(*command) as (_, ready),
         running_chromium() as browser,

@@ -8,11 +8,11 @@ The baseline is the robot link alone: the same robot, driven the same way over T
 """
 
 from lockstep.bench.context import Context
-from lockstep.bench.driving import Trip, console_trips, link_trips
-from lockstep.bench.event_log import robot_times
-from lockstep.bench.results import Result
-from lockstep.bench.samples import median, quantile
-from lockstep.bench.stack import Bridge, running_bridge, running_stack
+from lockstep.bench.figures.results import Result
+from lockstep.bench.figures.samples import median, quantile
+from lockstep.bench.harness.driving import Trip, console_trips, link_trips
+from lockstep.bench.harness.event_log import robot_times
+from lockstep.bench.harness.stack import Bridge, running_bridge, running_stack
 from lockstep.client import Console
 from lockstep.robot_bridge.link.link_client import RobotLink
 

@@ -4,7 +4,7 @@ import time
 from contextlib import ExitStack, closing
 
 from lockstep.bench.context import Context
-from lockstep.bench.results import Result
+from lockstep.bench.figures.results import Result
 from lockstep.rtc.addresses import Datagram, Path
 from lockstep.rtc.udp_socket import UdpSocket
 

@@ -8,15 +8,15 @@ Behind three networks the page is opened in network namespaces, with the kernel'
 
 import sys
 
-from lockstep.bench.browser import open_probed_page
 from lockstep.bench.browsers.chromium import running_chromium
+from lockstep.bench.browsers.probed_page import open_probed_page
 from lockstep.bench.context import Context
-from lockstep.bench.emulator.errors import NamespacesUnavailable
-from lockstep.bench.far_openings import far_baseline, far_console, open_far
-from lockstep.bench.processes import running_process
-from lockstep.bench.results import Result
-from lockstep.bench.samples import median
-from lockstep.bench.stack import running_stack
+from lockstep.bench.figures.results import Result
+from lockstep.bench.figures.samples import median
+from lockstep.bench.harness.processes import running_process
+from lockstep.bench.harness.stack import running_stack
+from lockstep.bench.page_opening.far_openings import far_baseline, far_console, open_far
+from lockstep.emulator.errors import NamespacesUnavailable
 
 __all__ = ["run"]
 
@@ -39,7 +39,7 @@ async def run(context: Context) -> list[Result]:
     for robot in context.robots[:1] if context.quick else context.robots:
         async with running_stack(robot) as stack:
             ours = [await _open(stack.operator, OURS) for _ in range(count)]
-            command = (sys.executable, "-m", "lockstep.bench.baseline_server", stack.bridge.address)
+            command = (sys.executable, "-m", "lockstep.bench.baseline.baseline_server", stack.bridge.address)
             async with running_process(*command) as (_, ready):
                 theirs = [await _open(ready["console"], THEIRS) for _ in range(count)]
         results += _rows(robot, ours, theirs)

@@ -5,11 +5,11 @@ with another gate. `lockstep experiment growth` shows the same at more rates, wi
 """
 
 from lockstep.bench.context import Context
-from lockstep.bench.emulator.impairment.profile import load_profile
 from lockstep.bench.experiment.choices import Choices
 from lockstep.bench.experiment.endurance.growth import Point, run_growth
-from lockstep.bench.results import Result
-from lockstep.client.media.media_gate import GateMode
+from lockstep.bench.experiment.judge.record import Gate
+from lockstep.bench.figures.results import Result
+from lockstep.emulator.impairment.profile import load_profile
 
 __all__ = ["run"]
 
@@ -18,7 +18,7 @@ PROFILE = "hong-kong"
 TOLERANCE = 2
 RATES, QUICK_RATES = (5.0, 20.0), (20.0,)  # events a second
 SECONDS, QUICK_SECONDS = 12, 4
-VIEWERS: tuple[tuple[GateMode, float], ...] = (("event", 0.0), ("age", 0.0), ("off", 0.0))
+VIEWERS: tuple[tuple[Gate, float], ...] = (("event", 0.0), ("age", 0.0), ("off", 0.0))
 BASELINES = {
     "age": "a gate by age: media captured at most 0.5 s ago, by clocks that agree",
     "off": "no gate",

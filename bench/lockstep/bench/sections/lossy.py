@@ -13,13 +13,13 @@ from dataclasses import dataclass
 from aiortc import RTCConfiguration, RTCDataChannel, RTCPeerConnection
 
 from lockstep.bench.context import Context
-from lockstep.bench.driving import console_trips
-from lockstep.bench.emulator import Constant, Impairment, Network, NetworkProcess, bursty, even_profile
-from lockstep.bench.loopback_peers import connect_through
-from lockstep.bench.results import Result
-from lockstep.bench.samples import quantile
-from lockstep.bench.stack import running_stack
+from lockstep.bench.figures.results import Result
+from lockstep.bench.figures.samples import quantile
+from lockstep.bench.harness.driving import console_trips
+from lockstep.bench.harness.loopback_peers import connect_through
+from lockstep.bench.harness.stack import running_stack
 from lockstep.client import Console
+from lockstep.emulator import Constant, Impairment, Network, NetworkProcess, bursty, even_profile
 
 __all__ = ["run"]
 

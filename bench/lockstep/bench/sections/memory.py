@@ -13,12 +13,12 @@ import time
 from contextlib import AsyncExitStack
 
 from lockstep.bench.context import Context
-from lockstep.bench.driving import console_trips
-from lockstep.bench.idle_crowd import idle_crowd
-from lockstep.bench.processes import Running, running_process
-from lockstep.bench.results import Result
+from lockstep.bench.figures.results import Result
+from lockstep.bench.harness.driving import console_trips
+from lockstep.bench.harness.processes import Running, running_process
+from lockstep.bench.harness.stack import running_stack
 from lockstep.bench.soak.memory import growth
-from lockstep.bench.stack import running_stack
+from lockstep.bench.viewers.idle_crowd import idle_crowd
 from lockstep.client import Console
 
 __all__ = ["run"]
@@ -75,7 +75,7 @@ async def _many(context: Context) -> list[Result]:
 async def _coming_and_going(context: Context) -> list[Result]:
     seconds = float(context.scale(SECONDS, QUICK_SECONDS))
     async with running_stack(ROBOT) as stack, AsyncExitStack() as others:
-        command = (sys.executable, "-m", "lockstep.bench.baseline_server", stack.bridge.address)
+        command = (sys.executable, "-m", "lockstep.bench.baseline.baseline_server", stack.bridge.address)
         rival, ready = await others.enter_async_context(running_process(*command))
         await _audience(others, stack.observer, OBSERVERS)
         await _audience(others, ready["console"], OBSERVERS, "plain")
@@ -91,7 +91,7 @@ async def _coming_and_going(context: Context) -> list[Result]:
 
 
 async def _audience(stack: AsyncExitStack, link: str, count: int, *how: str) -> None:
-    command = (sys.executable, "-m", "lockstep.bench.audience", link, str(count), *how)
+    command = (sys.executable, "-m", "lockstep.bench.viewers.audience", link, str(count), *how)
     await stack.enter_async_context(running_process(*command, ready_seconds=CONNECT_SECONDS))
 
 

@@ -22,12 +22,12 @@ import time
 from dataclasses import dataclass
 
 from lockstep.bench.context import Context
-from lockstep.bench.driving import console_trips
-from lockstep.bench.idle_crowd import idle_crowd
-from lockstep.bench.processes import Running, running_process
-from lockstep.bench.results import Result
-from lockstep.bench.samples import median, quantile
-from lockstep.bench.stack import Bridge, Metrics, Stack, running_stack
+from lockstep.bench.figures.results import Result
+from lockstep.bench.figures.samples import median, quantile
+from lockstep.bench.harness.driving import console_trips
+from lockstep.bench.harness.processes import Running, running_process
+from lockstep.bench.harness.stack import Bridge, Metrics, Stack, running_stack
+from lockstep.bench.viewers.idle_crowd import idle_crowd
 from lockstep.client import Console
 
 __all__ = ["run"]
@@ -172,14 +172,14 @@ async def _settled(audiences: list[Running]) -> list[Received]:
 
 async def _bare(bridge: Bridge, seconds: float) -> dict[int, float]:
     """Return the processor time per peer in % of a core, by number of peers."""
-    async with running_process(sys.executable, "-m", "lockstep.bench.baseline_server", bridge.address) as (
+    async with running_process(sys.executable, "-m", "lockstep.bench.baseline.baseline_server", bridge.address) as (
         server,
         ready,
     ):
         nobody = await _share(server, seconds)
         found: dict[int, float] = {}
         for peers in (1, BARE_PEERS):
-            command = (sys.executable, "-m", "lockstep.bench.audience", ready["console"], str(peers), "plain")
+            command = (sys.executable, "-m", "lockstep.bench.viewers.audience", ready["console"], str(peers), "plain")
             async with running_process(*command):
                 await asyncio.sleep(SETTLE)
                 found[peers] = (await _share(server, seconds) - nobody) / peers

@@ -6,11 +6,11 @@ The two alternate in one run.
 import httpx
 
 from lockstep.bench.context import Context
-from lockstep.bench.driving import Trip, console_trips
-from lockstep.bench.event_log import robot_times
-from lockstep.bench.results import Result
-from lockstep.bench.samples import median, quantile
-from lockstep.bench.stack import running_stack
+from lockstep.bench.figures.results import Result
+from lockstep.bench.figures.samples import median, quantile
+from lockstep.bench.harness.driving import Trip, console_trips
+from lockstep.bench.harness.event_log import robot_times
+from lockstep.bench.harness.stack import running_stack
 from lockstep.client import Console
 
 __all__ = ["run"]

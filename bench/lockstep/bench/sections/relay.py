@@ -8,9 +8,9 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from lockstep.bench.context import Context
+from lockstep.bench.figures.results import Result
+from lockstep.bench.figures.samples import median, quantile
 from lockstep.bench.relay.measure import Crowd, Killing, crowd, hop_delays, killings
-from lockstep.bench.results import Result
-from lockstep.bench.samples import median, quantile
 
 __all__ = ["run"]
 

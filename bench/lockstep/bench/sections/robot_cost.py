@@ -15,9 +15,9 @@ from contextlib import asynccontextmanager
 from typing import NamedTuple
 
 from lockstep.bench.context import Context
-from lockstep.bench.driving import console_trips
-from lockstep.bench.results import Result
-from lockstep.bench.stack import DEFAULT_ROBOT, Stack, running_stack
+from lockstep.bench.figures.results import Result
+from lockstep.bench.harness.driving import console_trips
+from lockstep.bench.harness.stack import DEFAULT_ROBOT, Stack, running_stack
 from lockstep.client import Console
 
 __all__ = ["run"]

@@ -8,11 +8,11 @@ import asyncio
 import sys
 
 from lockstep.bench.context import Context
-from lockstep.bench.driving import console_trips
-from lockstep.bench.processes import running_process
-from lockstep.bench.results import Result
-from lockstep.bench.samples import median, quantile
-from lockstep.bench.stack import DEFAULT_ROBOT, Stack, running_stack
+from lockstep.bench.figures.results import Result
+from lockstep.bench.figures.samples import median, quantile
+from lockstep.bench.harness.driving import console_trips
+from lockstep.bench.harness.processes import running_process
+from lockstep.bench.harness.stack import DEFAULT_ROBOT, Stack, running_stack
 from lockstep.client import Console
 
 __all__ = ["run"]
@@ -51,7 +51,7 @@ async def _drive(operator: Console, context: Context) -> list[float]:
 
 async def _watched(stack: Stack, operator: Console, context: Context) -> tuple[list[float], int]:
     """Return the trips in ms, and the bytes that the viewers got meanwhile."""
-    command = (sys.executable, "-m", "lockstep.bench.scene_viewers", stack.observer, str(VIEWERS))
+    command = (sys.executable, "-m", "lockstep.bench.viewers.scene_viewers", stack.observer, str(VIEWERS))
     async with running_process(*command) as (viewers, _):
         before = await viewers.ask("count", ANSWER_SECONDS)
         trips = await _drive(operator, context)

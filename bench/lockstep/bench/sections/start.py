@@ -12,13 +12,13 @@ from tempfile import TemporaryDirectory
 
 from playwright.async_api import Browser
 
-from lockstep.bench.browser import open_probed_page
 from lockstep.bench.browsers.chromium import running_chromium
+from lockstep.bench.browsers.probed_page import open_probed_page
 from lockstep.bench.context import Context
-from lockstep.bench.processes import running_process
-from lockstep.bench.results import Result
-from lockstep.bench.samples import median
-from lockstep.bench.stack import running_bridge
+from lockstep.bench.figures.results import Result
+from lockstep.bench.figures.samples import median
+from lockstep.bench.harness.processes import running_process
+from lockstep.bench.harness.stack import running_bridge
 
 __all__ = ["run"]
 
@@ -56,7 +56,7 @@ async def _plain(robot: str, browser: Browser) -> tuple[float, float]:
     began = time.monotonic()
     async with (
         running_bridge(robot) as bridge,
-        running_process(sys.executable, "-m", "lockstep.bench.baseline_server", bridge.address) as (_, ready),
+        running_process(sys.executable, "-m", "lockstep.bench.baseline.baseline_server", bridge.address) as (_, ready),
     ):
         linked = time.monotonic() - began
         return linked, await _first_picture(browser, ready["console"], THEIRS, began)

@@ -8,7 +8,7 @@ from typing import Annotated, Any
 import typer
 import uvloop
 
-from lockstep.bench.processes import ProcessFailed
+from lockstep.bench.harness.processes import ProcessFailed
 from lockstep.bench.soak.run import soak
 
 __all__ = ["soak_command"]

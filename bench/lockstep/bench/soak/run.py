@@ -14,16 +14,16 @@ from typing import Any
 
 import httpx
 
-from lockstep.bench.browser import open_probed_page
 from lockstep.bench.browsers.chromium import PAD, running_chromium
-from lockstep.bench.emulator import Network, load_profile
+from lockstep.bench.browsers.probed_page import open_probed_page
+from lockstep.bench.harness.stack import Metrics
 from lockstep.bench.soak.crowd import Crowd, Intruder
 from lockstep.bench.soak.judge import Judge
 from lockstep.bench.soak.memory import Sample, growth, growth_alike
 from lockstep.bench.soak.pages import OperatorPage, WatchedPage
 from lockstep.bench.soak.schedule import Action, schedule
 from lockstep.bench.soak.world import World
-from lockstep.bench.stack import Metrics
+from lockstep.emulator import Network, load_profile
 
 __all__ = ["soak"]
 

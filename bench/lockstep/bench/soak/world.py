@@ -1,25 +1,23 @@
 """The bridge and the console of a soak: processes that are killed and started again at the same address."""
 
 import asyncio
-import json
 import re
 import secrets
-import sys
 import time
 from collections import Counter
-from collections.abc import Iterator, Mapping
-from contextlib import AsyncExitStack
+from collections.abc import Iterator
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Self
+from typing import Self
 
 import httpx
 
-from lockstep.bench.processes import Running, running_process
+from lockstep.bench.harness.event_log import Record, records
+from lockstep.bench.harness.lives import DOWN_SECONDS, BridgeLives, Lives
+from lockstep.bench.harness.stack import LOCKSTEP
 
 __all__ = ["World"]
 
-DOWN_SECONDS = 1.0  # between a death and the next life
 HTTP_SECONDS = 10.0
 OPEN_ENCODERS = re.compile(r'^lockstep_media_encoders\{codec="(\w+)",stream="[^"]*"\} ([\d.e+]+)$', re.MULTILINE)
 
@@ -27,27 +25,22 @@ OPEN_ENCODERS = re.compile(r'^lockstep_media_encoders\{codec="(\w+)",stream="[^"
 class World:
     """A context manager in which the bridge runs; then call `open_console` with the console's address of the robot."""
 
-    def __init__(self, folder: Path, robot: str = "planar") -> None:
-        self.event_log = folder / "events.jsonl"
+    def __init__(self, folder: Path) -> None:
         self.console_url = ""
         self.operator = self.observer = ""
         self.bridge_kills = self.server_restarts = 0
-        self._robot = robot
         self._environment = {
             "LOCKSTEP_STATE_DIR": str(folder / "state"),
             "LOCKSTEP_SECRET": secrets.token_urlsafe(32),  # so that links outlive a restart
         }
-        self._bridge_life, self._server_life = AsyncExitStack(), AsyncExitStack()
-        self._bridge: Running | None = None
-        self._server: Running | None = None
-        self._bridge_port = self._server_port = 0
-        self._bridges = 0  # number of bridges started
+        self._bridge, self._server = BridgeLives(folder), Lives()
+        self._server_port = 0
         self._robot_address = ""
         self._troubles = 0
         self._calm_since = time.monotonic()
 
     async def __aenter__(self) -> Self:
-        await self._start_bridge()
+        await self._bridge.begin()
         return self
 
     async def open_console(self, robot_address: str) -> None:
@@ -57,13 +50,13 @@ class World:
     @property
     def robot(self) -> tuple[str, int]:
         """The address at which the bridge itself listens."""
-        return "127.0.0.1", self._bridge_port
+        return "127.0.0.1", self._bridge.port
 
     async def __aexit__(
         self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
     ) -> None:
-        await self._server_life.aclose()
-        await self._bridge_life.aclose()
+        await self._server.end()
+        await self._bridge.end()
 
     # Disturbances
 
@@ -81,11 +74,8 @@ class World:
     async def kill_bridge(self) -> None:
         self.trouble_begins()
         try:
-            if self._bridge is not None:
-                await self._bridge.kill()
-            await self._bridge_life.aclose()
-            await asyncio.sleep(DOWN_SECONDS)
-            await self._start_bridge()
+            await self._bridge.kill()
+            await self._bridge.begin()
             self.bridge_kills += 1
         finally:
             self.trouble_ends()
@@ -93,10 +83,11 @@ class World:
     async def restart_server(self, *, gently: bool) -> None:
         self.trouble_begins()
         try:
-            if self._server is not None and not gently:
+            if gently:
+                await self._server.end()
+                await asyncio.sleep(DOWN_SECONDS)
+            else:
                 await self._server.kill()
-            await self._server_life.aclose()
-            await asyncio.sleep(DOWN_SECONDS)
             await self._start_server()
             self.server_restarts += 1
         finally:
@@ -138,7 +129,7 @@ class World:
     def server_memory(self) -> int | None:
         """Return the server's memory in bytes; None while it is down."""
         try:
-            return None if self._server is None else self._server.resident_bytes()
+            return None if self._server.running is None else self._server.running.resident_bytes()
         except (OSError, ValueError, IndexError):
             return None
 
@@ -154,45 +145,14 @@ class World:
             counts[codec] += int(float(count))
         return tuple(sorted(counts.items()))
 
-    def records(self) -> Iterator[Mapping[str, Any]]:
-        """Yield the bridge's record of all epochs; half a line, which a killed bridge may leave, is passed over."""
-        with self.event_log.open() as lines:
-            for line in lines:
-                try:
-                    yield json.loads(line)
-                except ValueError:
-                    continue
-
-    async def _start_bridge(self) -> None:
-        command = (
-            sys.executable,
-            "-m",
-            "lockstep.robot_bridge",
-            self._robot,
-            "--port",
-            str(self._bridge_port),
-            "--json",
-        )
-        self._bridges += (
-            1  # a new state directory for each: one that was killed begins stopped, which is not at issue here
-        )
-        state = self.event_log.with_name(f"bridge-state-{self._bridges}")
-        files = ("--event-log", str(self.event_log), "--state-dir", str(state))
-        life = AsyncExitStack()
-        self._bridge, ready = await life.enter_async_context(
-            running_process(*command, *files, environment=self._environment)
-        )
-        self._bridge_life = life
-        self._bridge_port = int(ready["robot"].rsplit(":", 1)[1])
+    def records(self) -> Iterator[Record]:
+        """Yield the bridge's record of all epochs."""
+        return records(self._bridge.event_log)
 
     async def _start_server(self) -> None:
-        command = (str(Path(sys.executable).with_name("lockstep")), "serve", "--json", "--quiet")
+        command = (LOCKSTEP, "serve", "--json", "--quiet")
         where = ("--robot", self._robot_address, "--port", str(self._server_port))
-        life = AsyncExitStack()
-        self._server, ready = await life.enter_async_context(
-            running_process(*command, *where, environment=self._environment)
-        )
-        self._server_life = life
+        ready = await self._server.begin(*command, *where, **self._environment)
         self.console_url, self.operator, self.observer = ready["console"], ready["operator"], ready["observer"]
         self._server_port = int(self.console_url.rsplit(":", 1)[1])
 

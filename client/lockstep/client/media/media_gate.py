@@ -1,34 +1,29 @@
 """The gate for pictures and sound: one rule, the same in web/, both checked by tests/vectors/gate.json. No I/O.
 
-The mode `event` is the rule. The two others are for comparison: `off` renders everything; `age` renders media that were
-captured at most `MAX_AGE` ago by synchronised clocks, and ignores events.
+The mode `event` is the rule. The mode `off` renders everything.
 """
 
 from typing import Generic, Literal, NamedTuple, TypeVar
 
 from lockstep.protocol.serial import event_gap
 
-__all__ = ["MAX_AGE", "GateMode", "Gated", "MediaGate", "Verdict", "verdict"]
+__all__ = ["GateMode", "Gated", "MediaGate", "Verdict", "verdict"]
 
-GateMode = Literal["event", "off", "age"]
+GateMode = Literal["event", "off"]
 Verdict = Literal["render", "discard", "hold"]
 Medium = TypeVar("Medium")
 
-MAX_AGE = 0.5  # s; for the mode `age`
-
 
 def verdict(
-    feedback: int | None, stamp: int | None, tolerance: int, mode: GateMode = "event", age: float | None = None
+    feedback: int | None, stamp: int | None, tolerance: int, mode: GateMode = "event"
 ) -> tuple[Verdict, int | None]:
     """Return the verdict on a medium stamped `stamp` while `feedback` is the newest event, and the gap.
 
-    The gap is None when either side is unknown. `age`, in seconds, is for the mode `age` alone; None when unknown.
+    The gap is None when either side is unknown.
     """
     gap = None if feedback is None or stamp is None else event_gap(feedback, stamp)
     if mode == "off":
         return "render", gap
-    if mode == "age":
-        return ("render" if age is not None and age <= MAX_AGE else "discard"), gap
     if stamp is None:
         return "discard", None
     if gap is None or gap < -tolerance:
@@ -95,12 +90,12 @@ class MediaGate(Generic[Medium]):
         self._waiting = None
         return self._settle(decision, medium, stamp, gap)
 
-    def offer(self, medium: Medium, stamp: int | None, age: float | None = None) -> Gated[Medium] | None:
-        """Take a medium that arrived. `age`: s since its capture, if clocks are synchronised."""
+    def offer(self, medium: Medium, stamp: int | None) -> Gated[Medium] | None:
+        """Take a medium that arrived."""
         self.received += 1
         if stamp is not None:
             self.stamp = stamp
-        decision, gap = verdict(self._feedback, stamp, self.tolerance, self.mode, age)
+        decision, gap = verdict(self._feedback, stamp, self.tolerance, self.mode)
         if gap is not None:
             self.lag = max(self.lag, gap)
         if decision == "hold":
@@ -108,9 +103,9 @@ class MediaGate(Generic[Medium]):
             return None
         return self._settle(decision, medium, stamp, gap)
 
-    def check(self, stamp: int | None, age: float | None = None) -> tuple[Verdict, int | None]:
+    def check(self, stamp: int | None) -> tuple[Verdict, int | None]:
         """Return the verdict now on a medium that was let through before."""
-        return verdict(self._feedback, stamp, self.tolerance, self.mode, age)
+        return verdict(self._feedback, stamp, self.tolerance, self.mode)
 
     def _hold(self, medium: Medium, stamp: int | None) -> None:
         if self._waiting is not None:

@@ -136,7 +136,7 @@ class Stream:
                     self._start_over(self._assembler)
                 continue
             for frame in frames:
-                self._render(self.gate.offer(frame, frame.stamp, self._age(frame)))
+                self._render(self.gate.offer(frame, frame.stamp))
 
     # Through the gate, to the readers
 
@@ -146,7 +146,7 @@ class Stream:
 
     def check(self, medium: Decoded) -> tuple[Verdict, int | None]:
         """Return the verdict now on a medium that a reader took."""
-        return self.gate.check(medium.stamp, self._age(medium))
+        return self.gate.check(medium.stamp)
 
     def _age(self, medium: Decoded) -> float | None:
         """Return the medium's age in s, if both ends' clocks agree; None if it does not carry its capture time."""

@@ -11,7 +11,7 @@ from typing import Generic, TypeVar
 
 from lockstep.protocol.messages import Media
 
-__all__ = ["MediaOutbox", "NewestOutbox"]
+__all__ = ["MediaOutbox", "NewestOutbox", "StreamQueue"]
 
 Key = TypeVar("Key")
 Item = TypeVar("Item")
@@ -40,44 +40,71 @@ class NewestOutbox(Generic[Key, Item]):
         return self._items.pop(next(iter(self._items))) if self._items else None
 
 
+class StreamQueue(Generic[Item]):
+    """Waiting media of one stream: bounded, and nothing leaves that cannot be decoded."""
+
+    def __init__(self) -> None:
+        self.dropped = 0
+        self._items: deque[Item] = deque()
+        self._is_broken = False  # until a keyframe
+
+    def __len__(self) -> int:
+        return len(self._items)
+
+    def put(self, *, keyframe: bool, depth: int, make: Callable[[], Item]) -> None:
+        """Add a medium; `make` builds the item unless it is dropped at once.
+
+        A keyframe replaces the oldest beyond `depth`. Another picture that does not fit takes all that wait with it:
+        the stream resumes with the next keyframe.
+        """
+        if not keyframe and (self._is_broken or len(self._items) >= depth):
+            if not self._is_broken:
+                self._is_broken = True
+                self._drop(len(self._items))
+            self.dropped += 1
+            return
+        if keyframe:
+            self._is_broken = False
+            self._drop(len(self._items) - depth + 1)
+        self._items.append(make())
+
+    def pop(self) -> Item:
+        return self._items.popleft()
+
+    def take_all(self) -> list[Item]:
+        found = list(self._items)
+        self._items.clear()
+        return found
+
+    def _drop(self, count: int) -> None:
+        for _ in range(count):
+            self._items.popleft()
+            self.dropped += 1
+
+
 class MediaOutbox(Generic[Item]):
     """Waiting media of one peer. `Item` is the message or its bytes."""
 
     def __init__(self) -> None:
-        self._streams: dict[str, deque[Item]] = {}
-        self._broken: set[str] = set()  # streams that wait for a keyframe
-        self.drops: Counter[str] = Counter()
+        self._streams: dict[str, StreamQueue[Item]] = {}
 
     def __len__(self) -> int:
         return sum(map(len, self._streams.values()))
 
+    @property
+    def drops(self) -> Counter[str]:
+        """How many media of each stream were dropped."""
+        return Counter({stream: queue.dropped for stream, queue in self._streams.items() if queue.dropped})
+
     def put(self, media: Media, make: Callable[[], Item]) -> None:
         """Add a medium; `make` builds the item unless it is dropped at once."""
-        queue = self._streams.setdefault(media.stream, deque())
-        if media.keyframe:
-            self._broken.discard(media.stream)
-        elif media.stream in self._broken:
-            self.drops[media.stream] += 1
-            return
         depth = 1 if media.keyframe and media.codec != "pcm_s16le" else ORDERED_DEPTH
-        if media.keyframe:
-            while len(queue) >= depth:
-                self._drop(media.stream, queue)
-        elif len(queue) >= depth:
-            self._broken.add(media.stream)
-            self.drops[media.stream] += len(queue) + 1
-            queue.clear()
-            return
-        queue.append(make())
-
-    def _drop(self, stream: str, queue: deque[Item]) -> None:
-        queue.popleft()
-        self.drops[stream] += 1
+        self._streams.setdefault(media.stream, StreamQueue()).put(keyframe=media.keyframe, depth=depth, make=make)
 
     def pop(self) -> Item | None:
         """Return the next item, streams in turn; None if the outbox is empty."""
         for stream, queue in self._streams.items():
             if queue:
                 self._streams[stream] = self._streams.pop(stream)  # to the end of the turn
-                return queue.popleft()
+                return queue.pop()
         return None

@@ -13,8 +13,8 @@ from lockstep.rtc.ice.events import Answered, Ended, Event, PathChanged, Restart
 from lockstep.rtc.ice.role import Role
 from lockstep.rtc.ice.session import Session
 from lockstep.rtc.ice.settings import IceSettings
-from lockstep.rtc.ice.token_bucket import TokenBuckets
 from lockstep.rtc.stun import Kind, transaction_of, username_of
+from lockstep.rtc.token_bucket import TokenBucket
 
 __all__ = ["Agent"]
 
@@ -49,7 +49,7 @@ class Agent:
         self._set_candidates(local_candidates)
         self.counts: Counter[str] = Counter()  # dropped datagrams, by reason
         # Requests from paths that it has not claimed; `Port` asks before it passes one on.
-        self.unclaimed = TokenBuckets(self._settings.max_checks_per_second, self._settings.check_burst)
+        self.unclaimed = TokenBucket(self._settings.max_checks_per_second, self._settings.check_burst)
         self._directory = directory or Directory()
         self._rng = rng or SystemRandom()
         self._role = Role(controlling, self._rng.getrandbits(64))

@@ -18,8 +18,8 @@ from lockstep.rtc.addresses import Path
 from lockstep.rtc.demux import DatagramKind, datagram_kind
 from lockstep.rtc.ice.agent import Agent
 from lockstep.rtc.ice.directory import Directory
-from lockstep.rtc.ice.token_bucket import TokenBuckets
 from lockstep.rtc.stun import Kind, transaction_of, username_of
+from lockstep.rtc.token_bucket import TokenBucket
 
 __all__ = ["Port", "PortSettings"]
 
@@ -82,12 +82,12 @@ class SourceLimit:
     def __init__(self, settings: PortSettings) -> None:
         # A dictionary of sources would grow with forged ones, or forget honest ones. Python seeds the hash of texts
         # anew in each process, so that no sender can choose a slot to share.
-        self._sources = TokenBuckets(settings.source_rate, settings.source_burst, settings.source_slots)
-        self._total = TokenBuckets(settings.total_rate, settings.total_burst)
+        self._sources = [TokenBucket(settings.source_rate, settings.source_burst) for _ in range(settings.source_slots)]
+        self._total = TokenBucket(settings.total_rate, settings.total_burst)
 
     def take(self, host: str, agent: Agent, now: float) -> bool:
         slot = hash(source_of(host)) % len(self._sources)
-        return self._sources.take(now, slot) and agent.unclaimed.take(now) and self._total.take(now)
+        return self._sources[slot].take(now) and agent.unclaimed.take(now) and self._total.take(now)
 
 
 def source_of(host: str) -> str:

@@ -14,9 +14,9 @@ from lockstep.rtc.ice.directory import Directory
 from lockstep.rtc.ice.remote_candidates import RemoteCandidates
 from lockstep.rtc.ice.role import Role
 from lockstep.rtc.ice.settings import IceSettings
-from lockstep.rtc.ice.token_bucket import TokenBuckets
 from lockstep.rtc.ice.transactions import Transaction
 from lockstep.rtc.stun import BINDING, Kind, Message, StunError, StunErrorCode, is_authentic, parse, serialize
+from lockstep.rtc.token_bucket import TokenBucket
 
 if TYPE_CHECKING:
     from lockstep.rtc.ice.agent import Agent
@@ -64,8 +64,8 @@ class Session:
         self._triggered: deque[Pair] = deque()
         self._transactions: dict[bytes, Transaction] = {}
         self._seen: dict[bytes, None] = {}  # transactions of the peer's checks, the newest last
-        self._answers = TokenBuckets(settings.max_checks_per_second, settings.check_burst)
-        self._answers_again = TokenBuckets(settings.max_checks_per_second, settings.check_burst)  # to known checks
+        self._answers = TokenBucket(settings.max_checks_per_second, settings.check_burst)
+        self._answers_again = TokenBucket(settings.max_checks_per_second, settings.check_burst)  # to known checks
         self._out: list[Datagram] = []
         self._next_check_at = 0.0
         self._fails_at: float | None = None

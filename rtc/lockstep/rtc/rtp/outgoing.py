@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 
 from lockstep.rtc.rtp.extensions import ExtensionWriter, TransportNumbers
 from lockstep.rtc.rtp.history import History, RepairStream
-from lockstep.rtc.rtp.pacer import Pacer, TokenBucket
+from lockstep.rtc.rtp.pacer import Pacer, PathBudget
 from lockstep.rtc.rtp.packet import RtpPacket
 from lockstep.rtc.rtp.requests import Requests
 from lockstep.rtc.rtp.rtcp import RtcpPacket
@@ -41,7 +41,7 @@ class PathShare:
 
     epoch: float  # s since 1970 at which the clock of `now` was 0
     round_trip: RoundTrip = field(default_factory=RoundTrip)
-    bucket: TokenBucket = field(default_factory=TokenBucket)
+    path_budget: PathBudget = field(default_factory=PathBudget)
     numbers: TransportNumbers = field(default_factory=TransportNumbers)
 
 
@@ -52,7 +52,7 @@ class OutgoingStream:
         self.sink = Sink()
         ssrc, round_trip = parameters.ssrc, share.round_trip
         chain: Stage = ExtensionWriter(self.sink, parameters.extension_ids, parameters.fixed_values, share.numbers)
-        self.pacer = Pacer(chain, share.bucket) if paced else None
+        self.pacer = Pacer(chain, share.path_budget) if paced else None
         self.requests = Requests(self.pacer or chain, ssrc, round_trip)
         chain = self.requests
         self.history = History(chain, ssrc, round_trip, parameters.repair) if parameters.repeats else None

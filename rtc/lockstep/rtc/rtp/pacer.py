@@ -6,8 +6,9 @@ from dataclasses import dataclass
 
 from lockstep.rtc.rtp.packet import RtpPacket
 from lockstep.rtc.rtp.stage import PacketsLeft, Stage
+from lockstep.rtc.token_bucket import TokenBucket
 
-__all__ = ["Pacer", "PacerSettings", "TokenBucket"]
+__all__ = ["Pacer", "PacerSettings", "PathBudget"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -19,42 +20,34 @@ class PacerSettings:
     least_wait: float = 0.001  # s between two looks; timers are no finer
 
 
-class TokenBucket:
+class PathBudget:
     """The bytes that may leave for one peer, shared by the pacers of its streams."""
 
     def __init__(self, settings: PacerSettings | None = None) -> None:
         self.settings = settings or PacerSettings()
-        self._rate = self.settings.free_rate / 8  # bytes/s
-        self._tokens = float(self.settings.burst)
-        self._at: float | None = None
+        self._bucket = TokenBucket(self.settings.free_rate / 8, self.settings.burst)  # of bytes
 
     def limit(self, bitrate: float | None) -> None:
         """Limit the rate to a path that is believed to carry `bitrate` (bit/s); None: no limit was seen."""
         settings = self.settings
-        self._rate = (settings.free_rate if bitrate is None else bitrate * settings.headroom) / 8
+        self._bucket.rate = (settings.free_rate if bitrate is None else bitrate * settings.headroom) / 8
 
     def take(self, octets: int, now: float) -> bool:
         """Return True if a packet may leave. The last one may overdraw, so that any size passes some time."""
-        if self._at is not None:
-            self._tokens = min(float(self.settings.burst), self._tokens + (now - self._at) * self._rate)
-        self._at = now
-        if self._tokens <= 0:
-            return False
-        self._tokens -= octets
-        return True
+        return self._bucket.overdraw(octets, now)
 
-    def wait(self) -> float:
-        """Return the time in s after the last `take` until something may leave again."""
-        return max(self.settings.least_wait, -self._tokens / self._rate)
+    def wait(self, now: float) -> float:
+        """Return the time in s until something may leave again."""
+        return max(self.settings.least_wait, self._bucket.wait(now, level=0.0))
 
 
 class Pacer(Stage):
     """Holds packets back in their order; retransmissions go first. Sound does not pass it: it never waits."""
 
-    def __init__(self, following: Stage, bucket: TokenBucket) -> None:
+    def __init__(self, following: Stage, budget: PathBudget) -> None:
         super().__init__(following)
         self.dropped = 0  # packets that found no room
-        self._bucket = bucket
+        self._budget = budget
         self._repairs: deque[RtpPacket] = deque()
         self._packets: deque[RtpPacket] = deque()
         self._due: float | None = None
@@ -65,7 +58,7 @@ class Pacer(Stage):
         return self._due is not None
 
     def rtp(self, packet: RtpPacket, now: float) -> None:
-        if len(self._repairs) + len(self._packets) >= self._bucket.settings.waiting:
+        if len(self._repairs) + len(self._packets) >= self._budget.settings.waiting:
             self.dropped += 1
             return
         (self._repairs if packet.is_repair else self._packets).append(packet)
@@ -84,11 +77,11 @@ class Pacer(Stage):
     def _let_out(self, now: float) -> None:
         for packet in self._admitted(now):
             super().rtp(packet, now)
-        self._due = now + self._bucket.wait() if self._repairs or self._packets else None
+        self._due = now + self._budget.wait(now) if self._repairs or self._packets else None
 
     def _admitted(self, now: float) -> Iterator[RtpPacket]:
         for waiting in (self._repairs, self._packets):
             while waiting:
-                if not self._bucket.take(len(waiting[0].payload), now):
+                if not self._budget.take(len(waiting[0].payload), now):
                     return
                 yield waiting.popleft()

@@ -5,7 +5,7 @@ from typing import Literal, NamedTuple
 
 import msgspec
 
-from lockstep.server.util.token_bucket import TokenBucket
+from lockstep.rtc.token_bucket import TokenBucket
 
 __all__ = ["CHATTER", "Actor", "AuditBudget", "AuditKind", "AuditMerger", "AuditRecord", "AuditTrouble"]
 
@@ -91,10 +91,9 @@ class AuditBudget:
         key = (kind, link)
         if key not in self._buckets and len(self._buckets) >= MAX_BUDGETS:
             key = (kind, "")
-        bucket = self._buckets.get(key)
-        if bucket is None:
-            bucket = self._buckets[key] = TokenBucket(RATE, BURST, now)
-        return bucket.take(now)
+        if key not in self._buckets:
+            self._buckets[key] = TokenBucket(RATE, BURST)
+        return self._buckets[key].take(now)
 
     def forget_idle(self, now: float) -> None:
         """Drop the budgets that are full again."""

@@ -61,7 +61,7 @@ LOADERS: dict[Callable[[], typer.Typer], tuple[str, ...]] = {
     _robot: ("robot",),
     _check: ("check",),
     _access: ("invite", "invitations", "revoke", "audit"),
-    _recordings: ("record", "recordings", "replay", "verify", "export"),
+    _recordings: ("record", "recordings", "replay", "verify", "export", "report"),
 }
 
 

@@ -1,4 +1,4 @@
-"""Commands that measure or draw. They are in `bench/`, which is imported only when one is asked for.
+"""Commands that measure. They are in `bench/`, which is imported only when one is asked for.
 
 Where `bench/` is not installed, as in the images, there are no such commands.
 """
@@ -25,7 +25,7 @@ COMMANDS = {
         "Drive several robots while their bridges die in turn.",
     ),
     "network": (
-        "lockstep.bench.emulator.cli",
+        "lockstep.emulator.cli",
         "network_command",
         "Put a bad network between a console and whoever uses it.",
     ),
@@ -34,11 +34,6 @@ COMMANDS = {
         "lockstep.bench.interoperability.cli",
         "interoperability_command",
         "Drive with each client over each network.",
-    ),
-    "report": (
-        "lockstep.bench.session_report.cli",
-        "report_command",
-        "Draw the thesis' figures from a recorded session.",
     ),
     "soak": ("lockstep.bench.soak.cli", "soak_command", "Drive for a long time while everything fails now and then."),
 }

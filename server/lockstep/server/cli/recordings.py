@@ -1,4 +1,4 @@
-"""The commands about recordings: `record`, `recordings`, `replay`, `verify`, `export`."""
+"""The commands about recordings: `record`, `recordings`, `replay`, `verify`, `export`, `report`."""
 
 import os
 import sys
@@ -148,6 +148,20 @@ def add_recording_commands(app: typer.Typer, make_settings: MakeSettings) -> Non
         written = _or_usage(lambda: exporter.export(path, out, task))
         for each in written:
             sys.stdout.write(f"{escaped(each)}\n")
+
+    @app.command()
+    def report(
+        file: File,
+        out: Annotated[Path | None, typer.Option(help="HTML file to write; unset: beside the recording.")] = None,
+        directory: DirectoryOption = None,
+        robot: RobotOption = "",
+        state_dir: StateDirOption = None,
+    ) -> None:
+        """Draw figures of a recorded session, and say which promises were kept, in one HTML file."""
+        path = recording_file(file, make_settings(state_dir=state_dir), robot, directory)
+        reporter: Any = load_extra("lockstep.server.recording.report.report", "report")  # needs matplotlib
+        written = _or_usage(lambda: reporter.write_report(path, out or path.with_suffix(".html")))
+        sys.stdout.write(f"{escaped(written)}\n")
 
 
 def _ask(settings: Settings, robot: str, method: str, path: str, body: dict[str, str] | None = None) -> dict[str, Any]:

@@ -9,9 +9,9 @@ from collections.abc import Iterator
 
 from lockstep.protocol.console import Role, SharedNote
 from lockstep.protocol.messages import RefusalReason
+from lockstep.rtc.token_bucket import TokenBucket
 from lockstep.server.util.display_names import printable
 from lockstep.server.util.rate_limits import RateLimits
-from lockstep.server.util.token_bucket import TokenBucket
 
 __all__ = ["NoteBoard"]
 
@@ -26,10 +26,10 @@ SESSION_GAP = 600.0  # s; the notes outlast a reload of the page and a lost conn
 class NoteBoard:
     """The last notes of a session. `now` is monotonic seconds, `clock` seconds since 1970."""
 
-    def __init__(self, now: float) -> None:
+    def __init__(self) -> None:
         self._kept: deque[SharedNote] = deque(maxlen=KEPT)
         self._next_id = 1
-        self._all = TokenBucket(BOARD_RATE, BOARD_BURST, now)
+        self._all = TokenBucket(BOARD_RATE, BOARD_BURST)
         self._links = RateLimits(LINK_RATE, BURST)
         self._empty_since: float | None = None
 

@@ -42,7 +42,7 @@ class ParticipantList:
         self._clock = clock
         self._events = events
         self._renamed = renamed
-        self._board = NoteBoard(time.monotonic())
+        self._board = NoteBoard()
 
     def joined(self, peer: Peer) -> None:
         if peer.thumbnail:

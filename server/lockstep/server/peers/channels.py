@@ -20,6 +20,7 @@ from lockstep.protocol.console import (
 )
 from lockstep.protocol.errors import MessageError
 from lockstep.protocol.messages import Command, Ping, Reset, Rest, Stop
+from lockstep.rtc.token_bucket import TokenBucket
 from lockstep.server.errors import BinaryMessage, Flood, MalformedMessage, MessageTooLarge, UnknownChannel, WrongChannel
 from lockstep.server.stop.stop_presses import MAX_REASON, stop_text
 
@@ -125,17 +126,13 @@ def _whole(value: object) -> object:
 
 
 class MessageBudget:
-    """Token bucket for the messages of one peer. Stop messages are exempt."""
+    """Bounds the messages of one peer. Stop messages are exempt."""
 
-    def __init__(self, rate: float, now: float) -> None:
+    def __init__(self, rate: float) -> None:
         self._rate = rate
-        self._level = rate
-        self._at = now
+        self._bucket = TokenBucket(rate, rate)
 
     def spend(self, now: float) -> None:
         """Count a message. Raises Flood when more than `rate` messages a second come, after a burst of as many."""
-        self._level = min(self._rate, self._level + (now - self._at) * self._rate)
-        self._at = now
-        if self._level < 1:
+        if not self._bucket.take(now):
             raise Flood(f"more than {self._rate:g} messages a second")
-        self._level -= 1

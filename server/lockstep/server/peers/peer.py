@@ -21,6 +21,7 @@ from lockstep.protocol.console import (
     encode_console_message,
 )
 from lockstep.protocol.messages import Stop
+from lockstep.rtc.token_bucket import TokenBucket
 from lockstep.server.audit.records import Actor
 from lockstep.server.auth.tokens import Identity
 from lockstep.server.errors import ChannelError, Flood, TransportRefused
@@ -28,7 +29,6 @@ from lockstep.server.peers.channels import ChannelName, MessageBudget, channel_o
 from lockstep.server.peers.repeat_reply_limiter import RepeatReplyLimiter
 from lockstep.server.util.display_names import clean_name
 from lockstep.server.util.rate_limits import RateLimits
-from lockstep.server.util.token_bucket import TokenBucket
 
 __all__ = ["MessageWriter", "Peer", "PeerHost", "PeerLimits", "PeerStreams"]
 
@@ -138,9 +138,9 @@ class Peer(ABC):
         self._loop = asyncio.get_running_loop()
         self._writers: dict[ChannelName, MessageWriter] = {}
         rate = limits.max_observer_rate if identity.role == "observer" else limits.max_message_rate
-        self._budget = MessageBudget(rate, self._loop.time())
+        self._budget = MessageBudget(rate)
         self._patience = RateLimits(FORGIVEN_RATE, limits.max_bad_messages)
-        self.asks = TokenBucket(ASK_RATE, ASK_BURST, self._loop.time())  # of requests that concern everybody
+        self.asks = TokenBucket(ASK_RATE, ASK_BURST)  # of requests that concern everybody
         self._answers = RepeatReplyLimiter()
         self._heard_at = self._loop.time()
         self._connected = asyncio.Event()

@@ -62,7 +62,7 @@ class WebRtcPeer(Peer):
         self._connection = connection
         self._streams = media
         self._take_voice = take_voice
-        self._requests = MessageBudget(MAX_REQUESTS, self._loop.time())
+        self._requests = MessageBudget(MAX_REQUESTS)
         self._names: dict[int, ChannelName] = {}  # of data channels, by number
         self._channel_writers: dict[int, ChannelWriter] = {}
 

@@ -19,7 +19,7 @@ from lockstep.server.audit.records import Actor
 from lockstep.server.auth.tokens import Identity
 from lockstep.server.errors import Flood, TooManyRequests
 from lockstep.server.media.published.depacketise import PictureCodec
-from lockstep.server.media.published.encoded_wire import Encoded, encode_picture
+from lockstep.server.media.published.encoded_wire import PICTURES, Encoded
 from lockstep.server.media.published.incoming_pictures import IncomingPictures
 from lockstep.server.media.published.picture_assembly import MediaPacket
 from lockstep.server.media.published.published_camera import PublishedCamera
@@ -75,7 +75,7 @@ class Publisher:
         self.ended = ""
         self._limits = limits
         self._loop = asyncio.get_running_loop()
-        self._requests = MessageBudget(MAX_REQUESTS, self._loop.time())
+        self._requests = MessageBudget(MAX_REQUESTS)
         self._end = asyncio.Event()
         self._connected = asyncio.Event()
         self._connection: Connection | None = None  # None before the answer
@@ -130,7 +130,7 @@ class Publisher:
     def receives(self, connection: Connection, username: str, mid: str, codec: PictureCodec) -> None:
         """Take its pictures from section `mid`. Call once, with the answer; `username` is of the offer."""
         self._connection, self._mid = connection, mid
-        self._incoming = IncomingPictures(codec, self.camera.spec.latency, time.monotonic())
+        self._incoming = IncomingPictures(codec, self.camera.spec.latency)
         self.ice = IceSession(connection, username)
         connection.limit(mid, MOST_BPS)
 
@@ -253,7 +253,7 @@ class Publisher:
 
     def _pass_on(self, pictures: list[Encoded]) -> None:
         for picture in pictures:
-            if not self._decoder.write(encode_picture(picture)) and self._incoming is not None:
+            if not self._decoder.write(PICTURES.encode(picture)) and self._incoming is not None:
                 self._incoming.lost_picture()  # the decoder is too slow; it goes on with a keyframe
 
     def _decoded(self, said: Said) -> None:

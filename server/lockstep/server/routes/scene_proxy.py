@@ -16,12 +16,12 @@ from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import ConnectionClosed
 from websockets.typing import Subprotocol
 
+from lockstep.rtc.token_bucket import TokenBucket
 from lockstep.server.auth.tokens import SceneTicket
 from lockstep.server.errors import BadParameter, ConsoleError, NotFound
 from lockstep.server.http.security_headers import check_origin
 from lockstep.server.scene.view import SceneView
 from lockstep.server.state.dependencies import dependencies
-from lockstep.server.util.token_bucket import TokenBucket
 
 __all__ = ["is_allowed", "router", "scene_query"]
 
@@ -157,7 +157,7 @@ async def _join(websocket: WebSocket, scene: SceneView, ticket: SceneTicket) -> 
 
 async def _viewer_to_scene(websocket: WebSocket, upstream: ClientConnection) -> None:
     here, clock = dependencies(websocket), asyncio.get_running_loop().time
-    budget = TokenBucket(UP_RATE, UP_BURST, clock())
+    budget = TokenBucket(UP_RATE, UP_BURST)
     try:
         while True:
             data = await websocket.receive_bytes()

@@ -5,14 +5,13 @@ output reports the state of the loudspeaker, in messages of `source_wire`.
 """
 
 import os
-import struct
 import sys
 import time
 import wave
 from abc import ABC, abstractmethod
 from contextlib import suppress
 from pathlib import Path
-from typing import Any, BinaryIO, NamedTuple
+from typing import Any, BinaryIO
 
 import av
 import msgspec
@@ -21,13 +20,14 @@ from av.error import FFmpegError
 
 from lockstep.server.media.pulse_audio import PulseStream
 from lockstep.server.media.sources.errors import reason_of
-from lockstep.server.media.sources.source_wire import Trouble, Working, write_said
+from lockstep.server.media.sources.source_wire import SAID, Trouble, Working
 from lockstep.server.talkback.playout import Playout
 from lockstep.server.talkback.speaker_url import SpeakerSpec
+from lockstep.server.util.framed_pipe import FramedPipe
 
-__all__ = ["HEAD", "Sink", "main", "open_sink"]
+__all__ = ["VOICE", "Sink", "VoicePacket", "main", "open_sink"]
 
-HEAD = struct.Struct("!Hd")  # length of a packet, and its arrival on the monotonic clock
+MAX_LENGTH = 65_536  # bytes of a packet
 RATE = 48_000  # Hz
 BUFFER = int(0.1 * RATE)  # samples in the device
 RETRY = 2.0  # s until a device that failed is opened again
@@ -95,9 +95,12 @@ def open_sink(spec: SpeakerSpec) -> Sink:
     return _Alsa(spec.device) if spec.scheme == "alsa" else _File(spec.device)
 
 
-class _Packet(NamedTuple):
-    payload: bytes
-    sent: float
+class VoicePacket(msgspec.Struct, frozen=True, array_like=True):
+    payload: bytes  # Opus
+    sent: float  # s, its arrival at the console on the monotonic clock
+
+
+VOICE: FramedPipe[VoicePacket] = FramedPipe(VoicePacket, MAX_LENGTH)
 
 
 class Player:
@@ -121,9 +124,9 @@ class Player:
         except (OSError, FFmpegError, ValueError) as error:
             self._failed(error)
         else:
-            write_said(self._out, Working(self._spec.scheme))
+            SAID.write(self._out, Working(self._spec.scheme))
 
-    def play(self, packet: _Packet) -> None:
+    def play(self, packet: VoicePacket) -> None:
         self.open()
         try:
             frames = self._decoder.decode(av.Packet(packet.payload))
@@ -147,23 +150,13 @@ class Player:
 
     def _failed(self, error: Exception) -> None:
         pulse = self._spec.scheme == "pulse" and isinstance(error, OSError)
-        write_said(self._out, Trouble("no_sound_server", str(error)) if pulse else Trouble(*reason_of(error)))
+        SAID.write(self._out, Trouble("no_sound_server", str(error)) if pulse else Trouble(*reason_of(error)))
 
 
 def _decoder() -> AudioCodecContext:
     decoder: AudioCodecContext = av.CodecContext.create("libopus", "r")
     decoder.sample_rate, decoder.layout, decoder.format = RATE, "mono", "s16"
     return decoder
-
-
-def _packet(console: BinaryIO) -> _Packet | None:
-    """Read the next packet; None if the console has gone."""
-    head = console.read(HEAD.size)
-    if len(head) < HEAD.size:
-        return None
-    length, sent = HEAD.unpack(head)
-    payload = console.read(length)
-    return _Packet(payload, sent) if len(payload) == length else None
 
 
 def main() -> None:
@@ -173,7 +166,7 @@ def main() -> None:
     with suppress(OSError, KeyboardInterrupt):
         player = Player(spec, out)
         player.open()
-        while (packet := _packet(sys.stdin.buffer)) is not None:
+        while (packet := VOICE.read(sys.stdin.buffer)) is not None:
             player.play(packet)
     os._exit(0)  # a device that hangs must not delay the exit
 

@@ -9,10 +9,11 @@ from contextlib import suppress
 import msgspec
 import structlog
 
-from lockstep.server.media.sources.source_wire import Trouble, decode_said
-from lockstep.server.talkback.player import HEAD
+from lockstep.server.media.sources.source_wire import Said, Trouble
+from lockstep.server.talkback.player import VOICE, VoicePacket
 from lockstep.server.talkback.speaker_url import SpeakerSpec
 from lockstep.server.util.backoff import Backoff
+from lockstep.server.util.framed_pipe import FramedPipe
 
 __all__ = ["Speaker"]
 
@@ -21,6 +22,7 @@ log = structlog.get_logger(__name__)
 COMMAND = (sys.executable, "-m", "lockstep.server.talkback.player")
 HEALTHY = 10.0  # s
 MAX_WORDS = 4096  # bytes
+WORDS: FramedPipe[Said] = FramedPipe(Said, MAX_WORDS)
 
 
 class Speaker:
@@ -42,7 +44,7 @@ class Speaker:
         if writer is None or writer.transport.is_closing() or writer.transport.get_write_buffer_size() > 0:
             self.dropped += 1
             return False
-        writer.write(HEAD.pack(len(packet), time.monotonic()) + packet)
+        writer.write(VOICE.encode(VoicePacket(packet, time.monotonic())))
         return True
 
     async def run(self) -> None:
@@ -78,15 +80,8 @@ class Speaker:
             await process.wait()
 
     async def _hear(self, output: asyncio.StreamReader) -> None:
-        with suppress(asyncio.IncompleteReadError, ConnectionError):
-            while True:
-                length = int.from_bytes(await output.readexactly(4), "big")
-                if length > MAX_WORDS:
-                    return
-                said = decode_said(await output.readexactly(length))
-                if said is None:
-                    return
-                self._enter(said.detail if isinstance(said, Trouble) else "")
+        while (said := await WORDS.receive(output)) is not None:
+            self._enter(said.detail if isinstance(said, Trouble) else "")
 
     def _enter(self, trouble: str) -> None:
         if trouble == self.trouble:

@@ -13,7 +13,7 @@ from collections.abc import Callable
 from typing import Literal, NamedTuple
 
 from lockstep.protocol.console import Voice
-from lockstep.server.util.token_bucket import TokenBucket
+from lockstep.rtc.token_bucket import TokenBucket
 
 __all__ = ["SPEAKS_FOR", "TalkbackArbiter", "VoiceOutcome", "VoicePacket"]
 
@@ -42,7 +42,7 @@ class TalkbackArbiter:
         self._name = ""
         self._sequence: int | None = None  # of its last packet
         self._heard_at = float("-inf")
-        self._budget = TokenBucket(RATE, BURST, 0.0)
+        self._budget = TokenBucket(RATE, BURST)
 
     def packet(self, peer: str, name: str, packet: VoicePacket, now: float) -> VoiceOutcome:
         if not self._holds(peer):

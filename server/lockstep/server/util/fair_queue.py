@@ -4,7 +4,7 @@ import asyncio
 from collections import deque
 from collections.abc import Callable
 
-from lockstep.server.util.token_bucket import TokenBucket
+from lockstep.rtc.token_bucket import TokenBucket
 
 __all__ = ["FairQueue"]
 
@@ -21,11 +21,10 @@ class FairQueue:
     of connections, since each has one request under way.
     """
 
-    def __init__(self, pace: Callable[[float], TokenBucket] | None = None) -> None:
-        """`pace`: makes the budget of work that is not `first`, from the time on the loop's clock."""
+    def __init__(self, pace: TokenBucket | None = None) -> None:
+        """`pace`: the budget of work that is not `first`, by the loop's clock; None: no limit."""
         self._is_free = True  # in this iteration of the loop
-        self._make_pace = pace
-        self._pace: TokenBucket | None = None
+        self._pace = pace
         self._first: dict[str, deque[Work]] = {}  # by address, the next first
         self._others: dict[str, deque[Work]] = {}
         self._beginnings: deque[Work] = deque()
@@ -78,11 +77,7 @@ class FairQueue:
             asyncio.get_running_loop().call_soon(self._pass_on)
 
     def _paced(self, now: float) -> bool:
-        if self._make_pace is None:
-            return True
-        if self._pace is None:
-            self._pace = self._make_pace(now)
-        return self._pace.take(now)
+        return self._pace is None or self._pace.take(now)
 
     def _pass_on(self) -> None:
         loop = asyncio.get_running_loop()

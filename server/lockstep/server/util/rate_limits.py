@@ -2,6 +2,8 @@
 
 from collections import OrderedDict
 
+from lockstep.rtc.token_bucket import TokenBucket
+
 __all__ = ["RateLimits"]
 
 MAX_KEYS = 10_000
@@ -18,21 +20,16 @@ class RateLimits:
         self._rate = rate
         self._burst = burst
         self._max_keys = max_keys
-        self._buckets: OrderedDict[str, tuple[float, float]] = OrderedDict()  # level, and when
+        self._buckets: OrderedDict[str, TokenBucket] = OrderedDict()
 
     def __len__(self) -> int:
         return len(self._buckets)
 
     def spend(self, key: str, now: float) -> bool:
         """Take one token; False if the bucket is empty."""
-        level = self._level(key, now)
-        allowed = level >= 1
-        self._buckets[key] = (level - 1 if allowed else level, now)
+        if key not in self._buckets:
+            if len(self._buckets) >= self._max_keys:
+                self._buckets.popitem(last=False)
+            self._buckets[key] = TokenBucket(self._rate, self._burst)
         self._buckets.move_to_end(key)
-        if len(self._buckets) > self._max_keys:
-            self._buckets.popitem(last=False)
-        return allowed
-
-    def _level(self, key: str, now: float) -> float:
-        level, at = self._buckets.get(key, (float(self._burst), now))
-        return min(self._burst, level + max(0.0, now - at) * self._rate)
+        return self._buckets[key].take(now)

@@ -5,7 +5,7 @@ from collections.abc import Callable
 from typing import Protocol
 
 from lockstep.server.util.cooperative_scheduler import CooperativeScheduler
-from lockstep.server.util.token_bucket import TokenBucket
+from lockstep.rtc.token_bucket import TokenBucket
 
 __all__ = ["DatagramQueue", "DatagramQueues", "DriverQueue", "Waiting"]
 
@@ -83,7 +83,7 @@ class DatagramQueues:
 
     def __init__(self, turns: CooperativeScheduler, clock: Callable[[], float]) -> None:
         self.observers = DatagramQueue(turns)
-        self._not_driving = TokenBucket(NOT_DRIVING_RATE, NOT_DRIVING_RATE, clock())
+        self._not_driving = TokenBucket(NOT_DRIVING_RATE, NOT_DRIVING_RATE)
         self._clock = clock
 
     def create(self, *, waits: bool) -> DatagramQueue | DriverQueue:

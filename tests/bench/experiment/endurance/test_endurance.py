@@ -5,8 +5,8 @@ import json
 import pytest
 from typer.testing import CliRunner
 
-from lockstep.bench.emulator.impairment.outages import PlannedOutage
 from lockstep.bench.experiment.endurance.endurance import Endurance, Lost, cut_for_long
+from lockstep.emulator.impairment.outages import PlannedOutage
 from lockstep.server.cli.main import app
 
 

@@ -2,12 +2,12 @@ import re
 from pathlib import Path
 from xml.etree import ElementTree
 
-from lockstep.bench.emulator.impairment.profile import load_profile
 from lockstep.bench.experiment.choices import Mode, media_of
 from lockstep.bench.experiment.endurance.growth import Growth, Point
 from lockstep.bench.experiment.judge.findings import Cell, Findings
 from lockstep.bench.experiment.judge.report import write_report
 from lockstep.bench.experiment.judge.results import result_of
+from lockstep.emulator.impairment.profile import load_profile
 from tests.bench.experiment.made_up import choices, client, run
 
 PROFILE = load_profile("micro-lan")

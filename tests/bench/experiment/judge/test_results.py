@@ -2,10 +2,10 @@ from typing import Any
 
 import pytest
 
-from lockstep.bench.emulator.impairment.profile import load_profile
 from lockstep.bench.experiment.choices import media_of
 from lockstep.bench.experiment.judge.results import result_of
 from lockstep.bench.experiment.judge.table import COLUMNS, render_table, rows_of
+from lockstep.emulator.impairment.profile import load_profile
 from tests.bench.experiment.made_up import choices, client, run
 
 MEDIA = media_of(load_profile("micro-lan"))

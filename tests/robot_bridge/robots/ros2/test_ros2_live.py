@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from lockstep.bench.processes import running_process
+from lockstep.bench.harness.processes import running_process
 from lockstep.protocol.messages import Command, Feedback, Media, Rest, Stop
 from lockstep.protocol.serial import event_after
 from lockstep.robot_bridge.link.link_client import RobotLink

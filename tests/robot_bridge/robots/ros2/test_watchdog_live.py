@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from lockstep.bench.processes import Running, running_process
+from lockstep.bench.harness.processes import Running, running_process
 from lockstep.protocol.errors import LinkError
 from lockstep.protocol.messages import Feedback
 from lockstep.robot_bridge.link.link_client import RobotLink

@@ -32,7 +32,7 @@ class Network:
 @pytest.mark.parametrize("seed", range(20))
 def test_no_picture_is_taken_for_newer_than_it_is_on_paths_that_change(seed: int) -> None:
     network = Network(seed)
-    incoming = IncomingPictures("VP8", LATENCY, 0.0)
+    incoming = IncomingPictures("VP8", LATENCY)
     clock_ahead = network.chance.uniform(-5, 5)  # of the publisher's clock, which says nothing
     drift = network.chance.uniform(-1, 1) * DRIFT / 2
     arrivals: list[tuple[float, int, float]] = []
@@ -62,7 +62,7 @@ def test_no_picture_is_taken_for_newer_than_it_is_on_paths_that_change(seed: int
 
 
 def test_a_picture_has_no_time_before_a_round_trip_was_measured_and_the_timeline_has_settled() -> None:
-    incoming = IncomingPictures("VP8", 0.1, 0.0)
+    incoming = IncomingPictures("VP8", 0.1)
     times = [incoming.take(packet(n, 5 + n / 10), 100 + n / 10)[0].time for n in range(10)]
     assert times == [None] * 10
     incoming.path.observe(0.05, 101.0)
@@ -87,7 +87,7 @@ def test_the_shortest_round_trip_counts_and_is_forgotten_no_faster_than_clocks_m
 
 
 def test_more_packets_than_anybody_needs_are_counted_and_cost_nothing() -> None:
-    incoming = IncomingPictures("VP8", 0.1, 0.0)
+    incoming = IncomingPictures("VP8", 0.1)
     made = [len(incoming.take(packet(n, n / 30), 0.0)) for n in range(int(MAX_BURST) + 500)]
     assert sum(made) == MAX_BURST
     assert incoming.flooded == 500
@@ -95,7 +95,7 @@ def test_more_packets_than_anybody_needs_are_counted_and_cost_nothing() -> None:
 
 
 def test_a_publisher_that_falls_behind_for_good_is_late() -> None:
-    incoming = IncomingPictures("VP8", 0.1, 0.0)
+    incoming = IncomingPictures("VP8", 0.1)
     for n in range(20):
         incoming.take(packet(n, n / 10), n / 10)
     assert not incoming.late

@@ -10,7 +10,7 @@ import pytest
 from lockstep.server.media.codecs.picture_encoder import create_picture_encoder
 from lockstep.server.media.published.decoder_process import MAX_RATE, PublishedPictures
 from lockstep.server.media.published.depacketise import PictureCodec
-from lockstep.server.media.published.encoded_wire import Encoded, encode_picture, read_picture
+from lockstep.server.media.published.encoded_wire import PICTURES, Encoded
 from lockstep.server.media.sources.source_url import SourceSpec
 from lockstep.server.media.sources.source_wire import Captured, Said, Trouble, Working
 from tests.server.media.published.publishing import camera
@@ -131,7 +131,7 @@ def test_the_size_and_rate_of_the_camera_are_kept_and_no_more_than_thirty_a_seco
 
 def test_the_wire_gives_back_what_was_put_on_it_and_nothing_else() -> None:
     pictures = [Encoded("VP8", 1.5, True, b"x" * 70_000), Encoded("H264", None, False, b"")]
-    file = io.BytesIO(b"".join(map(encode_picture, pictures)))
-    assert [read_picture(file), read_picture(file), read_picture(file)] == [*pictures, None]
+    file = io.BytesIO(b"".join(map(PICTURES.encode, pictures)))
+    assert [PICTURES.read(file), PICTURES.read(file), PICTURES.read(file)] == [*pictures, None]
     for nonsense in (b"\xff\xff\xff\xff", b"\x00\x00\x00\x02\x91", b"\x00\x00\x00\x01\xc0", b"\x00"):
-        assert read_picture(io.BytesIO(nonsense)) is None
+        assert PICTURES.read(io.BytesIO(nonsense)) is None

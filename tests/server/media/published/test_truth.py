@@ -7,12 +7,12 @@ from pathlib import Path
 import httpx
 import pytest
 
-from lockstep.bench.emulator.impairment.deliveries import Deliveries
-from lockstep.bench.emulator.impairment.outages import Outages
-from lockstep.bench.emulator.impairment.profile import load_profile
-from lockstep.bench.emulator.transport.client_paths import ClientPaths
-from lockstep.bench.emulator.transport.udp_relay import UdpRelay
 from lockstep.client import Console
+from lockstep.emulator.impairment.deliveries import Deliveries
+from lockstep.emulator.impairment.outages import Outages
+from lockstep.emulator.impairment.profile import load_profile
+from lockstep.emulator.transport.client_paths import ClientPaths
+from lockstep.emulator.transport.udp_relay import UdpRelay
 from tests.server.media.numbered_pictures import OF_USE, events_behind, shown_while_driving
 from tests.server.media.published.publishing import TestPublisher
 from tests.support.stack import Stack, running_stack

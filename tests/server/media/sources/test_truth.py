@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from lockstep.bench.free_port import free_port
+from lockstep.bench.harness.free_port import free_port
 from lockstep.client import Console
 from tests.server.media.numbered_pictures import OF_USE, events_behind, shown_while_driving
 from tests.server.media.sources.live_sender import LiveSender

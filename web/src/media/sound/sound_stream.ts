@@ -78,7 +78,7 @@ export class SoundStream {
     if (stamps === null || stamps.newest === null) return;
     const mark = findMark(stamps.table, stamps.newest) ?? UNMARKED;
     const { feedback, tolerance, gate } = this.context();
-    noteSeen(this.gate.counts, judge(feedback, mark.stamp, tolerance, gate, null).gap);
+    noteSeen(this.gate.counts, judge(feedback, mark.stamp, tolerance, gate).gap);
   }
 
   private wouldPass(rtpTimestamp: number, context: GateContext): boolean {
@@ -86,7 +86,7 @@ export class SoundStream {
     const mark = stamps === null ? undefined : findMark(stamps.table, rtpTimestamp);
     if (mark === undefined) return false;
     const { feedback, tolerance, gate } = context;
-    return judge(feedback, mark.stamp, tolerance, gate, ageOf(mark, context)).verdict === "render";
+    return judge(feedback, mark.stamp, tolerance, gate).verdict === "render";
   }
 
   /** Whether the browser still plays what waited while it opened its sound device. */

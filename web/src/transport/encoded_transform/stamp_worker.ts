@@ -1,7 +1,7 @@
 /** Transform worker: reads the stamp of every encoded frame before it is decoded, and takes the trailer off. */
 import { eventOfOffset } from "../../gate/capture_time";
 import { judge } from "../../gate/media_gate";
-import { ageOf, type FrameMark, type GateContext } from "../../gate/gate_counters";
+import type { FrameMark } from "../../gate/gate_counters";
 import { rtpGap } from "../../gate/sound_backlog";
 import { markOfTrailer, splitTrailer } from "../../gate/trailer";
 import type { FrameNote, SoundContext, SoundSkip, TransformOptions } from "./stamp_messages";
@@ -83,10 +83,8 @@ function isSkipped(receiver: number, rtpTimestamp: number | undefined): boolean 
   return false;
 }
 
-/** The gap of a sound only grows, and so does its age: one that is too old now would never be heard. */
+/** The gap of a sound only grows: one that is too old now would never be heard. */
 function isTooOld(mark: FrameMark): boolean {
   if (mark.stamp === null) return false;
-  const now: GateContext = { ...context, wallMs: performance.timeOrigin + performance.now() };
-  const ageMs = ageOf(mark, now);
-  return judge(context.feedback, mark.stamp, context.tolerance, context.gate, ageMs).verdict === "discard";
+  return judge(context.feedback, mark.stamp, context.tolerance, context.gate).verdict === "discard";
 }

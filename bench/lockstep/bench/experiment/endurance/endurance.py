@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
-from lockstep.bench.emulator.impairment.outages import PlannedOutage
+from lockstep.emulator.impairment.outages import PlannedOutage
 
 __all__ = ["Endurance", "Lost", "cut_for_long"]
 

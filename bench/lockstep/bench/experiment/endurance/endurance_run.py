@@ -10,14 +10,14 @@ from typing import Any, Literal, Protocol
 import httpx
 import msgspec
 
-from lockstep.bench.driving import drive_on
-from lockstep.bench.emulator.impairment.profile import Profile
 from lockstep.bench.experiment.choices import Choices, media_of
 from lockstep.bench.experiment.endurance.endurance import Endurance
 from lockstep.bench.experiment.operator_script import OperatorScript
 from lockstep.bench.experiment.stage import Stage, running_stage
-from lockstep.bench.stack import Metrics
+from lockstep.bench.harness.driving import drive_on
+from lockstep.bench.harness.stack import Metrics
 from lockstep.client import CommandRefused, Console, ConsoleError
+from lockstep.emulator.impairment.profile import Profile
 
 __all__ = ["Driven", "EnduranceClient", "run_endurance"]
 

@@ -11,24 +11,24 @@ from contextlib import AsyncExitStack, asynccontextmanager
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
-from lockstep.bench.driving import drive_on
-from lockstep.bench.emulator.impairment.delay import Delay
-from lockstep.bench.emulator.impairment.profile import Profile, TwoWay
-from lockstep.bench.emulator.namespace.network_process import NetworkProcess
 from lockstep.bench.experiment.choices import Choices, MediaChoice
 from lockstep.bench.experiment.headless import HeadlessClient, headless_client
+from lockstep.bench.experiment.judge.age_gate import count_by_age
 from lockstep.bench.experiment.judge.measures import event_rate
-from lockstep.bench.experiment.judge.record import ClientRecord
+from lockstep.bench.experiment.judge.record import ClientRecord, Gate
 from lockstep.bench.experiment.stage import Stage, running_stage
+from lockstep.bench.harness.driving import drive_on
 from lockstep.client import Console
-from lockstep.client.media.media_gate import GateMode
+from lockstep.emulator.impairment.delay import Delay
+from lockstep.emulator.impairment.profile import Profile, TwoWay
+from lockstep.emulator.namespace.network_process import NetworkProcess
 
 __all__ = ["Growth", "Point", "later", "run_growth"]
 
 RATES = (2.0, 5.0, 10.0, 20.0)  # events a second
 DELAYS = (0.0, 0.25, 1.0, 2.0)  # s that a player adds
 # Every player is watched without a gate; the gates with the players that are hardest for them.
-VIEWERS: tuple[tuple[GateMode, float], ...] = (
+VIEWERS: tuple[tuple[Gate, float], ...] = (
     *(("off", delay) for delay in DELAYS),
     ("age", 0.0),
     ("age", 0.25),
@@ -37,12 +37,13 @@ VIEWERS: tuple[tuple[GateMode, float], ...] = (
     ("event", 2.0),
 )
 MEDIA = MediaChoice(400, 10.0, "PCMU", 2)  # nine viewers have to be decoded on this machine
+COUNTS = ("received", "rendered", "violations")
 SETTLE = 3.0  # s for a new rate to reach the slowest player
 
 
 @dataclass(frozen=True)
 class Point:
-    gate: GateMode
+    gate: Gate
     delay: float
     event_rate: float
     received: int
@@ -101,7 +102,7 @@ async def run_growth(
     say: Callable[[str], None],
     *,
     rates: Sequence[float] = RATES,
-    viewers: Sequence[tuple[GateMode, float]] = VIEWERS,
+    viewers: Sequence[tuple[Gate, float]] = VIEWERS,
 ) -> Growth:
     """Drive for `choices.seconds` at each event rate.
 
@@ -142,7 +143,7 @@ async def _drive(operator: Console, rate: float, seconds: float) -> None:
 
 @asynccontextmanager
 async def _viewers(
-    stage: Stage, choices: Choices, profile: Profile, chosen: Sequence[tuple[GateMode, float]]
+    stage: Stage, choices: Choices, profile: Profile, chosen: Sequence[tuple[Gate, float]]
 ) -> AsyncIterator[list[tuple[float, HeadlessClient]]]:
     async with AsyncExitStack() as stack:
         viewers = []
@@ -163,18 +164,18 @@ def _anew(record: ClientRecord) -> ClientRecord:
 
 def _point(delay: float, viewer: HeadlessClient) -> Point:
     record, camera = viewer.record, viewer.description.cameras[0].name
-    rendered = record.rendered.get(camera, [])[1:]
     before, after = (
         next(each for each in said["streams"] if each["stream"] == camera)
         for said in (record.statistics_before, record.statistics)
     )
-    gaps = [abs(each.gap) for each in rendered if each.gap is not None]
+    counts = count_by_age(record, camera, {name: after[name] - before[name] for name in COUNTS})
+    gaps = [abs(each.gap) for each in record.since_begin(camera) if each.gap is not None]
     return Point(
         gate=record.gate,
         delay=delay,
         event_rate=round(event_rate(record.feedbacks), 2),
-        received=after["received"] - before["received"],
-        rendered=after["rendered"] - before["rendered"],
+        received=counts["received"],
+        rendered=counts["rendered"],
         max_gap=max(gaps, default=0),
-        violations=after["violations"] - before["violations"],
+        violations=counts["violations"],
     )

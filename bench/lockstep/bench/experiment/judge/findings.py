@@ -3,11 +3,11 @@
 from dataclasses import dataclass, field
 from typing import Any
 
-from lockstep.bench.emulator.impairment.profile import Profile
 from lockstep.bench.experiment.choices import Choices
 from lockstep.bench.experiment.endurance.growth import Growth
 from lockstep.bench.experiment.judge.record import Run
 from lockstep.bench.experiment.judge.results import Result
+from lockstep.emulator.impairment.profile import Profile
 
 __all__ = ["Cell", "Findings"]
 

@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Sequence
 
 from lockstep.bench.experiment.judge.record import Arrival, Rendered
-from lockstep.bench.samples import quantile
+from lockstep.bench.figures.samples import quantile
 from lockstep.protocol.serial import event_gap
 
 __all__ = ["Spread", "beyond", "event_rate", "share_within", "spread"]

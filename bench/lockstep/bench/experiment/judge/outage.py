@@ -8,15 +8,15 @@ from collections.abc import AsyncIterator, Callable, Sequence
 from contextlib import asynccontextmanager
 from typing import Any, Protocol
 
-from lockstep.bench.driving import drive_on
-from lockstep.bench.emulator.impairment.delay import Constant
-from lockstep.bench.emulator.impairment.impairment import Impairment
-from lockstep.bench.emulator.impairment.profile import Profile, TwoWay
 from lockstep.bench.experiment.choices import Choices, media_of, round_trip_of
 from lockstep.bench.experiment.judge.outage_judge import Cut, Finding, judge_outage
-from lockstep.bench.experiment.judge.robot_log import records
 from lockstep.bench.experiment.stage import Stage, running_stage
+from lockstep.bench.harness.driving import drive_on
+from lockstep.bench.harness.event_log import records
 from lockstep.client import CommandRefused, Console, ConsoleError
+from lockstep.emulator.impairment.delay import Constant
+from lockstep.emulator.impairment.impairment import Impairment
+from lockstep.emulator.impairment.profile import Profile, TwoWay
 from lockstep.protocol.description import RobotDescription
 
 __all__ = ["OUTAGE_PROFILE", "run_outages"]

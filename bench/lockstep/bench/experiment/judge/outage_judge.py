@@ -2,7 +2,9 @@
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import NamedTuple
+
+from lockstep.bench.harness.event_log import Record
 
 __all__ = ["Cut", "Finding", "judge_outage"]
 
@@ -38,7 +40,7 @@ class Finding:
 
 
 def judge_outage(
-    log: Iterable[dict[str, Any]],
+    log: Iterable[Record],
     cut: Cut,
     *,
     hold: float,
@@ -50,7 +52,7 @@ def judge_outage(
     `log`: the bridge's records. `intentions`: (time, value of the first axis), each value once; empty: unknown.
     """
     issued: dict[tuple[int, int], float] = {}
-    executed: list[dict[str, Any]] = []
+    executed: list[Record] = []
     rested: list[float] = []
     for record in log:
         if record["kind"] == "feedback":
@@ -76,7 +78,7 @@ def judge_outage(
     )
 
 
-def _age(record: dict[str, Any], issued: dict[tuple[int, int], float]) -> float:
+def _age(record: Record, issued: dict[tuple[int, int], float]) -> float:
     """Return the age of the feedback that an executed command answers; infinite if no issue has that number."""
     answered = [(event, issue) for event, issue in issued if issue == record["issue"] and event < record["event"]]
     return record["time"] - issued[max(answered)] if answered else float("inf")

@@ -2,12 +2,13 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 from lockstep.client.control.command_gate import Pacing
-from lockstep.client.media.media_gate import GateMode
 
-__all__ = ["Arrival", "ClientRecord", "Rendered", "RobotRecord", "Run", "fresh"]
+__all__ = ["Arrival", "ClientRecord", "Gate", "Rendered", "RobotRecord", "Run", "fresh"]
+
+Gate = Literal["off", "age", "event"]  # "event" is the rule; the others are compared with it
 
 
 class Arrival(NamedTuple):
@@ -42,18 +43,23 @@ class ClientRecord:
 
     name: str
     kind: str  # "headless" or "chromium"
-    gate: GateMode
+    gate: Gate
     pacing: Pacing
     drives: bool
     tolerance: int
     feedbacks: list[Arrival] = field(default_factory=list)
     rendered: dict[str, list[Rendered]] = field(default_factory=dict)  # by stream
+    earlier: dict[str, int] = field(default_factory=dict)  # renderings from before the run: the one on screen, or none
     statistics_before: dict[str, Any] = field(default_factory=dict)  # the client's own, when the run begins
     statistics: dict[str, Any] = field(default_factory=dict)  # the client's own, when the run ends
     drawn_right: int = 0  # pictures whose pixels show the event that their stamp says
     drawn_wrong: int = 0
     drawn_unreadable: int = 0
     lost: str = ""  # why the connection ended before the run did
+
+    def since_begin(self, stream: str) -> list[Rendered]:
+        """Return the renderings of a stream since the run began."""
+        return self.rendered.get(stream, [])[self.earlier.get(stream, 0) :]
 
 
 @dataclass

@@ -2,7 +2,6 @@
 
 import html
 from collections.abc import Iterable, Iterator, Sequence
-from importlib.resources import files
 from itertools import groupby
 from pathlib import Path
 from typing import Any
@@ -19,10 +18,10 @@ from lockstep.bench.experiment.judge.findings import Cell, Findings
 from lockstep.bench.experiment.judge.record import ClientRecord, Run
 from lockstep.bench.experiment.judge.results import Result
 from lockstep.bench.experiment.judge.table import COLUMNS, rows_of
+from lockstep.server.recording.report.drawing import PAGE_STYLE
 
 __all__ = ["write_report"]
 
-STYLE = files("lockstep.bench.experiment") / "report.css"
 MODE_WORDS = {
     "off": "without synchronisation",
     "age": "gate by age, 0.5 s",
@@ -83,7 +82,7 @@ def _page(report: Findings) -> str:
     parts = [
         "<!doctype html><html lang='en'><head><meta charset='utf-8'>",
         "<meta name='viewport' content='width=device-width, initial-scale=1'>",
-        f"<title>Lockstep: experiments</title><style>{STYLE.read_text()}</style></head><body>",
+        f"<title>Lockstep: experiments</title><style>{PAGE_STYLE.read_text()}</style></head><body>",
         "<header><h1>Experiments</h1><p class='lead'>What an operator was shown over each network, and how many events",
         " the robot was ahead of it. A gap beyond the tolerance is red.</p>",
         f"<p class='quiet'>{_text(_machine(report))}</p>",

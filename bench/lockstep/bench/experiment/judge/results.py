@@ -3,6 +3,7 @@
 from typing import Any
 
 from lockstep.bench.experiment.choices import Choices, MediaChoice
+from lockstep.bench.experiment.judge.age_gate import count_by_age
 from lockstep.bench.experiment.judge.measures import beyond, event_rate, share_within, spread
 from lockstep.bench.experiment.judge.playout import heard
 from lockstep.bench.experiment.judge.record import ClientRecord, Rendered, Run
@@ -60,7 +61,7 @@ def _client(client: ClientRecord, run: Run) -> Result:
 
 def _stream(client: ClientRecord, name: str, run: Run) -> Result:
     before, after = (_said(statistics, name) for statistics in (client.statistics_before, client.statistics))
-    counts = {key: after.get(key, 0) - before.get(key, 0) for key in COUNTS}
+    counts = count_by_age(client, name, {key: after.get(key, 0) - before.get(key, 0) for key in COUNTS})
     rendered = [each for each in client.rendered[name] if each.at >= run.began]
     gaps = [abs(each.gap) for each in rendered if each.gap is not None]
     is_video = name in run.cameras

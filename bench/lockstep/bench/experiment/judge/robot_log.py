@@ -1,20 +1,11 @@
 """Reads the bridge's own log: commands, feedback and captures, with their times."""
 
-import json
-from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 from lockstep.bench.experiment.judge.record import Arrival, RobotRecord
+from lockstep.bench.harness.event_log import records
 
-__all__ = ["read_robot_log", "records"]
-
-
-def records(log: Path) -> Iterator[dict[str, Any]]:
-    """Yield the whole lines: the last one may still be being written."""
-    text = log.read_text()
-    for line in text[: text.rfind("\n") + 1].splitlines():
-        yield json.loads(line)
+__all__ = ["read_robot_log"]
 
 
 def read_robot_log(log: Path, since: float, until: float) -> RobotRecord:

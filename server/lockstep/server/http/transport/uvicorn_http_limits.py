@@ -12,13 +12,13 @@ import h11
 from starlette.applications import Starlette
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
+from lockstep.rtc.token_bucket import TokenBucket
 from lockstep.server.auth.known_tokens import KnownTokens
 from lockstep.server.http.limit_settings import LimitSettings
 from lockstep.server.http.transport.acceptor import PlacedProtocol
 from lockstep.server.http.transport.connection_places import ConnectionPlaces, Place
 from lockstep.server.util.fair_queue import FairQueue
 from lockstep.server.util.rate_limits import RateLimits
-from lockstep.server.util.token_bucket import TokenBucket
 
 __all__ = ["DEADLINE", "PLACE", "GuardedConnections", "guarded_by", "guarded_http"]
 
@@ -169,6 +169,6 @@ def guarded_http(
 def guarded_by(settings: LimitSettings, app: Starlette) -> GuardedConnections:
     """Return connections within the settings' bounds, to an app that `guard_app` has prepared."""
     places: ConnectionPlaces = app.state.connection_places
-    turns = FairQueue(lambda now: TokenBucket(settings.max_stranger_rate, settings.max_stranger_burst, now))
+    turns = FairQueue(TokenBucket(settings.max_stranger_rate, settings.max_stranger_burst))
     protocol = guarded_http(places, turns, app.state.known_tokens, settings.request_timeout)
     return GuardedConnections(protocol, places, turns)

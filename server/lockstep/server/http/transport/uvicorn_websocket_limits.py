@@ -11,8 +11,8 @@ from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIO
 from websockets.frames import Frame
 from websockets.http11 import Request
 
+from lockstep.rtc.token_bucket import TokenBucket
 from lockstep.server.http.robot_paths import below_robot
-from lockstep.server.util.token_bucket import TokenBucket
 
 __all__ = ["LINES", "TOO_MANY_FRAMES", "GuardedWebSocket"]
 
@@ -75,10 +75,9 @@ class GuardedWebSocket(WebSocketsSansIOProtocol):
                 self._drop_soon()
 
     def _too_many_control_frames(self) -> bool:
-        now = self.loop.time()
         if self._control is None:
-            self._control = TokenBucket(CONTROL_RATE, CONTROL_BURST, now)
-        return not self._control.take(now)
+            self._control = TokenBucket(CONTROL_RATE, CONTROL_BURST)
+        return not self._control.take(self.loop.time())
 
     def _refuse(self, code: int, reason: str) -> None:
         """Close the connection for a fault; discard what has already come with it."""

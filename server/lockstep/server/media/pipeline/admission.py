@@ -7,7 +7,7 @@ from prometheus_client import Counter
 from lockstep.protocol.serial import event_gap
 from lockstep.server.media.metrics import DropCounter
 from lockstep.server.media.pipeline.stage import FrameStage, SourceFrame
-from lockstep.server.util.token_bucket import TokenBucket
+from lockstep.rtc.token_bucket import TokenBucket
 
 __all__ = ["MAX_AT_ONCE", "Admission"]
 
@@ -31,7 +31,7 @@ class Admission(FrameStage):
         self._is_wanted = is_wanted
         self._arrived = arrived
         self._dropped = dropped
-        self._rate = TokenBucket(MAX_RATE, MAX_AT_ONCE, 0.0)
+        self._rate = TokenBucket(MAX_RATE, MAX_AT_ONCE)
         self._last_stamp: int | None = None
 
     def source(self, frame: SourceFrame) -> None:

@@ -19,9 +19,9 @@ from av.video.frame import VideoFrame
 from av.video.stream import VideoStream
 
 from lockstep.server.media.pipeline.frame_rate_limiter import FrameRateLimiter
-from lockstep.server.media.published.encoded_wire import Encoded, read_picture
+from lockstep.server.media.published.encoded_wire import PICTURES, Encoded
 from lockstep.server.media.sources.source_url import SourceSpec
-from lockstep.server.media.sources.source_wire import Captured, Said, Trouble, Working, write_said
+from lockstep.server.media.sources.source_wire import SAID, Captured, Said, Trouble, Working
 
 __all__ = ["PublishedPictures", "main"]
 
@@ -109,7 +109,7 @@ def main() -> None:
     out = os.fdopen(os.dup(sys.stdout.fileno()), "wb")
     os.dup2(sys.stderr.fileno(), sys.stdout.fileno())  # output that a library prints is not a message
     with suppress(OSError, KeyboardInterrupt):
-        decode_all(iter(lambda: read_picture(source), None), spec, lambda said: write_said(out, said))
+        decode_all(iter(lambda: PICTURES.read(source), None), spec, lambda said: SAID.write(out, said))
     os._exit(0)
 
 

@@ -1,16 +1,13 @@
-"""Messages of the console to the process that decodes published pictures: 4 bytes of length, then MessagePack."""
-
-import struct
-from typing import BinaryIO
+"""Messages of the console to the process that decodes published pictures."""
 
 import msgspec
 
 from lockstep.server.media.published.depacketise import PictureCodec
+from lockstep.server.util.framed_pipe import FramedPipe
 
-__all__ = ["Encoded", "encode_picture", "read_picture"]
+__all__ = ["PICTURES", "Encoded"]
 
 MAX_LENGTH = 2_500_000  # bytes
-_LENGTH = struct.Struct("!I")
 
 
 class Encoded(msgspec.Struct, frozen=True, array_like=True):
@@ -22,23 +19,4 @@ class Encoded(msgspec.Struct, frozen=True, array_like=True):
     data: bytes
 
 
-_decoder = msgspec.msgpack.Decoder(Encoded)
-_encoder = msgspec.msgpack.Encoder()
-
-
-def encode_picture(picture: Encoded) -> bytes:
-    data = _encoder.encode(picture)
-    return _LENGTH.pack(len(data)) + data
-
-
-def read_picture(file: BinaryIO) -> Encoded | None:
-    """Read the next picture; None when the console has gone, or the message is not valid."""
-    head = file.read(_LENGTH.size)
-    if len(head) < _LENGTH.size:
-        return None
-    (length,) = _LENGTH.unpack(head)
-    data = file.read(length) if length <= MAX_LENGTH else b""
-    try:
-        return _decoder.decode(data)
-    except msgspec.DecodeError:
-        return None
+PICTURES: FramedPipe[Encoded] = FramedPipe(Encoded, MAX_LENGTH)

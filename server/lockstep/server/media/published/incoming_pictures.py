@@ -1,11 +1,11 @@
 """Turns one publisher's packets into encoded pictures with the time of capture. No I/O, no clock is read."""
 
+from lockstep.rtc.token_bucket import TokenBucket
 from lockstep.server.media.published.depacketise import PictureCodec
 from lockstep.server.media.published.encoded_wire import Encoded
 from lockstep.server.media.published.path_bound import PathBound
 from lockstep.server.media.published.picture_assembly import AssembledPicture, MediaPacket, PictureAssembly
 from lockstep.server.media.sources.capture_timeline import CaptureTimeline
-from lockstep.server.util.token_bucket import TokenBucket
 
 __all__ = ["IncomingPictures"]
 
@@ -24,7 +24,7 @@ class IncomingPictures:
         heard_at: arrival of the last packet; None before the first
     """
 
-    def __init__(self, codec: PictureCodec, latency: float, now: float) -> None:
+    def __init__(self, codec: PictureCodec, latency: float) -> None:
         """`latency`: s from capture until the quickest picture leaves the publisher."""
         self.flooded = 0
         self.heard_at: float | None = None
@@ -32,7 +32,7 @@ class IncomingPictures:
         self._codec = codec
         self._assembly = PictureAssembly(codec)
         self._timeline = CaptureTimeline(latency)
-        self._budget = TokenBucket(MAX_RATE, MAX_BURST, now)
+        self._budget = TokenBucket(MAX_RATE, MAX_BURST)
 
     @property
     def lost(self) -> int:

@@ -3,6 +3,7 @@
 import threading
 from collections import deque
 
+from lockstep.robot_bridge.link.outgoing_queues import StreamQueue
 from lockstep.server.media.sources.source_wire import Captured, Said
 
 __all__ = ["LatestValue"]
@@ -20,11 +21,13 @@ class LatestValue:
     """
 
     def __init__(self) -> None:
-        self.dropped = 0
         self._lock = threading.Lock()
         self._words: deque[Said] = deque(maxlen=MOST_WORDS)
-        self._media: deque[Captured] = deque()
-        self._broken = False  # until a keyframe
+        self._media: StreamQueue[Captured] = StreamQueue()
+
+    @property
+    def dropped(self) -> int:
+        return self._media.dropped
 
     def put(self, said: Said) -> bool:
         """Add a message; True if the buffer was empty, so that the reader has to be told."""
@@ -37,31 +40,15 @@ class LatestValue:
             return empty and bool(self._words or self._media)
 
     def _keep(self, medium: Captured) -> None:
-        most = {"pcm_s16le": MOST_SOUND, "h264": MOST_DEPENDENT}.get(medium.codec, 1)
+        depth = {"pcm_s16le": MOST_SOUND, "h264": MOST_DEPENDENT}.get(medium.codec, 1)
         if medium.codec == "h264" and medium.keyframe:
-            self._broken = False
-            self._forget()
-        elif self._broken:
-            self.dropped += 1
-            return
-        elif len(self._media) >= most and medium.codec == "h264":
-            self._broken = True
-            self._forget()
-            self.dropped += 1
-            return
-        while len(self._media) >= most:
-            self._media.popleft()
-            self.dropped += 1
-        self._media.append(medium)
-
-    def _forget(self) -> None:
-        self.dropped += len(self._media)
-        self._media.clear()
+            depth = 1
+        keyframe = medium.keyframe or medium.codec != "h264"
+        self._media.put(keyframe=keyframe, depth=depth, make=lambda: medium)
 
     def take(self) -> list[Said]:
         """Return everything in the buffer, media last."""
         with self._lock:
-            found = [*self._words, *self._media]
+            words = list(self._words)
             self._words.clear()
-            self._media.clear()
-            return found
+            return [*words, *self._media.take_all()]

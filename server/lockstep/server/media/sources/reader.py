@@ -20,7 +20,7 @@ from lockstep.server.media.sources.errors import SourceError, reason_of
 from lockstep.server.media.sources.picture_source import read_pictures
 from lockstep.server.media.sources.sound_source import read_sound
 from lockstep.server.media.sources.source_url import SourceSpec
-from lockstep.server.media.sources.source_wire import Captured, Said, Trouble, Working, write_said
+from lockstep.server.media.sources.source_wire import SAID, Captured, Said, Trouble, Working
 from lockstep.server.util.backoff import Backoff
 
 __all__ = ["main", "read_source"]
@@ -72,7 +72,7 @@ def main() -> None:
     os.dup2(sys.stderr.fileno(), sys.stdout.fileno())  # output that a library prints is not a message
     threading.Thread(target=_end_with, args=(sys.stdin.buffer,), daemon=True).start()
     with suppress(OSError, KeyboardInterrupt):
-        read_source(spec, lambda said: write_said(out, said))
+        read_source(spec, lambda said: SAID.write(out, said))
     os._exit(0)  # a device that hangs holds nobody up
 
 

@@ -8,7 +8,7 @@ from contextlib import suppress
 from typing import BinaryIO
 
 from lockstep.server.media.sources.latest_value import LatestValue
-from lockstep.server.media.sources.source_wire import Said, read_said
+from lockstep.server.media.sources.source_wire import SAID, Said
 
 __all__ = ["ReaderProcess"]
 
@@ -91,7 +91,7 @@ class ReaderProcess:
     def _hear(self, output: BinaryIO, loop: asyncio.AbstractEventLoop) -> None:
         """Read messages, in the thread."""
         with output, suppress(RuntimeError):  # the loop has closed
-            while (said := read_said(output)) is not None:
+            while (said := SAID.read(output)) is not None:
                 if self._box.put(said):
                     loop.call_soon_threadsafe(self._take)
             loop.call_soon_threadsafe(self._ended.set)

@@ -1,14 +1,14 @@
-"""Messages of a source's process to the console: 4 bytes of length, then MessagePack, on its standard output."""
+"""Messages of a source's process to the console, on its standard output."""
 
-import struct
-from typing import BinaryIO, Literal
+from typing import Literal
 
 import msgspec
 
-__all__ = ["Captured", "Said", "SourceState", "Trouble", "Working", "decode_said", "read_said", "write_said"]
+from lockstep.server.util.framed_pipe import FramedPipe
+
+__all__ = ["SAID", "Captured", "Said", "SourceState", "Trouble", "Working"]
 
 MAX_LENGTH = 16_000_000  # bytes: a picture of 8 million pixels
-_LENGTH = struct.Struct("!I")
 
 SourceState = Literal["waiting", "connecting", "live", "reconnecting"]
 Codec = Literal["yuv420p", "mjpeg", "h264", "pcm_s16le"]
@@ -42,34 +42,4 @@ class Trouble(msgspec.Struct, frozen=True, tag="trouble", array_like=True):
 
 Said = Captured | Working | Trouble
 
-_decoder: msgspec.msgpack.Decoder[Said] = msgspec.msgpack.Decoder(Said)
-_encoder = msgspec.msgpack.Encoder()
-
-
-def write_said(file: BinaryIO, said: Said) -> None:
-    data = _encoder.encode(said)
-    file.write(_LENGTH.pack(len(data)))
-    file.write(data)
-    file.flush()
-
-
-def read_said(file: BinaryIO) -> Said | None:
-    """Read the next message; None when the other side has ended, or the message is not valid."""
-    head = file.read(_LENGTH.size)
-    if len(head) < _LENGTH.size:
-        return None
-    (length,) = _LENGTH.unpack(head)
-    if length > MAX_LENGTH:
-        return None
-    data = file.read(length)
-    if len(data) < length:
-        return None
-    return decode_said(data)
-
-
-def decode_said(data: bytes) -> Said | None:
-    """Decode one message without its length; None when it is not valid."""
-    try:
-        return _decoder.decode(data)
-    except msgspec.DecodeError:
-        return None
+SAID: FramedPipe[Said] = FramedPipe(Said, MAX_LENGTH)

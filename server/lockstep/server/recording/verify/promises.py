@@ -331,7 +331,7 @@ class Verifier:
             key = record.peer, stream.stream
             before = self._rendered.get(key)
             self._rendered[key] = stream
-            if before is None or "off" in (before.gate, stream.gate) or "age" in (before.gate, stream.gate):
+            if before is None or "off" in (before.gate, stream.gate):
                 continue  # its earlier rendering is not known, or was not promised
             self._checks["rendered"].looked += 1
             more = stream.violations - before.violations

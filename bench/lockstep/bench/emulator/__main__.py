@@ -1,3 +1,0 @@
-from lockstep.bench.emulator.cli import main
-
-main()

@@ -1,0 +1,1 @@
+"""Results of measurements: samples, quantiles, tables, the machine."""

@@ -1,0 +1,1 @@
+"""Starts and ends the processes of measurements and tests, and drives."""

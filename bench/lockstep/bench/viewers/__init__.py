@@ -1,0 +1,1 @@
+"""Clients that look on, by the hundred."""

@@ -1,0 +1,3 @@
+from lockstep.emulator.cli import main
+
+main()
