@@ -160,7 +160,7 @@ class Connection:
             async with asyncio.timeout_at(deadline):
                 await self._until(lambda: self.session.welcome is not None)
         except TimeoutError:
-            raise ConnectFailed("connected, but the console said nothing") from None
+            raise ConnectFailed("connected, but the console sent nothing") from None
         ticket = await self._peer.relay_ticket(self.welcome.peer)
         if ticket is None:
             raise ConnectFailed("no relay carries the session now")
@@ -241,7 +241,7 @@ class Connection:
         while True:
             now = self._loop.time()
             if now - self._heard_at > self.options.silence_seconds:
-                self._peer.lose(f"nothing was heard from the console for {self.options.silence_seconds:g} s")
+                self._peer.lose(f"the console was silent for {self.options.silence_seconds:g} s")
             if self._pings.lost(now):
                 self.driver.loss()
             ping = self._pings.send(now)

@@ -85,7 +85,7 @@ class Console:
         if pacing == "media" and not (decode and video):
             raise ValueError("pacing by media needs decoded pictures")
         if gate == "age" and carrier not in ("capture-time", "trailer"):
-            raise ValueError("ages need a carrier that says when a medium was captured: capture-time or trailer")
+            raise ValueError("the gate age needs a carrier with capture times: capture-time or trailer")
         self._options = ConnectionOptions(
             link=parse_link(link),
             pacing=pacing,

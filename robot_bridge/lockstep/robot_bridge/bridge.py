@@ -432,7 +432,7 @@ class Bridge:
         try:
             self._issue_measured(measured._replace(faults=[*measured.faults, self._failure]), time.monotonic())
         except Exception as error:
-            _logger.error("the failure cannot be fed back: %s", error, exc_info=error)
+            _logger.error("the bridge cannot report the failure: %s", error, exc_info=error)
 
     async def _tick_on(self) -> None:
         metronome = Ticker(self._robot.tick_seconds, time.monotonic(), catch_up=MAX_CATCH_UP)

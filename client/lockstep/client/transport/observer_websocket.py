@@ -75,7 +75,7 @@ class ObserverWebSocket:
             ticket = await self._whep.watch(self._relay)
         except SignallingRefused as error:
             if error.status in (404, 405):
-                raise LineBlocked("this console has no lines") from error
+                raise LineBlocked("this console offers no WebSocket for observers") from error
             raise
         try:
             self._socket = await connect(
@@ -91,7 +91,7 @@ class ObserverWebSocket:
         except (OSError, TimeoutError, ImportError, WebSocketException) as error:
             # ImportError: this kind of proxy needs a package that is not installed.
             await self._give_back(ticket)
-            raise LineBlocked(f"no WebSocket to the console ({error or type(error).__name__})") from error
+            raise LineBlocked(f"no WebSocket to the console opens ({error or type(error).__name__})") from error
         return []
 
     async def connect(self, seconds: float) -> None:
@@ -157,7 +157,7 @@ class ObserverWebSocket:
                 self._on_message(data)
         except ConnectionClosed:
             reason = self._socket.close_reason
-            self.lose(f"the console closed the connection ({reason})" if reason else "the console is gone")
+            self.lose(f"the console closed the connection ({reason})" if reason else "the connection was lost")
 
     async def _tell(self) -> None:
         if self._socket is None:

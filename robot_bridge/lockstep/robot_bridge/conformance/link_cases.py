@@ -125,7 +125,7 @@ async def _hello_timeout(subject: Subject) -> None:
         began = loop.time()
         await peer.ends("silent", patience=HELLO_TIMEOUT + PATIENCE)
         lasted = loop.time() - began
-        expect(lasted > HELLO_TIMEOUT - EARLY, f"it ended after {lasted:.1f} s, not {HELLO_TIMEOUT:g} s")
+        expect(lasted > HELLO_TIMEOUT - EARLY, f"the link ended after {lasted:.1f} s, not {HELLO_TIMEOUT:g} s")
 
 
 async def _secret(subject: Subject) -> None:
@@ -208,7 +208,7 @@ async def _silent_link(subject: Subject) -> None:
             lasted = loop.time() - began
             if isinstance(said, Goodbye):
                 expect(said.error == "silent", f"the link ended with {said.error!r}, not 'silent'")
-                expect(lasted > SILENCE - EARLY, f"it ended after {lasted:.1f} s, before {SILENCE:g} s had passed")
+                expect(lasted > SILENCE - EARLY, f"the link ended after {lasted:.1f} s; {SILENCE:g} s had to pass")
                 return
             expect(said is not None, "the connection ended without a goodbye")
             expect(lasted < longest, f"nothing but malformed bytes for {lasted:.0f} s, and the link is still open")

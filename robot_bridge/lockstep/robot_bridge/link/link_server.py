@@ -229,12 +229,12 @@ class LinkServer:
     def admit(self, peer: LinkPeer, hello: Hello) -> Hello | Goodbye:
         """Admit or refuse a link, after its peer has proven the secret if there is one."""
         if not self._has_room(hello):
-            return Goodbye(error="full", detail=f"this bridge takes {self._max_links} links")
+            return Goodbye(error="full", detail=f"this bridge takes at most {self._max_links} links")
         if hello.role == "operator" and self._operator is not None:
             return Goodbye(error="taken", detail="another operator link is open")
         if hello.role == "operator" and self._is_kept_from(hello.name):
             left = self._kept_until - self._clock()
-            return Goodbye(error="taken", detail=f"kept for {self._kept_for}, whose link broke, for {left:.0f} s more")
+            return Goodbye(error="taken", detail=f"kept {left:.0f} s more for {self._kept_for}, whose link broke")
         self._forget_applicant(peer)
         self._known.add(peer)
         if self._acceptor is not None:

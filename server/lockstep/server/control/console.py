@@ -79,7 +79,7 @@ __all__ = ["Console", "SceneFeed", "MediaFeed"]
 
 log = structlog.get_logger(__name__)
 
-TAKEN = "Another console has taken the robot. This one cannot drive it; STOP still works while its media link is up."
+TAKEN = "Another console has taken the robot. This console cannot drive it; STOP works while its media link is up."
 UNWRITTEN = "The audit log cannot be written ({}). The console goes on; what happens now may be missing from the log."
 RESTART_AFTER = 1.0  # s until a background task that failed runs again
 
@@ -380,7 +380,7 @@ class Console:
     def _silence(self, peer: Peer, message: SilenceStops) -> None:
         reason = self.stops.silence(peer, message.peer, silent=message.silent)
         if reason is not None:
-            self._refuse_request(peer, reason, "supervisors silence the stops of operators and observers")
+            self._refuse_request(peer, reason, "a supervisor can silence only operators and observers")
 
     def _joined(self, peer: Peer) -> None:
         peer.silenced = self.stops.is_silenced(peer.identity.token_id)

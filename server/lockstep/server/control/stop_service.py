@@ -52,12 +52,12 @@ RECORDS, RECORD_RATE = 5, 0.2  # Hz, of stops of one link, in full and in the lo
 RESETS, RESET_RATE = 5, 1.0  # Hz, of one link
 ROBOT_RESETS, ROBOT_RESET_RATE = 10, 2.0  # Hz, of all links together
 
-UNDELIVERED = "The stop could not be delivered: there is no link to the robot. It is sent first when the link is back."
+UNDELIVERED = "The stop was not delivered: there is no link to the robot. The stop is sent first when the link is back."
 UNWRITTEN = "Stops cannot be kept on this console's disk ({}). They are kept in memory, until this console ends."
 WRITTEN = "Stops can be kept on this console's disk again."
 SILENCED = (
     "A supervisor has silenced the STOP of your link, and of all links that you invited with it, for ten minutes. "
-    "What you stopped stays stopped."
+    "Robots that you stopped stay stopped."
 )
 HEARD = "The STOP of your link works again."
 
@@ -259,7 +259,7 @@ class StopService:
             return StopOutcome(press, taken, released=self._is_released(taken))
         self._keeper.keep(*(each for each in self._presses.pending if each.id == press))
         kept = await self._keeper.kept_words(press)
-        why = "the robot has not confirmed it" if self._robot.up else "the robot cannot be told now"
+        why = "the robot has not confirmed the stop" if self._robot.up else "the robot cannot be reached now"
         return StopOutcome(press, self._presses.outcome(press), f"{why}; {kept}")
 
     def _is_released(self, taken: StopTaken) -> bool:
@@ -311,7 +311,7 @@ class StopService:
             self._say_again(Press(id=held.press, by=by, where="epoch", reason=held.reason, time=time.time()))
         if newest is not None and newest.taken.number > held.number:
             self._say_again(newest.press)
-        self._settle(self._resets.link_down("the robot bridge was started anew"))
+        self._settle(self._resets.link_down("the robot bridge has restarted"))
 
     def _say_again(self, press: Press) -> None:
         if self._presses.again(press):
@@ -401,12 +401,12 @@ class StopService:
         """Return the reason why `by` may not reset now; None: it may."""
         if by.role != "supervisor":
             if by.role == "observer":
-                return "not_allowed", "observers do not reset"
+                return "not_allowed", "observers may not reset a stop"
             if not self._holds_seat(by):
-                return "no_seat", "the holder of the control seat resets, or a supervisor"
+                return "no_seat", "only the holder of the control seat or a supervisor may reset"
         now = time.monotonic()
         if not (self._link_resets.spend(by.link or by.peer, now) and self._robot_resets.spend("", now)):
-            return "too_often", "resets of this link, or for this robot, come too often"
+            return "too_often", "too many resets with this link or for this robot"
         if not self._robot.up:
             return "link_down", self._robot.detail
         if self._presses.pending:
