@@ -196,7 +196,7 @@ async def test_who_starts_and_ends_a_recording_is_audited_and_an_automatic_one_e
         assert (await rig.http.post("/api/recordings/stop", headers=rig.token("operator"))).status_code == 200
         audit = [each for each in rig.dependencies.audit if each.kind == "recording"]
         assert [(each.role, each.what) for each in audit] == [
-            ("", "started automatically"),
+            ("", "started by itself"),
             *[("operator", "ended"), ("operator", "started"), ("operator", "ended")],
         ]
         assert [each.detail for each in audit[2:]] == [started, started]
@@ -349,5 +349,5 @@ async def test_what_records_by_itself_and_fails_does_not_begin_again_at_once(
         await rig.http.post("/api/recordings", headers=rig.token("operator"))
         await eventually(lambda: len(failures()) >= 2)
         begun = [each.what for each in rig.dependencies.audit if each.kind == "recording" and "started" in each.what]
-        assert begun == ["started automatically", "started"]
+        assert begun == ["started by itself", "started"]
         assert not [each for each in os.listdir(tmp_path) if each.endswith(".mcap")]

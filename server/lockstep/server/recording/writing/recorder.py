@@ -153,7 +153,7 @@ class Recorder(SessionListener):
 
     def _try_again(self) -> None:
         try:
-            self._audited("started automatically", self.start("", "").recording)
+            self._audited("started by itself", self.start("", "").recording)
         except RecordingFailed as error:
             self._again_at = time.monotonic() + RETRY_SECONDS
             log.error("the recording cannot start", reason=error.detail)
