@@ -216,8 +216,8 @@ class SignatureChecker:
             self._fault(f"chunks were reordered or repeated: signature {found.number} comes after signature {before}")
         elif head != found.head:
             self._fault(
-                f"records behind signature {before}, up to event {found.event}, are not those that were signed: "
-                "changed, reordered, put in or taken out"
+                f"records after signature {before}, up to event {found.event}, are not those that were signed: "
+                "changed, reordered, added or removed"
             )
 
     def _end_chunk(self, number: int) -> None:
