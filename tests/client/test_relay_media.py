@@ -19,7 +19,7 @@ async def _nothing(socket: ServerConnection) -> None:
 async def test_a_relay_that_is_no_janus_is_refused_by_name() -> None:
     told = {"engine": "mediasoup", "relay": "0", "url": "wss://host", "feed": 7, "streams": []}
     ticket = msgspec.convert(told, RelayTicket)
-    with pytest.raises(ConnectFailed, match="not through a mediasoup"):
+    with pytest.raises(ConnectFailed, match="not through mediasoup"):
         RelayMedia(ticket, lambda _: None)
 
 
@@ -32,7 +32,7 @@ async def test_a_relay_that_says_nothing_is_given_up_by(late_from: float, monkey
     try:
         async with asyncio.timeout(20):
             await media._watch()
-        assert media.why == "nothing came from the relay for 0.02 s"
+        assert media.why == "no message came from the relay for 0.02 s"
     finally:
         await media.close()
 

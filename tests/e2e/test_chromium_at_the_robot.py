@@ -147,4 +147,4 @@ async def test_before_the_first_motion_the_robot_warns_and_the_page_counts_down(
 
 
 def _warned(console: ConsolePage) -> Locator:
-    return console.page.locator(".alarm").get_by_text("The robot warns whoever is near it: it may move in")
+    return console.page.locator(".alarm").get_by_text("The robot warns the people near it: it may move in")

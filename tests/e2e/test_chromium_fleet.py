@@ -139,7 +139,7 @@ async def test_a_lost_console_leaves_no_picture_that_looks_live(lone: Stack, chr
         with lone.frozen_console():
             await until(page, "s.phase === 'unknown' && s.robots.every((x) => x.picture !== 'live')")
             await expect(page.get_by_role("article").first).to_contain_text("Unknown since")
-            await expect(page.locator(".banner")).to_contain_text("What stands here was so at")
+            await expect(page.locator(".banner")).to_contain_text("This page shows the state at")
             await page.get_by_role("button", name="Stop all robots").tap()
             await expect(page.get_by_role("alert")).to_contain_text("stopped")
             assert await in_view(page, "Stop all robots")
@@ -153,7 +153,7 @@ async def test_a_link_that_is_no_good_says_what_to_do_and_can_be_replaced(lone: 
         assert await in_view(page, "Stop all robots")
         await page.get_by_label("Your link").fill("hello")
         await page.get_by_role("button", name="Open").click()
-        await expect(page.get_by_role("alert").first).to_contain_text("no link of a console")
+        await expect(page.get_by_role("alert").first).to_contain_text("not a link of a console")
         await page.get_by_label("Your link").fill(lone.observer)
         async with page.expect_event("load"):
             await page.get_by_role("button", name="Open").click()

@@ -24,7 +24,7 @@ async def test_a_geofence_and_the_speed_cap_are_shown_and_the_consoles_cap_canno
         await expect(switch).to_be_disabled()
         async with console.driving({LEFT_Y: -0.9, LEFT_X: 0.55}):
             await console.until("s.driving && s.limits.includes('charger')")
-            strip = console.page.get_by_label("What limits the robot")
+            strip = console.page.get_by_label("Limits of the robot")
             await strip.get_by_text("Keep out: Charging corner").wait_for()
         await console.tilt(LEFT_X, 0)
         await console.tilt(LEFT_Y, 1)

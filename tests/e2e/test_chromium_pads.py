@@ -233,4 +233,4 @@ async def test_turbo_drives_as_fast_as_the_limits_allow_and_the_settings_move_to
         await page.locator("input[type=file]").set_input_files(file)
         await page.locator(".pad-row", has_text="Normal").get_by_text("50 %").wait_for()
         await page.locator("input[type=file]").set_input_files({"name": "x", "mimeType": "text/plain", "buffer": b"{"})
-        await page.get_by_text("This file was not taken: it is not JSON").wait_for()
+        await page.get_by_text("This file was not imported: the content is not JSON").wait_for()

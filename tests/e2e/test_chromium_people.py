@@ -34,7 +34,7 @@ async def _invite(console: ConsolePage, role: str, name: str) -> str:
     await dialogue.get_by_label("Name").fill(name)
     await dialogue.get_by_label("Good for").select_option("1 hour")
     await dialogue.get_by_role("button", name="Create link").click()
-    await dialogue.get_by_text(f"Whoever opens this link is {name} ({role.lower()})").wait_for()
+    await dialogue.get_by_text(f"Anyone who opens this link is {name} ({role.lower()})").wait_for()
     return await dialogue.get_by_role("textbox", name="Link").input_value()
 
 

@@ -34,7 +34,7 @@ async def test_a_killed_bridge_is_shown_and_the_page_goes_on_with_its_next_epoch
         await console.let_go()
         await console.until(f"s.connected && s.epoch !== {epoch!r} && s.streams.overview?.rendered > 3", 60)
         assert (await console.stats())["event"] < 10, "references start anew with the epoch"
-        await console.until("s.stop.stopped && s.stop.reason.includes('did not end in order')")
+        await console.until("s.stop.stopped && s.stop.reason.includes('did not shut down cleanly')")
         async with Console(own_stack.supervisor, video=False, audio=False) as supervisor:
             await supervisor.reset()
         await console.until("!s.stop.stopped && s.seat && s.seat.mine")

@@ -220,7 +220,7 @@ class BridgeModel:
         assert not self.driven, "a press had no effect on a robot that moves"
         out: list[LinkMessage] = []
         if given.overtaken:
-            refused = ResetRefused(given.overtaken, "stale_reset", "a newer stop came")
+            refused = ResetRefused(given.overtaken, "stale_reset", "a newer stop arrived")
             out.append(self._refused_reset(refused))
         if self._on_disk == self.core_latch.version:
             return [*out, StopTaken(press=stop.press, number=given.number)]

@@ -123,7 +123,7 @@ def test_a_folder_that_is_there_is_left_as_it_is(tmp_path: Path, monkeypatch: py
     (folder / "my_arm" / "robot.py").write_text("# mine\n")
     asked = CliRunner().invoke(robot_app, ["new", "my_arm"])
     assert asked.exit_code == 2
-    assert "is there already" in asked.output
+    assert "exists already" in asked.output
     assert (folder / "my_arm" / "robot.py").read_text() == "# mine\n"
 
 

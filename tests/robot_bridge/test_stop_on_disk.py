@@ -103,7 +103,7 @@ async def test_a_bridge_that_was_killed_begins_stopped_and_says_why(tmp_path: Pa
     async with bridge_in(tmp_path) as bridge, operator(bridge) as driver:
         stop = driver.feedback.stop
         assert stop.stopped
-        assert "did not end in order" in stop.reason
+        assert "did not shut down cleanly" in stop.reason
         await driver.reset()
 
 

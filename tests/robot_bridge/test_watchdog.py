@@ -410,6 +410,6 @@ async def test_a_watchdog_process_that_is_killed_takes_the_robot_to_rest(
                 os.kill(started[0], signal.SIGKILL)
                 while True:
                     await driver.drive()
-        with pytest.raises(RobotFailed, match="watchdog process is gone"):
+        with pytest.raises(RobotFailed, match="watchdog process has ended"):
             await bridge.wait()
     assert robot.applied[-1][1] == NEUTRAL

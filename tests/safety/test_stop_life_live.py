@@ -171,7 +171,7 @@ class Session:
             self.told.append(Told(press, said["number"], not (failed or self._robot.disk.fails)))
             return int(said["number"])
         assert said["error"] in REFUSED, said
-        if "it is not on the console's disk" not in said["detail"]:
+        if "the stop is not on the console's disk" not in said["detail"]:
             assert "kept" in said["detail"]
             self.kept.append(press)
         return None

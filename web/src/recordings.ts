@@ -94,7 +94,7 @@ function askForToken(): View {
     event.preventDefault();
     const token = tokenIn(field.value);
     trouble.hidden = token !== "";
-    setText(trouble, "This is no link of a console: it has no token behind the #.");
+    setText(trouble, "This is not a link of a console: it has no token after the #.");
     if (token === "") return;
     history.replaceState(null, "", replayHash({ ...here(), token }));
     void route();

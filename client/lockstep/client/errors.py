@@ -33,7 +33,7 @@ ADVICE = {
     "unauthorized": "use a link of this console: one that it printed, or that `lockstep invite` made",
     "link_expired": "ask for a new link",
     "link_revoked": "ask the person who invited you",
-    "not_allowed": "this link's role does not permit it; use the operator's link",
+    "not_allowed": "the role of this link does not permit the request; use the operator's link",
     "robot_unreachable": "start the robot bridge, or give the console its address",
     "too_many_peers": "close another connection first",
 }
@@ -113,7 +113,7 @@ class NotArmed(CommandRefused):
     """The robot may not move before a neutral command: call `await console.arm()` when it is safe to go on."""
 
     def __init__(self) -> None:
-        super().__init__("not_neutral", "the robot was stopped, reset or away, or the seat is new: arm() first")
+        super().__init__("not_neutral", "the robot was stopped, reset or lost, or the seat is new: call arm() first")
 
 
 class StopUnconfirmed(ConsoleError):

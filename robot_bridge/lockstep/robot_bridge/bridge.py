@@ -232,7 +232,7 @@ class Bridge:
         try:
             self._links.publish_feedback(self._feedback.issue_failed(self._stops.failure))
         except Exception as error:
-            _logger.error("the failure cannot be fed back: %s", error, exc_info=error)
+            _logger.error("the bridge cannot report the failure: %s", error, exc_info=error)
 
     async def _run_reports(self) -> None:
         while True:

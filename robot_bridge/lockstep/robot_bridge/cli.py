@@ -188,7 +188,7 @@ def _tls(certificate: Path | None, key: Path | None, authority: Path | None) -> 
 def _choice(name: str, ros2: Path | None, mjcf: Path | None) -> tuple[str, Callable[[], Robot]]:
     """Return the name to announce and the function that makes the robot."""
     if ros2 is not None and mjcf is not None:
-        raise typer.BadParameter("--ros2 and --mjcf are two robots; a bridge has one")
+        raise typer.BadParameter("give --ros2 or --mjcf: a bridge has one robot")
     if ros2 is not None:
         return str(ros2), partial(_ros2, ros2)
     return (str(mjcf), partial(_mjcf, mjcf)) if mjcf is not None else (name, partial(create_robot, name))

@@ -54,7 +54,7 @@ class ServiceManager:
         except OSError as error:
             if not self._failed:
                 self._failed = True
-                _logger.error("the service manager at %s cannot be told: %s", os.fsdecode(self._address), error)
+                _logger.error("cannot notify the service manager at %s: %s", os.fsdecode(self._address), error)
 
 
 def _address(name: str) -> bytes:

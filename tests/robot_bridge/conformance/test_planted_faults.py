@@ -39,7 +39,7 @@ SAID = {  # of those that another fault could bring to the same end
     Fault.STAMPS_AHEAD: "a medium is stamped",
     Fault.TWO_OPERATORS: "a second operator was admitted beside the first",
     Fault.REFUSES_SILENTLY: "neither executed nor refused",
-    Fault.ANY_VERSION: "it was admitted",
+    Fault.ANY_VERSION: "the bridge admitted the link",
 }
 
 

@@ -24,11 +24,11 @@ def changed(**changes: object) -> Feedback:
     [
         (FEEDBACK, ""),
         (changed(axes=[]), "a feedback with 0 axes"),
-        (changed(axes=[math.nan] * len(FEEDBACK.axes)), "a feedback whose axes are no numbers"),
+        (changed(axes=[math.nan] * len(FEEDBACK.axes)), "a feedback whose axes are not numbers"),
         (changed(joints=[0.0] * 99), "a feedback with 99 joints"),
         (changed(wrench=[1.0]), "a feedback with 1 wrench"),
         (changed(ranges=[1.0]), "a feedback with 1 ranges"),
-        (changed(axes=[1e308] * len(FEEDBACK.axes)), "a feedback whose axes are no numbers"),
+        (changed(axes=[1e308] * len(FEEDBACK.axes)), "a feedback whose axes are not numbers"),
         (changed(time=math.nan), "a feedback without a time"),
         (changed(time=1e300), "a feedback without a time"),
         (changed(time=-1.0), "a feedback without a time"),
@@ -45,7 +45,7 @@ def test_a_console_takes_no_feedback_that_it_could_not_show_and_goes_on() -> Non
     bad = frame(encode_message(changed(axes=[math.inf] * len(FEEDBACK.axes))))
     good = frame(encode_message(FEEDBACK))
     found = session.receive(bad + good, 0.0)
-    assert found == [BadInput("malformed", "a feedback whose axes are no numbers"), FEEDBACK]
+    assert found == [BadInput("malformed", "a feedback whose axes are not numbers"), FEEDBACK]
 
 
 @pytest.mark.parametrize(

@@ -60,7 +60,7 @@ def test_sound_limits_pass() -> None:
         (fenced(polygon=((0, 0), (1, 0))), "corners"),
         (fenced(polygon=tuple((math.cos(k), math.sin(k)) for k in range(65))), "corners"),
         (fenced(polygon=((0, 0), (1, 0), (math.nan, 1))), "finite"),
-        (fenced(polygon=((0, 0), (0, 0), (1, 1))), "follows itself"),
+        (fenced(polygon=((0, 0), (0, 0), (1, 1))), "successive corners"),
         (fenced(polygon=((0, 0), (1, 1), (1, 0), (0, 1))), "cross"),
         (fenced(polygon=((0, 0), (1, 1), (2, 2))), "no area"),
         (msgspec.structs.replace(DESCRIPTION, geofences=(FENCE,) * 33), "33 geofences"),

@@ -20,13 +20,13 @@ def test_whatever_has_the_name_locks(tmp_path: Path) -> None:
 
 def test_what_cannot_be_looked_at_counts_as_locked(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
-    assert "folder of the lock-out file cannot be looked at" in look_at(tmp_path / "missing" / "lockout")
-    assert "cannot be looked at" in look_at(tmp_path / "file" / "lockout")
-    assert "cannot be looked at" in look_at(tmp_path / ("x" * 300))
+    assert "folder of the lock-out file cannot be checked" in look_at(tmp_path / "missing" / "lockout")
+    assert "cannot be checked" in look_at(tmp_path / "file" / "lockout")
+    assert "cannot be checked" in look_at(tmp_path / ("x" * 300))
 
 
 def test_before_the_first_look_the_robot_is_locked(tmp_path: Path) -> None:
-    assert "not looked at yet" in LockoutFile(tmp_path / "lockout").reason
+    assert "not been checked yet" in LockoutFile(tmp_path / "lockout").reason
 
 
 def test_a_look_that_hangs_locks_the_robot_after_a_while(tmp_path: Path) -> None:

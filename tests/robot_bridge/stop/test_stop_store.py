@@ -61,7 +61,7 @@ def test_a_bridge_that_did_not_end_in_order_begins_stopped(tmp_path: Path, recor
     kept_in(tmp_path, record, ended=False)
     start = start_of(found(tmp_path), WALL)
     assert start.record == record
-    assert "did not end in order" in start.stop_reason
+    assert "did not shut down cleanly" in start.stop_reason
     assert start.numbers_after > record.number + 1000, "numbers that never reached the disk may have been given"
 
 
@@ -201,7 +201,7 @@ def test_what_a_bridge_said_of_its_end_is_the_reason_of_the_next_stop_and_of_no_
     assert start.stop_reason.startswith("The robot bridge hung!")
     assert len(start.stop_reason) == MAX_NOTE
     kept_in(tmp_path, STOPPED, ended=False)
-    assert "did not end in order" in start_of(found(tmp_path), WALL).stop_reason
+    assert "did not shut down cleanly" in start_of(found(tmp_path), WALL).stop_reason
 
 
 def test_what_a_bridge_said_of_its_end_counts_for_nothing_when_it_ended_in_order_after_all(tmp_path: Path) -> None:

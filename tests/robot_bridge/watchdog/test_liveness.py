@@ -114,7 +114,7 @@ async def test_native_code_that_keeps_the_interpreter_ends_by_the_kernels_alarm(
         (tmp_path / "lock").touch()
         assert await bridge.process.wait() == -signal.SIGALRM
     async with bridge_after(tmp_path) as reason:
-        assert "did not end in order" in reason
+        assert "did not shut down cleanly" in reason
 
 
 async def test_a_message_that_nobody_reads_does_not_keep_it_alive(tmp_path: Path) -> None:

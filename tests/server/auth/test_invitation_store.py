@@ -70,7 +70,7 @@ def test_a_damaged_file_stops_the_start_and_not_a_console_that_runs(directory: S
         assert store.refresh() == []
     assert [line["log_level"] for line in logs] == ["error"], "said once"
     assert store.is_revoked(made.id)
-    assert store.trouble.startswith("not understood")
+    assert store.trouble.startswith("the file is damaged")
     with pytest.raises(StateDamaged, match="signing.key"):
         InvitationStore(directory)
 
@@ -82,8 +82,8 @@ def test_a_file_that_vanishes_revives_no_link(directory: StateDir) -> None:
     (directory.path / FILE).unlink()
     assert store.refresh() == []
     assert store.is_revoked(made.id)
-    assert store.trouble == "it is gone"
-    with pytest.raises(StateDamaged, match="gone"):
+    assert store.trouble == "the file is missing"
+    with pytest.raises(StateDamaged, match="missing"):
         store.update(_invite)
     with pytest.raises(StateDamaged, match="signing.key"):
         InvitationStore(directory)

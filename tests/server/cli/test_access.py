@@ -223,7 +223,7 @@ async def test_the_audit_of_a_console_that_ran_is_verified_and_an_edit_and_a_cut
     assert f"signed by {key}" in good.stdout
     assert json.loads(_lockstep(tmp_path / "other", "audit", str(state), "--verify", "--json").stdout)["ok"]
     wrong = _lockstep(state, "audit", "--verify", "--signed-by", "0" * 64)
-    assert "none that fits this audit and key" in wrong.stdout
+    assert "but none fits this audit log and key" in wrong.stdout
     assert _lockstep(state, "audit", "--verify", "--signed-by", "key").exit_code == 2
     path = state / "audit.jsonl"
     whole = path.read_bytes()

@@ -121,7 +121,7 @@ async def test_a_port_in_use_is_said_clearly() -> None:
         (("up", "--ros2", "none.yaml", "--port", "0", "--robot-port", "0"), 4, "none.yaml: No such file"),
         (("up", "--robot-python", "/none/python", "--port", "0", "--robot-port", "0"), 4, "/none/python"),
         (("serve", "--board", "redis://h", "--public-url", "http://h"), 2, "--robot NAME=tcp://"),
-        (("serve", "--ice-host", "203.0.113.1"), 2, "the outer one of a one-to-one NAT belongs to --advertise"),
+        (("serve", "--ice-host", "203.0.113.1"), 2, "the outer address of a one-to-one NAT with --advertise"),
     ],
 )
 async def test_what_cannot_work_is_said_in_one_line(arguments: tuple[str, ...], code: int, words: str) -> None:
@@ -154,7 +154,7 @@ async def test_a_certificate_that_is_none_is_said_in_one_line(tmp_path: Path) ->
     garbage.write_text("garbage")
     code, out, err = await _run("serve", "--port", "0", "--tls-cert", str(garbage), "--tls-key", str(garbage))
     assert (code, out) == (2, "")
-    assert "tls_cert and tls_key are no certificate chain" in err
+    assert "tls_cert and tls_key are not a certificate chain" in err
     assert "Traceback" not in err
 
 
@@ -241,7 +241,7 @@ def test_each_robot_of_up_has_its_latch_by_its_name_whatever_the_port(
 def test_up_names_the_robots_there_are_when_one_is_unknown(robots: list[str]) -> None:
     asked = CliRunner().invoke(app, ["up", *(word for robot in robots for word in ("--robot", robot))])
     assert asked.exit_code == 2
-    assert "no robot 'tractor'; there are" in asked.stderr
+    assert "no robot 'tractor'; choose one of" in asked.stderr
 
 
 def test_the_version_is_that_of_the_distribution() -> None:
@@ -262,7 +262,7 @@ async def test_a_misspelt_setting_of_the_environment_is_named_at_start(
     monkeypatch.setenv("LOCKSTEP_PORTT", "1")
     async with running_stack(tmp_path, extra=("--robot-port", "0")) as stack:
         pass
-    assert any("LOCKSTEP_PORTT is no setting" in line for line in stack.output)
+    assert any("LOCKSTEP_PORTT is not a setting" in line for line in stack.output)
 
 
 def test_each_command_is_where_it_is_looked_for_and_help_names_them_all() -> None:

@@ -113,7 +113,7 @@ def test_what_cannot_be_exported_is_said_in_one_line(directory: Path) -> None:
     (directory / "text.mcap").write_text("no recording")
     done = _lockstep(directory, "export", "text", "--to", "csv")
     assert done.exit_code == 2
-    assert "lockstep: text.mcap is no MCAP file" in done.stderr
+    assert "lockstep: text.mcap is not an MCAP file" in done.stderr
     assert "Traceback" not in done.output
 
 
@@ -121,7 +121,7 @@ def test_what_cannot_be_replayed_is_said_before_anything_is_served(directory: Pa
     (directory / "text.mcap").write_text("no recording")
     done = _lockstep(directory, "replay", "text")
     assert done.exit_code == 2
-    assert "lockstep: text.mcap is no MCAP file" in done.stderr
+    assert "lockstep: text.mcap is not an MCAP file" in done.stderr
 
 
 def test_without_a_console_recording_says_that_none_runs(directory: Path) -> None:

@@ -6,7 +6,7 @@ from lockstep.server.settings import Settings
 
 def test_a_misspelt_setting_is_named_with_the_one_that_was_probably_meant() -> None:
     assert unknown_settings(["LOCKSTEP_PORTT"], Settings) == [
-        "LOCKSTEP_PORTT is no setting and has no effect; did you mean LOCKSTEP_PORT?"
+        "LOCKSTEP_PORTT is not a setting and has no effect; did you mean LOCKSTEP_PORT?"
     ]
 
 

@@ -19,7 +19,7 @@ def test_a_robot_is_shown_with_its_ages_grown_then_unknown_then_not_at_all() -> 
     assert (fresh.link, fresh.feedback_age_ms, fresh.link_age_ms) == ("up", 505.0, 1500.0)
     assert fresh.console == "console-1"
     (silent,) = others.tiles([], 100.0 + UNKNOWN_AFTER + 0.5)
-    assert (silent.link, silent.detail, silent.event_rate) == ("unknown", "its console is not heard", 0.0)
+    assert (silent.link, silent.detail, silent.event_rate) == ("unknown", "its console is silent", 0.0)
     assert silent.link_age_ms == 3500.0, "how long it has been unknown"
     assert others.tiles([], 100.0 + GONE_AFTER) != []
     assert others.tiles([], 100.1 + GONE_AFTER) == []

@@ -66,7 +66,7 @@ async def test_a_stop_that_nobody_answers_is_said_to_be_not_confirmed(
         await eventually(lambda: two.state.unknown_since is None, "the board")
         answers = await two.stop(["left"], new_press(ANN, "http", ""))
         assert answers["left"][:2] == (False, False)
-        assert answers["left"].detail == "not confirmed: no console has it"
+        assert answers["left"].detail == "not confirmed: no console has this robot"
         server.kill()
         await eventually(lambda: two.state.unknown_since is not None, "the loss")
         answers = await two.stop(["left"], new_press(ANN, "http", ""))

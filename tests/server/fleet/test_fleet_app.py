@@ -112,7 +112,7 @@ async def test_one_link_cannot_take_all_places_by_way_of_several_robots() -> Non
         with ExitStack() as places:
             for _ in range(6):
                 places.enter_context(next(robots).place(link))
-            with pytest.raises(TooManyPeers, match="one link gets 6"):
+            with pytest.raises(TooManyPeers, match="this link has all of its 6"):
                 places.enter_context(next(robots).place(link))
             places.enter_context(next(robots).place(link._replace(token_id="y")))
 

@@ -146,7 +146,7 @@ async def test_an_observer_cannot_command_nor_rest_nor_take_the_seat_nor_reset()
         peer.send("session", SeatRequest())
         await _refused(peer, "not_allowed")
         peer.send("stop", Reset())
-        await _refused(peer, "not_allowed", "observers do not reset")
+        await _refused(peer, "not_allowed", "observers may not reset a stop")
         assert (await rig.session())["seat"]["holder"] == ""
         assert (await rig.session())["event"] == now.event
         assert rig.count("lockstep_refusals_total", reason="no_seat") == 2

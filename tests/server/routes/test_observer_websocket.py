@@ -78,7 +78,7 @@ async def test_a_line_drives_nothing_resets_nothing_and_gets_no_seat() -> None:
         await line.send(SeatRequest())
         await line.until(lambda each: isinstance(each, Refusal) and each.reason == "not_allowed")
         await line.send(Reset())
-        await line.until(lambda each: isinstance(each, Refusal) and each.detail == "observers do not reset")
+        await line.until(lambda each: isinstance(each, Refusal) and each.detail == "observers may not reset a stop")
         assert rig.count("lockstep_resets_total") == 0
 
 

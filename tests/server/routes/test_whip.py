@@ -314,7 +314,7 @@ async def test_a_publisher_that_stalls_is_said_to_and_its_link_alone_may_begin_a
         await publisher.post(rig.http, token)
         await state(peer, "live", "published by operator")
         publisher.pictures.goes_on.clear()
-        await state(peer, "reconnecting", "nothing comes any more")
+        await state(peer, "reconnecting", "no data arrives")
         assert rig.count("lockstep_media_source_failures_total", source="phone", reason="silent") == 1
         assert name(await post(rig, rig.token("operator"))) == (409, "camera_taken")
         seen = len(told(peer))

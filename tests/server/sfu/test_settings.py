@@ -33,7 +33,7 @@ def test_anything_else_is_refused(text: str) -> None:
 
 @pytest.mark.parametrize("text", ["livekit:wss://host?room=demo", "sfu:wss://host?secret=hush", "wss://host/1"])
 def test_another_engine_is_refused_with_what_a_relay_is_and_its_address_is_not_repeated(text: str) -> None:
-    with pytest.raises(ValidationError, match=r"a relay is a Janus: janus:ws\(s\)://host\[:port\]/ROOM") as refusal:
+    with pytest.raises(ValidationError, match=r"must be a Janus server: janus:ws\(s\)://host\[:port\]/ROOM") as refusal:
         Settings(relay=text)  # type: ignore[arg-type]
     assert "host?" not in refusal.value.errors()[0]["msg"]
 

@@ -107,7 +107,7 @@ async def test_a_disk_that_hangs_holds_up_nobody_who_pressed_for_long(
 
 async def test_whoever_pressed_is_told_how_long_a_stop_is_kept(tmp_path: Path) -> None:
     async with _running(tmp_path) as keeper:
-        for lasts, words in ((True, KEPT), (False, f"{KEPT_IN_MEMORY}; its state directory is a temporary one")):
+        for lasts, words in ((True, KEPT), (False, f"{KEPT_IN_MEMORY}; the state directory is temporary")):
             keeper.lasts = lasts
             press = _pressed(keeper, f"press {lasts}")
             keeper.keep(press)

@@ -124,7 +124,7 @@ export class ChartsDrawer implements Panel {
       this.drawnMs = -Infinity;
       return this.stack;
     } catch {
-      setText(this.words, "The charts could not be loaded: is the console there?");
+      setText(this.words, "The charts could not be loaded. Check the connection to the console.");
       return null;
     }
   }

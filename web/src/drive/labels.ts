@@ -30,7 +30,7 @@ export const ARM_REFUSAL_LABELS: Readonly<Record<ArmRefusal, string>> = {
   stopped: "The robot is stopped: reset it first",
   stop_pressed: "You pressed STOP, and the robot does not show it yet",
   hidden: "The page is hidden",
-  occupied: "Close what is open over the picture, or leave the text field, first",
+  occupied: "First close the window over the picture, or leave the text field",
   deadman_held: "Let go of the hold-to-run control first",
 };
 
@@ -39,8 +39,8 @@ export const DISARM_LABELS: Readonly<Record<DisarmReason, string>> = {
   operator: "Disarmed by you",
   blur: "Disarmed: the window lost focus",
   hidden: "Disarmed: the page was hidden",
-  pad_lost: "Disarmed: the gamepad is gone",
-  pad_silent: "Disarmed: the gamepad fell silent. Is it in range, and charged?",
+  pad_lost: "Disarmed: the gamepad was disconnected",
+  pad_silent: "Disarmed: the gamepad fell silent. Check its range and its battery",
   connection_lost: "Disarmed: the connection was lost",
   robot_down: "Disarmed: the robot cannot be reached",
   seat_lost: "Disarmed: the control seat was lost",

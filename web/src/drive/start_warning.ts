@@ -7,5 +7,5 @@ export function warningSeconds(feedback: Feedback | null, measuredMs: number | n
 }
 
 export function warningLabel(seconds: number): string {
-  return `The robot warns whoever is near it: it may move in ${seconds} s`;
+  return `The robot warns the people near it: it may move in ${seconds} s`;
 }

@@ -122,22 +122,22 @@ export function stopAllLabels(stop: StopAll): StopAllLabels | null {
       ...words,
       advice:
         all.length === 0
-          ? "This link is good for no robot."
+          ? "This link admits to no robot."
           : unsaved.length > 0
             ? UNSAVED_ADVICE
-            : "Each is reset on its own page. A reset moves nothing.",
+            : "Reset each robot on its own page. A reset moves nothing.",
     };
   const counted = `${stopped.length} of ${robotsLabel(all.length)} stopped`;
   const isKept = all.some(([, { fate }]) => fate === "kept");
   if (!isLate && !isKept) {
-    const advice = stop.failure === "" ? "" : `${stop.failure} It is said again.`;
-    return { tone: "pending", title: all.length === 0 ? "Saying STOP …" : `${counted} …`, ...words, advice };
+    const advice = stop.failure === "" ? "" : `${stop.failure} The page sends STOP again.`;
+    return { tone: "pending", title: all.length === 0 ? "Sending STOP …" : `${counted} …`, ...words, advice };
   }
   return {
     tone: "bad",
     title: counted,
     ...words,
-    advice: `${stop.failure === "" ? "" : `${stop.failure} `}Stop the others by their own emergency stops. ${nextWords(stop)}${unsaved.length > 0 ? ` ${UNSAVED_ADVICE}` : ""}`,
+    advice: `${stop.failure === "" ? "" : `${stop.failure} `}Stop the others with their own emergency stops. ${nextWords(stop)}${unsaved.length > 0 ? ` ${UNSAVED_ADVICE}` : ""}`,
   };
 }
 
@@ -147,19 +147,19 @@ function notSavedWords(unsaved: number, all: number): string {
 }
 
 const UNSAVED_ADVICE =
-  "A robot that has not saved its stop may move again when it restarts. Switch it off by its hardware stop.";
+  "A robot that has not saved its stop may move again when it restarts. Switch it off with its hardware stop.";
 
 function fateWords(fate: StopFate, detail: string): string {
   if (fate === "asking") return "not answered yet";
   return detail === ""
-    ? "not delivered: it is kept and sent first when the robot is back"
+    ? "not delivered: the stop is kept and sent first when the robot is back"
     : `not delivered: ${detail}`;
 }
 
 function nextWords(stop: StopAll): string {
-  return stop.isOver ? "Press again to say it once more." : "It is said again every second.";
+  return stop.isOver ? "Press STOP ALL to send it again." : "The page sends STOP again every second.";
 }
 
 function unansweredWords(stop: StopAll): string {
-  return `${stop.failure === "" ? "" : `${stop.failure} `}Stop the robots by their own emergency stops. ${nextWords(stop)}`;
+  return `${stop.failure === "" ? "" : `${stop.failure} `}Stop the robots with their own emergency stops. ${nextWords(stop)}`;
 }

@@ -29,25 +29,28 @@ const ASKED: Readonly<Record<ControlName, readonly [what: string, about: string]
     "A shoulder button is best. The robot moves only while it is held.",
   ],
   arm: ["Press the button that arms", "Usually Start or Options."],
-  stop: ["Press the button that stops the robot", "One that a thumb finds without looking."],
+  stop: ["Press the button that stops the robot", "Choose one that your thumb finds without looking."],
   left_x: ["Push the left stick all the way right, then all the way left", "Then let it go."],
   left_y: ["Push the left stick all the way up, then all the way down", "Then let it go."],
   right_x: ["Push the right stick all the way right, then all the way left", "Then let it go."],
   right_y: ["Push the right stick all the way up, then all the way down", "Then let it go."],
-  left_trigger: ["Pull the left trigger to its end, then let it go", "Skip it if the pad has none."],
-  right_trigger: ["Pull the right trigger to its end, then let it go", "Skip it if the pad has none."],
-  cross_up: ["Press up on the cross", "The directional pad. Skip it if there is none."],
-  cross_right: ["Press right on the cross", "Skip it if there is none."],
-  cross_down: ["Press down on the cross", "Skip it if there is none."],
-  cross_left: ["Press left on the cross", "Skip it if there is none."],
-  slow: ["Press the button for slow", "Held together with the other, for careful work. May be skipped."],
+  left_trigger: ["Pull the left trigger to its end, then let it go", "Skip this step if the pad has none."],
+  right_trigger: ["Pull the right trigger to its end, then let it go", "Skip this step if the pad has none."],
+  cross_up: ["Press up on the cross", "The directional pad. Skip this step if the pad has none."],
+  cross_right: ["Press right on the cross", "Skip this step if the pad has none."],
+  cross_down: ["Press down on the cross", "Skip this step if the pad has none."],
+  cross_left: ["Press left on the cross", "Skip this step if the pad has none."],
+  slow: [
+    "Press the button for slow",
+    "Hold it together with the other for careful work. You may skip this step.",
+  ],
   turbo: [
     "Press the button for turbo",
-    "Held for the turbo speed, never above the robot's limits. May be skipped.",
+    "Hold it for turbo speed, which never exceeds the robot's limits. You may skip this step.",
   ],
   layer: [
     "Press the button for the next layer",
-    "What the sticks move, where a robot has several sets. May be skipped.",
+    "A layer is a set of axes that the sticks move. You may skip this step.",
   ],
 };
 
@@ -67,7 +70,7 @@ export function calibrationPrompt(calibration: Calibration): CalibrationPrompt {
   return {
     what,
     about,
-    trouble: name === undefined ? "" : `That one is already “${name}”. Use another one.`,
+    trouble: name === undefined ? "" : `That input is already “${name}”. Use another one.`,
   };
 }
 

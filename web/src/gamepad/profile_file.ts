@@ -40,19 +40,19 @@ export function writeProfiles(book: PadProfiles): string {
 
 /** Reads what was stored or exported. One bad profile spoils the whole: half of it would be a surprise. */
 export function readProfiles(text: string): ParsedProfiles {
-  if (text.length > MAX_STORE_CHARS) return { kind: "bad", why: "it is too long" };
+  if (text.length > MAX_STORE_CHARS) return { kind: "bad", why: "the content is too long" };
   let found: unknown;
   try {
     found = JSON.parse(text);
   } catch {
-    return { kind: "bad", why: "it is not JSON" };
+    return { kind: "bad", why: "the content is not JSON" };
   }
   if (!isRecord(found) || found["format"] !== "lockstep-pads")
-    return { kind: "bad", why: "it is not a file of pad profiles" };
-  if (found["version"] !== STORE_VERSION) return { kind: "bad", why: "it is of another version" };
+    return { kind: "bad", why: "the content is not a file of pad profiles" };
+  if (found["version"] !== STORE_VERSION) return { kind: "bad", why: "the content is of another version" };
   const { profiles, preferred } = found;
   if (!Array.isArray(profiles) || profiles.length > MAX_PROFILES)
-    return { kind: "bad", why: "its profiles are no list, or too many" };
+    return { kind: "bad", why: "the profiles are not a list, or too many" };
   const read = profiles.map(readProfile);
   const bad = read.findIndex((profile) => profile === null);
   if (bad >= 0) return { kind: "bad", why: `profile ${bad + 1} is damaged` };

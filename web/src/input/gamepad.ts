@@ -138,12 +138,12 @@ export class Pad {
     for (const [index, known] of this.known)
       if (!pads.some((pad) => pad.index === index && pad.id === known.id)) {
         this.known.delete(index);
-        this.events.plugged(`Gamepad gone: ${padName(known.id)}`);
+        this.events.plugged(`Gamepad disconnected: ${padName(known.id)}`);
       }
     for (const pad of pads) {
       if (this.known.has(pad.index)) continue;
       this.knownOf(pad);
-      this.events.plugged(`Gamepad found: ${padName(pad.id)}`);
+      this.events.plugged(`Gamepad connected: ${padName(pad.id)}`);
     }
   }
 }

@@ -20,7 +20,7 @@ export class GamepadStorage {
     if (text === null) return;
     const parsed = readProfiles(text);
     if (parsed.kind === "profiles") this.saved = parsed.book;
-    else this.trouble = `The stored gamepad profiles were left out: ${parsed.why}`;
+    else this.trouble = `The stored gamepad profiles were ignored: ${parsed.why}`;
   }
 
   save(profile: PadProfile): void {
@@ -38,7 +38,7 @@ export class GamepadStorage {
   /** Takes the profiles of a file; says what is wrong with it, null when nothing is. */
   import(text: string): string | null {
     const parsed = readProfiles(text);
-    if (parsed.kind === "bad") return `This file was not taken: ${parsed.why}`;
+    if (parsed.kind === "bad") return `This file was not imported: ${parsed.why}`;
     this.write(mergeProfiles(this.saved, parsed.book));
     return null;
   }
@@ -53,7 +53,7 @@ export class GamepadStorage {
       localStorage.setItem(KEY, writeProfiles(book));
       this.trouble = null;
     } catch {
-      this.trouble = "This browser keeps nothing for this page: the profiles are gone when it closes";
+      this.trouble = "This browser stores nothing for this page: the profiles are lost when it closes";
     }
   }
 

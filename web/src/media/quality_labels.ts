@@ -3,7 +3,7 @@ import type { Quality } from "../protocol/wire";
 type StreamQuality = Quality["streams"][number];
 
 const REASONS: Readonly<Record<string, string>> = {
-  "no feedback": "nothing was heard from this page",
+  "no feedback": "no reports arrived from this page",
   loss: "the network loses packets",
   gap: "pictures came close to the tolerance",
   bandwidth: "the network carries no more",

@@ -95,12 +95,12 @@ function* recordsOf(number: number, body: ArrayBuffer): Generator<ReplayRecord> 
   let at = 0;
   for (let count = 0; at < body.byteLength && count < MOST_RECORDS; count++) {
     const length = at + 4 <= body.byteLength ? view.getUint32(at) : Infinity;
-    if (at + 4 + length > body.byteLength) throw new ChunkBroken("it ends within a header");
+    if (at + 4 + length > body.byteLength) throw new ChunkBroken("the chunk ends within a header");
     const head = json(new Uint8Array(body, at + 4, length));
-    if (!isRecord(head)) throw new ChunkBroken("a header is no object");
+    if (!isRecord(head)) throw new ChunkBroken("a header is not an object");
     at += 4 + length;
     const size = numeric(head["size"]);
-    if (size < 0 || at + size > body.byteLength) throw new ChunkBroken("it ends within a record");
+    if (size < 0 || at + size > body.byteLength) throw new ChunkBroken("the chunk ends within a record");
     yield {
       id: number * MOST_RECORDS + count,
       topic: text(head["topic"]),
@@ -121,7 +121,7 @@ function json(bytes: Uint8Array): unknown {
   try {
     return JSON.parse(decoder.decode(bytes)) as unknown;
   } catch (error) {
-    throw new ChunkBroken("it is not JSON", { cause: error });
+    throw new ChunkBroken("a header is not JSON", { cause: error });
   }
 }
 

@@ -61,7 +61,7 @@ export class PictureDecoder {
   private async ready(sequence: readonly ReplayRecord[]): Promise<VideoDecoder> {
     if (!("VideoDecoder" in globalThis)) throw new CannotDecode(withoutDecoder());
     const codec = codecOf(sequence[0]);
-    if (codec === null) throw new CannotDecode("The recording says nothing of how this picture was encoded");
+    if (codec === null) throw new CannotDecode("The recording does not say how this picture was encoded");
     if (this.decoder?.state === "configured" && codec === this.codec) return this.decoder;
     const { supported } = await VideoDecoder.isConfigSupported(configOf(codec));
     if (supported !== true)
@@ -118,6 +118,6 @@ function configOf(codec: string): VideoDecoderConfig {
 
 function withoutDecoder(): string {
   return isSecureContext
-    ? "This browser has no WebCodecs, which the pictures need. Chromium, Chrome, Edge, Safari and Firefox from 130 have it"
+    ? "This browser has no WebCodecs, which the pictures need. Use Chromium, Chrome, Edge, Safari or Firefox 130 or newer"
     : "Browsers decode recordings only on pages that come over HTTPS or from this computer itself";
 }

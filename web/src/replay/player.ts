@@ -226,7 +226,7 @@ export class Player {
       this.cameras.map(async (topic) => {
         const picture = moment.pictures.get(topic);
         if (picture === undefined) {
-          troubles.set(topic, moment.damaged ? DAMAGED : "No picture had come yet");
+          troubles.set(topic, moment.damaged ? DAMAGED : "No picture had arrived yet");
           return;
         }
         try {

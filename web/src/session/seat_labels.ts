@@ -11,7 +11,7 @@ export interface SeatLabels {
 export type Obstacle = "silent" | "robot_down" | "locked_out" | "stopped";
 
 const OBSTACLE_WORDS: Readonly<Record<Obstacle, string>> = {
-  silent: "The console is silent, and frees the seat of somebody it does not hear",
+  silent: "The console is silent, and frees your seat if it does not hear this page",
   robot_down: "The robot cannot be reached",
   locked_out: "Somebody at the robot has locked it",
   stopped: "Reset the robot, then arm to drive",

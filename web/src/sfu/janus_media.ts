@@ -43,7 +43,7 @@ export class JanusMedia {
     const streams = wantedMids(ticket).map((mid) => ({ feed: ticket.feed, mid }));
     const join = { request: "join", ptype: "subscriber", room: ticket.room, pin: ticket.pin, streams };
     const { sdp, data } = await this.socket.message(join, null);
-    if (sdp === null) throw new Error("the relay offered nothing");
+    if (sdp === null) throw new Error("the relay sent no offer");
     await this.connection.setRemoteDescription({ type: "offer", sdp: completeOffer(sdp) });
     this.readStamps(feedMids(data));
     await this.connection.setLocalDescription(await this.connection.createAnswer());

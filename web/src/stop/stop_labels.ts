@@ -14,7 +14,7 @@ const ADVICE: Readonly<Record<StopFate, string | null>> = {
   sending: null,
   confirmed: null,
   not_kept:
-    "The robot is stopped, but could not save that: if it restarts it may move again. Switch it off by its hardware stop.",
+    "The robot is stopped, but could not save the stop: if it restarts it may move again. Switch it off with its hardware stop.",
   waiting:
     "Your STOP has not reached the robot. Use the hardware stop now. The console keeps your STOP and sends it first when the link is back.",
   unconfirmed: "The robot has not confirmed your STOP. Use the hardware stop now.",

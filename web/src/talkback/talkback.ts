@@ -55,7 +55,7 @@ export class Talkback {
   obstacle(): string | null {
     if (this.sender === null) return "There is no loudspeaker at the robot";
     if (!this.context.hears(performance.now())) return "The console is silent";
-    if (!holdsSeat(this.context.state)) return "Who has control is heard at the robot";
+    if (!holdsSeat(this.context.state)) return "Only the driver is heard at the robot";
     const trouble = this.context.state.voice?.trouble ?? "";
     return trouble === "" ? null : `The loudspeaker at the robot does not work (${trouble})`;
   }

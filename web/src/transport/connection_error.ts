@@ -41,20 +41,20 @@ export function connectionErrorOf(status: number, error: string): ConnectionErro
 export const CONNECTION_ERROR_LABELS: Readonly<Record<ConnectionErrorKind, ConnectionErrorLabels>> = {
   console_full: {
     title: "The console is full",
-    text: "It serves as many people as it may. Somebody has to leave first.",
+    text: "The console serves as many people as it may. Somebody has to leave first.",
   },
   console_unreachable: {
     title: "Console unreachable",
-    text: "It does not answer: it is not running, or this device is offline. Check your network, then ask whoever runs it.",
+    text: "The console does not answer: it is not running, or this device is offline. Check your network, then ask the person who runs the console.",
   },
-  lost: { title: "Connection lost", text: "The robot comes to rest by itself." },
+  lost: { title: "Connection lost", text: "The robot comes to rest." },
   no_path: {
     title: "No path for pictures and commands",
-    text: "The console answers, but its UDP packets do not get through. A firewall blocks UDP, or the console needs a TURN server. Try another network, or show this to whoever runs the console.",
+    text: "The console answers, but its UDP packets do not get through. A firewall blocks UDP, or the console needs a TURN server. Try another network, or show this to the person who runs the console.",
   },
   no_relay: {
     title: "No path through the relay",
-    text: "This link allows only a TURN relay, and none could be used: the console names none, or it is out of reach. Take relay=only off the link to try a direct path.",
+    text: "This link allows only a TURN relay, and none could be used: the console names no TURN server, or this device cannot reach it. Remove relay=only from the link to try a direct path.",
   },
   origin_refused: {
     title: "Opened at a wrong address",
@@ -62,8 +62,8 @@ export const CONNECTION_ERROR_LABELS: Readonly<Record<ConnectionErrorKind, Conne
   },
   refused: { title: "The console refused the connection", text: "" },
   relay_lost: {
-    title: "The relay is gone",
-    text: "No other one is left: this page watches at the console itself in a moment.",
+    title: "The relay was lost",
+    text: "No other relay is left: this page connects to the console itself in a moment.",
   },
   robot_unreachable: {
     title: "Robot unreachable",
@@ -71,25 +71,25 @@ export const CONNECTION_ERROR_LABELS: Readonly<Record<ConnectionErrorKind, Conne
   },
   shutting_down: {
     title: "The console is stopping",
-    text: "This page comes back when it has started again.",
+    text: "This page reconnects when the console has started again.",
   },
   silent: {
     title: "Connection lost",
-    text: "The console fell silent and no other path was found. The robot comes to rest by itself.",
+    text: "The console fell silent and no other path was found. The robot comes to rest.",
   },
   token_refused: {
     title: "This link is not valid",
-    text: "The console does not know it: it is incomplete, or the console has a new key. Open the newest link, or ask for one.",
+    text: "The console does not know this link: the link is incomplete, or the console has a new key. Open the newest link, or ask for one.",
   },
 };
 
 export const CONNECTION_END_LABELS: Readonly<Record<ConnectionEnd, ConnectionErrorLabels>> = {
   link_revoked: {
     title: "This link was revoked",
-    text: "Whoever invited you has called it back, so this page is closed. Ask for a new link to come back.",
+    text: "The link ended, so this page is closed. Ask the person who invited you for a new link.",
   },
   link_expired: {
     title: "This link has expired",
-    text: "It was good for a limited time, so this page is closed. Ask for a new link to come back.",
+    text: "The link was valid for a limited time, so this page is closed. Ask for a new link to come back.",
   },
 };

@@ -292,7 +292,7 @@ export class Peer {
     if (this.options.relayOnly) return new PeerEnd("no_relay", "");
     return new PeerEnd(
       "no_path",
-      hasRelay(this.servers) ? "The console's TURN server did not help either" : "",
+      hasRelay(this.servers) ? "The console's TURN server gave no path either" : "",
     );
   }
 

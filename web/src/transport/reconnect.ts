@@ -114,13 +114,13 @@ export function reconnectLabel(phase: ReconnectPhase): string {
   switch (phase) {
     case "live":
     case "asking":
-      return "Asking whether it can be reached.";
+      return "Checking whether the console can be reached.";
     case "hoping":
-      return "It can be reached: waiting for this connection to come back.";
+      return "The console can be reached: waiting for this connection to come back.";
     case "restarting":
     case "moving":
-      return "It can be reached: moving this connection to another path.";
+      return "The console can be reached: moving this connection to another path.";
     case "over":
-      return "Connecting anew.";
+      return "Connecting again.";
   }
 }

@@ -76,7 +76,7 @@ describe("STOP ALL", () => {
     expect(words).toMatchObject({ tone: "bad", title: "1 of 3 robots stopped", stopped: ["a"] });
     expect(words?.missing).toEqual([
       { name: "b", detail: "not delivered: no answer from hall-b" },
-      { name: "c", detail: "not delivered: it is kept and sent first when the robot is back" },
+      { name: "c", detail: "not delivered: the stop is kept and sent first when the robot is back" },
     ]);
     expect(words?.advice).toContain("emergency stops");
   });
@@ -112,15 +112,15 @@ describe("STOP ALL", () => {
     stopFailed(stop, PRESS, "The console does not answer.");
     expect(stopAllLabels(stop)).toMatchObject({
       tone: "pending",
-      advice: "The console does not answer. It is said again.",
+      advice: "The console does not answer. The page sends STOP again.",
     });
     expect(stepStopAll(stop, 4001)).toBe(true);
     expect(stopAllLabels(stop)).toMatchObject({ tone: "bad", title: "STOP is not confirmed" });
     expect(stopAllLabels(stop)?.advice).toMatch(
-      /^The console does not answer\. Stop the robots by their own/,
+      /^The console does not answer\. Stop the robots with their own/,
     );
     expect(stepStopAll(stop, 61_001)).toBe(false);
-    expect(stopAllLabels(stop)?.advice).toContain("Press again");
+    expect(stopAllLabels(stop)?.advice).toContain("Press STOP ALL");
   });
 
   it("names after three seconds the robot that has not confirmed it", () => {

@@ -18,19 +18,19 @@ function storeThat(load: (number: number) => ReplayChunkContent): { store: Chunk
   return { store, asked };
 }
 
-test.each([new ConsoleError(422, "recording_damaged", "", null), new ChunkBroken("it ends within a record")])(
-  "a damaged chunk is asked for once, counted once, and is empty: %s",
-  async (error) => {
-    const { store, asked } = storeThat(() => {
-      throw error;
-    });
-    expect((await store.get(7)).broken).toBe(true);
-    expect((await store.get(7)).broken).toBe(true);
-    expect(asked).toEqual([7]);
-    expect(store.damaged).toEqual(new Set([7]));
-    expect(store.failed).toBe(0);
-  },
-);
+test.each([
+  new ConsoleError(422, "recording_damaged", "", null),
+  new ChunkBroken("the chunk ends within a record"),
+])("a damaged chunk is asked for once, counted once, and is empty: %s", async (error) => {
+  const { store, asked } = storeThat(() => {
+    throw error;
+  });
+  expect((await store.get(7)).broken).toBe(true);
+  expect((await store.get(7)).broken).toBe(true);
+  expect(asked).toEqual([7]);
+  expect(store.damaged).toEqual(new Set([7]));
+  expect(store.failed).toBe(0);
+});
 
 test("a request that failed is counted and made again", async () => {
   let away = true;

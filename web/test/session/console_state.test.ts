@@ -52,8 +52,8 @@ describe("the console's state", () => {
     applyMessage(state, { type: "notice", level: "info", text: "hello" }, 4);
     expect(state.log.map(({ text, count }) => [text, count])).toEqual([
       ["hello", 1],
-      ["Refused: It did not have one value for each axis (3 values are needed)", 1],
-      ["Refused: It came too late: the feedback it answers is too old", 2],
+      ["Refused: The command does not have one value for each axis (3 values are needed)", 1],
+      ["Refused: The command came too late: the feedback that it answers is too old", 2],
     ]);
   });
 

@@ -8,7 +8,7 @@ describe("the answer to a request for the seat", () => {
     ["declined", "declined", "Ann declined your request"],
     ["declined", "no answer", "Ann did not answer: your request is declined"],
     ["declined", "ask again a little later", "Declined just now: ask again a little later"],
-    ["seat_taken", "too many are waiting for it", "Not asked: too many are waiting for it"],
+    ["seat_taken", "too many people wait for the seat", "Not asked: too many people wait for the seat"],
     ["seat_taken", "", null],
     ["late", "", null],
   ] as const)("%s (%s) is told in words", (reason, detail, words) => {
@@ -16,9 +16,7 @@ describe("the answer to a request for the seat", () => {
   });
 
   it("names nobody when nobody is known", () => {
-    expect(requestAnswer({ ...refusalOf(0, "declined"), detail: "declined" }, "")).toContain(
-      "Whoever drives",
-    );
+    expect(requestAnswer({ ...refusalOf(0, "declined"), detail: "declined" }, "")).toContain("The driver");
   });
 
   it("is news for the seat's bar; that it is taken is none for a page that only looked", () => {

@@ -47,12 +47,12 @@ test("a source that fails and comes back is logged once each; one that connects 
   say(front("connecting"));
   say(front("live"));
   expect(state.log).toEqual([]);
-  say(front("reconnecting", "it has ended"));
+  say(front("reconnecting", "the source ended"));
   say(front("reconnecting", "connection refused"));
   say(front("live"));
   expect(state.log.map((line) => line.text)).toEqual([
     "Front is back",
-    "Front: Reconnecting… (it has ended)",
+    "Front: Reconnecting… (the source ended)",
   ]);
   expect(state.sources).toEqual([front("live")]);
 });

@@ -126,7 +126,7 @@ class MediaReceiver:
             if name in ("", stream.name):
                 return stream
         known = ", ".join(stream.name for stream in streams) or "none"
-        raise NoSuchStream(f"no {kind} stream {name!r} is received; there is: {known}")
+        raise NoSuchStream(f"no {kind} stream {name!r} is received; received: {known}")
 
     def reported(self) -> None:
         """Note that the statistics went to the console."""

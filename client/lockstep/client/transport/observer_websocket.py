@@ -71,7 +71,7 @@ class ObserverWebSocket:
             ticket = await self.whep.watch(self._relay)
         except SignallingRefused as error:
             if error.status in (404, 405):
-                raise LineBlocked("this console has no lines") from error
+                raise LineBlocked("this console offers no WebSocket for observers") from error
             raise
         try:
             self._socket = await connect(
@@ -87,7 +87,7 @@ class ObserverWebSocket:
         except (OSError, TimeoutError, ImportError, WebSocketException) as error:
             # ImportError: this kind of proxy needs a package that is not installed.
             await self._give_back(ticket)
-            raise LineBlocked(f"no WebSocket to the console ({error or type(error).__name__})") from error
+            raise LineBlocked(f"no WebSocket to the console opens ({error or type(error).__name__})") from error
         return []
 
     async def connect(self, seconds: float) -> None:
@@ -150,7 +150,7 @@ class ObserverWebSocket:
                 self._on_message(data)
         except ConnectionClosed:
             reason = self._socket.close_reason
-            self.lose(f"the console closed the connection ({reason})" if reason else "the console is gone")
+            self.lose(f"the console closed the connection ({reason})" if reason else "the connection was lost")
 
     async def _tell(self) -> None:
         if self._socket is None:

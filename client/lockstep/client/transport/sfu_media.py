@@ -54,7 +54,7 @@ class RelayMedia:
 
     def __init__(self, ticket: RelayTicket, on_message: Callable[[str | bytes], None]) -> None:
         if ticket.engine != "janus":
-            raise ConnectFailed(f"this client watches through a Janus or directly, and not through a {ticket.engine}")
+            raise ConnectFailed(f"this client can watch through Janus, but not through {ticket.engine}")
         self.ended = asyncio.Event()
         self.why = ""
         self.packets: Packets | None = None  # the source of media packets, after `negotiate`
@@ -101,7 +101,7 @@ class RelayMedia:
         }
         heard = await self._ask("message", body=body)
         if heard.jsep is None:
-            raise ConnectFailed("the relay offered nothing")
+            raise ConnectFailed("the relay sent no offer")
         offer = complete_description(str(heard.jsep["sdp"]))
         try:
             self._offer = parse_description(offer)
@@ -118,7 +118,7 @@ class RelayMedia:
     def connection(self) -> Connection:
         """The `rtc` connection, after `negotiate`; for measurements."""
         if self._connection is None:
-            raise RuntimeError("negotiate first")
+            raise RuntimeError("call negotiate() first")
         return self._connection
 
     async def connect(self) -> None:
@@ -129,7 +129,7 @@ class RelayMedia:
             async with asyncio.timeout(ANSWER_SECONDS):
                 await self._heard.wait()
         except TimeoutError:
-            raise ConnectFailed("no packet arrived from the relay: is UDP blocked on the way to it?") from None
+            raise ConnectFailed("no packet arrived from the relay: is UDP to the relay blocked?") from None
 
     async def run(self) -> None:
         """Keep the session and notice when the relay is gone, until cancelled."""
@@ -152,7 +152,7 @@ class RelayMedia:
     def _answer(self) -> str:
         offer, connection = self._offer, self._connection
         if offer is None or connection is None:
-            raise RuntimeError("negotiate first")
+            raise RuntimeError("call negotiate() first")
         media = {
             section.mid: receiving("video" if section.kind == "video" else "audio")
             for section in offer.sections
@@ -233,7 +233,7 @@ class RelayMedia:
                 # Late: this process was held up, and has not read the packets of that time yet.
                 held_up = held_up + 1 if loop.time() - due >= HELD_UP_SECONDS else 0
                 if not 0 < held_up <= MOST_HELD_UP:
-                    self._lose(f"nothing came from the relay for {SILENCE_SECONDS:g} s")
+                    self._lose(f"no message came from the relay for {SILENCE_SECONDS:g} s")
 
 
 def _ends(text: str | bytes) -> bool:

@@ -35,8 +35,8 @@ CHANNELS: Mapping[ChannelName, Reliability] = {
 CLOSE_SECONDS = 3.0
 LOOPBACK = "127.0.0.1"
 ENDS = {
-    "consent_expired": "the console answered nothing for 30 s",
-    "no_path": "no way to the console was found: is UDP between here and the console blocked?",
+    "consent_expired": "the console did not answer for 30 s",
+    "no_path": "no path to the console was found: is UDP to the console blocked?",
 }  # any other: the console closed the connection
 
 
@@ -148,12 +148,12 @@ class Peer:
     async def _ask_servers(self, endpoint: Endpoint) -> None:
         troubles = await endpoint.ask(self._ice_servers)
         if self._relay_only and not endpoint.candidates:
-            why = "; ".join(map(str, troubles)) or "the console knows none that answers"
+            why = "; ".join(map(str, troubles)) or "the console names no TURN server"
             raise ConnectFailed(f"no TURN server gave an address: {why}")
 
     def _need_connection(self) -> Connection:
         if self._connection is None:
-            raise RuntimeError("negotiate first")
+            raise RuntimeError("call negotiate() first")
         return self._connection
 
     async def connect(self, seconds: float) -> None:
@@ -174,7 +174,7 @@ class Peer:
                     self._stepped.clear()
                     await self._stepped.wait()
         except TimeoutError:
-            detail = f"no data channel after {seconds:g} s: is UDP between here and the console blocked?"
+            detail = f"no data channel after {seconds:g} s: is UDP to the console blocked?"
             raise ConnectFailed(detail) from None
         if self.ended.is_set():
             raise ConnectFailed(self.why)
@@ -196,7 +196,7 @@ class Peer:
         except (PeerNotReady, ChannelNotOpen, AssociationClosed):
             pass  # it has just ended, and an event says so
         except SendQueueFull:
-            self.lose("the console takes nothing any more")
+            self.lose("the console accepts no messages any more")
 
     async def restart_ice(self, seconds: float) -> None:
         """Look for a new path to the console; channels and media live on, and move to it when it is found.
@@ -207,7 +207,7 @@ class Peer:
         """
         connection, endpoint = self._need_connection(), self._endpoint
         if endpoint is None:
-            raise RuntimeError("negotiate first")
+            raise RuntimeError("call negotiate() first")
         if self.ended.is_set():
             raise SignallingRefused(404, "not_found", self.why)  # as the console would say
         if self._ice_servers:  # their credentials may have ended
@@ -220,7 +220,7 @@ class Peer:
                 await self._signal_restart(connection)
                 found = await restarted
         except (ValueError, PeerNotReady, TimeoutError) as error:
-            raise ConnectFailed(f"no new path to the console: {error or 'none within the time'}") from error
+            raise ConnectFailed(f"no new path to the console: {error or 'none was found in time'}") from error
         finally:
             self._restarted = None
             if not (restarted.done() and not restarted.cancelled() and restarted.result()):

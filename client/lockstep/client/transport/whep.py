@@ -91,7 +91,7 @@ class Whep:
         try:
             found = _ice_servers.decode(response.content).ice_servers
         except msgspec.DecodeError as error:
-            raise SignallingRefused(response.status_code, "", "not a list of ICE servers") from error
+            raise SignallingRefused(response.status_code, "", "the answer is not a list of ICE servers") from error
         return [IceServer(each.urls, each.username, each.credential) for each in found]
 
     async def relay(self, peer: str = "") -> RelayTicket | None:
@@ -101,7 +101,7 @@ class Whep:
         try:
             return _relay_answer.decode(response.content).relay
         except msgspec.DecodeError as error:
-            raise SignallingRefused(response.status_code, "", "not an answer about relays") from error
+            raise SignallingRefused(response.status_code, "", "the answer does not name a relay") from error
 
     async def watch(self, relay: str) -> str:
         """Return a ticket for the WebSocket of an observer that has its media from `relay`. Raises like `offer`."""
@@ -109,7 +109,7 @@ class Whep:
         try:
             return _watch_ticket.decode(response.content).ticket
         except msgspec.DecodeError as error:
-            raise SignallingRefused(response.status_code, "", "not a ticket") from error
+            raise SignallingRefused(response.status_code, "", "the answer is not a ticket") from error
 
     async def decline(self, ticket: str) -> None:
         """Give a ticket back; raises like `offer`."""
@@ -148,7 +148,7 @@ class Whep:
             said = _stop_answer.decode(answer.content)
             return StopTaken(press=press, number=said.number, kept=said.kept)
         except msgspec.DecodeError as error:
-            raise SignallingRefused(answer.status_code, "", "not an answer to a stop") from error
+            raise SignallingRefused(answer.status_code, "", "the answer does not confirm a stop") from error
 
     async def _request(self, method: str, url: str, **arguments: object) -> httpx.Response:
         try:

@@ -87,7 +87,7 @@ def _ask(address: str, fraction: float) -> None:
         err=True,
     )
     if not sys.stdin.isatty():
-        raise _usage("nobody is here to ask: give --yes when the robot may move")
+        raise _usage("there is no terminal to ask on: give --yes if the robot may move")
     if not typer.confirm("May it move?", err=True):
         raise typer.Exit(EXIT_FAILED)
 

@@ -134,16 +134,16 @@ class Driver:
         before = self.feedback.event
         number = message.number if isinstance(message, Reset) else 0
         wanted = message.event if isinstance(message, Command) else 0
-        async with within(PATIENCE, f"neither executed nor refused; it had to be refused {reasons[0]!r}"):
+        async with within(PATIENCE, f"neither executed nor refused; the message had to be refused {reasons[0]!r}"):
             while True:
                 said = await self.next()
                 if isinstance(said, Refusal) and said.event in (wanted, 0) and said.stop == number:
                     expect(said.reason in reasons, f"refused {said.reason!r}, not {' or '.join(map(repr, reasons))}")
                     return said
                 if isinstance(said, Feedback) and isinstance(message, Command) and is_newer(said.event, before):
-                    raise Violation(f"it executed as event {said.event}; it had to be refused {reasons[0]!r}")
+                    raise Violation(f"the command executed as event {said.event}; it had to be refused {reasons[0]!r}")
                 if isinstance(said, Feedback) and isinstance(message, Reset) and not said.stop.stopped:
-                    raise Violation(f"it released the stop; it had to be refused {reasons[0]!r}")
+                    raise Violation(f"the reset released the stop; it had to be refused {reasons[0]!r}")
 
     async def stop(self, press: str, peer: Peer | None = None) -> int:
         """Press STOP, on this link or another; return the number of the press."""

@@ -44,7 +44,7 @@ BAD_BEGINNINGS: tuple[tuple[str, bytes, str], ...] = (
     ("an empty frame", bytes(4), "framing"),
     ("a length of 4 GiB", b"\xff\xff\xff\xff", "framing"),
     ("a length beyond 8 KiB", (MAX_HELLO_FRAME + 1).to_bytes(4, "big"), "framing"),
-    ("a frame that is no message", frame(b"\xc1"), "handshake"),
+    ("a frame that is not a message", frame(b"\xc1"), "handshake"),
     ("a ping instead of a hello", frame(encode_message(Ping(id=1))), "handshake"),
 )
 
@@ -60,7 +60,7 @@ MALFORMED: tuple[tuple[str, bytes], ...] = (
     ("a map of 4 G entries", b"\xdf\xff\xff\xff\xff"),
     ("an unknown kind", b"\x81\xa4type\xa4none"),
     ("a command without fields", b"\x81\xa4type\xa7command"),
-    ("bytes behind the message", encode_message(Reset()) + b"\x00"),
+    ("bytes after the message", encode_message(Reset()) + b"\x00"),
     ("a string that is not UTF-8", b"\x82\xa4type\xa5reset\xa2by\xa2\xc3\x28"),
     ("a string of 501 characters", b"\x82\xa4type\xa5reset\xa2by\xda\x01\xf5" + b"x" * 501),
     ("a rest for event 0", b"\x82\xa4type\xa4rest\xa5event\x00"),
@@ -125,7 +125,7 @@ async def _hello_timeout(subject: Subject) -> None:
         began = loop.time()
         await peer.ends("silent", patience=HELLO_TIMEOUT + PATIENCE)
         lasted = loop.time() - began
-        expect(lasted > HELLO_TIMEOUT - EARLY, f"it ended after {lasted:.1f} s, not {HELLO_TIMEOUT:g} s")
+        expect(lasted > HELLO_TIMEOUT - EARLY, f"the link ended after {lasted:.1f} s, not {HELLO_TIMEOUT:g} s")
 
 
 async def _secret(subject: Subject) -> None:
@@ -208,7 +208,7 @@ async def _silent_link(subject: Subject) -> None:
             lasted = loop.time() - began
             if isinstance(said, Goodbye):
                 expect(said.error == "silent", f"the link ended with {said.error!r}, not 'silent'")
-                expect(lasted > SILENCE - EARLY, f"it ended after {lasted:.1f} s, before {SILENCE:g} s had passed")
+                expect(lasted > SILENCE - EARLY, f"the link ended after {lasted:.1f} s; {SILENCE:g} s had to pass")
                 return
             expect(said is not None, "the connection ended without a goodbye")
             expect(lasted < longest, f"nothing but malformed bytes for {lasted:.0f} s, and the link is still open")
@@ -249,9 +249,7 @@ LINK_CASES: tuple[Case, ...] = (
         "Bytes",
         _bad_beginnings,
     ),
-    Case(
-        "hello_timeout", "a client that says no hello within 2 s is told silent", "Handshake and roles", _hello_timeout
-    ),
+    Case("hello_timeout", "a client that sends no hello within 2 s gets silent", "Handshake and roles", _hello_timeout),
     Case("secret", "a client that does not prove the secret gets unauthorised", "The secret", _secret),
     Case("second_operator", "one operator at a time; another gets taken", "Handshake and roles", _second_operator),
     Case("permissions", "a message that its role does not permit is refused", "Handshake and roles", _permissions),

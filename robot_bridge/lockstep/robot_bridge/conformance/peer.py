@@ -63,7 +63,7 @@ class Peer(asyncio.Protocol):
         Raises:
             Violation: nothing came in time, or something that is not a message.
         """
-        async with within(patience, f"nothing came for {patience:g} s"):
+        async with within(patience, f"no message came for {patience:g} s"):
             while not self._waiting and not self.ended and self._broken is None:
                 self._news.clear()
                 await self._news.wait()
@@ -175,7 +175,7 @@ class Peer(asyncio.Protocol):
             for payload in self._frames.frames():
                 self._take(decode_message(payload))
         except (FramingError, MessageError) as error:
-            self._broken = self._broken or Violation(f"the bridge sent what is no message: {error.detail}")
+            self._broken = self._broken or Violation(f"the bridge sent bytes that are not a message: {error.detail}")
         self._news.set()
 
     def connection_lost(self, error: Exception | None) -> None:
@@ -189,7 +189,7 @@ class Peer(asyncio.Protocol):
                 if said is None:
                     raise Violation("the connection ended without a goodbye")
                 if isinstance(said, Hello):
-                    raise Violation("it was admitted")
+                    raise Violation("the bridge admitted the link")
         return said
 
     async def _answer(self) -> LinkMessage | None:

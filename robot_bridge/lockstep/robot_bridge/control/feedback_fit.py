@@ -25,7 +25,7 @@ def misfit(feedback: Feedback, description: RobotDescription) -> str:
         if len(found) not in lengths:
             return f"a feedback with {len(found)} {name}"
         if not all(-MOST <= value <= MOST for value in found):
-            return f"a feedback whose {name} are no numbers"
+            return f"a feedback whose {name} are not numbers"
     if not (0 <= feedback.time <= LONGEST and 0 <= feedback.warning <= LONGEST):
         return "a feedback without a time"
     return ""

@@ -57,7 +57,7 @@ def _check_position_limit(limit: PositionLimit, axes: set[str], joints: set[str]
     if not all(map(math.isfinite, bounds)):
         raise DescriptionError(f"{where}: every number must be finite")
     if len(bounds) == 2 and bounds[0] + limit.margin > bounds[1] - limit.margin:
-        raise DescriptionError(f"{where}: no room is left between minimum and maximum")
+        raise DescriptionError(f"{where}: the margin leaves no room between minimum and maximum")
 
 
 def _check_base(base: PlanarBase, axes: set[str], joints: set[str]) -> None:
@@ -80,13 +80,13 @@ def _check_fence(fence: Geofence) -> None:
         raise DescriptionError(f"{where}: every number must be finite")
     edges = [(corners[index - 1], corner) for index, corner in enumerate(corners)]
     if any(start == end for start, end in edges):
-        raise DescriptionError(f"{where}: a corner follows itself")
+        raise DescriptionError(f"{where}: two successive corners are the same")
     for index, edge in enumerate(edges):
         for other in edges[:index]:
             if len({*edge, *other}) == 4 and _cross(edge, other):
                 raise DescriptionError(f"{where}: its edges cross")
     if abs(sum(ax * by - bx * ay for (ax, ay), (bx, by) in edges)) < 1e-9:
-        raise DescriptionError(f"{where}: it has no area")
+        raise DescriptionError(f"{where} has no area")
 
 
 def _cross(first: tuple[Point, Point], second: tuple[Point, Point]) -> bool:

@@ -33,14 +33,14 @@ class LinkAdmission(Generic[Link]):
     def refuses(self, hello: Hello, now: float) -> Goodbye | None:
         """Return why the link is not admitted; None: it may be added."""
         if not self._has_room(hello):
-            return Goodbye(error="full", detail=f"this bridge takes {self._max_links} links")
+            return Goodbye(error="full", detail=f"this bridge takes at most {self._max_links} links")
         if hello.role != "operator":
             return None
         if self.operator is not None:
             return Goodbye(error="taken", detail="another operator link is open")
         left = self._kept_until - now
         if self._kept_for not in ("", hello.name) and left > 0:  # a stall gives the robot to no other client
-            return Goodbye(error="taken", detail=f"kept for {self._kept_for}, whose link broke, for {left:.0f} s more")
+            return Goodbye(error="taken", detail=f"kept {left:.0f} s more for {self._kept_for}, whose link broke")
         return None
 
     def add(self, link: Link, hello: Hello) -> None:

@@ -96,7 +96,7 @@ class LinkTransport(asyncio.Protocol):
             self._moved = now
         self._buffered = buffered
         if now - self._moved > self.session.patience:
-            self.session.lose(f"did not read for {self.session.patience:.1f} s")
+            self.session.lose(f"the other side did not read for {self.session.patience:.1f} s")
             self._transport.abort()
 
     def end(self, error: str, detail: str = "") -> None:

@@ -40,7 +40,7 @@ def write_new_robot(name: str, parent: Path) -> Path:
     try:
         folder.mkdir()
     except FileExistsError as error:
-        raise CannotWrite(f"{folder} is there already") from error
+        raise CannotWrite(f"{folder} exists already") from error
     names = {"package": name, "class_name": class_name(name), "label": name.replace("_", " ").strip().capitalize()}
     for source in sorted(TEMPLATE.rglob(f"*{SUFFIX}")):
         relative = source.relative_to(TEMPLATE).as_posix().removesuffix(SUFFIX)
@@ -52,9 +52,9 @@ def write_new_robot(name: str, parent: Path) -> Path:
 
 def _check(name: str) -> None:
     if not NAME.fullmatch(name) or keyword.iskeyword(name):
-        raise CannotWrite(f"{name!r} is no Python identifier of ASCII letters, digits and _, such as my_arm")
+        raise CannotWrite(f"{name!r} is not a Python identifier of ASCII letters, digits and _, such as my_arm")
     if name in TAKEN or name in sys.stdlib_module_names or (find_spec(name) is not None and name not in _here()):
-        raise CannotWrite(f"{name!r} is the name of a module that is there already; choose another")
+        raise CannotWrite(f"{name!r} is the name of a module that exists already; choose another")
 
 
 def _here() -> set[str]:

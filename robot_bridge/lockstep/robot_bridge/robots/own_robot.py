@@ -39,12 +39,12 @@ def create_own_robot(spec: str) -> Robot:
         raise UnknownRobot(f"{spec!r} is not module:Class")
     make = _find(spec, module, name)
     if isinstance(make, type) and not issubclass(make, Robot):
-        raise BadRobot(f"{spec} is no robot: the class does not inherit lockstep.robot_bridge.robots.base.Robot")
+        raise BadRobot(f"{spec} is not a robot: the class does not inherit lockstep.robot_bridge.robots.base.Robot")
     if not callable(make):
-        raise BadRobot(f"{spec} is no robot: it is a {type(make).__name__}, not a class")
+        raise BadRobot(f"{spec} is not a robot: it is a {type(make).__name__}, not a class")
     robot = _call(spec, make)
     if not isinstance(robot, Robot):
-        raise BadRobot(f"{spec} is no robot: it makes a {type(robot).__name__}")
+        raise BadRobot(f"{spec} is not a robot: it makes a {type(robot).__name__}")
     description = _call(f"{spec}: describe()", robot.describe)
     if not isinstance(description, RobotDescription):
         raise BadRobot(f"{spec}: describe() returned a {type(description).__name__}, not a RobotDescription")

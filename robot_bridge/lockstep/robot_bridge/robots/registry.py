@@ -43,7 +43,7 @@ def create_robot(name: str) -> Robot:
         spec = name if ":" in name else installed_robots().get(name)
         if spec is None:
             known = ", ".join(robot_names())
-            raise UnknownRobot(f"no robot {name!r}; there are {known}, and module:Class for one of your own")
+            raise UnknownRobot(f"no robot {name!r}; choose one of {known}, or give module:Class for your own robot")
         return create_own_robot(spec)
     robot = import_module(_PACKAGES[name]).create()
     if not isinstance(robot, Robot):

@@ -23,11 +23,11 @@ def look_at(path: Path) -> str:
     except FileNotFoundError:
         pass
     except OSError as error:
-        return f"the lock-out file cannot be looked at ({path}: {error.strerror or error})"
+        return f"the lock-out file cannot be checked ({path}: {error.strerror or error})"
     try:
         path.parent.stat()
     except OSError as error:
-        return f"the folder of the lock-out file cannot be looked at ({path.parent}: {error.strerror or error})"
+        return f"the folder of the lock-out file cannot be checked ({path.parent}: {error.strerror or error})"
     return ""
 
 
@@ -44,7 +44,7 @@ class LockoutFile:
         self._path = path
         self._look = look
         self._clock = clock
-        self._seen: tuple[str, float] = (f"the lock-out file was not looked at yet ({path})", clock())
+        self._seen: tuple[str, float] = (f"the lock-out file has not been checked yet ({path})", clock())
         self._looked = threading.Event()
         self._ending = threading.Event()
         self._thread = threading.Thread(target=self._run, name="lock-out file", daemon=True)
@@ -54,7 +54,7 @@ class LockoutFile:
         """The reason why the robot is locked out now; "" while it is not."""
         reason, seen_at = self._seen
         if not reason and self._clock() - seen_at > PATIENCE:
-            return f"the lock-out file cannot be looked at in time ({self._path})"
+            return f"the lock-out file cannot be checked in time ({self._path})"
         return reason
 
     def start(self) -> None:

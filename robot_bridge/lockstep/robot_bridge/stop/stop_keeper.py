@@ -128,7 +128,7 @@ class StopKeeper:
                     try:
                         await self._write(store, ended=in_order)
                     except OSError as error:
-                        _logger.error("the stop is not on the disk at the end: %s", error)
+                        _logger.error("the bridge ends, and the stop is not on the disk: %s", error)
                 await self._in_thread(store.close)
         self._thread.shutdown(wait=False)
 

@@ -35,7 +35,7 @@ HELD_UP = 1.5  # s without a feedback: a reset that comes then may have waited f
 MAX_PRESSES = 256  # remembered until the robot may move; a forgotten one counts as a new stop, which is the safe side
 MAX_NUMBER = 2**53 - 1
 TEXT = 500  # characters of `by` and `reason`, as on the link
-OVERTAKEN = "a newer stop came"
+OVERTAKEN = "a newer stop arrived"
 UNKEPT = "the reset could not be written to the robot's disk"
 
 

@@ -95,7 +95,7 @@ def start_of(found: Found, wall_microseconds: int) -> Start:
         return Start(record, max(clock, record.number), "")
     # The bridge may have given numbers that never reached the disk.
     numbers_after = max(clock, record.number, found.reserved)
-    reason = found.note or "The robot bridge did not end in order: power cut, kill, crash or hang"
+    reason = found.note or "The robot bridge did not shut down cleanly: power cut, kill, crash or hang"
     return Start(record, numbers_after, reason)
 
 
@@ -131,8 +131,8 @@ class StopStore:
         except BlockingIOError as error:
             self.close()
             raise StateDirInUse(
-                f"{self._directory}: another bridge keeps its stop here. A robot has one bridge at a time; of two "
-                "robots of the same name one needs a directory of its own, --state-dir DIR"
+                f"{self._directory}: another bridge keeps its stop here. Run one bridge for each robot; a second "
+                "robot of the same name needs its own directory, --state-dir DIR"
             ) from error
         except OSError as error:
             self.close()

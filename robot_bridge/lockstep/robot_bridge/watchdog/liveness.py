@@ -102,5 +102,5 @@ class Liveness:
         """End the process. Each call here may block or raise; then the alarm ends the process."""
         with suppress(Exception):
             self._note(reason)
-        _logger.critical("%s. It ends, so that it can be started again; every thread is at:", reason)
+        _logger.critical("%s. The bridge ends, so that it can be started again; the stacks of all threads:", reason)
         faulthandler.dump_traceback(all_threads=True)

@@ -108,7 +108,7 @@ class WatchdogProcess:
         try:
             os.write(process.stdin.fileno(), LEAVING)
         except OSError as error:
-            _logger.error("the watchdog process is gone: %s", error)
+            _logger.error("the watchdog process has ended: %s", error)
         process.stdin.close()
         try:
             process.wait(CLOSE_SECONDS)
@@ -124,7 +124,7 @@ class WatchdogProcess:
         try:
             os.write(self._process.stdin.fileno(), what)
         except OSError as error:
-            raise RobotUnavailable(f"the watchdog process is gone: {error}") from error
+            raise RobotUnavailable(f"the watchdog process has ended: {error}") from error
 
 
 def watch(heard: int, said: int, limit: float, act: Act, now: clock.Clock = clock.now) -> None:
@@ -133,7 +133,7 @@ def watch(heard: int, said: int, limit: float, act: Act, now: clock.Clock = cloc
     while True:
         timeout = max(0.0, limit - (now() - last)) if moving else None
         if not select.select([heard], [], [], timeout)[0]:
-            _logger.error("no tick of the bridge: the robot is brought to rest by its watchdog process")
+            _logger.error("no tick of the bridge: its watchdog process brings the robot to rest")
             _act(act, said)
             last = now()  # act again if still nothing comes
             continue
@@ -152,7 +152,7 @@ def _act_for_good(act: Act, said: int, now: clock.Clock) -> None:
 
     A listener may not have found this process yet, and no other process sends the message later.
     """
-    _logger.error("the bridge is gone: the robot is brought to rest by its watchdog process")
+    _logger.error("the bridge has ended: its watchdog process brings the robot to rest")
     heard, end = 0, now() + LAST_SECONDS
     while heard < LAST_ACTS and now() < end:
         heard += _act(act, said)

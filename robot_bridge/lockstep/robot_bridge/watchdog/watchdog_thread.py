@@ -73,9 +73,9 @@ class WatchdogThread:
 
     def _bring_to_rest(self) -> None:
         if not self._acted:
-            _logger.error("no tick for %.3f s: the robot is brought to rest beside the loop", self._now() - self._last)
+            _logger.error("no tick for %.3f s: the watchdog thread brings the robot to rest", self._now() - self._last)
         self._acted = True  # before the call: a call that ended half-way counts too
         try:
             self._act()
         except BaseException as error:  # the thread lives on and tries again
-            _logger.critical("the robot cannot be brought to rest beside the loop: %r", error)
+            _logger.critical("the watchdog thread cannot bring the robot to rest: %r", error)

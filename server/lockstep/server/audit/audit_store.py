@@ -90,11 +90,11 @@ class AuditStore:
         except OSError as error:
             if not self._trouble:
                 path = str(self._anchors.path)
-                log.error("signed heads of the audit cannot be kept", path=path, detail=error.strerror or str(error))
+                log.error("signed heads of the audit cannot be written", path=path, detail=error.strerror or str(error))
             self._trouble = True
         else:
             if self._trouble:
-                log.info("signed heads of the audit are kept again", path=str(self._anchors.path))
+                log.info("signed heads of the audit are written again", path=str(self._anchors.path))
             self._trouble = False
 
     def _is_anchored(self) -> bool:

@@ -12,7 +12,7 @@ from lockstep.server.event_clock import EventClock
 __all__ = ["AuditTrail", "RecordKeeper"]
 
 NOBODY = Actor()
-BEYOND = "counted together: too many for one link"
+BEYOND = "this link causes too many records; they are counted together"
 MERGE_SECONDS = 1.0  # repetitions become one record
 SLOW_TICKS = 60  # times that: what is beyond a link's budget becomes one record
 

@@ -26,6 +26,7 @@ SEEN = "newest-time.json"
 ASIDE = "revoked-lately"
 ASIDE_BYTES = 4096  # ids of links, one a line
 BEHIND_SECONDS = 60.0  # that a clock may be behind the newest time without a warning
+REPAIR = f"restore it, or remove signing.key and {SEEN} too, which ends all links"
 HANGS_AFTER = 10.0  # s that a change may take; then it is unknown what other processes have revoked meanwhile
 MAX_ELSEWHERE = 5000  # links that other consoles revoked; those that would end first are forgotten first
 Result = TypeVar("Result")
@@ -72,7 +73,7 @@ class InvitationStore:
         self._clock = LinkClock(seen, _steady())
         self._version = directory.version(FILE)
         if self._version is None and seen:
-            raise StateDamaged(directory.path / FILE, "it is gone; who removes it removes signing.key too")
+            raise StateDamaged(directory.path / FILE, f"the file is missing; {REPAIR}")
         self._known = self._read()
         self._elsewhere = self._read_elsewhere()
         self._revoked = self._known.revoked()
@@ -81,7 +82,7 @@ class InvitationStore:
         self._aside: tuple[int, int] | None = None  # version of the file that was set aside
         self._look_aside()
         if seen > time.time() + BEHIND_SECONDS:
-            log.warning("this machine's clock is behind; links end by the newest time that was seen", seen=seen)
+            log.warning("this machine's clock is behind the newest recorded time; links end by that time", seen=seen)
 
     def now(self) -> float:
         """Return the time by which links end, s since 1970; it never runs backwards."""
@@ -210,7 +211,7 @@ class InvitationStore:
         """Return what another process has added or revoked since. If the list cannot be read, `trouble` says why."""
         if not self._busy.acquire(blocking=False):  # a change is under way in a thread of this process
             if _steady() - self._busy_since > HANGS_AFTER:
-                self._tell_trouble("the disk does not answer", "a change of the list does not end")
+                self._tell_trouble("the disk does not answer", "a change of the list of links does not finish")
             return []
         try:
             found = self._refresh()
@@ -220,13 +221,13 @@ class InvitationStore:
         finally:
             self._busy.release()
         if self.trouble:
-            log.warning("it can be read again which links are revoked")
+            log.warning("the list of revoked links can be read again")
             self.trouble = ""
         return found
 
     def _tell_trouble(self, reason: str, detail: str) -> None:
         if reason != self.trouble:
-            log.error("it cannot be read which links are revoked; nobody is let in", detail=detail)
+            log.error("the list of revoked links cannot be read; the console admits no one", detail=detail)
         self.trouble = reason
 
     @contextmanager
@@ -252,7 +253,7 @@ class InvitationStore:
     def _read_known(self) -> Invitations:
         """Read the invitations. Raises StateDamaged if the file is gone that this run has seen before."""
         if self._version is not None and self._directory.version(FILE) is None:
-            raise StateDamaged(self._directory.path / FILE, "it is gone")
+            raise StateDamaged(self._directory.path / FILE, "the file is missing")
         return self._read()
 
     def _take(self, known: Invitations, version: tuple[int, int] | None) -> None:
@@ -267,14 +268,14 @@ class InvitationStore:
             return Invitations([] if data is None else _file.decode(data).invitations)
         except (msgspec.DecodeError, UnicodeError, RecursionError) as error:
             path = self._directory.path / FILE
-            raise StateDamaged(path, f"not understood: {error}; who removes it removes signing.key too") from error
+            raise StateDamaged(path, f"the file is damaged ({error}); {REPAIR}") from error
 
     def _read_seen(self) -> float:
         data = self._directory.read(SEEN)
         try:
             return 0.0 if data is None else _seen.decode(data).seen
         except (msgspec.DecodeError, UnicodeError, RecursionError) as error:
-            raise StateDamaged(self._directory.path / SEEN, f"not understood: {error}") from error
+            raise StateDamaged(self._directory.path / SEEN, f"the file is damaged: {error}") from error
 
     def _write_seen(self) -> float:
         """Write the time to disk and return it."""
@@ -289,7 +290,7 @@ class InvitationStore:
         try:
             return {} if data is None else _elsewhere.decode(data).revoked
         except (msgspec.DecodeError, UnicodeError, RecursionError) as error:
-            raise StateDamaged(self._directory.path / ELSEWHERE, f"not understood: {error}") from error
+            raise StateDamaged(self._directory.path / ELSEWHERE, f"the file is damaged: {error}") from error
 
 
 def _steady() -> float:

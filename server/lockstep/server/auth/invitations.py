@@ -102,9 +102,9 @@ class Invitations:
         if by is not None and by.robots:
             robots = robots or by.robots
             if not set(robots) <= set(by.robots):
-                raise NotAllowed("your own link is not good for all of these robots")
+                raise NotAllowed("your own link does not admit to all of these robots")
         if not MIN_SECONDS <= seconds <= MAX_SECONDS:
-            raise BadParameter(f"a link is good for {MIN_SECONDS:g} to {MAX_SECONDS:g} seconds")
+            raise BadParameter(f"a link is valid for {MIN_SECONDS:g} to {MAX_SECONDS:g} seconds")
         self._check_room(by, now)
         expires = now + seconds if by is None else min(now + seconds, by.expires)
         return self._add(
@@ -124,9 +124,9 @@ class Invitations:
         share = 1.0 if by is None or by.role == "supervisor" else 1.0 - FOR_SUPERVISORS
         live, kept = int(MAX_LIVE * share), int(MAX_KEPT * share)
         if sum(each.is_good(now) for each in self._known.values()) >= live:
-            raise TooManyInvitations(f"there are {live} already; revoke some first")
+            raise TooManyInvitations(f"{live} links are valid already; revoke some first")
         if by is not None and len(self._known) >= kept:
-            raise TooManyInvitations(f"{kept} are remembered, most of which ended; make one on the command line")
+            raise TooManyInvitations(f"the console remembers {kept} links; make this one on its command line")
         if by is not None and by.role != "supervisor":
             self._check_family(by, now)
 
@@ -143,9 +143,9 @@ class Invitations:
         family = [each for key, each in self._known.items() if key != founder and founders[key] == founder]
         live, kept = int(MAX_LIVE * FAMILY), int(MAX_KEPT * FAMILY)
         if sum(each.is_good(now) for each in family) >= live:
-            raise TooManyInvitations(f"{live} were made with your link and those that it invited; revoke some first")
+            raise TooManyInvitations(f"your link and its guests have made {live} links; revoke some first")
         if len(family) >= kept:
-            raise TooManyInvitations(f"{kept} made with your link are remembered; ask a supervisor for one")
+            raise TooManyInvitations(f"the console remembers {kept} links of yours; ask a supervisor for one")
 
     def _founders(self) -> dict[str, str]:
         """Map each link to the first in its line of inviters, which nobody or the printed link invited."""

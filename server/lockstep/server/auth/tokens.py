@@ -267,7 +267,7 @@ class Access:
         self._check_link(claims.jti, claims.exp)
         identity = Identity(claims.role, claims.name, claims.jti, claims.exp, claims.robots, claims.iat)
         if self._robot is not None and not identity.may_see(self._robot):
-            raise LinkOtherRobot("this link is good for other robots only")
+            raise LinkOtherRobot("this link does not admit to this robot")
         return identity
 
     def _ticket_for(self, holder: Identity) -> tuple[float, float, Role, str, str]:
@@ -292,7 +292,7 @@ class Access:
 
     def _check_list(self) -> None:
         if trouble := self._trouble():
-            raise StateUnavailable(f"the console cannot read which links are revoked, so it lets nobody in: {trouble}")
+            raise StateUnavailable(f"the console admits no one: it cannot read the list of revoked links: {trouble}")
 
     def _encode(self, claims: _LinkClaims | _TicketClaims | _FileClaims) -> str:
         return jwt.encode(msgspec.to_builtins(claims), self._secret, ALGORITHM)

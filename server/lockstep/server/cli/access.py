@@ -83,7 +83,7 @@ def add_access_commands(app: typer.Typer, make_settings: MakeSettings) -> None:
         else:
             sys.stdout.write(f"{link}\n")
             where = f" for {', '.join(made.robots)}" if made.robots else ""
-            _say(f"{made.role} {made.name!r}{where}, good for {expires}; end it with: lockstep revoke {made.id}")
+            _say(f"{made.role} {made.name!r}{where}, valid for {expires}; revoke it with: lockstep revoke {made.id}")
 
     @app.command()
     def invitations(state_dir: StateDirOption = None, as_json: Json = False) -> None:
@@ -116,7 +116,7 @@ def add_access_commands(app: typer.Typer, make_settings: MakeSettings) -> None:
         for each in ended:
             sys.stdout.write(f"revoked {each.id}  {each.role}  {each.name}\n")
         if not ended:
-            _say("it was revoked before")
+            _say("the link was revoked before")
 
     @app.command()
     def audit(
@@ -230,7 +230,7 @@ def _note_ended(state: ConsoleState, link: str, error: StateDirUnusable) -> None
         state.invitations.note_ended()
     except StateDirUnusable:
         raise _usage(str(error)) from error
-    _say(f"noted: a console that runs ends it now, and the list is written when the disk takes it ({error.reason})")
+    _say(f"a running console ends the link now and writes the list when the disk accepts it ({error.reason})")
 
 
 def _usage(text: str) -> typer.Exit:

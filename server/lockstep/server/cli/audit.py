@@ -81,10 +81,10 @@ def _chain_words(name: str, report: ChainReport) -> list[str]:
     numbers = f"{report.records} records, {report.first} to {report.last}"
     lines = [f"{'FAIL' if report.count else 'ok  '}  {name}: {numbers}, head {report.head}"]
     if report.earlier:
-        lines.append(f"        what came before record {report.first} is not kept any more")
+        lines.append(f"        the records before {report.first} are no longer kept")
     if report.unchained:
-        lines.append(f"        the first {report.unchained} are of a version without a chain")
-    lines += [f"        {place} is no record: a write that was cut off" for place in report.unreadable[:5]]
+        lines.append(f"        the first {report.unchained} records come from a version without a hash chain")
+    lines += [f"        {place} is not a record: a write was cut off" for place in report.unreadable[:5]]
     return lines + _faults(report)
 
 
@@ -96,14 +96,14 @@ def _anchor_words(verdict: AuditVerdict) -> list[str]:
     note, key = verdict.anchors, verdict.key
     if note.newest is None:
         return [
-            f"--    {note.known} signed heads in {verdict.place}, none that fits this audit and key:",
-            "        a cut at the end, and files that were written anew, would not be found",
+            f"--    {note.known} signed heads in {verdict.place}, but none fits this audit log and key:",
+            "        this check would not find a cut at the end, or files that were written again",
         ]
     lines = [
-        f"ok    {note.fitting + note.too_old} signed heads fit ({note.too_old} of records that are not kept any more)",
+        f"ok    {note.fitting + note.too_old} signed heads fit ({note.too_old} of records that are no longer kept)",
         f"        signed by {key}",
-        f"        the newest is of record {note.newest.n}: what came later could be cut off unseen",
+        f"        the newest is of record {note.newest.n}: this check would not find a cut after that record",
     ]
     if note.other_keys:
-        lines.append(f"        {note.other_keys} are signed by other keys, and say nothing here")
+        lines.append(f"        {note.other_keys} signed heads have other keys and were not used")
     return lines

@@ -373,14 +373,14 @@ def _run(
     except (StateDirUnusable, BadFleet, BoardUnusable, MediaAddressUnusable) as error:
         raise _usage(str(error)) from error
     except ssl.SSLError as error:
-        raise _usage(f"tls_cert and tls_key are no certificate chain and its key: {error}") from error
+        raise _usage(f"tls_cert and tls_key are not a certificate chain and its key: {error}") from error
     except BridgeFailed as error:
         if own_robot and error.code == EXIT_USAGE:  # the bridge itself has said what is wrong
             raise typer.Exit(EXIT_USAGE) from error
         say(str(error))
         raise typer.Exit(EXIT_BRIDGE) from error
     except ConsoleFailed as error:
-        say("the console has failed, as the log says, and ends; start it again")
+        say("the console has failed and ends; the log says why. Start the console again")
         raise typer.Exit(EXIT_FAILED) from error
 
 

@@ -251,7 +251,7 @@ def _in_words(verdict: Verdict) -> str:
 
 def _signature_words(report: SignatureReport) -> list[str]:
     if report.state == "unsigned":
-        return ["unsigned: whoever can write the file can write another story that fits"]
+        return ["unsigned: anyone who can write the file can change it so that these checks still pass"]
     until = datetime.fromtimestamp(report.until_time / 1e6).astimezone().isoformat(timespec="milliseconds")
     lines = [f"{report.state}: {report.signatures} signatures, the last one up to s={report.until_event}, {until}"]
     if report.signer:

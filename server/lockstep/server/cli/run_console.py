@@ -138,7 +138,7 @@ def _certificate(settings: Settings, directory: Path) -> Certificate | None:
         certificate = self_signed(directory, names - {"*"}, datetime.datetime.now(datetime.UTC))
     except OSError as error:
         raise StateDirUnusable(directory, f"{error.filename}: {error.strerror}") from error
-    say(f"the certificate is our own; its SHA-256 fingerprint is {fingerprint(certificate)}")
+    say(f"the console made its certificate itself; the SHA-256 fingerprint is {fingerprint(certificate)}")
     return certificate
 
 

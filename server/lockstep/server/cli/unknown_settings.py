@@ -48,4 +48,4 @@ def _names(settings: type[BaseModel], prefix: str) -> Iterable[str]:
 
 def _sentence(name: str, known: Iterable[str]) -> str:
     near = get_close_matches(name.upper(), known, 1)
-    return f"{name} is no setting and has no effect{f'; did you mean {near[0]}?' if near else ''}"
+    return f"{name} is not a setting and has no effect{f'; did you mean {near[0]}?' if near else ''}"

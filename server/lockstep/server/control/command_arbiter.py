@@ -155,7 +155,7 @@ class CommandArbiter:
         if nonce is None:
             return self._refuse(command, "late")
         if nonce != command.nonce:
-            return self._refuse(command, "unseen", "its nonce is not that of the feedback that it answers")
+            return self._refuse(command, "unseen", "the command has another nonce than the feedback that it answers")
         self._speed_cap.answered(peer, event, command, now)
         if self.moves(command) and not self._seat.may_move(peer):
             return self._refuse(command, "not_neutral", "send a neutral command first")

@@ -271,7 +271,7 @@ class Console:
     def epoch_began(self, epoch: str, description: RobotDescription) -> None:
         """Begin an epoch. References of different epochs are never compared, so every peer starts anew."""
         self.stops.epoch_ends(self.clock.stop)
-        self.resets.link_down("the robot bridge was started anew")
+        self.resets.link_down("the robot bridge has restarted")
         self._arbiter.epoch_ends()
         self.clock.begin(epoch)
         self.speed_cap.forget()
@@ -375,7 +375,7 @@ class Console:
     def _silence(self, peer: Peer, message: SilenceStops) -> None:
         reason = self.silence.silence(peer, message.peer, silent=message.silent)
         if reason is not None:
-            self._refuse_request(peer, reason, "supervisors silence the stops of operators and observers")
+            self._refuse_request(peer, reason, "a supervisor can silence only operators and observers")
 
     def _is_driven_by(self, peer: FeedbackReceiver) -> bool:
         return isinstance(peer, Peer) and self.seat.rules.holds(peer.id)

@@ -21,8 +21,8 @@ from lockstep.server.session_events import (
 
 __all__ = ["Notices"]
 
-TAKEN = "Another console has taken the robot. This one cannot drive it; STOP still works while its media link is up."
-UNDELIVERED = "The stop could not be delivered: there is no link to the robot. It is sent first when the link is back."
+TAKEN = "Another console has taken the robot. This console cannot drive it; STOP works while its media link is up."
+UNDELIVERED = "The stop was not delivered: there is no link to the robot. The stop is sent first when the link is back."
 STOPS_UNWRITTEN = "Stops cannot be kept on this console's disk ({}). They are kept in memory, until this console ends."
 STOPS_WRITTEN = "Stops can be kept on this console's disk again."
 AUDIT_UNWRITTEN = (

@@ -172,12 +172,12 @@ class ResetService:
         """Return the reason why `by` may not reset now; None: it may."""
         if by.role != "supervisor":
             if by.role == "observer":
-                return "not_allowed", "observers do not reset"
+                return "not_allowed", "observers may not reset a stop"
             if not self._holds_seat(by):
-                return "no_seat", "the holder of the control seat resets, or a supervisor"
+                return "no_seat", "only the holder of the control seat or a supervisor may reset"
         now = time.monotonic()
         if not (self._of_link.spend(by.link or by.peer, now) and self._of_robot.spend("", now)):
-            return "too_often", "resets of this link, or for this robot, come too often"
+            return "too_often", "too many resets with this link or for this robot"
         if not self._robot.up:
             return "link_down", self._robot.detail
         if self._stops.unconfirmed:

@@ -179,13 +179,13 @@ class ControlSeat:
 
     def take(self, peer: str, role: Role, now: float) -> SeatOutcome:
         if role != "supervisor":
-            return SeatOutcome(refusal=SeatRefusal(peer, "not_allowed", "only a supervisor takes the seat"))
+            return SeatOutcome(refusal=SeatRefusal(peer, "not_allowed", "only a supervisor may take the seat"))
         return self._step(peer, SeatInput.TAKE, now)
 
     def answer(self, peer: str, claimant: str, now: float, *, grant: bool) -> SeatOutcome:
         """Take the answer of `peer` to the claim of `claimant`; ignore it if there is no such claim any more."""
         if not self.holds(peer):
-            return SeatOutcome(refusal=SeatRefusal(peer, "no_seat", "only the holder answers"))
+            return SeatOutcome(refusal=SeatRefusal(peer, "no_seat", "only the holder of the seat may answer"))
         return self._step(claimant, SeatInput.GRANTED if grant else SeatInput.DECLINED, now)
 
     def release(self, peer: str, now: float) -> SeatOutcome:
@@ -273,7 +273,7 @@ class ControlSeat:
         if peer in self._declined:
             return SeatOutcome(refusal=SeatRefusal(peer, "declined", "ask again a little later"))
         if len(self._claims) >= MAX_CLAIMS:
-            return SeatOutcome(refusal=SeatRefusal(peer, "seat_taken", "too many are waiting for it"))
+            return SeatOutcome(refusal=SeatRefusal(peer, "seat_taken", "too many people wait for the seat"))
         self._claims[peer] = now + self.times.claim
         return SeatOutcome(changed=True)
 

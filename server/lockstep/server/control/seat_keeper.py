@@ -54,7 +54,7 @@ class SeatKeeper:
         now = time.monotonic()
         match message:
             case SeatRequest(only_if_free=False) if self._asks_too_much(peer, now):
-                self._host.refuse(peer, SeatRefusal(peer.id, "seat_taken", "your link asks for the seat already"))
+                self._host.refuse(peer, SeatRefusal(peer.id, "seat_taken", "your link has requested the seat already"))
             case SeatRequest(only_if_free=only_if_free):
                 self._act(self.rules.request(peer.id, peer.role, now, only_if_free=only_if_free), peer)
             case SeatTake():

@@ -213,7 +213,7 @@ class StopService:
             return StopOutcome(press, taken, released=self._is_released(taken))
         self._keeper.keep(*(each for each in self._presses.pending if each.id == press))
         kept = await self._keeper.kept_words(press)
-        why = "the robot has not confirmed it" if self._robot.up else "the robot cannot be told now"
+        why = "the robot has not confirmed the stop" if self._robot.up else "the robot cannot be reached now"
         return StopOutcome(press, self._presses.outcome(press), f"{why}; {kept}")
 
     def _is_released(self, taken: StopTaken) -> bool:

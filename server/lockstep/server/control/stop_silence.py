@@ -13,7 +13,7 @@ __all__ = ["SILENCED", "StopSilence"]
 
 SILENCED = (
     "A supervisor has silenced the STOP of your link, and of all links that you invited with it, for ten minutes. "
-    "What you stopped stays stopped."
+    "Robots that you stopped stay stopped."
 )
 HEARD = "The STOP of your link works again."
 

@@ -113,14 +113,14 @@ def _fits(report: ChainReport, n: int, head: str) -> bool | None:
     if known == head:
         return True
     if known is not None:
-        report.fault("anchor", n, f"record {n} is not the one that was signed: it, or one in front of it, was changed")
+        report.fault("anchor", n, f"record {n} is not as it was signed: that record, or one before it, was changed")
         return False
     if n > report.last:
-        report.fault("cut", n, f"the end was cut off behind record {report.last}: record {n} was signed")
+        report.fault("cut", n, f"the end was cut off after record {report.last}: record {n} was signed")
         return False
     if n < report.first:
         return None
-    report.fault("cut", n, f"record {n} was signed, and is not there")
+    report.fault("cut", n, f"record {n} was signed but is missing")
     return False
 
 

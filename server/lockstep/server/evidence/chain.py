@@ -90,11 +90,11 @@ def check_chain(lines: Iterable[ChainedLine]) -> ChainReport:
         elif link.before and link.before != report.head:
             _say_broken(report, numbers, link, place)
         elif link.before and link.n <= report.last:
-            report.fault("reordered", link.n, f"{place}: record {link.n} stands behind record {report.last}")
+            report.fault("reordered", link.n, f"{place}: record {link.n} comes after record {report.last}")
         if link.before:
             chained = True
         elif chained:
-            report.fault("unchained", link.n, f"{place}: record {link.n} carries no hash of the one before")
+            report.fault("unchained", link.n, f"{place}: record {link.n} has no hash of the record before")
         else:
             report.unchained += 1
         report.records += 1
@@ -107,20 +107,20 @@ def check_chain(lines: Iterable[ChainedLine]) -> ChainReport:
 def _begin(report: ChainReport, link: _Link) -> None:
     report.first, report.earlier = link.n, bool(link.before) and link.before != GENESIS
     if report.earlier and report.unreadable:
-        text = f"{report.unreadable[0]} is no record, and stands where the one in front of record {link.n} should"
+        text = f"{report.unreadable[0]} is not a record, but has the place of the record before {link.n}"
         report.fault("changed", link.n, text)
 
 
 def _say_broken(report: ChainReport, numbers: dict[str, int], link: _Link, place: Place) -> None:
     if link.n <= report.last:
-        text = f"{place}: record {link.n} stands behind record {report.last}: the order was changed"
+        text = f"{place}: record {link.n} comes after record {report.last}: the order was changed"
         report.fault("reordered", link.n, text)
     elif link.before in numbers:
-        text = f"{place}: record {link.n} was written behind record {numbers[link.before]}, not behind {report.last}"
+        text = f"{place}: record {link.n} was written after record {numbers[link.before]}, not after {report.last}"
         report.fault("reordered", link.n, text)
     else:
         text = (
-            f"{place}: record {link.n} does not fit record {report.last} in front of it: that one was changed, "
-            "or records between them were taken out"
+            f"{place}: record {link.n} does not fit record {report.last} before it: that record was changed, "
+            "or records between them were removed"
         )
         report.fault("changed", link.n, text)

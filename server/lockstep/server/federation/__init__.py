@@ -16,7 +16,7 @@ from lockstep.server.federation.settings import MAX_NAME, BoardSettings, check_a
 __all__ = ["Board", "BoardHost", "check_board", "make_board"]
 
 NOT_INSTALLED = "a board needs the package redis: .venv/bin/python -m pip install -e '.[redis]'"
-NO_ADDRESS = "a board needs --public-url: the pages of other consoles lead here"
+NO_ADDRESS = "a board needs --public-url: the pages of other consoles link to it"
 
 
 def make_board(

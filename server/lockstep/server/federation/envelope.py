@@ -34,7 +34,7 @@ class Seal:
             raise InputTooLarge(f"{kind}: more than {largest} bytes")
         text = sealed[SIZE:]
         if not hmac.compare_digest(sealed[:SIZE], self.of(kind, text)):
-            raise InputNotSealed(f"{kind}: not written by a console that has our signing key")
+            raise InputNotSealed(f"{kind}: the writer has another signing key than this console")
         return text
 
     def of(self, kind: str, text: bytes) -> bytes:

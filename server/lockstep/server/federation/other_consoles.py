@@ -14,7 +14,7 @@ UNKNOWN_AFTER = 3.0  # s without a sign of life
 GONE_AFTER = 60.0
 LIVES_AFTER = 2  # signs of life; a state that is only found in the store may be left over from a run that ended
 
-NOT_HEARD = "its console is not heard"
+NOT_HEARD = "its console is silent"
 
 
 @dataclass

@@ -9,7 +9,7 @@ from lockstep.server.federation.messages import Outcome, StopReply, StopRequest
 __all__ = ["Asked", "PendingStops"]
 
 MAX_REMEMBERED = 256  # requests that were obeyed; a repeat of one is answered, not obeyed again
-NOT_SAID = "its console could not deliver it, and does not say why"
+NOT_SAID = "its console could not deliver the stop and gives no reason"
 
 
 class Asked:

@@ -56,7 +56,7 @@ MAX_STOPS = 32  # stops that wait for answers at the same time; further ones are
 NEWS_AT_ONCE = 20  # messages, then a pause: a flood of news takes no more than its share of the loop
 NEWS_PAUSE = 0.01
 FAREWELL_SECONDS = 0.5
-TOO_MANY = StopAnswer(False, False, 0, "not confirmed: sent, but too many stops are under way")
+TOO_MANY = StopAnswer(False, False, 0, "not confirmed: the stop was sent, but too many stops wait for answers")
 
 
 class RedisBoard:
@@ -86,8 +86,8 @@ class RedisBoard:
         self._known_at = time.time()  # time of the newest knowledge of the others
         self._unknown_since: float | None = self._known_at
         self._trouble = "not connected yet"
-        self._unseen = ""  # reason that this console cannot be shown to the others
-        self._unshared = ""  # reason that the audit is not shared
+        self._unseen = ""  # reason that this console cannot publish its state to the others
+        self._unshared = ""  # reason that the audit log cannot be shared
         self._conflicts: tuple[Conflict, ...] = ()  # conflicts that the log has named
 
     # Board
@@ -218,7 +218,7 @@ class RedisBoard:
         except (BoardSilent, BoardUnreachable):
             raise
         except BoardError as error:
-            self._unseen = self._once(self._unseen, error, "this console cannot be shown to the others")
+            self._unseen = self._once(self._unseen, error, "this console cannot publish its state to the others")
         else:
             self._unseen = ""
 
@@ -233,7 +233,7 @@ class RedisBoard:
             except (BoardSilent, BoardUnreachable):
                 raise
             except BoardError as error:
-                self._unshared = self._once(self._unshared, error, "the audit is not shared")
+                self._unshared = self._once(self._unshared, error, "the audit log cannot be shared")
                 return
             self._unshared = ""
             for each in batch:
@@ -332,7 +332,7 @@ class RedisBoard:
             why = f"other consoles are unknown ({self._trouble})"
         else:
             owner = self._others.owners([robot], time.monotonic()).get(robot, "")
-            why = f"{owner} did not answer" if owner else "no console has it"
+            why = f"{owner} did not answer" if owner else "no console has this robot"
         return StopAnswer(False, False, 0, f"not confirmed: {why}")
 
     # State
@@ -353,11 +353,9 @@ class RedisBoard:
         self._metrics.consoles.set(self._others.living(now))
         conflicts = self._others.conflicts(self._own(), now)
         for each in _without(conflicts, self._conflicts):
-            log.error(
-                "two consoles have a robot of one name", error=each.error, robot=each.robot, consoles=each.consoles
-            )
+            log.error("two consoles claim one robot name", error=each.error, robot=each.robot, consoles=each.consoles)
         for each in _without(self._conflicts, conflicts):
-            log.info("one console has the robot again", robot=each.robot)
+            log.info("only one console claims the robot name again", robot=each.robot)
         self._conflicts = conflicts
         self._metrics.conflicts.set(len(conflicts))
 

@@ -174,7 +174,7 @@ class RedisStore:
                 message = await channel.get_message(timeout=HEARTBEAT)
                 if message is None:
                     if asked:
-                        raise BoardSilent("no news connection")
+                        raise BoardSilent("the news connection is silent")
                     async with asyncio.timeout(self._timeout):
                         await channel.ping()
             asked = message is None
@@ -220,7 +220,7 @@ class RedisStore:
     def _refusal(self, text: str) -> BoardTrouble:
         kind = text.split(" ", 1)[0]
         if kind == "WRONGTYPE":
-            return BoardWrongType("another kind of value is kept at a key of ours")
+            return BoardWrongType("a key of this console holds another kind of value")
         if kind in ("OOM", "MISCONF", "READONLY"):
             return BoardFull(self._words(text))
         return BoardRefused(self._words(text))

@@ -122,5 +122,5 @@ class Revocations:
         try:
             return await in_thread(self._links.keep_revoked_elsewhere)
         except StateDirUnusable as error:
-            log.error("links that were revoked elsewhere are forgotten with this run", detail=str(error))
+            log.error("revocations by other consoles are in memory only and end with this console", detail=str(error))
             return []

@@ -72,4 +72,4 @@ def check_address(url: str) -> None:
     if not good:
         raise ValueError("the board is not redis://[[user]:password@]host[:port][/number], rediss://… or unix:///path")
     if not set(query) <= set(QUERY):
-        raise ValueError(f"the board's address may only have {', '.join(QUERY)} behind its question mark")
+        raise ValueError(f"the query of the board's address may only have {', '.join(QUERY)}")

@@ -113,7 +113,7 @@ async def stop(request: Request, caller: Caller) -> Response:
     press = new_press(caller.actor, "http", wanted.reason, wanted.press)
     stopped = await here.stop_all(caller.identity, press)
     if not stopped:
-        raise LinkOtherRobot("this link is good for none of the robots here")
+        raise LinkOtherRobot("this link admits to none of the robots on this console")
     return json_answer(FleetStop(press=told_id(press, wanted.press), robots=[_stopped(each) for each in stopped]))
 
 

@@ -17,9 +17,9 @@ STOP = "/api/stop"  # is taken, and kept, also while the robot's session has fai
 LIMIT = Parameter("limit", "query", {"type": "integer", "minimum": 1, "maximum": MAX_RECORDS})
 
 FLEET_OPERATIONS: tuple[Operation, ...] = (
-    Operation("get", "/api/fleet", "All robots that the link is good for.", 200, FleetInfo),
+    Operation("get", "/api/fleet", "All robots that the link admits to.", 200, FleetInfo),
     Operation(
-        *("post", "/api/fleet/stop", "Stop all of them, latched. From every role.", 200, FleetStop),
+        *("post", "/api/fleet/stop", "Stop all robots, latched. Every role may do this.", 200, FleetStop),
         errors=(LinkOtherRobot, *WITH_JSON),
         body=StopRequest,
     ),

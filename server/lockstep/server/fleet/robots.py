@@ -32,12 +32,12 @@ def robot_settings(settings: Settings) -> dict[str, Settings]:
     """
     shared = [name for name in NEVER_SHARED if getattr(settings, name)]
     if shared:
-        raise BadFleet("setting_of_one_robot", f"{', '.join(shared)}: say in the fleet's file at which robot")
+        raise BadFleet("setting_of_one_robot", f"{', '.join(shared)}: set this for one robot in the fleet file")
     named = [(each.name, {"robot": each.address}) for each in parse_robots(settings.robots)]
     tables = [*named, *_tables(settings).items()]
     check_names(name for name, _ in tables)
     if not tables:
-        raise BadFleet("no_robots", f"{settings.fleet_file}: there is no [robots.NAME] in it")
+        raise BadFleet("no_robots", f"{settings.fleet_file}: the file has no table [robots.NAME]")
     common = {name: getattr(settings, name) for name in settings.model_fields_set - {"robots", "fleet_file"}}
     return {name: _settings(name, common, table) for name, table in tables}
 
@@ -47,7 +47,7 @@ def _settings(name: str, common: Mapping[str, Any], table: Mapping[str, Any]) ->
     if foreign:
         raise BadFleet("setting_of_the_console", f"robot {name}: {', '.join(foreign)} cannot be set for one robot")
     if "robot" not in table:
-        raise BadFleet("robot_without_address", f'robot {name}: it needs robot = "tcp://host:port"')
+        raise BadFleet("robot_without_address", f'robot {name}: the table needs robot = "tcp://host:port"')
     try:
         made = Settings(**{**common, "robots": (), "fleet_file": None, **table})
     except ValidationError as error:
@@ -68,5 +68,5 @@ def _tables(settings: Settings) -> dict[str, Mapping[str, Any]]:
         raise BadFleet("fleet_unreadable", f"{settings.fleet_file}: {error}") from error
     tables = content.pop("robots", {})
     if content or not isinstance(tables, dict) or not all(isinstance(each, dict) for each in tables.values()):
-        raise BadFleet("fleet_unreadable", f"{settings.fleet_file}: a table [robots.NAME] for each robot, nothing else")
+        raise BadFleet("fleet_unreadable", f"{settings.fleet_file}: the file may hold only tables [robots.NAME]")
     return tables

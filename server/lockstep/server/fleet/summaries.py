@@ -7,7 +7,7 @@ from lockstep.server.state.dependencies import Dependencies
 
 __all__ = ["FAILED", "UNREADABLE", "absent_tile", "tile_of"]
 
-UNREADABLE = "What this robot does cannot be read: a fault of the console."
+UNREADABLE = "A fault in the console keeps it from reading this robot's state."
 FAILED = "The console's session of this robot has failed; it is started again."
 MAX_WORDS, MAX_NAME, MAX_FAULTS = 500, 60, 20  # bounds of a tile
 

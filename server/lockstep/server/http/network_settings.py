@@ -73,7 +73,7 @@ class NetworkSettings(BaseSettings):
         if bool(self.tls_cert) != bool(self.tls_key):
             raise ValueError("tls_cert and tls_key belong together")
         if self.tls and self.tls_cert:
-            raise ValueError("either a self-signed certificate or tls_cert and tls_key")
+            raise ValueError("choose either a self-signed certificate or tls_cert and tls_key")
         if self.turn and len(self.turn_key) < MIN_TURN_SECRET:
             raise ValueError(f"turn needs a turn_secret of at least {MIN_TURN_SECRET} characters")
         return self

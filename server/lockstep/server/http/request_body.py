@@ -65,11 +65,11 @@ async def _read(request: Request, bound: int) -> bytes:
             async for chunk in request.stream():
                 body += chunk
                 if len(body) > bound:
-                    raise BodyTooLarge(f"more than {bound} bytes")
+                    raise BodyTooLarge(f"the body has more than {bound} bytes")
     except TimeoutError as error:
-        raise BodyTooSlow("the body did not come in time") from error
+        raise BodyTooSlow("the body did not arrive in time") from error
     except ClientDisconnect as error:
-        raise BodyTooSlow("the body never came whole") from error
+        raise BodyTooSlow("the connection ended before the whole body arrived") from error
     return bytes(body)
 
 

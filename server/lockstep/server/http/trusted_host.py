@@ -51,7 +51,9 @@ class HostNames:
         except ValueError as error:
             raise HostRefused("the Host header is not valid") from error
         if name not in self._names and not name.endswith(".localhost") and not _is_address(name):
-            raise HostRefused("this console does not go by that name; LOCKSTEP_ALLOWED_HOSTS lists further ones")
+            raise HostRefused(
+                "the Host header names a host that this console does not serve; LOCKSTEP_ALLOWED_HOSTS adds hosts"
+            )
 
 
 class TrustedHost:
@@ -142,7 +144,7 @@ class TrustedHost:
                 raise
             self._caught(scope, error)
             if not started:
-                await _refuse(scope, send, InternalFault("the console could not answer; it has written down why"))
+                await _refuse(scope, send, InternalFault("the console could not answer; its log says why"))
 
 
 def _is_one_of(scope: Scope, paths: tuple[str, ...]) -> bool:

@@ -31,20 +31,20 @@ def agreed_channels(maps: Sequence[str]) -> list[AgreedChannel]:
         BadSdp: a malformed line, an unknown channel, or a channel twice.
     """
     if len(maps) > len(CHANNELS):
-        raise BadSdp(f"more data channels than the {len(CHANNELS)} that there are")
+        raise BadSdp(f"the offer has more than {len(CHANNELS)} data channels")
     found = [_channel(each) for each in maps]
     if len({each.id for each in found}) < len(found) or len({each.name for each in found}) < len(found):
-        raise BadSdp("a=dcmap: a data channel that is there already")
+        raise BadSdp("a=dcmap: a data channel is named twice")
     return found
 
 
 def _channel(text: str) -> AgreedChannel:
     parsed = MAP.fullmatch(text)
     if parsed is None or int(parsed[1]) > MAX_ID:
-        raise BadSdp("an a=dcmap line that is not valid (RFC 8864 5.1)")
+        raise BadSdp("the offer has an a=dcmap line that is not valid (RFC 8864 5.1)")
     options = dict(each.split("=", 1) for each in parsed[2].split(";"))
     if len(options) < parsed[2].count(";") + 1 or options.keys() - {"label", "ordered", "max-retr"}:
-        raise BadSdp("a=dcmap: label, ordered and max-retr can be agreed on, each once")
+        raise BadSdp("a=dcmap: only label, ordered and max-retr are allowed, each once")
     try:
         name = channel_name(options.get("label", "").strip('"'))
     except ChannelError as error:
@@ -54,7 +54,7 @@ def _channel(text: str) -> AgreedChannel:
 
 def _ordered(said: str) -> bool:
     if said not in ("true", "false"):
-        raise BadSdp("a=dcmap: ordered is true or false")
+        raise BadSdp("a=dcmap: ordered must be true or false")
     return said == "true"
 
 
@@ -63,5 +63,5 @@ def _repeats(options: dict[str, str]) -> int | None:
     if said is None:
         return None
     if not re.fullmatch(r"[0-9]{1,5}", said) or int(said) > MAX_RETRANSMITS:
-        raise BadSdp(f"a=dcmap: max-retr is 0 to {MAX_RETRANSMITS}")
+        raise BadSdp(f"a=dcmap: max-retr must be 0 to {MAX_RETRANSMITS}")
     return int(said)

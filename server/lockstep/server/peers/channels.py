@@ -84,7 +84,7 @@ def parse_message(channel: ChannelName | None, data: object) -> ClientMessage:
         WrongChannel: this kind is not for this channel.
     """
     if not isinstance(data, str):
-        raise BinaryMessage("messages are text")
+        raise BinaryMessage("a message must be text")
     if len(data) > MAX_MESSAGE:
         raise MessageTooLarge(f"{len(data)} characters, the bound is {MAX_MESSAGE}")
     try:

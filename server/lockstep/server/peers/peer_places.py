@@ -25,6 +25,6 @@ def check_place(role: Role, held: int, taken: int, bound: int, reserved: int) ->
         raise TooManyPeers(f"all {limit} places are taken")
     share = -(-usual * LINK_SHARE[0] // LINK_SHARE[1])
     if held >= share:
-        raise TooManyPeers(f"one link gets {share} of the {bound} places; others need another one")
+        raise TooManyPeers(f"this link has all of its {share} of the {bound} places; use another link")
     if taken >= usual and held >= RESERVED_FOR_LINK:
-        raise TooManyPeers(f"of the last {reserved} places one link gets none beyond {RESERVED_FOR_LINK}")
+        raise TooManyPeers(f"the last {reserved} places are for links with fewer than {RESERVED_FOR_LINK}")

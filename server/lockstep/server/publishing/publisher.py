@@ -249,7 +249,7 @@ class Publisher:
         if now - (incoming.heard_at or self._shown_at) > self._limits.peer_silence:
             self.end("silent")
         elif self.stalled and self.camera.state != "reconnecting":
-            self.camera.failed(self, "silent", "nothing comes any more")
+            self.camera.failed(self, "silent", "no data arrives")
 
     def _pass_on(self, pictures: list[Encoded]) -> None:
         for picture in pictures:

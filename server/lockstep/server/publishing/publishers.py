@@ -22,11 +22,11 @@ MOST_CLOSING = 4  # ended publications whose connections and processes still end
 WORDS = {
     "deleted": "its publisher has left",
     "link ended": "its publisher's link has ended",
-    "silent": "nothing came any more",
-    "late": "its pictures came too late",
+    "silent": "no pictures arrived any more",
+    "late": "its pictures arrived too late",
     "never connected": "its publisher never connected",
     "too much": "its publisher sent too much",
-    "replaced": "its publisher begins anew",
+    "replaced": "its publisher restarts",
 }
 LinkEnded = Callable[[str, float], Awaitable[None]]  # id of the link, and the time of its expiry
 
@@ -89,7 +89,7 @@ class Publishers:
         if self._closing:
             raise ShuttingDown("the console is shutting down")
         if wanted and wanted not in self._cameras:
-            raise NotFound(f"no camera of that name; there are {', '.join(self._cameras)}")
+            raise NotFound(f"there is no camera of that name; choose one of {', '.join(self._cameras)}")
         link = identity.token_id
         if len(self._here) >= MOST_CLOSING + len(self._cameras):
             raise TooManyRequests("publications that have ended are still being closed")
@@ -112,7 +112,7 @@ class Publishers:
         names = [wanted] if wanted else sorted(self._cameras, key=lambda name: name != own)
         free = next((self._cameras[name] for name in names if self._cameras[name] not in taken), None)
         if free is None:
-            raise CameraTaken("somebody publishes it" if wanted else "somebody publishes each camera there is")
+            raise CameraTaken("this camera is published already" if wanted else "all cameras are published already")
         return free
 
     def admit(self, publisher: Publisher) -> None:

@@ -79,7 +79,7 @@ class ConsoleLibrary:
     def delete(self, recording_id: str) -> None:
         running = self._running()
         if running is not None and running[0].stem == recording_id:
-            raise AlreadyRecording("it is being written; stop it first")
+            raise AlreadyRecording("the recording is still being written; stop it first")
         path = self._recorder.shelf.path(recording_id)
         if path is None:
             raise NotFound("no such recording")
@@ -120,7 +120,7 @@ class FileLibrary:
         return _open(self._path, self._indexes)
 
     def delete(self, recording_id: str) -> None:
-        raise NotAllowed("a replayed file is not deleted here")
+        raise NotAllowed("a replayed file cannot be deleted here")
 
 
 def _open(path: Path, indexes: KnownIndexes) -> tuple[RecordingReader, RecordingEntry]:

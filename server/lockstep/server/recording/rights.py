@@ -20,7 +20,7 @@ from lockstep.server.recording.format.event_index import EventIndex
 
 __all__ = ["RecordingReaderRight", "check_end"]
 
-BEFORE = "it was recorded before your link was made"
+BEFORE = "this was recorded before your link was made"
 
 
 class RecordingReaderRight(NamedTuple):
@@ -72,4 +72,4 @@ def check_end(role: Role, *, automatic: bool, holds_seat: bool) -> None:
     if role == "observer":
         raise NotAllowed("only the operator or the supervisor may do this")
     if automatic and role != "supervisor" and not holds_seat:
-        raise NotAllowed("this console records by itself: only who holds the seat, or a supervisor, may end it")
+        raise NotAllowed("only the holder of the seat or a supervisor may end an automatic recording")

@@ -21,7 +21,7 @@ __all__ = ["ReconnectingLink", "LinkSink"]
 log = structlog.get_logger(__name__)
 
 HEALTHY_AFTER = 5.0  # s up; then the next loss is retried soon again
-FAULT = "internal_error: this console failed at what the robot sent"
+FAULT = "internal_error: this console failed on a message of the robot"
 
 
 class LinkSink(Protocol):

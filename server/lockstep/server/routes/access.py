@@ -25,8 +25,8 @@ Caller = Annotated[Right, Depends(authorized)]
 
 Result = TypeVar("Result")
 DEFAULT_SECONDS = 8 * 3600.0
-NOTED = "the link has ended, for the next start too; the list of links is written when the disk takes it"
-UNWRITTEN = "the link has ended here; that is written down when the disk takes it, and not known to a start before that"
+NOTED = "the link has ended for good; the console writes its list of links when the disk accepts it"
+UNWRITTEN = "the link has ended until this console restarts, and for good once the disk accepts the change"
 MAX_RECORDS = 500  # of the audit in one answer
 MAX_ENDED = 500  # links that have ended, in one answer, besides all that are good
 
@@ -88,7 +88,7 @@ async def invite(request: Request, caller: Caller) -> Response:
     wanted = await read_json(request, InvitationRequest)
     _require_inviter(caller)
     if here.context.is_silenced(caller.identity.token_id):
-        raise Silenced("a supervisor has silenced the STOP of your link; until that ends it invites nobody")
+        raise Silenced("a supervisor has silenced the STOP of your link; until that ends you cannot invite")
     robots = _wanted_robots(here, wanted)
     by = caller.actor
     try:
@@ -172,7 +172,7 @@ def _wanted_robots(here: Dependencies, wanted: InvitationRequest) -> tuple[str, 
 
 def _require_inviter(caller: HasRole) -> None:
     if not may_invite(caller.role):
-        raise NotAllowed("observers invite nobody")
+        raise NotAllowed("observers may not invite anyone")
 
 
 def _shown(found: Iterable[Invitation], now: float) -> list[Invitation]:

@@ -75,9 +75,9 @@ def _check_query(request: Request, ticket: str) -> None:
     known = dict.fromkeys(FLAGS, "") | dict([scene_query(request, ticket).partition("&")[0].split("=", 1)])
     for name, value in request.query_params.multi_items():
         if name not in known:
-            raise BadParameter(f"the 3D scene takes no {name[:40]!r}")
+            raise BadParameter(f"the 3D scene has no parameter {name[:40]!r}")
         if value != known[name]:
-            raise BadParameter(f"the 3D scene takes no other {name!r}")
+            raise BadParameter(f"the 3D scene takes no other value of {name!r}")
 
 
 @router.websocket("/scene/ws/{ticket}")

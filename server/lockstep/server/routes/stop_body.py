@@ -46,4 +46,4 @@ async def _read_in_time(request: Request) -> _AnyBody:
         async with asyncio.timeout(BODY_SECONDS):
             return await read_json(request, _AnyBody)
     except TimeoutError as error:
-        raise BodyTooSlow("the body did not come in time") from error
+        raise BodyTooSlow("the body did not arrive in time") from error

@@ -114,7 +114,7 @@ async def options() -> Response:
 
 @router.get("/whep", include_in_schema=False)
 async def nothing_to_get() -> Response:
-    raise HTTPException(405, "offers are posted here", {"Allow": "OPTIONS, POST"})
+    raise HTTPException(405, "send an offer to this URL by POST", {"Allow": "OPTIONS, POST"})
 
 
 @router.patch("/whep/{resource}")
@@ -137,7 +137,7 @@ async def patched(request: Request, here: Dependencies, ice: IceSession, still_t
         ice.add(fragment.candidates)
         return Response(status_code=204)
     if expected != "*" or not fragment.password:
-        raise BadSdpFragment("another ice-ufrag: a restart says If-Match: * and has an ice-pwd")
+        raise BadSdpFragment("the ice-ufrag differs: a restart needs If-Match: * and an ice-pwd")
     if not ice.connected:
         raise NotConnected("there is no ICE session that could be restarted")
     body = write_fragment(ice.restart(fragment), kind, mid)
@@ -151,7 +151,7 @@ def _precondition(request: Request, tag: str) -> str:
     if not expected:
         raise PreconditionRequired("a PATCH needs If-Match: the ETag of the ICE session, or * to restart it")
     if expected != "*" and tag not in [each.strip() for each in expected.split(",")]:
-        raise PreconditionFailed("that is not the newest ICE session")
+        raise PreconditionFailed("the If-Match header does not name the newest ICE session")
     return expected
 
 
@@ -173,7 +173,7 @@ def _check_sections(here: Dependencies, offer: SessionDescription) -> None:
     kinds = Counter(stream.kind for stream in here.media.offers)
     wanted = Counter(each.kind for each in offer.accepted if each.direction in ("recvonly", "sendrecv"))
     if any(wanted[kind] < count for kind, count in kinds.items()):
-        raise TooFewSections(f"{kinds['video']} of video and {kinds['audio']} of audio are needed for all streams")
+        raise TooFewSections(f"all streams need {kinds['video']} video and {kinds['audio']} audio sections")
 
 
 async def _negotiate(
@@ -225,6 +225,6 @@ async def _negotiate(
             raise BadSdp(str(error)) from error
         if isinstance(error, Exception) and not isinstance(error, ConsoleError):
             here.metrics.faults.caught("peer offer", error)
-            raise InternalFault("the console could not answer; it has written down why") from error
+            raise InternalFault("the console could not answer; its log says why") from error
         raise
     return peer, answer

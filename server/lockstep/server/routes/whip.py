@@ -62,7 +62,7 @@ async def create(
     """
     here = _enabled(request)
     if caller.identity.role == "observer":
-        raise NotAllowed("observers publish nothing")
+        raise NotAllowed("observers may not publish")
     if here.console.robot.description is None:
         raise RobotUnreachable(here.console.robot.detail)
     here.guard.offer(caller.token_id)  # before it costs anything
@@ -101,13 +101,13 @@ async def session_options(resource: str, request: Request) -> Response:
 @router.api_route("/whip", methods=["GET", "HEAD", "PUT", "PATCH", "DELETE"], include_in_schema=False)
 async def nothing_to_get(request: Request) -> Response:
     _enabled(request)
-    raise HTTPException(405, "offers are posted here", {"Allow": ENDPOINT_METHODS})
+    raise HTTPException(405, "send an offer to this URL by POST", {"Allow": ENDPOINT_METHODS})
 
 
 @router.api_route("/whip/{resource}", methods=["GET", "HEAD", "PUT", "POST"], include_in_schema=False)
 async def nothing_of_a_session(resource: str, request: Request) -> Response:
     _enabled(request)
-    raise HTTPException(405, "a WHIP session is patched and deleted", {"Allow": SESSION_METHODS})
+    raise HTTPException(405, "a WHIP session takes PATCH and DELETE only", {"Allow": SESSION_METHODS})
 
 
 @router.patch("/whip/{resource}")
@@ -129,7 +129,7 @@ async def delete(resource: str, request: Request, caller: Annotated[Right, Depen
 def _parsed(text: str) -> SessionDescription:
     offer = parse_offer(text)
     if any(section.sctp_port is not None for section in offer.sections):
-        raise BadSdp("a publisher has no data channels")
+        raise BadSdp("a publisher may not offer data channels")
     return offer
 
 
@@ -142,7 +142,7 @@ def _pictures(offer: SessionDescription) -> MediaSection:
             if best is not None:
                 repair = section.repair_of(best)
                 return replace(section, codecs=(best,) if repair is None else (best, repair))
-    raise NotAcceptable("no section that sends pictures in H.264 or VP8")
+    raise NotAcceptable("the offer has no section that sends pictures in H.264 or VP8")
 
 
 def _enabled(request: Request) -> Dependencies:
@@ -187,7 +187,7 @@ async def _negotiate(
             raise BadSdp(str(error)) from error
         if isinstance(error, Exception) and not isinstance(error, ConsoleError):
             here.metrics.faults.caught("publisher offer", error)
-            raise InternalFault("the console could not answer; it has written down why") from error
+            raise InternalFault("the console could not answer; its log says why") from error
         raise
     return publisher, write_description(answer)
 

@@ -101,18 +101,18 @@ class SceneView:
         """Count a viewer while entered. One link gets a quarter of the places; observers do not get the last ones.
 
         Raises:
-            SceneUnavailable: there are too many viewers, or this link opens scenes too often.
+            SceneUnavailable: there are too many viewers, or this link opens 3D scenes too often; wait a moment.
         """
         if not self._opens.spend(ticket.link, time.monotonic()):
-            raise SceneUnavailable("this link opens scenes too often")
+            raise SceneUnavailable("this link opens 3D scenes too often; wait a moment")
         bound = self._max_viewers
         if ticket.role == "observer":
             bound = max(1, bound - max(1, bound // RESERVED_PART))
         if self._viewers >= bound:
-            raise SceneUnavailable(f"all {bound} places are taken")
+            raise SceneUnavailable(f"all {bound} places of the 3D scene are taken")
         own = max(1, self._max_viewers // LINK_PART)
         if self._of_link[ticket.link] >= own:
-            raise SceneUnavailable(f"one link opens {own} scenes at most")
+            raise SceneUnavailable(f"one link may open at most {own} 3D scenes")
         self._of_link[ticket.link] += 1
         self._viewers += 1
         self._metrics.scene_viewers.set(self._viewers)

@@ -35,7 +35,7 @@ HEALTHY_SECONDS = 10.0
 LOOK_SECONDS = 0.25  # between two checks that the observers may still watch
 STRAY_SECONDS = 60.0  # then an observer with a key and no line to the console is thought to watch on without it
 RENEW_SECONDS = 600.0  # between two publications because of such observers
-ENDED, UNWATCHED, STRAY = "a link ended", "nobody watches", "somebody left with a key"
+ENDED, UNWATCHED, STRAY = "a link ended", "nobody watches", "an observer left with a key"
 OWN_REASONS = (NEW_EPOCH, ENDED, UNWATCHED, STRAY)  # reasons of the console to end a publication; no fault of a relay
 HEARTBEAT = encode_console_message(Pong(id=0))
 
@@ -195,7 +195,7 @@ class SfuCoordinator:
                 for station in self.stations:
                     self._gone(station, publication.why)
         if publication.why in OWN_REASONS:
-            log.info("no longer published", relay=origin.url.address, why=publication.why)
+            log.info("the session is no longer published", relay=origin.url.address, why=publication.why)
         else:
             self._lost(origin, publication.why)
 

@@ -64,7 +64,7 @@ async def publish(
     try:
         connection = await endpoint.connect(controlling=True)
     except TooManyPeers as error:
-        raise RelayRefused("this console has as many connections as it may") from error
+        raise RelayRefused("this console has reached its limit of connections") from error
     given: Subscriptions | None = None
     try:
         plan, offered = media.plan_publication(codec)
@@ -75,7 +75,7 @@ async def publish(
         try:
             connection.accept(parse_description(answer))
         except SdpError as error:
-            raise RelayRefused(f"its answer cannot be used: {error}") from error
+            raise RelayRefused(f"the relay's answer cannot be used: {error}") from error
         writer = ChannelWriter(connection, connection.open_channel(FEEDBACK, reliability=NEWEST_WINS))
         publication = Publication(feed, given.streams, writer.send_newest)
         given.on_failed(publication.failed)

@@ -92,7 +92,7 @@ class JanusRoom:
             {"type": "offer", "sdp": offer},
         )
         if answer.jsep is None:
-            raise RelayRefused("no answer to the offer")
+            raise RelayRefused("the relay did not answer the offer")
         return str(answer.jsep["sdp"])
 
     async def receive_from(self, handle: int, feed: int, streams: list[StreamInfo]) -> "Inlet":
@@ -122,7 +122,7 @@ class JanusRoom:
         )
         port, control = (answer.data.get(name) for name in ("port", "rtcp_port"))
         if not isinstance(port, int) or not isinstance(control, int):
-            raise RelayRefused("an answer without ports")
+            raise RelayRefused("the relay's answer has no ports")
         return Inlet(port, control)
 
     async def send_to(self, handle: int, feed: int, name: str, host: str, inlet: "Inlet") -> None:

@@ -158,5 +158,5 @@ class JanusSession:
 def _identifier(answer: Heard) -> int:
     found = answer.data.get("id")
     if not isinstance(found, int):
-        raise RelayRefused("an answer without an id")
+        raise RelayRefused("the relay's answer has no id")
     return found

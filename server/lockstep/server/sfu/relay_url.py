@@ -22,13 +22,13 @@ def parse_relay_url(text: str) -> RelayUrl:
     """Parse a relay's address. Raises ValueError with the reason, and with nothing that could be a secret."""
     engine, _, rest = text.partition(":")
     if engine != "janus":
-        raise ValueError(f"a relay is a Janus: {WANTED}")
+        raise ValueError(f"a relay must be a Janus server: {WANTED}")
     parts = urlsplit(rest)
     if parts.username or parts.password:
-        raise ValueError(f"no name and password in {WANTED}: secrets have settings of their own")
+        raise ValueError(f"the address may hold no name and password: {WANTED}")
     if parts.scheme not in ("ws", "wss") or not parts.hostname or parts.fragment:
         raise ValueError(f"{text.partition('?')[0]!r} is not {WANTED}")
     path, _, room = parts.path.rpartition("/")
     if not room.isdecimal() or parts.query or int(room) >= MOST_ROOM:
-        raise ValueError(f"a number for a room, and nothing behind it: {WANTED}")
+        raise ValueError(f"the address must end with the number of a room: {WANTED}")
     return RelayUrl(f"{parts.scheme}://{parts.netloc}{path}", int(room))

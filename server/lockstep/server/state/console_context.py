@@ -113,7 +113,7 @@ class ConsoleContext:
                     keep_at = loop.time() + KEEP_SECONDS
                     await in_thread(store.keep_time)
             except StateDirUnusable as error:
-                log.error("what time it is cannot be written down", detail=str(error))
+                log.error("the time cannot be written to the state directory", detail=str(error))
             except Exception as error:
                 self.metrics.faults.caught("links", error)
 
@@ -127,7 +127,7 @@ class ConsoleContext:
             try:
                 self.enforce(await in_thread(store.keep_ended), CONSOLE)
             except StateDirUnusable as error:
-                log.error("links that were revoked cannot be written down", detail=str(error))
+                log.error("revocations cannot be written to the state directory", detail=str(error))
             except Exception as error:
                 self.metrics.faults.caught("links", error)
 

@@ -43,15 +43,15 @@ class ConsoleLinks(NamedTuple):
             f"\n  To drive, open:   {self.operator}\n"
             f"\n  To watch, open:   {self.observer}\n"
             f"\n  To supervise:     {self.supervisor}\n"
-            "\n  Whoever has the first link can drive the robot; share the second. The third takes control from anyone."
-            "\n  `lockstep invite` makes links that end when you say. Ctrl-C ends everything.\n\n"
+            "\n  Anyone with the first link can drive the robot. Share the second. The third takes control from anyone."
+            "\n  `lockstep invite` makes links that expire when you choose. Ctrl-C ends everything.\n\n"
         )
 
     def _whereabouts(self) -> str:
         if not self.robots:
             return f"The robot is at {self.robot}."
         each = "".join(f"\n    {name:<20} {address}" for name, address in self.robots.items())
-        return f"Its robots:{each}"
+        return f"The robots:{each}"
 
 
 def console_link(console: str, token: str) -> str:

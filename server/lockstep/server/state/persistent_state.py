@@ -64,7 +64,7 @@ def open_state(settings: Settings, *, fall_back: bool = False) -> ConsoleState:
     except StateDirUnusable as error:
         if not fall_back or _is_used(path):
             raise
-        log.error("nothing is remembered: links and the audit log end with this console", detail=str(error))
+        log.error("the state directory is temporary: links and the audit log end with this console", detail=str(error))
     return _open(settings, Path(tempfile.mkdtemp(prefix="lockstep-")))._replace(lasts=False)
 
 

@@ -72,8 +72,8 @@ class StopKeeper:
         """Return how a press is kept, in words for its sender; wait briefly for it to be on the disk."""
         unwritten = await self.written(press)
         if unwritten:
-            return f"{KEPT_IN_MEMORY}; it is not on the console's disk ({unwritten})"
-        return KEPT if self.lasts else f"{KEPT_IN_MEMORY}; its state directory is a temporary one"
+            return f"{KEPT_IN_MEMORY}; the stop is not on the console's disk ({unwritten})"
+        return KEPT if self.lasts else f"{KEPT_IN_MEMORY}; the state directory is temporary"
 
     async def written(self, press: str) -> str:
         """Wait briefly for a kept press to be on the disk; return "", or the reason why it is not."""

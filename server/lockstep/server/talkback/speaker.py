@@ -54,7 +54,7 @@ class Speaker:
         while True:
             began = loop.time()
             await self._run_process()
-            self._enter("its process ended")
+            self._enter("the source's process ended")
             if loop.time() - began > HEALTHY:
                 backoff.healthy()
             await asyncio.sleep(backoff.next())

@@ -29,7 +29,7 @@ class Faults:
         """Count and log a fault. `where`: a stable name; `context` goes into the log. Raises nothing."""
         self._counter.labels(where).inc()
         if self._logged.spend(where, self._clock()):
-            log.error("a fault of the console's own", where=where, exc_info=error, **context)
+            log.error("an internal fault of the console", where=where, exc_info=error, **context)
 
     def uncaught(self, loop: object, context: dict[str, Any]) -> None:
         """Handle exceptions that nobody awaited or a callback raised, for `loop.set_exception_handler`."""

@@ -33,10 +33,10 @@ async def attempt(work: Awaitable[Result]) -> Result:
     except asyncio.CancelledError:
         if caller.cancelling() > before:
             raise
-        raise RuntimeError("it was cancelled, and its caller was not") from None
+        raise RuntimeError("the work was cancelled, but its caller was not") from None
     except Exception:
         if caller.cancelling() > before:
-            log.exception("failed as it ended")
+            log.exception("the work failed while its caller was cancelled")
         raise
     finally:
         if caller.cancelling() > before:

@@ -45,8 +45,8 @@ class NoSuchAddress(MediaAddressUnusable):
 
     def __str__(self) -> str:
         return (
-            f"ice_hosts: media cannot use {self.address} ({self.reason}). It has to be an address of this machine; "
-            "the outer one of a one-to-one NAT belongs to --advertise"
+            f"ice_hosts: media cannot use {self.address} ({self.reason}). Give an address of this machine here, "
+            "and the outer address of a one-to-one NAT with --advertise"
         )
 
 

@@ -21,7 +21,7 @@ def parse_offer(text: str, max_sections: int = MAX_SECTIONS) -> SessionDescripti
         BadSdp: not an offer that can be answered.
     """
     if sum(line.startswith("m=") for line in text.splitlines()) > max_sections:  # before it costs anything
-        raise TooManySections(f"more than {max_sections} media sections")
+        raise TooManySections(f"the offer has more than {max_sections} media sections")
     try:
         return parse_description(text)
     except SdpError as error:

@@ -181,7 +181,7 @@ async def test_old_odometry_is_a_fault_is_not_shown_as_fresh_and_stops(driver: D
         # Back again, but the stick was never let go: the robot must not start off by itself.
         await driver.driven(GO, lambda feedback: not feedback.unknown)
         await driver.drive(GO)
-        assert any("let go once" in fault for fault in driver.feedback.faults)
+        assert any("let go of the controls once" in fault for fault in driver.feedback.faults)
         await node.ended_in_one_zero(motion + 1)
         await driver.driven(STAY, lambda feedback: feedback.faults == [])
 
@@ -189,7 +189,7 @@ async def test_old_odometry_is_a_fault_is_not_shown_as_fresh_and_stops(driver: D
 async def test_bad_messages_are_counted_and_named_and_a_dead_robot_is_a_fault(driver: Driver, node: RosRobot) -> None:
     for topic, complaint in (
         ("/odom", "/odom: N × odometry with a value that is not a number"),
-        ("/scan", "/scan: N × scan whose angles make no sense"),
+        ("/scan", "/scan: N × scan with invalid angles"),
         ("/image", "/camera/image_raw: N × picture in encoding '16UC1', which is not supported"),
     ):
         await driver.told_of(complaint, lambda topic=topic: node.tell(f"spoil {topic}"))  # type: ignore[misc]

@@ -98,7 +98,7 @@ def test_what_is_wrong_is_named_with_its_line_and_key(tmp_path: Path, text: str,
 
 def test_zones_without_a_base_make_no_sense(tmp_path: Path) -> None:
     zone = "geofences:\n  - {name: z, label: Z, kind: keep_in, polygon: [[0, 0], [1, 0], [1, 1]]}\n"
-    with pytest.raises(SettingsError, match="line 5: geofences: only a base"):
+    with pytest.raises(SettingsError, match="line 5: geofences: zones need a base"):
         read_settings(written(tmp_path, ARM + zone))
 
 

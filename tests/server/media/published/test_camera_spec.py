@@ -32,7 +32,7 @@ def test_the_setting_names_published_cameras_and_no_two_sources_have_one_name() 
         *(("door", "rtsp"), ("phone", "whip"), ("desk", "whip")),
     ]
     assert Settings().whip == ()
-    with pytest.raises(ValueError, match="two have the same name, phone"):
+    with pytest.raises(ValueError, match="the name phone is used twice"):
         Settings(cameras="phone=rtsp://h/", whip="phone")  # type: ignore[arg-type]
     with pytest.raises(ValueError, match="whip: more than 4"):
         Settings(whip="a b c d e")  # type: ignore[arg-type]

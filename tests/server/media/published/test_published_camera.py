@@ -23,14 +23,14 @@ def test_it_says_who_publishes_and_why_nobody_does() -> None:
     heard.camera.begin(ann)
     for _ in range(3):
         heard.camera.captured(ann, PICTURE, "Ann")
-    heard.camera.failed(ann, "silent", "nothing comes any more")
+    heard.camera.failed(ann, "silent", "no data arrives")
     heard.camera.captured(ann, PICTURE, "Ann")
     heard.camera.end(ann, "deleted", "its publisher has left")
     heard.camera.end(ann, "deleted", "again")
     assert heard.changes == [
         ("connecting", ""),
         ("live", "published by Ann"),
-        ("reconnecting", "nothing comes any more"),
+        ("reconnecting", "no data arrives"),
         ("live", "published by Ann"),
         ("waiting", "its publisher has left"),
     ]

@@ -74,7 +74,7 @@ async def test_a_process_that_dies_is_started_again(tmp_path: Path) -> None:
     async with watching("file:x", command) as watched:
         await watched.until(lambda: len(watched.failures) >= 2)
         assert watched.failures[0] == "died"
-        assert watched.source.detail == "its process ended"
+        assert watched.source.detail == "the source's process ended"
 
 
 @pytest.mark.parametrize("said", ["b'\\xff\\xff\\xff\\xff'", "b'\\0\\0\\0\\2\\xc1\\xc1'", "b'\\0\\0\\0\\x10short'"])

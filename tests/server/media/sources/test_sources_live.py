@@ -50,5 +50,5 @@ def test_bad_sources_are_refused_at_the_start_without_a_word_of_their_password()
         assert "geheim" not in caught.value.errors()[0]["msg"]
     settings = Settings(cameras="a=rtsp://u:geheim@h/ b=file:x", microphones="pulse:")  # type: ignore[arg-type]
     assert [spec.name for spec in settings.sources] == ["a", "b", "microphone1"]
-    with pytest.raises(ValidationError, match="same name"):
+    with pytest.raises(ValidationError, match="used twice"):
         Settings(cameras="a=file:x", microphones="a=file:x")  # type: ignore[arg-type]

@@ -16,14 +16,14 @@ export interface FleetMessage extends ConnectionErrorLabels {
 export const NO_LINK: FleetMessage = {
   key: "no_link",
   title: "Open the link",
-  text: "This page needs the link that lockstep serve printed, or one that somebody gave you: it ends in #token=…",
+  text: "This page needs the link that lockstep serve printed, or a link that somebody gave you. The link ends in #token=…",
   action: "paste",
 };
 
 export const NO_ROBOTS: FleetMessage = {
   key: "no_robots",
   title: "No robots",
-  text: "Your link is good for none of this console’s robots. Ask whoever runs it for a link that names one.",
+  text: "Your link admits to none of this console’s robots. Ask the person who runs the console for another link.",
   action: "paste",
 };
 
@@ -31,7 +31,7 @@ export function notFound(query: string): FleetMessage {
   return {
     key: `not_found ${query}`,
     title: "No robot found",
-    text: `No name has “${query}” in it.`,
+    text: `No robot’s name contains “${query}”.`,
     action: "clear",
   };
 }
@@ -61,7 +61,7 @@ function pasteForm(): HTMLElement {
   });
   const trouble = h("p", "library-trouble", { role: "alert" });
   trouble.hidden = true;
-  setText(trouble, "This is no link of a console: it has no token behind the #.");
+  setText(trouble, "This is not a link of a console: it has no token after the #.");
   const send = h("button", "field-button", { type: "submit" }, "Open");
   const form = h("form", "message-form", {}, field, send, trouble);
   form.addEventListener("submit", (event) => {

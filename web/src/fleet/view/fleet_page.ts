@@ -253,7 +253,7 @@ export class FleetPage {
         trouble !== null && "why" in trouble
           ? CONNECTION_ERROR_LABELS[trouble.why].title
           : "The console is silent";
-      const since = answer === null ? "" : ` What stands here was so at ${clockLabel(heardAt)}.`;
+      const since = answer === null ? "" : ` This page shows the state at ${clockLabel(heardAt)}.`;
       words = `${why}.${since} Asking again …`;
       tone = "bad";
     }
@@ -288,7 +288,7 @@ function loadingElement(): HTMLElement {
     "div",
     "fleet-loading",
     {},
-    h("p", "loading-words muted", { role: "status" }, "Asking for the robots …"),
+    h("p", "loading-words muted", { role: "status" }, "Loading the robots …"),
     h("ul", "fleet-grid", { "aria-hidden": "true" }, ...places),
   );
 }

@@ -33,7 +33,7 @@ export function createStopBar(stop: StopAll, events: StopBarEvents): Panel {
     update() {
       const said = stopAllLabels(stop);
       setData(press, "state", said?.tone === "pending" ? "pending" : "ready");
-      setText(words, said?.tone === "pending" ? "telling the robots…" : hint(events.whom()));
+      setText(words, said?.tone === "pending" ? "sending to the robots…" : hint(events.whom()));
       answer.show(said);
     },
   };

@@ -123,9 +123,9 @@ export class ListView {
   }
 
   private noteWords(entries: readonly RecordingEntry[] | null, found: number): string {
-    if (entries === null) return this.trouble.hidden ? "Looking for recordings …" : "";
+    if (entries === null) return this.trouble.hidden ? "Loading the recordings …" : "";
     if (entries.length === 0)
-      return "Nothing has been recorded yet. Press Record on the console's page, or start it with lockstep up --record.";
+      return "Nothing has been recorded yet. Press Record on the console's page, or start the console with lockstep up --record.";
     return found === 0 ? "No recording has all of these words." : "";
   }
 
@@ -166,7 +166,7 @@ export class ListView {
   private tools(entry: RecordingEntry): HTMLElement[] {
     if (this.asked === entry.id)
       return [
-        h("span", "row-question", {}, "Delete it for good?"),
+        h("span", "row-question", {}, "Delete this recording for good?"),
         button("chip-button danger", "Delete", () => void this.delete(entry)),
         button("chip-button", "Keep", () => this.ask(null)),
       ];

@@ -28,7 +28,7 @@ export class MarkList {
     const filters = h(
       "div",
       "mark-filters",
-      { role: "group", "aria-label": "Which" },
+      { role: "group", "aria-label": "Kinds" },
       ...this.filters.values(),
     );
     this.element.append(

@@ -201,11 +201,12 @@ export class PlayerView {
 
   private troubleNow(): string {
     const { trouble, index, isGone, isRunning } = this.player;
-    if (isGone) return "This recording was deleted. What the page has loaded can still be looked at.";
+    if (isGone)
+      return "This recording was deleted. You can still look at the parts that the page has loaded.";
     if (isRunning && trouble instanceof ConsoleError && trouble.status === 0)
-      return "The console does not answer. The page keeps trying by itself.";
+      return "The console does not answer. The page keeps trying.";
     if (trouble !== null) return requestErrorLabel(trouble);
-    return index.lastEvent === 0 ? "Nothing of it is on disk yet." : "";
+    return index.lastEvent === 0 ? "No part of this recording is on disk yet." : "";
   }
 
   private hash(): string {
@@ -226,7 +227,10 @@ export class PlayerView {
     });
     try {
       await navigator.clipboard.writeText(`${location.origin}${location.pathname}${hash}`);
-      setText(told, watches ? "Copied" : "Copied, without your rights: others open it with their own link");
+      setText(
+        told,
+        watches ? "Copied" : "Copied, without your rights: others open the recording with their own link",
+      );
     } catch {
       setText(told, "The address of this page is the link");
     }

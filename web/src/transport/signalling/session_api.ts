@@ -55,8 +55,8 @@ export function requestErrorLabel(error: unknown): string {
   if (!(error instanceof ConsoleError)) return "The page could not do this. Reload it and try again.";
   if (error.status === 0) return "The console does not answer. Check the connection and try again.";
   if (error.status === 401) return "Your own link is no longer valid. Ask for a new one.";
-  if (error.status === 403) return `Your link does not permit it: ${error.detail}.`;
-  if (error.status === 404) return "The console does not know it any more.";
-  if (error.status === 429) return "Too many at once. Wait a moment and try again.";
+  if (error.status === 403) return `Your link does not permit this: ${error.detail}.`;
+  if (error.status === 404) return "The console no longer has this.";
+  if (error.status === 429) return "Too many requests at once. Wait a moment and try again.";
   return `The console refused: ${error.detail || error.error}.`;
 }

@@ -12,7 +12,7 @@ const ALWAYS: readonly Line[] = [
   [["Space"], "Hold to move; pad: right bumper. Let go to bring the robot to rest"],
   [["Shift"], "Slow while held; pad: left bumper"],
   [["Tab"], "Next control layer, while armed; pad: Y"],
-  [["F8", "F9"], "Grant or decline the control seat to whoever asks first"],
+  [["F8", "F9"], "Grant or decline the first request for the control seat"],
   [["V"], "Hold to talk, where the robot has a loudspeaker and you have control"],
   [["C"], "Live charts, open and close"],
   [["F"], "Freeze the charts"],

@@ -5,7 +5,7 @@ import { h, setHidden, type Panel } from "../elements/dom";
 
 /** At the foot of the large view: what slows the robot down, or keeps it from moving on. */
 export function createLimitsStrip(engine: ConsoleEngine): Panel {
-  const element = h("ul", "limits", { "aria-label": "What limits the robot", "aria-live": "polite" });
+  const element = h("ul", "limits", { "aria-label": "Limits of the robot", "aria-live": "polite" });
   let shown = "";
   return {
     element,

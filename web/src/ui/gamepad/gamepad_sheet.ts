@@ -86,7 +86,7 @@ class PadSheet implements SheetContent {
     const live = this.pad.all().find((each) => each.index === gamepad.index && each.id === gamepad.id);
     if (live === undefined) {
       this.leaveWizard();
-      setText(this.words, `${padName(gamepad.id)} is gone: nothing was changed`);
+      setText(this.words, `${padName(gamepad.id)} was disconnected: nothing was changed`);
       return;
     }
     this.wizard.update(live, setupOf(live, this.pad.storage.saved.profiles).shaping, now);

@@ -119,7 +119,7 @@ class AuditView<Entry extends AuditEntry> {
       this.isLoaded = true;
       this.entries = this.source.merged(this.entries, entries);
     } catch (error) {
-      const old = this.entries.length === 0 ? "" : " What is below is as it was.";
+      const old = this.entries.length === 0 ? "" : " The list below may be out of date.";
       this.trouble = `${requestErrorLabel(error)}${old}`;
     }
   }

@@ -106,7 +106,10 @@ function createResult(): { element: HTMLElement; show(made: NewInvitation | null
         name === ""
           ? `${role === "observer" ? "an" : role === "operator" ? "an" : "a"} ${role}`
           : `${name} (${role})`;
-      setText(words, `Whoever opens this link is ${whom} until ${until}. It can be revoked at any time.`);
+      setText(
+        words,
+        `Anyone who opens this link is ${whom} until ${until}. The link can be revoked at any time.`,
+      );
       copy.show(made.link);
       code.append(qrCode(made.link));
     },

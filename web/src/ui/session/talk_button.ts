@@ -21,7 +21,7 @@ export function createTalkButton(engine: ConsoleEngine, voice: Talkback): Panel 
       const offered = voice.isOffered();
       setHidden(button, !offered || (obstacle !== null && !talk.talking && !holdsOwnTrouble(engine)));
       setHidden(key, voice.keyDrives());
-      button.title = obstacle ?? "Your voice is heard at the robot while you hold this";
+      button.title = obstacle ?? "Your voice is heard at the robot while you hold this button";
       button.disabled = obstacle !== null;
       setData(button, "talk", talk.talking ? "on" : talk.microphone);
       setText(label, words(engine, voice, mine));

@@ -21,7 +21,7 @@ export interface OverlayLabels {
 }
 
 const NOT_KEPT =
-  "The robot could not save this stop: if it restarts, it may move again. Switch it off by its hardware stop before anyone goes near.";
+  "The robot could not save this stop: if it restarts, it may move again. Switch it off with its hardware stop before anyone goes near.";
 
 /** Says over the large view what is wrong, and offers the way out. */
 export function createOverlay(engine: ConsoleEngine): Panel {
@@ -66,7 +66,7 @@ export function overlayLabels(engine: ConsoleEngine, now: number): OverlayLabels
     return {
       tone: "bad",
       title: "Robot unreachable",
-      text: `${detail === "" ? "" : `${sentence(detail)} `}The console keeps trying. Look after the robot and its bridge.`,
+      text: `${detail === "" ? "" : `${sentence(detail)} `}The console keeps trying. Check the robot and its bridge.`,
     };
   }
   return engine.state.stop.stopped || engine.state.stop.locked_out !== "" ? stopWords(engine, now) : null;
@@ -78,7 +78,7 @@ function linkWords(link: ConnectionState, now: number): OverlayLabels {
       return {
         tone: "calm",
         title: "Open the link",
-        text: "This page needs the link that lockstep up printed: it ends in #token=…",
+        text: "This page needs the link that lockstep up printed. The link ends in #token=…",
       };
     case "connecting":
       if (link.after === undefined) return { tone: "calm", title: "Connecting…", text: "" };
@@ -98,7 +98,7 @@ function linkWords(link: ConnectionState, now: number): OverlayLabels {
 function silentWords(engine: ConsoleEngine, now: number): OverlayLabels {
   const since = ageLabel(engine.silentMs(now));
   const stopped = engine.state.stop.stopped ? " The robot was stopped when it was last heard." : "";
-  const text = `Nothing was heard for ${since}. ${reconnectLabel(engine.connection.reconnect.phase)}${stopped}`;
+  const text = `The console has been silent for ${since}. ${reconnectLabel(engine.connection.reconnect.phase)}${stopped}`;
   return { tone: "bad", title: "Console silent", text };
 }
 

@@ -41,7 +41,7 @@ def describe(settings: Ros2Settings) -> RobotDescription:
     if base is None and arm is None:
         raise SettingsPlace((), "there is nothing to drive: give a base, an arm or both")
     if base is None and settings.geofences:
-        raise SettingsPlace(("geofences",), "only a base can be kept in zones")
+        raise SettingsPlace(("geofences",), "zones need a base")
     for number, camera in enumerate(settings.cameras):
         if settings.use_sim_time and camera.captured == "header":
             keys = ("cameras", number, "captured")

@@ -131,7 +131,7 @@ class _Beginning:
         except (OSError, TimeoutError):
             self._acceptor.places.on_refused("no_handshake")
         except Exception as error:
-            loop.call_exception_handler({"message": "a connection could not begin", "exception": error})
+            loop.call_exception_handler({"message": "a connection could not start", "exception": error})
         finally:
             if not handed_over:
                 self._connection.close()

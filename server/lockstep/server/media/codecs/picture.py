@@ -66,7 +66,7 @@ class PictureDecoder:
 
     def _from_h264(self, group: Sequence[Media]) -> av.VideoFrame:
         if not group:
-            raise PayloadError("there is no keyframe to begin with yet")
+            raise PayloadError("no keyframe has arrived yet")
         if self._h264 is None:
             self._h264 = av.CodecContext.create("h264", "r")
             self._h264.options = {"max_pixels": str(MAX_H264)}

@@ -233,7 +233,7 @@ _MU_LAW = _mu_law_table()
 
 def _layout(channels: int) -> str:
     if channels not in (1, 2):
-        raise PayloadError(f"{channels} channels: only mono and stereo are known")
+        raise PayloadError(f"{channels} channels: only mono and stereo are supported")
     return "mono" if channels == 1 else "stereo"
 
 

@@ -133,11 +133,11 @@ class SoundEncoders:
 def _segment(job: SoundJob) -> Segment:
     media = job.media
     if media.codec != "pcm_s16le":
-        raise UnsupportedCodecError(f"{media.codec} is no sound that can be encoded")
+        raise UnsupportedCodecError(f"{media.codec} is not a sound format that can be encoded")
     if media.channels not in (1, 2) or media.sample_rate < MIN_RATE:
         raise PayloadError(f"{media.channels} channels at {media.sample_rate} Hz")
     if not media.payload or len(media.payload) % (2 * media.channels):
-        raise PayloadError(f"{len(media.payload)} bytes are no whole samples of {media.channels} channels")
+        raise PayloadError(f"{len(media.payload)} bytes are not whole samples of {media.channels} channels")
     samples = np.frombuffer(media.payload, "<i2").astype(np.int16, copy=False)
     return Segment(samples, media.sample_rate, media.channels, media.stamp, media.time, job.capture_time)
 

@@ -22,14 +22,14 @@ def parse_published(texts: Iterable[str]) -> tuple[SourceSpec, ...]:
     """
     given = list(texts)
     if len(given) > MOST:
-        raise BadSource(f"more than {MOST}")
+        raise BadSource(f"more than {MOST} cameras")
     found: list[SourceSpec] = []
     for text in given:
         name, _, options = text.strip().partition("#")
         if not NAME.fullmatch(name):
-            raise BadSource(f"{name[:40]!r} is no name: letters, digits, - and _, at most 32, the first a letter")
+            raise BadSource(f"{name[:40]!r} is not a name: use a letter, then at most 31 letters, digits, - and _")
         if name in (each.name for each in found):
-            raise BadSource(f"{name} is the name of another one")
+            raise BadSource(f"the name {name} is used twice")
         spec = parse_source("video", f"{name}={SCHEME}://publisher#latency={LATENCY}{',' if options else ''}{options}")
         found.append(spec._replace(passing=False))
     return tuple(found)

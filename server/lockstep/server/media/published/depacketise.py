@@ -32,7 +32,7 @@ def join_payloads(codec: PictureCodec, payloads: Sequence[bytes]) -> bytes:
             if unit.begins_unit:
                 parts.append(START_CODE)
             elif not parts:
-                raise PayloadError("it begins in the middle of a fragmented NAL unit")
+                raise PayloadError("the picture begins in the middle of a fragmented NAL unit")
             parts.append(unit.data)
     return b"".join(parts)
 

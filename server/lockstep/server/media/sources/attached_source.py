@@ -56,7 +56,7 @@ class AttachedSource:
         while True:
             began = loop.time()
             why = await self._process.run(msgspec.json.encode(self.spec) + b"\n")
-            self._trouble(Trouble(why, "its process ended" if why == "died" else "it hangs"))
+            self._trouble(Trouble(why, "the source's process ended" if why == "died" else "the source's process hangs"))
             if loop.time() - began > PATIENCE:
                 backoff.healthy()
             await asyncio.sleep(backoff.next())

@@ -45,7 +45,7 @@ _REASONS = {
     "InvalidDataError": "not_media",
     "ProtocolNotFoundError": "unknown_protocol",
 }
-_WORDS = {"silent": "nothing comes any more", "ended": "it has ended", "not_media": "what comes is no known medium"}
+_WORDS = {"silent": "no data arrives", "ended": "the source ended", "not_media": "the data is not known media"}
 
 
 def reason_of(error: Exception) -> tuple[str, str]:

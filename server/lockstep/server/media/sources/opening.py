@@ -55,7 +55,7 @@ def kernel_time(start: float | None, now: float) -> float | None:
 def settled_lag(lag: float) -> None:
     """Raise FellBehind if the source is too late to catch up."""
     if lag > MOST_LAG:
-        raise FellBehind(f"what came was {lag:.0f} s late")
+        raise FellBehind(f"the data arrived {lag:.0f} s late")
 
 
 class Pace:

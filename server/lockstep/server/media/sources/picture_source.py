@@ -34,7 +34,7 @@ def read_pictures(spec: SourceSpec, working: Callable[[str], None], captured: Em
     while True:
         with opened(spec) as container:
             if not container.streams.video:
-                raise NoSuchMedium("it has no pictures")
+                raise NoSuchMedium("the source has no pictures")
             connection = _Connection(spec, container, decoded, captured)
             working(connection.detail)
             again = connection.read()

@@ -50,7 +50,7 @@ def read_source(spec: SourceSpec, say: Callable[[Said], None], sleep: Callable[[
 
         try:
             read(spec, working, captured)
-            say(Trouble("ended", "it has ended"))
+            say(Trouble("ended", "the source ended"))
         except _Unheard:
             return
         except (SourceError, FFmpegError, OSError, ValueError) as error:

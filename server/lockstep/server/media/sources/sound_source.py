@@ -58,7 +58,7 @@ def _read_pulse(spec: SourceSpec, working: Callable[[str], None], captured: Emit
 def _read_container(spec: SourceSpec, working: Callable[[str], None], captured: Emit) -> None:
     with opened(spec) as container:
         if not container.streams.audio:
-            raise NoSuchMedium("it has no sound")
+            raise NoSuchMedium("the source has no sound")
         stream = container.streams.audio[0]
         context = stream.codec_context
         rate = int(spec.rate or min(DEFAULT_RATE, max(8000, context.sample_rate)))

@@ -40,7 +40,7 @@ class SourceSettings(BaseSettings):
             raise ValueError(f"whip: {error}") from None
         names = [spec.name for spec in self.sources]
         if twice := next((name for name in names if names.count(name) > 1), ""):
-            raise ValueError(f"camera, microphone, whip: two have the same name, {twice}")
+            raise ValueError(f"camera, microphone, whip: the name {twice} is used twice")
         try:
             _ = self.speaker_spec
         except BadSpeaker as error:

@@ -60,7 +60,7 @@ def parse_sources(kind: Kind, texts: Iterable[str]) -> tuple[SourceSpec, ...]:
     """
     given = list(texts)
     if len(given) > MOST:
-        raise BadSource(f"more than {MOST}")
+        raise BadSource(f"more than {MOST} sources")
     found: list[SourceSpec] = []
     for number, text in enumerate(given, 1):
         try:
@@ -68,7 +68,7 @@ def parse_sources(kind: Kind, texts: Iterable[str]) -> tuple[SourceSpec, ...]:
         except BadSource as error:
             raise BadSource(f"number {number}: {error}") from None
         if spec.name in (each.name for each in found):
-            raise BadSource(f"number {number}: {spec.name} is the name of another one")
+            raise BadSource(f"number {number}: the name {spec.name} is used twice")
         found.append(spec)
     return tuple(found)
 
@@ -147,7 +147,7 @@ def _number(name: str, value: str, least: float, most: float) -> float:
     except ValueError:
         number = float("nan")
     if not least <= number <= most:
-        raise BadSource(f"{name} is a number from {least:g} to {most:g}")
+        raise BadSource(f"{name} must be a number from {least:g} to {most:g}")
     return number
 
 
@@ -160,5 +160,5 @@ def _choice(name: str, value: str, *choices: str) -> str:
 def _size(value: str) -> tuple[int, int]:
     match = re.fullmatch(r"(\d{2,4})x(\d{2,4})", value)
     if match is None or int(match[1]) % 2 or int(match[2]) % 2:
-        raise BadSource("size is even numbers of pixels, as in 1280x720")
+        raise BadSource("size must be two even numbers of pixels, as in 1280x720")
     return int(match[1]), int(match[2])

@@ -50,7 +50,7 @@ def export(path: Path, out: Path | None, task: str) -> list[Path]:
         cameras = [each.topic for each in reader.index.topics if each.topic.startswith(CAMERA)]
         cameras = [topic for topic in cameras if reader.index.counts.get(topic)]
         if not cameras:
-            raise RecordingDamaged("it has no pictures")
+            raise RecordingDamaged("the recording has no pictures")
         sound = _first_sound(reader)
         written = []
         for topic in cameras:

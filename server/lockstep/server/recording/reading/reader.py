@@ -119,7 +119,7 @@ class RecordingReader:
         for number in range(min(2, len(self.index.chunks))):
             for record in self.chunk(number, {OWN_TOPICS[RobotRecord]}):
                 return _shown(own_record(RobotRecord, record.data).description)
-        raise RecordingDamaged("it does not say which robot it is of")
+        raise RecordingDamaged("the recording has no description of its robot")
 
     def records(
         self,
@@ -181,7 +181,7 @@ class RecordingReader:
             )
             parts = chunk_records(content)
         except CRCValidationError as error:
-            raise RecordingTampered(f"chunk {number} is not what was written") from error
+            raise RecordingTampered(f"chunk {number} was changed after it was written") from error
         except BROKEN as error:
             raise RecordingDamaged(f"chunk {number}: {error}") from error
         for part in parts:
@@ -205,18 +205,18 @@ class RecordingReader:
     def _seek(self, offset: int) -> None:
         """Seek to an offset that the file names, which may be any number."""
         if not 0 <= offset <= self.size:
-            raise RecordingDamaged(f"nothing stands at byte {offset} of {self.size}")
+            raise RecordingDamaged(f"byte {offset} is beyond the end of the file, {self.size} bytes")
         self._file.seek(offset)
 
     def _read_info(self) -> RecordingInfo:
         self._file.seek(0)
         if self._file.read(len(MAGIC)) != MAGIC:
-            raise RecordingDamaged(f"{self.path.name} is no MCAP file")
+            raise RecordingDamaged(f"{self.path.name} is not an MCAP file")
         header = self._file.read(HEAD)
         offset = len(MAGIC) + HEAD + int.from_bytes(header[1:], "little")
         metadata = Metadata.read(ReadDataStream(BytesIO(self._record_at(offset, Opcode.METADATA))))
         if metadata.name != METADATA_NAME:
-            raise RecordingDamaged(f"{self.path.name} is no recording of Lockstep")
+            raise RecordingDamaged(f"{self.path.name} is not a recording of Lockstep")
         return RecordingInfo.parse(metadata.metadata)
 
     def _read_index(self) -> EventIndex | None:

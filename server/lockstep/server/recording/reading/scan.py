@@ -123,7 +123,7 @@ def scan_file(path: Path, info: RecordingInfo) -> Scan:
     scan = Scan(info)
     with open_regular(path) as file:
         if file.read(len(MAGIC)) != MAGIC:
-            raise RecordingDamaged(f"{path.name} is no MCAP file")
+            raise RecordingDamaged(f"{path.name} is not an MCAP file")
         try:
             for raw in raw_records(file):
                 if not scan.take(raw):
@@ -142,7 +142,7 @@ def complete_file(path: Path, info: RecordingInfo) -> EventIndex:
     """
     scan = scan_file(path, info)
     if not scan.chunks:
-        raise RecordingDamaged(f"{path.name} holds nothing")
+        raise RecordingDamaged(f"{path.name} has no records")
     try:
         with path.open("r+b") as file:
             file.truncate(scan.whole)

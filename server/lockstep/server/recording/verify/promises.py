@@ -116,7 +116,7 @@ class _Stops:
         elif not record.number:
             self._asked_without_id = False
         elif record.number < self.shown:
-            return f"a reset of stop {record.number} had effect, and stop {self.shown} is newer"
+            return f"a reset of stop {record.number} took effect, although stop {self.shown} is newer"
         return ""
 
     def _take(self, taken: StopRecord) -> None:
@@ -171,7 +171,7 @@ class Verifier:
         """Check one of Lockstep's own records; times in ns since 1970."""
         micros = arrived // 1000
         if record.epoch != self._epoch:
-            self.fail("monotonic", f"a record of epoch {record.epoch!r}", record.event, micros)
+            self.fail("monotonic", f"a record of another epoch, {record.epoch!r}", record.event, micros)
         match record:
             case RobotRecord():
                 self._description = record.description
@@ -204,11 +204,9 @@ class Verifier:
         if self._stops.coming or self._stopped:
             self.fail("stopped", "a command went to the robot while it was stopped", command.event, micros)
         if self._in_flight is not None:
-            self.fail(
-                "once", f"a command while that of event {self._in_flight.event} is on its way", command.event, micros
-            )
+            self.fail("once", f"a command overtook that of event {self._in_flight.event}", command.event, micros)
         if self._newest is not None and command.event != event_after(self._newest.event):
-            self.fail("once", f"a command that is not the next after event {self._newest.event}", command.event, micros)
+            self.fail("once", f"a command is not the next after event {self._newest.event}", command.event, micros)
         self._judge_nonce(command, micros)
         self._in_flight = command
 
@@ -217,7 +215,7 @@ class Verifier:
         known = None if self._newest is None else self._answered.get(self._newest.event)
         nonce = 0 if known is None else known.nonces.get(command.issue, 0)
         if nonce and command.nonce != nonce:
-            text = f"its nonce is not that of issue {command.issue}, which it answers"
+            text = f"the command has another nonce than issue {command.issue}, which it answers"
             self.fail("in_time", text, command.event, micros)
 
     def _feedback(self, feedback: FeedbackRecord, micros: int, captured: int) -> None:
@@ -285,7 +283,7 @@ class Verifier:
         issued = known.times.get(command.issue)
         if issued is None:
             if self._events > 1:
-                text = f"it answers issue {command.issue}, which is not in the record"
+                text = f"the command answers issue {command.issue}, which is not recorded"
                 self.fail("in_time", text, command.event, micros)
             return
         age = feedback.time - issued
@@ -294,7 +292,7 @@ class Verifier:
             text = f"executed {age:.3f} s after the feedback that it answers; {most:g} s are allowed"
             self.fail("in_time", text, command.event, micros)
         if known.stopped.get(command.issue):
-            self.fail("stopped", "it answers a feedback that says stopped", command.event, micros)
+            self.fail("stopped", "the command answers a feedback that says stopped", command.event, micros)
 
     def medium(self, stream: str, stamp: int, arrived: int, captured: int) -> None:
         """Check a picture or a sound of the robot; times in ns since 1970."""
@@ -302,7 +300,7 @@ class Verifier:
         self._checks["stamps"].looked += 1
         micros = arrived // 1000
         if not is_event(stamp):
-            self.fail("stamps", f"{stream}: {stamp} is no event", stamp, micros)
+            self.fail("stamps", f"{stream}: {stamp} is not an event", stamp, micros)
             return
         at = (captured - self._offset) / 1e9
         if self._newest is None or is_newer(stamp, self._newest.event):
@@ -343,7 +341,7 @@ class Verifier:
         """Return the verdict, after the last record, which arrived at `ended` (µs)."""
         for stream, stamp, micros, _ in self._waiting:
             if ended - micros > 2_000_000:  # a picture may overtake its feedback, but not by that much
-                self.fail("stamps", f"{stream}: stamped with an event that never came", stamp, micros)
+                self.fail("stamps", f"{stream}: stamped with an event that is not recorded", stamp, micros)
         return Verdict(
             ok=all(check.ok for check in self._checks.values()),
             checks=self._checks,

@@ -29,7 +29,7 @@ def verify_file(path: Path, key: str = "") -> Verdict:
     with RecordingReader(path) as reader:
         verifier = Verifier(reader.info.epoch)
         if reader.interrupted:
-            verifier.fail("readable", "it was interrupted, and ends where it was")
+            verifier.fail("readable", "the recording was interrupted and has no end")
         robots: set[str] = set()
         counts: dict[str, int] = {}
         ended = reader.index.started
@@ -70,7 +70,7 @@ def _show(verifier: Verifier, record: Record, robots: set[str]) -> None:
     if own is None:
         return
     if own.event != record.event:
-        text = f"{record.topic}: the record says event {own.event}, its reference {record.event}"
+        text = f"{record.topic}: the record says event {own.event}, but its event reference says {record.event}"
         verifier.fail("monotonic", text, record.event, record.arrived // 1000)
     if isinstance(own, RobotRecord):
         robots.update(camera.name for camera in own.description.cameras)
@@ -83,4 +83,4 @@ def _compare(verifier: Verifier, reader: RecordingReader, counts: dict[str, int]
     for topic in sorted({*reader.index.counts, *counts}):
         said, found = reader.index.counts.get(topic, 0), counts.get(topic, 0)
         if said != found:
-            verifier.fail("complete", f"{topic}: the index says {said} records, there are {found}")
+            verifier.fail("complete", f"{topic}: the index counts {said} records, but the file has {found}")

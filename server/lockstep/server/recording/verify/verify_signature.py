@@ -115,27 +115,27 @@ class SignatureChecker:
         elif raw.opcode == Opcode.METADATA:
             self._metadata += 1
             if self._metadata > 1:
-                self._fault("metadata that nobody signed")
+                self._fault("metadata is not signed")
         elif raw.opcode == Opcode.MESSAGE:
-            self._fault(f"a message outside of all chunks, at byte {raw.offset}, that nobody signed")
+            self._fault(f"a message at byte {raw.offset} is outside of all chunks and not signed")
 
     def _attachment(self, content: bytes) -> None:
         if zlib.crc32(content[:-4]).to_bytes(4, "little") != content[-4:]:
             self._fault("the index was changed: its checksum does not fit")
         if INDEX_NAME.encode() not in content[:64]:
-            self._fault("an attachment that nobody signed")
+            self._fault("an attachment is not signed")
 
     def _schema(self, schema: Schema) -> None:
         if self._schemas.setdefault(schema.id, schema) != schema:
-            self._fault(f"another schema than the one that was signed: {schema.name}")
+            self._fault(f"the schema {schema.name} differs from the signed one")
         elif self._chain is not None and self._schemas[schema.id] is schema:
-            self._fault(f"a schema that nobody signed: {schema.name}")
+            self._fault(f"the schema {schema.name} is not signed")
 
     def _channel(self, channel: Channel) -> None:
         if self._channels.setdefault(channel.id, channel) != channel:
-            self._fault(f"another topic than the one that was signed: {channel.topic}")
+            self._fault(f"the topic {channel.topic} differs from the signed one")
         elif self._chain is not None and self._channels[channel.id] is channel:
-            self._fault(f"a topic that nobody signed: {channel.topic}")
+            self._fault(f"the topic {channel.topic} is not signed")
 
     def _chunk(self, chunk: Chunk, number: int) -> None:
         if self._positions:
@@ -146,7 +146,7 @@ class SignatureChecker:
             check_packed(chunk)
             stream, length = get_chunk_data_stream(chunk, validate_crc=True)
         except BROKEN as error:
-            self._fault(f"chunk {number} is not what was written: {type(error).__name__}")
+            self._fault(f"chunk {number} was changed after it was written: {type(error).__name__}")
             return
         self._positions = {}
         while stream.count < length:
@@ -160,7 +160,7 @@ class SignatureChecker:
                 self._message(Message.read(stream, size), at)
             else:
                 stream.read(size)
-                self._fault(f"chunk {number} holds a record of kind {opcode} that nobody signed")
+                self._fault(f"chunk {number} holds a record of kind {opcode} that is not signed")
         self._check_span(number)
         self._end_chunk(number)
 
@@ -168,7 +168,7 @@ class SignatureChecker:
         """Check a chunk's stated times: a reader that looks for a time passes over chunks by them."""
         times = [time for found in (self._positions or {}).values() for time, _ in found]
         if times and self._spans[number] != (min(times), max(times)):
-            self._fault(f"chunk {number} says that it is of another time than its messages are")
+            self._fault(f"chunk {number} gives another time than its messages have")
 
     def _message(self, message: Message, at: int) -> None:
         channel = self._channels[message.channel_id]
@@ -209,28 +209,28 @@ class SignatureChecker:
         if (message.log_time, message.publish_time, message.sequence) != (found.until, found.until, found.event):
             self._fault(f"signature {found.number} stands at another event or time than it says")
         if last is not None and last.final:
-            self._fault(f"signature {found.number} comes behind the closing one")
+            self._fault(f"signature {found.number} comes after the closing one")
         if found.number > before + 1:
-            self._fault(f"chunks were taken out: signature {found.number} comes behind signature {before}")
+            self._fault(f"chunks were removed: signature {found.number} comes after signature {before}")
         elif found.number <= before:
-            self._fault(f"chunks were reordered or repeated: signature {found.number} comes behind signature {before}")
+            self._fault(f"chunks were reordered or repeated: signature {found.number} comes after signature {before}")
         elif head != found.head:
             self._fault(
-                f"records behind signature {before}, up to event {found.event}, are not those that were signed: "
-                "changed, reordered, put in or taken out"
+                f"records after signature {before}, up to event {found.event}, are not those that were signed: "
+                "changed, reordered, added or removed"
             )
 
     def _end_chunk(self, number: int) -> None:
         if self._chain is not None and self._chain.waiting:
             self._chain.drop_waiting()
-            self._fault(f"the end of chunk {number} was signed by nobody")
+            self._fault(f"the end of chunk {number} is not signed")
 
     def _message_index(self, found: MessageIndex) -> None:
         if self._positions is None:
             return
         expected = self._positions.pop(found.channel_id, [])
         if expected != [(time, at) for time, at in found.records]:
-            self._fault(f"the message index of chunk {len(self._chunks) - 1} leads elsewhere")
+            self._fault(f"the message index of chunk {len(self._chunks) - 1} points to other messages")
 
     def _fault(self, text: str) -> None:
         report = self._report
@@ -249,7 +249,7 @@ class SignatureChecker:
         """Return the report, after the last record."""
         report, last = self._report, self._last
         if not report.signatures:
-            faults = [SignatureFault(1, 0, "it is not signed at all")] if self._key else []
+            faults = [SignatureFault(1, 0, "the recording is not signed")] if self._key else []
             return SignatureReport(faults=faults)
         if self._key and report.signer != self._key:
             self._fault(f"signed by {report.signer or 'nobody'}, not by {self._key}")
@@ -260,13 +260,13 @@ class SignatureChecker:
             report.state = "broken"
         elif last is None or not last.final:
             report.state = "open"
-            self._fault("no closing signature: the console was interrupted here, or somebody cut off the end")
+            self._fault("the closing signature is missing: the console was interrupted, or the end was cut off")
         return report
 
     def _compare_indexes(self) -> None:
         if self._index_chunks != self._chunks:
-            self._fault("the summary names other chunks than there are")
+            self._fault("the summary names other chunks than the file has")
         elif any(span not in (None, said) for span, said in zip(self._spans, self._index_spans, strict=True)):
-            self._fault("the summary says that chunks are of another time than they are")
+            self._fault("the summary gives chunks another time than their messages have")
         if self._index is not None and [chunk.offset for chunk in self._index.chunks] != self._chunks:
-            self._fault("the index names other chunks than there are")
+            self._fault("the index names other chunks than the file has")

@@ -133,7 +133,7 @@ class Recorder:
             self._record_act("started by itself", self.start("", "").recording)
         except RecordingFailed as error:
             self._again_at = time.monotonic() + RETRY_SECONDS
-            log.error("recording does not begin", reason=error.detail)
+            log.error("the recording cannot start", reason=error.detail)
 
     # starting and stopping
 

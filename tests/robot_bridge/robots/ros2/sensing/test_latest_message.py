@@ -6,7 +6,7 @@ from lockstep.robot_bridge.robots.ros2.sensing.latest_message import BAD_SHOWN, 
 def test_before_the_first_message_nothing_is_known_and_that_is_a_fault() -> None:
     newest: Newest[int] = Newest("/odom", 0.5)
     assert newest.fresh(10.0) is None
-    assert newest.faults(10.0) == ["/odom: nothing has come yet"]
+    assert newest.faults(10.0) == ["/odom: no message has arrived yet"]
 
 
 def test_a_message_is_fresh_until_the_timeout_and_then_a_fault() -> None:
@@ -17,7 +17,7 @@ def test_a_message_is_fresh_until_the_timeout_and_then_a_fault() -> None:
     assert arrived.value == 7
     assert newest.faults(10.5) == []
     assert newest.fresh(10.6) is None
-    assert newest.faults(10.6) == ["/odom: nothing for 0.6 s"]
+    assert newest.faults(10.6) == ["/odom: no message for 0.6 s"]
 
 
 def test_a_repeated_header_stamp_brings_nothing_new() -> None:

@@ -147,7 +147,7 @@ def test_a_jpeg_of_another_size_is_refused() -> None:
 
 @pytest.mark.parametrize("data", [b"", b"\xff\xd8", b"\x89PNG\r\n", jpeg()[:20], b"\xff\xd8\xff\xe0\x00\x01" * 9])
 def test_what_is_no_jpeg_is_named_by_its_format(data: bytes) -> None:
-    with pytest.raises(BadPicture, match="format 'png' that is no JPEG"):
+    with pytest.raises(BadPicture, match="format 'png' that is not JPEG"):
         from_compressed(Compressed(array.array("B", data), format="png"), WIDTH, HEIGHT)
 
 

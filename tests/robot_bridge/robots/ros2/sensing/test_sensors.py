@@ -49,4 +49,4 @@ def test_a_lockout_topic_that_falls_silent_locks() -> None:
     ros, topic = lockout()
     ros.says(locked=False)
     assert topic.reason(clock.now()) == ""
-    assert topic.reason(clock.now() + 1.1) == f"nothing is heard of the lock-out ({TOPIC})"
+    assert topic.reason(clock.now() + 1.1) == f"no message of the lock-out topic arrives ({TOPIC})"

@@ -66,7 +66,7 @@ class ArmDrive(Drive):
         found = self._states.faults(now)
         missing = self._book.missing(self._timeout, now)
         if missing and not found:
-            found.append(f"{self._states.topic}: nothing of {', '.join(missing[:8])}")
+            found.append(f"{self._states.topic}: no positions of {', '.join(missing[:8])}")
         return found
 
     def _trajectory(self, said: Said, values: list[float]) -> Any:

@@ -83,7 +83,7 @@ class Drive(ABC):
         if not self._heard:
             found.append(f"{self._topic}: no subscriber for {self._kind.__name__}")
         if self._stream.withheld and not self._stopped and not found:
-            found.append(f"{self._topic}: let go once; the robot's side was lost while it was driven")
+            found.append(f"{self._topic}: let go of the controls once; the robot's subscriber was lost during motion")
         return found
 
     @abstractmethod

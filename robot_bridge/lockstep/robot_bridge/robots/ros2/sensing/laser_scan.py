@@ -51,7 +51,7 @@ class Sectors:
         if not 0 < ranges.size <= MAX_RAYS:
             raise BadScan("scan without rays, or with far too many")
         if not (math.isfinite(scan.angle_min) and math.isfinite(scan.angle_increment)) or scan.angle_increment == 0:
-            raise BadScan("scan whose angles make no sense")
+            raise BadScan("scan with invalid angles")
         angles = scan.angle_min + self._yaw + scan.angle_increment * np.arange(ranges.size)
         # Beyond its own limits a scanner says nothing (REP 117: NaN is wrong, infinite is free).
         seen = (ranges >= max(scan.range_min, self._range_min)) & (ranges <= min(scan.range_max, self._range_max))

@@ -57,9 +57,9 @@ class Newest(Generic[Value]):
         found = []
         last, bad = self._last, self._bad
         if last is None:
-            found.append(f"{self.topic}: nothing has come yet")
+            found.append(f"{self.topic}: no message has arrived yet")
         elif now - last.time > self.timeout:
-            found.append(f"{self.topic}: nothing for {now - last.time:.1f} s")
+            found.append(f"{self.topic}: no message for {now - last.time:.1f} s")
         if bad is not None and now - bad[1] <= BAD_SHOWN:
             found.append(f"{self.topic}: {self.bad[bad[0]]} × {bad[0]}")
         return found

@@ -93,7 +93,7 @@ def from_compressed(image: CompressedMessage, width: int, height: int) -> Payloa
     data = bytes(image.data)
     size = jpeg_size(data)
     if size is None:
-        raise BadPicture(f"picture in format {image.format[:20]!r} that is no JPEG")
+        raise BadPicture(f"picture in format {image.format[:20]!r} that is not JPEG")
     if size != (width, height):
         raise BadPicture(f"picture of another size than {width}x{height}")
     return Payload("mjpeg", data)

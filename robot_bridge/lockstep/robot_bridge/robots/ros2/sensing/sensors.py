@@ -81,7 +81,7 @@ class LockoutTopic:
         """Return why the robot is locked; "" while it is not. A silent switch may have locked it."""
         said = self._said.fresh(now)
         if said is None:
-            return f"nothing is heard of the lock-out ({self._topic})"
+            return f"no message of the lock-out topic arrives ({self._topic})"
         return f"locked at the robot ({self._topic})" if said.value else ""
 
     def _take(self, message: Any) -> None:
