@@ -197,7 +197,7 @@ class Console:
         return self._live().statistics()
 
     def rendered(self, stream: str) -> list[Rendering]:
-        """Return the last thousand renderings of `stream`, a camera or microphone, oldest first; none if not received."""
+        """Return the last thousand renderings of the camera or microphone `stream`, oldest first."""
         return self._live().media.log(stream)
 
     def feedback_log(self) -> list[FeedbackArrival]:
