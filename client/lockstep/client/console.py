@@ -30,12 +30,15 @@ LEAVE_SECONDS = 1.5  # time for the robot to come to rest before the connection 
 
 
 class Console:
-    """One connection to a Lockstep console, as an async context manager. After ConsoleLost make a new Console.
+    """One connection to a Lockstep console, as an async context manager: `async with Console(link) as console:`.
+
+    Entering connects. Leaving brings the robot to rest, releases the seat and closes. After ConsoleLost make a new
+    Console.
 
     Args:
         link: the link that `lockstep up` prints: "http://host:port/#token=…"
         pacing: "feedback": the next command waits for the feedback of the last; "media": also for its picture
-        tolerance: largest gap of a rendered picture, in events
+        tolerance: largest gap of a rendered picture, in events; 0 or more
         audio_tolerance: the same for sound
         gate: "event": the rule. "off": renders everything, for comparison
         carrier: the way in which the event reference travels with media; no other carrier is offered
@@ -46,8 +49,8 @@ class Console:
         sound_codec: "opus" or "PCMU"; None: the console's first choice
         event_rate: events per second, at most; None: the rate of the robot's description, which is never exceeded
         name: the name that other participants see
-        connect_seconds: time allowed for connecting, including the wait for the robot
-        silence_seconds: time without a message from the console after which the connection counts as lost
+        connect_seconds: s allowed for connecting, including the wait for the robot
+        silence_seconds: s without a message from the console after which the connection counts as lost
         tls_ca: file with a certificate to trust instead of the system's, such as a console's own (tls-cert.pem)
         relay_only: connect through the console's TURN server or not at all
         through_relay: an observer watches through a relay (docs/relay.md) if the console has one for it
@@ -56,6 +59,8 @@ class Console:
     Raises:
         LinkFormatError: the link is not one that `lockstep up` prints.
         ValueError: pacing by media without decoded pictures.
+        SignallingRefused: on entering: the console refused the connection, for example because the link is old.
+        ConnectFailed: on entering: no console, robot or network path was found within `connect_seconds`.
     """
 
     def __init__(
@@ -106,12 +111,7 @@ class Console:
         self._connection: Connection | None = None
 
     async def __aenter__(self) -> Self:
-        """Connect.
-
-        Raises:
-            SignallingRefused: the console refused the connection, for example because the link is old.
-            ConnectFailed: no console, robot or network path was found within `connect_seconds`.
-        """
+        """Connect; the class says which errors that may raise."""
         connection = Connection(self._options)
         try:
             await connection.open()
@@ -151,7 +151,7 @@ class Console:
 
     @property
     def feedback(self) -> Feedback | None:
-        """The newest feedback; None before the first."""
+        """The newest feedback; None before the first. `drive` and `feedbacks` return it too."""
         return self._live().driving.driver.sender.newest
 
     @property
@@ -197,7 +197,7 @@ class Console:
         return self._live().statistics()
 
     def rendered(self, stream: str) -> list[Rendering]:
-        """Return the last thousand renderings of a camera or microphone, oldest first."""
+        """Return the last thousand renderings of the camera or microphone `stream`, oldest first."""
         return self._live().media.log(stream)
 
     def feedback_log(self) -> list[FeedbackArrival]:
@@ -235,7 +235,10 @@ class Console:
     async def request_seat(self, seconds: float = 65.0) -> None:
         """Ask the holder for the control seat and wait until it is granted; a free seat is granted at once.
 
-        `seconds` covers the 60 s after which the console counts no answer as no. Cancellation withdraws the request.
+        The console counts no answer within 60 s as no. Cancellation withdraws the request.
+
+        Args:
+            seconds: s to wait for the console's answer, more than the holder's 60 s
 
         Raises:
             SeatRefused: the holder declined or did not answer, or this link is an observer's.
@@ -264,11 +267,19 @@ class Console:
         return await self._live().driving.driver.arm()
 
     def grant(self, peer: str) -> None:
-        """Hand the control seat to a peer that asked for it: one of `seat.claims`."""
+        """Hand the control seat to a peer that asked for it.
+
+        Args:
+            peer: the id of one of `seat.claims`
+        """
         self._live().requests.answer(peer, grant=True)
 
     def decline(self, peer: str) -> None:
-        """Refuse a peer that asked for the control seat."""
+        """Refuse a peer that asked for the control seat.
+
+        Args:
+            peer: the id of one of `seat.claims`
+        """
         self._live().requests.answer(peer, grant=False)
 
     def release_seat(self) -> None:
@@ -278,10 +289,13 @@ class Console:
     async def drive(self, values: Mapping[str, float] | Sequence[float]) -> Feedback:
         """Send one command as soon as the gate is open; return the feedback that answers it.
 
-        `values` has one value per axis in the description's order, or maps axis names to values; other axes get their
-        value at rest. The first call arms: from then on, whenever 200 ms pass without another call, the console sends
-        neutral values, five times a second, until `rest`. A lost command is repeated; a command that arrived too late
-        is tried again on fresh feedback.
+        The first call arms: from then on, whenever 200 ms pass without another call, the console sends neutral values,
+        five times a second, until `rest`. A lost command is repeated; a command that arrived too late is tried again on
+        fresh feedback.
+
+        Args:
+            values: one value per axis in the description's order, or axis names with their values, other axes at rest;
+                in the axis' unit (such as m/s). The bridge limits a value to the axis' `minimum` and `maximum`
 
         Raises:
             CommandError: an unknown axis, a wrong number of values, or a value that is not finite.
@@ -318,9 +332,13 @@ class Console:
         await self._live().driving.driver.rest()
 
     async def stop(self, reason: str = "") -> StopState:
-        """Latch the stop, from any role, at any time; over HTTP as well when the data channel does not confirm it.
+        """Latch the stop, from any role, at any time.
 
-        Return the stop, with its number, when the robot has confirmed this very press.
+        Return it, with its number, when the robot has confirmed this very press. When the data channel does not
+        confirm it, the press goes over HTTP as well.
+
+        Args:
+            reason: what everybody and the audit trail are told
 
         Raises:
             StopUnconfirmed: the robot has not confirmed it; the console keeps the stop if it was reached.
@@ -329,7 +347,10 @@ class Console:
         return await connection.requests.stop(connection.options.name, reason)
 
     async def reset(self, number: int | None = None) -> StopState:
-        """Release stop `number`, or the newest that this connection knows. Moves nothing; `arm` comes next.
+        """Release a stop. Moves nothing; `arm` comes next.
+
+        Args:
+            number: of the stop; None: the newest that this connection knows
 
         Raises:
             CommandRefused: this connection neither holds the seat nor is a supervisor's, there is a newer stop
@@ -343,6 +364,9 @@ class Console:
     async def note(self, text: str) -> SharedNote:
         """Write a note to everyone and return it; it keeps the event reference of that moment.
 
+        Args:
+            text: at most 500 characters
+
         Raises:
             CommandRefused: there are too many notes, or nothing in this one can be printed.
         """
@@ -351,7 +375,11 @@ class Console:
     # Watching
 
     async def feedbacks(self) -> AsyncGenerator[Feedback]:
-        """Yield every new feedback; a slow reader gets only the newest. Raises ConsoleLost when the connection ends."""
+        """Yield every new feedback; a slow reader gets only the newest.
+
+        Raises:
+            ConsoleLost: the connection ended.
+        """
         connection = self._live()
         queue: NewestQueue[Feedback] = NewestQueue(1)
         connection.driving.readers.append(queue)
@@ -366,17 +394,31 @@ class Console:
             connection.driving.readers.remove(queue)
 
     async def pictures(self, camera: str = "", *, keep: int = 2) -> AsyncGenerator[Picture]:
-        """Yield the pictures of a camera ("" is the main one) that pass the gate; each is checked again when taken.
+        """Yield the pictures of a camera that pass the gate; each is checked again when it is taken.
 
-        A slow reader loses the oldest pictures: at most `keep` wait. Raises ConsoleLost when the connection ends, and
-        NoSuchStream for a camera that is not received.
+        Args:
+            camera: its name in the description; "" is the main one
+            keep: pictures that may wait for a slow reader, which loses the oldest
+
+        Raises:
+            ConsoleLost: the connection ended.
+            NoSuchStream: this camera is not received.
         """
         connection = self._live()
         async for stream, medium in self._media(connection, connection.media.stream("video", camera), keep):
             yield Picture(stream.name, medium.stamp, stream.check(medium)[1], medium.frame)
 
     async def sounds(self, microphone: str = "", *, keep: int = 50) -> AsyncGenerator[Sound]:
-        """Yield the segments of a microphone ("" is the first) that pass the gate, as `pictures` does."""
+        """Yield the segments of a microphone that pass the gate, as `pictures` does.
+
+        Args:
+            microphone: its name in the description; "" is the first one
+            keep: segments that may wait for a slow reader, which loses the oldest
+
+        Raises:
+            ConsoleLost: the connection ended.
+            NoSuchStream: this microphone is not received.
+        """
         connection = self._live()
         async for stream, medium in self._media(connection, connection.media.stream("audio", microphone), keep):
             yield Sound(stream.name, medium.stamp, stream.check(medium)[1], medium.frame)

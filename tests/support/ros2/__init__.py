@@ -22,6 +22,7 @@ __all__ = [
     "RosBridge",
     "RosRobot",
     "have_ros",
+    "ros_environment",
     "ros_python",
     "running_ros_bridge",
     "running_ros_robot",
@@ -54,7 +55,7 @@ def ros_python() -> str:
     return str(python)
 
 
-def _ros_environment() -> dict[str, str]:
+def ros_environment() -> dict[str, str]:
     """A domain that nobody else uses now, on this machine only."""
     return {
         "ROS_DOMAIN_ID": str(_free_domain()),
@@ -121,7 +122,7 @@ def _zeros(twists: list[dict[str, Any]]) -> int:
 @asynccontextmanager
 async def running_ros_robot(directory: Path) -> AsyncIterator[RosRobot]:
     log = directory / "robot_node.jsonl"
-    environment = _ros_environment()
+    environment = ros_environment()
     async with running_process(ros_python(), str(NODE), str(log), environment=environment) as (process, _):
         yield RosRobot(process, environment, log)
 
