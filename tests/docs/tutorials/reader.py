@@ -14,7 +14,7 @@ from contextlib import asynccontextmanager, suppress
 from pathlib import Path
 from typing import NamedTuple
 
-from lockstep.bench.free_port import free_port
+from lockstep.bench.harness.free_port import free_port
 
 __all__ = ["ROOT", "Reader", "program"]
 

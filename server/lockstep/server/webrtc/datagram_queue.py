@@ -4,8 +4,8 @@ from collections import deque
 from collections.abc import Callable
 from typing import Protocol
 
-from lockstep.server.util.cooperative_scheduler import CooperativeScheduler
 from lockstep.rtc.token_bucket import TokenBucket
+from lockstep.server.util.cooperative_scheduler import CooperativeScheduler
 
 __all__ = ["DatagramQueue", "DatagramQueues", "DriverQueue", "Waiting"]
 

@@ -5,9 +5,9 @@ from collections.abc import Callable
 from prometheus_client import Counter
 
 from lockstep.protocol.serial import event_gap
+from lockstep.rtc.token_bucket import TokenBucket
 from lockstep.server.media.metrics import DropCounter
 from lockstep.server.media.pipeline.stage import FrameStage, SourceFrame
-from lockstep.rtc.token_bucket import TokenBucket
 
 __all__ = ["MAX_AT_ONCE", "Admission"]
 
