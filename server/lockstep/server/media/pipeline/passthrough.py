@@ -114,9 +114,9 @@ class Passthrough(FrameStage):
         for target in list(self._passed.targets):
             if not self._may_pass_to(target):
                 self._encodings.return_to_own(target)
-        for encoding in self._encodings.own:
+        for encoding in [each for each in self._encodings.own if each.codec == "H264"]:
             for target in [*encoding.targets, *encoding.arriving]:
-                if encoding.codec == "H264" and self._may_pass_to(target):
+                if self._may_pass_to(target):
                     encoding.leave(target)
                     self._passed.targets[target] = None
 
