@@ -136,7 +136,7 @@ def test_without_a_console_the_settings_say_where_it_will_be(tmp_path: Path) -> 
     [
         (("invite", "--role", "admin"), "observer, operator or supervisor"),
         (("invite", "--expires", "soon"), "not a time"),
-        (("invite", "--expires", "1s"), "good for 60"),
+        (("invite", "--expires", "1s"), "valid for 60"),
         (("revoke", "nothing"), "no such invitation"),
         (("audit",), "no audit log"),
     ],

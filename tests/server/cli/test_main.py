@@ -241,7 +241,7 @@ def test_each_robot_of_up_has_its_latch_by_its_name_whatever_the_port(
 def test_up_names_the_robots_there_are_when_one_is_unknown(robots: list[str]) -> None:
     asked = CliRunner().invoke(app, ["up", *(word for robot in robots for word in ("--robot", robot))])
     assert asked.exit_code == 2
-    assert "no robot 'tractor'; choose one of" in asked.stderr
+    assert "no robot 'tractor'; there are" in asked.stderr
 
 
 def test_the_version_is_that_of_the_distribution() -> None:
