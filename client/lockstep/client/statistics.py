@@ -21,10 +21,10 @@ class Percentiles(msgspec.Struct, frozen=True, kw_only=True):
     """Percentiles of the last samples; None without samples."""
 
     count: int = 0  # samples
-    median: float | None = None
-    p95: float | None = None
-    p99: float | None = None
-    maximum: float | None = None
+    median: float | None = None  # half of the samples are at most so large
+    p95: float | None = None  # 95 % of them are
+    p99: float | None = None  # 99 % of them are
+    maximum: float | None = None  # the largest
 
 
 class StreamStatistics(msgspec.Struct, frozen=True, kw_only=True):
@@ -41,11 +41,11 @@ class StreamStatistics(msgspec.Struct, frozen=True, kw_only=True):
     tolerance: int = 0  # largest gap that is rendered
     lag: int = 0  # largest gap seen since the last report, rendered or not
     received: int = 0  # decoded and put to the gate
-    rendered: int = 0
+    rendered: int = 0  # handed on
     discarded: int = 0  # too old, or a newer one came while it was held
     held: int = 0  # ahead of the feedback by more than the tolerance, so that it had to wait
     violations: int = 0  # rendered with |gap| > tolerance: 0 unless the gate is off or goes by age
-    gate: GateMode = "event"
+    gate: GateMode = "event"  # the rule by which media are rendered
     packets: int = 0  # of RTP
     frames: int = 0  # complete encoded frames
     lost: int = 0  # packets that never came
@@ -81,7 +81,7 @@ class ConsoleStatistics(msgspec.Struct, frozen=True, kw_only=True):
     streams: list[StreamStatistics] = []  # cameras and microphones that are received
     picture_delay_ms: float | None = None  # from a command to the first picture of its event, the last one seen
     picture_delay_p50_ms: float | None = None  # of the same, the median
-    picture_delay_p95_ms: float | None = None
+    picture_delay_p95_ms: float | None = None  # of the same, the 95th percentile
     command_to_picture_ms: Percentiles = Percentiles()  # of the same
     round_trip_ms: float | None = None  # of the last ping
     command_to_feedback_ms: Percentiles = Percentiles()  # from sending a command to the feedback that answers it

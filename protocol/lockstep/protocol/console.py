@@ -222,9 +222,9 @@ class Participant(msgspec.Struct, frozen=True, kw_only=True):
     """A connected peer, as all others see it."""
 
     peer: str  # its id, as in `Seat.holder`
-    name: str
-    role: Role
-    carrier: Carrier
+    name: str  # as the peer calls itself
+    role: Role  # of its link
+    carrier: Carrier  # the way in which stamps travel to it
     gap: int = 0  # of the picture on its screen, in events
     picture_delay_ms: float | None = None  # from a command to its picture; None: unknown
     round_trip_ms: float | None = None  # to the console; None: not measured yet
@@ -309,7 +309,7 @@ class SharedNote(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", ta
     role: Role  # the writer's
     text: str  # at most 500 characters
     epoch: str  # of the event; "" before the robot was reached
-    event: EventReference
+    event: EventReference  # the one that held
     time: float  # s since 1970, the console's clock: for people to read, never for a decision
 
 
