@@ -28,6 +28,7 @@ async def test_its_program_drives_a_square_and_prints_its_figures(tmp_path: Path
 
 
 @pytest.mark.long
+@pytest.mark.timeout(500)
 async def test_a_reader_gets_from_the_first_link_to_an_experiment(tmp_path: Path) -> None:
     reader = Reader("student", tmp_path)
     # `make run` is what the README begins with; it runs `lockstep up` with these arguments.
