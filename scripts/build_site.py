@@ -60,10 +60,13 @@ def page_text(name: str, text: str, known: dict[str, str]) -> str:
             raise BrokenLink(name, target)
         return label
 
-    return "".join(
-        DIAGRAM.sub(lambda diagram: render_sequence(diagram[1]), part) if code else LINK.sub(link, part)
-        for code, part in _parts(text)
-    )
+    return "".join(DIAGRAM.sub(_diagram, part) if code else LINK.sub(link, part) for code, part in _parts(text))
+
+
+def _diagram(found: re.Match[str]) -> str:
+    """A sequence diagram becomes a picture; any other kind stays readable as text."""
+    text = found[1]
+    return render_sequence(text) if text.lstrip().startswith("sequenceDiagram") else f"```text\n{text}\n```"
 
 
 def _parts(text: str) -> Iterator[tuple[bool, str]]:

@@ -1,8 +1,8 @@
-"""For the API reference: the comment at the end of a field's line is the field's documentation."""
+"""For the API reference: the comments behind a class's fields become a list of its attributes."""
 
 import ast
 
-from griffe import Attribute, Docstring, Extension
+from griffe import Class, Docstring, Extension
 
 __all__ = ["FieldComments"]
 
@@ -10,12 +10,14 @@ __all__ = ["FieldComments"]
 class FieldComments(Extension):  # type: ignore[misc]
     """An extension of Griffe, which reads the sources without importing them."""
 
-    def on_attribute_instance(self, *, node: ast.AST, attr: Attribute, **others: object) -> None:
-        if attr.docstring is not None or attr.parent is None or not attr.parent.is_class:
-            return
-        last = getattr(node, "end_lineno", None)
-        if not isinstance(node, ast.AnnAssign) or last is None:
-            return
-        _, mark, comment = attr.lines_collection[attr.filepath][last - 1][node.end_col_offset :].partition("#")
-        if mark:
-            attr.docstring = Docstring(comment.strip(), lineno=last, endlineno=last, parent=attr)
+    def on_class_members(self, *, node: ast.AST, cls: Class, **others: object) -> None:
+        fields = [each for each in getattr(node, "body", ()) if isinstance(each, ast.AnnAssign)]
+        source = cls.lines_collection[cls.filepath]
+        lines = []
+        for field in fields:
+            comment = source[(field.end_lineno or 0) - 1][field.end_col_offset or 0 :].partition("#")[2].strip()
+            if comment and isinstance(field.target, ast.Name):
+                lines.append(f"    {field.target.id}: {comment}")
+        if lines:
+            about = cls.docstring.value if cls.docstring is not None else ""
+            cls.docstring = Docstring("\n".join([about, "", "Attributes:", *lines]), parent=cls)

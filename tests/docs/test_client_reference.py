@@ -1,7 +1,10 @@
 """docs/client.md shows every public name of `lockstep.client`, and each has a docstring to show."""
 
+import ast
 import inspect
 import re
+import textwrap
+from importlib import import_module
 from pathlib import Path
 
 import pytest
@@ -30,6 +33,18 @@ def test_every_public_member_of_the_console_says_what_it_does_and_names_its_para
     if inspect.isfunction(member):
         for parameter in list(inspect.signature(member).parameters)[1:]:
             assert re.search(rf"^    {parameter}: |`{parameter}`", text, re.MULTILINE), parameter
+
+
+@pytest.mark.parametrize("name", SHOWN)
+def test_every_field_of_what_it_hands_out_says_what_it_is(name: str) -> None:
+    module, _, kind = name.rpartition(".")
+    shown = getattr(import_module(module), kind)
+    source = textwrap.dedent(inspect.getsource(shown))
+    lines = source.splitlines()
+    tree = ast.parse(source).body[0]
+    assert isinstance(tree, ast.ClassDef)
+    fields = [each for each in tree.body if isinstance(each, ast.AnnAssign)]
+    assert [ast.unparse(each) for each in fields if "# " not in lines[(each.end_lineno or 0) - 1]] == []
 
 
 def test_the_constructors_parameters_are_all_explained() -> None:

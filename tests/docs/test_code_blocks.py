@@ -119,6 +119,7 @@ def _options(command: Any) -> set[str]:
     return given | {"--help", "--version"}
 
 
+@pytest.mark.slow  # loads the code of every command
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
 def test_every_lockstep_command_and_option_exists(page: Path) -> None:
     assert [flaw for words in commands(page.read_text()) for flaw in flaws(words)] == []

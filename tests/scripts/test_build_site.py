@@ -49,6 +49,12 @@ def test_code_is_left_as_it_is_and_a_diagram_becomes_a_picture() -> None:
     assert page_text("docs/a.md", f"before\n\n{diagram}\n", KNOWN).startswith('before\n\n<div class="sequence">')
 
 
+def test_a_diagram_of_another_kind_stays_readable_as_text() -> None:
+    assert (
+        page_text("docs/a.md", "```mermaid\nflowchart LR\nA --> B\n```", KNOWN) == "```text\nflowchart LR\nA --> B\n```"
+    )
+
+
 def test_every_page_is_in_the_navigation_once(tmp_path: Path) -> None:
     stage(tmp_path)
     staged = {path.relative_to(tmp_path).as_posix() for path in tmp_path.rglob("*.md")}

@@ -20,33 +20,33 @@ FORGOTTEN = 3.0  # s after which a picture says nothing about the present delay
 class Percentiles(msgspec.Struct, frozen=True, kw_only=True):
     """Percentiles of the last samples; None without samples."""
 
-    count: int = 0
-    median: float | None = None
-    p95: float | None = None
-    p99: float | None = None
-    maximum: float | None = None
+    count: int = 0  # samples
+    median: float | None = None  # half of the samples are at most so large
+    p95: float | None = None  # 95 % of them are
+    p99: float | None = None  # 99 % of them are
+    maximum: float | None = None  # the largest
 
 
 class StreamStatistics(msgspec.Struct, frozen=True, kw_only=True):
     """The figures of one stream since the connection began."""
 
-    stream: str
+    stream: str  # name of the camera or microphone
     kind: str  # "video" or "audio"
-    codec: str
-    carrier: Carrier
+    codec: str  # "VP8", "H264", "opus" or "PCMU"; "" before the first packet
+    carrier: Carrier  # the way in which the stamp travels
     stamp: int = 0  # last one seen; 0 before the first
     gap: int = 0  # at the last rendering
     max_gap: int = 0  # largest |gap| rendered
     mean_gap: float | None = None  # of |gap| rendered; None before the first
-    tolerance: int = 0
+    tolerance: int = 0  # largest gap that is rendered
     lag: int = 0  # largest gap seen since the last report, rendered or not
     received: int = 0  # decoded and put to the gate
-    rendered: int = 0
-    discarded: int = 0
-    held: int = 0
+    rendered: int = 0  # handed on
+    discarded: int = 0  # too old, or a newer one came while it was held
+    held: int = 0  # ahead of the feedback by more than the tolerance, so that it had to wait
     violations: int = 0  # rendered with |gap| > tolerance: 0 unless the gate is off
-    gate: GateMode = "event"
-    packets: int = 0
+    gate: GateMode = "event"  # the rule by which media are rendered
+    packets: int = 0  # of RTP
     frames: int = 0  # complete encoded frames
     lost: int = 0  # packets that never came
     unstamped: int = 0  # frames without a stamp
@@ -76,16 +76,16 @@ class ConsoleStatistics(msgspec.Struct, frozen=True, kw_only=True):
     peer: str = ""  # this connection's id
     epoch: str = ""  # run of the robot bridge
     event: int = 0  # newest feedback; 0 before the first
-    armed: bool = False
-    gate: GateState = "no_feedback"
-    streams: list[StreamStatistics] = []
+    armed: bool = False  # whether neutral values are sent while `drive` is not called
+    gate: GateState = "no_feedback"  # as `Console.gate_state`
+    streams: list[StreamStatistics] = []  # cameras and microphones that are received
     picture_delay_ms: float | None = None  # from a command to the first picture of its event, the last one seen
-    picture_delay_p50_ms: float | None = None
-    picture_delay_p95_ms: float | None = None
-    command_to_picture_ms: Percentiles = Percentiles()
+    picture_delay_p50_ms: float | None = None  # of the same, the median
+    picture_delay_p95_ms: float | None = None  # of the same, the 95th percentile
+    command_to_picture_ms: Percentiles = Percentiles()  # of the same
     round_trip_ms: float | None = None  # of the last ping
-    command_to_feedback_ms: Percentiles = Percentiles()
-    event_rate: float = 0.0  # Hz
+    command_to_feedback_ms: Percentiles = Percentiles()  # from sending a command to the feedback that answers it
+    event_rate: float = 0.0  # Hz, over the last 5 s
     bad_messages: int = 0  # messages from the console that could not be read
     repeats: int = 0  # commands sent again because no answer arrived
     echoes: int = 0  # copies of commands because the path loses packets

@@ -211,21 +211,23 @@ class SeatClaim(msgspec.Struct, frozen=True, kw_only=True):
 class Seat(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", tag="seat"):
     """Who may drive. `holder` is a peer id, empty when the seat is free."""
 
-    holder: str = ""
-    name: str = ""
-    why: str = ""  # "released", "heartbeat lost", "disconnected", "granted", "taken", "idle" …
-    claims: list[SeatClaim] = []
+    holder: str = ""  # the peer's id
+    name: str = ""  # the holder's
+    why: str = ""  # of the last change: "released", "heartbeat lost", "disconnected", "granted", "taken", "idle" …
+    claims: list[SeatClaim] = []  # the one that waits longest first
     idle_seconds_left: float | None = None  # until the idle holder loses it; sent when the countdown begins or ends
 
 
 class Participant(msgspec.Struct, frozen=True, kw_only=True):
-    peer: str
-    name: str
-    role: Role
-    carrier: Carrier
-    gap: int = 0
-    picture_delay_ms: float | None = None
-    round_trip_ms: float | None = None
+    """A connected peer, as all others see it."""
+
+    peer: str  # its id, as in `Seat.holder`
+    name: str  # as the peer calls itself
+    role: Role  # of its link
+    carrier: Carrier  # the way in which stamps travel to it
+    gap: int = 0  # of the picture on its screen, in events
+    picture_delay_ms: float | None = None  # from a command to its picture; None: unknown
+    round_trip_ms: float | None = None  # to the console; None: not measured yet
     loss: float | None = None  # 0 to 1, of the media on the way to this peer
     tier: Tier | None = None  # None: receives no video
     silenced: bool = False  # a supervisor silenced the stops of its link
@@ -301,13 +303,13 @@ class RecordingState(msgspec.Struct, frozen=True, kw_only=True, tag_field="type"
 class SharedNote(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", tag="note_shared"):
     """A participant's note, with the event it belongs to. Newcomers get the last ones."""
 
-    id: int
-    peer: str
-    name: str
-    role: Role
-    text: str
+    id: int  # counts up in a session
+    peer: str  # the id of the peer that wrote it
+    name: str  # the writer's
+    role: Role  # the writer's
+    text: str  # at most 500 characters
     epoch: str  # of the event; "" before the robot was reached
-    event: EventReference
+    event: EventReference  # the one that held
     time: float  # s since 1970, the console's clock: for people to read, never for a decision
 
 

@@ -88,9 +88,9 @@ RefusalReason = Literal[
 class StopState(msgspec.Struct, frozen=True):
     """The latched stop, and the number of the newest one. `by` and `reason` are empty unless stopped."""
 
-    stopped: bool = False
+    stopped: bool = False  # until a reset
     by: Text = ""  # who said the first stop since the last reset
-    reason: Text = ""
+    reason: Text = ""  # which that person gave
     number: StopNumber = 0  # of the newest stop, also after its reset; never given twice; 0 before the first
     press: PressId = ""  # id of the press that became the newest stop
     kept: bool = True  # whether this state is on the robot's disk
@@ -130,18 +130,18 @@ class Command(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", tag="
 class Feedback(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", tag="feedback"):
     """Measured state after command `event`. A later `issue` of the same event is the same event measured again."""
 
-    event: EventReference
-    issue: IssueNumber
+    event: EventReference  # the number of the latest executed command
+    issue: IssueNumber  # 1 for an event's first feedback, one more each time it is measured again
     time: float  # s, the bridge's monotonic clock when it was issued
     axes: AxisValues  # measured, in the axes' units
-    joints: AxisValues = []
+    joints: AxisValues = []  # measured, in the joints' units
     wrench: Annotated[
         list[float], msgspec.Meta(max_length=6)
     ] = []  # fx fy fz (N), tx ty tz (N m), in the sensor's frame; empty without a sensor
     ranges: Annotated[list[float], msgspec.Meta(max_length=MAX_RAYS)] = []  # m; range_max means nothing seen
-    at_rest: bool = True
-    stop: StopState = StopState()
-    faults: Annotated[list[Text], msgspec.Meta(max_length=MAX_FAULTS)] = []
+    at_rest: bool = True  # nothing moves and nothing is commanded to
+    stop: StopState = StopState()  # whether the robot is stopped, and why
+    faults: Annotated[list[Text], msgspec.Meta(max_length=MAX_FAULTS)] = []  # what is wrong with the robot, for people
     limits: Texts = []  # names of the position limits and geofences that slowed the robot since the last feedback
     unknown: Texts = []  # names of axes and joints that could not be measured: their values are old
     nonce: Nonce = 0  # 53 random bits, new in every issue

@@ -10,7 +10,7 @@ import pytest
 
 from tests.docs.tutorials.reader import ROOT, Reader
 
-pytestmark = pytest.mark.long
+pytestmark = [pytest.mark.long, pytest.mark.timeout(500)]
 
 
 async def test_a_reader_gets_from_the_wheels_to_a_bridge_that_died(tmp_path: Path) -> None:

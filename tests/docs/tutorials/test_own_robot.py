@@ -9,7 +9,7 @@ import pytest
 
 from tests.docs.tutorials.reader import Reader
 
-pytestmark = pytest.mark.long
+pytestmark = [pytest.mark.long, pytest.mark.timeout(500)]
 
 
 async def test_a_reader_gets_from_the_template_to_a_checked_bridge_in_two_languages(tmp_path: Path) -> None:

@@ -52,6 +52,7 @@ async def test_a_reader_drives_the_base_and_sees_its_topics_fall_silent(reader: 
 
 
 @pytest.mark.long
+@pytest.mark.timeout(500)
 async def test_the_bridge_alone_passes_the_check(reader: Reader) -> None:
     reader.take("python3 -m venv rosenv")
     node = reader.take("rosenv/bin/python docs/examples/ros2/turtlebot.py")

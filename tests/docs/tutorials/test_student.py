@@ -1,13 +1,12 @@
 """docs/tutorials/student.md, done step by step."""
 
-import asyncio
 import re
-import sys
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
 
-from tests.docs.tutorials.reader import Reader, page, program
+from tests.docs.tutorials.reader import Reader, page
 from tests.support.stack import running_stack
 
 CORNER = re.compile(r"event (\d+): x (-?[\d.]+) m, y (-?[\d.]+) m")
@@ -16,24 +15,20 @@ NEAR = 0.15  # m; a busy machine holds a command up, and the robot comes to rest
 
 
 async def test_its_program_drives_a_square_and_prints_its_figures(tmp_path: Path) -> None:
-    file = tmp_path / "square.py"
-    code = program("student", "square.py")
-    assert "SIDE, SPEED = 0.5, " in code
-    file.write_text(code.replace("SIDE, SPEED = 0.5, ", f"SIDE, SPEED = {SIDE}, "))
+    reader, file = Reader("student", tmp_path), tmp_path / "square.py"
+    assert "SIDE, SPEED = 0.5, " in file.read_text()
+    file.write_text(file.read_text().replace("SIDE, SPEED = 0.5, ", f"SIDE, SPEED = {SIDE}, "))
     async with running_stack(tmp_path) as stack:
-        process = await asyncio.create_subprocess_exec(
-            *(sys.executable, str(file), stack.operator), stdout=asyncio.subprocess.PIPE
-        )
-        said = (await process.communicate())[0].decode()
-    assert process.returncode == 0
+        said = await reader.type(f"python square.py '{stack.operator}'")
     corners = [(float(x), float(y)) for _, x, y in CORNER.findall(said)]
-    wanted = [(SIDE, 0.0), (SIDE, SIDE), (0.0, SIDE), (0.0, 0.0)]
-    assert len(corners) == len(wanted)
-    assert all(abs(x - u) < NEAR and abs(y - v) < NEAR for (x, y), (u, v) in zip(corners, wanted, strict=True))
+    sides = [(x - u, y - v) for (u, v), (x, y) in pairwise(corners)]
+    wanted = [(0.0, SIDE), (-SIDE, 0.0), (0.0, -SIDE)]
+    assert all(abs(x - u) < NEAR and abs(y - v) < NEAR for (x, y), (u, v) in zip(sides, wanted, strict=True))
     assert re.search(r"overview: \d+ rendered, \d+ discarded, gap at most [0-4]\n", said)
 
 
 @pytest.mark.long
+@pytest.mark.timeout(500)
 async def test_a_reader_gets_from_the_first_link_to_an_experiment(tmp_path: Path) -> None:
     reader = Reader("student", tmp_path)
     # `make run` is what the README begins with; it runs `lockstep up` with these arguments.

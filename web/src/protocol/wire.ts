@@ -155,6 +155,7 @@ export interface Notice {
   readonly text: string;
 }
 
+/** A connected peer, as all others see it. */
 export interface Participant {
   readonly peer: string;
   readonly name: string;

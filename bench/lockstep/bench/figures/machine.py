@@ -5,7 +5,9 @@ import os
 import platform
 import shutil
 import subprocess
-from importlib.metadata import version
+from collections.abc import Iterable
+from contextlib import suppress
+from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
@@ -23,7 +25,7 @@ def machine_facts() -> dict[str, Any]:
         "system": f"{platform.system()} {platform.release()}",
         "python": platform.python_version(),
         "chromium": _chromium_version(),
-        "packages": {name: version(name) for name in PACKAGES},
+        "packages": _versions(PACKAGES),
     }
 
 
@@ -55,3 +57,12 @@ def _chromium_version() -> str | None:
         return None
     found = subprocess.run([executable, "--version"], capture_output=True, text=True, timeout=30, check=False)
     return found.stdout.strip() or None
+
+
+def _versions(packages: Iterable[str]) -> dict[str, str]:
+    """Those that are installed: an experiment without a browser needs no package that drives one."""
+    found = {}
+    for name in packages:
+        with suppress(PackageNotFoundError):
+            found[name] = version(name)
+    return found

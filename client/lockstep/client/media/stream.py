@@ -27,17 +27,17 @@ class Picture(NamedTuple):
 
     stream: str  # name of the camera
     stamp: int | None  # event reference at capture; None only with the gate off
-    gap: int | None  # newest feedback's event minus the stamp
-    frame: av.VideoFrame
+    gap: int | None  # newest feedback's event minus the stamp; None only with the gate off
+    frame: av.VideoFrame  # `frame.to_ndarray(format="rgb24")` has the shape (height, width, 3), uint8
 
 
 class Sound(NamedTuple):
-    """A segment of sound that may be played now; fields as in `Picture`."""
+    """A segment of sound that may be played now."""
 
-    stream: str
-    stamp: int | None
-    gap: int | None
-    frame: av.AudioFrame
+    stream: str  # name of the microphone
+    stamp: int | None  # event reference at capture; None only with the gate off
+    gap: int | None  # newest feedback's event minus the stamp; None only with the gate off
+    frame: av.AudioFrame  # `frame.to_ndarray()` has its samples, `frame.sample_rate` is in Hz
 
 
 class Stream:
