@@ -125,7 +125,7 @@ class EpochBegan(SessionEvent, frozen=True):
 
 
 class LinkUp(SessionEvent, frozen=True):
-    state: RobotState
+    state: RobotState | None
 
 
 class LinkDown(SessionEvent, frozen=True):

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from lockstep.server.composition import robot_app, robot_session
+from lockstep.server.composition import robot_app
 from lockstep.server.media.sources.source_manager import SourceManager
 from lockstep.server.recording.recording_store import RecordingStore
 from lockstep.server.recording.writing import recorder
@@ -15,6 +15,7 @@ from lockstep.server.recording.writing.recorder import Recorder
 from lockstep.server.sfu.coordinator import SfuCoordinator
 from lockstep.server.stop.stop_keeper import StopKeeper
 from lockstep.server.talkback.talkback import Talkback
+from lockstep.server.telemetry import background
 from tests.server.rig import eventually, running_rig
 
 
@@ -31,7 +32,7 @@ from tests.server.rig import eventually, running_rig
 async def test_a_fault_of_a_background_task_is_counted_and_takes_neither_the_session_nor_stop_with_it(
     name: str, kind: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(robot_session, "RESTART_AFTER", 0.01)
+    monkeypatch.setattr(background, "RESTART_AFTER", 0.01)
     run: Callable[[Any], Awaitable[None]] = kind.run
     runs: list[object] = []
 
@@ -53,7 +54,7 @@ async def test_a_fault_of_a_background_task_is_counted_and_takes_neither_the_ses
 async def test_a_machine_that_gives_no_more_threads_takes_neither_the_session_nor_stop_with_it(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(robot_session, "RESTART_AFTER", 0.01)
+    monkeypatch.setattr(background, "RESTART_AFTER", 0.01)
     runs: list[object] = []
 
     async def fails(ended: object, moving: object) -> None:

@@ -73,7 +73,7 @@ def _console(settings: Settings, metrics: Metrics, stops: StopKeeper, events: Se
 async def test_a_background_task_that_fails_is_counted_and_runs_again(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    monkeypatch.setattr("lockstep.server.control.console.RESTART_AFTER", 0.0)
+    monkeypatch.setattr("lockstep.server.telemetry.background.RESTART_AFTER", 0.0)
     metrics = Metrics()
     wanted = Settings(robot="tcp://127.0.0.1:1", seat_timeout=0.01)
     stops = StopKeeper(tmp_path, wanted.robot)

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lockstep.server.peers.feedback_fanout import FeedbackFanout, FeedbackPace
+from lockstep.server.peers.feedback_fanout import FeedbackFanout, FeedbackPace, FeedbackReceiver
 from lockstep.server.util.cooperative_scheduler import SLICE
 
 
@@ -19,7 +19,7 @@ class FakePeer:
         self.news.set()
 
 
-def _drives(peer: object) -> bool:
+def _drives(peer: FeedbackReceiver) -> bool:
     return True
 
 
@@ -159,5 +159,17 @@ async def test_an_observer_gets_the_newest_of_a_burst() -> None:
             fanout.publish(str(number))
         await observer.news.wait()
     assert observer.got == ["first", "9"]
+    task.cancel()
+    await asyncio.gather(task, return_exceptions=True)
+
+
+async def test_a_relay_gets_feedback_once_for_all_its_watchers_as_an_observer_does() -> None:
+    relay, observer = FakePeer(), FakePeer()
+    fanout = FeedbackFanout(1000, _drives, list, lambda: [observer], [relay])
+    task = asyncio.create_task(fanout.run())
+    fanout.publish("a")
+    async with asyncio.timeout(20):
+        await observer.news.wait()
+    assert (relay.got, observer.got) == (["a"], ["a"])
     task.cancel()
     await asyncio.gather(task, return_exceptions=True)

@@ -39,11 +39,14 @@ class _Hall:
         self.relays = _Keyed()
         self.here: list[_Watcher] = []
         self.ended: set[str] = set()
+        self.faults: list[Exception] = []
         self.now = 100.0
         settings = RelaySettings(relay=("janus:ws://a.example/1",), observers_direct=0)
         self.coordinator = SfuCoordinator(settings, self.relays, self.here, self.has_ended, lambda: self.now)
 
     def has_ended(self, link: str, expires: float) -> bool:
+        if self.faults:
+            raise self.faults.pop()
         return link in self.ended or self.now >= expires
 
     def watch(self, link: str, expires: float = 1e9) -> _Watcher:
@@ -97,6 +100,19 @@ async def test_when_the_link_of_somebody_who_has_the_key_expires_it_is_made_anew
         second = await hall.another(first)
         assert first.why == coordinator.ENDED
         assert second.feed != first.feed
+
+
+async def test_a_fault_of_the_task_that_looks_for_ended_links_makes_the_publication_anew(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    async with _hall(monkeypatch) as hall:
+        first = hall.relays.carrying["0"]
+        hall.coordinator.key(hall.here[0])
+        hall.faults.append(RuntimeError("a fault of the console's own"))
+        second = await hall.another(first)
+        hall.coordinator.key(hall.watch("mallory", expires=hall.now + 5))
+        hall.now += 6
+        assert (await hall.another(second)).feed != second.feed, "ended links are looked for again"
 
 
 async def test_the_end_of_a_link_whose_holder_never_had_the_key_disturbs_nobody(

@@ -10,7 +10,7 @@ from fastapi import FastAPI, Response
 from starlette.types import Lifespan
 
 from lockstep.server.composition.app_factory import bare_app, guard_app, open_context
-from lockstep.server.composition.robot_session import run_on, running_session
+from lockstep.server.composition.robot_session import running_session
 from lockstep.server.http.json_response import json_answer
 from lockstep.server.http.static_files import page_router
 from lockstep.server.routes import access, ice, observer_websocket, recordings, session, sfu, whep, whip
@@ -19,6 +19,7 @@ from lockstep.server.routes.openapi import openapi_document
 from lockstep.server.settings import Settings
 from lockstep.server.state.dependencies import Dependencies
 from lockstep.server.state.persistent_state import ConsoleState
+from lockstep.server.telemetry.background import keep_running
 from lockstep.server.telemetry.log_context import LogContext
 from lockstep.server.telemetry.metrics import Metrics
 from lockstep.server.util.gc_scheduler import sweep_forever
@@ -40,7 +41,7 @@ def create_app(settings: Settings, state: ConsoleState | None = None) -> FastAPI
                     running = [
                         tasks.create_task(context.run(), name="links"),
                         tasks.create_task(
-                            run_on(
+                            keep_running(
                                 "sweeper",
                                 lambda: sweep_forever(lambda: peers.ended, lambda: clock.moving),
                                 metrics.faults,

@@ -1,7 +1,7 @@
 """The session of one robot: console, media, seat, recorder, scene, audit, and all else that robots do not share."""
 
 import asyncio
-from collections.abc import AsyncIterator, Awaitable, Callable
+from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 
 from lockstep.protocol.console import ServerMessage
@@ -35,15 +35,12 @@ from lockstep.server.state.console_context import ConsoleContext
 from lockstep.server.state.dependencies import Dependencies
 from lockstep.server.stop.stop_keeper import StopKeeper
 from lockstep.server.talkback.talkback import Talkback
-from lockstep.server.telemetry.faults import Faults
+from lockstep.server.telemetry.background import keep_running
 from lockstep.server.telemetry.log_context import follow_clock
 from lockstep.server.telemetry.metrics import Metrics
 from lockstep.server.util.state_dir import StateDir
-from lockstep.server.util.uncancelled import attempt
 
-__all__ = ["run_on", "running_session"]
-
-RESTART_AFTER = 1.0  # s until a background task that failed runs again
+__all__ = ["running_session"]
 
 
 @asynccontextmanager
@@ -85,21 +82,9 @@ async def _running_stops(
     keeper = StopKeeper(directory.path, settings.robot, lasts=context.state.lasts)
     await keeper.load()
     async with asyncio.TaskGroup() as tasks:
-        running = tasks.create_task(run_on("kept stops", keeper.run, metrics.faults), name="kept stops")
+        running = tasks.create_task(keep_running("kept stops", keeper.run, metrics.faults), name="kept stops")
         yield keeper
         running.cancel()
-
-
-async def run_on(name: str, run: Callable[[], Awaitable[None]], faults: Faults) -> None:
-    """Run a side task until cancelled or done, and again after a fault, which must not affect control or STOP."""
-    while True:
-        try:
-            await attempt(run())
-        except Exception as error:
-            faults.caught(name, error, what="a background task, which runs again")
-            await asyncio.sleep(RESTART_AFTER)
-        else:
-            return
 
 
 @asynccontextmanager
@@ -173,14 +158,14 @@ async def _session(
         relays=relays,
         voice=voice,
         publishers=publishers,
-        recordings=RecordingService(ConsoleLibrary(recorder), access, trail, console.link_holds_seat),
+        recordings=RecordingService(ConsoleLibrary(recorder), access, trail, console.seat.is_held_with),
     )
     try:
         async with asyncio.TaskGroup() as tasks:
             running = [
                 tasks.create_task(console.run(), name="console"),
                 *(
-                    tasks.create_task(run_on(name, run, metrics.faults), name=name)
+                    tasks.create_task(keep_running(name, run, metrics.faults), name=name)
                     for name, run in (
                         ("media", media.run),
                         ("sources", sources.run),
@@ -192,7 +177,7 @@ async def _session(
                 ),
             ]
             if scene is not None:
-                running.append(tasks.create_task(run_on("scene", scene.run, metrics.faults), name="scene"))
+                running.append(tasks.create_task(keep_running("scene", scene.run, metrics.faults), name="scene"))
             yield made
             for task in running:
                 task.cancel()

@@ -2,17 +2,14 @@
 
 import asyncio
 import time
-from collections.abc import Awaitable, Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import Protocol
-
-import structlog
 
 from lockstep.protocol.console import (
     ClientMessage,
     Note,
     Rename,
     Report,
-    RobotState,
     SeatDecline,
     SeatGrant,
     SeatRelease,
@@ -85,14 +82,10 @@ from lockstep.server.session_events import (
 from lockstep.server.settings import Settings
 from lockstep.server.stop.stop_keeper import StopKeeper
 from lockstep.server.stop.stop_presses import new_press
+from lockstep.server.telemetry.background import keep_running
 from lockstep.server.telemetry.faults import Faults
-from lockstep.server.util.uncancelled import attempt
 
 __all__ = ["Console", "MediaFeed"]
-
-log = structlog.get_logger(__name__)
-
-RESTART_AFTER = 1.0  # s until a background task that failed runs again
 
 
 class MediaFeed(MediaSink, Protocol):
@@ -143,7 +136,7 @@ class Console:
         self.stops = StopService(self.robot, stops, peers, clock, silence, events)
         self.resets = ResetService(self.robot, self.stops, peers, clock, seat, events)
         self._fanout = FeedbackFanout(
-            settings.observer_feedback_hz, self._is_driven_by, peers.drivers, peers.observers, relays
+            settings.observer_feedback_hz, self.seat.is_held_by, peers.drivers, peers.observers, relays
         )
         self._forwarded_at = 0.0  # departure of the command in flight
         self._shown_stop = StopState()  # state that was published last
@@ -154,31 +147,21 @@ class Console:
         """Run until cancelled. The peers end before the links, so the last message to the robot is the rest."""
         self._events.publish(SessionBegan())
         async with asyncio.TaskGroup() as tasks:
-            tasks.create_task(self._guard("feedback", self._fanout.run))
-            tasks.create_task(self._guard("seat", self.seat.watch))
-            tasks.create_task(self._guard("stops", self.stops.run))
-            tasks.create_task(self._guard("disk of stops", self.stops.watch_disk))
-            tasks.create_task(self._guard("resets", self.resets.run))
-            tasks.create_task(self._guard("audit", self.audit.run))
-            tasks.create_task(self._guard("participants", self.people.share))
-            tasks.create_task(self._guard("robot", self.robot.run))
+            for name, run in (
+                ("feedback", self._fanout.run),
+                ("seat", self.seat.watch),
+                ("stops", self.stops.run),
+                ("disk of stops", self.stops.watch_disk),
+                ("resets", self.resets.run),
+                ("audit", self.audit.run),
+                ("participants", self.people.share),
+                ("robot", self.robot.run),
+            ):
+                tasks.create_task(keep_running(name, run, self._faults))
             try:
                 await asyncio.Event().wait()
             finally:
                 await self.peers.close()
-
-    def state_of_robot(self, description: RobotDescription) -> RobotState:
-        return RobotState(
-            link="up" if self.robot.up else "down",
-            epoch=self.robot.epoch,
-            description=description,
-            detail=self.robot.detail,
-        )
-
-    def link_holds_seat(self, link: str) -> bool:
-        """True if a peer with the link of this id holds the seat."""
-        holder = self.peers.by_id(self.seat.rules.holder)
-        return holder is not None and holder.identity.token_id == link
 
     # PeerHost
 
@@ -197,8 +180,8 @@ class Console:
             peer.send(
                 "session", Welcome(peer=peer.id, role=peer.role, name=peer.name, streams=peer.streams, voice=peer.voice)
             )
-            if self.robot.description is not None:
-                peer.send("session", self.state_of_robot(self.robot.description))
+            if (state := self.robot.state()) is not None:
+                peer.send("session", state)
             peer.send("session", self.seat.message())
             peer.send("session", self.speed_cap.state(time.monotonic()))
             self.people.welcome(peer)
@@ -286,16 +269,14 @@ class Console:
         self._link_was_up = True
         self.stops.link_up()
         self._arbiter.link_up(self.robot.description)
-        self._events.publish(LinkUp(self.state_of_robot(self.robot.description)))
+        self._events.publish(LinkUp(self.robot.state()))
 
     def link_down(self, detail: str) -> None:
         was_up, self._link_was_up = self._link_was_up, False
         self._arbiter.link_down()
         self.stops.link_down()
         self.resets.link_down(detail)
-        description = self.robot.description
-        state = None if description is None else self.state_of_robot(description)
-        self._events.publish(LinkDown(state, detail, was_up))
+        self._events.publish(LinkDown(self.robot.state(), detail, was_up))
         is_taken = detail.startswith("taken")
         if is_taken and (was_up or not self._robot_is_taken):
             self._events.publish(RobotTaken(detail))
@@ -377,9 +358,6 @@ class Console:
         if reason is not None:
             self._refuse_request(peer, reason, "a supervisor can silence only operators and observers")
 
-    def _is_driven_by(self, peer: FeedbackReceiver) -> bool:
-        return isinstance(peer, Peer) and self.seat.rules.holds(peer.id)
-
     def _refuse_request(self, peer: Peer, reason: RefusalReason, detail: str = "") -> None:
         self._refuse(peer, "session", Refusal(event=0, reason=reason, current=self.clock.event, detail=detail))
 
@@ -392,7 +370,7 @@ class Console:
         return self.robot.send(outcome.command)
 
     def _report_speed(self, peer: Peer, report: Report) -> None:
-        if not self.seat.rules.holds(peer.id):
+        if not self.seat.is_held_by(peer):
             return
         self._events.publish(SpeedReported(peer.actor, report))
         now = time.monotonic()
@@ -400,14 +378,3 @@ class Console:
         news = self.speed_cap.news(now)
         if news is not None:
             self._events.publish(SpeedCapChanged(news))
-
-    # background tasks
-
-    async def _guard(self, name: str, task: Callable[[], Awaitable[None]]) -> None:
-        """Run `task` again when it fails: a fault in one place must not take the seat's watchdog with it."""
-        while True:
-            try:
-                await attempt(task())
-            except Exception as error:
-                self._faults.caught(name, error, what="a background task, which runs again")
-            await asyncio.sleep(RESTART_AFTER)

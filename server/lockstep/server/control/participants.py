@@ -4,7 +4,7 @@ import asyncio
 import time
 from collections.abc import Callable
 
-from lockstep.protocol.console import Participants, SharedNote
+from lockstep.protocol.console import Participant, Participants, SharedNote
 from lockstep.protocol.messages import RefusalReason
 from lockstep.server.control.notes import NoteBoard
 from lockstep.server.event_clock import EventClock
@@ -18,9 +18,11 @@ from lockstep.server.session_events import (
     PeerRenamed,
     SessionEvents,
 )
+from lockstep.server.util.display_names import unique_names
 
 __all__ = ["ParticipantList"]
 
+FEW = 10  # participants up to which everybody's measured values are shared
 CROWD = 10  # peers; the list of participants goes out at most once a second, ten times more rarely to 100
 
 
@@ -44,7 +46,21 @@ class ParticipantList:
         self._renamed = renamed
         self._board = NoteBoard()
 
+    def current(self) -> Participants:
+        """Return all, those who may drive first. In a crowd only they have measured values: the list changes less."""
+        found = []
+        for peer in self._people():
+            with peer.contained("participant"):
+                found.append(peer.participant())
+        everyone = sorted(found, key=lambda each: each.role == "observer")
+        return Participants(
+            participants=[
+                each if len(everyone) <= FEW or each.role != "observer" else _without_values(each) for each in everyone
+            ]
+        )
+
     def joined(self, peer: Peer) -> None:
+        self._give_names()
         if peer.thumbnail:
             peer.name = peer.wanted_name  # not in the list, but a stop names its sender
             return
@@ -60,7 +76,7 @@ class ParticipantList:
 
     def welcome(self, peer: Peer) -> None:
         """Tell a newcomer who is here and what was written."""
-        peer.send("session", self._peers.participants())
+        peer.send("session", self.current())
         for note in self._board:
             peer.send("session", note)
 
@@ -73,9 +89,23 @@ class ParticipantList:
 
     def settle_names(self) -> None:
         """Give every peer a distinct name; a name is free again when its owner leaves."""
-        changed = self._peers.settle_names()
+        changed = self._give_names()
         if changed:
             self._renamed(changed)
+
+    def _give_names(self) -> list[Peer]:
+        """Give everyone the name they asked for, or that with a number. Return the peers whose name changed."""
+        people = self._people()
+        names = unique_names([(peer.wanted_name, peer.name) for peer in people])
+        changed = []
+        for peer, name in zip(people, names, strict=True):
+            if peer.name != name:
+                peer.name = name
+                changed.append(peer)
+        return changed
+
+    def _people(self) -> list[Peer]:
+        return [peer for peer in self._peers if not peer.thumbnail]
 
     def write(self, peer: Peer, text: str) -> RefusalReason | None:
         """Send a note to everyone. Return the reason if it is refused, else None."""
@@ -92,7 +122,17 @@ class ParticipantList:
         while True:
             await asyncio.sleep(max(1.0, len(self._peers) / CROWD))
             self.settle_names()
-            current = self._peers.participants()
+            current = self.current()
             if current != shown:
                 shown = current
                 self._events.publish(ParticipantsChanged(current))
+
+
+def _without_values(participant: Participant) -> Participant:
+    return Participant(
+        peer=participant.peer,
+        name=participant.name,
+        role=participant.role,
+        carrier=participant.carrier,
+        silenced=participant.silenced,
+    )

@@ -49,6 +49,14 @@ class SeatKeeper:
             idle_seconds_left=_rounded(self.rules.idle_seconds_left(now)),
         )
 
+    def is_held_by(self, peer: Peer) -> bool:
+        return self.rules.holds(peer.id)
+
+    def is_held_with(self, link: str) -> bool:
+        """True if a peer with the link of this id holds the seat."""
+        holder = self._peers.by_id(self.rules.holder)
+        return holder is not None and holder.identity.token_id == link
+
     def handle(self, peer: Peer, message: SeatMessage) -> None:
         """Act on a request of `peer`."""
         now = time.monotonic()

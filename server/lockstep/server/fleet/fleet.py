@@ -2,7 +2,7 @@
 
 import asyncio
 import time
-from collections.abc import AsyncIterator, Awaitable, Callable, Mapping
+from collections.abc import AsyncIterator, Mapping
 from contextlib import asynccontextmanager
 from pathlib import Path
 from typing import NamedTuple
@@ -25,8 +25,8 @@ from lockstep.server.settings import Settings
 from lockstep.server.state.console_context import ConsoleContext
 from lockstep.server.state.persistent_state import robot_place
 from lockstep.server.stop.stop_presses import Press
+from lockstep.server.telemetry.background import keep_running
 from lockstep.server.util.gc_scheduler import sweep_forever
-from lockstep.server.util.uncancelled import attempt
 
 __all__ = ["Fleet", "Stopped", "fleet_caller", "fleet_of"]
 
@@ -34,7 +34,6 @@ log = structlog.get_logger(__name__)
 
 LOOK_SECONDS = 1.0  # between two looks at every robot
 START_SECONDS = 20.0  # wait of the console for its sessions before it answers
-RESTART_AFTER = 1.0  # s until a background task that failed runs again
 ELSEWHERE = Actor("another console")
 
 
@@ -80,10 +79,11 @@ class Fleet:
             ]
             running += [
                 tasks.create_task(context.run(), name="links"),
-                tasks.create_task(self._guard("fleet", self._look), name="fleet"),
-                tasks.create_task(self._guard("board", board.run), name="board"),
+                tasks.create_task(keep_running("fleet", self._look, self.metrics.faults), name="fleet"),
+                tasks.create_task(keep_running("board", board.run, self.metrics.faults), name="board"),
                 tasks.create_task(
-                    self._guard("sweeper", lambda: sweep_forever(self._ended, self._moving)), name="sweeper"
+                    keep_running("sweeper", lambda: sweep_forever(self._ended, self._moving), self.metrics.faults),
+                    name="sweeper",
                 ),
             ]
             settled = [tasks.create_task(each.settled.wait()) for each in self.sessions.values()]
@@ -213,15 +213,6 @@ class Fleet:
 
     def _moving(self) -> bool:
         return any(session.moving for session in self.sessions.values())
-
-    async def _guard(self, name: str, task: Callable[[], Awaitable[None]]) -> None:
-        """Run `task` again when it fails."""
-        while True:
-            try:
-                await attempt(task())
-            except Exception as error:
-                self.metrics.faults.caught(name, error, what="a background task, which runs again")
-            await asyncio.sleep(RESTART_AFTER)
 
 
 def fleet_of(connection: HTTPConnection) -> Fleet:

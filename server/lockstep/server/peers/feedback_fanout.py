@@ -10,7 +10,7 @@ hundred peers are served in small slices, and the operator's commands are handle
 import asyncio
 from collections import deque
 from collections.abc import Callable, Sequence
-from typing import Protocol
+from typing import Generic, Protocol, TypeVar
 
 from lockstep.server.util.cooperative_scheduler import turns_of_loop
 
@@ -57,14 +57,17 @@ class FeedbackPace:
         return text
 
 
-class FeedbackFanout:
+Operator = TypeVar("Operator", bound=FeedbackReceiver)
+
+
+class FeedbackFanout(Generic[Operator]):
     """Run `run` as a task; call `publish` for every feedback."""
 
     def __init__(
         self,
         rate: float,
-        drives: Callable[[FeedbackReceiver], bool],
-        operators: Callable[[], Sequence[FeedbackReceiver]],
+        drives: Callable[[Operator], bool],
+        operators: Callable[[], Sequence[Operator]],
         observers: Callable[[], Sequence[FeedbackReceiver]],
         relays: Sequence[FeedbackReceiver] = (),
     ) -> None:
@@ -79,7 +82,7 @@ class FeedbackFanout:
         self._relays = relays
         self._offered = asyncio.Event()
         self._newest = ""
-        self._behind: dict[FeedbackReceiver, None] = {}  # operators that have not got the newest yet, in order
+        self._behind: dict[Operator, None] = {}  # operators that have not got the newest yet, in order
         self._asked = False  # True while a turn of the loop is requested
 
     def publish(self, text: str) -> None:

@@ -123,7 +123,7 @@ class Peer(ABC):
         self.id = secrets.token_hex(4)  # public: others see it
         self.identity = identity
         self.wanted_name = clean_name(identity.name, identity.role)
-        self.name = ""  # shown to others; `PeerRegistry` sets it
+        self.name = ""  # shown to others; `ParticipantList` sets it
         self.report = Report()  # newest
         self._quality: Quality | None = None  # newest
         self.ended = ""  # reason; "" while it lives

@@ -8,7 +8,7 @@ from typing import Protocol
 
 import structlog
 
-from lockstep.protocol.console import Participant, Participants, ServerMessage, encode_console_message
+from lockstep.protocol.console import ServerMessage, encode_console_message
 from lockstep.server.auth.tokens import Identity
 from lockstep.server.errors import NotFound, ShuttingDown, TooManyRequests
 from lockstep.server.peers.channels import ChannelName
@@ -17,14 +17,12 @@ from lockstep.server.peers.peer_places import check_place
 from lockstep.server.peers.webrtc_peer import WebRtcPeer
 from lockstep.server.peers.websocket_peer import WebSocketPeer
 from lockstep.server.telemetry.metrics import Metrics
-from lockstep.server.util.display_names import unique_names
 from lockstep.server.util.fair_queue import FairQueue
 
 __all__ = ["PeerRegistry"]
 
 log = structlog.get_logger(__name__)
 
-FEW = 10  # participants up to which everybody's measured values are shared
 CLOSE_TIMEOUT = 8.0  # s for all peers together
 
 
@@ -91,17 +89,6 @@ class PeerRegistry:
         """Return the observers that get feedback from here, and not from a relay."""
         return [peer for peer in self._sessions if peer.role == "observer" and not peer.relay]
 
-    def settle_names(self) -> list[Peer]:
-        """Give everyone the name they asked for, or that with a number. Return the peers whose name changed."""
-        people = [peer for peer in self._sessions if not peer.thumbnail]
-        names = unique_names([(peer.wanted_name, peer.name) for peer in people])
-        changed = []
-        for peer, name in zip(people, names, strict=True):
-            if peer.name != name:
-                peer.name = name
-                changed.append(peer)
-        return changed
-
     @contextmanager
     def place(self, identity: Identity, *, relayed: bool = False, thumbnail: bool = False) -> Iterator[None]:
         """Keep a place while a peer is being negotiated; `check_place` decides which peers get a place.
@@ -140,7 +127,6 @@ class PeerRegistry:
         self._sessions[peer] = task
         self._metrics.peers.labels(peer.role).inc()
         with peer.contained("join"):
-            self.settle_names()
             peer.joined()
         log.info("peer joined", peer=peer.id, role=peer.role, name=peer.name)
 
@@ -170,20 +156,6 @@ class PeerRegistry:
     def announce(self, message: ServerMessage) -> None:
         """Send a message of the session to everyone."""
         self.tell("session", message)
-
-    def participants(self) -> Participants:
-        """Return all, those who may drive first. In a crowd only they have measured values: the list changes less."""
-        people = [peer for peer in self._sessions if not peer.thumbnail]
-        found = []
-        for peer in people:
-            with peer.contained("participant"):
-                found.append(peer.participant())
-        everyone = sorted(found, key=lambda each: each.role == "observer")
-        return Participants(
-            participants=[
-                each if len(everyone) <= FEW or each.role != "observer" else _without_values(each) for each in everyone
-            ]
-        )
 
     def end_all(self, why: str) -> None:
         for peer in self._sessions:
@@ -220,13 +192,3 @@ class PeerRegistry:
             self._metrics.peers_ended.labels(peer.ended).inc()
             self._metrics.dropped.labels("channel").inc(peer.dropped())
             log.info("peer left", peer=peer.id, role=peer.role, name=peer.name, why=peer.ended)
-
-
-def _without_values(participant: Participant) -> Participant:
-    return Participant(
-        peer=participant.peer,
-        name=participant.name,
-        role=participant.role,
-        carrier=participant.carrier,
-        silenced=participant.silenced,
-    )

@@ -9,6 +9,7 @@ from typing import Protocol
 
 import structlog
 
+from lockstep.protocol.console import RobotState
 from lockstep.protocol.description import RobotDescription
 from lockstep.protocol.messages import (
     Command,
@@ -100,6 +101,14 @@ class RobotConnection:
     @property
     def up(self) -> bool:
         return self.reached.is_set()
+
+    def state(self) -> RobotState | None:
+        """Return the state as everyone is told it; None before the robot was reached."""
+        if self.description is None:
+            return None
+        return RobotState(
+            link="up" if self.up else "down", epoch=self.epoch, description=self.description, detail=self.detail
+        )
 
     async def run(self) -> None:
         """Run until cancelled."""

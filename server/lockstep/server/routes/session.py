@@ -94,7 +94,7 @@ async def session(request: Request, caller: Caller) -> Response:
             stopped=console.clock.stop.stopped,
             stop=console.clock.stop,
             seat=console.seat.message(),
-            participants=console.peers.participants().participants,
+            participants=console.people.current().participants,
             link=LinkInfo(up=console.robot.up, detail=console.robot.detail),
             you={"role": caller.role, "name": caller.name},
             peers={peer.id: peer.streams for peer in console.peers},

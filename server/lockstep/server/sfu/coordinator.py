@@ -200,19 +200,17 @@ class SfuCoordinator:
             self._lost(origin, publication.why)
 
     async def _while_wanted(self, publication: Publication, origin: SfuServer) -> None:
-        loop = asyncio.get_running_loop()
-        tasks = [
-            loop.create_task(self._extend(origin, station, publication), name=f"relay {station.name}")
-            for station in self.stations
-            if station is not origin
-        ]
-        tasks += [loop.create_task(self._watch(publication)), loop.create_task(self._beat(publication))]
-        try:
+        """Return when the publication has ended. A fault in one of the tasks ends it too."""
+        async with asyncio.TaskGroup() as tasks:
+            running = [
+                tasks.create_task(self._extend(origin, station, publication), name=f"relay {station.name}")
+                for station in self.stations
+                if station is not origin
+            ]
+            running += [tasks.create_task(self._watch(publication)), tasks.create_task(self._beat(publication))]
             await publication.ended.wait()
-        finally:
-            for task in tasks:
+            for task in running:
                 task.cancel()
-            await asyncio.gather(*tasks, return_exceptions=True)
 
     async def _watch(self, publication: Publication) -> None:
         """End the publication when nobody watches, or a holder of its key may no longer watch."""

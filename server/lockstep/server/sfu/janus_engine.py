@@ -42,6 +42,7 @@ class JanusEngine:
                 yield publication
             finally:
                 watching.cancel()
+                await asyncio.gather(watching, return_exceptions=True)
 
     @asynccontextmanager
     async def pass_on(
