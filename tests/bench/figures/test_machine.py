@@ -1,6 +1,6 @@
 import pytest
 
-from lockstep.bench import machine
+from lockstep.bench.figures import machine
 
 
 def test_a_package_that_is_not_installed_has_no_version_among_the_facts(monkeypatch: pytest.MonkeyPatch) -> None:
