@@ -286,10 +286,10 @@ class Console:
         now = time.monotonic()
         if not self.clock.observe(feedback, now):
             return
+        self._fanout.publish(encode_console_message(feedback))  # first: the operator's next command waits for it
         had_command = self._arbiter.in_flight is not None
         self._arbiter.feedback(feedback)
         self.resets.feedback(feedback.stop)
-        self._fanout.publish(encode_console_message(feedback))
         self.speed_cap.fed_back(feedback, now)
         is_answer = had_command and self._arbiter.in_flight is None
         self._events.publish(FeedbackReceived(feedback, now, now - self._forwarded_at if is_answer else None))
