@@ -136,3 +136,27 @@ async def test_an_acceptor_that_is_closed_before_it_runs_accepts_nothing() -> No
     acceptor = LinkAcceptor(listening_socket("127.0.0.1", 0), None, asyncio.Protocol, lambda: None, max_handshakes=1)
     await acceptor.close()
     await acceptor.run()
+
+
+async def test_a_fault_in_one_connection_ends_no_other_and_not_the_acceptor() -> None:
+    faults = iter([RuntimeError("planted")])
+    served: asyncio.Queue[asyncio.Protocol] = asyncio.Queue()
+
+    def factory() -> asyncio.Protocol:
+        for fault in faults:
+            raise fault
+        served.put_nowait(protocol := asyncio.Protocol())
+        return protocol
+
+    listener, failures = listening_socket("127.0.0.1", 0), list[bool]()
+    acceptor = LinkAcceptor(listener, None, factory, lambda: failures.append(True), max_handshakes=1)
+    async with asyncio.TaskGroup() as tasks, asyncio.timeout(PATIENCE):
+        tasks.create_task(acceptor.run())
+        reader, unlucky = await asyncio.open_connection(*listener.getsockname()[:2])
+        assert await reader.read() == b""
+        _, lucky = await asyncio.open_connection(*listener.getsockname()[:2])
+        await served.get()
+        assert failures == [True]
+        for each in (unlucky, lucky):
+            each.transport.abort()
+        await acceptor.close()

@@ -2,6 +2,7 @@
 
 import asyncio
 import contextlib
+import logging
 import socket
 import ssl
 from collections.abc import Callable
@@ -11,6 +12,8 @@ from lockstep.robot_bridge.link.applicants import Applicants
 from lockstep.robot_bridge.link.known_addresses import KnownAddresses
 
 __all__ = ["LinkAcceptor", "listening_socket"]
+
+_logger = logging.getLogger(__name__)
 
 HANDSHAKE_TIMEOUT = 2.0  # s
 SILENCE = 4.0  # s that a TLS client may take for its first record
@@ -184,6 +187,11 @@ class LinkAcceptor:
         except asyncio.CancelledError:
             self._failed()
             raise
+        except Exception as error:  # a fault in one connection must not end the bridge, which takes others
+            _logger.error("a connection to the robot link failed: %r", error, exc_info=error)
+            self._failed()
+            with contextlib.suppress(OSError):
+                connection.close()
 
 
 def _close_if_cancelled(connection: socket.socket, task: asyncio.Task[None]) -> None:
