@@ -28,6 +28,7 @@ REAL = (
     "lockstep.bench.quality.stage",
     "lockstep.bench.relay.stage",
     "lockstep.bench.harness.stack",
+    "lockstep.bench.harness.tcp_path",
     "lockstep.client.console",
     "lockstep.client.transport.webrtc_peer",
     "httpx",

@@ -3,7 +3,7 @@
 from lockstep.client.control.command_gate import CommandGate
 from lockstep.client.control.command_sender import CommandSender
 from lockstep.protocol.messages import Command, Rest
-from tests.client.helpers import feedback
+from tests.makers import feedback
 
 FAST = [1.0]
 NEUTRAL = [0.0]

@@ -7,8 +7,8 @@ import pytest
 from lockstep.client.control.command_gate import CommandGate
 from lockstep.client.control.command_sender import CommandSender
 from lockstep.protocol.messages import Command, StopState
-from tests.client.helpers import feedback, refusal
 from tests.client.vectors import load_vectors
+from tests.makers import feedback, refusal
 
 CASES = load_vectors("driving.json")["cases"]
 NEUTRAL = [0.0]

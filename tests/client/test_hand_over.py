@@ -12,13 +12,13 @@ from lockstep.client import CommandRefused, Console, SeatRefused
 from lockstep.protocol.serial import event_after
 from tests.client.truth import until_logged
 from tests.support.stack import Stack
+from tests.waiting import PATIENCE
 
 pytestmark = pytest.mark.asyncio(loop_scope="module")
 
 FIRST = [0.2, 0.0, 0.0]  # what each driver sends tells the log who drove
 SECOND = [0.0, 0.1, 0.0]
 NEUTRAL = [0.0, 0.0, 0.0]
-PATIENCE = 20.0  # s
 
 
 def _console(link: str, name: str) -> Console:

@@ -6,8 +6,8 @@ import pytest
 
 from lockstep.client.control.command_gate import CommandGate
 from lockstep.client.control.command_sender import CommandSender
-from tests.client.helpers import feedback
 from tests.client.vectors import load_vectors
+from tests.makers import feedback
 
 CASES: list[dict[str, Any]] = load_vectors("learning.json")["cases"]
 MOVING = [1.0]

@@ -2,8 +2,8 @@
 
 from lockstep.client.control.command_sender import ECHO, ECHOES, LOSSY_SPELL, SALVO, SALVO_SPACING
 from lockstep.client.control.repeat_timer import FLOOR, INITIAL
-from tests.client.helpers import feedback
 from tests.client.senders import FAST, commands, flying, new_sender
+from tests.makers import feedback
 
 
 def test_a_repeat_gives_no_sample_of_the_round_trip() -> None:

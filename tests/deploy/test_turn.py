@@ -19,10 +19,10 @@ from aioice import stun, turn
 from lockstep.bench.harness.free_port import free_port
 from lockstep.bench.harness.processes import started
 from lockstep.rtc.interfaces import own_addresses
+from tests.waiting import PATIENCE
 
 START_TURN = Path(__file__).resolve().parents[2] / "deploy" / "start-turn"
 SECRET, REALM = "only for tests, only on this machine", "lockstep.test"
-PATIENCE = 30.0
 TCP, UDP = 0x06000000, 0x11000000  # REQUESTED-TRANSPORT
 FORBIDDEN = 403
 

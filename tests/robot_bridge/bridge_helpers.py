@@ -27,6 +27,7 @@ from lockstep.robot_bridge.link.link_client import RobotLink
 from lockstep.robot_bridge.robots.base import MediaSource
 from lockstep.robot_bridge.robots.planar.robot import PlanarRobot, PlanarState
 from lockstep.robot_bridge.settings import BridgeSettings
+from tests.waiting import PATIENCE
 
 __all__ = [
     "Addressed",
@@ -44,7 +45,6 @@ __all__ = [
 
 Kind = TypeVar("Kind", bound=LinkMessage)
 
-PATIENCE = 20.0  # s; a busy machine, never waited for in full
 RESET_AGAIN = 0.1  # s between two tries to reset a stop that is too new
 
 

@@ -6,9 +6,9 @@ import sys
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 
-__all__ = ["flooding"]
+from tests.waiting import PATIENCE
 
-PATIENCE = 20.0  # s
+__all__ = ["flooding"]
 
 
 @asynccontextmanager

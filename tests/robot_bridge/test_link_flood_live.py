@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from lockstep.bench.harness.tcp_path import TcpPath
 from lockstep.protocol.errors import LinkLost
 from lockstep.protocol.framing import frame
 from lockstep.protocol.link_secret import LinkSecret
@@ -24,48 +25,6 @@ SECRET = LinkSecret.draw()
 DELAY = 0.05  # s each way between console and bridge
 FLOOD = 640  # connections a second
 OPEN = 400  # connections that the flood keeps open; the bridge closes most of them
-
-
-class SlowPath:
-    """TCP to a bridge that takes a while each way, like a network."""
-
-    def __init__(self, to: tuple[str, int]) -> None:
-        self._to = to
-        self._tasks: set[asyncio.Task[None]] = set()
-        self._server: asyncio.Server | None = None
-        self.address = ("", 0)
-
-    async def __aenter__(self) -> "SlowPath":
-        self._server = await asyncio.start_server(self._carry, "127.0.0.1", 0)
-        self.address = self._server.sockets[0].getsockname()[:2]
-        return self
-
-    async def __aexit__(self, *_: object) -> None:
-        assert self._server is not None
-        self._server.close()
-        for task in self._tasks:
-            task.cancel()
-        await asyncio.gather(*self._tasks, return_exceptions=True)
-
-    async def _carry(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-        task = asyncio.current_task()
-        assert task is not None
-        self._tasks.add(task)
-        there_reader, there_writer = await asyncio.open_connection(*self._to)
-        try:
-            with contextlib.suppress(ConnectionError):
-                await asyncio.gather(_later(reader, there_writer), _later(there_reader, writer))
-        finally:
-            for each in (writer, there_writer):
-                each.transport.abort()
-            self._tasks.discard(task)
-
-
-async def _later(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-    while data := await reader.read(65536):
-        await asyncio.sleep(DELAY)
-        writer.write(data)
-    writer.close()
 
 
 FLOODING = """
@@ -101,11 +60,11 @@ def flood(address: tuple[str, int], host: str, says: bytes) -> AbstractAsyncCont
     return flooding(FLOODING, host, str(address[1]), str(FLOOD), str(OPEN), says.hex())
 
 
-async def _opens(path: SlowPath, trust: ssl.SSLContext | None) -> bool:
+async def _opens(path: TcpPath, trust: ssl.SSLContext | None) -> bool:
     """At the first try, or on a machine that is slower than the flood at the third: a console tries again at once."""
     for _ in range(3):
         with contextlib.suppress(LinkLost):
-            async with RobotLink(*path.address, "operator", secret=SECRET, tls=trust) as link:
+            async with RobotLink("127.0.0.1", path.port, "operator", secret=SECRET, tls=trust) as link:
                 return link.connected
     return False
 
@@ -126,7 +85,7 @@ async def test_a_console_gets_its_link_every_time(tls: bool, host: str, says: by
     settings = BridgeSettings(port=0, secret=SECRET, tls=bridge_tls)
     async with (
         Bridge(RecordingRobot(), settings) as bridge,
-        SlowPath(bridge.address) as path,
+        TcpPath((bridge.address[0], bridge.address[1]), delay=DELAY) as path,
         flood(bridge.address, host, says),
     ):
         async with asyncio.timeout(40):

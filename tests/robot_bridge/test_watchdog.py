@@ -27,9 +27,9 @@ from lockstep.robot_bridge.watchdog.watchdog_process import LAST_ACTS, LEAVING, 
 from lockstep.robot_bridge.watchdog.watchdog_thread import WatchdogThread
 from lockstep.robot_bridge.watchdog.watchdogs import Watchdogs
 from tests.robot_bridge.bridge_helpers import NEUTRAL, Operator, RecordingRobot, log_lines, operator, running_bridge
+from tests.waiting import PATIENCE
 
 LIMIT = 0.1  # s
-PATIENCE = 20.0  # s
 FAST = 0.2  # m/s
 
 

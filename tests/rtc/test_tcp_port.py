@@ -14,9 +14,9 @@ from lockstep.rtc.ice.tcp import TcpFraming, frame
 from lockstep.rtc.peer_events import Connected, PeerEnded, PeerEvent
 from lockstep.rtc.sdp import SessionDescription, parse_description, write_description
 from lockstep.rtc.tcp_port import TcpPort, TcpPortSettings
+from tests.waiting import PATIENCE
 
 HOST = "127.0.0.1"
-PATIENCE = 20.0  # s
 
 
 async def until(connection: Connection, wanted: type[PeerEvent]) -> PeerEvent:

@@ -17,13 +17,14 @@ from pathlib import Path
 from random import Random
 from typing import Any, TypeVar
 
+from lockstep.bench.harness.tcp_path import TcpPath
 from lockstep.client.console import Console
 from lockstep.client.errors import ConnectFailed, ConsoleLost
 from lockstep.server.robot.console_name import console_name
 from tests.robot_bridge.bridge_model import MotionWitness
 from tests.server.rig import PATIENCE
 
-__all__ = ["ConsoleProcess", "Judge", "LinkPath", "Player", "Robot"]
+__all__ = ["ConsoleProcess", "Judge", "Player", "Robot"]
 
 START_SECONDS = 40.0  # a busy machine that imports everything
 END_SECONDS = 30.0
@@ -31,51 +32,6 @@ LITTLE = 40  # bytes of a file that still fit on a full disk
 LOST_AFTER = 1.5  # s of a console's silence
 
 Result = TypeVar("Result")
-
-
-class LinkPath:
-    """Stands between the console and the bridge, which has another port after each start."""
-
-    def __init__(self) -> None:
-        self.target = 0
-        self.port = 0
-        self.away = False  # nothing comes through
-        self._ends: set[asyncio.StreamWriter] = set()
-        self._tasks: set[asyncio.Task[None]] = set()
-
-    async def close(self) -> None:
-        self.away = True
-        self.cut()
-        await asyncio.gather(*self._tasks, return_exceptions=True)
-
-    def cut(self) -> None:
-        for end in self._ends:
-            end.transport.abort()
-
-    def accept(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-        task = asyncio.get_running_loop().create_task(self._join(reader, writer), name="link path")
-        self._tasks.add(task)
-        task.add_done_callback(self._tasks.discard)
-
-    async def _join(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-        self._ends.add(writer)
-        try:
-            other_reader, other = await asyncio.open_connection("127.0.0.1", self.target)
-        except OSError:
-            writer.transport.abort()
-            return
-        self._ends.add(other)
-        if self.away:
-            self.cut()
-        await asyncio.gather(self._pass_on(reader, other), self._pass_on(other_reader, writer))
-
-    async def _pass_on(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-        with suppress(OSError):
-            while data := await reader.read(1 << 16):
-                writer.write(data)
-                await writer.drain()
-        writer.transport.abort()
-        self._ends.discard(writer)
 
 
 class FailingDisk:
@@ -118,7 +74,7 @@ class FailingDisk:
 class Robot:
     """A bridge, whose state folder and records outlive its process."""
 
-    def __init__(self, directory: Path, path: LinkPath) -> None:
+    def __init__(self, directory: Path, path: TcpPath) -> None:
         self.records: list[dict[str, Any]] = []  # of all runs but those of media, with a line "ended" after each
         self.numbers: dict[str, set[int]] = {}  # of each press; more than one where a disk has not kept it
         self.held: tuple[int, float] | None = None  # number and time of the newest stop, while one holds
@@ -145,7 +101,7 @@ class Robot:
         self.disk.mend()
         address = await self._launch()
         assert address, "the bridge did not start"
-        self._path.target = int(address.rpartition(":")[2])
+        self._path.target = ("127.0.0.1", int(address.rpartition(":")[2]))
 
     async def _launch(self) -> str:
         """Records come through a pipe, so that they are seen as they come and take no part in what a disk does."""
@@ -239,7 +195,7 @@ async def ended(process: Process, name: str) -> None:
 class ConsoleProcess:
     """`lockstep serve` on the same port and the same state folder in every run."""
 
-    def __init__(self, directory: Path, path: LinkPath) -> None:
+    def __init__(self, directory: Path, path: TcpPath) -> None:
         self.links: dict[str, str] = {}
         self.output: list[str] = []
         directory.mkdir()

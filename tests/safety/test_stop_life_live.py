@@ -17,6 +17,7 @@ from typing import Any, NamedTuple
 import httpx
 import pytest
 
+from lockstep.bench.harness.tcp_path import TcpPath
 from lockstep.client.console import Console
 from lockstep.client.errors import CommandRefused, SeatRefused, StopUnconfirmed
 from lockstep.protocol.errors import LinkRefused
@@ -24,7 +25,7 @@ from lockstep.protocol.messages import Command, Feedback, LinkMessage, Refusal
 from lockstep.protocol.serial import event_after
 from lockstep.robot_bridge.link.link_client import RobotLink
 from lockstep.robot_bridge.stop.stop_latch import LEAST_STOP
-from tests.safety.live_world import ConsoleProcess, Judge, LinkPath, Player, Robot
+from tests.safety.live_world import ConsoleProcess, Judge, Player, Robot
 from tests.server.rig import PATIENCE
 
 # Steps with a + between them run at the same time.
@@ -77,7 +78,7 @@ class Told(NamedTuple):
 class Session:
     """The steps; each returns when what it brings about has come."""
 
-    def __init__(self, random: Random, console: ConsoleProcess, robot: Robot, path: LinkPath) -> None:
+    def __init__(self, random: Random, console: ConsoleProcess, robot: Robot, path: TcpPath) -> None:
         self.told: list[Told] = []
         self.kept: list[str] = []  # presses that the console promised to send later
         self._random = random
@@ -136,7 +137,7 @@ class Session:
         async with asyncio.timeout(PATIENCE):
             while True:
                 with suppress(LinkRefused):  # until the bridge knows that the other is gone
-                    async with RobotLink("127.0.0.1", self._path.target, "operator", name=self._console.name) as link:
+                    async with RobotLink(*self._path.target, "operator", name=self._console.name) as link:
                         yield link
                         return
                 await asyncio.sleep(0.02)
@@ -319,14 +320,10 @@ async def _forward(console: Console, speed: float) -> Feedback:
 @asynccontextmanager
 async def running_session(directory: Path, random: Random) -> AsyncIterator[tuple[Session, Robot]]:
     async with AsyncExitStack() as stack:
-        path = LinkPath()
+        path = await stack.enter_async_context(TcpPath(("127.0.0.1", 0)))
         robot = Robot(directory, path)
         await robot.start()
         stack.push_async_callback(robot.end, signal.SIGTERM)
-        server = await asyncio.start_server(path.accept, "127.0.0.1", 0)
-        stack.push_async_callback(path.close)
-        stack.callback(server.close)
-        path.port = server.sockets[0].getsockname()[1]
         console = ConsoleProcess(directory / "console", path)
         await console.start()
         stack.push_async_callback(console.end, signal.SIGTERM)

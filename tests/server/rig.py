@@ -28,6 +28,7 @@ from lockstep.server.peers.webrtc_peer import WebRtcPeer
 from lockstep.server.settings import Settings
 from lockstep.server.state.dependencies import Dependencies
 from lockstep.server.state.persistent_state import open_state
+from tests.waiting import PATIENCE, eventually
 
 __all__ = [
     "PATIENCE",
@@ -41,7 +42,6 @@ __all__ = [
     "stop_words",
 ]
 
-PATIENCE = 30.0  # s; a busy machine, never waited for in full
 HELD_UP = ("late", "not_neutral", "unseen")  # refusals that follow when a busy machine held the robot or us up
 
 
@@ -188,13 +188,6 @@ class TestPeer:
             opened = asyncio.Event()
             channel.on("open", opened.set)
             await opened.wait()
-
-
-async def eventually(state: Callable[[], bool], seconds: float = PATIENCE) -> None:
-    """Returns once `state` holds; for metrics and other values that have no event to wait for."""
-    async with asyncio.timeout(seconds):
-        while not state():  # noqa: ASYNC110
-            await asyncio.sleep(0.01)
 
 
 def stop_words(stop: StopState) -> tuple[str, str] | None:

@@ -1,13 +1,9 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lockstep.protocol.messages import Feedback, StopState
 from lockstep.protocol.serial import FIRST_EVENT, MAX_EVENT, event_gap
 from lockstep.server.event_clock import HISTORY, EventClock
-
-
-def _feedback(event: int, issue: int = 1, *, stopped: bool = False) -> Feedback:
-    return Feedback(event=event, issue=issue, time=0.0, axes=[], stop=StopState(stopped=stopped))
+from tests.makers import feedback
 
 
 def test_before_the_first_feedback_nothing_is_known() -> None:
@@ -20,7 +16,7 @@ def test_before_the_first_feedback_nothing_is_known() -> None:
 def test_another_epoch_starts_anew_and_the_same_goes_on() -> None:
     clock = EventClock()
     assert clock.begin("a")
-    clock.observe(_feedback(7, stopped=True), 1.0)
+    clock.observe(feedback(7, stopped=True), 1.0)
     assert not clock.begin("a")
     assert clock.event == 7
     assert clock.stop.stopped
@@ -31,27 +27,27 @@ def test_another_epoch_starts_anew_and_the_same_goes_on() -> None:
 
 def test_the_same_event_measured_again_is_news_once() -> None:
     clock = EventClock()
-    assert clock.observe(_feedback(7, 1), 0.0)
-    assert clock.observe(_feedback(7, 2), 0.0)
-    assert not clock.observe(_feedback(7, 2), 0.0)
-    assert not clock.observe(_feedback(7, 1), 0.0)
+    assert clock.observe(feedback(7, 1), 0.0)
+    assert clock.observe(feedback(7, 2), 0.0)
+    assert not clock.observe(feedback(7, 2), 0.0)
+    assert not clock.observe(feedback(7, 1), 0.0)
 
 
 @given(st.integers(1, MAX_EVENT), st.lists(st.tuples(st.integers(-3, 3), st.integers(1, 5))))
 def test_the_reference_never_goes_back(start: int, steps: list[tuple[int, int]]) -> None:
     clock, last = EventClock(), start
-    clock.observe(_feedback(start), 0.0)
+    clock.observe(feedback(start), 0.0)
     for now, (step, issue) in enumerate(steps):
-        clock.observe(_feedback((last + step - 1) % MAX_EVENT + 1, issue), float(now))
+        clock.observe(feedback((last + step - 1) % MAX_EVENT + 1, issue), float(now))
         assert event_gap(clock.event, last) >= 0
         last = clock.event
 
 
 def test_a_medium_is_stamped_with_what_held_then() -> None:
     clock = EventClock()
-    clock.observe(_feedback(5), 1.0)
-    clock.observe(_feedback(5, 2), 1.5)
-    clock.observe(_feedback(6), 2.0)
+    clock.observe(feedback(5), 1.0)
+    clock.observe(feedback(5, 2), 1.5)
+    clock.observe(feedback(6), 2.0)
     assert clock.reference_at(0.9) is None
     assert clock.reference_at(1.0) == 5
     assert clock.reference_at(1.99) == 5
@@ -61,6 +57,6 @@ def test_a_medium_is_stamped_with_what_held_then() -> None:
 def test_only_so_much_history_is_kept() -> None:
     clock = EventClock()
     for event in range(1, HISTORY + 2):
-        clock.observe(_feedback(event), float(event))
+        clock.observe(feedback(event), float(event))
     assert clock.reference_at(1.5) is None
     assert clock.reference_at(2.5) == 2

@@ -12,10 +12,9 @@ from types import TracebackType
 import redis.asyncio
 
 from lockstep.bench.harness.free_port import free_port
+from tests.waiting import PATIENCE
 
 __all__ = ["RedisServer"]
-
-PATIENCE = 20.0  # s
 
 
 class RedisServer:

@@ -9,8 +9,8 @@ from lockstep.client.control.repeat_timer import INITIAL
 from lockstep.client.control.resting import SETTLE
 from lockstep.protocol.messages import Command, Feedback, Rest, StopState
 from lockstep.protocol.serial import MAX_EVENT, event_after
-from tests.client.helpers import feedback, refusal
 from tests.client.senders import FAST, NEUTRAL, commands, flying, new_sender, rests
+from tests.makers import feedback, refusal
 
 
 def test_an_intention_leaves_at_once_and_its_feedback_is_its_outcome() -> None:

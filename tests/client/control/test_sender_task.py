@@ -7,7 +7,7 @@ from lockstep.client.control.command_sender import CommandSender
 from lockstep.client.control.sender_task import Driver
 from lockstep.client.errors import CommandRefused, ConsoleLost
 from lockstep.protocol.messages import Command, Rest
-from tests.client.helpers import feedback, refusal
+from tests.makers import feedback, refusal
 
 SECONDS = 20
 

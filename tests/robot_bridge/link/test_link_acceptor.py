@@ -13,8 +13,7 @@ from lockstep.robot_bridge.link.known_addresses import KnownAddresses
 from lockstep.robot_bridge.link.link_acceptor import LinkAcceptor, listening_socket
 from lockstep.robot_bridge.link.link_tls import LinkTls
 from tests.support.certificates import Authority
-
-PATIENCE = 20.0  # s
+from tests.waiting import PATIENCE
 
 
 class Tls:

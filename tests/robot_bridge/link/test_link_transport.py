@@ -4,7 +4,6 @@ import asyncio
 
 from lockstep.protocol.framing import FrameReader, frame
 from lockstep.protocol.messages import (
-    Feedback,
     Goodbye,
     Hello,
     LinkMessage,
@@ -18,6 +17,7 @@ from lockstep.protocol.messages import (
 from lockstep.robot_bridge.link.link_session import BadInput, BridgeSession
 from lockstep.robot_bridge.link.link_transport import LinkTransport
 from lockstep.robot_bridge.link.message_rate import MessageRate
+from tests.makers import feedback
 
 HELLO = Hello(role="robot", epoch="e1")
 
@@ -87,10 +87,6 @@ class Endpoint(LinkTransport):
         for _ in range(round(seconds / 0.05)):
             self.now += 0.05
             self.tick()
-
-
-def feedback(event: int) -> Feedback:
-    return Feedback(event=event, issue=1, time=0.0, axes=[])
 
 
 def picture(stamp: int) -> Media:

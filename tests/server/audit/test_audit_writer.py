@@ -5,8 +5,7 @@ import pytest
 
 from lockstep.server.audit.audit_writer import MAX_WAITING, AuditWriter
 from lockstep.server.audit.records import AuditRecord
-
-PATIENCE = 20.0  # s
+from tests.waiting import PATIENCE
 
 
 class FakeFile:

@@ -23,9 +23,9 @@ from lockstep.server.settings import Settings
 from lockstep.server.state.persistent_state import open_state
 from lockstep.server.util.state_dir import StateDir, StateDirUnusable
 from tests.support.stack import running_stack
+from tests.waiting import PATIENCE
 
 LOCKSTEP = str(Path(sys.executable).with_name("lockstep"))
-PATIENCE = 30.0  # s
 
 
 def _lockstep(directory: Path, *arguments: str) -> Result:

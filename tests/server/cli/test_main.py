@@ -19,9 +19,9 @@ from typer.testing import CliRunner
 
 from lockstep.server.cli.main import LOADERS, app
 from tests.support.stack import running_fleet, running_stack
+from tests.waiting import PATIENCE
 
 LOCKSTEP = str(Path(sys.executable).with_name("lockstep"))
-PATIENCE = 30.0  # s
 
 
 async def _run(*arguments: str) -> tuple[int, str, str]:

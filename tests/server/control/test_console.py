@@ -36,6 +36,7 @@ from lockstep.server.settings import Settings
 from lockstep.server.stop.stop_keeper import StopKeeper
 from lockstep.server.telemetry.metrics import Metrics
 from lockstep.server.util.fair_queue import FairQueue
+from tests.makers import feedback
 from tests.server.rig import PATIENCE
 
 ROBOT = RobotDescription(name="r", label="R", axes=())
@@ -53,10 +54,6 @@ class FakePlane:
 
     def feed(self, media: Media, now: float) -> None:
         self.fed += 1
-
-
-def _feedback(event: int) -> Feedback:
-    return Feedback(event=event, issue=1, time=0.0, axes=[])
 
 
 def _console(settings: Settings, metrics: Metrics, stops: StopKeeper, events: SessionEvents | None = None) -> Console:
@@ -211,10 +208,10 @@ def test_what_the_old_bridge_said_last_is_not_taken_for_the_new_ones() -> None:
     connection, host = _connection()
     connection.link_opened("operator", "a", ROBOT)
     connection.link_opened("media", "b", ROBOT)
-    connection.link_received("operator", _feedback(900))
+    connection.link_received("operator", feedback(900))
     connection.link_closed("operator", "lost")
     connection.link_opened("operator", "b", ROBOT)
-    connection.link_received("operator", _feedback(1))
+    connection.link_received("operator", feedback(1))
     assert host.calls == ["epoch a", "up", "epoch b", "down lost", "up", "feedback 1"]
 
 
@@ -232,7 +229,7 @@ def test_each_kind_of_message_goes_its_way() -> None:
     connection, host = _connection()
     connection.link_opened("operator", "a", ROBOT)
     messages: list[LinkMessage] = [
-        _feedback(1),
+        feedback(1),
         Refusal(event=1, reason="late", current=1),
         Media(stream="x", codec="mjpeg", stamp=1, time=0.0, payload=b""),
     ]

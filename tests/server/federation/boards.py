@@ -15,10 +15,9 @@ from lockstep.server.federation.redis_board import RedisBoard
 from lockstep.server.federation.robot_summary import Tile
 from lockstep.server.stop.stop_presses import Press
 
-__all__ = ["KEY", "FakeHost", "FakeLinks", "TestBoard", "eventually", "running_board", "tile"]
+__all__ = ["KEY", "FakeHost", "FakeLinks", "TestBoard", "running_board", "tile"]
 
 KEY = "k" * 32
-PATIENCE = 30.0  # s; a busy machine, never waited for in full
 
 
 def tile(name: str = "left", **more: object) -> Tile:
@@ -99,9 +98,3 @@ async def running_board(url: str, name: str, *robots: Tile, key: str = KEY) -> A
             yield board
         finally:
             running.cancel()
-
-
-async def eventually(true: Callable[[], object], what: str) -> None:
-    async with asyncio.timeout(PATIENCE):
-        while not true():  # noqa: ASYNC110
-            await asyncio.sleep(0.02)

@@ -11,8 +11,9 @@ from structlog.testing import capture_logs
 from lockstep.server.audit.records import Actor, AuditRecord
 from lockstep.server.federation import redis_board
 from lockstep.server.stop.stop_presses import new_press
-from tests.server.federation.boards import eventually, running_board, tile
+from tests.server.federation.boards import running_board, tile
 from tests.support.redis_server import RedisServer
+from tests.waiting import eventually
 
 ANN = Actor("Ann", "operator", "peer", "link")
 PRESS = "5f" * 16
@@ -26,12 +27,12 @@ async def server(tmp_path: Path) -> AsyncIterator[RedisServer]:
 
 async def test_each_console_sees_the_others_robots_and_their_changes_at_once(server: RedisServer) -> None:
     async with running_board(server.url, "one", tile("left")) as one, running_board(server.url, "two") as two:
-        await eventually(two.others, "the robot of the other console")
+        await eventually(two.others)
         seen = two.others()[0]
         assert (seen.name, seen.url, seen.console) == ("left", "https://one.example/robots/left/", one.name)
         assert two.state.unknown_since is None
         one.publish([tile("left", driver="Ann", stopped=True, event=12)])
-        await eventually(lambda: two.others()[0].driver == "Ann", "the driver")
+        await eventually(lambda: two.others()[0].driver == "Ann")
         assert two.others()[0].stopped
         assert one.others() == []
 
@@ -39,8 +40,8 @@ async def test_each_console_sees_the_others_robots_and_their_changes_at_once(ser
 async def test_a_console_that_ends_in_good_order_takes_its_robots_with_it(server: RedisServer) -> None:
     async with running_board(server.url, "two") as two:
         async with running_board(server.url, "one", tile("left")):
-            await eventually(two.others, "the robot")
-        await eventually(lambda: not two.others(), "its end")
+            await eventually(two.others)
+        await eventually(lambda: not two.others())
 
 
 async def test_a_stop_reaches_the_robot_of_another_console_once_and_is_answered(server: RedisServer) -> None:
@@ -48,7 +49,7 @@ async def test_a_stop_reaches_the_robot_of_another_console_once_and_is_answered(
         running_board(server.url, "one", tile("left"), tile("right")) as one,
         running_board(server.url, "two", tile("far")) as two,
     ):
-        await eventually(lambda: len(two.others()) == 2, "the robots")
+        await eventually(lambda: len(two.others()) == 2)
         one.host.away.add("right")
         answers = await two.stop(["left", "right"], new_press(ANN, "http", "smoke", PRESS))
         assert one.host.stops == [("left", "Ann", "smoke"), ("right", "Ann", "smoke")]
@@ -63,12 +64,12 @@ async def test_a_stop_that_nobody_answers_is_said_to_be_not_confirmed(
 ) -> None:
     monkeypatch.setattr(redis_board, "STOP_PATIENCE", 0.5)
     async with running_board(server.url, "two") as two:
-        await eventually(lambda: two.state.unknown_since is None, "the board")
+        await eventually(lambda: two.state.unknown_since is None)
         answers = await two.stop(["left"], new_press(ANN, "http", ""))
         assert answers["left"][:2] == (False, False)
         assert answers["left"].detail == "not confirmed: no console has this robot"
         server.kill()
-        await eventually(lambda: two.state.unknown_since is not None, "the loss")
+        await eventually(lambda: two.state.unknown_since is not None)
         answers = await two.stop(["left"], new_press(ANN, "http", ""))
         assert answers["left"].detail.startswith("not confirmed: other consoles are unknown (unreachable")
 
@@ -78,12 +79,12 @@ async def test_a_flood_of_stops_keeps_nobody_elses_stop_from_the_robot(
 ) -> None:
     monkeypatch.setattr(redis_board, "MAX_STOPS", 1)
     async with running_board(server.url, "one", tile("left")) as one, running_board(server.url, "two") as two:
-        await eventually(two.others, "the robot")
+        await eventually(two.others)
         flood = asyncio.create_task(two.stop(["nobodys"], new_press(Actor("Mallory"), "http", "")))
         await asyncio.sleep(0)
         answers = await two.stop(["left"], new_press(ANN, "http", "smoke"))
         assert not answers["left"].confirmed
-        await eventually(lambda: one.host.stops == [("left", "Ann", "smoke")], "the stop")
+        await eventually(lambda: one.host.stops == [("left", "Ann", "smoke")])
         flood.cancel()
 
 
@@ -112,35 +113,35 @@ async def test_a_link_that_is_revoked_at_one_console_is_revoked_at_the_others_al
     server: RedisServer,
 ) -> None:
     async with running_board(server.url, "one") as one, running_board(server.url, "two") as two:
-        await eventually(lambda: two.state.unknown_since is None, "the board")
+        await eventually(lambda: two.state.unknown_since is None)
         one.links.revoke("abc")
-        await eventually(lambda: "abc" in two.links.elsewhere, "the revocation")
+        await eventually(lambda: "abc" in two.links.elsewhere)
         assert "abc" not in one.links.elsewhere
     async with running_board(server.url, "three") as three:
-        await eventually(lambda: "abc" in three.links.elsewhere, "the revocation, afterwards")
+        await eventually(lambda: "abc" in three.links.elsewhere)
 
 
 async def test_a_revocation_while_redis_was_away_comes_when_it_is_back_and_a_lost_list_is_made_again(
     server: RedisServer,
 ) -> None:
     async with running_board(server.url, "one") as one, running_board(server.url, "two") as two:
-        await eventually(lambda: one.state.unknown_since is None and two.state.unknown_since is None, "the board")
+        await eventually(lambda: one.state.unknown_since is None and two.state.unknown_since is None)
         one.links.revoke("early")
-        await eventually(lambda: "early" in two.links.elsewhere, "the first")
+        await eventually(lambda: "early" in two.links.elsewhere)
         server.kill()
-        await eventually(lambda: one.state.unknown_since is not None, "the loss")
+        await eventually(lambda: one.state.unknown_since is not None)
         one.links.revoke("late")
         await server.start()
-        await eventually(lambda: "late" in two.links.elsewhere, "the second")
+        await eventually(lambda: "late" in two.links.elsewhere)
     async with running_board(server.url, "three") as three:
-        await eventually(lambda: three.links.elsewhere.keys() == {"early", "late"}, "both")
+        await eventually(lambda: three.links.elsewhere.keys() == {"early", "late"})
 
 
 async def test_two_living_consoles_that_claim_one_robot_both_say_so_and_the_log_does(server: RedisServer) -> None:
     with capture_logs() as logs:
         async with running_board(server.url, "one", tile("left")) as one:
             async with running_board(server.url, "two", tile("left")) as two:
-                await eventually(lambda: one.state.conflicts and two.state.conflicts, "the conflict")
+                await eventually(lambda: one.state.conflicts and two.state.conflicts)
                 (conflict,) = one.state.conflicts
                 assert conflict == two.state.conflicts[0]
                 assert (conflict.error, conflict.robot) == ("robot_claimed_twice", "left")
@@ -148,8 +149,8 @@ async def test_two_living_consoles_that_claim_one_robot_both_say_so_and_the_log_
                 assert two.others() == [], "an own robot is not shown as somebody else's too"
                 answers = await two.stop(["left"], new_press(ANN, "http", ""))
                 assert answers["left"].confirmed
-                await eventually(lambda: _named(logs) == 2, "both logs")
-            await eventually(lambda: not one.state.conflicts, "the end of it")
+                await eventually(lambda: _named(logs) == 2)
+            await eventually(lambda: not one.state.conflicts)
 
 
 def _named(logs: Sequence[Mapping[str, object]]) -> int:
@@ -163,6 +164,6 @@ async def test_whom_one_console_silences_the_others_silence_too_and_hear_again_w
         running_board(server.url, "two", tile("far")) as two,
     ):
         one.host.silenced = {"link": until}
-        await eventually(lambda: two.host.elsewhere.get(one.id) == {"link": until}, "the silence")
+        await eventually(lambda: two.host.elsewhere.get(one.id) == {"link": until})
         one.host.silenced = {}
-        await eventually(lambda: two.host.elsewhere.get(one.id) == {}, "its end")
+        await eventually(lambda: two.host.elsewhere.get(one.id) == {})

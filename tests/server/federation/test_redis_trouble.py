@@ -15,9 +15,10 @@ from lockstep.server.federation.messages import MAX_PUBLISHED, Published, pack_p
 from lockstep.server.federation.redis_private import LARGEST
 from lockstep.server.federation.robot_summary import within_bounds
 from lockstep.server.stop.stop_presses import new_press
-from tests.server.federation.boards import KEY, eventually, running_board, tile
+from tests.server.federation.boards import KEY, running_board, tile
 from tests.support.certificates import Authority
 from tests.support.redis_server import RedisServer
+from tests.waiting import eventually
 
 ANN = Actor("Ann", "operator")
 NOTE = AuditRecord(n=1, time=1.0, kind="note")
@@ -42,19 +43,19 @@ async def test_a_hung_redis_is_named_and_what_was_known_of_others_turns_unknown_
     server: RedisServer,
 ) -> None:
     async with running_board(server.url, "one", tile("left")) as one, running_board(server.url, "two") as two:
-        await eventually(lambda: one.state.unknown_since is None and two.others(), "the robot")
+        await eventually(lambda: one.state.unknown_since is None and two.others())
         server.hang()
-        await eventually(lambda: two.state.unknown_since is not None and two.others()[0].link == "unknown", "the loss")
+        await eventually(lambda: two.state.unknown_since is not None and two.others()[0].link == "unknown")
         assert two.state.detail.startswith("silent: ")
         assert two.others()[0].name == "left"
         assert not (await two.audit(1)).complete
         server.go_on()
-        await eventually(lambda: two.state.unknown_since is None and two.others()[0].link == "up", "its return")
+        await eventually(lambda: two.state.unknown_since is None and two.others()[0].link == "up")
 
 
 async def test_a_board_ends_while_redis_hangs(server: RedisServer) -> None:
     async with running_board(server.url, "one", tile("left")) as one:
-        await eventually(lambda: one.state.unknown_since is None, "the board")
+        await eventually(lambda: one.state.unknown_since is None)
         server.hang()
 
 
@@ -63,27 +64,27 @@ async def test_a_wrong_password_is_named_and_never_shown(tmp_path: Path) -> None
         wrong = f"redis://:{PASSWORD}-not@127.0.0.1:{server.port}/0"
         with capture_logs() as logs:
             async with running_board(wrong, "one") as one:
-                await eventually(lambda: one.state.detail.startswith("refused"), "the refusal")
+                await eventually(lambda: one.state.detail.startswith("refused"))
                 await one.stop(["left"], new_press(ANN, "http", ""))
                 shown = f"{one.state} {logs}"
             assert one.count("lockstep_board_failures_total", reason="refused") >= 1
             assert PASSWORD not in shown
             async with running_board(server.url, "two") as two:
-                await eventually(lambda: two.state.unknown_since is None, "the right one")
+                await eventually(lambda: two.state.unknown_since is None)
         assert PASSWORD not in str(logs)
 
 
 async def test_a_full_redis_keeps_others_known_and_says_that_this_console_is_not_shown(server: RedisServer) -> None:
     async with running_board(server.url, "one", tile("left")) as one, running_board(server.url, "two") as two:
-        await eventually(lambda: two.others() and one.state.unknown_since is None, "the robot")
+        await eventually(lambda: two.others() and one.state.unknown_since is None)
         async with server.client() as client:
             await client.config_set("maxmemory", "1")
             two.record("far", NOTE)
-            await eventually(lambda: "full" in two.state.detail, "the trouble")
+            await eventually(lambda: "full" in two.state.detail)
             assert two.state.unknown_since is None
             assert not (await two.audit(1)).complete
             await client.config_set("maxmemory", "0")
-        await eventually(lambda: two.state.detail == "", "the end of it")
+        await eventually(lambda: two.state.detail == "")
         assert two.count("lockstep_board_failures_total", reason="full") >= 1
 
 
@@ -92,10 +93,10 @@ async def test_a_value_of_another_kind_at_a_key_of_ours_is_named(server: RedisSe
         await client.set("lockstep:consoles", "rubbish")
         await client.set("lockstep:audit", "rubbish")
         async with running_board(server.url, "one", tile("left")) as one:
-            await eventually(lambda: one.state.detail.startswith("wrong_type"), "the name")
+            await eventually(lambda: one.state.detail.startswith("wrong_type"))
             one.record("left", NOTE)
             await client.delete("lockstep:consoles")
-            await eventually(lambda: one.state.unknown_since is None, "the rest")
+            await eventually(lambda: one.state.unknown_since is None)
             found = await one.audit(10)
             assert (found.records, found.complete) == ([], False)
             assert found.detail.startswith("wrong_type")
@@ -119,9 +120,9 @@ async def test_what_no_console_wrote_is_counted_by_name_and_shown_to_nobody(serv
             async def counted(reason: str, metric: str = "bad_input") -> None:
                 name = f"lockstep_board_{metric}_total"
                 before = one.count(name, reason=reason)
-                await eventually(lambda: one.count(name, reason=reason) > before, reason)
+                await eventually(lambda: one.count(name, reason=reason) > before)
 
-            await eventually(lambda: one.state.unknown_since is None, "the board")
+            await eventually(lambda: one.state.unknown_since is None)
             await put(b"rubbish")
             await counted("not_sealed")
             await put(pack_published(Seal("another signing key, of another fleet"), stranger))
@@ -145,12 +146,12 @@ async def test_what_no_console_wrote_is_counted_by_name_and_shown_to_nobody(serv
             assert one.state.unknown_since is None, "nothing of this is trouble with the board"
             await client.delete(f"lockstep:console:{STRANGER}")
             await put(pack_published(Seal(KEY), stranger))
-            await eventually(one.others, "what a console did write")
+            await eventually(one.others)
 
 
 async def test_a_string_of_any_size_costs_no_more_than_one_of_ours(server: RedisServer) -> None:
     async with server.client() as client, running_board(server.url, "one", tile("left")) as one:
-        await eventually(lambda: one.state.unknown_since is None, "the board")
+        await eventually(lambda: one.state.unknown_since is None)
         await client.xadd("lockstep:audit", {b"line": b"x" * (LARGEST + 1)})
         found = await one.audit(10)
         assert (found.records, found.complete) == ([], False)
@@ -164,7 +165,7 @@ async def test_a_stop_comes_through_a_flood_of_news(server: RedisServer) -> None
         running_board(server.url, "one", tile("left")) as one,
         running_board(server.url, "two") as two,
     ):
-        await eventually(two.others, "the robot")
+        await eventually(two.others)
         for _ in range(5):
             pipeline = client.pipeline(transaction=False)
             for _ in range(100):
@@ -172,7 +173,7 @@ async def test_a_stop_comes_through_a_flood_of_news(server: RedisServer) -> None
             await pipeline.execute()
         answers = await two.stop(["left"], new_press(ANN, "http", ""))
         assert answers["left"].delivered
-        await eventually(lambda: one.count("lockstep_board_bad_input_total", reason="not_sealed") == 500, "the flood")
+        await eventually(lambda: one.count("lockstep_board_bad_input_total", reason="not_sealed") == 500)
 
 
 async def test_records_beyond_the_bound_are_lost_and_counted_while_redis_is_away(tmp_path: Path) -> None:
@@ -195,9 +196,9 @@ async def test_encrypted_and_with_a_password(tmp_path: Path) -> None:
     async with server:
         trusting = f"{server.url}?ssl_ca_certs={authority.certificate}"
         async with running_board(trusting, "one", tile("left")), running_board(trusting, "two") as two:
-            await eventually(two.others, "the robot")
+            await eventually(two.others)
         async with running_board(server.url, "three") as three:
-            await eventually(lambda: "CERTIFICATE_VERIFY_FAILED" in three.state.detail, "a certificate of nobody's")
+            await eventually(lambda: "CERTIFICATE_VERIFY_FAILED" in three.state.detail)
             assert PASSWORD not in three.state.detail
 
 
@@ -209,10 +210,10 @@ async def test_a_user_who_may_do_no_more_than_the_guide_says_suffices(server: Re
         await client.execute_command(*user)  # type: ignore[no-untyped-call]
     url = f"redis://ann:{PASSWORD}@127.0.0.1:{server.port}/0"
     async with running_board(url, "one", tile("left")) as one, running_board(url, "two", tile("far")) as two:
-        await eventually(lambda: one.others() and two.others(), "the robots")
+        await eventually(lambda: one.others() and two.others())
         one.record("left", NOTE)
         one.links.revoke("abc")
-        await eventually(lambda: "abc" in two.links.elsewhere, "the revocation")
+        await eventually(lambda: "abc" in two.links.elsewhere)
         assert (await two.stop(["left"], new_press(ANN, "http", "")))["left"].delivered
         async with asyncio.timeout(20):
             while not (await two.audit(10)).records:  # noqa: ASYNC110

@@ -23,12 +23,12 @@ from lockstep.server.state.persistent_state import open_state
 from tests.server.rig import Rig, TestPeer
 from tests.support.redis_server import RedisServer
 from tests.support.stack import Stack, running_fleet
+from tests.waiting import PATIENCE
 
 pytestmark = pytest.mark.asyncio(loop_scope="module")
 
 SECRET = "one key for all consoles behind one entry"
 PASSWORD = "correct-horse-battery-staple"
-PATIENCE = 30.0  # s; a busy machine, never waited for in full
 
 Answer = dict[str, Any]
 

@@ -6,7 +6,6 @@ JSON line when it has begun, answers each line on standard input with its counts
 """
 
 import asyncio
-import json
 import os
 import sys
 from collections import Counter
@@ -16,6 +15,7 @@ from urllib.parse import urlsplit
 import httpx
 import uvloop
 
+from lockstep.bench.harness.asked import answer, say
 from lockstep.bench.hostile import over_http, over_robot_link, over_webrtc, over_whip
 from lockstep.bench.hostile.target import Misbehaviour, Target
 from lockstep.client.console_url import parse_link
@@ -98,20 +98,12 @@ class Crowd:
 async def _run(link: str, operator: str, bridge: str, count: int, seed: int, only: str = "") -> None:
     crowd = Crowd(link, operator, bridge, count, seed, tuple(kind for kind in KINDS if only in ("", kind.__name__)))
     running = asyncio.create_task(crowd.run())
-    lines = asyncio.StreamReader()
-    await asyncio.get_running_loop().connect_read_pipe(lambda: asyncio.StreamReaderProtocol(lines), sys.stdin)
-    _say({"members": count})
+    say({"members": count})
     try:
-        async for _ in lines:
-            _say(crowd.summary())
+        await answer(crowd.summary)
     finally:
         running.cancel()
         await asyncio.wait((running,))
-
-
-def _say(what: object) -> None:
-    sys.stdout.write(json.dumps(what) + "\n")
-    sys.stdout.flush()
 
 
 def main() -> None:

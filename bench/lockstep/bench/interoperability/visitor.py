@@ -17,6 +17,7 @@ from typing import Any
 from lockstep.bench.experiment.choices import Choices
 from lockstep.bench.experiment.endurance.endurance import Endurance
 from lockstep.bench.experiment.endurance.endurance_run import Driven, HeadlessHands
+from lockstep.bench.harness.tcp_path import TcpPath
 from lockstep.client import Console
 
 __all__ = ["main"]
@@ -24,32 +25,6 @@ __all__ = ["main"]
 LIVE_SECONDS = 90.0
 TOLERANCE = 4  # events
 RELAY_ONLY = "&relay=only"  # of a link: through TURN or not at all
-CHUNK = 65536
-
-
-async def _pipe(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-    with contextlib.suppress(OSError):
-        while data := await reader.read(CHUNK):
-            writer.write(data)
-            await writer.drain()
-    writer.close()
-
-
-@asynccontextmanager
-async def _door(address: str) -> AsyncIterator[int]:
-    """Open a port of loopback that leads to `address`."""
-    host, _, port = address.rpartition(":")
-
-    async def accept(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-        try:
-            far_reader, far_writer = await asyncio.open_connection(host.strip("[]"), int(port))
-        except OSError:
-            writer.close()
-            return
-        await asyncio.gather(_pipe(reader, far_writer), _pipe(far_reader, writer))
-
-    async with await asyncio.start_server(accept, "127.0.0.1", 0) as server:
-        yield int(server.sockets[0].getsockname()[1])
 
 
 @asynccontextmanager
@@ -108,9 +83,10 @@ async def visit(client: str, link: str, seconds: float, door: str) -> dict[str, 
         return await _watch_through_janus(link, seconds)
     if not door:
         return await _drive(client, link, seconds)
-    async with _door(door) as port:
+    host, _, port = door.rpartition(":")
+    async with TcpPath((host.strip("[]"), int(port))) as path:
         behind = link.partition("://")[2].partition("/")[2]
-        return await _drive(client, f"http://127.0.0.1:{port}/{behind}", seconds)
+        return await _drive(client, f"http://127.0.0.1:{path.port}/{behind}", seconds)
 
 
 def main() -> None:

@@ -6,15 +6,15 @@ line on standard input with each observer's counts so far. It ends at the end of
 """
 
 import asyncio
-import json
 import signal
 import sys
 import time
-from collections.abc import AsyncIterator, Callable, Sequence
+from collections.abc import AsyncIterator, Callable
 from contextlib import AsyncExitStack, asynccontextmanager
 
 import uvloop
 
+from lockstep.bench.harness.asked import answer, say
 from lockstep.client import Console
 from lockstep.client.console_url import parse_link
 from lockstep.client.media.rtp_counter import RtpCounter
@@ -42,19 +42,12 @@ async def attend(link: str, count: int, plain: bool) -> None:
 
     try:
         readers = await asyncio.gather(*(join(stack) for stack in stacks))
-        _say({"observers": count, "seconds": round(time.monotonic() - began, 1)})
-        await _answer(readers)
+        say({"observers": count, "seconds": round(time.monotonic() - began, 1)})
+        await answer(lambda: {"counts": [reader() for reader in readers]})
     except asyncio.CancelledError:
         pass
     finally:
         await asyncio.gather(*(stack.aclose() for stack in stacks))
-
-
-async def _answer(readers: Sequence[Callable[[], Counts]]) -> None:
-    lines = asyncio.StreamReader()
-    await asyncio.get_running_loop().connect_read_pipe(lambda: asyncio.StreamReaderProtocol(lines), sys.stdin)
-    async for _ in lines:
-        _say({"counts": [reader() for reader in readers]})
 
 
 @asynccontextmanager
@@ -92,10 +85,6 @@ async def _plain(link: str) -> AsyncIterator[Callable[[], Counts]]:
         yield lambda: {"video": [counter.frames, counter.lost]}
     finally:
         await peer.close()
-
-
-def _say(message: dict[str, object]) -> None:
-    print(json.dumps(message), flush=True)
 
 
 def main() -> None:

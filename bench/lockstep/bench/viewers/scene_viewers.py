@@ -6,7 +6,6 @@ The process runs at a low priority, because a viewer's own computer would not be
 """
 
 import asyncio
-import json
 import os
 import sys
 from contextlib import AsyncExitStack
@@ -17,6 +16,7 @@ import viser
 from websockets.asyncio.client import ClientConnection, connect
 from websockets.typing import Subprotocol
 
+from lockstep.bench.harness.asked import answer, say
 from lockstep.client.console_url import parse_link
 
 __all__ = ["main"]
@@ -45,8 +45,8 @@ async def watch(link: str, count: int) -> None:
         watching = [tasks.create_task(viewer.watch()) for viewer in viewers]
         for viewer in viewers:
             await viewer.sees.wait()
-        _say({"viewers": count})
-        await _answer(viewers)
+        say({"viewers": count})
+        await answer(lambda: {"received": [viewer.received for viewer in viewers]})
         for task in watching:
             task.cancel()
 
@@ -59,17 +59,6 @@ async def _opened(link: str) -> connect:
     path: str = answer.raise_for_status().json()["path"]
     address = parse_qs(urlsplit(path).query)["websocket"][0]
     return connect(address, subprotocols=[VERSION], proxy=None, max_size=None, compression=None)
-
-
-async def _answer(viewers: list[Viewer]) -> None:
-    lines = asyncio.StreamReader()
-    await asyncio.get_running_loop().connect_read_pipe(lambda: asyncio.StreamReaderProtocol(lines), sys.stdin)
-    async for _ in lines:
-        _say({"received": [viewer.received for viewer in viewers]})
-
-
-def _say(message: dict[str, object]) -> None:
-    print(json.dumps(message), flush=True)
 
 
 def main() -> None:

@@ -13,8 +13,7 @@ from lockstep.server.media.sources.attached_source import COMMAND, AttachedSourc
 from lockstep.server.media.sources.source_url import parse_source
 from lockstep.server.media.sources.source_wire import Captured
 from tests.server.media.sources.media_files import film
-
-PATIENCE = 20.0
+from tests.waiting import PATIENCE
 
 
 class Watched:

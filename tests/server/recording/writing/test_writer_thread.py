@@ -24,8 +24,7 @@ from lockstep.server.recording.writing import writer_thread
 from lockstep.server.recording.writing.queue_items import FeedbackItem, MediaItem, OwnItem, RobotItem
 from lockstep.server.recording.writing.writer_thread import RecordingThread
 from tests.server.recording.makers import CODECS, DESCRIPTION, EPOCH, SECOND, START
-
-PATIENCE = 20.0  # s
+from tests.waiting import PATIENCE
 
 
 class Made:

@@ -1,24 +1,33 @@
-"""Makers of messages for the client's tests."""
+"""Makers of messages for tests of all parts."""
+
+from collections.abc import Sequence
 
 from lockstep.protocol.messages import Feedback, Refusal, RefusalReason, StopState
+
+__all__ = ["feedback", "refusal"]
 
 
 def feedback(
     event: int,
     issue: int = 1,
     *,
+    axes: Sequence[float] = (),
+    joints: Sequence[float] = (),
     at_rest: bool = True,
     stopped: bool = False,
     stop: StopState | None = None,
+    nonce: int = 0,
     neutral_needed: bool = False,
 ) -> Feedback:
     return Feedback(
         event=event,
         issue=issue,
         time=0.0,
-        axes=[0.0],
+        axes=list(axes),
+        joints=list(joints),
         at_rest=at_rest,
         stop=stop or StopState(stopped=stopped),
+        nonce=nonce,
         neutral_needed=neutral_needed,
     )
 
