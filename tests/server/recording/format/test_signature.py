@@ -154,6 +154,19 @@ def test_any_flipped_byte_is_named_wherever_it_lies(whole: bytes, path: Path) ->
         assert not verdict.ok or content(path) == meant, f"byte {at} of {len(whole)}"
 
 
+def test_a_byte_that_changed_in_the_part_that_other_readers_begin_with_is_named(whole: bytes, path: Path) -> None:
+    start, end = int.from_bytes(whole[-20:-12], "little"), len(whole) - len(MAGIC) - 4  # of the summary's offsets
+    for at in range(start, end, 3):
+        flipped = bytearray(whole)
+        flipped[at] ^= 0x10
+        path.write_bytes(flipped)
+        try:
+            verdict = verify_file(path)
+        except RecordingError:
+            continue
+        assert not verdict.ok, f"byte {at - start} of {end - start}"
+
+
 def test_a_chunk_that_cannot_be_read_is_named_and_those_behind_it_are_judged(whole: bytes, path: Path) -> None:
     """Its compression has a name longer than the chunk."""
     with path.open("rb") as file:

@@ -1,12 +1,15 @@
 """Checks a recording file: `lockstep verify`."""
 
+import os
+import struct
+import zlib
 from pathlib import Path
 
 from lockstep.server.recording.errors import RecordingError
 from lockstep.server.recording.format.payload import own_record_of
 from lockstep.server.recording.format.records import RobotRecord
 from lockstep.server.recording.format.topics import stream_of
-from lockstep.server.recording.reading.raw_records import MAGIC, raw_records
+from lockstep.server.recording.reading.raw_records import MAGIC, MAX_RECORD, raw_records
 from lockstep.server.recording.reading.reader import Record, RecordingReader
 from lockstep.server.recording.reading.scan import scan_file
 from lockstep.server.recording.verify.promises import Verdict, Verifier
@@ -14,6 +17,8 @@ from lockstep.server.recording.verify.verify_signature import SignatureChecker
 from lockstep.server.util.regular_file import open_regular
 
 __all__ = ["verify_file"]
+
+_footer = struct.Struct("<QQL")  # start of the summary, start of its offsets, checksum (MCAP specification, "Footer")
 
 
 def verify_file(path: Path, key: str = "") -> Verdict:
@@ -30,6 +35,8 @@ def verify_file(path: Path, key: str = "") -> Verdict:
         verifier = Verifier(reader.info.epoch)
         if reader.interrupted:
             verifier.fail("readable", "the recording was interrupted and has no end")
+        elif not _is_summary_whole(path):
+            verifier.fail("readable", "the summary does not match its checksum")
         robots: set[str] = set()
         counts: dict[str, int] = {}
         ended = reader.index.started
@@ -44,6 +51,18 @@ def verify_file(path: Path, key: str = "") -> Verdict:
         _compare(verifier, reader, counts)
         _show_signatures(verifier, path, reader, key)
         return verifier.verdict(ended)
+
+
+def _is_summary_whole(path: Path) -> bool:
+    """Return whether the summary matches the checksum in the footer. Other programs read it; no signature covers it."""
+    with open_regular(path) as file:
+        at = file.seek(0, os.SEEK_END) - len(MAGIC) - _footer.size
+        file.seek(at)
+        start, _, checksum = _footer.unpack(file.read(_footer.size))
+        if not 0 <= at - start <= MAX_RECORD:
+            return False
+        file.seek(start)
+        return zlib.crc32(file.read(at + _footer.size - 4 - start)) == int(checksum)
 
 
 def _show_signatures(verifier: Verifier, path: Path, reader: RecordingReader, key: str) -> None:
