@@ -4,9 +4,9 @@ from lockstep.rtc.demux import DatagramKind, datagram_kind
 from lockstep.rtc.rtp.errors import RtpError
 from lockstep.rtc.rtp.incoming import IncomingParameters, IncomingStream
 from lockstep.rtc.rtp.outgoing import OutgoingParameters, OutgoingStream, PathShare
-from lockstep.rtc.rtp.packet import RtpPacket
-from lockstep.rtc.rtp.rtcp import RtcpPacket, pack_rtcp, parse_rtcp
 from lockstep.rtc.rtp.stage import RoundTrip
+from lockstep.rtc.rtp.wire.packet import RtpPacket
+from lockstep.rtc.rtp.wire.rtcp import RtcpPacket, pack_rtcp, parse_rtcp
 
 __all__ = ["try_input"]
 

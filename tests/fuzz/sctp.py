@@ -8,7 +8,7 @@ import contextlib
 
 from lockstep.rtc.dcep import DcepError, decode_open
 from lockstep.rtc.sctp.errors import SctpParseError
-from lockstep.rtc.sctp.packet import decode_packet
+from lockstep.rtc.sctp.wire.packet import decode_packet
 from tests.rtc.sctp.hostile import Victim
 
 __all__ = ["SCENES", "pack", "try_input"]

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from lockstep.rtc.dcep import ACK, Open, Reliability
-from lockstep.rtc.sctp.chunks import (
+from lockstep.rtc.sctp.wire.chunks import (
     BEGIN,
     END,
     IMMEDIATE,

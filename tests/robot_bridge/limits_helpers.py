@@ -4,8 +4,8 @@ import math
 from collections.abc import Sequence
 
 from lockstep.protocol.description import Axis, AxisGain, Geofence, Joint, PlanarBase, PositionLimit, RobotDescription
-from lockstep.robot_bridge.control.axis_shaper import AxisShaper
-from lockstep.robot_bridge.control.motion_limits import MotionLimits
+from lockstep.robot_bridge.control.limits.axis_shaper import AxisShaper
+from lockstep.robot_bridge.control.limits.motion_limits import MotionLimits
 from lockstep.robot_bridge.description.check_description import check_description
 
 __all__ = ["DT", "LIFT", "ExactBase", "ExactLift", "base_description", "inside"]

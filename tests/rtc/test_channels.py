@@ -16,9 +16,9 @@ from lockstep.rtc.channels import (
 )
 from lockstep.rtc.dcep import MOST_TEXT, DcepError, Open, Reliability, decode_open
 from lockstep.rtc.sctp import AssociationClosed, Closed, Established, SctpSettings, SendQueueFull, State
-from lockstep.rtc.sctp.chunks import BEGIN, END, UNORDERED, CookieEcho, Data, Init, InitAck
-from lockstep.rtc.sctp.packet import decode_packet
-from lockstep.rtc.sctp.parameters import STATE_COOKIE
+from lockstep.rtc.sctp.wire.chunks import BEGIN, END, UNORDERED, CookieEcho, Data, Init, InitAck
+from lockstep.rtc.sctp.wire.packet import decode_packet
+from lockstep.rtc.sctp.wire.parameters import STATE_COOKIE
 from tests.rtc.sctp.hostile import Victim
 from tests.rtc.sctp.network import Link, World, seeded
 

@@ -14,7 +14,7 @@ from lockstep.rtc.channels import ChannelClosed, ChannelMessage, ChannelOpened
 from lockstep.rtc.endpoint import Connection, Endpoint, EndpointSettings, TooManyPeers
 from lockstep.rtc.peer import OfferedMedia
 from lockstep.rtc.peer_events import Answered, Connected, PacketReceived, PeerEnded, PeerEvent, PlainRtp
-from lockstep.rtc.rtp.packet import RtpPacket
+from lockstep.rtc.rtp.wire.packet import RtpPacket
 from lockstep.rtc.sdp import MID_URI, Codec, LocalMedia, parse_description, write_description
 from tests.rtc.vp8 import packetise
 

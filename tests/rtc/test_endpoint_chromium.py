@@ -12,8 +12,8 @@ from lockstep.rtc.endpoint import Connection, Endpoint
 from lockstep.rtc.interfaces import own_addresses
 from lockstep.rtc.peer import OfferedMedia
 from lockstep.rtc.peer_events import Connected, MediaEvent, PacketReceived, PeerEnded, PeerEvent
-from lockstep.rtc.rtp.extensions import ABS_SEND_TIME_URI
 from lockstep.rtc.rtp.stage import KeyframeRequested, Reception
+from lockstep.rtc.rtp.wire.extensions import ABS_SEND_TIME_URI
 from lockstep.rtc.sdp import MID_URI, Codec, LocalMedia, parse_description, write_description
 from tests.rtc.vp8 import packetise
 

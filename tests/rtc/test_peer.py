@@ -21,9 +21,9 @@ from lockstep.rtc.peer_events import (
     Restarted,
     RestartFailed,
 )
-from lockstep.rtc.rtp.packet import RtpPacket
-from lockstep.rtc.rtp.rtcp import ReceiverReport, ReportBlock, pack_rtcp
 from lockstep.rtc.rtp.stage import KeyframeRequested, Reception
+from lockstep.rtc.rtp.wire.packet import RtpPacket
+from lockstep.rtc.rtp.wire.rtcp import ReceiverReport, ReportBlock, pack_rtcp
 from lockstep.rtc.sctp import Closed
 from lockstep.rtc.sdp import MID_URI, Codec, Fragment, LocalMedia, SdpError, parse_fragment, write_fragment
 from tests.rtc.peer_pair import PeerPair, through_text

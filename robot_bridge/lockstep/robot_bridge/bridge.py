@@ -9,11 +9,11 @@ from types import TracebackType
 from typing import Self
 
 from lockstep.robot_bridge.control import clock
-from lockstep.robot_bridge.control.axis_shaper import AxisShaper
 from lockstep.robot_bridge.control.command_executor import CommandExecutor
 from lockstep.robot_bridge.control.event_core import EventCore
 from lockstep.robot_bridge.control.feedback_issuer import FeedbackIssuer
-from lockstep.robot_bridge.control.motion_limits import MotionLimits
+from lockstep.robot_bridge.control.limits.axis_shaper import AxisShaper
+from lockstep.robot_bridge.control.limits.motion_limits import MotionLimits
 from lockstep.robot_bridge.control.tick_loop import TickLoop
 from lockstep.robot_bridge.counters import BridgeCounters
 from lockstep.robot_bridge.description.check_description import check_description

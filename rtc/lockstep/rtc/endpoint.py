@@ -33,10 +33,10 @@ from lockstep.rtc.ice.port import Port, PortSettings
 from lockstep.rtc.peer import OfferedMedia, Peer, PeerSettings
 from lockstep.rtc.peer_events import PacketReceived, PeerEnded, PeerEvent
 from lockstep.rtc.sdp import Fragment, LocalMedia, SessionDescription
-from lockstep.rtc.server_links import RelayLink, RelayRefused, open_relay
-from lockstep.rtc.tcp_port import TcpPort, TcpPortSettings
+from lockstep.rtc.sockets.server_links import RelayLink, RelayRefused, open_relay
+from lockstep.rtc.sockets.tcp_port import TcpPort, TcpPortSettings
+from lockstep.rtc.sockets.udp_socket import UdpSocket
 from lockstep.rtc.turn.servers import IceServer, MappedAddress, ServerUri, server_uris
-from lockstep.rtc.udp_socket import UdpSocket
 
 __all__ = ["Connection", "Endpoint", "EndpointSettings", "TooManyPeers", "Turns"]
 

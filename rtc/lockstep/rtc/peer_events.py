@@ -6,8 +6,8 @@ from typing import NamedTuple
 from lockstep.rtc.addresses import Path
 from lockstep.rtc.channels import ChannelEvent
 from lockstep.rtc.ice.events import Answered, Restarted, RestartFailed
-from lockstep.rtc.rtp.packet import RtpPacket
 from lockstep.rtc.rtp.stage import StreamEvent
+from lockstep.rtc.rtp.wire.packet import RtpPacket
 
 __all__ = [
     "Answered",

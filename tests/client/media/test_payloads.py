@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from lockstep.client.media.payloads import UNPACK
-from lockstep.rtc.rtp.payloads import PayloadError
+from lockstep.rtc.rtp.wire.payloads import PayloadError
 
 VP8 = RTCRtpCodecParameters(mimeType="video/VP8", clockRate=90_000, payloadType=96)
 H264 = RTCRtpCodecParameters(mimeType="video/H264", clockRate=90_000, payloadType=98)

@@ -14,8 +14,8 @@ from lockstep.protocol.carriers import EVENT_REFERENCE_URI, pack_event_reference
 from lockstep.rtc.endpoint import Connection, Endpoint
 from lockstep.rtc.peer import OfferedMedia
 from lockstep.rtc.peer_events import Connected, MediaEvent, PeerEvent
-from lockstep.rtc.rtp.packet import RtpPacket
 from lockstep.rtc.rtp.stage import KeyframeRequested
+from lockstep.rtc.rtp.wire.packet import RtpPacket
 from lockstep.rtc.sdp import LocalMedia, write_description
 
 HOST = "127.0.0.1"

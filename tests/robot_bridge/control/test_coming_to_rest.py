@@ -4,8 +4,8 @@ from collections.abc import Sequence
 
 import pytest
 
-from lockstep.robot_bridge.control.axis_shaper import AxisShaper
 from lockstep.robot_bridge.control.coming_to_rest import PATIENCE, REPEATS, ComingToRest
+from lockstep.robot_bridge.control.limits.axis_shaper import AxisShaper
 from lockstep.robot_bridge.robots.planar.description import DESCRIPTION
 from lockstep.robot_bridge.robots.planar.robot import PlanarRobot
 

@@ -5,8 +5,8 @@ from typing import cast
 import pytest
 
 from lockstep.protocol.messages import LinkMessage, Refusal, Reset, Stop
-from lockstep.robot_bridge.control.axis_shaper import AxisShaper
 from lockstep.robot_bridge.control.event_core import EventCore
+from lockstep.robot_bridge.control.limits.axis_shaper import AxisShaper
 from lockstep.robot_bridge.counters import BridgeCounters
 from lockstep.robot_bridge.event_log import EventLog
 from lockstep.robot_bridge.link.link_transport import LinkTransport

@@ -7,7 +7,7 @@ from typing import Self
 
 from lockstep.rtc.ice.agent import Agent
 from lockstep.rtc.ice.events import Event
-from lockstep.rtc.udp_socket import UdpSocket
+from lockstep.rtc.sockets.udp_socket import UdpSocket
 
 __all__ = ["AgentOnSocket"]
 

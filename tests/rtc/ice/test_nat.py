@@ -21,7 +21,7 @@ from lockstep.rtc.addresses import Address, Datagram, Path
 from lockstep.rtc.ice.agent import Agent
 from lockstep.rtc.ice.events import Ended, PathChanged
 from lockstep.rtc.ice.gathering import Advertised, gather
-from lockstep.rtc.udp_socket import UdpSocket
+from lockstep.rtc.sockets.udp_socket import UdpSocket
 from tests.rtc.ice.sockets import AgentOnSocket
 
 INNER, OUTER = "10.77.0.5", "203.0.113.7"  # of the console: every port of the outer address is forwarded

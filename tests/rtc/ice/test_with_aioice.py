@@ -13,7 +13,7 @@ from lockstep.rtc.ice.candidates import parse_candidate
 from lockstep.rtc.ice.credentials import Credentials
 from lockstep.rtc.ice.events import PathChanged
 from lockstep.rtc.ice.gathering import gather
-from lockstep.rtc.udp_socket import UdpSocket
+from lockstep.rtc.sockets.udp_socket import UdpSocket
 from tests.rtc.ice.sockets import AgentOnSocket
 
 HOST = "127.0.0.1"

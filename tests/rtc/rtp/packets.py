@@ -1,7 +1,7 @@
 """Packets and a stage for tests."""
 
-from lockstep.rtc.rtp.packet import RtpPacket
-from lockstep.rtc.rtp.rtcp import ReportBlock
+from lockstep.rtc.rtp.wire.packet import RtpPacket
+from lockstep.rtc.rtp.wire.rtcp import ReportBlock
 
 __all__ = ["SSRC", "block", "packet"]
 

@@ -1,22 +1,12 @@
 """Each stage by itself, on a sink, with the time in the test's hand."""
 
-from lockstep.rtc.rtp.extensions import (
-    ABS_SEND_TIME_URI,
-    TRANSPORT_NUMBER_URI,
-    ExtensionReader,
-    ExtensionWriter,
-    TransportNumbers,
-    pack_send_time,
-)
 from lockstep.rtc.rtp.feedback import FullIntraRequest, Nack, PictureLoss, Remb, TransportFeedback
 from lockstep.rtc.rtp.history import History, HistorySettings, RepairStream
 from lockstep.rtc.rtp.losses import Losses, LossSettings
-from lockstep.rtc.rtp.numbers import Unwrapper, is_after
 from lockstep.rtc.rtp.pacer import Pacer, PacerSettings, PathBudget
 from lockstep.rtc.rtp.receiver_reports import ReceiverReports
 from lockstep.rtc.rtp.repairs import Repairs
 from lockstep.rtc.rtp.requests import Requests
-from lockstep.rtc.rtp.rtcp import Goodbye, ReceiverReport, SenderReport, SourceDescription
 from lockstep.rtc.rtp.sender_reports import SenderReports
 from lockstep.rtc.rtp.stage import (
     Arrivals,
@@ -30,6 +20,16 @@ from lockstep.rtc.rtp.stage import (
     Stage,
     StreamEnded,
 )
+from lockstep.rtc.rtp.wire.extensions import (
+    ABS_SEND_TIME_URI,
+    TRANSPORT_NUMBER_URI,
+    ExtensionReader,
+    ExtensionWriter,
+    TransportNumbers,
+    pack_send_time,
+)
+from lockstep.rtc.rtp.wire.numbers import Unwrapper, is_after
+from lockstep.rtc.rtp.wire.rtcp import Goodbye, ReceiverReport, SenderReport, SourceDescription
 from tests.rtc.rtp.packets import SSRC, block, packet
 
 EPOCH = 1_700_000_000.0

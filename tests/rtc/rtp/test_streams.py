@@ -3,15 +3,15 @@
 from collections.abc import Callable
 from random import Random
 
-from lockstep.rtc.rtp.extensions import ABS_SEND_TIME_URI
 from lockstep.rtc.rtp.feedback import PictureLoss
 from lockstep.rtc.rtp.history import RepairStream
 from lockstep.rtc.rtp.incoming import IncomingParameters, IncomingStream
 from lockstep.rtc.rtp.outgoing import OutgoingParameters, OutgoingStream, PathShare
-from lockstep.rtc.rtp.packet import RtpPacket
-from lockstep.rtc.rtp.rtcp import ReceiverReport, SenderReport, SourceDescription, pack_rtcp, parse_rtcp
 from lockstep.rtc.rtp.stage import BandwidthEstimate, KeyframeRequested, PacketsGone, RoundTrip
 from lockstep.rtc.rtp.streams import Identity, NegotiatedMedia, Streams
+from lockstep.rtc.rtp.wire.extensions import ABS_SEND_TIME_URI
+from lockstep.rtc.rtp.wire.packet import RtpPacket
+from lockstep.rtc.rtp.wire.rtcp import ReceiverReport, SenderReport, SourceDescription, pack_rtcp, parse_rtcp
 from lockstep.rtc.sdp import Codec, MediaSection
 
 STAMP = "urn:stamp"

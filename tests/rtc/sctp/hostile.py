@@ -2,8 +2,8 @@
 
 from lockstep.rtc.channels import ChannelEvent, DataChannels
 from lockstep.rtc.sctp import Closed, SctpSettings, State
-from lockstep.rtc.sctp.chunks import Chunk, Init
-from lockstep.rtc.sctp.packet import decode_packet, encode_packet
+from lockstep.rtc.sctp.wire.chunks import Chunk, Init
+from lockstep.rtc.sctp.wire.packet import decode_packet, encode_packet
 from tests.rtc.sctp.network import World, seeded
 
 __all__ = ["NAMED_ENDS", "Victim"]

@@ -15,7 +15,7 @@ from lockstep.rtc.sctp import (
     State,
     StreamsReset,
 )
-from lockstep.rtc.sctp.chunks import (
+from lockstep.rtc.sctp.wire.chunks import (
     BEGIN,
     END,
     IMMEDIATE,
@@ -35,8 +35,13 @@ from lockstep.rtc.sctp.chunks import (
     Skip,
     Unknown,
 )
-from lockstep.rtc.sctp.packet import decode_packet, encode_packet
-from lockstep.rtc.sctp.parameters import OUTGOING_RESET_REQUEST, RECONFIG_RESPONSE, STATE_COOKIE, UNRECOGNIZED_PARAMETER
+from lockstep.rtc.sctp.wire.packet import decode_packet, encode_packet
+from lockstep.rtc.sctp.wire.parameters import (
+    OUTGOING_RESET_REQUEST,
+    RECONFIG_RESPONSE,
+    STATE_COOKIE,
+    UNRECOGNIZED_PARAMETER,
+)
 from tests.rtc.sctp.hostile import Victim
 from tests.rtc.sctp.network import Link, World, associated, seeded
 

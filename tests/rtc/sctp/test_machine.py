@@ -18,7 +18,7 @@ from lockstep.rtc.sctp import (
     SendQueueFull,
     State,
 )
-from lockstep.rtc.sctp.chunks import (
+from lockstep.rtc.sctp.wire.chunks import (
     Abort,
     Chunk,
     CookieAck,

@@ -3,8 +3,8 @@
 import pytest
 
 from lockstep.rtc.sctp import MessageReceived, SctpSettings
-from lockstep.rtc.sctp.chunks import Data, InterleavedData
-from lockstep.rtc.sctp.packet import decode_packet
+from lockstep.rtc.sctp.wire.chunks import Data, InterleavedData
+from lockstep.rtc.sctp.wire.packet import decode_packet
 from tests.rtc.sctp.network import Link, associated
 
 BULK, STATE = 1, 2

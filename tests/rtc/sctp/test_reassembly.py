@@ -3,8 +3,8 @@
 import pytest
 
 from lockstep.rtc.sctp import SctpSettings
-from lockstep.rtc.sctp.chunks import BEGIN, END, UNORDERED, InterleavedData, Skip
 from lockstep.rtc.sctp.reassembly import Reassembly
+from lockstep.rtc.sctp.wire.chunks import BEGIN, END, UNORDERED, InterleavedData, Skip
 
 
 def _fragment(number: int, flags: int, message: int = 0) -> InterleavedData:

@@ -114,7 +114,7 @@ async def test_a_worker_that_fails_is_reported_once_counted_and_goes_on(caplog: 
         await stream(hub, viewer, "video", picture, 2, first=50)
         assert value(hub, "frames_dropped_total", stream="camera0", stage="worker_failed") == 3
         assert (
-            len([record for record in caplog.records if record.name == "lockstep.server.media.pipeline.encoder_worker"])
+            len([record for record in caplog.records if record.name == "lockstep.server.media.encoding.encoder_worker"])
             == 1
         )
 

@@ -10,7 +10,7 @@ import pytest
 from aiortc.rtp import RtcpPsfbPacket
 
 from lockstep.protocol.carriers import EVENT_REFERENCE_URI
-from lockstep.rtc.rtp.extensions import ABS_SEND_TIME_URI
+from lockstep.rtc.rtp.wire.extensions import ABS_SEND_TIME_URI
 from tests.server.media.feeding import read_stamp, stream, timestamps, value
 from tests.server.media.viewer import (
     TIMEOUT,

@@ -16,10 +16,10 @@ from lockstep.rtc.rtp.feedback import Nack, PictureLoss
 from lockstep.rtc.rtp.history import RepairStream
 from lockstep.rtc.rtp.losses import Losses
 from lockstep.rtc.rtp.outgoing import OutgoingParameters, OutgoingStream, PathShare
-from lockstep.rtc.rtp.packet import RtpPacket
 from lockstep.rtc.rtp.repairs import Repairs
 from lockstep.rtc.rtp.stage import KeyframeRequested, RoundTrip, Sink
-from lockstep.server.media.pipeline.keyframes import KeyframeScheduler
+from lockstep.rtc.rtp.wire.packet import RtpPacket
+from lockstep.server.media.encoding.keyframes import KeyframeScheduler
 
 __all__ = ["Repaired", "simulate"]
 

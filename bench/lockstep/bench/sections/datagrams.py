@@ -6,7 +6,7 @@ from contextlib import ExitStack, closing
 from lockstep.bench.context import Context
 from lockstep.bench.figures.results import Result
 from lockstep.rtc.addresses import Datagram, Path
-from lockstep.rtc.udp_socket import UdpSocket
+from lockstep.rtc.sockets.udp_socket import UdpSocket
 
 __all__ = ["run"]
 

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping
 
-from lockstep.rtc.rtp.payloads import h264_parts, vp8_part
+from lockstep.rtc.rtp.wire.payloads import h264_parts, vp8_part
 
 __all__ = ["UNPACK"]
 

@@ -18,8 +18,8 @@ from lockstep.protocol.carriers import (
 from lockstep.rtc.endpoint import Connection
 from lockstep.rtc.peer import PeerNotReady
 from lockstep.rtc.peer_events import PacketReceived, PeerEvent, PlainRtcp, PlainRtp
-from lockstep.rtc.rtp.packet import RtpPacket
-from lockstep.rtc.rtp.payloads import PayloadError
+from lockstep.rtc.rtp.wire.packet import RtpPacket
+from lockstep.rtc.rtp.wire.payloads import PayloadError
 
 __all__ = ["EXTENSION_URIS", "PacketSink", "Packets", "stamp_reader"]
 

@@ -3,7 +3,7 @@
 import logging
 from collections.abc import Callable
 
-from lockstep.robot_bridge.control.axis_shaper import AxisShaper
+from lockstep.robot_bridge.control.limits.axis_shaper import AxisShaper
 from lockstep.robot_bridge.robots.base import Robot
 
 __all__ = ["ComingToRest"]

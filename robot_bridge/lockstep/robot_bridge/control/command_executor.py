@@ -4,11 +4,11 @@ import logging
 
 from lockstep.protocol.description import RobotDescription
 from lockstep.protocol.messages import Command, Feedback, Reset, Rest, Stop
-from lockstep.robot_bridge.control.axis_shaper import AxisShaper
 from lockstep.robot_bridge.control.clock import Clock
 from lockstep.robot_bridge.control.event_core import Answered, EventCore, Executed, Refused
 from lockstep.robot_bridge.control.feedback_issuer import FeedbackIssuer
-from lockstep.robot_bridge.control.motion_limits import MotionLimits
+from lockstep.robot_bridge.control.limits.axis_shaper import AxisShaper
+from lockstep.robot_bridge.control.limits.motion_limits import MotionLimits
 from lockstep.robot_bridge.control.start_signal import StartSignal
 from lockstep.robot_bridge.counters import BridgeCounters
 from lockstep.robot_bridge.event_log import EventLog

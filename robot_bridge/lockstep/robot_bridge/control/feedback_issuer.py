@@ -5,11 +5,11 @@ import time
 
 from lockstep.protocol.description import RobotDescription
 from lockstep.protocol.messages import MAX_FAULTS, Feedback
-from lockstep.robot_bridge.control.axis_shaper import AxisShaper
 from lockstep.robot_bridge.control.clock import Clock
 from lockstep.robot_bridge.control.event_core import EventCore
 from lockstep.robot_bridge.control.event_times import EventTimes
 from lockstep.robot_bridge.control.last_known import LastKnown
+from lockstep.robot_bridge.control.limits.axis_shaper import AxisShaper
 from lockstep.robot_bridge.counters import BridgeCounters
 from lockstep.robot_bridge.event_log import EventLog
 from lockstep.robot_bridge.robots.base import Measurement, Robot

@@ -5,10 +5,10 @@ import contextlib
 import logging
 import time
 
-from lockstep.robot_bridge.control.axis_shaper import AxisShaper
 from lockstep.robot_bridge.control.clock import Clock
 from lockstep.robot_bridge.control.coming_to_rest import ComingToRest
 from lockstep.robot_bridge.control.command_executor import CommandExecutor
+from lockstep.robot_bridge.control.limits.axis_shaper import AxisShaper
 from lockstep.robot_bridge.control.ticker import Ticker
 from lockstep.robot_bridge.counters import BridgeCounters
 from lockstep.robot_bridge.errors import RobotFailed, RobotUnavailable, named

@@ -7,9 +7,9 @@ reset are called, and the clients are answered.
 import logging
 
 from lockstep.protocol.messages import Reset, Stop
-from lockstep.robot_bridge.control.axis_shaper import AxisShaper
 from lockstep.robot_bridge.control.clock import Clock
 from lockstep.robot_bridge.control.event_core import EventCore
+from lockstep.robot_bridge.control.limits.axis_shaper import AxisShaper
 from lockstep.robot_bridge.errors import named
 from lockstep.robot_bridge.event_log import EventLog
 from lockstep.robot_bridge.link.link_transport import LinkTransport

@@ -4,9 +4,9 @@ from collections import OrderedDict
 from dataclasses import dataclass, replace
 
 from lockstep.rtc.rtp.feedback import Nack
-from lockstep.rtc.rtp.packet import RtpPacket
-from lockstep.rtc.rtp.rtcp import RtcpPacket
 from lockstep.rtc.rtp.stage import RoundTrip, Stage
+from lockstep.rtc.rtp.wire.packet import RtpPacket
+from lockstep.rtc.rtp.wire.rtcp import RtcpPacket
 
 __all__ = ["History", "HistorySettings", "RepairStream"]
 

@@ -3,14 +3,14 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from lockstep.rtc.rtp.extensions import ExtensionReader
 from lockstep.rtc.rtp.feedback import PictureLoss, Remb
 from lockstep.rtc.rtp.losses import Losses
-from lockstep.rtc.rtp.packet import RtpPacket
 from lockstep.rtc.rtp.receiver_reports import ReceiverReports
 from lockstep.rtc.rtp.repairs import Repairs
-from lockstep.rtc.rtp.rtcp import ReceiverReport, RtcpPacket
 from lockstep.rtc.rtp.stage import RoundTrip, Sink, StreamEvent
+from lockstep.rtc.rtp.wire.extensions import ExtensionReader
+from lockstep.rtc.rtp.wire.packet import RtpPacket
+from lockstep.rtc.rtp.wire.rtcp import ReceiverReport, RtcpPacket
 
 __all__ = ["IncomingParameters", "IncomingStream"]
 

@@ -3,9 +3,9 @@
 from dataclasses import dataclass
 
 from lockstep.rtc.rtp.feedback import Nack
-from lockstep.rtc.rtp.numbers import Unwrapper
-from lockstep.rtc.rtp.packet import RtpPacket
 from lockstep.rtc.rtp.stage import PacketsGone, RoundTrip, Stage
+from lockstep.rtc.rtp.wire.numbers import Unwrapper
+from lockstep.rtc.rtp.wire.packet import RtpPacket
 
 __all__ = ["Losses", "LossSettings"]
 

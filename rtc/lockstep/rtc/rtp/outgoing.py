@@ -3,14 +3,14 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
-from lockstep.rtc.rtp.extensions import ExtensionWriter, TransportNumbers
 from lockstep.rtc.rtp.history import History, RepairStream
 from lockstep.rtc.rtp.pacer import Pacer, PathBudget
-from lockstep.rtc.rtp.packet import RtpPacket
 from lockstep.rtc.rtp.requests import Requests
-from lockstep.rtc.rtp.rtcp import RtcpPacket
 from lockstep.rtc.rtp.sender_reports import SenderReports
 from lockstep.rtc.rtp.stage import RoundTrip, Sink, Stage, StreamEvent
+from lockstep.rtc.rtp.wire.extensions import ExtensionWriter, TransportNumbers
+from lockstep.rtc.rtp.wire.packet import RtpPacket
+from lockstep.rtc.rtp.wire.rtcp import RtcpPacket
 
 __all__ = ["MAX_PAYLOAD", "OutgoingParameters", "OutgoingStream", "PathShare"]
 

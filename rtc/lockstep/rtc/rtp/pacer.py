@@ -4,8 +4,8 @@ from collections import deque
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from lockstep.rtc.rtp.packet import RtpPacket
 from lockstep.rtc.rtp.stage import PacketsLeft, Stage
+from lockstep.rtc.rtp.wire.packet import RtpPacket
 from lockstep.rtc.token_bucket import TokenBucket
 
 __all__ = ["Pacer", "PacerSettings", "PathBudget"]

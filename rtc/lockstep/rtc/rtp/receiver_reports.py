@@ -2,10 +2,10 @@
 
 from dataclasses import dataclass
 
-from lockstep.rtc.rtp.numbers import Unwrapper
-from lockstep.rtc.rtp.packet import RtpPacket
-from lockstep.rtc.rtp.rtcp import Goodbye, ReceiverReport, ReportBlock, RtcpPacket, SenderReport
 from lockstep.rtc.rtp.stage import Stage, StreamEnded
+from lockstep.rtc.rtp.wire.numbers import Unwrapper
+from lockstep.rtc.rtp.wire.packet import RtpPacket
+from lockstep.rtc.rtp.wire.rtcp import Goodbye, ReceiverReport, ReportBlock, RtcpPacket, SenderReport
 
 __all__ = ["ReceiverReports", "ReceiverReportSettings"]
 

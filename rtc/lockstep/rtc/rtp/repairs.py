@@ -2,8 +2,8 @@
 
 from collections.abc import Mapping
 
-from lockstep.rtc.rtp.packet import RtpPacket
 from lockstep.rtc.rtp.stage import Stage
+from lockstep.rtc.rtp.wire.packet import RtpPacket
 
 __all__ = ["Repairs"]
 

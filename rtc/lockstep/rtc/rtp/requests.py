@@ -3,9 +3,9 @@
 from dataclasses import dataclass
 
 from lockstep.rtc.rtp.feedback import FullIntraRequest, PictureLoss, Remb, TransportFeedback
-from lockstep.rtc.rtp.packet import RtpPacket
-from lockstep.rtc.rtp.rtcp import RtcpPacket
 from lockstep.rtc.rtp.stage import Arrivals, BandwidthEstimate, KeyframeRequested, RoundTrip, Stage
+from lockstep.rtc.rtp.wire.packet import RtpPacket
+from lockstep.rtc.rtp.wire.rtcp import RtcpPacket
 
 __all__ = ["Requests", "RequestSettings"]
 

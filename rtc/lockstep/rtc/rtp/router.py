@@ -4,7 +4,7 @@ from collections import Counter
 from collections.abc import Collection, Iterable
 from dataclasses import dataclass
 
-from lockstep.rtc.rtp.packet import RtpPacket
+from lockstep.rtc.rtp.wire.packet import RtpPacket
 
 __all__ = ["Route", "Router"]
 

@@ -2,9 +2,9 @@
 
 from dataclasses import dataclass
 
-from lockstep.rtc.rtp.packet import RtpPacket
-from lockstep.rtc.rtp.rtcp import Goodbye, ReceiverReport, ReportBlock, RtcpPacket, SenderReport, SourceDescription
 from lockstep.rtc.rtp.stage import Reception, RoundTrip, Stage
+from lockstep.rtc.rtp.wire.packet import RtpPacket
+from lockstep.rtc.rtp.wire.rtcp import Goodbye, ReceiverReport, ReportBlock, RtcpPacket, SenderReport, SourceDescription
 
 __all__ = ["SenderReports", "SenderReportSettings"]
 

@@ -12,8 +12,8 @@ Nothing here does I/O or reads a clock: `now` is handed in, in seconds of one mo
 from dataclasses import dataclass, field
 from typing import Literal
 
-from lockstep.rtc.rtp.packet import RtpPacket
-from lockstep.rtc.rtp.rtcp import ReportBlock, RtcpPacket
+from lockstep.rtc.rtp.wire.packet import RtpPacket
+from lockstep.rtc.rtp.wire.rtcp import ReportBlock, RtcpPacket
 
 __all__ = [
     "Arrivals",

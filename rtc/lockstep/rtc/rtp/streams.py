@@ -12,10 +12,17 @@ from lockstep.rtc.rtp.errors import RtpError
 from lockstep.rtc.rtp.history import RepairStream
 from lockstep.rtc.rtp.incoming import IncomingParameters, IncomingStream
 from lockstep.rtc.rtp.outgoing import OutgoingParameters, OutgoingStream, PathShare
-from lockstep.rtc.rtp.packet import RtpPacket
 from lockstep.rtc.rtp.router import Route, Router
-from lockstep.rtc.rtp.rtcp import ReceiverReport, RtcpPacket, SenderReport, SourceDescription, pack_rtcp, parse_rtcp
 from lockstep.rtc.rtp.stage import StreamEvent, earliest
+from lockstep.rtc.rtp.wire.packet import RtpPacket
+from lockstep.rtc.rtp.wire.rtcp import (
+    ReceiverReport,
+    RtcpPacket,
+    SenderReport,
+    SourceDescription,
+    pack_rtcp,
+    parse_rtcp,
+)
 from lockstep.rtc.sdp import MID_URI, Codec, Direction, MediaSection
 
 __all__ = ["Identity", "NegotiatedMedia", "Streams"]

@@ -6,7 +6,18 @@ from enum import Enum
 from struct import Struct
 from typing import Any
 
-from lockstep.rtc.sctp.chunks import (
+from lockstep.rtc.sctp.errors import AssociationClosed, MessageTooLarge, ProtocolViolation, SctpParseError
+from lockstep.rtc.sctp.events import Closed, Established, Event, OutgoingStreamsReset, StreamsReset
+from lockstep.rtc.sctp.handshake import Cookies, PeerInit, own_parameters, read_init, unrecognized
+from lockstep.rtc.sctp.heartbeat import Heartbeats
+from lockstep.rtc.sctp.receiver import PLAIN_SACK, Receiver
+from lockstep.rtc.sctp.round_trip import RoundTrip
+from lockstep.rtc.sctp.send_queue import Message
+from lockstep.rtc.sctp.sender import Sender
+from lockstep.rtc.sctp.serial import MASK_32
+from lockstep.rtc.sctp.settings import SctpSettings
+from lockstep.rtc.sctp.stream_reset import StreamReset
+from lockstep.rtc.sctp.wire.chunks import (
     Abort,
     Chunk,
     CookieAck,
@@ -27,12 +38,8 @@ from lockstep.rtc.sctp.chunks import (
     ShutdownComplete,
     Unknown,
 )
-from lockstep.rtc.sctp.errors import AssociationClosed, MessageTooLarge, ProtocolViolation, SctpParseError
-from lockstep.rtc.sctp.events import Closed, Established, Event, OutgoingStreamsReset, StreamsReset
-from lockstep.rtc.sctp.handshake import Cookies, PeerInit, own_parameters, read_init, unrecognized
-from lockstep.rtc.sctp.heartbeat import Heartbeats
-from lockstep.rtc.sctp.packet import COMMON_HEADER, Packet, decode_packet, encode_packet
-from lockstep.rtc.sctp.parameters import (
+from lockstep.rtc.sctp.wire.packet import COMMON_HEADER, Packet, decode_packet, encode_packet
+from lockstep.rtc.sctp.wire.parameters import (
     INVALID_STREAM,
     PROTOCOL_VIOLATION,
     STALE_COOKIE,
@@ -40,13 +47,6 @@ from lockstep.rtc.sctp.parameters import (
     UNRECOGNIZED_CHUNK,
     USER_ABORT,
 )
-from lockstep.rtc.sctp.receiver import PLAIN_SACK, Receiver
-from lockstep.rtc.sctp.round_trip import RoundTrip
-from lockstep.rtc.sctp.send_queue import Message
-from lockstep.rtc.sctp.sender import Sender
-from lockstep.rtc.sctp.serial import MASK_32
-from lockstep.rtc.sctp.settings import SctpSettings
-from lockstep.rtc.sctp.stream_reset import StreamReset
 
 __all__ = ["Association", "State"]
 

@@ -5,9 +5,10 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from struct import Struct
 
-from lockstep.rtc.sctp.chunks import ForwardTsn, Init, InterleavedData, InterleavedForwardTsn, Reconfig
 from lockstep.rtc.sctp.errors import ProtocolViolation
-from lockstep.rtc.sctp.parameters import (
+from lockstep.rtc.sctp.settings import SctpSettings
+from lockstep.rtc.sctp.wire.chunks import ForwardTsn, Init, InterleavedData, InterleavedForwardTsn, Reconfig
+from lockstep.rtc.sctp.wire.parameters import (
     FORWARD_TSN_SUPPORTED,
     STATE_COOKIE,
     SUPPORTED_EXTENSIONS,
@@ -15,7 +16,6 @@ from lockstep.rtc.sctp.parameters import (
     Parameter,
     encode_parameters,
 )
-from lockstep.rtc.sctp.settings import SctpSettings
 
 __all__ = ["Cookies", "PeerInit", "own_parameters", "read_init", "unrecognized"]
 

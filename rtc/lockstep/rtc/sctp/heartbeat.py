@@ -2,8 +2,8 @@
 
 from struct import Struct
 
-from lockstep.rtc.sctp.chunks import Heartbeat, HeartbeatAck
-from lockstep.rtc.sctp.parameters import encode_parameters
+from lockstep.rtc.sctp.wire.chunks import Heartbeat, HeartbeatAck
+from lockstep.rtc.sctp.wire.parameters import encode_parameters
 
 __all__ = ["Heartbeats"]
 

@@ -2,11 +2,11 @@
 
 from dataclasses import dataclass, field
 
-from lockstep.rtc.sctp.chunks import BEGIN, END, UNORDERED, Data, InterleavedData, Skip
 from lockstep.rtc.sctp.errors import ProtocolViolation
 from lockstep.rtc.sctp.events import MessageReceived
 from lockstep.rtc.sctp.serial import MASK_16, MASK_32, unwrap
 from lockstep.rtc.sctp.settings import SctpSettings
+from lockstep.rtc.sctp.wire.chunks import BEGIN, END, UNORDERED, Data, InterleavedData, Skip
 
 __all__ = ["Reassembly"]
 

@@ -3,9 +3,9 @@
 from bisect import bisect_left
 from collections import deque
 
-from lockstep.rtc.sctp.chunks import Sack
 from lockstep.rtc.sctp.serial import MASK_32
 from lockstep.rtc.sctp.settings import SctpSettings
+from lockstep.rtc.sctp.wire.chunks import Sack
 
 __all__ = ["ReceivedTsns"]
 

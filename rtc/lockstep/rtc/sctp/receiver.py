@@ -2,12 +2,12 @@
 
 from collections import Counter
 
-from lockstep.rtc.sctp.chunks import IMMEDIATE, Data, ForwardTsn, InterleavedData, InterleavedForwardTsn
 from lockstep.rtc.sctp.errors import ProtocolViolation
 from lockstep.rtc.sctp.events import MessageReceived
 from lockstep.rtc.sctp.reassembly import Reassembly
 from lockstep.rtc.sctp.received import ReceivedTsns
 from lockstep.rtc.sctp.settings import SctpSettings
+from lockstep.rtc.sctp.wire.chunks import IMMEDIATE, Data, ForwardTsn, InterleavedData, InterleavedForwardTsn
 
 __all__ = ["PLAIN_SACK", "Receiver"]
 

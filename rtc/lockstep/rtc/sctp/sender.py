@@ -4,7 +4,12 @@ from collections import Counter, deque
 from enum import Enum
 from heapq import heappop, heappush
 
-from lockstep.rtc.sctp.chunks import (
+from lockstep.rtc.sctp.congestion import CongestionWindow
+from lockstep.rtc.sctp.round_trip import RoundTrip
+from lockstep.rtc.sctp.send_queue import Message, SendQueue
+from lockstep.rtc.sctp.serial import MASK_16, MASK_32, unwrap
+from lockstep.rtc.sctp.settings import SctpSettings
+from lockstep.rtc.sctp.wire.chunks import (
     BEGIN,
     DATA_HEADER,
     END,
@@ -18,12 +23,7 @@ from lockstep.rtc.sctp.chunks import (
     Skip,
     encode_data,
 )
-from lockstep.rtc.sctp.congestion import CongestionWindow
-from lockstep.rtc.sctp.packet import COMMON_HEADER
-from lockstep.rtc.sctp.round_trip import RoundTrip
-from lockstep.rtc.sctp.send_queue import Message, SendQueue
-from lockstep.rtc.sctp.serial import MASK_16, MASK_32, unwrap
-from lockstep.rtc.sctp.settings import SctpSettings
+from lockstep.rtc.sctp.wire.packet import COMMON_HEADER
 
 __all__ = ["Outgoing", "Sender"]
 

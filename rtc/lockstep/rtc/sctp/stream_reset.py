@@ -3,9 +3,10 @@
 from dataclasses import dataclass
 from struct import Struct
 
-from lockstep.rtc.sctp.chunks import Reconfig
 from lockstep.rtc.sctp.events import Event, OutgoingStreamsReset, StreamsReset
-from lockstep.rtc.sctp.parameters import (
+from lockstep.rtc.sctp.serial import MASK_32, unwrap
+from lockstep.rtc.sctp.wire.chunks import Reconfig
+from lockstep.rtc.sctp.wire.parameters import (
     ADD_INCOMING_STREAMS,
     ADD_OUTGOING_STREAMS,
     INCOMING_RESET_REQUEST,
@@ -14,7 +15,6 @@ from lockstep.rtc.sctp.parameters import (
     TSN_RESET_REQUEST,
     Parameter,
 )
-from lockstep.rtc.sctp.serial import MASK_32, unwrap
 
 __all__ = ["StreamReset"]
 

@@ -10,8 +10,8 @@ from lockstep.rtc.peer import OfferedMedia
 from lockstep.rtc.sdp import MID_URI, Codec, LocalMedia, MediaSection, SessionDescription
 from lockstep.server.media.codecs.codec_choice import OPUS, chosen_codecs, known_codecs, offered_codecs
 from lockstep.server.media.codecs.extensions import choose_carrier, wanted_uris
+from lockstep.server.media.encoding.stream_encodings import StreamEncodings
 from lockstep.server.media.pipeline.stream import Stream, VideoStream
-from lockstep.server.media.pipeline.stream_encodings import StreamEncodings
 
 __all__ = ["MediaPlan", "PlannedStream", "codec_in_use", "plan_answer", "plan_publication"]
 

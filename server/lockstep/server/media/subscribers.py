@@ -6,9 +6,9 @@ from collections.abc import Callable
 from lockstep.protocol.console import StreamInfo
 from lockstep.rtc.endpoint import Connection, Turns
 from lockstep.server.media.codecs.codec_choice import h264_profile
+from lockstep.server.media.encoding.frame_queue import Outbox
 from lockstep.server.media.metrics import MediaMetrics
 from lockstep.server.media.pipeline.fanout import FanOut
-from lockstep.server.media.pipeline.frame_queue import Outbox
 from lockstep.server.media.pipeline.rtp_sender import RtpSender
 from lockstep.server.media.pipeline.stream import AudioStream, VideoStream
 from lockstep.server.media.planning import MediaPlan, PlannedStream

@@ -4,9 +4,9 @@ from collections.abc import Callable
 
 from lockstep.protocol.carriers import Carrier
 from lockstep.server.media.codecs.h264 import Profile
+from lockstep.server.media.encoding.frame_queue import Outbox
 from lockstep.server.media.metrics import MediaMetrics
 from lockstep.server.media.pipeline.frame import EncodedFrame
-from lockstep.server.media.pipeline.frame_queue import Outbox
 from lockstep.server.media.pipeline.rtp_sender import RtpSender
 from lockstep.server.media.quality.encoding_target import PictureTier
 

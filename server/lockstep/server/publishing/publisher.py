@@ -14,7 +14,7 @@ import structlog
 from lockstep.rtc.endpoint import Connection
 from lockstep.rtc.peer import PeerNotReady
 from lockstep.rtc.peer_events import Answered, Connected, PacketReceived, PeerEnded, PeerEvent
-from lockstep.rtc.rtp.packet import RtpPacket
+from lockstep.rtc.rtp.wire.packet import RtpPacket
 from lockstep.server.audit.records import Actor
 from lockstep.server.auth.tokens import Identity
 from lockstep.server.errors import Flood, TooManyRequests

@@ -6,8 +6,8 @@ import msgspec
 import pytest
 
 from lockstep.protocol.description import RobotDescription
-from lockstep.robot_bridge.control.axis_shaper import AxisShaper
-from lockstep.robot_bridge.control.motion_limits import MotionLimits
+from lockstep.robot_bridge.control.limits.axis_shaper import AxisShaper
+from lockstep.robot_bridge.control.limits.motion_limits import MotionLimits
 from lockstep.robot_bridge.description.check_description import check_description
 from lockstep.robot_bridge.robots.mobile_manipulator.robot import MobileManipulator
 

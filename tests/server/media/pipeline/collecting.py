@@ -5,13 +5,13 @@ from typing import Any, cast
 from prometheus_client import CollectorRegistry
 
 from lockstep.protocol.messages import Media
+from lockstep.server.media.encoding.frame_queue import Outbox
+from lockstep.server.media.encoding.stream_encodings import StreamEncodings
+from lockstep.server.media.encoding.tier_encoding import TierEncoding
 from lockstep.server.media.metrics import DropCounter, MediaMetrics
 from lockstep.server.media.pipeline.frame import EncodedFrame
-from lockstep.server.media.pipeline.frame_queue import Outbox
 from lockstep.server.media.pipeline.rtp_sender import RtpSender
 from lockstep.server.media.pipeline.stage import FrameStage, SourceFrame
-from lockstep.server.media.pipeline.stream_encodings import StreamEncodings
-from lockstep.server.media.pipeline.tier_encoding import TierEncoding
 from lockstep.server.media.quality.encoding_target import EncodingTarget
 from lockstep.server.media.settings import MediaSettings
 from lockstep.server.media.subscription import Subscription

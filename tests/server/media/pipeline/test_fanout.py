@@ -3,7 +3,7 @@ import asyncio
 from lockstep.server.media.pipeline.fanout import FanOut
 from lockstep.server.media.pipeline.frame import EncodedFrame
 from lockstep.server.util.cooperative_scheduler import CooperativeScheduler
-from tests.server.media.pipeline.test_frame_queue import frame
+from tests.server.media.encoding.test_frame_queue import frame
 
 
 class FakeTarget:

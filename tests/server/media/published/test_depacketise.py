@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lockstep.rtc.rtp.payloads import PayloadError
+from lockstep.rtc.rtp.wire.payloads import PayloadError
 from lockstep.server.media.codecs.packetise import packetise_h264, packetise_vp8
 from lockstep.server.media.published.depacketise import PictureCodec, begins_picture, is_keyframe, join_payloads
 

@@ -3,7 +3,7 @@
 from collections.abc import Collection
 
 from lockstep.protocol.carriers import CAPTURE_TIME_URI, EVENT_REFERENCE_URI, PLAYOUT_DELAY_URI, Carrier
-from lockstep.rtc.rtp.extensions import ABS_SEND_TIME_URI
+from lockstep.rtc.rtp.wire.extensions import ABS_SEND_TIME_URI
 from lockstep.rtc.sdp import MID_URI
 
 __all__ = ["choose_carrier", "wanted_uris"]

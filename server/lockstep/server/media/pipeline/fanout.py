@@ -7,9 +7,9 @@ from collections import deque
 from collections.abc import Iterable
 from typing import Protocol
 
+from lockstep.server.media.encoding.tier_encoding import TierEncoding
 from lockstep.server.media.pipeline.frame import EncodedFrame
 from lockstep.server.media.pipeline.stage import FrameStage, SourceFrame
-from lockstep.server.media.pipeline.tier_encoding import TierEncoding
 from lockstep.server.util.cooperative_scheduler import CooperativeScheduler
 
 __all__ = ["FanOut", "Target"]

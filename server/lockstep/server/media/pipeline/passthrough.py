@@ -14,13 +14,13 @@ from lockstep.protocol.messages import Media
 from lockstep.server.media.codecs.group_of_pictures import GroupOfPictures
 from lockstep.server.media.codecs.h264 import Profile, accepts, inspect
 from lockstep.server.media.codecs.packetise import packetise_h264
+from lockstep.server.media.encoding.stream_encodings import StreamEncodings
+from lockstep.server.media.encoding.tier_encoding import TierEncoding
 from lockstep.server.media.errors import PayloadError
 from lockstep.server.media.metrics import DropCounter
 from lockstep.server.media.pipeline.frame import EncodedFrame
 from lockstep.server.media.pipeline.media_clock import PictureClock
 from lockstep.server.media.pipeline.stage import FrameStage, SourceFrame
-from lockstep.server.media.pipeline.stream_encodings import StreamEncodings
-from lockstep.server.media.pipeline.tier_encoding import TierEncoding
 from lockstep.server.media.subscription import Subscription
 
 __all__ = ["Passthrough"]

@@ -2,10 +2,10 @@
 
 from typing import Protocol
 
+from lockstep.server.media.encoding.stream_encodings import PASSED, StreamEncodings
+from lockstep.server.media.encoding.tier_encoding import TierEncoding
 from lockstep.server.media.pipeline.frame import EncodedFrame
 from lockstep.server.media.pipeline.stage import FrameStage
-from lockstep.server.media.pipeline.stream_encodings import PASSED, StreamEncodings
-from lockstep.server.media.pipeline.tier_encoding import TierEncoding
 from lockstep.server.media.quality.encoding_target import PictureTier
 
 __all__ = ["FrameTaker", "RecordedEncoding"]

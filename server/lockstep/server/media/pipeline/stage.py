@@ -13,8 +13,8 @@ encoded frames in the passthrough. All stages run on the event loop, and their m
 from typing import NamedTuple
 
 from lockstep.protocol.messages import Media
+from lockstep.server.media.encoding.tier_encoding import TierEncoding
 from lockstep.server.media.pipeline.frame import EncodedFrame
-from lockstep.server.media.pipeline.tier_encoding import TierEncoding
 
 __all__ = ["FrameStage", "SourceFrame"]
 

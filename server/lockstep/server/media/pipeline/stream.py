@@ -6,18 +6,18 @@ from typing import Literal
 from lockstep.protocol.description import Camera, Microphone
 from lockstep.server.media.codecs.group_of_pictures import GroupOfPictures
 from lockstep.server.media.codecs.picture_encoder import VIDEO_CODECS
+from lockstep.server.media.encoding.encoder_worker import EncoderWorker
+from lockstep.server.media.encoding.picture_encoding import PictureJob, PictureQueue, TierEncoders
+from lockstep.server.media.encoding.sound_encoding import SoundEncoders, SoundJob, SoundQueue
+from lockstep.server.media.encoding.stream_encodings import StreamEncodings
 from lockstep.server.media.metrics import DropCounter, MediaMetrics
 from lockstep.server.media.pipeline.admission import Admission
-from lockstep.server.media.pipeline.encoder_worker import EncoderWorker
 from lockstep.server.media.pipeline.media_clock import PictureClock
 from lockstep.server.media.pipeline.passthrough import Passthrough
-from lockstep.server.media.pipeline.picture_encoding import PictureJob, PictureQueue, TierEncoders
 from lockstep.server.media.pipeline.picture_thinning import PictureThinning
 from lockstep.server.media.pipeline.recorded_encoding import RecordedEncoding
-from lockstep.server.media.pipeline.sound_encoding import SoundEncoders, SoundJob, SoundQueue
 from lockstep.server.media.pipeline.sound_rate_limiter import SoundRateLimiter
 from lockstep.server.media.pipeline.stage import FrameStage
-from lockstep.server.media.pipeline.stream_encodings import StreamEncodings
 from lockstep.server.media.quality.encoding_target import EncodingTarget
 from lockstep.server.media.quality.expected_loss import ExpectedLoss
 from lockstep.server.media.settings import MediaSettings

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from typing import Literal
 
-from lockstep.rtc.rtp.payloads import PayloadError, h264_parts, vp8_part
+from lockstep.rtc.rtp.wire.payloads import PayloadError, h264_parts, vp8_part
 from lockstep.server.media.codecs.h264 import START_CODE
 
 __all__ = ["PictureCodec", "begins_picture", "is_keyframe", "join_payloads"]

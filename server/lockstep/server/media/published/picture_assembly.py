@@ -7,7 +7,7 @@ loss that is not repaired in time costs pictures until the next keyframe, and ne
 from collections.abc import Iterator
 from typing import NamedTuple
 
-from lockstep.rtc.rtp.payloads import PayloadError
+from lockstep.rtc.rtp.wire.payloads import PayloadError
 from lockstep.server.media.published.depacketise import PictureCodec, begins_picture, is_keyframe, join_payloads
 
 __all__ = ["AssembledPicture", "MediaPacket", "PictureAssembly"]

@@ -1,0 +1,1 @@
+"""Limits of motion: axes, joints, positions and geofences."""

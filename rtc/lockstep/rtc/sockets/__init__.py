@@ -1,0 +1,1 @@
+"""The sockets of the endpoint: UDP, TCP, and links to TURN servers."""

@@ -1,0 +1,142 @@
+"""The encodings of one stream, and who gets which."""
+
+from collections.abc import Iterator
+
+from lockstep.server.media.encoding.keyframes import KeyframeScheduler
+from lockstep.server.media.encoding.tier_encoding import TierEncoding
+from lockstep.server.media.metrics import MediaMetrics
+from lockstep.server.media.quality.encoding_target import EncodingTarget, PictureTier
+from lockstep.server.media.settings import MediaSettings
+from lockstep.server.media.subscription import Subscription
+
+__all__ = ["PASSED", "StreamEncodings"]
+
+PASSED = "H264-passed"  # the codec in metrics of pictures that are passed on as the camera encoded them
+
+
+class StreamEncodings:
+    """The encodings that the console makes of a stream, and for a camera its own. Iterating yields all of them.
+
+    Attributes:
+        codecs: what the console can encode, the best first
+        full: the best encoding target that a tier can get
+        passed: the encoding that the camera itself makes; None for a microphone
+        passes: True while the camera makes it
+    """
+
+    def __init__(
+        self,
+        stream: str,
+        codecs: tuple[str, ...],
+        full: EncodingTarget,
+        settings: MediaSettings,
+        metrics: MediaMetrics,
+        *,
+        video: bool,
+    ) -> None:
+        self.stream = stream
+        self.codecs = codecs
+        self.full = full
+        self.passes = False
+        self._settings = settings
+        self._metrics = metrics
+        self._video = video
+        self._own: dict[tuple[str, PictureTier], TierEncoding] = {}
+        self._subscriptions: dict[Subscription, None] = {}  # an ordered set
+        self._peers = metrics.peers.labels(stream)
+        self.passed: TierEncoding | None = None
+
+    def __iter__(self) -> Iterator[TierEncoding]:
+        if self.passed is not None:
+            yield self.passed
+        yield from self._own.values()
+
+    @property
+    def is_taken(self) -> bool:
+        """True if some peer gets this stream."""
+        return bool(self._subscriptions)
+
+    @property
+    def own(self) -> list[TierEncoding]:
+        """The existing encodings that the console makes."""
+        return list(self._own.values())
+
+    def add_passed(self) -> TierEncoding:
+        """Create the encoding of pictures that are passed on as the camera encoded them."""
+        self.passed = self._create(PASSED, "operator")
+        return self.passed
+
+    def find(self, codec: str, tier: PictureTier) -> TierEncoding | None:
+        """Return an encoding of the console if it exists."""
+        return self._own.get((codec, tier))
+
+    def get(self, codec: str, tier: PictureTier) -> TierEncoding:
+        """Return an encoding of the console, created by the first call; it costs nothing while nobody needs it."""
+        found = self._own.get((codec, tier))
+        if found is None:
+            found = self._own[codec, tier] = self._create(codec, tier)
+        return found
+
+    def _create(self, codec: str, tier: PictureTier) -> TierEncoding:
+        settings = self._settings
+        keyframes = KeyframeScheduler(settings.keyframe_interval_seconds, settings.keyframe_spacing_seconds)
+        return TierEncoding(
+            self.stream, codec, tier, self.full, keyframes, self._metrics, moves_at_keyframes=self._video
+        )
+
+    def of_tier(self, tier: PictureTier) -> list[TierEncoding]:
+        """Return the existing encodings of the console for a tier, in all codecs."""
+        return [each for each in self._own.values() if each.tier == tier]
+
+    def join(self, codec: str, target: Subscription, tier: PictureTier = "operator") -> None:
+        target.tier = tier
+        self.get(codec, tier).join(target)
+        self._subscriptions[target] = None
+        self._peers.inc()
+
+    def move(self, codec: str, target: Subscription, tier: PictureTier) -> None:
+        """Give `target` another tier, from that tier's next keyframe on.
+
+        Does nothing for a target that has left or is in that tier, except to cancel its pending move to another. A
+        target that gets the camera's own encoding is in no tier until it gets one of the console's again.
+        """
+        if target not in self._subscriptions:
+            return
+        target.tier = tier
+        source = next((each for each in self if target in each.targets), None)
+        if source is None or source is self.passed:
+            return
+        for each in self._own.values():
+            each.arriving.pop(target, None)
+        if source.tier != tier:
+            self.get(codec, tier).expect(target, source)
+
+    def move_all(self, codec: str) -> None:
+        """Complete the pending moves between the console's encodings of a codec."""
+        for each in self._own.values():
+            if each.codec == codec:
+                each.arrive()
+
+    def request_keyframe(self, target: Subscription, cause: str) -> None:
+        """Request a keyframe for `target`; see `TierEncoding.request_keyframe`.
+
+        A camera takes no such requests: instead of its encoding, the target gets the console's.
+        """
+        for each in self:
+            if target in each.targets:
+                each.request_keyframe(cause)
+                if each is self.passed:
+                    self.return_to_own(target)
+
+    def return_to_own(self, target: Subscription) -> None:
+        """Move `target` from the camera's encoding to the console's with its next keyframe; it misses nothing."""
+        if self.passed is not None:
+            self.get("H264", target.tier).expect(target, self.passed)
+
+    def leave(self, target: Subscription) -> None:
+        """Remove a target. Idempotent."""
+        if target in self._subscriptions:
+            del self._subscriptions[target]
+            self._peers.dec()
+        for each in self:
+            each.leave(target)

@@ -1,0 +1,136 @@
+"""Endpoints and a real coturn, on loopback."""
+
+import asyncio
+import base64
+import hashlib
+import hmac
+import time
+from collections.abc import AsyncIterator
+from pathlib import Path
+from typing import cast
+
+import pytest
+
+from lockstep.rtc.channels import ChannelMessage
+from lockstep.rtc.endpoint import Connection, Endpoint, EndpointSettings
+from lockstep.rtc.peer_events import Connected, PeerEvent, Restarted
+from lockstep.rtc.sdp import parse_description, write_description
+from lockstep.rtc.sockets.server_links import RelayRefused
+from lockstep.rtc.stun import Kind, Message, parse, serialize
+from lockstep.rtc.turn.servers import IceServer
+from tests.support.turn_server import TURN_SECRET, TurnServer, running_turn_server
+
+HOST = "127.0.0.1"
+SECONDS = 20
+
+
+@pytest.fixture
+async def turn(tmp_path: Path) -> AsyncIterator[TurnServer]:
+    async with running_turn_server(tmp_path) as running:
+        yield running
+
+
+def server(turn: TurnServer, transport: str = "udp", secret: str = TURN_SECRET) -> IceServer:
+    user = f"{int(time.time()) + 600}:test"
+    password = base64.b64encode(hmac.new(secret.encode(), user.encode(), hashlib.sha1).digest()).decode()
+    return IceServer([turn.uri.replace("transport=udp", f"transport={transport}")], user, password)
+
+
+async def until(connection: Connection, kind: type) -> PeerEvent:
+    async with asyncio.timeout(SECONDS):
+        async for event in connection:
+            if isinstance(event, kind):
+                return event
+    raise AssertionError("ended")
+
+
+@pytest.mark.parametrize("transport", ["udp", "tcp"])
+async def test_a_peer_without_addresses_of_its_own_is_reached_through_a_relay_and_moves_to_another(
+    turn: TurnServer, transport: str
+) -> None:
+    async with Endpoint([]) as relayed, Endpoint([HOST]) as direct:
+        assert await relayed.ask([server(turn, transport)]) == []
+        assert [each.candidate.type for each in relayed.candidates] == ["relay"]
+        ours, theirs = relayed.connect(controlling=True), direct.connect(controlling=False)
+        offer = parse_description(write_description(ours.offer()))
+        ours.accept(theirs.answer(offer, {}))
+        await until(ours, Connected)
+        channel = ours.open_channel("x")
+        ours.send(channel, "through a relay")
+        assert await until(theirs, ChannelMessage) == ChannelMessage(channel, "through a relay")
+        first = ours.peer.ice.path
+        assert await relayed.ask([server(turn, transport)]) == []
+        answer = theirs.peer.answer_restart(ours.restart(), asyncio.get_running_loop().time())
+        theirs.flush()
+        ours.accept_restart(answer)
+        await until(ours, Restarted)
+        assert first is not None
+        assert ours.peer.ice.path is not None
+        assert ours.peer.ice.path.local != first.local
+        ours.send(channel, "through another")
+        assert await until(theirs, ChannelMessage) == ChannelMessage(channel, "through another")
+
+
+async def test_a_server_that_refuses_or_is_not_there_is_named_and_the_others_count(turn: TurnServer) -> None:
+    async with Endpoint([HOST]) as endpoint:
+        nobody = IceServer([f"turn:{HOST}:9?transport=tcp"], "user", "password")
+        troubles = await endpoint.ask([server(turn, secret="another"), nobody, server(turn, "tcp")])
+        assert [each.candidate.type for each in endpoint.candidates] == ["host", "relay"]
+        refused = [each for each in troubles if isinstance(each, RelayRefused)]
+        assert len(troubles) == 2
+        assert [each.code for each in refused] == [401]
+        assert str(refused[0]).startswith("401")
+
+
+async def test_addresses_that_carry_nothing_are_given_back(turn: TurnServer) -> None:
+    async with Endpoint([HOST]) as endpoint:
+        await endpoint.ask([server(turn)])
+        [first] = [each for each in endpoint.candidates if each.candidate.type == "relay"]
+        await endpoint.ask([server(turn)])
+        [second] = [each for each in endpoint.candidates if each.candidate.type == "relay"]
+        assert first.base != second.base
+        link = endpoint._relays[0]
+        await endpoint.ask([])
+        assert link.relayed is None
+        assert [each.candidate.type for each in endpoint.candidates] == ["host"]
+
+
+class Nat(asyncio.DatagramProtocol):
+    """A STUN server that sees everybody at 203.0.113.9."""
+
+    def connection_made(self, transport: asyncio.BaseTransport) -> None:
+        self.transport = transport
+
+    def datagram_received(self, data: bytes, addr: tuple[str, int]) -> None:
+        request = parse(data)
+        answer = serialize(Message(Kind.SUCCESS, request.transaction, mapped=("203.0.113.9", addr[1])))
+        cast(asyncio.DatagramTransport, self.transport).sendto(answer, addr)
+
+
+async def test_a_stun_server_tells_how_a_nat_shows_us() -> None:
+    transport, _ = await asyncio.get_running_loop().create_datagram_endpoint(Nat, local_addr=(HOST, 0))
+    port = transport.get_extra_info("sockname")[1]
+    try:
+        async with Endpoint([HOST, "127.0.0.2"]) as endpoint:
+            assert await endpoint.ask([IceServer([f"stun:{HOST}:{port}"])]) == []
+            found = [each for each in endpoint.candidates if each.candidate.type == "srflx"]
+            assert found
+            assert all(each.candidate.address == ("203.0.113.9", each.base[1]) for each in found)
+            line = found[0].candidate.line()
+            assert line.endswith(f"raddr {found[0].base[0]} rport {found[0].base[1]}")
+    finally:
+        transport.close()
+
+
+async def test_a_server_that_says_nothing_is_waited_for_a_bounded_time() -> None:
+    settings = EndpointSettings(ask_seconds=0.3)
+    silent, _ = await asyncio.get_running_loop().create_datagram_endpoint(
+        asyncio.DatagramProtocol, local_addr=(HOST, 0)
+    )
+    port = silent.get_extra_info("sockname")[1]
+    try:
+        async with Endpoint([HOST], settings=settings) as endpoint, asyncio.timeout(SECONDS):
+            await endpoint.ask([IceServer([f"stun:{HOST}:{port}"]), IceServer([f"turn:{HOST}:{port}"], "u", "p")])
+            assert [each.candidate.type for each in endpoint.candidates] == ["host"]
+    finally:
+        silent.close()
