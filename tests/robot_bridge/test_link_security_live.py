@@ -154,7 +154,7 @@ async def test_strangers_do_not_count_as_links_and_links_are_bounded() -> None:
         link_to(bridge) as link,
     ):
         await drives(link)
-        with pytest.raises(LinkRefused, match="takes 1 links"):
+        with pytest.raises(LinkRefused, match="takes at most 1 links"):
             await RobotLink(*bridge.address, "media", secret=SECRET).connect()
 
 

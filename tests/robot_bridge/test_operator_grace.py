@@ -28,7 +28,7 @@ async def lose_a_link(bridge: Bridge, name: str) -> None:
 async def test_another_console_does_not_get_the_robot_of_one_that_is_held_up() -> None:
     async with bridge_with(60.0) as bridge:
         await lose_a_link(bridge, "first")
-        with pytest.raises(LinkRefused, match="taken: kept for first"):
+        with pytest.raises(LinkRefused, match="taken: kept for first, whose link broke"):
             await RobotLink(*bridge.address, "operator", name="second").connect()
         async with RobotLink(*bridge.address, "media", name="second") as watcher:
             watcher.send(Stop(reason="smoke"))

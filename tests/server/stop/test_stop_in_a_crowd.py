@@ -6,6 +6,7 @@ import pytest
 
 from lockstep.protocol.console import Role, Seat, SeatRequest
 from lockstep.protocol.messages import Ping, Pong, Stop, StopTaken
+from lockstep.rtc.token_bucket import TokenBucket
 from lockstep.server.util.cooperative_scheduler import turns_of_loop
 from tests.server.rig import PATIENCE, running_rig
 
@@ -81,9 +82,8 @@ async def test_of_operators_who_flood_only_whoever_drives_does_not_wait_for_the_
             await driver.until(lambda each: isinstance(each, Seat) and each.holder != "")
         turns = rig.dependencies.media.datagrams.observers
         monkeypatch.setattr(turns_of_loop(), "is_over", lambda: True)
-        monkeypatch.setattr(
-            rig.dependencies.media.datagrams._not_driving, "take", lambda now: False
-        )  # others have sent too much
+        used_up = TokenBucket(0.001, 0.0)  # others have sent too much
+        monkeypatch.setattr(rig.dependencies.media.datagrams, "_not_driving", used_up)
         for each in crowd:
             turns.add(each)
         rounds = []

@@ -40,7 +40,7 @@ class LinkAdmission(Generic[Link]):
             return Goodbye(error="taken", detail="another operator link is open")
         left = self._kept_until - now
         if self._kept_for not in ("", hello.name) and left > 0:  # a stall gives the robot to no other client
-            return Goodbye(error="taken", detail=f"kept {left:.0f} s more for {self._kept_for}, whose link broke")
+            return Goodbye(error="taken", detail=f"kept for {self._kept_for}, whose link broke, for {left:.0f} s more")
         return None
 
     def add(self, link: Link, hello: Hello) -> None:

@@ -174,7 +174,7 @@ async def test_old_odometry_is_a_fault_is_not_shown_as_fresh_and_stops(driver: D
         await node.tell(f"{how} /odom")
         await driver.driven(GO, lambda feedback: bool(feedback.unknown))
         assert driver.feedback.unknown == ["base.vx", "base.wz", "base.x", "base.y", "base.yaw"]
-        assert any(fault.startswith("/odom: nothing for") for fault in driver.feedback.faults)
+        assert any(fault.startswith("/odom: no message for") for fault in driver.feedback.faults)
         assert not driver.feedback.at_rest
         await node.ended_in_one_zero(motion + 1)
         await node.tell("speak /odom")
@@ -197,7 +197,7 @@ async def test_bad_messages_are_counted_and_named_and_a_dead_robot_is_a_fault(dr
     await driver.driven(GO, lambda feedback: feedback.axes == GO)
     await node.process.kill()
     await driver.driven(GO, lambda feedback: bool(feedback.unknown))
-    lost = {"/odom: nothing", "/scan: nothing", "/camera/image_raw: nothing"}
+    lost = {"/odom: no message", "/scan: no message", "/camera/image_raw: no message"}
     await driver.driven(STAY, lambda feedback: lost <= {fault.partition(" for")[0] for fault in feedback.faults})
 
 
