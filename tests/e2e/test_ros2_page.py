@@ -48,7 +48,7 @@ async def test_the_page_drives_the_node_and_shows_what_it_says(base: Stack, node
         await console.press(RB)
         await console.until("s.driving && s.at_rest === false")
         await node.tell("hush /odom")
-        await console.until("s.axes['base.vx'] === null && s.faults.some((x) => x.startsWith('/odom: nothing'))")
+        await console.until("s.axes['base.vx'] === null && s.faults.some((x) => x.startsWith('/odom: no message'))")
         await expect(console.page.get_by_text("/odom: no message for").first).to_be_visible()
         await console.press(RB, False)
         await console.tilt(LEFT_Y, 0)
