@@ -235,6 +235,7 @@ function takeRecording(state: ConsoleState, recording: RecordingState, wallMs: n
 
 function takeSeat(state: ConsoleState, seat: Seat, wallMs: number): void {
   const change = seatHandover(state.seat, seat, state.welcome?.peer ?? null);
+  if (state.seat === null) state.seatNotice = null; // of an earlier connection, whose seat this one may contradict
   state.seat = seat;
   if (change === null) return;
   state.handOver = change;

@@ -66,6 +66,16 @@ describe("the console's state", () => {
     expect(state.handOver).toMatchObject({ toMe: false, fromMe: false });
   });
 
+  it("takes back what an earlier connection said of the seat when the next one says who has it", () => {
+    const state = createConsoleState();
+    applyMessage(state, seatOf("x", "Ada"), 0);
+    applyMessage(state, { ...seatOf("", ""), why: "disconnected" }, 0);
+    forgetConnection(state);
+    expect(state.seatNotice?.words).toBe("Ada left: the control seat is free");
+    applyMessage(state, seatOf("x", "Ada"), 0);
+    expect([state.seatNotice, state.seat?.name]).toEqual([null, "Ada"]);
+  });
+
   it("keeps only the newest lines of the log", () => {
     const state = createConsoleState();
     for (let index = 0; index < 100; index++) note(state, "info", `line ${index}`, index);
