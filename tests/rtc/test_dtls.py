@@ -115,6 +115,22 @@ def test_a_datagram_of_data_with_a_record_that_was_changed_gives_the_others() ->
     assert pair.server.events() == [DtlsData(b"four")]
 
 
+@pytest.mark.parametrize("version", [b"\xfe\xff", b"\x00\x00", b"\x03\x03"])
+def test_records_in_the_content_of_a_malformed_one_are_all_read_at_once(version: bytes) -> None:
+    """OpenSSL skips the malformed header alone. What it did not read would fill its buffer for ever."""
+    pair = DtlsPair()
+    pair.connect()
+    for number in range(20):
+        pair.client.send(b"%d" % number, NOW)
+    inner = b"".join(pair.client.datagrams_to_send())
+    header = b"\x17" + version + inner[3:11] + len(inner).to_bytes(2, "big")
+    pair.server.receive_datagram(header + inner, NOW)
+    assert pair.server.events() == [DtlsData(b"%d" % number) for number in range(20)]
+    pair.client.send(b"next", NOW)
+    pair.server.receive_datagram(pair.client.datagrams_to_send()[0], NOW)
+    assert pair.server.events() == [DtlsData(b"next")]
+
+
 @pytest.mark.parametrize("lost", range(8))
 def test_a_lost_datagram_of_the_handshake_is_sent_again(lost: int) -> None:
     pair = DtlsPair(settings=DtlsSettings(mtu=600))

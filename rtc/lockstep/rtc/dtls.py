@@ -186,12 +186,8 @@ class DtlsConnection:
         elif self._is_too_much(len(data)):
             self._fail("too_much_handshake", f"more than {self._settings.max_handshake} bytes before connected")
         else:
-            records = _data_records(data) if self._state is DtlsState.CONNECTED else 0
             self._ssl.bio_write(data)
-            if records:
-                self._advance(now, records, len(data))
-            else:
-                self._advance(now)
+            self._advance(now)
 
     def handle_timer(self, now: float) -> None:
         """Repeat the unanswered flight (RFC 6347 4.2.4), if OpenSSL finds that it is due."""
@@ -261,20 +257,17 @@ class DtlsConnection:
         self._handshake_bytes += length
         return self._handshake_bytes > self._settings.max_handshake
 
-    def _advance(self, now: float, records: int = -1, size: int = MAX_PLAINTEXT) -> None:
+    def _advance(self, now: float) -> None:
         """Let OpenSSL read all records that it has.
 
-        `records`: their number if all are application data, of at most `size` bytes, to which OpenSSL has no answer.
+        It alone knows how many: it skips only the header of a malformed record, and finds others in its content.
         """
         try:
             if self._state is DtlsState.CONNECTING:
                 self._ssl.do_handshake()
                 self._finish_handshake()
-            while self._state is DtlsState.CONNECTED and records:
-                self._events.append(DtlsData(self._ssl.recv(size)))
-                records -= 1
-            if not records:
-                return
+            while self._state is DtlsState.CONNECTED:
+                self._events.append(DtlsData(self._ssl.recv(MAX_PLAINTEXT)))
         except SSL.WantReadError:
             pass  # all was read
         except SSL.ZeroReturnError:
@@ -334,15 +327,6 @@ def records(data: bytes) -> Iterator[bytes]:
         end = start + HEADER + int.from_bytes(data[start + 11 : start + HEADER], "big")
         yield data[start:end]
         start = end
-
-
-def _data_records(data: bytes) -> int:
-    """Return the number of records in a datagram; 0 if any of them is not application data, or not whole."""
-    count = start = 0
-    while start + HEADER <= len(data) and data[start] == APPLICATION_DATA:
-        start += HEADER + int.from_bytes(data[start + 11 : start + HEADER], "big")
-        count += 1
-    return count if start == len(data) else 0
 
 
 def _datagrams(written: bytes, mtu: int) -> Iterator[bytes]:
