@@ -117,6 +117,25 @@ async def test_after_a_failure_the_next_bridge_begins_stopped_with_the_reason_an
     assert all(values == NEUTRAL for _, values in robot.applied)
 
 
+@pytest.mark.parametrize(
+    "error", [OSError("no answer"), asyncio.CancelledError()], ids=lambda error: type(error).__name__
+)
+async def test_a_robot_that_cannot_be_measured_at_the_start_is_closed_and_the_next_bridge_begins_stopped(
+    tmp_path: Path, error: BaseException
+) -> None:
+    settings = BridgeSettings(port=0, state_dir=tmp_path / "state")
+    broken = BreakableRobot()
+    broken.broken["measure"] = error
+    bridge = Bridge(broken, settings)
+    with pytest.raises(RobotFailed, match=type(error).__name__):
+        await bridge.start()
+    assert broken.calls[-1] == "close"
+    with pytest.raises(ConnectionRefusedError):
+        await asyncio.open_connection(*bridge.address)
+    async with Bridge(RecordingRobot(), settings) as bridge, operator(bridge) as driver:
+        assert driver.feedback.stop.stopped
+
+
 async def test_a_robot_that_works_but_for_its_measurement_ramps_down() -> None:
     robot = BreakableRobot()
     async with running_bridge(robot) as bridge, operator(bridge) as driver:

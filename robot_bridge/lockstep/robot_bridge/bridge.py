@@ -131,6 +131,7 @@ class Bridge:
             RobotUnavailable: the robot's watchdog process cannot be had.
             StateDirInUse, StateDirUnusable: the stop cannot be kept in the directory of the settings.
             OSError: the event log cannot be opened.
+            RobotFailed: the robot adapter raised at its first measurement; the next bridge begins stopped.
         """
         try:
             self._core.begin(await self._keeper.open(self._now()))
@@ -139,13 +140,21 @@ class Bridge:
                 await asyncio.to_thread(self._lockout.start)
             await self._watchdogs.start()
             self.address = await self._links.listen(self._settings.host, self._settings.port)
+            self._begin()
         except BaseException:
             await self.close()
             raise
+
+    def _begin(self) -> None:
         self._stops.begin()
         stop = self._core.stop_state
         self._log.record("start", self._core.current, epoch=self.epoch, stopped=stop.stopped, number=stop.number)
-        self._links.publish_feedback(self._feedback.issue())
+        try:
+            feedback = self._feedback.issue()
+        except BaseException as error:  # an adapter may raise one that ends the loop or cancels the task
+            self._stops.fail(error)
+            raise RobotFailed(named(error)) from error
+        self._links.publish_feedback(feedback)
         atexit.register(self._ticks.rest_at_exit)
         self._liveness.start(self._keeper.note_end)
         # No group of the caller: the ticks go on while the caller is cancelled, until `close` has brought the robot to
@@ -195,12 +204,11 @@ class Bridge:
 
     async def _end_run(self) -> None:
         """End the ticks, which always apply the rest values and call the robot's own stop."""
-        if self._running is None:
-            return
-        self._running.cancel()
-        await asyncio.wait([self._running])
-        if not self._running.cancelled():
-            self._running.exception()  # `wait` raises it; here it only must not count as unnoticed
+        if self._running is not None:
+            self._running.cancel()
+            await asyncio.wait([self._running])
+            if not self._running.cancelled():
+                self._running.exception()  # `wait` raises it; here it only must not count as unnoticed
         atexit.unregister(self._ticks.rest_at_exit)
 
     async def __aenter__(self) -> Self:

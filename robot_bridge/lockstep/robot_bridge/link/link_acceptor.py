@@ -98,6 +98,7 @@ class LinkAcceptor:
         self._known = known or KnownAddresses(None)
         self._is_unwritten = False  # an address was added since the last write began
         self._wake = asyncio.Event()  # there is something to write, or the end has come
+        self._is_fault_logged = False
         self._ended = asyncio.Event()  # `run` has ended, or was never called
         self._ended.set()
 
@@ -188,7 +189,9 @@ class LinkAcceptor:
             self._failed()
             raise
         except Exception as error:  # a fault in one connection must not end the bridge, which takes others
-            _logger.error("a connection to the robot link failed: %r", error, exc_info=error)
+            if not self._is_fault_logged:  # a stranger may cause it again and again
+                self._is_fault_logged = True
+                _logger.error("a connection to the robot link failed: %r", error, exc_info=error)
             self._failed()
             with contextlib.suppress(OSError):
                 connection.close()
