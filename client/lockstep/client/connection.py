@@ -1,7 +1,9 @@
 """The connection to a console, from its opening to its end. `Console` is its public interface."""
 
 import asyncio
+import logging
 from collections.abc import Callable
+from contextlib import AsyncExitStack
 from dataclasses import replace
 
 from lockstep.client.connection_options import ConnectionOptions
@@ -21,6 +23,8 @@ from lockstep.client.transport.whep import Whep
 from lockstep.protocol.console import Rename
 
 __all__ = ["Connection"]
+
+_logger = logging.getLogger(__name__)
 
 
 class Connection:
@@ -129,6 +133,10 @@ class Connection:
                 tasks.append(group.create_task(self._start_session(transport, group, tasks)))
                 await transport.ended.wait()
                 await cancel_all(tasks)
+        except Exception as error:  # a fault of this program; the user's waits raise it
+            _logger.exception("the connection to the console failed")
+            cause = error.exceptions[0] if isinstance(error, ExceptionGroup) else error
+            transport.lose(f"this client failed: {type(cause).__name__}: {cause}")
         finally:
             self._end(ConsoleLost(transport.why or "closed"))
 
@@ -157,14 +165,15 @@ class Connection:
         await finish(self._close())
 
     async def _close(self) -> None:
-        if self._transport is not None:
-            await self._transport.close()
-        if self.relay is not None:
-            await self.relay.close()
-        if self._running is not None:
-            await self._running
-        self._end(ConsoleLost("closed"))
-        self.media.close()
+        async with AsyncExitStack() as stack:  # each is closed, whatever the others raise
+            stack.callback(self.media.close)
+            stack.callback(self._end, ConsoleLost("closed"))
+            if self._running is not None:
+                stack.push_async_callback(asyncio.wait, [self._running])
+            if self.relay is not None:
+                stack.push_async_callback(self.relay.close)
+            if self._transport is not None:
+                stack.push_async_callback(self._transport.close)
 
     def statistics(self) -> ConsoleStatistics:
         driver, round_trip = self.driving.driver, self._heartbeat.round_trip

@@ -623,6 +623,7 @@ class Endpoint:
             self._loop.remove_writer(found.fileno())
             found.close()
         self._sockets.clear()
+        self._full.clear()
 
     async def __aenter__(self) -> Self:
         return self
