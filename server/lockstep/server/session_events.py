@@ -1,4 +1,4 @@
-"""The events of a robot's session, and those who hear them: metrics, audit, recorder, notices, 3D scene, relays.
+"""The events of a robot's session, and their subscribers: metrics, audit, recorder, notices and 3D scene.
 
 The console decides and acts first: STOP, seat and commands need no subscriber. Then it publishes what has happened.
 """

@@ -14,7 +14,7 @@ from lockstep.server.media.pipeline.admission import MAX_AT_ONCE
 from lockstep.server.media.pipeline.frame import EncodedFrame
 from lockstep.server.media.pipeline.rtp_sender import RtpSender
 from tests.server.media.feeding import refused, stream, value
-from tests.server.media.viewer import TIMEOUT, picture, running_plane, sender_of, sound, viewing
+from tests.server.media.viewer import TIMEOUT, description, picture, running_plane, sender_of, sound, viewing
 
 
 async def test_a_medium_older_than_the_one_before_is_dropped_and_counted() -> None:
@@ -187,3 +187,14 @@ async def test_a_sender_without_a_path_sends_nothing() -> None:
             assert new.transmit(frame) is None, "it has no connection yet"
             assert new.stats.packets == 0
             assert not new.paced
+
+
+async def test_whoever_asks_after_a_failure_is_told_of_the_failure_and_not_of_an_end() -> None:
+    told: list[str] = []
+    async with running_plane() as hub, viewing(hub, ["video"]) as viewer:
+        viewer.media.failed("planted", RuntimeError("planted"))
+        viewer.media.on_ended(lambda: told.append("ended"))
+        viewer.media.on_failed(lambda stage, error: told.append(stage))
+        assert told == ["planted"]
+        hub.configure(description())
+    assert told == ["planted"]

@@ -94,6 +94,8 @@ class MediaHub:
     def configure(self, description: RobotDescription) -> None:
         """Create the streams of a robot; once per epoch. Peers that are still attached get nothing more."""
         self.subscribers.end_all()
+        for stream in self._streams.values():
+            stream.recording.stop()  # what their encoders still finish belongs to the last epoch
         self._capture_clock = CaptureClock()
         self._streams = {camera.name: self._maker.video(camera) for camera in description.cameras}
         for microphone in description.microphones:

@@ -54,7 +54,8 @@ class Subscriptions:
         self._turns = turns
         self._report_seconds = 1.0  # between two sender reports, unless this peer comes first
         self._has_left = False
-        self._has_failed = False
+        self._failure: tuple[str, Exception] | None = None  # stage and error of the first failure
+        self._has_ended = False  # another epoch has begun
         self._tell_failed: Callable[[str, Exception], None] = _log_failure
         self._tell_ended: Callable[[], None] = lambda: None
 
@@ -161,24 +162,28 @@ class Subscriptions:
                 delivery.stream.encodings.request_keyframe(delivery.target, "pli")
 
     def on_failed(self, tell: Callable[[str, Exception], None]) -> None:
-        """Call `tell` with the stage and the exception once this peer cannot be served; `tell` raises nothing."""
+        """Call `tell` with the stage and the exception once this peer cannot be served, at once if it is so already;
+        `tell` raises nothing."""
         self._tell_failed = tell
+        if self._failure is not None:
+            tell(*self._failure)
 
     def on_ended(self, tell: Callable[[], None]) -> None:
         """Call `tell` once the streams have ended, at once if they have; `tell` raises nothing."""
         self._tell_ended = tell
-        if self._has_left:
+        if self._has_ended:
             tell()
 
     def failed(self, stage: str, error: Exception) -> None:
         """Stop serving this peer, because doing so raised `error`. Only the first error is told. Raises nothing."""
-        if not self._has_failed:
-            self._has_failed = True
+        if self._failure is None:
+            self._failure = stage, error
             self._leave_all()
             self._tell_failed(stage, error)
 
     def detach(self) -> None:
         """Take no more frames, because the streams have ended. Raises nothing."""
+        self._has_ended = True
         self._leave()
         self._tell_ended()
 

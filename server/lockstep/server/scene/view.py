@@ -101,7 +101,7 @@ class SceneView:
         """Count a viewer while entered. One link gets a quarter of the places; observers do not get the last ones.
 
         Raises:
-            SceneUnavailable: there are too many viewers, or this link opens 3D scenes too often; wait a moment.
+            SceneUnavailable: there are too many viewers, or this link opens 3D scenes too often.
         """
         if not self._opens.spend(ticket.link, time.monotonic()):
             raise SceneUnavailable("this link opens 3D scenes too often; wait a moment")

@@ -3,7 +3,11 @@
 import asyncio
 import threading
 from collections.abc import AsyncIterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import asynccontextmanager, suppress
+from typing import NoReturn
+
+import pytest
 
 from lockstep.server.media.codecs.packetise import packetise_h264
 from lockstep.server.media.encoding.encoder_worker import Encoded, EncoderWorker
@@ -124,4 +128,20 @@ async def test_nothing_passes_after_the_end_and_it_can_run_again() -> None:
     assert world.stamps == []
     async with world.running():
         await world.take(2)
+    assert world.stamps == [2]
+
+
+async def test_a_picture_for_which_there_was_no_room_for_a_thread_does_not_keep_the_next_ones_out() -> None:
+    world = World()
+    with pytest.MonkeyPatch.context() as patch:
+
+        def refuse(*arguments: object) -> NoReturn:
+            raise RuntimeError("can't start new thread")
+
+        async with world.running():
+            patch.setattr(ThreadPoolExecutor, "submit", refuse)
+            with pytest.raises(RuntimeError):
+                arrive(world.worker, picture(1, 0.0))
+            patch.undo()
+            await world.take(2)
     assert world.stamps == [2]

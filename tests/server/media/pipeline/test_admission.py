@@ -52,3 +52,12 @@ def test_the_newest_frame_is_known_even_if_nobody_takes_it() -> None:
     assert before is None
     assert newest is not None
     assert (newest.media.width, newest.arrived_at) == (64, 0.25)
+
+
+def test_the_size_is_that_of_the_newest_picture_that_says_it_and_was_not_dropped() -> None:
+    world = World()
+    arrive(world.stage, picture(5, 0.0, width=64, height=48), picture(6, 0.1, width=0), picture(2, 0.2, width=800))
+    assert world.stage.size == (64, 48)
+    newest = world.stage.newest
+    assert newest is not None
+    assert newest.media.stamp == 6

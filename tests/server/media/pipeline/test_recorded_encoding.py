@@ -1,7 +1,10 @@
 """Which of a stream's encodings is recorded: the operator's, a camera's own, the observers', else one made for it."""
 
 import asyncio
+import threading
+from collections.abc import Callable
 from itertools import groupby, pairwise
+from typing import Any
 
 import av
 import pytest
@@ -307,3 +310,27 @@ async def test_a_clock_that_jumped_back_where_the_codec_changes_does_not_end_the
             await taken.hear(hub, heard(3, 10))
     assert taken.codecs[-1] == "PCMU"
     assert taken.steps[-3:] == [0.02] * 3
+
+
+async def test_a_picture_that_is_encoded_while_another_epoch_begins_is_recorded_in_neither(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    taken, goes_on, told = Taken(), threading.Event(), threading.Event()
+    async with running_plane(description(microphones=0)) as hub:
+        hub.record(taken)
+        await taken.feed(hub, plain(1, 2))
+        worker = hub._streams["camera0"].worker
+        work: Callable[..., None] = worker._work
+
+        def late(*arguments: Any) -> None:
+            goes_on.wait(TIMEOUT)
+            work(*arguments)
+            told.set()
+
+        monkeypatch.setattr(worker, "_work", late)
+        hub.feed(picture(3, 0.1), 0.1)
+        hub.configure(description(microphones=0))
+        goes_on.set()
+        assert told.wait(TIMEOUT), "and the loop has had no turn since the epoch began"
+        await taken.feed(hub, [picture(1, 0.2)])
+        assert taken.stamps == [1, 2, 1]

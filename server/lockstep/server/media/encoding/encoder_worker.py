@@ -93,8 +93,8 @@ class EncoderWorker(FrameStage, Generic[Job]):
         if self._thread is None or self._turns is None or self._is_busy:
             return
         if (job := self._queue.next_job()) is not None:
-            self._is_busy = True
             self._thread.submit(self._work, job, self._turns)
+            self._is_busy = True  # not if there is no room for a thread: the next run tries again
 
     def _work(self, job: Job, turns: CooperativeScheduler) -> None:
         """Do a job in the thread. Its results go out at once, without waiting for a task's turn."""

@@ -19,16 +19,19 @@ class Admission(FrameStage):
     """Passes frames on that come in order and not too often, while somebody takes the stream.
 
     Attributes:
-        newest: the newest frame, also one that was dropped; None before the first
+        newest: the newest frame that came in order and not too often; None before the first
+        size: width and height of the newest picture that says them; None before the first
     """
 
     def __init__(
-        self, following: FrameStage, is_wanted: Callable[[], bool], arrived: Counter, dropped: DropCounter
+        self, following: FrameStage, choose: Callable[[], bool], arrived: Counter, dropped: DropCounter
     ) -> None:
-        """`is_wanted` returns whether somebody takes the stream; it is called for each frame."""
+        """`choose` chooses what is recorded of the next frame, and returns whether somebody takes the stream. It is
+        called for each frame."""
         super().__init__(following)
         self.newest: SourceFrame | None = None
-        self._is_wanted = is_wanted
+        self.size: tuple[int, int] | None = None
+        self._choose = choose
         self._arrived = arrived
         self._dropped = dropped
         self._rate = TokenBucket(MAX_RATE, MAX_AT_ONCE)
@@ -36,7 +39,6 @@ class Admission(FrameStage):
 
     def source(self, frame: SourceFrame) -> None:
         media = frame.media
-        self.newest = frame
         self._arrived.inc()
         if not self._rate.take(frame.arrived_at):
             self._dropped.count("too_often")
@@ -46,6 +48,9 @@ class Admission(FrameStage):
         if not in_order and event_gap(media.stamp, self._last_stamp or media.stamp) < 0:
             self._dropped.count("stale_stamp")
             return
-        self._last_stamp = media.stamp
-        if self._is_wanted() or media.codec == "h264":  # the camera's next keyframe may be far
+        self.newest, self._last_stamp = frame, media.stamp
+        if media.width > 0 and media.height > 0:
+            self.size = media.width, media.height
+        is_taken = self._choose()
+        if is_taken or media.codec == "h264":  # the camera's next keyframe may be far
             super().source(frame)

@@ -76,8 +76,8 @@ class RecordedEncoding(FrameStage):
             self._drop(encoding)
         self._current = self._next = self._meanwhile = None
 
-    def is_wanted(self) -> bool:
-        """Return whether the next medium is needed by anybody; choose the encoding that is recorded of it."""
+    def choose_for_next(self) -> bool:
+        """Choose the encoding that is recorded of the next frame. Return whether anybody takes that frame."""
         if self._take is None:
             return self._encodings.is_taken
         self._choose()

@@ -55,11 +55,8 @@ class VideoStream(Stream):
 
     @property
     def size(self) -> tuple[int, int]:
-        """Width and height of the newest picture."""
-        newest = self.first.newest
-        if newest is None or newest.media.width <= 0 or newest.media.height <= 0:
-            return self.first_size
-        return newest.media.width, newest.media.height
+        """Width and height of the newest picture that says them."""
+        return self.first.size or self.first_size
 
     @property
     def gives_h264(self) -> bool:
@@ -108,7 +105,7 @@ class StreamMaker:
         if settings.video_frames_per_second is not None:
             thinned = PictureThinning(worker, settings.video_frames_per_second, dropped)
         passthrough = Passthrough(thinned, encodings, passed, clock, group, dropped)
-        admission = Admission(passthrough, recording.is_wanted, metrics.frames_in.labels(name), dropped)
+        admission = Admission(passthrough, recording.choose_for_next, metrics.frames_in.labels(name), dropped)
         return VideoStream(
             name,
             camera.label,
@@ -132,5 +129,5 @@ class StreamMaker:
         queue = SoundQueue(encodings, expected_loss, dropped)
         worker = EncoderWorker(recording, queue, SoundEncoders(settings.opus_bitrate_bps), encodings, dropped)
         limiter = SoundRateLimiter(worker, dropped)
-        admission = Admission(limiter, recording.is_wanted, metrics.frames_in.labels(name), dropped)
+        admission = Admission(limiter, recording.choose_for_next, metrics.frames_in.labels(name), dropped)
         return AudioStream(name, microphone.label, admission, encodings, recording, worker, expected_loss)
