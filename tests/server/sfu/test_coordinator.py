@@ -22,6 +22,8 @@ class Relays:
         self.tried: list[str] = []
         self.carrying: dict[str, Publication] = {}
         self.changed = asyncio.Event()
+        self.passed_on = asyncio.Event()
+        self.odd = False
 
     @asynccontextmanager
     async def publish(self, station: SfuServer, feed: int) -> AsyncIterator[Publication]:
@@ -39,6 +41,9 @@ class Relays:
 
     @asynccontextmanager
     async def pass_on(self, origin: SfuServer, station: SfuServer, publication: Publication) -> AsyncIterator[Watched]:
+        self.passed_on.set()
+        if self.odd:
+            raise UnicodeError("no host of that name")
         await asyncio.Event().wait()  # no relay is ever reached from another one here
         yield publication
 
@@ -102,3 +107,25 @@ async def test_a_relay_that_does_not_answer_the_farewell_does_not_keep_the_conso
     await asyncio.gather(asked, running, return_exceptions=True)
     assert not going_on
     assert relays.tried == ["0"]
+
+
+async def test_a_fault_on_the_way_to_one_more_relay_ends_nothing_at_the_first() -> None:
+    relays = Relays()
+    relays.odd = True
+    settings = RelaySettings(relay=("janus:ws://a.example/1", "janus:ws://b.example/1"), observers_direct=0)
+    coordinator = SfuCoordinator(settings, relays, [Watching()], _good, lambda: 100.0)
+    asked = asyncio.create_task(coordinator.ticket(None, ""))
+    running = asyncio.create_task(coordinator.run())
+    try:
+        await relays.until_carried_by("0")
+        for _ in range(2):  # it is tried again
+            relays.passed_on.clear()
+            async with asyncio.timeout(20):
+                await relays.passed_on.wait()
+        assert coordinator.stations[1].trouble == "UnicodeError"
+        assert relays.tried == ["0"]
+        assert not relays.carrying["0"].ended.is_set()
+    finally:
+        for task in (asked, running):
+            task.cancel()
+        await asyncio.gather(asked, running, return_exceptions=True)

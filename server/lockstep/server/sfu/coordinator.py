@@ -187,7 +187,8 @@ class SfuCoordinator:
             self._publication = publication
             self._holders.clear()
             self._published_at = self._clock()
-            self._live(origin, publication)
+            if not publication.ended.is_set():  # an epoch may have begun during the negotiation
+                self._live(origin, publication)
             try:
                 await self._while_wanted(publication, origin)
             finally:
@@ -251,6 +252,10 @@ class SfuCoordinator:
                 await attempt(self._feed(origin, station, publication))
             except RelayError as error:
                 self._lost(station, str(error))
+            except Exception as error:
+                # A fault of the console itself; one more relay never ends the others.
+                log.exception("passing on to a relay failed", relay=station.url.address)
+                self._lost(station, type(error).__name__)
             finally:
                 self._gone(station, "")
             if self._clock() - began > HEALTHY_SECONDS:

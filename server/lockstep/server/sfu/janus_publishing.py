@@ -78,10 +78,10 @@ async def publish(
             raise RelayRefused(f"the relay's answer cannot be used: {error}") from error
         writer = ChannelWriter(connection, connection.open_channel(FEEDBACK, reliability=NEWEST_WINS))
         publication = Publication(feed, given.streams, writer.send_newest)
-        given.on_failed(publication.failed)
-        given.on_ended(lambda: publication.end(NEW_EPOCH))
-        found.append(publication)
         line = _Line(connection, given, writer, publication)
+        given.on_failed(publication.failed)
+        given.on_ended(line.streams_ended)
+        found.append(publication)
         connection.listen(line.heard)
         await _connected(line, publication)
         yield publication
@@ -97,11 +97,16 @@ class _Line:
     def __init__(
         self, connection: Connection, media: Subscriptions, writer: ChannelWriter, publication: Publication
     ) -> None:
-        self.decided = asyncio.Event()  # set when the connection is made, or has failed
+        self.decided = asyncio.Event()  # set when the connection is made, has failed, or is not needed any more
         self._connection = connection
         self._media = media
         self._writer = writer
         self._publication = publication
+
+    def streams_ended(self) -> None:
+        """End the publication: another epoch has begun, which may be in the middle of its negotiation."""
+        self._publication.end(NEW_EPOCH)
+        self.decided.set()
 
     def heard(self, event: PeerEvent) -> None:
         try:
@@ -131,5 +136,5 @@ async def _connected(line: _Line, publication: Publication) -> None:
             await line.decided.wait()
     except TimeoutError as error:
         raise RelaySilent("no path for media") from error
-    if publication.ended.is_set():
+    if publication.ended.is_set() and publication.why != NEW_EPOCH:
         raise RelaySilent(publication.why)
