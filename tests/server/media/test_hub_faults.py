@@ -189,7 +189,7 @@ async def test_a_sender_without_a_path_sends_nothing() -> None:
             assert not new.paced
 
 
-async def test_whoever_asks_after_a_failure_is_told_of_the_failure_and_not_of_an_end() -> None:
+async def test_a_failure_is_told_to_a_later_listener_too_and_is_not_an_end() -> None:
     told: list[str] = []
     async with running_plane() as hub, viewing(hub, ["video"]) as viewer:
         viewer.media.failed("planted", RuntimeError("planted"))
