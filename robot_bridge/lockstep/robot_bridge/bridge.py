@@ -14,6 +14,7 @@ from lockstep.robot_bridge.control.event_core import EventCore
 from lockstep.robot_bridge.control.feedback_issuer import FeedbackIssuer
 from lockstep.robot_bridge.control.limits.axis_shaper import AxisShaper
 from lockstep.robot_bridge.control.limits.motion_limits import MotionLimits
+from lockstep.robot_bridge.control.tick_alarm import TickAlarm
 from lockstep.robot_bridge.control.tick_loop import TickLoop
 from lockstep.robot_bridge.counters import BridgeCounters
 from lockstep.robot_bridge.description.check_description import check_description
@@ -77,14 +78,16 @@ class Bridge:
         self._lockout = None if settings.lockout_file is None else LockoutFile(settings.lockout_file)
         self._watchdogs = Watchdogs(robot, watchdog_seconds(description, robot.tick_seconds), now)
         self._liveness = liveness or Liveness()
-        limits = MotionLimits(description, robot, robot.tick_seconds)
+        longest_tick = robot.tick_seconds * (2 if robot.ticks_on_command else 1)  # s from one tick to the next
+        limits = MotionLimits(description, robot, robot.tick_seconds, longest_tick=longest_tick)
         shaper = AxisShaper(description.axes, hold=description.hold, limiter=limits)
-        refusals = Refusals(counters, self._log)
+        refusals, alarm = Refusals(counters, self._log), TickAlarm()
         self._stops = StopHandler(robot, self._core, shaper, self._keeper, self._lockout, refusals, self._log, now)
         self._feedback = FeedbackIssuer(robot, description, self._core, shaper, counters, self._log, now)
         executor = CommandExecutor(
             *(robot, description, self._core, shaper, limits, self._watchdogs),
-            *(self._stops, self._feedback, refusals, counters, self._log, now),
+            *(self._stops, self._feedback, refusals, alarm, counters, self._log),
+            now,
         )
         self._links = LinkServer(
             executor,
@@ -100,7 +103,8 @@ class Bridge:
         )
         self._ticks = TickLoop(
             *(robot, description.hold, shaper, executor, self._stops),
-            *(self._watchdogs, self._liveness, self._links, counters, now),
+            *(self._watchdogs, self._liveness, self._links, alarm, counters),
+            now,
         )
         self._sources = MediaSources(
             *(robot, self._core, self._feedback, self._links, counters, self._log), event_strip=settings.event_strip

@@ -27,7 +27,9 @@ def do(gate: CommandGate, action: dict[str, Any], now: float) -> None:
 
 @pytest.mark.parametrize("case", CASES, ids=[case["name"] for case in CASES])
 def test_the_gate_goes_through_the_shared_table(case: dict[str, Any]) -> None:
-    gate = CommandGate(case["pacing"], case["tolerance"], case["min_interval_ms"] / 1000)
+    shortest = case["min_interval_ms"]
+    calm = case.get("calm_interval_ms", shortest)
+    gate = CommandGate(case["pacing"], case["tolerance"], shortest / 1000, calm_interval=calm / 1000)
     for number, step in enumerate(case["steps"]):
         now = step["at"] / 1000
         do(gate, step["do"], now)

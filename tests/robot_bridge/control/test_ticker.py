@@ -1,3 +1,5 @@
+import random
+
 import pytest
 
 from lockstep.robot_bridge.control.ticker import Ticker
@@ -31,3 +33,24 @@ def test_without_catch_up_the_beat_that_is_due_comes_at_once_and_the_grid_stays(
     metronome = Ticker(0.01, 0.0)
     assert metronome.wait(0.057) == 0.0
     assert metronome.wait(0.057) == pytest.approx(0.003)
+
+
+def test_beats_that_come_as_early_as_they_may_are_no_more_than_one_in_each_period() -> None:
+    metronome, now, beats = Ticker(0.01, 0.0), 0.0, list[float]()
+    chance = random.Random(1)
+    for _ in range(1000):
+        metronome.wait(now)
+        soonest = metronome.early(now)
+        beat = now + soonest if chance.random() < 0.7 else now + soonest + chance.random() * 0.01
+        beats.append(beat)
+        now = beat
+    assert all(number * 0.01 <= beat + 1e-9 <= (number + 1) * 0.01 + 2e-9 for number, beat in enumerate(beats))
+
+
+def test_a_beat_may_come_early_as_soon_as_its_period_has_begun() -> None:
+    metronome = Ticker(0.01, 0.0)
+    assert metronome.wait(0.0) == pytest.approx(0.01)
+    assert metronome.early(0.0) == 0.0
+    assert metronome.wait(0.002) == pytest.approx(0.018), "the beat before came at 0.002"
+    assert metronome.early(0.002) == pytest.approx(0.008)
+    assert metronome.early(0.015) == 0.0

@@ -2,13 +2,17 @@ import { eventAfter, eventGap, isNewer } from "../gate/serial";
 
 export type Pacing = "feedback" | "media";
 
+/** Events that follow one another sooner wait for pictures and sound; ms. */
+export const CALM_INTERVAL_MS = 40;
+
 /** Why no new command may be sent now, or that it may. */
 export type GateState = "open" | "no_feedback" | "in_flight" | "rate" | "picture" | "sound";
 
 export interface CommandGate {
   pacing: Pacing;
   tolerance: number; // events, of the picture; 4
-  minIntervalMs: number; // between two events; 40
+  minIntervalMs: number; // between two events; 17
+  calmIntervalMs: number; // not less; 40
   event: number | null; // newest feedback; null before the first
   issue: number; // newest issue of that event
   nonce: number; // of that issue: a command names it, as proof that it was seen
@@ -31,11 +35,22 @@ export interface NextCommand {
   readonly nonce: number; // of that issue
 }
 
-export function createCommandGate(pacing: Pacing, tolerance: number, minIntervalMs: number): CommandGate {
+/**
+ * The tolerance counts events, so each picture and each sound has less time where events follow one another quickly.
+ * Events sooner than `calmIntervalMs` therefore wait while what is seen or heard is farther behind than two thirds of
+ * its tolerance; as long as no picture was shown, they wait for none.
+ */
+export function createCommandGate(
+  pacing: Pacing,
+  tolerance: number,
+  minIntervalMs: number,
+  calmIntervalMs = minIntervalMs,
+): CommandGate {
   return {
     pacing,
     tolerance,
     minIntervalMs,
+    calmIntervalMs: Math.max(calmIntervalMs, minIntervalMs),
     event: null,
     issue: 0,
     nonce: 0,
@@ -103,11 +118,25 @@ export function farthestBehind(event: number, stamps: readonly number[]): number
 export function gateState(gate: CommandGate, now: number): GateState {
   if (gate.event === null) return "no_feedback";
   if (gate.inFlight !== null) return "in_flight";
-  if (now - gate.lastSentMs < gate.minIntervalMs) return "rate";
+  if (now < opensAt(gate)) return "rate";
   if (gate.pacing !== "media") return "open";
   if (!isNear(gate.event, gate.shown, gate.tolerance)) return "picture";
   const { heard } = gate;
   return heard === null || isNear(gate.event, heard.stamp, heard.tolerance) ? "open" : "sound";
+}
+
+/** When the event rate allows the next command, unless a picture or a sound comes before; -Infinity before the first. */
+export function opensAt(gate: CommandGate): number {
+  return gate.lastSentMs + (keepsUp(gate) ? gate.minIntervalMs : gate.calmIntervalMs);
+}
+
+function keepsUp({ event, shown, tolerance, heard }: CommandGate): boolean {
+  if (event === null) return true;
+  const isClose = (stamp: number, most: number): boolean =>
+    Math.abs(eventGap(event, stamp)) <= Math.floor((2 * most) / 3);
+  return (
+    (shown === null || isClose(shown, tolerance)) && (heard === null || isClose(heard.stamp, heard.tolerance))
+  );
 }
 
 export function nextCommand(gate: CommandGate): NextCommand | null {

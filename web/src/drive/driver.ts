@@ -3,6 +3,7 @@ import {
   gateState,
   nextCommand,
   noteSent,
+  opensAt,
   takeFeedback,
   takeRefusal,
   createCommandGate,
@@ -88,9 +89,10 @@ export function createDriver(
   tolerance: number,
   minIntervalMs: number,
   neutral: readonly number[],
+  calmIntervalMs = minIntervalMs,
 ): Driver {
   return {
-    gate: createCommandGate(pacing, tolerance, minIntervalMs),
+    gate: createCommandGate(pacing, tolerance, minIntervalMs, calmIntervalMs),
     repeat: createRepeatTimer(),
     latency: createLatency(),
     neutral,
@@ -216,7 +218,7 @@ export function driverSilence(driver: Driver): void {
   driver.rest = null;
 }
 
-/** What to send now. Called at a fixed rate and after every feedback. */
+/** What to send now. Called at the moments of the inputs, at every tick and after every feedback. */
 export function driverStep(
   driver: Driver,
   intention: Intention,
@@ -231,6 +233,11 @@ export function driverStep(
     if (command === null) return out;
     out.push(command);
   }
+}
+
+/** How long the event rate alone holds the next command back, in ms; null when it does not. */
+export function driverOpensIn({ gate }: Driver, now: number): number | null {
+  return gateState(gate, now) === "rate" ? opensAt(gate) - now : null;
 }
 
 function restDue(driver: Driver, now: number): ClientMessage | null {

@@ -13,7 +13,7 @@ import {
 import { capHolds, cappedShare, viewDelay } from "../drive/speed_cap";
 import { STALE_MS } from "../drive/feedback_age";
 import { notePicture } from "../drive/latency";
-import { noteHeard, noteShown, setPacing } from "../drive/command_gate";
+import { CALM_INTERVAL_MS, noteHeard, noteShown, setPacing } from "../drive/command_gate";
 import { restartInterlock, snapshotOf } from "../drive/restart_interlock";
 import { createRateMeter, noteOccurrence } from "../util/samples";
 import { parseServerMessage } from "../protocol/wire_parser";
@@ -21,6 +21,7 @@ import { ARM_REFUSAL_LABELS } from "../drive/labels";
 import { Controls, type ControlSample } from "../input/controls";
 import { Disposal } from "../input/disposal";
 import { keepKeyboardFree } from "../input/pointer_focus";
+import { SendTimer } from "../input/send_timer";
 import { Ticker } from "../input/ticker";
 import { watchPage } from "../input/page_lifecycle";
 import type { TouchSticks } from "../input/touch_sticks";
@@ -56,6 +57,9 @@ export interface ConsoleEngineEvents {
   pictureDrawn(): void; // of the main stream
 }
 
+/** An input that is told so late waited behind a page that was held up. */
+const HELD_UP_MS = 50;
+
 /** What is called at every tick. */
 interface Stepped {
   step(now: number): void;
@@ -87,6 +91,7 @@ export class ConsoleEngine {
   peer: Peer | null = null;
   measuredMs: number | null = null; // when the newest feedback came
   private heardMs = 0;
+  private readonly sendTimer = new SendTimer(() => this.takeInput(performance.now()));
   private readonly heartbeat = new Heartbeat({
     tell: (message) => this.tell("control", message),
     report: () => reportOf(this),
@@ -123,13 +128,19 @@ export class ConsoleEngine {
       answerClaim: (grant) => this.session.answerShown(grant),
       lost: () => this.disarm("pad_lost"),
       silent: () => this.disarm("pad_silent"),
+      changed: (at) => this.inputChanged(at),
       plugged: (words) => note(this.state, "info", words, Date.now()),
     });
     if (this.reader === null)
       note(this.state, "error", "This browser cannot read stamps: no picture passes the gate", Date.now());
     this.watchPage();
     keepKeyboardFree(this.disposal);
-    this.ticker = new Ticker(this.disposal, (now) => this.tick(now));
+    this.ticker = new Ticker(this.disposal, {
+      tick: (now) => this.tick(now),
+      poll: (now) => {
+        if (this.controls.hasPadNews) this.takeInput(now);
+      },
+    });
   }
 
   isArmed(): boolean {
@@ -225,6 +236,7 @@ export class ConsoleEngine {
     this.disarm("operator");
     this.talkback?.close();
     this.disposal.close();
+    this.sendTimer.set(null);
     this.controls.close();
     this.connection.close();
     this.streams.close();
@@ -305,7 +317,8 @@ export class ConsoleEngine {
     this.measuredMs = now;
     this.haptics.took(feedback, now);
     if (this.driver !== null) driver.driverFeedback(this.driver, feedback, this.canCommand(), now);
-    this.drive(now);
+    if (this.isArmed() && this.controls.hasPadNews) this.takeInput(now);
+    else this.drive(now);
     this.streams.changed();
     this.page.feedbackTaken(now);
   }
@@ -336,7 +349,13 @@ export class ConsoleEngine {
     const { axes, layers, max_event_rate: rate } = robot.description;
     const { settings, feedback } = this.state;
     const { pacing, tolerance } = settings;
-    this.driver = driver.createDriver(pacing, tolerance.video, 1000 / rate, restValues(axes));
+    this.driver = driver.createDriver(
+      pacing,
+      tolerance.video,
+      1000 / rate,
+      restValues(axes),
+      CALM_INTERVAL_MS,
+    );
     this.heartbeat.begin();
     this.layer = Math.min(this.layer, Math.max(0, layers.length - 1));
     if (feedback !== null) driver.driverFeedback(this.driver, feedback, this.canCommand(), now);
@@ -347,7 +366,29 @@ export class ConsoleEngine {
   }
 
   private tick(now: number): void {
-    const sample = this.controls.sample();
+    this.takeInput(now, true);
+    this.ticker.hurry(this.isArmed() && this.controls.hasPad);
+    this.streams.listen();
+    this.talkback?.step(now);
+    this.stopping.step(now);
+    this.charts?.step(now);
+    this.haptics.step(now);
+    if (this.state.welcome !== null) this.heartbeat.step(now);
+    this.connection.step(now);
+  }
+
+  /**
+   * A key or a finger did something. What waited behind a page that was held up is not what is held now: the tick that
+   * follows takes that.
+   */
+  private inputChanged(at: number): void {
+    const now = performance.now();
+    if (this.isArmed() && now - at < HELD_UP_MS && !this.ticker.isLate(now)) this.takeInput(now);
+  }
+
+  /** Takes what the operator holds now, and sends what follows from it. */
+  private takeInput(now: number, isTick = false): void {
+    const sample = this.controls.sample(isTick);
     const lost = arming.lostCondition(this.conditions(now));
     if (lost !== null) this.disarm(lost);
     const change = arming.sampleDeadman(this.arming, sample.deadman, sample.signature, now);
@@ -357,13 +398,6 @@ export class ConsoleEngine {
     if (this.driver !== null && change === "taped_down") driver.driverDisarm(this.driver, now);
     if (change === "taped_down") this.page.armedChanged();
     this.drive(now);
-    this.streams.listen();
-    this.talkback?.step(now);
-    this.stopping.step(now);
-    this.charts?.step(now);
-    this.haptics.step(now);
-    if (this.state.welcome !== null) this.heartbeat.step(now);
-    this.connection.step(now);
   }
 
   private takeValues(sample: ControlSample): void {
@@ -393,6 +427,7 @@ export class ConsoleEngine {
     const intention = { armed: this.isArmed(), values: this.values };
     const messages = driver.driverStep(this.driver, intention, this.canCommand(), now);
     for (const message of messages) this.tell("control", message);
+    this.sendTimer.set(this.isArmed() ? driver.driverOpensIn(this.driver, now) : null);
   }
 
   private tell(channel: ChannelName, message: ClientMessage): boolean {
@@ -405,6 +440,6 @@ export class ConsoleEngine {
     notePicture(this.driver.latency, stamp, at);
     noteShown(this.driver.gate, stamp);
     this.page.pictureDrawn();
-    if (this.state.settings.pacing === "media") this.drive(at);
+    this.drive(at);
   }
 }

@@ -25,6 +25,17 @@ export class Controls {
     readonly events: KeyboardEvents & PadEvents,
   ) {
     this.keyboard = new Keyboard(events);
+    sticks.onchange = (at) => events.changed(at);
+  }
+
+  /** Whether a pad is in use. */
+  get hasPad(): boolean {
+    return this.pad !== null && this.pad.state !== null;
+  }
+
+  /** Whether a pad has reported since it was read. */
+  get hasPadNews(): boolean {
+    return this.pad?.hasNews === true;
   }
 
   /** Whether a deadman is held, by what is known now. */
@@ -36,8 +47,9 @@ export class Controls {
     return this.pad?.state?.ready === true ? this.pad.state : null;
   }
 
-  sample(): ControlSample {
-    this.pad?.poll();
+  /** `isTick`: at a tick pads are read in any case, so that one that has fallen silent is noticed. */
+  sample(isTick: boolean): ControlSample {
+    if (isTick || this.hasPadNews) this.pad?.poll();
     const { keyboard, sticks, readyPad: pad } = this;
     const touch = sticks.deadman ? sticks.inputs : null;
     const held: HeldInputs = { pad: pad?.inputs ?? null, keys: keyboard.keys, touch };

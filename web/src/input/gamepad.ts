@@ -68,6 +68,11 @@ export class Pad {
     for (const known of this.known.values()) known.pressed = null;
   }
 
+  /** Whether a pad has reported since it was read. With pads that give no times it never has. */
+  get hasNews(): boolean {
+    return this.all().some((pad) => this.known.get(pad.index)?.silence.stampMs !== pad.timestamp);
+  }
+
   /** Reads all pads, and tells of what was pressed since the last time. */
   poll(): void {
     const pads = this.all();

@@ -8,6 +8,8 @@ export interface KeyboardEvents {
   isArmed(): boolean;
   /** Answers whoever asks for the seat; says whether anybody does. */
   answerClaim(grant: boolean): boolean;
+  /** Keys that drive, or a touch stick, are held otherwise. `at`: when that happened, by the page's clock. */
+  changed(at: number): void;
 }
 
 const STOP_KEYS = new Set(["Escape", "Backspace"]);
@@ -79,7 +81,7 @@ export class Keyboard {
 
   /** Some browsers press a focused button when the space bar is let go, whatever became of the key's way down. */
   private up(event: KeyboardEvent): void {
-    this.keys.delete(event.code);
+    if (this.keys.delete(event.code)) this.events.changed(event.timeStamp);
     const inField = event.target instanceof Element && event.target.matches(FIELDS);
     if (this.events.isArmed() && !inField) event.preventDefault();
   }
@@ -89,6 +91,7 @@ export class Keyboard {
     if (event.repeat) return;
     if (event.code === "Tab") this.events.nextLayer();
     else this.keys.add(event.code);
+    this.events.changed(event.timeStamp);
   }
 
   /** The space bar still counts as held where it works a button: arming needs it seen released. */

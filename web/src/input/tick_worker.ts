@@ -1,4 +1,17 @@
-/** A timer that goes on at its rate while the page is hidden. */
-const scope = self as unknown as { postMessage(message: null): void };
+/** A timer that goes on at its rate while the page is hidden. A message is its new interval in ms. */
+interface Scope {
+  postMessage(message: null): void;
+  onmessage: ((event: MessageEvent<number>) => void) | null;
+}
 
-setInterval(() => scope.postMessage(null), 10);
+const scope = self as unknown as Scope;
+let timer = every(10);
+
+scope.onmessage = ({ data }) => {
+  clearInterval(timer);
+  timer = every(data);
+};
+
+function every(ms: number): ReturnType<typeof setInterval> {
+  return setInterval(() => scope.postMessage(null), ms);
+}

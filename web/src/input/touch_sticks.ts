@@ -13,6 +13,7 @@ interface Stick {
 
 /** Two on-screen sticks. Touching one holds the deadman. */
 export class TouchSticks {
+  onchange: (at: number) => void = () => undefined; // a finger has moved or was lifted, at this time
   private readonly sticks: Record<Side, Stick>;
 
   constructor(left: HTMLElement, right: HTMLElement) {
@@ -48,17 +49,27 @@ export class TouchSticks {
       stick.pointer = event.pointerId;
       pad.setPointerCapture(event.pointerId);
       pad.classList.add("is-held");
-      move(stick, event);
+      this.moved(stick, event);
     });
-    pad.addEventListener("pointermove", (event) => {
-      if (event.pointerId === stick.pointer) move(stick, event);
-    });
+    // The first comes as the device reports, the second once for each frame of the screen; not all browsers have the
+    // first, and none has it outside of a secure context.
+    for (const type of ["pointerrawupdate", "pointermove"] as const)
+      pad.addEventListener(type, (event) => {
+        if (event instanceof PointerEvent && event.pointerId === stick.pointer) this.moved(stick, event);
+      });
     for (const type of ["pointerup", "pointercancel", "lostpointercapture"] as const)
       pad.addEventListener(type, (event) => {
-        if (event.pointerId === stick.pointer) letGo(stick);
+        if (event.pointerId !== stick.pointer) return;
+        letGo(stick);
+        this.onchange(event.timeStamp);
       });
     pad.addEventListener("contextmenu", (event) => event.preventDefault());
     return stick;
+  }
+
+  private moved(stick: Stick, event: PointerEvent): void {
+    move(stick, event);
+    this.onchange(event.timeStamp);
   }
 }
 

@@ -7,6 +7,7 @@ import {
   noteHeard,
   noteSent,
   noteShown,
+  opensAt,
   takeFeedback,
   takeRefusal,
   type CommandGate,
@@ -27,6 +28,7 @@ interface PacingCase {
   pacing: Pacing;
   tolerance: number;
   min_interval_ms: number;
+  calm_interval_ms?: number; // as min_interval_ms without
   steps: Step[];
 }
 
@@ -50,8 +52,8 @@ function openGate(pacing: Pacing): CommandGate {
 describe("the command gate", () => {
   it("has a table of cases", () => expect(cases.length).toBeGreaterThan(15));
 
-  it.each(cases)("$name", ({ pacing, tolerance, min_interval_ms, steps }) => {
-    const gate = createCommandGate(pacing, tolerance, min_interval_ms);
+  it.each(cases)("$name", ({ pacing, tolerance, min_interval_ms, calm_interval_ms, steps }) => {
+    const gate = createCommandGate(pacing, tolerance, min_interval_ms, calm_interval_ms);
     for (const step of steps) {
       act(gate, step);
       expect(gateState(gate, step.at)).toBe(step.then);
@@ -98,6 +100,19 @@ describe("the command gate", () => {
       takeFeedback(gate, 30, 1);
       noteHeard(gate, heard(1));
       expect(gateState(gate, 0)).toBe("picture");
+    });
+
+    it("lets no event follow sooner than the calm interval while the sound is behind by more than two thirds", () => {
+      const gate = createCommandGate("feedback", 4, 16, 40);
+      takeFeedback(gate, 20, 1);
+      noteHeard(gate, heard(16));
+      noteSent(gate, 0);
+      takeFeedback(gate, 21, 1);
+      expect(gateState(gate, 16)).toBe("rate");
+      expect(opensAt(gate)).toBe(40);
+      noteHeard(gate, heard(17));
+      expect(gateState(gate, 16)).toBe("open");
+      expect(opensAt(gate)).toBe(16);
     });
 
     it("paced by feedback does not wait for it", () => {

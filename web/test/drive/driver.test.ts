@@ -6,6 +6,7 @@ import {
   driverDisarm,
   driverFeedback,
   driverLoss,
+  driverOpensIn,
   driverPingAnswered,
   driverRefusal,
   driverRelease,
@@ -53,6 +54,19 @@ describe("commands", () => {
     expect(driverStep(driver, MOVING, true, 12)).toEqual([
       { type: "command", event: 3, issue: 1, nonce: 0, values: [1, 0] },
     ]);
+  });
+
+  it("tell how long the event rate alone holds the next one back", () => {
+    driver = createDriver("feedback", 4, 16, NEUTRAL, 40);
+    proven(driver);
+    driverFeedback(driver, feedbackOf(1), true, 0);
+    expect(driverOpensIn(driver, 0)).toBeNull();
+    expect(driverStep(driver, MOVING, true, 0)).toHaveLength(1);
+    expect(driverOpensIn(driver, 4)).toBeNull(); // in flight
+    driverFeedback(driver, feedbackOf(2), true, 5);
+    expect(driverOpensIn(driver, 5)).toBe(11);
+    expect(driverStep(driver, MOVING, true, 15)).toEqual([]);
+    expect(driverStep(driver, MOVING, true, 16)).toHaveLength(1);
   });
 
   it("name the nonce of the issue that they answer, also when repeated", () => {

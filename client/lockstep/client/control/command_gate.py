@@ -4,7 +4,9 @@ from typing import Literal, NamedTuple
 
 from lockstep.protocol.serial import event_after, event_gap
 
-__all__ = ["CommandGate", "GateState", "NextCommand", "Pacing"]
+__all__ = ["CALM_INTERVAL", "CommandGate", "GateState", "NextCommand", "Pacing"]
+
+CALM_INTERVAL = 0.040  # s; events that follow one another sooner wait for the pictures
 
 Pacing = Literal["feedback", "media"]
 GateState = Literal["open", "no_feedback", "in_flight", "rate", "picture"]
@@ -19,12 +21,21 @@ class NextCommand(NamedTuple):
 
 class CommandGate:
     """Opens when the last command was answered, the event rate allows another and, with pacing `media`, the picture on
-    screen will be within tolerance of the next feedback as well."""
+    screen will be within tolerance of the next feedback as well.
 
-    def __init__(self, pacing: Pacing, tolerance: int, min_interval: float) -> None:
+    The tolerance counts events, so each picture has less time where events follow one another quickly. Events sooner
+    than `calm_interval` therefore wait while the picture on screen is farther behind than two thirds of the tolerance;
+    as long as no picture was shown, they wait for none.
+    """
+
+    def __init__(
+        self, pacing: Pacing, tolerance: int, min_interval: float, *, calm_interval: float | None = None
+    ) -> None:
+        """`calm_interval`: s; None: `min_interval`."""
         self.pacing = pacing
         self.tolerance = tolerance
         self.min_interval = min_interval  # s between the first sendings of two events
+        self.calm_interval = min_interval if calm_interval is None else max(calm_interval, min_interval)
         self._feedback: tuple[int, int] | None = None  # newest (event, issue)
         self._in_flight: int | None = None
         self._sent_at: float | None = None
@@ -75,8 +86,10 @@ class CommandGate:
         return "open"
 
     def opens_at(self) -> float:
-        """Return the time at which the event rate allows the next command."""
-        return float("-inf") if self._sent_at is None else self._sent_at + self.min_interval
+        """Return the time at which the event rate allows the next command, unless a picture is shown before."""
+        if self._sent_at is None:
+            return float("-inf")
+        return self._sent_at + (self.min_interval if self._pictures_keep_up() else self.calm_interval)
 
     def next(self) -> NextCommand:
         """Return the command that an open gate lets pass.
@@ -87,6 +100,11 @@ class CommandGate:
         if self._feedback is None:
             raise RuntimeError("no feedback to answer")
         return NextCommand(event_after(self._feedback[0]), self._feedback[1])
+
+    def _pictures_keep_up(self) -> bool:
+        if self._shown is None or self._feedback is None:
+            return True
+        return abs(event_gap(self._feedback[0], self._shown)) <= 2 * self.tolerance // 3
 
     def _picture_is_near(self, event: int) -> bool:
         """True if the picture on screen stays within tolerance when the next feedback arrives, one event on. At

@@ -5,7 +5,7 @@ from collections import deque
 from collections.abc import Callable
 
 from lockstep.client.connection_options import ConnectionOptions
-from lockstep.client.control.command_gate import CommandGate
+from lockstep.client.control.command_gate import CALM_INTERVAL, CommandGate
 from lockstep.client.control.command_sender import CommandSender
 from lockstep.client.control.sender_task import Driver
 from lockstep.client.errors import ConsoleLost
@@ -61,8 +61,14 @@ class Driving:
                 self._driver.hold_back("link_down")
             return None
         description = robot.description
-        rate = min(description.max_event_rate, self._options.event_rate or description.max_event_rate)
-        gate = CommandGate(self._options.pacing, self._options.tolerance["video"], 1 / rate)
+        asked = self._options.event_rate
+        rate = min(description.max_event_rate, asked or description.max_event_rate)
+        gate = CommandGate(
+            self._options.pacing,
+            self._options.tolerance["video"],
+            1 / rate,
+            calm_interval=None if asked else CALM_INTERVAL,
+        )
         sender = CommandSender(gate, [axis.rest for axis in description.axes])
         self._driver = Driver(sender, self._send)
         self._session.seated, self._session.unseated = sender.seated, sender.unseated

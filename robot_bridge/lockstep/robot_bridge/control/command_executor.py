@@ -10,6 +10,7 @@ from lockstep.robot_bridge.control.feedback_issuer import FeedbackIssuer
 from lockstep.robot_bridge.control.limits.axis_shaper import AxisShaper
 from lockstep.robot_bridge.control.limits.motion_limits import MotionLimits
 from lockstep.robot_bridge.control.start_signal import StartSignal
+from lockstep.robot_bridge.control.tick_alarm import TickAlarm
 from lockstep.robot_bridge.counters import BridgeCounters
 from lockstep.robot_bridge.event_log import EventLog
 from lockstep.robot_bridge.link.link_server import LinkPeer
@@ -38,11 +39,13 @@ class CommandExecutor:
         stops: StopHandler,
         feedback: FeedbackIssuer,
         refusals: Refusals,
+        alarm: TickAlarm,
         counters: BridgeCounters,
         log: EventLog,
         now: Clock,
     ) -> None:
         self._robot = robot
+        self._alarm = alarm
         self._core = core
         self._shaper = shaper
         self._limits = limits
@@ -72,9 +75,11 @@ class CommandExecutor:
                 applied = self._core.rest(message.event)
                 if applied:
                     self._shaper.rest()
+                    self._alarm.ring()
                 self._log.record("rest", message.event, applied=applied)
             case Stop():
                 self._stops.stop(peer, message)
+                self._alarm.ring()
             case Reset():
                 self._stops.reset(peer, message)
 
@@ -91,6 +96,7 @@ class CommandExecutor:
         if isinstance(outcome, Executed):
             self._feedback.rested_why = ""
             self._shaper.drive(outcome.values, now)
+            self._alarm.ring()
             self._counters.executed += 1
             self._log.record("executed", outcome.event, issue=command.issue, values=outcome.values)
         elif isinstance(outcome, Answered):

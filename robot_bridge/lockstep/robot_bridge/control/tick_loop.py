@@ -1,4 +1,10 @@
-"""Runs the ticks of a robot. However they end, the robot is brought to rest and stopped."""
+"""Runs the ticks of a robot. However they end, the robot is brought to rest and stopped.
+
+A tick ends each period of the robot's `tick_seconds`. If the robot allows it, a command, a rest or a stop begins the
+tick of the present period at once. Each period has one tick in any case: a flood of commands makes no more of them, so
+neither the ramps nor a simulated robot's time become faster. Two ticks are less than two periods apart, which is what
+the limits reckon with.
+"""
 
 import asyncio
 import contextlib
@@ -9,6 +15,7 @@ from lockstep.robot_bridge.control.clock import Clock
 from lockstep.robot_bridge.control.coming_to_rest import ComingToRest
 from lockstep.robot_bridge.control.command_executor import CommandExecutor
 from lockstep.robot_bridge.control.limits.axis_shaper import AxisShaper
+from lockstep.robot_bridge.control.tick_alarm import TickAlarm
 from lockstep.robot_bridge.control.ticker import Ticker
 from lockstep.robot_bridge.counters import BridgeCounters
 from lockstep.robot_bridge.errors import RobotFailed, RobotUnavailable, named
@@ -39,9 +46,11 @@ class TickLoop:
         watchdogs: Watchdogs,
         liveness: Liveness,
         links: LinkServer,
+        alarm: TickAlarm,
         counters: BridgeCounters,
         now: Clock,
     ) -> None:
+        """`alarm`: rings when a command, a rest or a stop was taken."""
         self._robot = robot
         self._hold = hold
         self._shaper = shaper
@@ -50,6 +59,7 @@ class TickLoop:
         self._watchdogs = watchdogs
         self._liveness = liveness
         self._links = links
+        self._alarm = alarm
         self._counters = counters
         self._now = now
         self._at_rest = asyncio.Event()  # nothing is driven
@@ -103,13 +113,22 @@ class TickLoop:
     async def _tick_on(self) -> None:
         metronome = Ticker(self._robot.tick_seconds, time.monotonic(), catch_up=MAX_CATCH_UP)
         while True:
-            await asyncio.sleep(metronome.wait(time.monotonic()))
+            await self._wait(metronome)
             self._counters.skipped_ticks = metronome.skipped
             try:
                 self.tick()
                 self._liveness.ticked()
             except BaseException as error:  # an adapter may raise one that ends the loop or cancels the task
                 raise RobotFailed(named(error)) from error
+
+    async def _wait(self, metronome: Ticker) -> None:
+        """Wait for the next tick."""
+        now = time.monotonic()
+        seconds = metronome.wait(now)
+        if self._robot.ticks_on_command:
+            await self._alarm.wait(seconds, at_least=metronome.early(now))
+        else:
+            await asyncio.sleep(seconds)
 
     async def _leave(self) -> None:
         leaving = self._coming_to_rest()

@@ -4,7 +4,11 @@ __all__ = ["Ticker"]
 
 
 class Ticker:
-    """Beats at a fixed period. Call `wait` before each beat and sleep for the seconds that it returns."""
+    """Beats at a fixed period. Call `wait` before each beat and sleep for the seconds that it returns.
+
+    A beat may come early, at any time in the period that it ends: see `early`. There is one beat in each period then
+    too, so early beats are no more beats.
+    """
 
     def __init__(self, period: float, now: float, *, catch_up: int = 0) -> None:
         """`catch_up`: the number of missed beats made good at once; the rest are skipped and counted."""
@@ -21,3 +25,7 @@ class Ticker:
             self.skipped += behind
             self._next += behind * self._period
         return max(0.0, self._next - now)
+
+    def early(self, now: float) -> float:
+        """Return the seconds until the beat that `wait` announced may come: its period has begun then; 0 if it has."""
+        return max(0.0, self._next - self._period - now)

@@ -62,12 +62,17 @@ class Robot(ABC):
     Order: `describe` first; then, every `tick_seconds`, `apply` and `tick`; `measure` right after a `tick`. Values
     reach `apply` already clamped, slew-limited and, without a command to execute, at rest.
 
+    With `ticks_on_command` a command begins the tick of the present period of `tick_seconds` at once. There is still
+    one tick in each period, so two ticks may follow each other closely, and the next one come up to two periods later.
+    Set it if the robot takes values at any time, and holds them until the next ones.
+
     A method that raises ends the bridge. Before it does, the rest values are applied at the axes' brake rates, again
     after each failure, then `stop` is called, then `close`; each call is made even if the others raised. A new object
     is in the state that `reset` leaves behind; the bridge stops it if it was stopped before.
     """
 
     tick_seconds: float = 0.004
+    ticks_on_command: bool = False
     rests_from_thread: bool = False  # True if `rest_from_thread` may be called while another method hangs
     rest_call: str = ""  # "package.module:function" for a watchdog process, see `rest_from_thread`; "": none
     rest_arguments: tuple[str, ...] = ()  # arguments of that function

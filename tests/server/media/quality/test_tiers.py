@@ -155,6 +155,19 @@ async def test_a_clients_report_of_its_gap_reaches_the_controller() -> None:
         assert cast(Any, path)._gap_near == 2
 
 
+@pytest.mark.parametrize(("events", "near"), [(12, 2), (30, 0)])
+async def test_a_gap_counts_less_where_it_grew_because_events_follow_one_another_more_quickly(
+    events: int, near: int
+) -> None:
+    async with running_plane() as hub, viewing(hub, ["video"], priority=True) as viewer:
+        path = viewer.media.quality.path
+        for number, lag in enumerate((1, 1, 3, 3), 1):  # twice a second
+            event = number * events
+            stream = StreamReport(stream="camera0", carrier="none", stamp=event - lag, tolerance=4, lag=lag)
+            viewer.media.report(Report(event=event, streams=[stream]), number * 0.5)
+        assert cast(Any, path)._gap_near == near
+
+
 async def test_receiver_reports_give_loss_and_round_trip() -> None:
     async with running_plane() as hub, viewing(hub, ["video"], priority=True) as viewer:
         assert viewer.media.loss is None

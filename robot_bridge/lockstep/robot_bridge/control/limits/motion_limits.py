@@ -35,7 +35,16 @@ class MotionLimits:
         blind: names of the limits among them that slow it because the position is not known
     """
 
-    def __init__(self, description: RobotDescription, sense: PositionSense, tick_seconds: float) -> None:
+    def __init__(
+        self,
+        description: RobotDescription,
+        sense: PositionSense,
+        tick_seconds: float,
+        *,
+        longest_tick: float | None = None,
+    ) -> None:
+        """`longest_tick`: the most seconds from one tick to the next; None: `tick_seconds`."""
+        reaction = tick_seconds if longest_tick is None else longest_tick
         self.acting: frozenset[str] = frozenset()
         self.blind: frozenset[str] = frozenset()
         self._linger = round(LINGER / tick_seconds)  # calls
@@ -43,13 +52,13 @@ class MotionLimits:
         self._sense = sense
         self._rest_values = [axis.rest for axis in description.axes]
         self._positions = [
-            PositionGuard(limit, description, tick_seconds)
+            PositionGuard(limit, description, reaction)
             for limit in description.position_limits
             if not is_by_posture(limit)
         ]
-        self._postures = posture_guards(description, tick_seconds)
+        self._postures = posture_guards(description, reaction)
         base = description.planar_base
-        self._fence = FenceGuard(base, description, tick_seconds) if base and description.geofences else None
+        self._fence = FenceGuard(base, description, reaction) if base and description.geofences else None
         guarded = {number for guard in self._positions for number in guard.axes}
         guarded.update(number for guard in self._postures for number in guard.axes)
         guarded.update(() if self._fence is None else self._fence.axes)

@@ -189,6 +189,7 @@ def _slide() -> tuple[Geom, ...]:
 DESCRIPTION: Final = RobotDescription(
     name="micromanipulator",
     label="Micromanipulator (simulated)",
+    max_event_rate=60.0,
     watchdog=0.25,  # a simulation hurts no person, and busy machines hold it up
     axes=(
         _axis("probe.vx", "Forward", 60 * MICRO),

@@ -37,6 +37,7 @@ class Micromanipulator(Robot):
     """The axes are the probe's velocity along x, y and z, the focus' velocity, and the change of the light."""
 
     tick_seconds = 0.004
+    ticks_on_command = True
     rests_from_thread = True
 
     def __init__(self) -> None:

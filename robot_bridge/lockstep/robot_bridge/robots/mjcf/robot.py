@@ -31,6 +31,7 @@ __all__ = ["MjcfRobot"]
 TICK: Final = 0.004  # s, about
 BUSIEST: Final = 0.6  # share of a tick that the simulation may take
 TRIED_TICKS: Final = 25
+EVENT_RATE: Final = 60.0  # Hz, at most
 WATCHDOG: Final = 0.25  # s; a simulation hurts no person, and busy machines hold it up
 REST_SPEED: Final = 0.02  # rad/s, or of the model's size per second
 MARGIN: Final = 0.01  # of a joint's range, by which servos run on
@@ -42,6 +43,7 @@ _logger = logging.getLogger(__name__)
 class MjcfRobot(Robot):
     """A robot with an axis for every actuator, except velocity servos that only damp a position servo."""
 
+    ticks_on_command = True
     rests_from_thread = True
 
     def __init__(self, path: Path) -> None:
@@ -192,6 +194,7 @@ class MjcfRobot(Robot):
         return RobotDescription(
             name=name,
             watchdog=WATCHDOG,
+            max_event_rate=EVENT_RATE,
             label=label_of(name if title in ("", "MuJoCo Model") else title),
             axes=axes,
             joints=tuple(part for joint in self._joints for part in joint.parts),

@@ -54,5 +54,5 @@ def describe(model: Any) -> RobotDescription:
         hold=0.3,
         watchdog=0.25,  # a simulation hurts no person, and busy machines hold it up
         max_event_age=2.0,
-        max_event_rate=25.0,
+        max_event_rate=60.0,
     )

@@ -29,6 +29,7 @@ REST_SPEED: Final = 0.02  # m/s and rad/s, of every joint
 class MobileManipulator(Robot):
     """The axes are the base's velocity in its own frame and the tool's twist against the base, in the base frame."""
 
+    ticks_on_command = True
     rests_from_thread = True
 
     def __init__(self) -> None:

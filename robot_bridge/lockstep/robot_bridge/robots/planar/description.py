@@ -49,6 +49,7 @@ _FORBIDDEN = (0.75, 0.25, 0.25, 1.0)
 DESCRIPTION = RobotDescription(
     name="planar",
     label="Planar robot (simulated without physics engine)",
+    max_event_rate=60.0,
     axes=(
         Axis(name="base.vx", label="Forward", unit="m/s", minimum=-0.8, maximum=0.8, slew=4.0, brake=8.0),
         Axis(name="base.vy", label="Left", unit="m/s", minimum=-0.8, maximum=0.8, slew=4.0, brake=8.0),

@@ -36,6 +36,7 @@ class PlanarRobot(Robot):
     """A robot for tests and for machines without GL. It moves exactly as commanded unless something is in the way."""
 
     tick_seconds = 0.004
+    ticks_on_command = True
     rests_from_thread = True
 
     def __init__(self, state: PlanarState | None = None) -> None:

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
 __all__ = ["CameraLink", "PeerQuality", "SoundLink"]
 
+CALM_RATE = 25.0  # events a second up to which each event of a gap counts in full
 WIRE_SHARE = 0.92  # share of payload in the bytes that a receiver counts; the rest are headers
 
 
@@ -59,6 +60,7 @@ class PeerQuality:
         self.quality: Quality | None = None  # the last one sent
         self._clock = clock
         self._estimates: dict[frozenset[int], int] = {}
+        self._reported: tuple[int, float] | None = None  # event and time of the last report
 
     def stay_low(self) -> None:
         """Keep this peer in the low tier: nobody looks closely at its pictures. Call before it joins."""
@@ -104,8 +106,11 @@ class PeerQuality:
     def report(self, report: Report, now: float) -> None:
         """Take the client's own report. Only the gaps of the main camera count, or of the first that delivers pictures.
 
-        The gap of a camera without pictures grows with every event, which says nothing about the path.
+        The gap of a camera without pictures grows with every event, which says nothing about the path. Nor does a gap
+        that grows because events follow one another more quickly: the operator's page lets them only while pictures
+        keep up. So a gap counts as it were at `CALM_RATE`.
         """
+        share = self._calm_share(report.event, now)
         if not self.cameras:
             return
         streams = [camera.stream for camera in self.cameras]
@@ -114,7 +119,15 @@ class PeerQuality:
             if stream.stream != main or stream.stamp == 0 or report.event == 0:
                 continue
             lag = max(stream.lag, event_gap(report.event, stream.stamp))
-            self.path.lagged(lag, stream.tolerance, now)
+            self.path.lagged(int(lag * share), stream.tolerance, now)
+
+    def _calm_share(self, event: int, now: float) -> float:
+        """Return the part of a gap that is left at `CALM_RATE`, from the events since the last report."""
+        before, self._reported = self._reported, (event, now)
+        if before is None or not event or not before[0]:
+            return 1.0
+        events, seconds = event_gap(event, before[0]), now - before[1]
+        return min(1.0, CALM_RATE * seconds / events) if events > 0 else 1.0
 
     def decide(self, now: float) -> Reason | None:
         """Evaluate the path; return the reason if its rate was lowered."""
