@@ -3,6 +3,7 @@
 import math
 
 from lockstep.protocol.description import (
+    Action,
     Axis,
     Binding,
     Body,
@@ -93,6 +94,7 @@ DESCRIPTION = RobotDescription(
             ),
         ),
     ),
+    actions=(Action(name="home", label="Home"),),
     cameras=(OVERVIEW, FRONT),
     microphones=(MICROPHONE,),
     wrench=WrenchSensor(name="bumper", body="base", threshold_force=2.0, full_scale_force=80.0, full_scale_torque=20.0),

@@ -1,23 +1,28 @@
 """The planar robot: a holonomic disc in a walled room, integrated by hand."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
 
+from lockstep.protocol.actions import ParameterValue
 from lockstep.protocol.description import RobotDescription
+from lockstep.robot_bridge.robots.actions import ActionRun
 from lockstep.robot_bridge.robots.base import Measurement, MediaSource, Robot
 from lockstep.robot_bridge.robots.camera_source import CameraSource
 from lockstep.robot_bridge.robots.microphone_source import MicrophoneSource
 from lockstep.robot_bridge.robots.planar.description import DESCRIPTION, FRONT, MICROPHONE, OVERVIEW, RADIUS, RANGES
 from lockstep.robot_bridge.robots.planar.drawing import FrontDrawing, OverviewDrawing
+from lockstep.robot_bridge.robots.planar.homing import Homing
 from lockstep.robot_bridge.robots.planar.room import contacts, ray_hits
 from lockstep.robot_bridge.robots.planar.sound import Synthesiser
 
 __all__ = ["PlanarRobot", "PlanarState"]
 
 STIFFNESS = 150.0  # N per m/s that a contact blocks: the motors push harder the faster they should go
+HOMING_SPEED = 0.4  # m/s
+HOMING_TURN = 0.8  # rad/s
 ANGLES = RANGES.angle_min + RANGES.angle_increment * np.arange(RANGES.count, dtype=np.float64)
 
 
@@ -40,6 +45,7 @@ class PlanarRobot(Robot):
 
     def __init__(self, state: PlanarState | None = None) -> None:
         self._state = state or PlanarState()
+        self._home = self._state[:3]
         self._command = (0.0, 0.0, 0.0)
         self._braked = False  # the stop holds the wheels
         self._sound = Synthesiser()
@@ -110,6 +116,9 @@ class PlanarRobot(Robot):
 
     def reset(self) -> None:
         self._braked = False
+
+    def begin_action(self, name: str, parameters: Mapping[str, ParameterValue]) -> ActionRun:
+        return Homing(lambda: self._state[:3], self._home, speed=HOMING_SPEED, turn=HOMING_TURN, tick=self.tick_seconds)
 
     def sources(self) -> Sequence[MediaSource]:
         return self._sources
