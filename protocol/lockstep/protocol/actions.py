@@ -21,6 +21,7 @@ __all__ = [
     "ActionState",
     "ActionUpdate",
     "ParameterValue",
+    "Parameters",
     "RenewedAction",
     "Status",
     "StatusItem",

@@ -85,9 +85,13 @@ class Bridge:
         self._feedback = FeedbackIssuer(robot, description, self._core, shaper, counters, self._log, now)
         actions = ActionRunner(robot, description, self._core, shaper, counters, self._log, now)
         executor = CommandExecutor(
-            *(robot, description, self._core, shaper, limits, self._watchdogs),
-            *(self._stops, self._feedback, actions),
-            *(refusals, counters, self._log, now),
+            *(robot, description, self._core, shaper, limits, self._watchdogs, self._stops),
+            feedback=self._feedback,
+            actions=actions,
+            refusals=refusals,
+            counters=counters,
+            log=self._log,
+            now=now,
         )
         self._links = LinkServer(
             executor,

@@ -4,6 +4,7 @@ import math
 
 from lockstep.protocol.description import (
     Action,
+    ActionParameter,
     Axis,
     Binding,
     Body,
@@ -94,7 +95,15 @@ DESCRIPTION = RobotDescription(
             ),
         ),
     ),
-    actions=(Action(name="home", label="Home"),),
+    actions=(
+        Action(name="home", label="Home"),
+        Action(
+            name="light",
+            label="Light",
+            moves=False,
+            parameters=(ActionParameter(name="on", label="On", kind="switch", default=True),),
+        ),
+    ),
     cameras=(OVERVIEW, FRONT),
     microphones=(MICROPHONE,),
     wrench=WrenchSensor(name="bumper", body="base", threshold_force=2.0, full_scale_force=80.0, full_scale_torque=20.0),

@@ -6,9 +6,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from lockstep.protocol.actions import ParameterValue
+from lockstep.protocol.actions import ParameterValue, StatusItem
 from lockstep.protocol.description import RobotDescription
-from lockstep.robot_bridge.robots.actions import ActionRun
+from lockstep.robot_bridge.robots.actions import ActionDone, ActionRun
 from lockstep.robot_bridge.robots.base import Measurement, MediaSource, Robot
 from lockstep.robot_bridge.robots.camera_source import CameraSource
 from lockstep.robot_bridge.robots.microphone_source import MicrophoneSource
@@ -17,6 +17,7 @@ from lockstep.robot_bridge.robots.planar.drawing import FrontDrawing, OverviewDr
 from lockstep.robot_bridge.robots.planar.homing import Homing
 from lockstep.robot_bridge.robots.planar.room import contacts, ray_hits
 from lockstep.robot_bridge.robots.planar.sound import Synthesiser
+from lockstep.robot_bridge.robots.simulated_battery import SimulatedBattery
 
 __all__ = ["PlanarRobot", "PlanarState"]
 
@@ -46,6 +47,8 @@ class PlanarRobot(Robot):
     def __init__(self, state: PlanarState | None = None) -> None:
         self._state = state or PlanarState()
         self._home = self._state[:3]
+        self._light = False
+        self._battery = SimulatedBattery()
         self._command = (0.0, 0.0, 0.0)
         self._braked = False  # the stop holds the wheels
         self._sound = Synthesiser()
@@ -70,6 +73,7 @@ class PlanarRobot(Robot):
         dt = self.tick_seconds
         vx, vy, wz = self._command
         before = self._state
+        self._battery.tick(dt, moving=bool(vx or vy or wz))
         if not (vx or vy or wz or before.vx or before.vy or before.wz or before.fx or before.fy):
             return
         yaw = math.remainder(before.yaw + wz * dt, math.tau)
@@ -118,7 +122,14 @@ class PlanarRobot(Robot):
         self._braked = False
 
     def begin_action(self, name: str, parameters: Mapping[str, ParameterValue]) -> ActionRun:
+        if name == "light":
+            self._light = parameters["on"] is True
+            return ActionDone("on" if self._light else "off")
         return Homing(lambda: self._state[:3], self._home, speed=HOMING_SPEED, turn=HOMING_TURN, tick=self.tick_seconds)
+
+    def status(self) -> Sequence[StatusItem]:
+        light = StatusItem(name="light", label="Light", kind="switch", value=self._light)
+        return (self._battery.item(), light)
 
     def sources(self) -> Sequence[MediaSource]:
         return self._sources
