@@ -1,6 +1,8 @@
 """Actions and status between a real console and real clients. The bridge's own log is the judge of what ended when."""
 
 import asyncio
+import json
+from pathlib import Path
 from typing import Any
 
 import httpx
@@ -9,6 +11,8 @@ import pytest
 from lockstep.bench.harness.driving import drive_on
 from lockstep.client import ActionCancelled, ActionRefused, Console, NotArmed
 from lockstep.protocol.actions import ActionUpdate
+from lockstep.server.recording.reading.reader import RecordingReader
+from lockstep.server.recording.verify.verify_file import verify_file
 from tests.client.truth import until_logged
 from tests.support.stack import Stack
 from tests.waiting import PATIENCE
@@ -137,6 +141,26 @@ async def test_the_status_is_told_with_units_and_age(stack: Stack) -> None:
         assert battery.kind == "battery"
         assert 0 < float(battery.value) <= 1
         assert battery.age < battery.old_after
+
+
+async def test_a_recording_has_who_asked_what_and_how_it_went(stack: Stack, tmp_path: Path) -> None:
+    token = stack.operator.partition("#token=")[2]
+    headers = {"Authorization": f"Bearer {token}"}
+    async with httpx.AsyncClient(base_url=stack.console, headers=headers) as http, _console(stack.operator) as console:
+        await _go_away(console)
+        recording = (await http.post("/api/recordings", json={})).json()["recording"]
+        final = await console.act("home")
+        assert (await http.post("/api/recordings/stop")).status_code == 200
+        (tmp_path / "a.mcap").write_bytes((await http.get(f"/api/recordings/{recording}/file")).content)
+    verdict = verify_file(tmp_path / "a.mcap")
+    assert verdict.ok
+    assert verdict.checks["actions"].looked > 2
+    with RecordingReader(tmp_path / "a.mcap") as reader:
+        found = [json.loads(each.data) for each in reader.records(topics={"/lockstep/action"})]
+        items = [json.loads(each.data)["items"] for each in reader.records(topics={"/lockstep/status"})]
+    assert [each["state"] for each in found][:2] == ["asked", "running"]
+    assert (found[-1]["state"], found[-1]["id"], found[-1]["event"]) == ("done", final.id, final.event)
+    assert "battery" in [item["name"] for item in items[0]]
 
 
 async def test_over_http_only_what_moves_nothing_and_only_with_the_seat(stack: Stack) -> None:

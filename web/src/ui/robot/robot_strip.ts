@@ -63,9 +63,23 @@ function showWords(engine: ConsoleEngine, element: HTMLElement, now: number): vo
   const last = actions.at(-1) ?? null;
   const update = running ?? (last !== null && now - engine.actionMs < SHOWN_MS ? last : null);
   const label = robot?.description.actions.find((each) => each.name === update?.name)?.label;
-  setText(element, update === null ? "" : actionWords({ label: label ?? update.name }, update));
+  setText(
+    element,
+    update === null ? whyNot(engine, now) : actionWords({ label: label ?? update.name }, update),
+  );
   setData(element, "tone", update === null ? "off" : actionTone(update));
   element.title = update === null ? "" : `by ${update.by}`;
+}
+
+/** Why the first action that cannot be asked for cannot; "" for whoever may not drive. */
+function whyNot(engine: ConsoleEngine, now: number): string {
+  const { state } = engine;
+  if (!mayDrive(state)) return "";
+  for (const action of state.robot?.description.actions ?? []) {
+    const refusal = actRefusal(action, state.actions, engine.actConditions(now));
+    if (refusal !== null) return `${action.label}: ${ACT_REFUSAL_LABELS[refusal]}`;
+  }
+  return "";
 }
 
 /** One action: asks, shows its progress, cancels. */
