@@ -62,7 +62,13 @@ async def test_without_arming_a_motion_says_why_not_and_the_light_goes_on(stack:
 
 @pytest.mark.parametrize(
     ("how", "reason"),
-    [("cancel", "cancelled"), ("stick", "driving"), ("disarm", "rested"), ("stop", "stopped, rested"), ("blur", "rested")],
+    [
+        ("cancel", "cancelled"),
+        ("stick", "driving"),
+        ("disarm", "rested"),
+        ("stop", "stopped, rested"),
+        ("blur", "rested"),
+    ],
 )
 async def test_what_moves_ends_with_everything_that_ends_driving(
     stack: Stack, chromium: Browser, how: str, reason: str
