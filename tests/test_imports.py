@@ -27,8 +27,8 @@ FROM_THE_BRIDGE = {
 # The console's folders and files, from the bottom to the top: each imports those before it.
 LAYERS = (
     "errors", "event_clock", "util", "telemetry", "evidence", "audit", "stop", "session_events", "webrtc", "media",
-    "talkback", "auth", "http", "peers", "sfu", "robot", "federation", "publishing", "scene", "settings_file",
-    "settings", "control", "recording", "state", "routes", "composition", "fleet", "cli",
+    "talkback", "auth", "http", "peers", "sfu", "robot", "actions", "federation", "publishing", "scene",
+    "settings_file", "settings", "control", "recording", "state", "routes", "composition", "fleet", "cli",
 )  # fmt: skip
 
 

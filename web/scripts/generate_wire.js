@@ -18,6 +18,8 @@ function typeOf(node) {
   if (node.enum) return node.enum.map((value) => JSON.stringify(value)).join(" | ");
   if (node.prefixItems) return `readonly [${node.prefixItems.map(typeOf).join(", ")}]`;
   if (node.type === "array") return `readonly (${typeOf(node.items)})[]`;
+  if (node.type === "object" && node.additionalProperties)
+    return `Readonly<Record<string, ${typeOf(node.additionalProperties)}>>`;
   if (node.type === "integer" || node.type === "number") return "number";
   if (node.type === "string" || node.type === "boolean" || node.type === "null") return node.type;
   throw new Error(`no type for ${JSON.stringify(node)}`);

@@ -62,6 +62,7 @@ export function descriptionOf(axes: readonly Axis[]): RobotDescription {
     start_warning: null,
     watchdog: null,
     body_twists: [],
+    actions: [],
     hold: 0.3,
     max_event_age: 2,
     max_event_rate: 25,

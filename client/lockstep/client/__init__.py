@@ -2,6 +2,9 @@
 
 from lockstep.client.console import Console
 from lockstep.client.errors import (
+    ActionCancelled,
+    ActionFailed,
+    ActionRefused,
     CommandError,
     CommandRefused,
     ConnectFailed,
@@ -19,6 +22,9 @@ from lockstep.client.media.stream import Picture, Sound
 from lockstep.client.statistics import ConsoleStatistics, Percentiles, StreamStatistics
 
 __all__ = [
+    "ActionCancelled",
+    "ActionFailed",
+    "ActionRefused",
     "CommandError",
     "CommandRefused",
     "ConnectFailed",

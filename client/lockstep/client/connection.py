@@ -12,6 +12,7 @@ from lockstep.client.errors import ConnectFailed, ConsoleLost
 from lockstep.client.heartbeat import Heartbeat
 from lockstep.client.media.media_receiver import MediaReceiver
 from lockstep.client.message_dispatcher import MessageDispatcher
+from lockstep.client.robot_actions import RobotActions, RobotNews
 from lockstep.client.session import Session
 from lockstep.client.session_requests import SessionRequests
 from lockstep.client.shielded_close import cancel_all, finish
@@ -50,6 +51,7 @@ class Connection:
         self._has_media = asyncio.Event()  # `media` is prepared
         self._transport: Transport | None = None
         self._requests: SessionRequests | None = None
+        self._actions: RobotActions | None = None
         self._running: asyncio.Task[None] | None = None
 
     @property
@@ -63,6 +65,16 @@ class Connection:
         if self._requests is None:
             raise ConsoleLost("not connected yet")
         return self._requests
+
+    @property
+    def actions(self) -> RobotActions:
+        if self._actions is None:
+            raise ConsoleLost("not connected yet")
+        return self._actions
+
+    @property
+    def news(self) -> RobotNews:
+        return self._messages.news
 
     @property
     def lost(self) -> ConsoleLost | None:
@@ -96,6 +108,7 @@ class Connection:
         transport, sections = await open_transport(options, self._messages.received, deadline, beside=beside)
         self._transport = transport
         self._requests = SessionRequests(transport, self.session, self.driving, self._messages.until)
+        self._actions = RobotActions(transport, self.session, self.driving, self.news, self._messages.until)
         if ticket is None and transport.packets is not None:
             self.media.prepare(transport.packets, sections, options.decode)
         await transport.connect(deadline - self._loop.time())

@@ -2,11 +2,13 @@
 
 import asyncio
 import math
-from collections.abc import AsyncGenerator, Mapping, Sequence
+from collections.abc import AsyncGenerator, Callable, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
+
+from msgspec.structs import replace
 
 from lockstep.client.connection import Connection
 from lockstep.client.connection_options import ConnectionOptions
@@ -19,6 +21,7 @@ from lockstep.client.media.render_log import FeedbackArrival, Rendering
 from lockstep.client.media.stream import Picture, Sound, Stream
 from lockstep.client.statistics import ConsoleStatistics
 from lockstep.client.transport.webrtc_peer import Route
+from lockstep.protocol.actions import ActionUpdate, ParameterValue, StatusItem
 from lockstep.protocol.carriers import Carrier
 from lockstep.protocol.console import Participant, Role, Seat, SharedNote
 from lockstep.protocol.description import RobotDescription
@@ -192,6 +195,19 @@ class Console:
         """The last hundred notes to everyone, oldest first."""
         return list(self._live().session.notes)
 
+    @property
+    def actions(self) -> list[ActionUpdate]:
+        """How the newest actions of the robot do, oldest first, whoever asked for them."""
+        return list(self._live().news.updates.values())
+
+    @property
+    def status(self) -> list[StatusItem]:
+        """What the robot says of itself: battery, mode, temperatures. `age` (s) is that of now; empty before any."""
+        news = self._live().news
+        since = asyncio.get_running_loop().time() - news.status_at
+        items = [] if news.status is None else news.status.items
+        return [replace(item, age=item.age + since) for item in items]
+
     def stats(self) -> ConsoleStatistics:
         """Return the figures since the connection began."""
         return self._live().statistics()
@@ -326,6 +342,33 @@ class Console:
         if not all(math.isfinite(value) for value in command):
             raise CommandError("a value is NaN or infinite")
         return command
+
+    async def act(
+        self,
+        name: str,
+        parameters: Mapping[str, ParameterValue] | None = None,
+        *,
+        progress: Callable[[ActionUpdate], None] | None = None,
+    ) -> ActionUpdate:
+        """Ask for an action of the robot's description, once; return its last update when it is done.
+
+        While an action moves the robot, this sends neutral commands that renew it, as fast as answers come. Without
+        them the robot ends it within `hold`. `drive` with another value cancels it, and so does the cancellation of
+        this call.
+
+        Args:
+            name: of one of `description.actions`
+            parameters: values by name; those with a default may be left out
+            progress: called with each update: `running` with its progress from 0 to 1, and the last one
+
+        Raises:
+            ActionRefused: it was not begun; `reason` says why.
+            NotArmed: `arm` comes first, as before driving.
+            ActionCancelled: it was begun and cancelled; `reason` says why.
+            ActionFailed: the robot failed at it.
+            ConsoleLost: the connection ended; the robot has ended what moves it.
+        """
+        return await self._live().actions.act(name, parameters or {}, progress)
 
     async def rest(self) -> None:
         """Send a rest at once, past the gate, and repeat it until the robot is proven to be at rest. Disarms."""

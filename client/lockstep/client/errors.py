@@ -8,13 +8,19 @@ ConsoleError
 ├── ConnectFailed           the console, or the way to it, did not work within the time allowed
 ├── ConsoleLost             an established connection ended; terminal, make a new Console
 ├── StopUnconfirmed         the robot has not confirmed a stop; it is not lost, but do not rely on it
+├── ActionCancelled         an action began and was cancelled: a stick, a stop, a lost seat, no armed events, …
+├── ActionFailed            an action began, and the robot failed at it
 └── Refused                 the console or the robot said no
+    ├── ActionRefused       … to an action
     ├── CommandRefused      … to a command
     │   └── NotArmed        … until `await console.arm()`: after a stop, a reset, a lost link, …
     └── SeatRefused         … to the control seat
 """
 
 __all__ = [
+    "ActionCancelled",
+    "ActionFailed",
+    "ActionRefused",
     "CommandError",
     "CommandRefused",
     "ConnectFailed",
@@ -126,6 +132,30 @@ class StopUnconfirmed(ConsoleError):
     def __init__(self, press: str, detail: str) -> None:
         super().__init__(detail)
         self.press = press
+
+
+class ActionRefused(Refused):
+    """The action was not begun.
+
+    Attributes:
+        reason: one of `lockstep.protocol.actions.ActionReason`
+    """
+
+
+class ActionCancelled(ConsoleError):
+    """The action was begun and cancelled; the robot comes to rest.
+
+    Attributes:
+        reason: one of `lockstep.protocol.actions.ActionReason`
+    """
+
+    def __init__(self, reason: str, detail: str = "") -> None:
+        super().__init__(f"{reason}: {detail}" if detail else reason)
+        self.reason = reason
+
+
+class ActionFailed(ConsoleError):
+    """The robot began the action and failed at it; the detail says why."""
 
 
 class SeatRefused(Refused):

@@ -7,7 +7,9 @@ from lockstep.client.control.driving import Driving
 from lockstep.client.errors import ConsoleLost
 from lockstep.client.heartbeat import Heartbeat
 from lockstep.client.media.media_receiver import MediaReceiver
+from lockstep.client.robot_actions import RobotNews
 from lockstep.client.session import Session
+from lockstep.protocol.actions import ActionUpdate, Status
 from lockstep.protocol.console import (
     Participants,
     RobotState,
@@ -28,6 +30,7 @@ class MessageDispatcher:
 
     Attributes:
         lost: why no more messages come; None while they do
+        news: of the robot's actions and status
         malformed: messages from the console that could not be read
     """
 
@@ -38,6 +41,7 @@ class MessageDispatcher:
         self._driving = driving
         self._media = media
         self._heartbeat = heartbeat
+        self.news = RobotNews()
         self._changed = asyncio.Event()  # a message came, or the end
 
     async def until(self, condition: Callable[[], bool]) -> None:
@@ -87,6 +91,8 @@ class MessageDispatcher:
                 self._session.stop_shown(message.stop)
             case StopTaken():
                 self._session.stop_taken(message)
+            case ActionUpdate() | Status():
+                self.news.hear(message, asyncio.get_running_loop().time())
             case Welcome() | Seat() | Participants() | SharedNote():
                 self._session.hear(message)
         self._wake_waiters()

@@ -8,9 +8,9 @@ import the other. JSON Schemas and the page's TypeScript types are generated fro
 | control | unordered, 0 retransmits | client | command, rest, report, ping |
 | | | server | feedback, refusal, pong |
 | session | reliable | client | seat_request, seat_grant, seat_decline, seat_take, seat_release, rename, note |
-| | | client | silence_stops |
+| | | client | silence_stops, act, action_cancel |
 | | | server | welcome, robot, seat, participants, quality, speed_cap, sources, voice, recording, note_shared |
-| | | server | notice, refusal |
+| | | server | notice, refusal, action, status |
 | stop | reliable | client | stop, reset |
 | | | server | stop_state, stop_taken, refusal |
 """
@@ -19,6 +19,7 @@ from typing import Annotated, Literal
 
 import msgspec
 
+from lockstep.protocol.actions import Act, ActionCancel, ActionUpdate, Status
 from lockstep.protocol.carriers import Carrier
 from lockstep.protocol.description import RobotDescription
 from lockstep.protocol.errors import MessageError
@@ -344,6 +345,8 @@ ClientMessage = (
     | SilenceStops
     | Rename
     | Note
+    | Act
+    | ActionCancel
     | Stop
     | Reset
 )
@@ -364,6 +367,8 @@ ServerMessage = (
     | Notice
     | StopStateNotice
     | StopTaken
+    | ActionUpdate
+    | Status
 )
 
 _client_decoder: msgspec.json.Decoder[ClientMessage] = msgspec.json.Decoder(ClientMessage)

@@ -8,6 +8,8 @@ from typing import Literal
 import msgspec
 
 __all__ = [
+    "Action",
+    "ActionParameter",
     "Axis",
     "AxisGain",
     "Binding",
@@ -234,6 +236,29 @@ class StartWarning(msgspec.Struct, frozen=True, kw_only=True):
     value: float  # that the axis is driven to while it warns
 
 
+class ActionParameter(msgspec.Struct, frozen=True, kw_only=True):
+    """A value that an action takes."""
+
+    name: str
+    label: str
+    kind: Literal["number", "choice", "switch"]
+    unit: str = ""  # of a number
+    minimum: float | None = None  # of a number; None: no bound
+    maximum: float | None = None
+    choices: tuple[str, ...] = ()  # of a choice
+    default: bool | float | str | None = None  # None: a request has to name a value
+
+
+class Action(msgspec.Struct, frozen=True, kw_only=True):
+    """A thing that the robot does when it is asked once (docs/robot-link.md, "Actions")."""
+
+    name: str  # "home"
+    label: str  # "Home"
+    moves: bool = True  # it moves something: it lives only while armed events renew it
+    parameters: tuple[ActionParameter, ...] = ()
+    confirm: str = ""  # question that a console asks the person first; "": it asks none
+
+
 class RobotDescription(msgspec.Struct, frozen=True, kw_only=True):
     name: str  # "mobile-manipulator"
     label: str  # "Mobile manipulator"
@@ -251,6 +276,7 @@ class RobotDescription(msgspec.Struct, frozen=True, kw_only=True):
     force_feeling: ForceFeeling | None = None
     body_twists: tuple[BodyTwist, ...] = ()
     start_warning: StartWarning | None = None
+    actions: tuple[Action, ...] = ()
     hold: float = 0.3  # s a command is held before the robot comes to rest without another
     watchdog: float | None = (
         None  # s without a tick after which the robot is brought to rest; None: see docs/robot-link.md

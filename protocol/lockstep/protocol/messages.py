@@ -7,6 +7,7 @@ from typing import Annotated, Literal
 
 import msgspec
 
+from lockstep.protocol.actions import Act, ActionCancel, ActionUpdate, RenewedAction, Status
 from lockstep.protocol.description import RobotDescription
 from lockstep.protocol.errors import MessageError
 from lockstep.protocol.serial import MAX_EVENT
@@ -125,6 +126,7 @@ class Command(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", tag="
     issue: IssueNumber
     values: AxisValues  # one per axis of the description, in its units
     nonce: Nonce = 0  # of the issue that it answers: proof that the sender has seen it
+    action: RenewedAction = ""  # id of the moving action that the armed sender lets go on; "": none
 
 
 class Feedback(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", tag="feedback"):
@@ -239,6 +241,10 @@ LinkMessage = (
     | Stop
     | StopTaken
     | Reset
+    | Act
+    | ActionCancel
+    | ActionUpdate
+    | Status
     | Ping
     | Pong
     | Goodbye

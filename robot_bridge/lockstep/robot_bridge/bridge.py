@@ -8,6 +8,7 @@ from collections import Counter
 from types import TracebackType
 from typing import Self
 
+from lockstep.robot_bridge.actions.action_runner import ActionRunner
 from lockstep.robot_bridge.control import clock
 from lockstep.robot_bridge.control.command_executor import CommandExecutor
 from lockstep.robot_bridge.control.event_core import EventCore
@@ -84,10 +85,16 @@ class Bridge:
         refusals, alarm = Refusals(counters, self._log), TickAlarm()
         self._stops = StopHandler(robot, self._core, shaper, self._keeper, self._lockout, refusals, self._log, now)
         self._feedback = FeedbackIssuer(robot, description, self._core, shaper, counters, self._log, now)
+        actions = ActionRunner(robot, description, self._core, shaper, counters, self._log, now)
         executor = CommandExecutor(
-            *(robot, description, self._core, shaper, limits, self._watchdogs),
-            *(self._stops, self._feedback, refusals, alarm, counters, self._log),
-            now,
+            *(robot, description, self._core, shaper, limits, self._watchdogs, self._stops),
+            feedback=self._feedback,
+            actions=actions,
+            refusals=refusals,
+            alarm=alarm,
+            counters=counters,
+            log=self._log,
+            now=now,
         )
         self._links = LinkServer(
             executor,

@@ -16,6 +16,7 @@ class BridgeCounters:
     skipped_ticks: int = 0  # the loop was blocked for longer than could be caught up
     stalls: int = 0  # the ticks were held up for longer than the watchdog allows; the robot came to rest
     watchdog: int = 0  # stalls in which a watchdog beside the loop brought the robot to rest
+    actions: Counter[str] = field(default_factory=Counter)  # begun and ended, by state, {"done": 1}
     limits: Counter[str] = field(default_factory=Counter)  # spells in which a limit slowed the robot, {"charger": 2}
     refusals: Counter[str] = field(default_factory=Counter)  # by reason, {"late": 3}
     bad_input: Counter[str] = field(default_factory=Counter)  # by name, {"malformed": 1}

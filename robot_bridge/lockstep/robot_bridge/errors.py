@@ -7,6 +7,7 @@ BridgeError
 ├── SettingsError           a settings file cannot be used; names its line and key
 ├── ModelError              a MuJoCo model cannot be driven
 ├── DescriptionError        the robot's description contradicts itself
+├── BadParameter            a request for an action has a parameter that the action does not take
 ├── ListenError             the bridge cannot listen on the address
 ├── InsecureLink            the bridge will not listen there without a secret or client certificates
 ├── StateDirInUse           another bridge keeps its stop in the directory
@@ -15,6 +16,7 @@ BridgeError
 """
 
 __all__ = [
+    "BadParameter",
     "BadRobot",
     "BridgeError",
     "DescriptionError",
@@ -51,6 +53,10 @@ class BridgeError(Exception):
 
 class RobotUnavailable(BridgeError):
     name = "robot_unavailable"
+
+
+class BadParameter(BridgeError):
+    name = "bad_parameter"
 
 
 class UnknownRobot(BridgeError):

@@ -33,6 +33,7 @@ EventKind = Literal[
     "driven",
     "at_rest",
     "stall",
+    "action",
 ]
 Field = str | int | float | bool | list[float] | list[str]
 

@@ -26,6 +26,7 @@ ConsoleError
 │   ├── LockedOut           a reset while somebody at the robot keeps it from being driven
 │   ├── NotAcceptable       an offer without anything that the console accepts
 │   ├── NotConnected
+│   ├── NotRenewable        an action that moves the robot, asked for over HTTP
 │   ├── NotFound
 │   ├── PreconditionFailed
 │   ├── TooManyInvitations
@@ -94,6 +95,7 @@ __all__ = [
     "NotAllowed",
     "NotConnected",
     "NotFound",
+    "NotRenewable",
     "OriginRefused",
     "PreconditionFailed",
     "PreconditionRequired",
@@ -236,6 +238,10 @@ class NotAcceptable(RequestError):
 
 
 class NotConnected(RequestError):
+    pass
+
+
+class NotRenewable(RequestError):
     pass
 
 
@@ -407,6 +413,7 @@ HTTP_ERRORS: dict[type[ConsoleError], HttpError] = {
     NotAcceptable: HttpError(406, "not_acceptable"),
     CameraTaken: HttpError(409, "camera_taken", {"Retry-After": "5"}),
     NotConnected: HttpError(409, "not_connected"),
+    NotRenewable: HttpError(409, "not_renewable"),
     LockedOut: HttpError(409, "locked_out"),
     ResetTooSoon: HttpError(409, "too_soon", {"Retry-After": "1"}),
     PressUsed: HttpError(409, "press_used"),

@@ -8,6 +8,7 @@ from typing import Literal, TypeVar
 
 import msgspec
 
+from lockstep.protocol.actions import Act, ActionUpdate, Status
 from lockstep.protocol.console import Participants, Report, RobotState, Seat, SharedNote, SpeedCapState
 from lockstep.protocol.description import RobotDescription
 from lockstep.protocol.messages import Command, Feedback, Refusal, RefusalReason, Rest, StopState, StopTaken
@@ -16,6 +17,10 @@ from lockstep.server.stop.stop_presses import Press
 from lockstep.server.telemetry.faults import Faults
 
 __all__ = [
+    "ActionAsked",
+    "ActionCancelled",
+    "ActionRefused",
+    "ActionUpdated",
     "CommandForwarded",
     "CommandRefused",
     "CommandRepeated",
@@ -41,6 +46,7 @@ __all__ = [
     "SilenceChanged",
     "SpeedCapChanged",
     "SpeedReported",
+    "StatusReceived",
     "StopAnswered",
     "StopAsked",
     "StopRepeated",
@@ -153,6 +159,41 @@ class StopShown(SessionEvent, frozen=True):
 
     stop: StopState
     event: int
+
+
+# actions and status
+
+
+class ActionAsked(SessionEvent, frozen=True):
+    """A request for an action went to the robot for the first time."""
+
+    by: Actor
+    act: Act
+
+
+class ActionRefused(SessionEvent, frozen=True):
+    """The console has refused an action; the robot's refusals are in `ActionUpdated`."""
+
+    by: Actor
+    update: ActionUpdate
+
+
+class ActionCancelled(SessionEvent, frozen=True):
+    """A cancel went to the robot for an action that runs."""
+
+    by: Actor  # Actor(): the console, because the seat changes hands
+    id: str  # "": the action that moves the robot
+
+
+class ActionUpdated(SessionEvent, frozen=True):
+    """The robot has said how an action does, or the console knows it because the link was lost."""
+
+    update: ActionUpdate
+    new_state: bool  # False: only its progress is new
+
+
+class StatusReceived(SessionEvent, frozen=True):
+    status: Status
 
 
 # stops and resets

@@ -19,6 +19,7 @@ import { createLimitsStrip } from "../ui/driving/limits_strip";
 import { createOverlay, overlayLabels } from "../ui/views/overlay";
 import { createSeatBar } from "../ui/session/seat_bar";
 import { createStatusBar } from "../ui/status/status_bar";
+import { createRobotStrip } from "../ui/robot/robot_strip";
 import { createStopPanel } from "../ui/driving/stop_panel";
 import { watchTouch } from "../ui/elements/touch_detection";
 import { ViewGrid } from "../ui/views/view_grid";
@@ -89,6 +90,7 @@ export class Page {
     );
     const alarm = createAlarmStrip(engine);
     const banner = createBanner(engine);
+    const robot = createRobotStrip(engine);
     const event = createEventPanel(engine);
     grid.card = event.element;
     const force = later.panel((parts) => parts.createForceGauge(engine, false));
@@ -118,7 +120,7 @@ export class Page {
     const deck = h("footer", "deck", {}, arm.element, axes.element, left, right, stop.element);
     this.root.append(
       ...[bar.element, seat.element],
-      h("div", "strips", {}, alarm.element, banner.element),
+      h("div", "strips", {}, alarm.element, banner.element, robot.element),
       ...[grid.element, rail],
       ...[charts.element, sheets.element, deck, announcer.element],
     );
@@ -129,6 +131,7 @@ export class Page {
       seat,
       alarm,
       banner,
+      robot,
       event,
       force,
       contact,

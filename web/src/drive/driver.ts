@@ -48,6 +48,7 @@ const FEW_SAMPLES = 8;
 export interface Intention {
   readonly armed: boolean;
   readonly values: readonly number[]; // one per axis; at rest unless the deadman is held
+  readonly action?: string; // id of the moving action that this page lets go on; "" for none
 }
 
 /**
@@ -263,7 +264,7 @@ function commandDue(driver: Driver, intention: Intention, now: number): ClientMe
     if (now >= driver.repeatAtMs) noteSending(driver, driver.sends + 1, now);
     else noteEcho(driver);
   } else {
-    if (!wantsToSend(driver, intention.armed, values, now)) return null;
+    if (!wantsToSend(driver, intention, values, now)) return null;
     noteSent(driver.gate, now);
     noteCommandSent(driver.latency, next.event, now);
     noteSending(driver, 1, now);
@@ -271,7 +272,11 @@ function commandDue(driver: Driver, intention: Intention, now: number): ClientMe
     driver.flightIsNeutral = isSame(values, driver.neutral);
   }
   driver.lastValues = values;
-  return { type: "command", ...next, values };
+  // Only an armed page lets an action go on: what it sends after disarming names none.
+  const { action = "" } = intention;
+  return action !== "" && mayMove
+    ? { type: "command", ...next, values, action }
+    : { type: "command", ...next, values };
 }
 
 function noteSending(driver: Driver, sends: number, now: number): void {
@@ -313,10 +318,11 @@ function knowsFewCommands(driver: Driver): boolean {
   return driver.latency.toFeedback.values.length < FEW_SAMPLES;
 }
 
-function wantsToSend(driver: Driver, armed: boolean, values: readonly number[], now: number): boolean {
+function wantsToSend(driver: Driver, intention: Intention, values: readonly number[], now: number): boolean {
   if (gateState(driver.gate, now) !== "open") return false;
-  if (!armed) return driver.neutralOwed;
+  if (!intention.armed) return driver.neutralOwed;
   if (driver.unproven) return true;
+  if ((intention.action ?? "") !== "") return true; // every answer is renewed at once
   const idles = isSame(values, driver.neutral) && isSame(driver.lastValues, driver.neutral);
   return !idles || now - driver.gate.lastSentMs >= IDLE_INTERVAL_MS;
 }

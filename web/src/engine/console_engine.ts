@@ -36,10 +36,13 @@ import type { Preconnection } from "../transport/webrtc/preconnection";
 import type { ChannelName, Peer, PeerOptions } from "../transport/peer";
 import { newReader } from "../transport/encoded_transform/stamp_reader";
 import { SessionClient } from "../session/session_client";
+import { ActionClient, drawId } from "../robot/action_client";
+import type { ActConditions } from "../robot/actions";
 import { reportOf } from "./report";
 import { StopSender } from "./stop_sender";
 import type { Talkback } from "../talkback/talkback";
 import type {
+  Action,
   ClientMessage,
   Feedback,
   RobotState,
@@ -73,6 +76,7 @@ export class ConsoleEngine {
   readonly connection: Connection;
   readonly stopping: StopSender;
   readonly session: SessionClient;
+  readonly actions: ActionClient;
   readonly controls: Controls;
   readonly events = createRateMeter();
   readonly audio = new AudioDevice();
@@ -90,6 +94,8 @@ export class ConsoleEngine {
   private readonly disposal = new Disposal();
   peer: Peer | null = null;
   measuredMs: number | null = null; // when the newest feedback came
+  statusMs = 0; // when the robot's newest status came
+  actionMs = -Infinity; // when the newest news of an action came
   private heardMs = 0;
   private readonly sendTimer = new SendTimer(() => this.takeInput(performance.now()));
   private readonly heartbeat = new Heartbeat({
@@ -120,6 +126,7 @@ export class ConsoleEngine {
     });
     this.stopping = new StopSender(api, this.connection);
     this.session = new SessionClient(this.state, name, (message) => this.tell("session", message));
+    this.actions = new ActionClient((message) => this.tell("session", message), drawId);
     this.controls = new Controls(sticks, {
       stop: () => this.stop("stop key"),
       arm: () => this.toggleArmed(),
@@ -177,6 +184,23 @@ export class ConsoleEngine {
     };
   }
 
+  actConditions(now = performance.now()): ActConditions {
+    const { operator, connected, robotUp, holdsSeat, lockedOut, stopped, stopPressed } = this.conditions(now);
+    return {
+      ...{ operator, connected, robotUp, holdsSeat, lockedOut },
+      stopped: stopped || stopPressed,
+      armed: this.isArmed(),
+      proven: this.driver?.unproven === false,
+      deadman: this.arming.state === "driving",
+    };
+  }
+
+  /** Asks for an action once. Armed commands let it go on until it ends, or this page disarms. */
+  act(action: Action, parameters: Readonly<Record<string, boolean | number | string>>): void {
+    const now = performance.now();
+    if (this.actions.act(action, parameters, this.state.feedback?.nonce ?? 0, now)) this.drive(now);
+  }
+
   toggleArmed(): void {
     if (this.isArmed()) {
       this.disarm("operator");
@@ -192,6 +216,7 @@ export class ConsoleEngine {
     if (!arming.disarm(this.arming, reason)) return;
     this.controls.release();
     this.haptics.still();
+    this.actions.forget();
     if (this.driver !== null) driver.driverDisarm(this.driver, performance.now());
     this.drive(performance.now());
     this.page.armedChanged();
@@ -302,6 +327,11 @@ export class ConsoleEngine {
     else if (message.type === "welcome") this.welcomed(message);
     else if (message.type === "robot") this.robotChanged(message, now);
     else if (message.type === "seat") this.session.seatMs = now;
+    else if (message.type === "status") this.statusMs = now;
+    else if (message.type === "action") {
+      this.actionMs = now;
+      this.actions.updated(message);
+    }
   }
 
   /** Whoever drives next has to arm, and nothing of the one before is executed. */
@@ -424,7 +454,7 @@ export class ConsoleEngine {
   private drive(now: number): void {
     if (this.driver === null || this.state.welcome === null) return;
     noteHeard(this.driver.gate, this.streams.heard());
-    const intention = { armed: this.isArmed(), values: this.values };
+    const intention = { armed: this.isArmed(), values: this.values, action: this.actions.renewed(now) };
     const messages = driver.driverStep(this.driver, intention, this.canCommand(), now);
     for (const message of messages) this.tell("control", message);
     this.sendTimer.set(this.isArmed() ? driver.driverOpensIn(this.driver, now) : null);

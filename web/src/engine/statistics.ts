@@ -60,6 +60,7 @@ export interface Statistics {
   readonly stop_press: StopFate | null; // what became of the newest press on this page; null: nothing to tell
   readonly stale: string | null; // why the large view must not be trusted
   readonly at_rest: boolean | null;
+  readonly joints: readonly number[]; // measured; empty before the first feedback
   readonly axes: Readonly<Record<string, number | null>>; // measured; null where that is not known
   readonly layer: string | null; // the control layer that is active
   readonly faults: readonly string[];
@@ -112,6 +113,7 @@ export function statisticsOf(engine: ConsoleEngine, mainStream: string | null): 
     stop_press: engine.stopping.fate(now),
     stale: main === undefined ? null : stalenessOf(engine.streams, main, now),
     at_rest: state.feedback?.at_rest ?? null,
+    joints: state.feedback?.joints ?? [],
     axes: axesOf(engine),
     layer: state.robot?.description.layers[engine.layer]?.name ?? null,
     faults: state.feedback?.faults ?? [],

@@ -1,5 +1,57 @@
 // Generated from docs/schemas/console.schema.json by `npm run generate`. Do not edit.
 
+/** Ask for an action. The robot does it at most once for each id, and answers with `action` messages. */
+export interface Act {
+  readonly type: "act";
+  readonly id: string;
+  readonly name: string;
+  readonly parameters?: Readonly<Record<string, boolean | number | string>>;
+  readonly nonce?: number;
+  readonly by?: string;
+}
+
+/** A thing that the robot does when it is asked once (docs/robot-link.md, "Actions"). */
+export interface Action {
+  readonly name: string;
+  readonly label: string;
+  readonly moves: boolean;
+  readonly parameters: readonly (ActionParameter)[];
+  readonly confirm: string;
+}
+
+/** Cancel an action that runs. Repeats, and ids of actions that do not run, have no effect. */
+export interface ActionCancel {
+  readonly type: "action_cancel";
+  readonly id?: string;
+}
+
+/** A value that an action takes. */
+export interface ActionParameter {
+  readonly name: string;
+  readonly label: string;
+  readonly kind: "choice" | "number" | "switch";
+  readonly unit: string;
+  readonly minimum: number | null;
+  readonly maximum: number | null;
+  readonly choices: readonly (string)[];
+  readonly default: boolean | number | string | null;
+}
+
+/** How an action does. `done`, `failed`, `cancelled` and `refused` are final. */
+export interface ActionUpdate {
+  readonly type: "action";
+  readonly id: string;
+  readonly name: string;
+  readonly state: "cancelled" | "done" | "failed" | "refused" | "running";
+  readonly reason: "" | "bad_parameter" | "busy" | "cancelled" | "driving" | "interrupted" | "late" | "link_down" | "locked_out" | "no_seat" | "not_allowed" | "not_neutral" | "not_possible" | "not_renewable" | "not_renewed" | "rested" | "stopped" | "too_often" | "unknown_action" | "warning";
+  readonly progress: number;
+  readonly text: string;
+  readonly moves: boolean;
+  readonly event: number;
+  readonly began: number;
+  readonly by: string;
+}
+
 /** One value of a command, in physical units. */
 export interface Axis {
   readonly name: string;
@@ -65,7 +117,7 @@ export interface Camera {
   readonly metres_per_pixel: number | null;
 }
 
-export type ClientMessage = Command | Rest | Report | Ping | SeatRequest | SeatGrant | SeatDecline | SeatTake | SeatRelease | SilenceStops | Rename | Note | Stop | Reset;
+export type ClientMessage = Command | Rest | Report | Ping | SeatRequest | SeatGrant | SeatDecline | SeatTake | SeatRelease | SilenceStops | Rename | Note | Act | ActionCancel | Stop | Reset;
 
 /** Event `event`, valid only as the answer to issue `issue` of feedback `event - 1`. */
 export interface Command {
@@ -74,6 +126,7 @@ export interface Command {
   readonly issue: number;
   readonly values: readonly (number)[];
   readonly nonce?: number;
+  readonly action?: string;
 }
 
 /** A set of bindings that are active together; the operator switches between layers. */
@@ -301,6 +354,7 @@ export interface RobotDescription {
   readonly force_feeling: ForceFeeling | null;
   readonly body_twists: readonly (BodyTwist)[];
   readonly start_warning: StartWarning | null;
+  readonly actions: readonly (Action)[];
   readonly hold: number;
   readonly watchdog: number | null;
   readonly max_event_age: number;
@@ -361,7 +415,7 @@ export interface SeatTake {
   readonly type: "seat_take";
 }
 
-export type ServerMessage = Feedback | Refusal | Pong | Welcome | RobotState | Seat | Participants | Quality | SpeedCapState | Sources | Voice | RecordingState | SharedNote | Notice | StopStateNotice | StopTaken;
+export type ServerMessage = Feedback | Refusal | Pong | Welcome | RobotState | Seat | Participants | Quality | SpeedCapState | Sources | Voice | RecordingState | SharedNote | Notice | StopStateNotice | StopTaken | ActionUpdate | Status;
 
 /** A participant's note, with the event it belongs to. Newcomers get the last ones. */
 export interface SharedNote {
@@ -412,6 +466,26 @@ export interface StartWarning {
   readonly seconds: number;
   readonly axis: string;
   readonly value: number;
+}
+
+/** All status items of a robot, in its own order. Each message replaces the one before it. */
+export interface Status {
+  readonly type: "status";
+  readonly event: number;
+  readonly items: readonly (StatusItem)[];
+}
+
+/** One thing that a robot says of itself. */
+export interface StatusItem {
+  readonly name: string;
+  readonly label: string;
+  readonly kind: "battery" | "hardware_stop" | "mode" | "number" | "switch" | "temperature" | "text";
+  readonly value: boolean | number | string;
+  readonly unit: string;
+  readonly level: "error" | "ok" | "warning";
+  readonly text: string;
+  readonly age: number;
+  readonly old_after: number;
 }
 
 /** Latch the stop. Repeats of one press carry its id and are one stop. */

@@ -23,6 +23,7 @@ const GROUPS: Readonly<Record<MarkKind, MarkGroup>> = {
   note: "others",
   fault: "others",
   link: "others",
+  action: "others",
 };
 
 const NAMES: Readonly<Record<MarkKind, string>> = {
@@ -34,6 +35,7 @@ const NAMES: Readonly<Record<MarkKind, string>> = {
   note: "Note",
   fault: "Fault",
   link: "Robot link",
+  action: "Action",
 };
 
 export function groupOf(mark: ReplayMark): MarkGroup {

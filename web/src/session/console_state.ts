@@ -1,4 +1,5 @@
 import type {
+  ActionUpdate,
   Feedback,
   Participant,
   Quality,
@@ -10,6 +11,7 @@ import type {
   SharedNote,
   SourceStatus,
   SpeedCapState,
+  Status,
   StopState,
   Voice,
   Welcome,
@@ -20,6 +22,8 @@ import { seatHandover, type SeatHandover } from "./seat_handover";
 import type { GateMode } from "../gate/media_gate";
 import { isNewer } from "../gate/serial";
 import { resetRefusalLabel } from "../stop/reset_labels";
+import { actionNamed, isRunning, takeUpdate } from "../robot/actions";
+import { actionWords } from "../robot/action_labels";
 import { sourceLabel } from "./source_labels";
 import { REFUSAL_LABELS } from "./refusal_labels";
 
@@ -57,6 +61,8 @@ export interface ConsoleState {
   voice: Voice | null; // who is heard at the robot; null before the console has said so
   recording: RecordingState | null; // null before the console has said so
   notes: SharedNote[]; // oldest first
+  actions: readonly ActionUpdate[]; // of the robot, oldest request first
+  status: Status | null; // what the robot says of itself; null before it has
   feedback: Feedback | null; // newest
   stop: StopState;
   stopIsHeard: boolean; // on this connection; else it is of an earlier one
@@ -100,6 +106,8 @@ export function createConsoleState(): ConsoleState {
     voice: null,
     recording: null,
     notes: [],
+    actions: [],
+    status: null,
     feedback: null,
     stop: NOT_STOPPED,
     stopIsHeard: false,
@@ -120,6 +128,8 @@ export function forgetConnection(state: ConsoleState): void {
   state.voice = null;
   state.recording = null;
   state.notes = [];
+  state.actions = [];
+  state.status = null;
   state.feedback = null;
   state.stopIsHeard = false;
   state.roundTripMs = null;
@@ -189,6 +199,12 @@ export function applyMessage(state: ConsoleState, message: ServerMessage, wallMs
       state.notes.push(message);
       state.notes.splice(0, state.notes.length - NOTE_LIMIT);
       return;
+    case "action":
+      takeAction(state, message, wallMs);
+      return;
+    case "status":
+      state.status = message;
+      return;
     case "pong":
     case "stop_taken": // the stop sender's
       return;
@@ -224,6 +240,16 @@ function takeStop(state: ConsoleState, stop: StopState): void {
   if (state.stopIsHeard && stop.number < state.stop.number) return;
   state.stop = stop;
   state.stopIsHeard = true;
+}
+
+/** How an action ends is a line of the log. */
+function takeAction(state: ConsoleState, update: ActionUpdate, wallMs: number): void {
+  const known = state.actions.find((each) => each.id === update.id);
+  state.actions = takeUpdate(state.actions, update);
+  if (isRunning(update) || known?.state === update.state) return;
+  if (update.state === "done" && update.text === "") return;
+  const label = actionNamed(state.robot?.description ?? null, update.name)?.label ?? update.name;
+  note(state, update.state === "done" ? "info" : "warning", actionWords({ label }, update), wallMs);
 }
 
 /** A failure is said once, in the log too. */

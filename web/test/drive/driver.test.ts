@@ -69,6 +69,20 @@ describe("commands", () => {
     expect(driverStep(driver, MOVING, true, 16)).toHaveLength(1);
   });
 
+  it("name the action that an armed page lets go on, at every answer and never after disarming", () => {
+    const HOMING = { ...IDLE, action: "id" };
+    expect(driverStep(driver, HOMING, true, 0)).toMatchObject([{ action: "id", values: NEUTRAL }]);
+    driverFeedback(driver, feedbackOf(2), true, 12);
+    expect(driverStep(driver, HOMING, true, 12), "not only five times a second").toMatchObject([
+      { action: "id" },
+    ]);
+    driverFeedback(driver, feedbackOf(3), true, 24);
+    driverDisarm(driver, 24);
+    const after = commands(driverStep(driver, { ...HOMING, armed: false }, true, 24));
+    expect(after).toHaveLength(1);
+    expect(after[0]).not.toHaveProperty("action");
+  });
+
   it("name the nonce of the issue that they answer, also when repeated", () => {
     driverFeedback(driver, feedbackOf(1, { issue: 2, nonce: 12 }), true, 1);
     expect(driverStep(driver, MOVING, true, 2)).toMatchObject([{ issue: 2, nonce: 12 }]);

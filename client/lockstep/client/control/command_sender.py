@@ -87,6 +87,7 @@ class CommandSender:
     def __init__(self, gate: CommandGate, neutral: Sequence[float]) -> None:
         self.gate = gate
         self.timer = RepeatTimer()
+        self.action = ""  # id of the moving action that every command lets go on; "": none
         self.armed = False
         self.ready = False  # True if the robot may move: a neutral command was executed since one was last needed
         self.holds_seat = True  # False: the executed event is another peer's
@@ -274,7 +275,9 @@ class CommandSender:
     def _next(self, now: float) -> Command:
         event, issue = self.gate.next()
         want = _Want.NEUTRAL if self._only_neutral(event) else self._want
-        command = Command(event=event, issue=issue, values=self._values_for(want), nonce=self._nonce)
+        command = Command(
+            event=event, issue=issue, values=self._values_for(want), nonce=self._nonce, action=self.action
+        )
         neutral = command.values == self._neutral
         flight = _Flight(command, want, self._ticket if want is _Want.VALUES else 0, now, neutral=neutral)
         flight.repeat_at = now + self._wait(1)
@@ -317,7 +320,9 @@ class CommandSender:
         flight.issue = self.gate.next().issue
         want = _Want.NEUTRAL if self._only_neutral(flight.command.event) else _Want.VALUES
         values = self._values_for(want)
-        again = Command(event=flight.command.event, issue=flight.issue, values=values, nonce=self._nonce)
+        again = Command(
+            event=flight.command.event, issue=flight.issue, values=values, nonce=self._nonce, action=self.action
+        )
         return [again] * copies
 
     def _could_be_answered(self, flight: _Flight, now: float) -> bool:

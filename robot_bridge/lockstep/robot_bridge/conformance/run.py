@@ -5,6 +5,7 @@ import contextlib
 from collections.abc import Callable, Sequence
 
 from lockstep.protocol.errors import LinkLost, LinkRefused
+from lockstep.robot_bridge.conformance.action_cases import ACTION_CASES
 from lockstep.robot_bridge.conformance.case import Case, Outcome, Result
 from lockstep.robot_bridge.conformance.errors import NotApplicable, StoppedByOther, Violation
 from lockstep.robot_bridge.conformance.event_cases import EVENT_CASES
@@ -16,7 +17,7 @@ from lockstep.robot_bridge.conformance.subject import Subject
 
 __all__ = ["CASES", "play", "play_all"]
 
-CASES: tuple[Case, ...] = (*LINK_CASES, *EVENT_CASES, *REST_CASES, *STOP_CASES, *MEDIA_CASES)
+CASES: tuple[Case, ...] = (*LINK_CASES, *EVENT_CASES, *REST_CASES, *STOP_CASES, *ACTION_CASES, *MEDIA_CASES)
 CASE_SECONDS = 120.0  # a robot may warn for 30 s each time before it moves
 
 

@@ -2,8 +2,11 @@
 
 import logging
 
+from lockstep.protocol.actions import Act, ActionCancel, Status
 from lockstep.protocol.description import RobotDescription
 from lockstep.protocol.messages import Command, Feedback, Reset, Rest, Stop
+from lockstep.robot_bridge.actions.action_runner import ActionRunner
+from lockstep.robot_bridge.actions.status_issuer import StatusIssuer
 from lockstep.robot_bridge.control.clock import Clock
 from lockstep.robot_bridge.control.event_core import Answered, EventCore, Executed, Refused
 from lockstep.robot_bridge.control.feedback_issuer import FeedbackIssuer
@@ -38,6 +41,7 @@ class CommandExecutor:
         watchdogs: Watchdogs,
         stops: StopHandler,
         feedback: FeedbackIssuer,
+        actions: ActionRunner,
         refusals: Refusals,
         alarm: TickAlarm,
         counters: BridgeCounters,
@@ -52,11 +56,14 @@ class CommandExecutor:
         self._watchdogs = watchdogs
         self._stops = stops
         self._feedback = feedback
+        self._actions = actions
         self._refusals = refusals
         self._counters = counters
         self._log = log
         self._now = now
+        self._status = StatusIssuer(robot)
         self._signal = StartSignal(description)
+        self._axes = len(description.axes)
         self._blind: frozenset[str] = frozenset()  # limits that slowed the robot because its position was unknown
         self._rested = True  # nothing was driven at the last tick
 
@@ -65,9 +72,11 @@ class CommandExecutor:
     def link_opened(self, peer: LinkPeer) -> None:
         if peer.session.role == "operator":
             self._need_neutral()
+            self._actions.link_opened(peer)
+            self._status.want_issue()
         self._core.want_issue()
 
-    def link_message(self, peer: LinkPeer, message: Command | Rest | Stop | Reset) -> None:
+    def link_message(self, peer: LinkPeer, message: Command | Rest | Stop | Reset | Act | ActionCancel) -> None:
         match message:
             case Command():
                 self._command(peer, message)
@@ -76,12 +85,17 @@ class CommandExecutor:
                 if applied:
                     self._shaper.rest()
                     self._alarm.ring()
+                    self._actions.interrupt("rested")
                 self._log.record("rest", message.event, applied=applied)
             case Stop():
                 self._stops.stop(peer, message)
                 self._alarm.ring()
             case Reset():
                 self._stops.reset(peer, message)
+            case Act():
+                self._actions.act(peer, message)
+            case ActionCancel():
+                self._actions.cancel(message)
 
     def link_bad_input(self, peer: LinkPeer, bad: BadInput) -> None:
         if bad.name == "malformed" or bad.name == "not_allowed":
@@ -89,13 +103,19 @@ class CommandExecutor:
 
     def operator_lost(self) -> None:
         self._shaper.rest()
+        self._actions.link_lost()
 
     def _command(self, peer: LinkPeer, command: Command) -> None:
         now = self._now()
         outcome = self._core.command(command, now)
+        if isinstance(outcome, Executed | Refused):
+            moving = len(command.values) == self._axes and self._core.moves(command.values)
+            executed = isinstance(outcome, Executed)
+            self._actions.commanded(command.action, moving=moving, executed=executed, now=now)
         if isinstance(outcome, Executed):
             self._feedback.rested_why = ""
-            self._shaper.drive(outcome.values, now)
+            if not self._actions.moving:  # else the action has the axes, and this command is neutral
+                self._shaper.drive(outcome.values, now)
             self._alarm.ring()
             self._counters.executed += 1
             self._log.record("executed", outcome.event, issue=command.issue, values=outcome.values)
@@ -118,12 +138,14 @@ class CommandExecutor:
             BaseException: the adapter raised.
         """
         self._stops.look(now)
-        moved = not self._shaper.at_rest
+        self._actions.look()
+        moved = self._moves
+        self._actions.step()
         values = self._shaper.step(now, self._robot.tick_seconds)  # asks for positions, which may hang too
         if (held := self._watchdogs.begin(now, moved)) is not None:
             self._held_up(held)
             values = self._shaper.values
-        self._watchdogs.ticked(now, not self._shaper.at_rest)
+        self._watchdogs.ticked(now, self._moves)
         self._robot.apply(self._signal.on(values) if self._core.warns(now) else values)
         self._robot.tick()
         self._feedback.limits_act(self._limits.acting)
@@ -131,16 +153,37 @@ class CommandExecutor:
         if self._shaper.at_rest:
             self._stops.rests()
         self.note_motion()
-        return self._feedback.issue() if self._core.issue_due(now) else None
+        if not self._core.issue_due(now):
+            return None
+        feedback = self._feedback.issue(acts=self._actions.moving)
+        self._actions.issued(feedback.nonce, now)
+        return feedback
+
+    @property
+    def _moves(self) -> bool:
+        return self._actions.moving or not self._shaper.at_rest
+
+    def status(self, now: float) -> Status | None:
+        """Return the robot's status if it is due.
+
+        Raises:
+            BaseException: the adapter raised.
+        """
+        return self._status.look(now, self._core.current)
+
+    def end_actions(self) -> None:
+        """Cancel all actions, because the ticks end. Raises nothing."""
+        self._actions.close()
 
     def note_motion(self) -> None:
         """Record whether the robot is driven, if that has changed."""
-        if self._shaper.at_rest != self._rested:
-            self._rested = self._shaper.at_rest
+        if self._moves == self._rested:
+            self._rested = not self._moves
             self._log.record("at_rest" if self._rested else "driven", self._core.current)
 
     def _held_up(self, held: Held) -> None:
         """Make the operator begin anew after too long without a tick: the robot's motion meanwhile is unknown."""
+        self._actions.interrupt("interrupted")
         self._shaper.cut()
         self._core.need_neutral()
         self._counters.stalls += 1

@@ -51,9 +51,11 @@ class FeedbackIssuer:
         self._acted: set[str] = set()  # limits that slowed it since the last feedback
         self._source_faults: list[str] = []  # "media: OSError: no camera"
 
-    def issue(self) -> Feedback:
+    def issue(self, *, acts: bool = False) -> Feedback:
+        """Measure and issue. `acts`: an action moves the robot."""
         taken = time.monotonic()
-        return self._issue(self._robot.measure(), taken)
+        measured = self._robot.measure()
+        return self._issue(measured._replace(at_rest=measured.at_rest and not acts), taken)
 
     def issue_failed(self, failure: str) -> Feedback:
         """Issue that the robot failed, with the last measured values if it cannot be measured any more."""

@@ -88,6 +88,7 @@ class TickLoop:
 
         `running`: the task that ends when the ticks have ended.
         """
+        self._executor.end_actions()
         self._shaper.rest()
         running.add_done_callback(lambda _: self._at_rest.set())
         with contextlib.suppress(TimeoutError):
@@ -98,17 +99,21 @@ class TickLoop:
 
     def rest_at_exit(self) -> None:
         """Bring the robot to rest when the event loop is gone."""
+        self._executor.end_actions()
         leaving = self._coming_to_rest()
         leaving.at_once()
         leaving.stop()
 
     def tick(self) -> None:
         """Run one tick, and send a feedback if one is due."""
-        feedback = self._executor.tick(self._now())
+        now = self._now()
+        feedback = self._executor.tick(now)
         if self._shaper.at_rest:
             self._at_rest.set()
         if feedback is not None:
             self._links.publish_feedback(feedback)
+        if (status := self._executor.status(now)) is not None:
+            self._links.publish_status(status)
 
     async def _tick_on(self) -> None:
         metronome = Ticker(self._robot.tick_seconds, time.monotonic(), catch_up=MAX_CATCH_UP)
@@ -131,6 +136,7 @@ class TickLoop:
             await asyncio.sleep(seconds)
 
     async def _leave(self) -> None:
+        self._executor.end_actions()
         leaving = self._coming_to_rest()
         try:
             while True:

@@ -20,6 +20,7 @@ from lockstep.protocol.description import (
     StartWarning,
 )
 from lockstep.protocol.messages import MAX_AXES, MAX_RAYS
+from lockstep.robot_bridge.description.check_actions import action_texts, check_actions
 from lockstep.robot_bridge.description.check_limits import check_limits
 from lockstep.robot_bridge.errors import DescriptionError
 
@@ -80,6 +81,7 @@ def check_description(description: RobotDescription) -> None:
         _check_feeling(description.force_feeling)
     if description.start_warning is not None:
         _check_warning(description, description.start_warning)
+    check_actions(description.actions)
     check_limits(description)
 
 
@@ -172,6 +174,7 @@ def _check_texts(description: RobotDescription) -> None:
     ]
     for each in labelled:
         texts += [each.name, each.label]
+    texts += action_texts(description.actions)
     for text in texts:
         if len(text) > MAX_NAME:
             raise DescriptionError(f"a name or label of {len(text)} characters, the bound is {MAX_NAME}")

@@ -9,6 +9,7 @@ from functools import cache
 from pathlib import Path
 from typing import Protocol
 
+from lockstep.protocol.actions import Act, ActionCancel, Status
 from lockstep.protocol.description import RobotDescription
 from lockstep.protocol.framing import frame
 from lockstep.protocol.link_secret import LinkSecret
@@ -54,7 +55,7 @@ class LinkHandler(Protocol):
     def link_opened(self, peer: "LinkPeer") -> None:
         """A link was admitted; its hello is on the way."""
 
-    def link_message(self, peer: "LinkPeer", message: Command | Rest | Stop | Reset) -> None:
+    def link_message(self, peer: "LinkPeer", message: Command | Rest | Stop | Reset | Act | ActionCancel) -> None:
         """A valid message came that the link's role permits."""
 
     def link_bad_input(self, peer: "LinkPeer", bad: BadInput) -> None:
@@ -200,6 +201,11 @@ class LinkServer:
             for peer in self._admitted.events:
                 peer.send_encoded("event", notice)
 
+    def publish_status(self, status: Status) -> None:
+        """Send the status to the operator link."""
+        if self._admitted.operator is not None:
+            self._admitted.operator.send(status)
+
     def publish_media(self, media: Media) -> None:
         """Send a medium to every media link, newest wins per stream."""
         encoded = encode_once(media)
@@ -248,7 +254,7 @@ class LinkServer:
                     self._handler.link_bad_input(peer, event)
             case Hello():
                 self._handler.link_opened(peer)
-            case Command() | Rest() | Stop() | Reset():
+            case Command() | Rest() | Stop() | Reset() | Act() | ActionCancel():
                 self._handler.link_message(peer, event)
             case _:
                 raise AssertionError(f"the session let {type(event).__name__} through")

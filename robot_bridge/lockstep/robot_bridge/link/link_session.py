@@ -12,6 +12,7 @@ from typing import Literal, NamedTuple
 
 import msgspec
 
+from lockstep.protocol.actions import Act, ActionCancel, ActionUpdate, Status, fits_kind
 from lockstep.protocol.errors import FramingError, MessageError
 from lockstep.protocol.framing import MAX_CONTROL_FRAME, MAX_HELLO_FRAME, MAX_MEDIA_FRAME, FrameReader
 from lockstep.protocol.link_secret import NONCE_BYTES, LinkSecret, draw_nonce
@@ -51,12 +52,12 @@ HELLO_TIMEOUT = 2.0  # s
 OWN_STALL = 0.5  # s between two ticks; more means that this side did not look, not that the other side was silent
 
 FROM_CLIENT: dict[LinkRole, tuple[type[LinkMessage], ...]] = {
-    "operator": (Command, Rest, Stop, Reset),
+    "operator": (Command, Rest, Stop, Reset, Act, ActionCancel),
     "events": (Stop,),
     "media": (Stop,),
 }
 FROM_ROBOT: dict[LinkRole, tuple[type[LinkMessage], ...]] = {
-    "operator": (Feedback, Refusal, StopTaken),
+    "operator": (Feedback, Refusal, StopTaken, ActionUpdate, Status),
     "events": (EventNotice, Refusal, StopTaken),
     "media": (Media, Refusal, StopTaken),
 }
@@ -344,7 +345,13 @@ class ClientSession(LinkSession):
         return message
 
     def _receive_open(self, message: LinkMessage, now: float) -> LinkMessage | BadInput | None:
-        """Refuse a feedback that does not fit the description as bad input: no part could show or record it."""
+        """Refuse a feedback or a status that does not fit as bad input: no part could show or record it."""
+        if (
+            isinstance(message, Status)
+            and isinstance(message, self._allowed)
+            and not all(map(fits_kind, message.items))
+        ):
+            return BadInput("malformed", "a status item whose value is not of its kind")
         described = None if self.hello is None else self.hello.description
         if isinstance(message, Feedback) and isinstance(message, self._allowed) and described is not None:
             wrong = misfit(message, described)

@@ -1,11 +1,13 @@
 """The interface between the bridge and a robot."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple, Protocol
 
+from lockstep.protocol.actions import ParameterValue, StatusItem
 from lockstep.protocol.description import RobotDescription
 from lockstep.protocol.messages import Media
+from lockstep.robot_bridge.robots.actions import ActionNotPossible, ActionRun
 
 __all__ = ["Measurement", "MediaSource", "Robot", "Stamp", "Stamper"]
 
@@ -141,6 +143,28 @@ class Robot(ABC):
         Called in every tick. While the robot is locked it is stopped, and no remote person can release it.
         """
         return ""
+
+    def hardware_stop(self) -> bool | None:
+        """Return whether a hardware stop of the robot is pressed; None if that is not known, or there is none.
+
+        Called in every tick. A pressed one counts as a lock, as `locked_out` does, and stands in the status.
+        """
+        return None
+
+    def begin_action(self, name: str, parameters: Mapping[str, ParameterValue]) -> ActionRun:
+        """Begin an action of the description. The parameters are complete and checked.
+
+        The bridge cancels an action that moves the robot as soon as no armed event renews it, a stick is moved, or the
+        robot is stopped.
+
+        Raises:
+            ActionNotPossible: not now; the text tells a person why.
+        """
+        raise ActionNotPossible(f"{name} is not implemented")
+
+    def status(self) -> Sequence[StatusItem]:
+        """Return all that the robot says of itself: battery, mode, temperatures. Called twice a second."""
+        return ()
 
     def sources(self) -> Sequence[MediaSource]:
         """Return the cameras and microphones, with the names that they have in the description."""

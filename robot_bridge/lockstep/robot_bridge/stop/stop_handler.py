@@ -21,6 +21,8 @@ from lockstep.robot_bridge.stop.stop_latch import OVERTAKEN, ResetRefused, Reset
 
 __all__ = ["StopHandler"]
 
+HARDWARE_STOP = "the hardware stop is pressed"
+
 _logger = logging.getLogger(__name__)
 
 
@@ -94,7 +96,8 @@ class StopHandler:
         if self._robot_error is not None:
             raise self._robot_error
         file = "" if self._lockout is None else self._lockout.reason
-        reason = " · ".join(filter(None, (file, self._robot.locked_out())))[:500]
+        pressed = HARDWARE_STOP if self._robot.hardware_stop() else ""
+        reason = " · ".join(filter(None, (file, pressed, self._robot.locked_out())))[:500]
         if reason == self._core.stop_state.locked_out:
             return
         if not reason:

@@ -18,6 +18,7 @@ AuditKind = Literal[
     "claim",  # the claims on the seat changed
     "stop",
     "reset",
+    "action",  # asked for, refused by the console, cancelled, ended
     "silence",  # of a link's stops by a supervisor: begun, ended
     "refusal",  # merged: `count` of the same within a second
     "invitation",
@@ -38,7 +39,19 @@ CHATTER: frozenset[AuditKind] = frozenset({"joined", "renamed", "left", "claim",
 # Kinds that are written one by one only as often as their link's budget allows; the rest is counted together.
 # The others are either not caused by a link, or limited where they are asked for.
 LIMITED: frozenset[AuditKind] = frozenset(
-    {"joined", "renamed", "left", "seat", "claim", "invitation", "revocation", "recording", "reading", "publication"}
+    {
+        "action",
+        "joined",
+        "renamed",
+        "left",
+        "seat",
+        "claim",
+        "invitation",
+        "revocation",
+        "recording",
+        "reading",
+        "publication",
+    }
 )
 BURST = 30.0  # records of one kind and link at once
 RATE = 0.1  # Hz, afterwards

@@ -5,6 +5,7 @@ import time
 from collections.abc import Callable, Iterable, Sequence
 from typing import Protocol
 
+from lockstep.protocol.actions import Act, ActionCancel, ActionUpdate, Status
 from lockstep.protocol.console import (
     ClientMessage,
     Note,
@@ -36,6 +37,8 @@ from lockstep.protocol.messages import (
     StopState,
     StopTaken,
 )
+from lockstep.server.actions.action_service import ActionService
+from lockstep.server.actions.status_service import StatusService
 from lockstep.server.audit.audit_trail import AuditTrail
 from lockstep.server.audit.records import Actor
 from lockstep.server.control.command_arbiter import (
@@ -77,6 +80,7 @@ from lockstep.server.session_events import (
     SessionEvents,
     SpeedCapChanged,
     SpeedReported,
+    StatusReceived,
     StopShown,
 )
 from lockstep.server.settings import Settings
@@ -135,6 +139,8 @@ class Console:
         self.silence = silence
         self.stops = StopService(self.robot, stops, peers, clock, silence, events)
         self.resets = ResetService(self.robot, self.stops, peers, clock, seat, events)
+        self.actions = ActionService(self.robot, clock, self.seat.is_held_by, events)
+        self.status = StatusService()
         self._fanout = FeedbackFanout(
             settings.observer_feedback_hz, self.seat.is_held_by, peers.drivers, peers.observers, relays
         )
@@ -185,6 +191,10 @@ class Console:
             peer.send("session", self.seat.message())
             peer.send("session", self.speed_cap.state(time.monotonic()))
             self.people.welcome(peer)
+            for update in self.actions.newest():
+                peer.send("session", update)
+            if (status := self.status.message(time.monotonic())) is not None:
+                peer.send("session", status)
             for news in self._further_news():
                 peer.send("session", news)
 
@@ -200,6 +210,10 @@ class Console:
                 peer.send("control", Pong(id=message.id))
             case Stop():
                 self._stop(peer, channel, message)
+            case Act():
+                self.actions.act_by_peer(peer, message)
+            case ActionCancel():
+                self.actions.cancel_by_peer(peer, message)
             case SeatRelease():
                 self.seat.handle(peer, message)
             case Note():
@@ -242,6 +256,7 @@ class Console:
 
     def rest_robot(self, why: str) -> None:
         """Rest the robot before anybody else drives: the last holder's command in flight is void too."""
+        self.actions.cancel("", Actor())
         outcome = self._arbiter.abandon()
         if isinstance(outcome, ForwardRest) and self.robot.send(outcome.rest):
             self._events.publish(RestForwarded(Actor(), outcome.rest, why))
@@ -256,6 +271,8 @@ class Console:
         self.stops.epoch_ends(self.clock.stop)
         self.resets.link_down("the robot bridge has restarted")
         self._arbiter.epoch_ends()
+        self.actions.epoch_ends()
+        self.status.forget()
         self.clock.begin(epoch)
         self.speed_cap.forget()
         self._events.publish(EpochBegan(description))
@@ -276,6 +293,7 @@ class Console:
         self._arbiter.link_down()
         self.stops.link_down()
         self.resets.link_down(detail)
+        self.actions.link_down()
         self._events.publish(LinkDown(self.robot.state(), detail, was_up))
         is_taken = detail.startswith("taken")
         if is_taken and (was_up or not self._robot_is_taken):
@@ -309,6 +327,13 @@ class Console:
         self._arbiter.stop_taken(taken)
         self.stops.taken(taken)
 
+    def action_updated(self, update: ActionUpdate) -> None:
+        self.actions.updated(update)
+
+    def status_received(self, status: Status) -> None:
+        if self.status.take(status, time.monotonic()):
+            self._events.publish(StatusReceived(status))
+
     def link_failed(self, role: LinkRole, error: Exception) -> None:
         self._faults.caught(f"robot link {role}", error)
 
@@ -322,7 +347,7 @@ class Console:
             outcome = Absorbed()
         match outcome:
             case Forward(forwarded):
-                if self._arbiter.moves(forwarded):
+                if self._arbiter.moves(forwarded) or forwarded.action:
                     self.seat.moved(peer)
                 self._events.publish(CommandForwarded(peer.actor, forwarded))
             case Refuse(refusal):

@@ -6,6 +6,7 @@ from lockstep.protocol.console import Notice, ServerMessage, StopStateNotice
 from lockstep.server.audit.records import AuditTrouble
 from lockstep.server.peers.peer_registry import PeerRegistry
 from lockstep.server.session_events import (
+    ActionUpdated,
     LinkDown,
     LinkUp,
     NoteWritten,
@@ -14,6 +15,7 @@ from lockstep.server.session_events import (
     SeatChanged,
     SessionEvents,
     SpeedCapChanged,
+    StatusReceived,
     StopsDiskChanged,
     StopSent,
     StopShown,
@@ -55,6 +57,8 @@ class Notices:
         events.subscribe(SpeedCapChanged, self._speed_cap_changed)
         events.subscribe(ParticipantsChanged, self._participants_changed)
         events.subscribe(NoteWritten, self._note_written)
+        events.subscribe(ActionUpdated, self._action_updated)
+        events.subscribe(StatusReceived, self._status_received)
         events.subscribe(StopShown, self._stop_shown)
         events.subscribe(StopSent, self._stop_sent)
         events.subscribe(StopsDiskChanged, self._stops_disk_changed)
@@ -86,6 +90,12 @@ class Notices:
 
     def _note_written(self, event: NoteWritten) -> None:
         self._peers.announce(event.note)
+
+    def _action_updated(self, event: ActionUpdated) -> None:
+        self._peers.announce(event.update)
+
+    def _status_received(self, event: StatusReceived) -> None:
+        self._peers.announce(event.status)
 
     def _stop_shown(self, event: StopShown) -> None:
         self._peers.tell("stop", StopStateNotice(stop=event.stop, event=event.event))

@@ -7,6 +7,10 @@ from lockstep.server.audit.audit_trail import AuditTrail
 from lockstep.server.audit.records import AuditTrouble
 from lockstep.server.http.versions import console_version, description_hash, page_build
 from lockstep.server.session_events import (
+    ActionAsked,
+    ActionCancelled,
+    ActionRefused,
+    ActionUpdated,
     EpochBegan,
     LinkDown,
     LinkUp,
@@ -61,6 +65,10 @@ class SessionAudit:
         events.subscribe(StopAnswered, self._stop_answered)
         events.subscribe(ResetDone, self._reset_done)
         events.subscribe(ResetRefused, self._reset_refused)
+        events.subscribe(ActionAsked, self._action_asked)
+        events.subscribe(ActionCancelled, self._action_cancelled)
+        events.subscribe(ActionRefused, self._action_refused)
+        events.subscribe(ActionUpdated, self._action_updated)
         events.subscribe(SilenceChanged, self._silence_changed)
         events.subscribe(StopsDiskChanged, self._stops_disk_changed)
         events.subscribe(AuditTrouble, self._audit_trouble)
@@ -108,6 +116,23 @@ class SessionAudit:
         """Stops and resets have records of their own, also when they come by HTTP."""
         if event.to.peer and event.channel != "stop":
             self._audit.refused(event.to, event.refusal.reason)
+
+    # actions
+
+    def _action_asked(self, event: ActionAsked) -> None:
+        self._audit.record("action", event.by, "asked", event.act.name)
+
+    def _action_cancelled(self, event: ActionCancelled) -> None:
+        self._audit.again("action", event.by, "cancel" if event.by.peer else "cancel, the seat changes")
+
+    def _action_refused(self, event: ActionRefused) -> None:
+        self._audit.refused(event.by, event.update.reason)
+
+    def _action_updated(self, event: ActionUpdated) -> None:
+        update = event.update
+        if event.new_state and update.state != "running":
+            outcome = f"{update.state}, {update.reason}" if update.reason else update.state
+            self._audit.record("action", what=outcome, detail=f"{update.name}, by {update.by}")
 
     # stops and resets
 

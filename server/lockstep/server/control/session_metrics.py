@@ -6,6 +6,8 @@ from prometheus_client import Counter
 
 from lockstep.server.audit.records import AuditTrouble
 from lockstep.server.session_events import (
+    ActionRefused,
+    ActionUpdated,
     CommandForwarded,
     CommandRefused,
     CommandRepeated,
@@ -18,6 +20,7 @@ from lockstep.server.session_events import (
     RestForwarded,
     SessionEvents,
     SpeedCapChanged,
+    StatusReceived,
     StopAsked,
 )
 from lockstep.server.telemetry.metrics import Metrics
@@ -40,6 +43,9 @@ class SessionMetrics:
         events.subscribe(Refused, self._refused)
         events.subscribe(InputRefused, self._input_refused)
         events.subscribe(SpeedCapChanged, self._speed_cap_changed)
+        events.subscribe(ActionUpdated, self._action_updated)
+        events.subscribe(ActionRefused, self._action_refused)
+        events.subscribe(StatusReceived, self._status_received)
         events.subscribe(LinkUp, self._link_up)
         events.subscribe(LinkDown, self._link_down)
         events.subscribe(StopAsked, self._stop_asked)
@@ -81,6 +87,16 @@ class SessionMetrics:
 
     def _speed_cap_changed(self, event: SpeedCapChanged) -> None:
         self._metrics.speed_share.set(event.state.share)
+
+    def _action_updated(self, event: ActionUpdated) -> None:
+        if event.new_state:
+            self._metrics.actions.labels(event.update.state, event.update.reason).inc()
+
+    def _action_refused(self, event: ActionRefused) -> None:
+        self._metrics.actions.labels("refused", event.update.reason).inc()
+
+    def _status_received(self, event: StatusReceived) -> None:
+        self._metrics.status_shown(event.status)
 
     def _link_up(self, event: LinkUp) -> None:
         self._metrics.link_up.set(1)

@@ -5,6 +5,7 @@ from typing import Literal
 
 import msgspec
 
+from lockstep.protocol.actions import Act, ActionCancel
 from lockstep.protocol.console import (
     ClientMessage,
     Note,
@@ -46,7 +47,19 @@ class _AnyStop(msgspec.Struct, frozen=True, kw_only=True):
 
 CHANNELS: dict[ChannelName, tuple[type[ClientMessage], ...]] = {
     "control": (Command, Rest, Report, Ping, Stop),  # a stop is accepted on every channel
-    "session": (SeatRequest, SeatGrant, SeatDecline, SeatTake, SeatRelease, SilenceStops, Rename, Note, Stop),
+    "session": (
+        SeatRequest,
+        SeatGrant,
+        SeatDecline,
+        SeatTake,
+        SeatRelease,
+        SilenceStops,
+        Rename,
+        Note,
+        Act,
+        ActionCancel,
+        Stop,
+    ),
     "stop": (Stop, Reset),
 }
 

@@ -9,6 +9,7 @@ from typing import Protocol
 
 import structlog
 
+from lockstep.protocol.actions import Act, ActionCancel, ActionUpdate, Status
 from lockstep.protocol.console import RobotState
 from lockstep.protocol.description import RobotDescription
 from lockstep.protocol.messages import (
@@ -57,6 +58,8 @@ class RobotHost(Protocol):
     def feedback_received(self, feedback: Feedback) -> None: ...
     def refusal_received(self, refusal: Refusal) -> None: ...
     def stop_taken(self, taken: StopTaken) -> None: ...
+    def action_updated(self, update: ActionUpdate) -> None: ...
+    def status_received(self, status: Status) -> None: ...
     def link_failed(self, role: LinkRole, error: Exception) -> None: ...
 
 
@@ -116,7 +119,7 @@ class RobotConnection:
             for role, keeper in self._keepers.items():
                 tasks.create_task(keeper.run(), name=f"robot link {role}")
 
-    def send(self, message: Command | Rest | Reset) -> bool:
+    def send(self, message: Command | Rest | Reset | Act | ActionCancel) -> bool:
         """Send over the operator link. Return whether the link took the message."""
         return self._keepers["operator"].send(message)
 
@@ -169,3 +172,7 @@ class RobotConnection:
             self._host.refusal_received(message)
         elif isinstance(message, StopTaken):
             self._host.stop_taken(message)
+        elif isinstance(message, ActionUpdate):
+            self._host.action_updated(message)
+        elif isinstance(message, Status):
+            self._host.status_received(message)

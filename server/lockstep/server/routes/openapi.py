@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 
 import msgspec
 
+from lockstep.protocol.actions import ActionUpdate
 from lockstep.protocol.console import RecordingState
 from lockstep.protocol.serial import MAX_EVENT
 from lockstep.server.errors import (
@@ -37,6 +38,7 @@ from lockstep.server.errors import (
     NotAllowed,
     NotConnected,
     NotFound,
+    NotRenewable,
     OriginRefused,
     PreconditionFailed,
     PreconditionRequired,
@@ -62,6 +64,7 @@ from lockstep.server.errors import (
 )
 from lockstep.server.http.problem import PROBLEM_JSON, Problem
 from lockstep.server.routes.access import MAX_RECORDS, AuditPage, InvitationList, InvitationRequest, NewInvitation
+from lockstep.server.routes.actions import ActionList, ActionRequest, RobotStatus
 from lockstep.server.routes.observer_websocket import WatchTicket
 from lockstep.server.routes.recordings import (
     MAX_LISTED,
@@ -137,6 +140,7 @@ TO = Parameter("to", "query", {"type": "integer", "minimum": 1, "maximum": MAX_E
 TOPIC = Parameter("topic", "query", {"type": "array", "items": {"type": "string"}, "maxItems": 50})
 DECODABLE = Parameter("decodable", "query", {"type": "boolean", "default": False})
 TICKET = Parameter("ticket", "query", {"type": "string"})
+ACTION = Parameter("name", "path", {"type": "string"}, required=True)
 INVITATION = Parameter("invitation_id", "path", {"type": "string"}, required=True)
 
 OPERATIONS: tuple[Operation, ...] = (
@@ -228,6 +232,14 @@ OPERATIONS: tuple[Operation, ...] = (
         ),
         body=ResetRequest,
     ),
+    Operation("get", "/api/actions", "How the newest actions of the robot do.", 200, ActionList),
+    Operation(
+        *("post", "/api/actions/{name}", "Ask for an action that moves nothing.", 200, ActionUpdate),
+        errors=(NotAllowed, NoSeat, NotFound, NotRenewable, LinkDown, Unconfirmed, *WITH_JSON),
+        body=ActionRequest,
+        parameters=(ACTION,),
+    ),
+    Operation("get", "/api/status", "What the robot says of itself.", 200, RobotStatus),
     Operation("post", "/api/scene", "A ticket for the 3D scene.", 200, ScenePath, (SceneUnavailable,)),
     Operation("get", "/api/invitations", "The links that the caller may see.", 200, InvitationList, (NotAllowed,)),
     Operation(

@@ -4,14 +4,17 @@ import platform
 from collections import Counter as Totals
 from collections.abc import Sequence
 from importlib.metadata import version
+from typing import get_args
 
 from prometheus_client import CollectorRegistry, Counter, Gauge, Histogram, ProcessCollector
 
+from lockstep.protocol.actions import Status, StatusLevel
 from lockstep.server.telemetry.exposition import Exposition
 from lockstep.server.telemetry.faults import Faults
 
 __all__ = ["MAX_LIMITS", "Metrics", "certificate_end", "describe_process"]
 
+MAX_STATUS_NAMES = 64  # names of status items whose values are shown, over all bridges since the start
 MAX_LIMITS = 300  # names of limits that are counted apart, over all robots
 
 
@@ -78,6 +81,19 @@ class Metrics:
             registry=registry,
         )
         self._limits: set[str] = set()  # names that have a counter
+        self.actions = Counter(
+            "lockstep_actions", "Actions of the robot, by new state and reason", ["state", "reason"], registry=registry
+        )
+        self.status_items = Gauge(
+            "lockstep_status_items", "Items of the robot's newest status, by level", ["level"], registry=registry
+        )
+        self.status_values = Gauge(
+            "lockstep_status_value",
+            "Numbers of the robot's newest status, by name of the item",
+            ["item"],
+            registry=registry,
+        )
+        self._status_names: set[str] = set()  # names that have a gauge
         self.stopped = Gauge("lockstep_stopped", "1 if the robot is stopped, else 0", registry=registry)
         self.recording_failed = Gauge(
             "lockstep_recording_failed", "1 if a recording is wanted but cannot be written, else 0", registry=registry
@@ -113,6 +129,18 @@ class Metrics:
                 name = "other"
             self._limits.add(name)
             self.limited.labels(name).inc()
+
+    def status_shown(self, status: Status) -> None:
+        """Show the numbers of a status. The robot chooses the names: those beyond `MAX_STATUS_NAMES` are left out."""
+        levels = Totals(item.level for item in status.items)
+        for level in get_args(StatusLevel):
+            self.status_items.labels(level).set(levels[level])
+        for item in status.items:
+            if isinstance(item.value, str):
+                continue
+            if item.name in self._status_names or len(self._status_names) < MAX_STATUS_NAMES:
+                self._status_names.add(item.name)
+                self.status_values.labels(item.name).set(item.value)
 
     def collect(self, bad_input: Totals[str], drops: Totals[str]) -> None:
         """Update the counters from the totals that the robot links keep."""

@@ -10,7 +10,13 @@ import pytest
 from lockstep.protocol.console import Report, StreamReport
 from lockstep.protocol.messages import StopState
 from lockstep.protocol.serial import MAX_EVENT
-from lockstep.server.recording.format.records import CommandRecord, FeedbackRecord, ReportRecord, StopRecord
+from lockstep.server.recording.format.records import (
+    ActionRecord,
+    CommandRecord,
+    FeedbackRecord,
+    ReportRecord,
+    StopRecord,
+)
 from lockstep.server.recording.format.topics import CAMERA
 from lockstep.server.recording.verify.promises import CheckName
 from lockstep.server.recording.verify.verify_file import verify_file
@@ -202,3 +208,44 @@ def test_an_interrupted_recording_is_not_taken_for_a_whole_one(tmp_path: Path) -
     Story(events=80).write(path)
     path.write_bytes(path.read_bytes()[: path.stat().st_size * 2 // 3])
     assert failed(path) == {"readable"}
+
+
+def action(id: str, state: Literal["running", "done"], event: int = 50) -> ActionRecord:
+    return ActionRecord(epoch=EPOCH, event=event, id=id, name="home", state=state, by="Ada", moves=True)
+
+
+def named_by_commands(entry: Entry, id: str, until: int) -> Entry:
+    """Commands of events up to `until` let the action go on."""
+    if isinstance(entry.record, CommandRecord) and entry.event <= until:
+        return changed(entry, action=id)
+    return entry
+
+
+def with_actions(named_until: int, *records: tuple[int, ActionRecord]) -> Change:
+    """The records right behind the feedback of their events."""
+
+    def change(entry: Entry) -> list[Entry]:
+        added = [each for event, each in records if entry.event == event and isinstance(entry.record, FeedbackRecord)]
+        return [
+            named_by_commands(entry, "a", named_until),
+            *(own_entry(each, entry.arrived + index + 1) for index, each in enumerate(added)),
+        ]
+
+    return change
+
+
+@pytest.mark.parametrize(
+    ("named_until", "records", "wrong"),
+    [
+        (79, [(20, action("a", "running")), (70, action("a", "done"))], set[CheckName]()),
+        (30, [(20, action("a", "running")), (70, action("a", "done"))], {"actions"}),
+        (79, [(20, action("a", "running")), (21, action("b", "running")), (22, action("a", "done"))], {"actions"}),
+        (79, [(20, action("a", "running")), (22, action("a", "done")), (23, action("a", "running"))], {"actions"}),
+    ],
+)
+def test_an_action_begins_once_alone_and_only_while_commands_name_it(
+    tmp_path: Path, named_until: int, records: list[tuple[int, ActionRecord]], wrong: set[CheckName]
+) -> None:
+    path = tmp_path / "a.mcap"
+    rewritten(path, Story(events=80).entries(), with_actions(named_until, *records))
+    assert failed(path) == wrong

@@ -4,6 +4,7 @@ import math
 from typing import Final
 
 from lockstep.protocol.description import (
+    Action,
     Axis,
     AxisGain,
     Binding,
@@ -200,6 +201,10 @@ DESCRIPTION: Final = RobotDescription(
     ),
     joints=tuple(Joint(name=name, unit="m", minimum=low, maximum=high) for name, (low, high) in WINDOWS.items()),
     layers=LAYERS,
+    actions=(
+        Action(name="autofocus", label="Autofocus"),
+        Action(name="snapshot", label="Snapshot", moves=False),
+    ),
     cameras=(MICROSCOPE, SIDE),
     microphones=(MICROPHONE,),
     wrench=WrenchSensor(

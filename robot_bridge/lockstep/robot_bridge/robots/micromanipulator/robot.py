@@ -1,13 +1,24 @@
 """The micromanipulator: stepping drives, a needle that bends, and the microscope's view of them."""
 
 import math
-from collections.abc import Sequence
+from collections import deque
+from collections.abc import Mapping, Sequence
 from typing import Final, NamedTuple
 
+from lockstep.protocol.actions import ParameterValue, StatusItem
 from lockstep.protocol.description import RobotDescription
+from lockstep.robot_bridge.robots.actions import ActionDone, ActionRun
 from lockstep.robot_bridge.robots.base import Measurement, MediaSource, Robot
 from lockstep.robot_bridge.robots.camera_source import CameraSource
-from lockstep.robot_bridge.robots.micromanipulator.description import DESCRIPTION, MICROPHONE, MICROSCOPE, SIDE, START
+from lockstep.robot_bridge.robots.micromanipulator.autofocus import Autofocus
+from lockstep.robot_bridge.robots.micromanipulator.description import (
+    DESCRIPTION,
+    MICROPHONE,
+    MICROSCOPE,
+    SIDE,
+    START,
+    WINDOWS,
+)
 from lockstep.robot_bridge.robots.micromanipulator.draughtsman import Draughtsman
 from lockstep.robot_bridge.robots.micromanipulator.needle import Contact, Needle
 from lockstep.robot_bridge.robots.micromanipulator.sound import Sound
@@ -17,6 +28,8 @@ from lockstep.robot_bridge.robots.microphone_source import MicrophoneSource
 __all__ = ["MicromanipulatorState", "Micromanipulator"]
 
 LIGHT_RANGE: Final = (20.0, 130.0)  # %
+SNAPSHOTS: Final = 16  # that are kept
+FOCUS: Final = 3  # index of its axis and of its drive
 TOO_MUCH: Final = 300e-6  # N on the needle above which a fault reports it
 
 Vector = tuple[float, float, float]
@@ -45,6 +58,8 @@ class Micromanipulator(Robot):
         self._needle = Needle(self._holder())
         self._light = MicromanipulatorState().light
         self._values: list[float] = [0.0] * len(DESCRIPTION.axes)
+        self._snapshots: deque[MicromanipulatorState] = deque(maxlen=SNAPSHOTS)
+        self._taken = 0  # snapshots since the start
         self._stopped = False  # no drive has a command to step
         self._draughtsman = Draughtsman()
         self._sound = Sound()
@@ -93,6 +108,31 @@ class Micromanipulator(Robot):
             focus=self._drives[3].position,
             light=self._light,
         )
+
+    def begin_action(self, name: str, parameters: Mapping[str, ParameterValue]) -> ActionRun:
+        if name == "autofocus":
+            return Autofocus(
+                lambda: self._drives[FOCUS].position,
+                lambda: self._needle.tip[2] - self._drives[FOCUS].position,
+                WINDOWS["focus.z"],
+                axes=len(DESCRIPTION.axes),
+                axis=FOCUS,
+                tick=self.tick_seconds,
+            )
+        self._taken += 1
+        self._snapshots.append(self.state())
+        return ActionDone(f"picture {self._taken}, focus {self._drives[FOCUS].position * 1e6:.1f} µm")
+
+    @property
+    def snapshots(self) -> Sequence[MicromanipulatorState]:
+        """The states of the last snapshots, oldest first."""
+        return tuple(self._snapshots)
+
+    def status(self) -> Sequence[StatusItem]:
+        lamp = StatusItem(
+            name="lamp", label="Lamp", kind="temperature", value=round(24 + 0.15 * self._light, 1), unit="°C"
+        )
+        return (lamp, StatusItem(name="snapshots", label="Snapshots", kind="number", value=float(self._taken)))
 
     def rest_from_thread(self) -> None:
         self._values = [0.0] * len(DESCRIPTION.axes)

@@ -17,6 +17,8 @@ Array = npt.NDArray[np.float64]
 FASTEST: Final = (1.5, 1.5, 1.8, 2.5, 2.5, 3.0)  # rad/s
 STEADY: Final = 0.002  # rad; an arm that has moved less resolves a twist to the same velocities, to within a hundredth
 LEAD: Final = (0.065, 0.065, 0.065, 0.08, 0.08, 0.08)  # rad; with the servos' stiffness, this is the largest push
+HOMING_SPEED: Final = 0.6  # rad/s
+HOMING_GAIN: Final = 3.0  # 1/s
 STILL: Final = (0.0,) * len(FASTEST)
 
 
@@ -45,13 +47,35 @@ class ArmDrive:
         lags = (-model.actuator_biasprm[ARM, 2] / model.actuator_gainprm[ARM, 0]).tolist()
         self._servos = tuple(zip(lags, LEAD, lower, upper, strict=True))
         self._posture: list[float] = self._joints.tolist()
+        self._home = tuple(self._posture)
+        self._goes_home = False
         self._resolved: _Resolved | None = None  # the last one
         self.faults: list[str] = []
 
     def release(self) -> None:
         """Hold the arm's present posture."""
         self._posture = self._joints.tolist()
+        self._goes_home = False
         self.faults = []
+
+    def from_home(self) -> list[float]:
+        """Return the distance of each joint from the posture in which the arm began, rad."""
+        return [abs(joint - home) for joint, home in zip(self._joints.tolist(), self._home, strict=True)]
+
+    def go_home(self) -> None:
+        """Move towards that posture while no twist is wanted, until `stay`."""
+        self._goes_home = True
+
+    def stay(self) -> None:
+        """Go no farther towards that posture."""
+        self._goes_home = False
+
+    def _homewards(self) -> Sequence[float]:
+        """Return the joints' velocities, rad/s: slower near the goal."""
+        return [
+            min(max(HOMING_GAIN * (home - place), -HOMING_SPEED), HOMING_SPEED)
+            for place, home in zip(self._posture, self._home, strict=True)
+        ]
 
     def rates(self, twist: Sequence[float]) -> Sequence[float]:
         """Return the velocities of the joints, rad/s, that `twist` would cause in the present posture."""
@@ -60,7 +84,7 @@ class ArmDrive:
     def drive(self, twist: Sequence[float], seconds: float) -> None:
         """Use `twist` (base frame, m/s and rad/s) for the coming `seconds`."""
         self.faults = []
-        velocities = self._follow(twist) if any(twist) else STILL
+        velocities = self._follow(twist) if any(twist) else self._homewards() if self._goes_home else STILL
         posture, aims = [], []
         for place, joint, velocity, (lag, lead, lower, upper) in zip(
             self._posture, self._joints.tolist(), velocities, self._servos, strict=True

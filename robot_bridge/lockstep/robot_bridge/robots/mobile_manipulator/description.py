@@ -2,7 +2,16 @@
 
 from typing import Any, Final
 
-from lockstep.protocol.description import BodyTwist, Camera, ForceFeeling, Microphone, RobotDescription, WrenchSensor
+from lockstep.protocol.description import (
+    Action,
+    ActionParameter,
+    BodyTwist,
+    Camera,
+    ForceFeeling,
+    Microphone,
+    RobotDescription,
+    WrenchSensor,
+)
 from lockstep.robot_bridge.robots.mobile_manipulator.controls import AXES, LAYERS
 from lockstep.robot_bridge.robots.mobile_manipulator.kinematics import describe_bodies, describe_joints
 from lockstep.robot_bridge.robots.mobile_manipulator.limits import BASE_ON_FLOOR, GEOFENCES, arm_limits
@@ -23,6 +32,15 @@ WRENCH: Final = WrenchSensor(
 
 # A push at the wrist is seldom more than a tenth of the sensor's range: it is felt early.
 FEELING: Final = ForceFeeling(threshold_newtons=3.0, full_newtons=80.0, curve=0.6)
+ACTIONS: Final = (
+    Action(name="home", label="Arm home"),
+    Action(
+        name="light",
+        label="Light",
+        moves=False,
+        parameters=(ActionParameter(name="on", label="On", kind="switch", default=True),),
+    ),
+)
 TOOL_TWIST: Final = BodyTwist(
     body="tool",
     frame=MOUNT,
@@ -46,6 +64,7 @@ def describe(model: Any) -> RobotDescription:
         wrench=WRENCH,
         ranges=RING,
         force_feeling=FEELING,
+        actions=ACTIONS,
         body_twists=(TOOL_TWIST,),
         bodies=describe_bodies(model),
         position_limits=arm_limits(joints),

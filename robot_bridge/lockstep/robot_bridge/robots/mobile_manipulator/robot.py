@@ -1,11 +1,13 @@
 """The mobile manipulator: its drives, senses, cameras and microphone around one simulation."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Final
 
 import numpy as np
 
+from lockstep.protocol.actions import ParameterValue, StatusItem
 from lockstep.protocol.description import RobotDescription
+from lockstep.robot_bridge.robots.actions import ActionDone, ActionRun
 from lockstep.robot_bridge.robots.base import Measurement, MediaSource, Robot
 from lockstep.robot_bridge.robots.camera_source import CameraSource
 from lockstep.robot_bridge.robots.microphone_source import SEGMENT_SECONDS, MicrophoneSource
@@ -14,10 +16,12 @@ from lockstep.robot_bridge.robots.mobile_manipulator.base_drive import BaseDrive
 from lockstep.robot_bridge.robots.mobile_manipulator.contact_sense import ContactSense
 from lockstep.robot_bridge.robots.mobile_manipulator.description import CAMERAS, MICROPHONE, describe
 from lockstep.robot_bridge.robots.mobile_manipulator.hearing import Hearing
+from lockstep.robot_bridge.robots.mobile_manipulator.homing import Homing
 from lockstep.robot_bridge.robots.mobile_manipulator.range_ring import RangeSensors
 from lockstep.robot_bridge.robots.mobile_manipulator.simulation import BASE, Simulation
 from lockstep.robot_bridge.robots.mobile_manipulator.sound import Sound
 from lockstep.robot_bridge.robots.mujoco_view.renderer import Renderer
+from lockstep.robot_bridge.robots.simulated_battery import SimulatedBattery
 
 __all__ = ["MobileManipulator"]
 
@@ -51,6 +55,8 @@ class MobileManipulator(Robot):
         self._rest_values = [0.0] * len(self._description.axes)
         self._values: Sequence[float] = self._rest_values
         self._stopped = False  # the base is parked and the arm holds its posture, at any applied value
+        self._light = False
+        self._battery = SimulatedBattery()
         self._renderer = Renderer(model, CAMERAS[0].width, CAMERAS[0].height)
         self._sources: tuple[MediaSource, ...] = (
             *(CameraSource(each, self._renderer.drawing(each), self.simulation.snapshot) for each in CAMERAS),
@@ -65,6 +71,7 @@ class MobileManipulator(Robot):
 
     def tick(self) -> None:
         data = self.simulation.data
+        self._battery.tick(self.tick_seconds, moving=any(self._values))
         self._base.drive(data, self._values[BASE])
         self._arm.drive(self._values[BASE.stop :], self.tick_seconds)
         if not self.simulation.step(STEPS_PER_TICK):
@@ -93,11 +100,23 @@ class MobileManipulator(Robot):
         """Return the rates of the arm's joints; the base's rates are left out: no limit by posture needs them."""
         return [0.0, 0.0, 0.0, *self._arm.rates(values[BASE.stop :])]
 
+    def begin_action(self, name: str, parameters: Mapping[str, ParameterValue]) -> ActionRun:
+        if name == "home":
+            return Homing(self._arm, self.tick_seconds)
+        self._light = parameters["on"] is True
+        return ActionDone("on" if self._light else "off")
+
+    def status(self) -> Sequence[StatusItem]:
+        light = StatusItem(name="light", label="Light", kind="switch", value=self._light)
+        return (self._battery.item(), light)
+
     def rest_from_thread(self) -> None:
         self._values = self._rest_values
+        self._arm.stay()
 
     def stop(self) -> None:
         self._stopped = True
+        self._arm.stay()
         self._values = self._rest_values
 
     def reset(self) -> None:

@@ -3,6 +3,8 @@
 import math
 
 from lockstep.protocol.description import (
+    Action,
+    ActionParameter,
     Axis,
     Binding,
     Body,
@@ -92,6 +94,15 @@ DESCRIPTION = RobotDescription(
                     key_negative="KeyE",
                 ),
             ),
+        ),
+    ),
+    actions=(
+        Action(name="home", label="Home"),
+        Action(
+            name="light",
+            label="Light",
+            moves=False,
+            parameters=(ActionParameter(name="on", label="On", kind="switch", default=True),),
         ),
     ),
     cameras=(OVERVIEW, FRONT),

@@ -1,23 +1,29 @@
 """The planar robot: a holonomic disc in a walled room, integrated by hand."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
 
+from lockstep.protocol.actions import ParameterValue, StatusItem
 from lockstep.protocol.description import RobotDescription
+from lockstep.robot_bridge.robots.actions import ActionDone, ActionRun
 from lockstep.robot_bridge.robots.base import Measurement, MediaSource, Robot
 from lockstep.robot_bridge.robots.camera_source import CameraSource
 from lockstep.robot_bridge.robots.microphone_source import MicrophoneSource
 from lockstep.robot_bridge.robots.planar.description import DESCRIPTION, FRONT, MICROPHONE, OVERVIEW, RADIUS, RANGES
 from lockstep.robot_bridge.robots.planar.drawing import FrontDrawing, OverviewDrawing
+from lockstep.robot_bridge.robots.planar.homing import Homing
 from lockstep.robot_bridge.robots.planar.room import contacts, ray_hits
 from lockstep.robot_bridge.robots.planar.sound import Synthesiser
+from lockstep.robot_bridge.robots.simulated_battery import SimulatedBattery
 
 __all__ = ["PlanarRobot", "PlanarState"]
 
 STIFFNESS = 150.0  # N per m/s that a contact blocks: the motors push harder the faster they should go
+HOMING_SPEED = 0.4  # m/s
+HOMING_TURN = 0.8  # rad/s
 ANGLES = RANGES.angle_min + RANGES.angle_increment * np.arange(RANGES.count, dtype=np.float64)
 
 
@@ -41,6 +47,9 @@ class PlanarRobot(Robot):
 
     def __init__(self, state: PlanarState | None = None) -> None:
         self._state = state or PlanarState()
+        self._home = self._state[:3]
+        self._light = False
+        self._battery = SimulatedBattery()
         self._command = (0.0, 0.0, 0.0)
         self._braked = False  # the stop holds the wheels
         self._sound = Synthesiser()
@@ -65,6 +74,7 @@ class PlanarRobot(Robot):
         dt = self.tick_seconds
         vx, vy, wz = self._command
         before = self._state
+        self._battery.tick(dt, moving=bool(vx or vy or wz))
         if not (vx or vy or wz or before.vx or before.vy or before.wz or before.fx or before.fy):
             return
         yaw = math.remainder(before.yaw + wz * dt, math.tau)
@@ -111,6 +121,16 @@ class PlanarRobot(Robot):
 
     def reset(self) -> None:
         self._braked = False
+
+    def begin_action(self, name: str, parameters: Mapping[str, ParameterValue]) -> ActionRun:
+        if name == "light":
+            self._light = parameters["on"] is True
+            return ActionDone("on" if self._light else "off")
+        return Homing(lambda: self._state[:3], self._home, speed=HOMING_SPEED, turn=HOMING_TURN, tick=self.tick_seconds)
+
+    def status(self) -> Sequence[StatusItem]:
+        light = StatusItem(name="light", label="Light", kind="switch", value=self._light)
+        return (self._battery.item(), light)
 
     def sources(self) -> Sequence[MediaSource]:
         return self._sources

@@ -8,12 +8,14 @@ from typing import Annotated, Literal
 
 import msgspec
 
+from lockstep.protocol.actions import ActionReason, ActionState, ParameterValue, StatusItem
 from lockstep.protocol.console import Participant, Report
 from lockstep.protocol.description import RobotDescription
 from lockstep.protocol.messages import EventReference, RefusalReason, StopState
 
 __all__ = [
     "OWN_RECORDS",
+    "ActionRecord",
     "CommandOutcome",
     "CommandRecord",
     "Degraded",
@@ -27,6 +29,7 @@ __all__ = [
     "RobotRecord",
     "SeatRecord",
     "SignatureRecord",
+    "StatusRecord",
     "StopRecord",
     "Vector",
     "Whole",
@@ -65,6 +68,7 @@ class CommandRecord(OwnRecord, frozen=True, kw_only=True):
     outcome: CommandOutcome
     reason: RefusalReason | Literal[""] = ""  # why it was refused
     nonce: int = 0  # as its sender named it; 0 in recordings from before there were nonces
+    action: str = ""  # id of the moving action that it lets go on
 
 
 class FeedbackRecord(OwnRecord, frozen=True, kw_only=True):
@@ -124,6 +128,28 @@ class StopRecord(OwnRecord, frozen=True, kw_only=True):
     press: str = ""  # id of the press; "" of a reset
     number: int = 0  # of the stop that was taken or released; 0 if not known yet
     kept: bool = True  # the stop that was taken is on the robot's disk
+
+
+class ActionRecord(OwnRecord, frozen=True, kw_only=True):
+    """A request for an action went to the robot, or somebody said how one does; `event` is the current one then."""
+
+    id: str  # of the request; "" of a cancel of whatever moves
+    name: str
+    state: ActionState | Literal["asked", "cancel"]
+    by: str  # who asked, or cancels; "" for the console
+    peer: str = ""  # of the request or the cancel, over a data channel
+    reason: ActionReason = ""
+    progress: float = 0.0
+    text: str = ""
+    moves: bool = False
+    parameters: dict[str, ParameterValue] = {}  # of the request
+    nonce: int = 0  # of the feedback that the request answers
+
+
+class StatusRecord(OwnRecord, frozen=True, kw_only=True):
+    """What the robot said of itself; the age of a reading is that at its arrival."""
+
+    items: list[StatusItem]
 
 
 class ParticipantsRecord(OwnRecord, frozen=True, kw_only=True):
@@ -192,6 +218,8 @@ OWN_RECORDS: dict[str, type[OwnRecord]] = {
     "lockstep.Rest": RestRecord,
     "lockstep.Seat": SeatRecord,
     "lockstep.Stop": StopRecord,
+    "lockstep.Action": ActionRecord,
+    "lockstep.Status": StatusRecord,
     "lockstep.Participants": ParticipantsRecord,
     "lockstep.Report": ReportRecord,
     "lockstep.Note": NoteRecord,

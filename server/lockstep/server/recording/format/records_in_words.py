@@ -3,6 +3,7 @@
 from typing import NamedTuple
 
 from lockstep.server.recording.format.records import (
+    ActionRecord,
     Degraded,
     NoteRecord,
     OwnRecord,
@@ -37,6 +38,12 @@ def in_words(record: OwnRecord) -> Words | None:
             named = f" of stop {number}" if number else ""
             words = f"{kind}{named} by {by or 'somebody'} ({where}){': ' + reason if reason else ''}"
             return Words(words, kind == "stop")
+        case ActionRecord(state="running"):
+            return None  # its progress; "asked" tells the begin
+        case ActionRecord(name=name, state=state, by=by, reason=reason, text=text):
+            why = ", ".join(filter(None, (reason, text)))
+            words = f"action {name or 'that moves'} {state} by {by or 'the console'}{': ' + why if why else ''}"
+            return Words(words, state in ("failed", "cancelled", "refused"))
         case RefusalRecord(refused=event, reason=reason, by=by):
             return Words(f"{by} refused {'event ' + str(event) if event else 'a request'}: {reason}", True)
         case RestRecord(why=why) if why:

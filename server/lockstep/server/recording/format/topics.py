@@ -18,6 +18,7 @@ from google.protobuf.message import Message
 from lockstep.protocol.description import RobotDescription
 from lockstep.server.recording.format.records import (
     OWN_RECORDS,
+    ActionRecord,
     CommandRecord,
     Degraded,
     FeedbackRecord,
@@ -30,6 +31,7 @@ from lockstep.server.recording.format.records import (
     RobotRecord,
     SeatRecord,
     SignatureRecord,
+    StatusRecord,
     StopRecord,
     WrenchRecord,
 )
@@ -67,6 +69,8 @@ OWN_TOPICS: dict[type[OwnRecord], str] = {
     RestRecord: "/lockstep/rest",
     SeatRecord: "/lockstep/seat",
     StopRecord: "/lockstep/stop",
+    ActionRecord: "/lockstep/action",
+    StatusRecord: "/lockstep/status",
     ParticipantsRecord: "/lockstep/participants",
     ReportRecord: "/lockstep/report",
     NoteRecord: "/lockstep/note",

@@ -7,6 +7,7 @@ import msgspec
 
 from lockstep.protocol.description import RobotDescription
 from lockstep.server.recording.format.records import (
+    ActionRecord,
     FeedbackRecord,
     NoteRecord,
     OwnRecord,
@@ -18,7 +19,7 @@ from lockstep.server.recording.format.records import (
 
 __all__ = ["Mark", "BookmarkFinder", "MarkKind"]
 
-MarkKind = Literal["contact", "refusal", "stop", "reset", "seat", "note", "fault", "link"]
+MarkKind = Literal["contact", "refusal", "stop", "reset", "seat", "note", "fault", "link", "action"]
 REFUSAL_SPACING = 1_000_000  # µs
 STOP_SPACING = 1_000_000  # µs between marks of further stops, while one holds
 RELEASE_SHARE = 0.6  # of the threshold: a contact ends below it, so that a trembling force is one contact
@@ -56,6 +57,9 @@ class BookmarkFinder:
                 known, self._holder = self._holder is not None, holder
                 words = f"{record.name or 'free'} ({record.why})"
                 return [Mark(record.event, arrived, "seat", words)] if known else []
+            case ActionRecord(state=state) if state not in ("running", "cancel"):
+                words = f"{record.name} {state}{': ' + record.reason if record.reason else ''}"
+                return [Mark(record.event, arrived, "action", words)]
             case NoteRecord():
                 return [Mark(record.event, arrived, "note", f"{record.name}: {record.text}"[:200])]
             case RobotRecord():

@@ -12,6 +12,7 @@ from lockstep.protocol.console import StreamReport
 from lockstep.protocol.description import RobotDescription
 from lockstep.protocol.serial import event_after, event_gap, is_event, is_newer
 from lockstep.server.recording.format.records import (
+    ActionRecord,
     CommandRecord,
     Degraded,
     FeedbackRecord,
@@ -34,6 +35,7 @@ CheckName = Literal[
     "in_time",  # no command executes later than max_event_age after the feedback that it answers, and has seen
     "seat",  # commands are forwarded for the seat's holder alone
     "stopped",  # no command is forwarded while the robot is stopped, or a stop is on its way to it
+    "actions",  # each begins once, one moves the robot at a time, and only while commands name it
     "stamps",  # no picture or sound is stamped newer than it is
     "rendered",  # the operator's page rendered nothing beyond its tolerance
     "signed",  # the file is as it was signed, to its end; or nothing is signed
@@ -46,12 +48,15 @@ CHECKS: tuple[CheckName, ...] = (
     "in_time",
     "seat",
     "stopped",
+    "actions",
     "stamps",
     "rendered",
     "signed",
 )
 TICK = 0.25  # s from the decision to execute until the feedback's own time: a tick and the measurement, with room
 ROUNDING = 2e-6  # s; times in the file are rounded to ns, capture times of sound to a sample
+LEAVE = 1.0  # s on top of hold until the end of an action is told
+MANY_ACTIONS = 1000  # whose end is remembered
 MANY_PRESSES = 64  # on their way; beyond that some share an answer, and the oldest may have none
 MOST = 50  # violations of a check that are listed
 
@@ -134,6 +139,51 @@ class _Stops:
         return f"stop {stop.number} is shown after stop {shown}" if stop.number < shown else ""
 
 
+class _Actions:
+    """The actions that began in the recording. What began before it is not judged."""
+
+    def __init__(self) -> None:
+        self._ended: dict[str, None] = {}  # ids, oldest first
+        self._running: dict[str, bool] = {}  # ids, and whether they move the robot
+        self._renewed: dict[str, int] = {}  # ids that move the robot -> event of the newest command that names them
+        self._times: dict[str, float] = {}  # of that event's feedback, s, the bridge's clock
+
+    def record(self, record: ActionRecord) -> str:
+        """Take a record and return its fault, or ""."""
+        if record.state in ("asked", "cancel"):
+            return ""
+        if record.state == "running":
+            if record.id in self._ended:
+                return f"action {record.name} ran again after its end"
+            others = [id for id, moves in self._running.items() if moves and id != record.id]
+            self._running[record.id] = record.moves
+            return f"action {record.name} moves the robot beside another one" if record.moves and others else ""
+        self._running.pop(record.id, None)
+        self._renewed.pop(record.id, None)
+        self._times.pop(record.id, None)
+        self._ended[record.id] = None
+        if len(self._ended) > MANY_ACTIONS:
+            del self._ended[next(iter(self._ended))]
+        return ""
+
+    def command(self, command: CommandRecord) -> None:
+        if self._running.get(command.action):
+            self._renewed[command.action] = command.event
+
+    def feedback(self, feedback: FeedbackRecord, description: RobotDescription | None) -> str:
+        """Take a feedback and return its fault, or ""."""
+        hold = 0.0 if description is None else description.hold
+        for id, moves in self._running.items():
+            if not moves:
+                continue
+            if id not in self._times or self._renewed.get(id) == feedback.event:
+                self._times[id] = feedback.time
+            elif feedback.time - self._times[id] > hold + LEAVE:
+                self._times[id] = feedback.time
+                return "an action moves the robot, and no command has named it for longer than hold"
+        return ""
+
+
 class Verifier:
     def __init__(self, epoch: str) -> None:
         self._epoch = epoch
@@ -145,6 +195,7 @@ class Verifier:
         self._offset = 0  # ns from the bridge's clock to the recording's
         self._holder: str | None = None  # None: not known yet
         self._stops = _Stops()
+        self._actions = _Actions()
         self._stopped = False
         self._in_flight: CommandRecord | None = None
         self._linked = True
@@ -182,6 +233,10 @@ class Verifier:
             case StopRecord():
                 if wrong := self._stops.record(record):
                     self.fail("stopped", wrong, record.event, micros)
+            case ActionRecord():
+                self._checks["actions"].looked += record.state not in ("asked", "cancel")
+                if wrong := self._actions.record(record):
+                    self.fail("actions", wrong, record.event, micros)
             case RefusalRecord(by="robot", refused=refused) if self._in_flight is not None:
                 if refused in (0, self._in_flight.event):
                     self._in_flight = None
@@ -208,6 +263,7 @@ class Verifier:
         if self._newest is not None and command.event != event_after(self._newest.event):
             self.fail("once", f"a command is not the next after event {self._newest.event}", command.event, micros)
         self._judge_nonce(command, micros)
+        self._actions.command(command)
         self._in_flight = command
 
     def _judge_nonce(self, command: CommandRecord, micros: int) -> None:
@@ -235,6 +291,8 @@ class Verifier:
         self._stopped = feedback.stop.stopped
         if wrong := self._stops.feedback(feedback):
             self.fail("stopped", wrong, feedback.event, micros)
+        if wrong := self._actions.feedback(feedback, self._description):
+            self.fail("actions", wrong, feedback.event, micros)
         known = self._answered[feedback.event]
         known.times[feedback.issue] = feedback.time
         known.stopped[feedback.issue] = feedback.stop.stopped

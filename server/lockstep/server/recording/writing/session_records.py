@@ -10,6 +10,7 @@ from lockstep.server.audit.records import Actor
 from lockstep.server.event_clock import EventClock
 from lockstep.server.media.pipeline.frame import EncodedFrame
 from lockstep.server.recording.format.records import (
+    ActionRecord,
     CommandOutcome,
     CommandRecord,
     NoteRecord,
@@ -20,11 +21,15 @@ from lockstep.server.recording.format.records import (
     RestRecord,
     RobotRecord,
     SeatRecord,
+    StatusRecord,
     StopRecord,
 )
 from lockstep.server.recording.times import LinkTimes, RecordClock
 from lockstep.server.recording.writing.queue_items import FeedbackItem, Item, MediaItem, OwnItem, RobotItem
 from lockstep.server.session_events import (
+    ActionAsked,
+    ActionCancelled,
+    ActionUpdated,
     CommandForwarded,
     CommandRefused,
     CommandRepeated,
@@ -39,6 +44,7 @@ from lockstep.server.session_events import (
     SeatChanged,
     SessionEvents,
     SpeedReported,
+    StatusReceived,
     StopAnswered,
     StopSent,
 )
@@ -110,6 +116,10 @@ class SessionRecords:
         events.subscribe(StopAnswered, self._stop_answered)
         events.subscribe(ResetDone, self._reset_done)
         events.subscribe(SpeedReported, self._speed_reported)
+        events.subscribe(ActionAsked, self._action_asked)
+        events.subscribe(ActionCancelled, self._action_cancelled)
+        events.subscribe(ActionUpdated, self._action_updated)
+        events.subscribe(StatusReceived, self._status_received)
 
     def _link_changed(self, event: LinkUp | LinkDown) -> None:
         state = event.state
@@ -158,6 +168,7 @@ class SessionRecords:
                 issue=command.issue,
                 values=command.values,
                 nonce=command.nonce,
+                action=command.action,
                 peer=by.peer,
                 name=by.name,
                 outcome=outcome,
@@ -227,6 +238,46 @@ class SessionRecords:
 
     def _speed_reported(self, event: SpeedReported) -> None:
         self._put_own(ReportRecord(**self._now(), peer=event.by.peer, name=event.by.name, report=event.report))
+
+    def _action_asked(self, event: ActionAsked) -> None:
+        act, by = event.act, event.by
+        self._put_own(
+            ActionRecord(
+                **self._now(),
+                id=act.id,
+                name=act.name,
+                state="asked",
+                by=by.name,
+                peer=by.peer,
+                parameters=act.parameters,
+                nonce=act.nonce,
+            )
+        )
+
+    def _action_cancelled(self, event: ActionCancelled) -> None:
+        by = event.by
+        self._put_own(ActionRecord(**self._now(), id=event.id, name="", state="cancel", by=by.name, peer=by.peer))
+
+    def _action_updated(self, event: ActionUpdated) -> None:
+        update = event.update
+        self._put_own(
+            ActionRecord(
+                epoch=self._clock.epoch,
+                event=update.event,
+                id=update.id,
+                name=update.name,
+                state=update.state,
+                by=update.by,
+                reason=update.reason,
+                progress=update.progress,
+                text=update.text,
+                moves=update.moves,
+            )
+        )
+
+    def _status_received(self, event: StatusReceived) -> None:
+        status = event.status
+        self._put_own(StatusRecord(epoch=self._clock.epoch, event=status.event, items=status.items))
 
     # handing over to the thread
 

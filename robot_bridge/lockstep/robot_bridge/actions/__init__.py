@@ -1,0 +1,1 @@
+"""Actions of a robot at the bridge, and its status."""

@@ -1,0 +1,171 @@
+"""Cases about actions: at most once, and no motion without armed events. A robot without actions has nothing to try."""
+
+from itertools import count
+
+import msgspec
+
+from lockstep.protocol.actions import Act, ActionUpdate
+from lockstep.protocol.description import Action
+from lockstep.protocol.messages import Rest
+from lockstep.protocol.serial import event_after
+from lockstep.robot_bridge.conformance.case import Case
+from lockstep.robot_bridge.conformance.driver import BY, Driver
+from lockstep.robot_bridge.conformance.errors import expect
+from lockstep.robot_bridge.conformance.event_cases import SETTLE
+from lockstep.robot_bridge.conformance.subject import Subject, needs
+from lockstep.robot_bridge.conformance.waiting import PATIENCE, within
+
+__all__ = ["ACTION_CASES"]
+
+HOLDS = 2  # times `hold` for which an action is renewed
+ASKING = ("late", "too_often", "not_possible", "busy")  # refusals after which a case cannot be tried
+
+_ids = count(1)
+
+
+def _moving(driver: Driver) -> Action:
+    """Return an action that moves the robot and needs no person: no question, and no value without a default.
+
+    Raises:
+        NotApplicable: there is none.
+    """
+    for action in driver.description.actions:
+        if action.moves and not action.confirm and all(each.default is not None for each in action.parameters):
+            return action
+    needs(False, "no action that moves the robot can be begun without a person")
+    raise AssertionError("`needs` raises")
+
+
+def _request(driver: Driver, name: str, *, nonce: int | None = None) -> Act:
+    nonce = driver.feedback.nonce if nonce is None else nonce
+    return Act(id=f"check-{next(_ids)}-{nonce:x}"[:64], name=name, nonce=nonce, by=BY)
+
+
+async def _told(driver: Driver, id: str, patience: float = PATIENCE) -> ActionUpdate:
+    """Return the next update of this request."""
+    async with within(patience, f"no `action` message tells of request {id}"):
+        while True:
+            said = await driver.next()
+            if isinstance(said, ActionUpdate) and said.id == id:
+                return said
+
+
+async def _refused(driver: Driver, act: Act, reason: str) -> None:
+    driver.peer.send(act)
+    said = await _told(driver, act.id)
+    expect(
+        (said.state, said.reason) == ("refused", reason),
+        f"an action that must be refused {reason!r} is {said.state} {said.reason}".rstrip(),
+    )
+
+
+async def _begun(driver: Driver) -> Act:
+    """Begin an action that moves the robot."""
+    act = _request(driver, _moving(driver).name)
+    driver.peer.send(act)
+    said = await _told(driver, act.id)
+    needs(not (said.state == "refused" and said.reason in ASKING), f"the robot refuses it: {said.reason} {said.text}")
+    expect(said.state == "running", f"a proper request is {said.state} {said.reason}".rstrip())
+    expect(said.moves, "an action that moves the robot says that it does not")
+    return act
+
+
+async def _ended(driver: Driver, act: Act, *reasons: str) -> None:
+    longest, began = driver.description.hold + SETTLE, driver.feedback.time
+    async with within(longest + PATIENCE, f"the action goes on; it had to end: {' or '.join(reasons)}"):
+        while (said := await _told(driver, act.id, longest + PATIENCE)).state == "running":
+            pass
+    if said.state == "cancelled":
+        expect(said.reason in reasons, f"cancelled {said.reason!r}, not {' or '.join(map(repr, reasons))}")
+    else:
+        took = driver.feedback.time - began
+        expect(took <= longest, f"the action went on for {took:.1f} s; it had to end: {' or '.join(reasons)}")
+        needs(False, f"the action was {said.state} before it had to be cancelled")
+
+
+async def _unknown(subject: Subject) -> None:
+    async with subject.operator() as driver:
+        needs(bool(driver.description.actions), "the description has no actions")
+        await _refused(driver, _request(driver, "no such action"), "unknown_action")
+
+
+async def _late(subject: Subject) -> None:
+    async with subject.operator() as driver:
+        name = _moving(driver).name
+        await _refused(driver, _request(driver, name, nonce=driver.feedback.nonce % 2**52 + 1), "late")
+
+
+async def _neutral(subject: Subject) -> None:
+    async with subject.operator(armed=False) as driver:
+        name = _moving(driver).name
+        expect(driver.feedback.neutral_needed, "neutral_needed is false on a new operator link")
+        await _refused(driver, _request(driver, name), "not_neutral")
+
+
+async def _stopped(subject: Subject) -> None:
+    async with subject.operator() as driver:
+        name = _moving(driver).name
+        await driver.stop("check-action-stop")
+        await driver.heard(lambda feedback: feedback.stop.stopped, "the stop")
+        await _refused(driver, _request(driver, name), "stopped")
+
+
+async def _hold(subject: Subject) -> None:
+    async with subject.operator() as driver:
+        act = await _begun(driver)
+        await _ended(driver, act, "not_renewed")
+        driver.peer.send(act)
+        said = await _told(driver, act.id)
+        expect(said.state == "cancelled", f"a repeat of a request that was cancelled is {said.state}: it began again")
+
+
+async def _renewed(subject: Subject) -> None:
+    async with subject.operator() as driver:
+        act = await _begun(driver)
+        began = driver.feedback.time
+        while driver.feedback.time - began < HOLDS * driver.description.hold:
+            command = msgspec.structs.replace(driver.command(driver.neutral), action=act.id)
+            driver.peer.send(command)
+            await driver.becomes(command)
+        driver.peer.send(act)
+        said = await _told(driver, act.id)
+        expect(said.state != "cancelled", f"an action that armed events renew was cancelled {said.reason!r}")
+
+
+async def _stick(subject: Subject) -> None:
+    async with subject.operator() as driver:
+        act = await _begun(driver)
+        driver.peer.send(driver.command(driver.moving()))
+        await _ended(driver, act, "driving")
+
+
+async def _rest(subject: Subject) -> None:
+    async with subject.operator() as driver:
+        act = await _begun(driver)
+        driver.peer.send(Rest(event=event_after(driver.feedback.event)))
+        await _ended(driver, act, "rested")
+
+
+async def _stop(subject: Subject) -> None:
+    async with subject.operator() as driver:
+        act = await _begun(driver)
+        await driver.stop("check-action-moving")
+        await _ended(driver, act, "stopped")
+
+
+ACTION_CASES: tuple[Case, ...] = (
+    Case("action_unknown", "an action that the robot does not have is refused unknown_action", "Actions", _unknown),
+    Case("action_late", "a request that names no nonce of a recent feedback is refused late", "Actions", _late),
+    Case("action_neutral", "a motion is refused not_neutral on a new operator link", "What moves the robot", _neutral),
+    Case("action_stopped", "a stopped robot begins no action", "What moves the robot", _stopped),
+    Case(
+        "action_hold",
+        "a motion that no armed event renews is cancelled when hold has passed, and a repeat does not begin it again",
+        "What moves the robot",
+        _hold,
+    ),
+    Case("action_renewed", "a motion goes on while armed events name it", "What moves the robot", _renewed),
+    Case("action_stick", "a moving command cancels a motion", "What moves the robot", _stick),
+    Case("action_rest", "a rest cancels a motion", "What moves the robot", _rest),
+    Case("action_stop", "a stop cancels a motion", "What moves the robot", _stop),
+)

@@ -1,0 +1,55 @@
+"""Actions of a robot adapter: the part that its author writes (docs/robot-link.md, "Actions")."""
+
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from typing import NamedTuple
+
+__all__ = ["ActionDone", "ActionFailed", "ActionNotPossible", "ActionRun", "ActionStep"]
+
+
+class ActionNotPossible(Exception):
+    """Raised by `Robot.begin_action`: not now. The text tells a person why."""
+
+
+class ActionFailed(Exception):
+    """Raised by `ActionRun.step`: it did not work. The robot is at rest, or comes to rest by itself."""
+
+
+class ActionStep(NamedTuple):
+    """How far an action is."""
+
+    progress: float = 0.0  # from 0 to 1
+    text: str = ""  # what it does now; its result when it is done
+    # Values for the axes, as those of a command: the bridge clamps them, keeps slew, limits and geofences, and brings
+    # them to rest when the action ends. None: the robot moves in its own way, or not at all.
+    values: Sequence[float] | None = None
+    done: bool = False
+
+
+class ActionRun(ABC):
+    """One run of an action. Both methods are called from the bridge's event loop and must return at once."""
+
+    @abstractmethod
+    def step(self) -> ActionStep:
+        """Go on; called once a tick, before `apply`.
+
+        Raises:
+            ActionFailed: it did not work.
+        """
+
+    @abstractmethod
+    def cancel(self) -> None:
+        """Bring to rest whatever this action moves, now. No `step` follows."""
+
+
+class ActionDone(ActionRun):
+    """The run of an action that was done at once."""
+
+    def __init__(self, text: str = "") -> None:
+        self._text = text
+
+    def step(self) -> ActionStep:
+        return ActionStep(progress=1.0, text=self._text, done=True)
+
+    def cancel(self) -> None:
+        pass

@@ -1,0 +1,1 @@
+"""Actions of the robot, and its status, at the console."""

@@ -1,0 +1,159 @@
+"""Passes requests for actions on to the robot, and keeps how each action does.
+
+The robot bridge decides what begins and what ends an action (docs/robot-link.md, "Actions"). The console checks the
+right to ask, and cancels whatever moves the robot when the control seat changes hands.
+"""
+
+import asyncio
+import secrets
+import time
+from collections import OrderedDict
+from collections.abc import Callable, Mapping
+from typing import Protocol
+
+import msgspec
+
+from lockstep.protocol.actions import Act, ActionCancel, ActionReason, ActionUpdate, ParameterValue
+from lockstep.protocol.description import RobotDescription
+from lockstep.rtc.token_bucket import TokenBucket
+from lockstep.server.audit.records import Actor
+from lockstep.server.errors import LinkDown, NotFound, NotRenewable, TooManyRequests, Unconfirmed
+from lockstep.server.event_clock import EventClock
+from lockstep.server.peers.peer import Peer
+from lockstep.server.session_events import ActionAsked, ActionCancelled, ActionRefused, ActionUpdated, SessionEvents
+from lockstep.server.util.rate_limits import RateLimits
+
+__all__ = ["ActionService"]
+
+ASKS, ASK_RATE = 10, 5.0  # Hz, of one link
+UPDATES, UPDATE_RATE = 100, 50.0  # Hz, of the robot; further updates of progress alone are left out
+KEPT = 32  # newest actions whose state newcomers are told
+ANSWER_SECONDS = 1.0  # for the robot to answer a request over HTTP
+
+
+class ActionsLink(Protocol):
+    """The part of the connection to the robot that the service uses."""
+
+    @property
+    def up(self) -> bool: ...
+    @property
+    def detail(self) -> str: ...
+    @property
+    def description(self) -> RobotDescription | None: ...
+    def send(self, message: Act | ActionCancel) -> bool: ...
+
+
+class ActionService:
+    """All methods but `act_by_http` are called on the loop and return at once."""
+
+    def __init__(
+        self, robot: ActionsLink, clock: EventClock, holds_seat: Callable[[Peer], bool], events: SessionEvents
+    ) -> None:
+        self._robot = robot
+        self._clock = clock
+        self._holds_seat = holds_seat
+        self._events = events
+        self._asks = RateLimits(ASK_RATE, ASKS)
+        self._progress = TokenBucket(UPDATE_RATE, UPDATES)
+        self._updates: OrderedDict[str, ActionUpdate] = OrderedDict()  # by id of the request, oldest first
+        self._waiting: dict[str, asyncio.Future[ActionUpdate]] = {}  # requests over HTTP
+
+    def newest(self) -> list[ActionUpdate]:
+        """Return how the newest actions do, oldest first."""
+        return list(self._updates.values())
+
+    def act_by_peer(self, peer: Peer, act: Act) -> None:
+        """Pass on a request of the seat's holder; refuse that of anyone else."""
+        if (reason := self._why_not(peer, act)) is not None:
+            refused = ActionUpdate(
+                id=act.id, name=act.name, state="refused", reason=reason, event=self._clock.event, by=peer.name
+            )
+            peer.send("session", refused)
+            self._events.publish(ActionRefused(peer.actor, refused))
+
+    def _why_not(self, peer: Peer, act: Act) -> ActionReason | None:
+        if peer.role == "observer":
+            return "not_allowed"
+        if not self._holds_seat(peer):
+            return "no_seat"
+        if not self._asks.spend(peer.identity.token_id or peer.id, time.monotonic()):
+            return "too_often"
+        return None if self._send(msgspec.structs.replace(act, by=peer.name), peer.actor) else "link_down"
+
+    def _send(self, act: Act, by: Actor) -> bool:
+        if not self._robot.up or not self._robot.send(act):
+            return False
+        if act.id not in self._updates:
+            self._events.publish(ActionAsked(by, act))
+        return True
+
+    async def act_by_http(self, by: Actor, name: str, parameters: Mapping[str, ParameterValue]) -> ActionUpdate:
+        """Ask for an action that moves nothing; return the robot's answer. The caller has checked the right to ask.
+
+        Raises:
+            NotFound: the robot has no such action.
+            NotRenewable: it moves the robot, and no armed events come over HTTP.
+            TooManyRequests: of this link.
+            LinkDown, Unconfirmed: the robot cannot be asked, or has not answered.
+        """
+        description, feedback = self._robot.description, self._clock.feedback
+        if description is None or feedback is None or not self._robot.up:
+            raise LinkDown(self._robot.detail)
+        action = next((each for each in description.actions if each.name == name), None)
+        if action is None:
+            raise NotFound(f"the robot has no action {name!r}"[:200])
+        if action.moves:
+            raise NotRenewable(f"{name} moves the robot: it needs armed events on the control channel")
+        if not self._asks.spend(by.link or by.name, time.monotonic()):
+            raise TooManyRequests("at most five actions a second")
+        act = Act(id=secrets.token_hex(16), name=name, parameters=dict(parameters), nonce=feedback.nonce, by=by.name)
+        answered: asyncio.Future[ActionUpdate] = asyncio.get_running_loop().create_future()
+        self._waiting[act.id] = answered
+        try:
+            if not self._send(act, by):
+                raise LinkDown(self._robot.detail)
+            async with asyncio.timeout(ANSWER_SECONDS):
+                return await answered
+        except TimeoutError:
+            raise Unconfirmed("the robot has not answered yet; GET /api/actions shows whether it does") from None
+        finally:
+            del self._waiting[act.id]
+
+    def cancel_by_peer(self, peer: Peer, cancel: ActionCancel) -> None:
+        """Pass on what the seat's holder or a supervisor cancels. Others have STOP."""
+        if peer.role == "supervisor" or self._holds_seat(peer):
+            self.cancel(cancel.id, peer.actor)
+
+    def cancel(self, id: str, by: Actor) -> None:
+        """Cancel an action; "" cancels the one that moves the robot. `Actor()`: because the seat changes hands."""
+        if any(each.state == "running" and (each.id == id or (not id and each.moves)) for each in self.newest()):
+            self._robot.send(ActionCancel(id=id))
+            self._events.publish(ActionCancelled(by, id))
+        elif id:
+            self._robot.send(ActionCancel(id=id))  # its first update may be on the way
+
+    def updated(self, update: ActionUpdate) -> None:
+        """Take the robot's news of an action."""
+        before = self._updates.get(update.id)
+        if update == before:
+            return
+        if (waiting := self._waiting.get(update.id)) is not None and not waiting.done():
+            waiting.set_result(update)
+        is_progress = before is not None and before.state == update.state
+        if is_progress and not self._progress.take(time.monotonic()):
+            return
+        self._updates[update.id] = update
+        if len(self._updates) > KEPT:
+            ended = next((id for id, each in self._updates.items() if each.state != "running"), None)
+            self._updates.pop(next(iter(self._updates)) if ended is None else ended)
+        self._events.publish(ActionUpdated(update, new_state=not is_progress))
+
+    def link_down(self) -> None:
+        """Note what the bridge does without this link: it cancels the action that moves the robot."""
+        for update in self.newest():
+            if update.moves and update.state == "running":
+                self.updated(msgspec.structs.replace(update, state="cancelled", reason="link_down"))
+
+    def epoch_ends(self) -> None:
+        """Forget all actions: the bridge that did them has ended."""
+        self._updates.clear()

@@ -1,0 +1,60 @@
+"""Actions and status over HTTP (docs/console-api.md, "Actions")."""
+
+import time
+from typing import Annotated
+
+import msgspec
+from fastapi import APIRouter, Depends, Request, Response
+
+from lockstep.protocol.actions import ActionUpdate, Parameters, Status
+from lockstep.server.auth.tokens import Right
+from lockstep.server.errors import NoSeat, NotAllowed
+from lockstep.server.http.json_response import json_answer
+from lockstep.server.http.request_body import read_json
+from lockstep.server.state.dependencies import authorized, dependencies
+
+__all__ = ["ActionList", "ActionRequest", "RobotStatus", "router"]
+
+router = APIRouter()
+Caller = Annotated[Right, Depends(authorized)]
+
+
+class ActionList(msgspec.Struct, frozen=True):
+    """Answer of GET /api/actions: how the newest actions do, oldest first."""
+
+    actions: list[ActionUpdate]
+
+
+class ActionRequest(msgspec.Struct, frozen=True):
+    """Body of POST /api/actions/{name}."""
+
+    parameters: Parameters = {}
+
+
+class RobotStatus(msgspec.Struct, frozen=True):
+    """Answer of GET /api/status."""
+
+    status: Status | None  # None before the robot said any; the ages are those of now
+
+
+@router.get("/api/actions")
+async def actions(request: Request, caller: Caller) -> Response:
+    return json_answer(ActionList(dependencies(request).console.actions.newest()))
+
+
+@router.post("/api/actions/{name}")
+async def act(request: Request, caller: Caller, name: str) -> Response:
+    """The holder of the control seat. The right is looked at again once the body has come."""
+    wanted = await read_json(request, ActionRequest)
+    caller = await authorized(request)
+    console = dependencies(request).console
+    if caller.role == "observer":
+        raise NotAllowed("observers watch")
+    if not console.seat.is_held_with(caller.identity.token_id):
+        raise NoSeat("take the control seat first, with a connection of this link")
+    return json_answer(await console.actions.act_by_http(caller.actor, name, wanted.parameters))
+
+
+@router.get("/api/status")
+async def status(request: Request, caller: Caller) -> Response:
+    return json_answer(RobotStatus(dependencies(request).console.status.message(time.monotonic())))

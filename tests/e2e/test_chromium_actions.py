@@ -1,0 +1,105 @@
+"""Actions and status on the page: what moves the robot ends with everything that ends driving."""
+
+import pytest
+from playwright.async_api import Browser, Locator, expect
+
+from lockstep.bench.browsers.console_page import RB, ConsolePage, open_console
+from tests.client.truth import until_logged
+from tests.support.stack import Stack
+
+pytestmark = pytest.mark.browser
+
+
+def _action(console: ConsolePage, name: str) -> Locator:
+    return console.page.locator(f'.action[data-action="{name}"]')
+
+
+def _words(console: ConsolePage) -> Locator:
+    return console.page.locator(".action-words")
+
+
+async def _away(console: ConsolePage) -> None:
+    """So far from home that the way back takes a while; armed, with everything let go."""
+    await console.until_live()
+    await console.drive_on_until("Math.abs(s.joints?.[0] ?? 0) > 0.4")
+    await console.let_go()
+    await console.until("s.at_rest === true && s.armed")
+
+
+async def test_home_shows_its_progress_and_leaves_the_keyboard_with_the_robot(stack: Stack, chromium: Browser) -> None:
+    async with (
+        open_console(chromium, stack.operator) as console,
+        open_console(chromium, stack.observer, pad=False) as observer,
+    ):
+        await _away(console)
+        await _action(console, "home").get_by_role("button").click()
+        await expect(_action(console, "home")).to_have_attribute("data-state", "running")
+        await expect(_words(observer)).to_contain_text("Home")
+        assert await console.page.evaluate("document.activeElement === document.body")
+        await expect(_words(console)).to_contain_text("done · at home")
+        await expect(_action(observer, "home")).to_be_hidden()
+    done = await until_logged(stack, "action", lambda record: record["state"] == "done")
+    assert done["name"] == "home"
+
+
+async def test_without_arming_a_motion_says_why_not_and_the_light_goes_on(stack: Stack, chromium: Browser) -> None:
+    async with open_console(chromium, stack.operator) as console:
+        await console.until_live()
+        home = _action(console, "home").get_by_role("button")
+        await expect(home).to_have_attribute("aria-disabled", "true")
+        await expect(home).to_have_attribute("title", "Arm first: this moves the robot")
+        await home.click(force=True)
+        light = console.page.locator('.status-item[data-item="light"] .status-value')
+        await _action(console, "light").get_by_role("combobox").select_option("on")
+        await _action(console, "light").get_by_role("button").click()
+        await expect(light).to_have_text("on")
+        await _action(console, "light").get_by_role("combobox").select_option("off")
+        await _action(console, "light").get_by_role("button").click()
+        await expect(light).to_have_text("off")
+        await expect(console.page.locator('.status-item[data-item="battery"]')).to_have_attribute("data-tone", "good")
+    assert not [record for record in await stack.events("action") if record["name"] == "home"]
+
+
+@pytest.mark.parametrize(
+    ("how", "reason"),
+    [
+        ("cancel", "cancelled"),
+        ("stick", "driving"),
+        ("disarm", "rested"),
+        ("stop", "stopped, rested"),
+        ("blur", "rested"),
+    ],
+)
+async def test_what_moves_ends_with_everything_that_ends_driving(
+    stack: Stack, chromium: Browser, how: str, reason: str
+) -> None:
+    async with open_console(chromium, stack.operator) as console:
+        await _away(console)
+        await _action(console, "home").get_by_role("button").click()
+        await expect(_action(console, "home")).to_have_attribute("data-state", "running")
+        match how:
+            case "cancel":
+                await _action(console, "home").get_by_role("button").click()
+            case "stick":
+                await console.press(RB)
+                await console.tilt(1, -0.5)
+            case "disarm":
+                await console.page.get_by_role("button", name="Disarm").click()
+            case "stop":
+                await console.page.get_by_role("button", name="Stop the robot").click()
+            case "blur":
+                await console.page.evaluate("dispatchEvent(new Event('blur'))")
+        ended = await until_logged(stack, "action", lambda record: record["state"] in ("cancelled", "done"))
+        assert ended["state"] == "cancelled"
+        assert ended["reason"] in reason.split(", ")  # a page that stops rests too: whichever is there first
+        await console.press(RB, False)
+
+
+async def test_a_page_that_is_gone_leaves_no_motion_behind(stack: Stack, chromium: Browser) -> None:
+    async with open_console(chromium, stack.operator) as console:
+        await _away(console)
+        await _action(console, "home").get_by_role("button").click()
+        await expect(_action(console, "home")).to_have_attribute("data-state", "running")
+        await console.page.close()
+        ended = await until_logged(stack, "action", lambda record: record["state"] != "running")
+        assert ended["state"] == "cancelled"

@@ -1,0 +1,242 @@
+"""Actions of a whole bridge over real TCP: what moves the robot lives only while armed events renew it."""
+
+from collections.abc import Awaitable, Callable, Mapping, Sequence
+from pathlib import Path
+from typing import cast
+
+import msgspec
+import pytest
+
+from lockstep.protocol.actions import Act, ActionCancel, ActionUpdate, ParameterValue, Status, StatusItem
+from lockstep.protocol.description import Action, RobotDescription
+from lockstep.protocol.messages import Feedback, Rest, Stop
+from lockstep.robot_bridge.bridge import Bridge
+from lockstep.robot_bridge.errors import RobotFailed
+from lockstep.robot_bridge.link.link_client import RobotLink
+from lockstep.robot_bridge.robots.actions import ActionDone, ActionFailed, ActionNotPossible, ActionRun, ActionStep
+from lockstep.robot_bridge.robots.planar.robot import PlanarState
+from tests.robot_bridge.bridge_helpers import NEUTRAL, Operator, RecordingRobot, log_lines, operator, running_bridge
+
+MARGIN = 0.05  # s between the bridge's reading of the clock and the test's, on a busy machine
+AWAY = PlanarState(x=0.5, y=0.2, yaw=0.3)
+
+
+class HomingRobot(RecordingRobot):
+    """Begins away from its home."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._state = AWAY
+
+
+class OwnMotion(ActionRun):
+    def __init__(self, robot: "OwnWayRobot") -> None:
+        self._robot = robot
+
+    def step(self) -> ActionStep:
+        self._robot.calls.append("step")
+        if self._robot.fails is not None:
+            raise self._robot.fails
+        return ActionStep(0.5, "docking")
+
+    def cancel(self) -> None:
+        self._robot.calls.append("cancel")
+        if self._robot.cancel_fails:
+            raise OSError("the motor does not answer")
+
+
+class OwnWayRobot(RecordingRobot):
+    """Docks in a way of its own, not by its axes; has a light, and a hardware stop."""
+
+    fails: Exception | None = None
+    cancel_fails = False
+    pressed: bool | None = None
+
+    def describe(self) -> RobotDescription:
+        actions = (Action(name="dock", label="Dock"), Action(name="light", label="Light", moves=False))
+        return msgspec.structs.replace(super().describe(), actions=actions)
+
+    def begin_action(self, name: str, parameters: Mapping[str, ParameterValue]) -> ActionRun:
+        if name == "light":
+            return ActionDone("on")
+        if self.fails is not None and isinstance(self.fails, ActionNotPossible):
+            raise self.fails
+        return OwnMotion(self)
+
+    def hardware_stop(self) -> bool | None:
+        return self.pressed
+
+    def status(self) -> Sequence[StatusItem]:
+        good = StatusItem(
+            name="battery", label="Battery", kind="battery", value=0.4, level="warning", text="charge soon"
+        )
+        return [good, StatusItem(name="wrong", label="Wrong", kind="number", value=float("nan"))]
+
+
+async def ask(driver: Operator, name: str, id: str = "id-1") -> ActionUpdate:
+    """Ask for an action; its first update."""
+    driver.link.send(Act(id=id, name=name, nonce=driver.feedback.nonce, by="test"))
+    return await driver.next(ActionUpdate)
+
+
+async def renew(driver: Operator, id: str = "id-1") -> None:
+    """One armed event that lets the action go on. It does not wait for its feedback."""
+    driver.link.send(msgspec.structs.replace(driver.command(list(NEUTRAL)), action=id))
+
+
+async def until_final(driver: Operator, *, renews: str = "") -> ActionUpdate:
+    """Go on until an update is final; renew with every feedback, or stay silent."""
+    while True:
+        message = await driver._next((Feedback, ActionUpdate))
+        if isinstance(message, ActionUpdate) and message.state != "running":
+            return message
+        if isinstance(message, Feedback) and renews:
+            await renew(driver, renews)
+
+
+async def test_home_drives_the_robot_home_while_armed_events_renew_it() -> None:
+    robot = HomingRobot()
+    async with running_bridge(robot) as bridge, operator(bridge) as driver:
+        robot._home = (0.0, 0.0, 0.0)
+        begun = await ask(driver, "home")
+        assert (begun.state, begun.moves, begun.by, begun.began) == ("running", True, "test", begun.event)
+        await renew(driver)
+        final = await until_final(driver, renews="id-1")
+        assert (final.state, final.text, final.progress) == ("done", "at home", 1.0)
+        assert final.event > begun.event, "the armed events went on"
+        x, y, _ = robot.state[:3]
+        assert max(abs(x), abs(y)) < 0.02
+        repeated = await ask(driver, "home")
+        assert repeated == final, "a repeat is answered from memory"
+        await driver.heard(lambda feedback: feedback.at_rest)
+
+
+async def test_without_renewal_the_robot_is_at_rest_when_hold_has_passed(tmp_path: Path) -> None:
+    robot, log = HomingRobot(), tmp_path / "events.jsonl"
+    async with running_bridge(robot, event_log=log) as bridge, operator(bridge) as driver:
+        await ask(driver, "home")
+        final = await until_final(driver)
+        assert (final.state, final.reason) == ("cancelled", "not_renewed")
+        await robot.until(lambda: robot.applied[-1][1] == NEUTRAL, "at rest")
+        hold = bridge.description.hold
+    began = cast(float, log_lines(log, "action")[0]["time"])
+    assert any(values != NEUTRAL for when, values in robot.applied if when >= began)
+    assert all(values == NEUTRAL for when, values in robot.applied if when >= began + hold + MARGIN)
+
+
+async def stick(driver: Operator) -> None:
+    driver.link.send(msgspec.structs.replace(driver.command([0.0, 0.1, 0.0]), action="id-1"))
+
+
+async def stop(driver: Operator) -> None:
+    driver.link.send(Stop())
+
+
+async def let_go(driver: Operator) -> None:
+    driver.link.send(Rest(event=driver.feedback.event))
+
+
+async def cancel(driver: Operator) -> None:
+    driver.link.send(ActionCancel(id="id-1"))
+
+
+async def stale_stick(driver: Operator) -> None:
+    driver.link.send(msgspec.structs.replace(driver.command([0.0, 0.1, 0.0]), nonce=1))
+
+
+@pytest.mark.parametrize(
+    ("end", "reason"),
+    [
+        (stick, "driving"),
+        (stale_stick, "driving"),
+        (stop, "stopped"),
+        (let_go, "rested"),
+        (cancel, "cancelled"),
+    ],
+)
+@pytest.mark.parametrize("name", ["home", "dock"])
+async def test_a_stick_a_stop_a_rest_and_a_cancel_end_what_moves(
+    end: Callable[[Operator], Awaitable[None]], reason: str, name: str
+) -> None:
+    robot = HomingRobot() if name == "home" else OwnWayRobot()
+    async with running_bridge(robot) as bridge, operator(bridge) as driver:
+        assert (await ask(driver, name)).state == "running"
+        await end(driver)
+        final = await until_final(driver)
+        assert (final.state, final.reason) == ("cancelled", reason)
+        if name == "dock":
+            assert robot.calls.count("cancel") == 1
+
+
+async def test_a_lost_link_cancels_and_the_next_console_hears_of_it() -> None:
+    robot = OwnWayRobot()
+    async with running_bridge(robot) as bridge:
+        async with operator(bridge) as driver:
+            await ask(driver, "dock")
+        await robot.until(lambda: "cancel" in robot.calls, "cancelled")
+        async with RobotLink(*bridge.address, "operator", name="test") as link:
+            final = await Operator(link).next(ActionUpdate)
+        assert (final.id, final.state, final.reason) == ("id-1", "cancelled", "link_down")
+
+
+async def test_a_stopped_robot_begins_nothing_and_after_the_reset_a_neutral_command_comes_first() -> None:
+    async with running_bridge(OwnWayRobot()) as bridge, operator(bridge) as driver:
+        driver.link.send(Stop())
+        await driver.heard(lambda feedback: feedback.stop.stopped)
+        assert (await ask(driver, "dock", "a")).reason == "stopped"
+        assert (await ask(driver, "light", "b")).reason == "stopped"
+        await driver.reset()
+        assert (await ask(driver, "dock", "c")).reason == "not_neutral"
+        assert (await ask(driver, "light", "d")).state == "running"
+        await driver.arm()
+        assert (await ask(driver, "dock", "e")).state == "running"
+
+
+async def test_an_action_that_the_robot_does_not_take_is_refused_and_one_that_fails_says_why() -> None:
+    robot = OwnWayRobot()
+    async with running_bridge(robot) as bridge, operator(bridge) as driver:
+        robot.fails = ActionNotPossible("the dock is taken")
+        refused = await ask(driver, "dock", "a")
+        assert (refused.state, refused.reason, refused.text) == ("refused", "not_possible", "the dock is taken")
+        robot.fails = ActionFailed("the dock was not found")
+        await ask(driver, "dock", "b")
+        final = await until_final(driver)
+        assert (final.state, final.text) == ("failed", "the dock was not found")
+        assert bridge.counters.actions == {"refused": 1, "running": 1, "failed": 1}
+
+
+@pytest.mark.parametrize("when", ["begin", "step", "cancel"])
+async def test_an_adapter_that_raises_in_an_action_ends_the_bridge_with_the_robot_at_rest(when: str) -> None:
+    robot = OwnWayRobot()
+    bridge: Bridge
+    async with running_bridge(robot) as bridge, operator(bridge) as driver:
+        if when == "begin":
+            robot.begin_action = None  # type: ignore[method-assign, assignment]
+        await ask(driver, "dock")
+        robot.cancel_fails = when == "cancel"
+        if when == "step":
+            robot.fails = OSError("no answer")
+        driver.link.send(ActionCancel() if when == "cancel" else Rest(event=1))
+        with pytest.raises(RobotFailed):
+            await bridge.wait()
+        assert robot.applied[-1][1] == NEUTRAL
+        assert "stop" in robot.calls
+
+
+async def test_a_hardware_stop_that_is_pressed_locks_the_robot_and_stands_in_the_status() -> None:
+    robot = OwnWayRobot()
+    robot.pressed = False
+    async with running_bridge(robot) as bridge, operator(bridge) as driver:
+        status = await driver.next(Status)
+        assert [(item.name, item.value) for item in status.items] == [("hardware_stop", False), ("battery", 0.4)]
+        await ask(driver, "dock")
+        robot.pressed = True
+        final = await until_final(driver)
+        assert (final.state, final.reason) == ("cancelled", "locked_out")
+        while (status := await driver.next(Status)).items[0].value is not True:
+            pass
+        assert status.items[0].level == "error"
+        assert driver.feedback.stop.locked_out == "the hardware stop is pressed"
+        robot.pressed = False
+        await driver.heard(lambda feedback: not feedback.stop.locked_out)
+        assert driver.feedback.stop.stopped, "the end of the lock releases nothing"

@@ -1,0 +1,67 @@
+import type { Action, ActionUpdate } from "../protocol/wire";
+import type { ActRefusal } from "./actions";
+
+export type Tone = "good" | "wait" | "bad" | "off";
+
+export const ACT_REFUSAL_LABELS: Readonly<Record<ActRefusal, string>> = {
+  observer: "This link is for watching",
+  not_connected: "Not connected to the console",
+  robot_down: "The robot cannot be reached",
+  no_seat: "Get the control seat first",
+  locked_out: "Somebody at the robot has locked it",
+  stopped: "The robot is stopped: reset it first",
+  not_armed: "Arm first: this moves the robot",
+  neutral_waits: "Arming: wait for the robot's answer",
+  driving: "Let go of the hold-to-run control first",
+  runs: "It runs already",
+  busy: "Another action moves the robot",
+};
+
+/** What a person reads where an action was refused or cancelled. */
+export const ACTION_REASON_LABELS: Readonly<Record<ActionUpdate["reason"], string>> = {
+  "": "",
+  unknown_action: "the robot has no such action",
+  bad_parameter: "a value does not fit",
+  late: "it came too late",
+  busy: "another action runs",
+  driving: "a stick was moved",
+  not_neutral: "arm first",
+  warning: "the robot warns before it moves",
+  not_possible: "not possible now",
+  no_seat: "you do not hold the control seat",
+  not_allowed: "your link does not permit it",
+  not_renewable: "it needs a page or a program that stays",
+  too_often: "too many requests at once",
+  link_down: "the link to the robot was lost",
+  stopped: "the robot was stopped",
+  locked_out: "somebody at the robot locked it",
+  cancelled: "it was cancelled",
+  not_renewed: "no armed command renewed it in time",
+  rested: "the driver let go or disarmed",
+  interrupted: "the robot interrupted it",
+};
+
+const STATES: Readonly<Record<ActionUpdate["state"], string>> = {
+  running: "running",
+  done: "done",
+  failed: "failed",
+  cancelled: "cancelled",
+  refused: "refused",
+};
+
+/** "Home: cancelled, a stick was moved". */
+export function actionWords(action: Pick<Action, "label">, update: ActionUpdate): string {
+  const why = ACTION_REASON_LABELS[update.reason];
+  const parts = [STATES[update.state], why, update.text].filter((each) => each !== "");
+  if (update.state === "running") {
+    const percent = `${Math.round(update.progress * 100)} %`;
+    return `${action.label}: ${[percent, update.text].filter((each) => each !== "").join(" · ")}`;
+  }
+  return `${action.label}: ${parts.join(" · ")}`;
+}
+
+export function actionTone(update: ActionUpdate): Tone {
+  if (update.state === "running") return "wait";
+  if (update.state === "done") return "good";
+  return update.state === "failed" ? "bad" : "wait";
+}
