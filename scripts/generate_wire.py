@@ -12,7 +12,7 @@ from typing import Any, get_args
 import msgspec
 
 from lockstep.protocol.console import ClientMessage, ServerMessage
-from lockstep.protocol.messages import LinkMessage
+from lockstep.protocol.messages import LinkMessageOnWire
 from lockstep.server.fleet.openapi import fleet_openapi
 from lockstep.server.recording.format.records import OWN_RECORDS
 from lockstep.server.routes.openapi import openapi_document
@@ -66,7 +66,7 @@ def generated() -> dict[Path, str]:
         SCHEMAS / "console.schema.json": _schema("Lockstep console messages", console, received),
         SCHEMAS / "console-openapi.json": json.dumps(openapi_document(), indent=2) + "\n",
         SCHEMAS / "fleet-openapi.json": json.dumps(fleet_openapi(), indent=2) + "\n",
-        SCHEMAS / "robot-link.schema.json": _schema("Lockstep robot link messages", {"LinkMessage": LinkMessage}),
+        SCHEMAS / "robot-link.schema.json": _schema("Lockstep robot link messages", {"LinkMessage": LinkMessageOnWire}),
         SCHEMAS / "recording.schema.json": _recording_schema(),
     }
 

@@ -91,6 +91,7 @@ class CommandExecutor:
         if isinstance(outcome, Executed):
             self._feedback.rested_why = ""
             self._shaper.drive(outcome.values, now)
+            self._feedback.timing.executed(now)
             self._counters.executed += 1
             self._log.record("executed", outcome.event, issue=command.issue, values=outcome.values)
         elif isinstance(outcome, Answered):
@@ -120,6 +121,8 @@ class CommandExecutor:
         self._watchdogs.ticked(now, not self._shaper.at_rest)
         self._robot.apply(self._signal.on(values) if self._core.warns(now) else values)
         self._robot.tick()
+        if self._feedback.timing.waits_for_tick:
+            self._feedback.timing.applied(now, self._now())
         self._feedback.limits_act(self._limits.acting)
         self._note_blind(self._limits.blind)
         if self._shaper.at_rest:
