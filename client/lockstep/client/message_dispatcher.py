@@ -19,6 +19,7 @@ from lockstep.protocol.console import (
 )
 from lockstep.protocol.errors import MessageError
 from lockstep.protocol.messages import Feedback, Pong, Refusal, StopTaken
+from lockstep.protocol.trace_messages import Traces
 
 __all__ = ["MessageDispatcher"]
 
@@ -87,7 +88,7 @@ class MessageDispatcher:
                 self._session.stop_shown(message.stop)
             case StopTaken():
                 self._session.stop_taken(message)
-            case Welcome() | Seat() | Participants() | SharedNote():
+            case Welcome() | Seat() | Participants() | SharedNote() | Traces():
                 self._session.hear(message)
         self._wake_waiters()
 

@@ -1,4 +1,4 @@
-"""Measures the spans of the command that executes, on the bridge's own clock. No I/O, no clock: the caller hands in `now`.
+"""Measures the spans of the command that executes, on the bridge's own clock. No I/O; the caller hands in `now`.
 
 Call order: `executed` when a command executes, `applied` after the next tick, `measured` when its feedback is made.
 """

@@ -1,7 +1,7 @@
 """Sends spans to the peers that ask for them, and takes those of the operator's client (docs/traces.md).
 
-Nothing is measured, kept or sent for a peer that has not asked. A message with spans leaves only if nothing waits on its
-way, so it delays neither feedback nor pictures; what it did not carry is forgotten.
+Nothing is kept or sent for a peer that has not asked. A message with spans leaves only if nothing waits on its way, so
+it delays neither feedback nor pictures; what it did not carry is forgotten.
 """
 
 import asyncio

@@ -31,6 +31,7 @@ from lockstep.server.recording.format.records import (
     SeatRecord,
     SignatureRecord,
     StopRecord,
+    TraceRecord,
     WrenchRecord,
 )
 
@@ -69,6 +70,7 @@ OWN_TOPICS: dict[type[OwnRecord], str] = {
     StopRecord: "/lockstep/stop",
     ParticipantsRecord: "/lockstep/participants",
     ReportRecord: "/lockstep/report",
+    TraceRecord: "/lockstep/trace",
     NoteRecord: "/lockstep/note",
     Degraded: "/lockstep/degraded",
     WrenchRecord: "/wrench",
