@@ -1,4 +1,4 @@
-// Writes src/protocol/wire.ts (types) and src/protocol/wire_schema.json (what the parser checks) from docs/schemas/console.schema.json.
+// Writes src/protocol/wire.ts (types), src/protocol/ways.ts (spans in the order of their way) and src/protocol/wire_schema.json (what the parser checks) from docs/schemas/console.schema.json.
 // With --check nothing is written and a difference ends with status 1.
 import { existsSync, readFileSync, writeFileSync } from "node:fs";
 
@@ -64,6 +64,13 @@ function recordOf({ properties = {}, required = [] }) {
   return optional.length > 0 ? { fields, optional } : { fields };
 }
 
+/** PictureSpans -> PICTURE_WAY. */
+function wayOf(name, spans) {
+  const constant = `${name.replace(/Spans$/, "").toUpperCase()}_WAY`;
+  const entries = spans.map(({ name, clock }) => `  { name: "${name}", clock: "${clock}" },`);
+  return `export const ${constant} = [\n${entries.join("\n")}\n] as const;`;
+}
+
 function reachableFrom(name, found = new Set()) {
   if (found.has(name)) return found;
   found.add(name);
@@ -76,7 +83,11 @@ const head = "// Generated from docs/schemas/console.schema.json by `npm run gen
 const types = `${head}\n${Object.entries(definitions).map(declarationOf).join("\n\n")}\n`;
 const received = [...reachableFrom("ServerMessage")].sort();
 const checks = Object.fromEntries(received.map((name) => [name, shapeOf(definitions[name])]));
+const ways = Object.entries(definitions).flatMap(([name, node]) =>
+  node["x-way"] === undefined ? [] : [wayOf(name, node["x-way"])],
+);
 const generated = {
+  "../src/protocol/ways.ts": `${head}\n${ways.join("\n\n")}\n`,
   "../src/protocol/wire.ts": types,
   "../src/protocol/wire_schema.json": `${JSON.stringify(checks)}\n`,
 };

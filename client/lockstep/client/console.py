@@ -26,6 +26,7 @@ from lockstep.protocol.carriers import Carrier
 from lockstep.protocol.console import Participant, Role, Seat, SharedNote
 from lockstep.protocol.description import RobotDescription
 from lockstep.protocol.messages import Feedback, StopState
+from lockstep.protocol.trace_messages import Traces
 
 __all__ = ["Console"]
 
@@ -219,6 +220,23 @@ class Console:
     def feedback_log(self) -> list[FeedbackArrival]:
         """Return the last thousand feedbacks and their arrival times (s, the loop's clock), oldest first."""
         return list(self._live().driving.arrivals)
+
+    def trace(self, wanted: bool = True) -> None:
+        """Ask the console where the time of pictures and commands goes, or to say no more; see `traces`.
+
+        Args:
+            wanted: False ends it; a connection begins without
+        """
+        self._live().requests.trace(wanted=wanted)
+
+    def traces(self) -> Traces:
+        """Return the last thousand pictures' and commands' spans at the robot and the console, oldest first.
+
+        Empty before `trace`. The console tells them a few times a second, of each camera the newest pictures only, and
+        not while feedback waits on its way. docs/traces.md has the spans.
+        """
+        session = self._live().session
+        return Traces(pictures=list(session.traced_pictures), commands=list(session.traced_commands))
 
     async def restart_ice(self) -> None:
         """Look for a new path to the console, as after a change of networks; the connection lives on meanwhile.

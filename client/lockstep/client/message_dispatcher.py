@@ -21,6 +21,7 @@ from lockstep.protocol.console import (
 )
 from lockstep.protocol.errors import MessageError
 from lockstep.protocol.messages import Feedback, Pong, Refusal, StopTaken
+from lockstep.protocol.trace_messages import Traces
 
 __all__ = ["MessageDispatcher"]
 
@@ -93,7 +94,7 @@ class MessageDispatcher:
                 self._session.stop_taken(message)
             case ActionUpdate() | Status():
                 self.news.hear(message, asyncio.get_running_loop().time())
-            case Welcome() | Seat() | Participants() | SharedNote():
+            case Welcome() | Seat() | Participants() | SharedNote() | Traces():
                 self._session.hear(message)
         self._wake_waiters()
 

@@ -5,10 +5,12 @@ from collections.abc import Callable
 
 from lockstep.protocol.console import Participants, Role, Seat, SharedNote, Welcome
 from lockstep.protocol.messages import Refusal, StopState, StopTaken
+from lockstep.protocol.trace_messages import CommandTrace, PictureTrace, Traces
 
 __all__ = ["Session"]
 
 KEPT_NOTES = 100
+KEPT_TRACES = 1000  # of pictures, and as many of commands
 
 
 class Session:
@@ -29,6 +31,8 @@ class Session:
         self.newest_stop = 0  # number of the newest stop that this connection knows
         self.participants = Participants(participants=[])
         self.notes: deque[SharedNote] = deque(maxlen=KEPT_NOTES)
+        self.traced_pictures: deque[PictureTrace] = deque(maxlen=KEPT_TRACES)
+        self.traced_commands: deque[CommandTrace] = deque(maxlen=KEPT_TRACES)
         self.seated: Callable[[], None] = _ignore
         self.unseated: Callable[[], None] = _ignore
         self.refusals: deque[Refusal] = deque(maxlen=16)
@@ -54,8 +58,11 @@ class Session:
     def claims_seat(self) -> bool:
         return any(claim.peer == self.peer for claim in self.seat.claims)
 
-    def hear(self, message: Welcome | Seat | Participants | SharedNote) -> None:
+    def hear(self, message: Welcome | Seat | Participants | SharedNote | Traces) -> None:
         match message:
+            case Traces():
+                self.traced_pictures.extend(message.pictures)
+                self.traced_commands.extend(message.commands)
             case Welcome():
                 self.welcome = message
             case Participants():

@@ -21,6 +21,7 @@ from lockstep.protocol.console import (
     SharedNote,
 )
 from lockstep.protocol.messages import Refusal, Reset, Stop, StopState
+from lockstep.protocol.trace_messages import TraceRequest
 
 __all__ = ["SessionRequests"]
 
@@ -67,6 +68,9 @@ class SessionRequests:
 
     def answer(self, peer: str, *, grant: bool) -> None:
         self._transport.send("session", SeatGrant(peer=peer) if grant else SeatDecline(peer=peer))
+
+    def trace(self, *, wanted: bool) -> None:
+        self._transport.send("session", TraceRequest(wanted=wanted))
 
     async def note(self, text: str) -> SharedNote:
         """Write a note and return it. Raises CommandRefused: too many notes, or nothing in this one can be printed."""

@@ -5,10 +5,10 @@ import the other. JSON Schemas and the page's TypeScript types are generated fro
 
 | channel | reliability | who | messages |
 |---|---|---|---|
-| control | unordered, 0 retransmits | client | command, rest, report, ping |
-| | | server | feedback, refusal, pong |
+| control | unordered, 0 retransmits | client | command, rest, report, ping, trace_report |
+| | | server | feedback, refusal, pong, traces |
 | session | reliable | client | seat_request, seat_grant, seat_decline, seat_take, seat_release, rename, note |
-| | | client | silence_stops, act, action_cancel |
+| | | client | silence_stops, act, action_cancel, trace_request |
 | | | server | welcome, robot, seat, participants, quality, speed_cap, sources, voice, recording, note_shared |
 | | | server | notice, refusal, action, status |
 | stop | reliable | client | stop, reset |
@@ -36,6 +36,7 @@ from lockstep.protocol.messages import (
     StopState,
     StopTaken,
 )
+from lockstep.protocol.trace_messages import TraceReport, TraceRequest, Traces
 
 __all__ = [
     "ClientMessage",
@@ -349,6 +350,8 @@ ClientMessage = (
     | ActionCancel
     | Stop
     | Reset
+    | TraceRequest
+    | TraceReport
 )
 ServerMessage = (
     Feedback
@@ -369,6 +372,7 @@ ServerMessage = (
     | StopTaken
     | ActionUpdate
     | Status
+    | Traces
 )
 
 _client_decoder: msgspec.json.Decoder[ClientMessage] = msgspec.json.Decoder(ClientMessage)

@@ -11,6 +11,7 @@ from lockstep.protocol.actions import Act, ActionCancel, ActionUpdate, RenewedAc
 from lockstep.protocol.description import RobotDescription
 from lockstep.protocol.errors import MessageError
 from lockstep.protocol.serial import MAX_EVENT
+from lockstep.protocol.trace import CommandSpans, PictureSpans
 
 __all__ = [
     "MAX_AXES",
@@ -25,6 +26,7 @@ __all__ = [
     "Goodbye",
     "Hello",
     "LinkMessage",
+    "LinkMessageOnWire",
     "LinkRole",
     "Media",
     "MediaCodec",
@@ -34,11 +36,14 @@ __all__ = [
     "RefusalReason",
     "Reset",
     "Rest",
+    "RobotFeedback",
     "Stop",
     "StopState",
     "StopTaken",
     "decode_message",
     "encode_message",
+    "plain_feedback",
+    "spans_of",
 ]
 
 PROTOCOL_VERSION = 2
@@ -151,6 +156,12 @@ class Feedback(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", tag=
     warning: float = 0.0  # s that the robot still warns before it may move
 
 
+class RobotFeedback(Feedback, frozen=True, kw_only=True, tag_field="type", tag="feedback"):
+    """A feedback as it travels on the robot link. The console passes it on without the spans."""
+
+    spans: CommandSpans | msgspec.UnsetType = msgspec.UNSET  # of the command; only in the first issue, and optional
+
+
 class Refusal(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", tag="refusal"):
     """Why a command was not executed, and which event is current."""
 
@@ -181,6 +192,7 @@ class Media(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", tag="me
     sample_rate: Annotated[int, msgspec.Meta(ge=0, le=192000)] = 0  # Hz; 0 for pictures
     channels: Annotated[int, msgspec.Meta(ge=0, le=8)] = 0
     keyframe: bool = True  # decodable without earlier ones
+    spans: PictureSpans | msgspec.UnsetType = msgspec.UNSET  # the bridge's own, of a picture; optional
 
 
 class Rest(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", tag="rest"):
@@ -229,11 +241,10 @@ class Goodbye(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", tag="
     detail: Text = ""
 
 
-LinkMessage = (
+_WithoutFeedback = (
     Hello
     | Challenge
     | Command
-    | Feedback
     | Refusal
     | EventNotice
     | Media
@@ -249,8 +260,10 @@ LinkMessage = (
     | Pong
     | Goodbye
 )
+LinkMessage = _WithoutFeedback | Feedback
+LinkMessageOnWire = _WithoutFeedback | RobotFeedback  # both feedbacks have one tag
 
-_decoder: msgspec.msgpack.Decoder[LinkMessage] = msgspec.msgpack.Decoder(LinkMessage)
+_decoder: msgspec.msgpack.Decoder[LinkMessageOnWire] = msgspec.msgpack.Decoder(LinkMessageOnWire)
 _encoder = msgspec.msgpack.Encoder()
 
 
@@ -260,12 +273,28 @@ def encode_message(message: LinkMessage) -> bytes:
 
 
 def decode_message(data: bytes | bytearray | memoryview) -> LinkMessage:
-    """The message in `data`.
+    """The message in `data`. A feedback is a `RobotFeedback` if it has spans.
 
     Raises:
         MessageError: not MessagePack, an unknown kind, or a field of the wrong type or range.
     """
     try:
-        return _decoder.decode(data)
+        message = _decoder.decode(data)
     except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
         raise MessageError(str(error)) from error
+    if isinstance(message, RobotFeedback) and message.spans is msgspec.UNSET:
+        return plain_feedback(message)
+    return message
+
+
+def plain_feedback(feedback: Feedback) -> Feedback:
+    """Return the feedback without the spans that it may have on the robot link."""
+    if not isinstance(feedback, RobotFeedback):
+        return feedback
+    return Feedback(**{name: getattr(feedback, name) for name in Feedback.__struct_fields__})
+
+
+def spans_of(feedback: Feedback) -> CommandSpans:
+    """Return the spans that the bridge has measured of the command; none are known of most feedbacks."""
+    spans = feedback.spans if isinstance(feedback, RobotFeedback) else msgspec.UNSET
+    return CommandSpans() if spans is msgspec.UNSET else spans

@@ -5,7 +5,10 @@ import logging
 import time
 from collections.abc import Callable
 
+import msgspec
+
 from lockstep.protocol.messages import Media
+from lockstep.protocol.trace import PictureSpans, span_ms
 from lockstep.robot_bridge.control.event_core import EventCore
 from lockstep.robot_bridge.control.event_times import EventTimes
 from lockstep.robot_bridge.control.feedback_issuer import FeedbackIssuer
@@ -35,6 +38,7 @@ class MediaSources:
     ) -> None:
         """`event_strip`: draw the event into pictures, for measurements."""
         self._robot = robot
+        self._times = feedback.times
         self._stamper = _Stamper(core, feedback.times)
         self._feedback = feedback
         self._links = links
@@ -71,7 +75,27 @@ class MediaSources:
     def _emit(self, media: Media) -> None:
         self._counters.media += 1
         self._log.record("media", media.stamp, stream=media.stream, captured=media.time)
+        if media.codec != "pcm_s16le":
+            media = with_spans(media, self._times.began(media.stamp), time.monotonic())
         self._links.publish_media(media if self._mark is None else self._mark(media))
+
+
+def with_spans(media: Media, event_began: float | None, now: float) -> Media:
+    """Return a picture with its spans at this bridge; those that its source has measured itself stay as they are.
+
+    Args:
+        event_began: when the event of its stamp became current, s; None: not known
+        now: s, when the picture is whole
+
+    All times are on the bridge's monotonic clock.
+    """
+    own = PictureSpans() if media.spans is msgspec.UNSET else media.spans
+    if own.camera_wait_ms is msgspec.UNSET and event_began is not None:
+        own = msgspec.structs.replace(own, camera_wait_ms=span_ms(media.time - event_began))
+    if own.capture_ms is msgspec.UNSET:
+        encoding = 0.0 if own.bridge_encode_ms is msgspec.UNSET else own.bridge_encode_ms / 1000
+        own = msgspec.structs.replace(own, capture_ms=span_ms(now - media.time - encoding))
+    return msgspec.structs.replace(media, spans=own)
 
 
 class _Stamper:

@@ -12,6 +12,8 @@ from lockstep.protocol.actions import Act, ActionUpdate, Status
 from lockstep.protocol.console import Participants, Report, RobotState, Seat, SharedNote, SpeedCapState
 from lockstep.protocol.description import RobotDescription
 from lockstep.protocol.messages import Command, Feedback, Refusal, RefusalReason, Rest, StopState, StopTaken
+from lockstep.protocol.trace import CommandSpans
+from lockstep.protocol.trace_messages import EventTrace
 from lockstep.server.audit.records import Actor
 from lockstep.server.stop.stop_presses import Press
 from lockstep.server.telemetry.faults import Faults
@@ -25,6 +27,7 @@ __all__ = [
     "CommandRefused",
     "CommandRepeated",
     "EpochBegan",
+    "EventsTraced",
     "FeedbackReceived",
     "InputRefused",
     "LinkDown",
@@ -152,6 +155,14 @@ class FeedbackReceived(SessionEvent, frozen=True):
     feedback: Feedback
     now: float  # s on the monotonic clock
     turnaround: float | None  # s since the command that it answers was forwarded; None: it answers none
+    spans: CommandSpans = CommandSpans()  # of that command, as bridge and console have measured them
+
+
+class EventsTraced(SessionEvent, frozen=True):
+    """The seat's holder has reported where the time of these events went."""
+
+    by: Actor
+    events: list[EventTrace]
 
 
 class StopShown(SessionEvent, frozen=True):

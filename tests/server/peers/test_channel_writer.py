@@ -79,3 +79,17 @@ def test_a_message_that_the_peer_cannot_take_is_left_out_and_counted() -> None:
     writer.send("hello")
     assert connection.taken == ["hello"]
     assert writer.too_large == writer.lost == 1
+
+
+def test_what_can_be_spared_is_left_out_while_anything_waits() -> None:
+    writer, connection = _writer()
+    writer.send_spare("one")
+    writer.send_spare("two")
+    assert connection.taken == ["one"]
+    connection.waiting = False
+    writer.send_spare("three")
+    assert connection.taken == ["one", "three"]
+    writer.send_newest("feedback")
+    writer.send_spare("four")
+    _drain(writer, connection)
+    assert connection.taken == ["one", "three", "feedback"]

@@ -6,6 +6,7 @@ import type { ConsoleEngine } from "../engine/console_engine";
 import type { SceneStatistics, SceneView } from "../scene/scene_view";
 import { statisticsOf, type Statistics } from "../engine/statistics";
 import type { RobotDescription } from "../protocol/wire";
+import type { TracedCommand, TracedPicture } from "../engine/trace_book";
 
 /** What may be set by code; a field that is left out stays as it is. */
 export interface Configuration {
@@ -23,6 +24,10 @@ export interface LockstepHook {
   rendered(stream: string): readonly Rendering[];
   /** The newest events and when their feedback came. */
   feedbacks(): readonly FeedbackArrival[];
+  /** The newest traced pictures and commands, while traces are asked for (docs/traces.md). */
+  traces(): { readonly pictures: readonly TracedPicture[]; readonly commands: readonly TracedCommand[] };
+  /** Asks the console for traces, or no more; the charts ask too while they are open. */
+  trace(wanted: boolean): void;
   /** What the 3D scene shows. */
   scene(): SceneStatistics;
   configure(configuration: Configuration): void;
@@ -50,6 +55,11 @@ export function installHook(page: HookedPage): void {
     robot: () => engine.state.robot?.description ?? null,
     rendered: (stream) => (streams.videos.get(stream) ?? streams.sounds.get(stream))?.log.all() ?? [],
     feedbacks: () => streams.feedbacks.all(),
+    traces: () => ({
+      pictures: engine.tracing.book.pictures.all(),
+      commands: engine.tracing.book.commands.all(),
+    }),
+    trace: (wanted) => engine.tracing.show(wanted, performance.now()),
     scene: () => page.grid.scene?.statistics() ?? NO_SCENE,
     configure({ gate, pacing, tolerance }) {
       const { settings } = engine.state;

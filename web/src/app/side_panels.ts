@@ -1,9 +1,11 @@
 import { ChartSampler } from "../charts/chart_sampler";
 import { ChartsDrawer } from "../charts/charts_drawer";
+import type { WaySource } from "../charts/way_figures";
 import type { ConsoleEngine } from "../engine/console_engine";
 import { readFragment } from "../util/url_fragment";
 import type { PageAction } from "../input/shortcuts";
 import { replayHash } from "../replay/replay_link";
+import { mayDrive } from "../session/console_state";
 import { countUnread, createUnread, markRead } from "../session/unread_notes";
 import { Pad } from "../input/gamepad";
 import { GamepadStorage } from "../input/gamepad_storage";
@@ -72,7 +74,16 @@ export class SidePanels {
     this.tabs = this.createTabs();
     const sampler = new ChartSampler(engine);
     engine.charts = sampler;
-    this.charts = new ChartsDrawer(sampler, (open) => root.classList.toggle("shows-charts", open));
+    const ways: WaySource = {
+      book: engine.tracing.book,
+      mainStream: () => grid.mainStream(),
+      mayDrive: () => mayDrive(engine.state),
+      isRelayed: () => engine.streams.relay !== null,
+    };
+    this.charts = new ChartsDrawer(sampler, ways, (open) => {
+      engine.tracing.show(open, performance.now());
+      root.classList.toggle("shows-charts", open);
+    });
     addEventListener("keydown", (event) => {
       if (event.code === "Escape") this.sheets.close();
     });

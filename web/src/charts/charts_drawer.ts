@@ -5,6 +5,7 @@ import { redrawMs } from "./chart_scale";
 import { button, h, setData, setHidden, setPressed, setText, type Panel } from "../ui/elements/dom";
 import { chartPicture } from "./chart_image";
 import type { ChartStack } from "./chart_stack";
+import type { WaySource } from "./way_figures";
 import { saveFile } from "../ui/elements/save_file";
 
 const RANGES = [
@@ -29,6 +30,7 @@ export class ChartsDrawer implements Panel {
   /** `toggled`: the page makes room, or takes it back. */
   constructor(
     private readonly sampler: ChartSampler,
+    private readonly ways: WaySource,
     private readonly toggled: (open: boolean) => unknown,
   ) {
     this.rangeButtons = RANGES.map(({ seconds, label }) =>
@@ -119,7 +121,7 @@ export class ChartsDrawer implements Panel {
     try {
       const { ChartStack: Stack } = await import("./chart_stack");
       if (!this.open) return null;
-      this.stack ??= new Stack(this.sampler.ring);
+      this.stack ??= new Stack(this.sampler.ring, this.ways);
       this.place.replaceChildren(this.stack.element);
       this.drawnMs = -Infinity;
       return this.stack;

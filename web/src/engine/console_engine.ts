@@ -39,6 +39,7 @@ import { SessionClient } from "../session/session_client";
 import { ActionClient, drawId } from "../robot/action_client";
 import type { ActConditions } from "../robot/actions";
 import { reportOf } from "./report";
+import { Tracing } from "./tracing";
 import { StopSender } from "./stop_sender";
 import type { Talkback } from "../talkback/talkback";
 import type {
@@ -90,6 +91,12 @@ export class ConsoleEngine {
   speedShare = 1; // of full speed that the cap leaves
   firstPictureMs: number | null = null;
   readonly haptics = new Haptics(this);
+  readonly tracing = new Tracing({
+    tell: (channel, message) => this.tell(channel, message),
+    isConnected: () => this.state.welcome !== null,
+    drivesRecorded: () => this.state.recording?.state === "recording" && holdsSeat(this.state),
+    mainStream: () => this.page.mainStream(),
+  });
   readonly ticker: Ticker;
   private readonly disposal = new Disposal();
   peer: Peer | null = null;
@@ -288,6 +295,7 @@ export class ConsoleEngine {
   private connectionClosed(): void {
     this.disarm("connection_lost");
     this.haptics.forget();
+    this.tracing.connectionClosed();
     this.peer = null;
     this.driver = null;
     this.streams.close();
@@ -322,6 +330,7 @@ export class ConsoleEngine {
       this.tookFeedback(message, before, now);
     else if (message.type === "refusal" && this.driver !== null) {
       driver.driverRefusal(this.driver, message, this.isArmed());
+      this.tracing.book.noteRefused(message.event);
       this.drive(now);
     } else if (message.type === "pong") this.tookPong(message.id, now);
     else if (message.type === "welcome") this.welcomed(message);
@@ -332,6 +341,7 @@ export class ConsoleEngine {
       this.actionMs = now;
       this.actions.updated(message);
     }
+    else if (message.type === "traces") this.tracing.told(message);
   }
 
   /** Whoever drives next has to arm, and nothing of the one before is executed. */
@@ -351,6 +361,7 @@ export class ConsoleEngine {
     else this.drive(now);
     this.streams.changed();
     this.page.feedbackTaken(now);
+    this.tracing.book.noteAnswered(feedback.event, now, performance.now());
   }
 
   private tookPong(id: number, now: number): void {
@@ -403,6 +414,7 @@ export class ConsoleEngine {
     this.stopping.step(now);
     this.charts?.step(now);
     this.haptics.step(now);
+    this.tracing.step(now);
     if (this.state.welcome !== null) this.heartbeat.step(now);
     this.connection.step(now);
   }
@@ -424,6 +436,7 @@ export class ConsoleEngine {
     const change = arming.sampleDeadman(this.arming, sample.deadman, sample.signature, now);
     this.capSpeed(now);
     this.takeValues(sample);
+    this.tracing.noteIntention(this.values, now);
     if (this.driver !== null && change === "released") driver.driverRelease(this.driver, now);
     if (this.driver !== null && change === "taped_down") driver.driverDisarm(this.driver, now);
     if (change === "taped_down") this.page.armedChanged();
@@ -456,7 +469,10 @@ export class ConsoleEngine {
     noteHeard(this.driver.gate, this.streams.heard());
     const intention = { armed: this.isArmed(), values: this.values, action: this.actions.renewed(now) };
     const messages = driver.driverStep(this.driver, intention, this.canCommand(), now);
-    for (const message of messages) this.tell("control", message);
+    for (const message of messages) {
+      this.tell("control", message);
+      this.tracing.noteSent(message, now);
+    }
     this.sendTimer.set(this.isArmed() ? driver.driverOpensIn(this.driver, now) : null);
   }
 
@@ -466,6 +482,7 @@ export class ConsoleEngine {
 
   private drawn(stream: VideoStream, stamp: number | null, at: number): void {
     this.firstPictureMs ??= at;
+    this.tracing.noteDrawn(stream.info.stream, stream.drawn);
     if (stamp === null || stream.info.stream !== this.page.mainStream() || this.driver === null) return;
     notePicture(this.driver.latency, stamp, at);
     noteShown(this.driver.gate, stamp);

@@ -6,6 +6,7 @@ import type { MediaSection } from "../transport/webrtc/media_section";
 import type { StreamInfo } from "../protocol/wire";
 import { openFrames, type OnPicture } from "./frame_source";
 import type { Picture } from "./picture";
+import { PictureTrace, type DrawnPicture } from "./picture_trace";
 import { RenderLog } from "./render_log";
 
 export interface VideoStreamEvents {
@@ -17,7 +18,9 @@ export interface VideoStreamEvents {
 export class VideoStream {
   readonly gate = createPictureGate<Picture>();
   readonly log = new RenderLog();
+  readonly trace = new PictureTrace();
   readonly frames = createRateMeter();
+  drawn: DrawnPicture | null = null; // the newest on the canvas
   width = 0;
   height = 0;
   lastDrawnMs: number | null = null;
@@ -32,9 +35,13 @@ export class VideoStream {
     private readonly events: VideoStreamEvents,
   ) {
     this.drawing = canvas.getContext("2d", { alpha: false });
-    if (section.stamps !== null) section.stamps.onstamp = () => this.settle();
+    if (section.stamps !== null) {
+      section.stamps.onstamp = () => this.settle();
+      section.stamps.onframe = (rtpTimestamp, times) => this.trace.transformed(rtpTimestamp, times);
+    }
     const take: OnPicture = (picture, rtpTimestamp) => {
       this.lastGoodMs = performance.now();
+      this.trace.decoded(rtpTimestamp, this.lastGoodMs);
       offerPicture(this.gate, picture, rtpTimestamp, this.lookup, events.context(), this.draw);
     };
     this.endFrames = section.track === null ? () => undefined : openFrames(section.track, take);
@@ -62,6 +69,7 @@ export class VideoStream {
     age: number | null,
   ): void => {
     const { canvas } = this;
+    const began = performance.now();
     this.width = picture.width;
     this.height = picture.height;
     if (canvas.width !== picture.width) canvas.width = picture.width;
@@ -71,6 +79,7 @@ export class VideoStream {
     this.lastDrawnMs = at;
     noteOccurrence(this.frames, at);
     this.log.add({ stamp, gap, feedback: this.events.context().feedback, at, age });
+    this.drawn = this.trace.drawn(stamp, began, at);
     this.events.drawn(this, stamp, at);
   };
 }

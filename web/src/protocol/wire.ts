@@ -117,7 +117,7 @@ export interface Camera {
   readonly metres_per_pixel: number | null;
 }
 
-export type ClientMessage = Command | Rest | Report | Ping | SeatRequest | SeatGrant | SeatDecline | SeatTake | SeatRelease | SilenceStops | Rename | Note | Act | ActionCancel | Stop | Reset;
+export type ClientMessage = Command | Rest | Report | Ping | SeatRequest | SeatGrant | SeatDecline | SeatTake | SeatRelease | SilenceStops | Rename | Note | Act | ActionCancel | Stop | Reset | TraceRequest | TraceReport;
 
 /** Event `event`, valid only as the answer to issue `issue` of feedback `event - 1`. */
 export interface Command {
@@ -129,11 +129,39 @@ export interface Command {
   readonly action?: string;
 }
 
+/** A command's way from the stick to the robot, and its feedback's way back, in order; ms. */
+export interface CommandSpans {
+  readonly input_ms?: number;
+  readonly forward_ms?: number;
+  readonly tick_wait_ms?: number;
+  readonly apply_ms?: number;
+  readonly rate_wait_ms?: number;
+  readonly measure_ms?: number;
+  readonly back_ms?: number;
+  readonly take_ms?: number;
+  readonly link_ms?: number;
+  readonly between_ms?: number;
+}
+
+/** The spans of one executed command, as far as the console knows them. */
+export interface CommandTrace {
+  readonly event: number;
+  readonly spans: CommandSpans;
+}
+
 /** A set of bindings that are active together; the operator switches between layers. */
 export interface ControlLayer {
   readonly name: string;
   readonly label: string;
   readonly bindings: readonly (Binding)[];
+}
+
+/** One event as the operator's client has measured it, with what the console has told it. */
+export interface EventTrace {
+  readonly event: number;
+  readonly command?: CommandSpans;
+  readonly stream?: string;
+  readonly picture?: PictureSpans;
 }
 
 /** Measured state after command `event`. A later `issue` of the same event is the same event measured again. */
@@ -225,6 +253,32 @@ export interface Participant {
 export interface Participants {
   readonly type: "participants";
   readonly participants: readonly (Participant)[];
+}
+
+/** A picture's way from its capture to the canvas, in order; ms. An absent span was not measured. */
+export interface PictureSpans {
+  readonly camera_wait_ms?: number;
+  readonly capture_ms?: number;
+  readonly bridge_encode_ms?: number;
+  readonly link_wait_ms?: number;
+  readonly encoder_wait_ms?: number;
+  readonly encode_ms?: number;
+  readonly packetise_ms?: number;
+  readonly send_ms?: number;
+  readonly assemble_ms?: number;
+  readonly transform_ms?: number;
+  readonly decode_ms?: number;
+  readonly gate_ms?: number;
+  readonly draw_ms?: number;
+  readonly between_ms?: number;
+}
+
+/** The spans of one picture, as far as the console knows them. */
+export interface PictureTrace {
+  readonly stream: string;
+  readonly stamp: number;
+  readonly rtp_time: number;
+  readonly spans: PictureSpans;
 }
 
 /** Heartbeat; answered at once by a pong with the same id. */
@@ -415,7 +469,7 @@ export interface SeatTake {
   readonly type: "seat_take";
 }
 
-export type ServerMessage = Feedback | Refusal | Pong | Welcome | RobotState | Seat | Participants | Quality | SpeedCapState | Sources | Voice | RecordingState | SharedNote | Notice | StopStateNotice | StopTaken | ActionUpdate | Status;
+export type ServerMessage = Feedback | Refusal | Pong | Welcome | RobotState | Seat | Participants | Quality | SpeedCapState | Sources | Voice | RecordingState | SharedNote | Notice | StopStateNotice | StopTaken | ActionUpdate | Status | Traces;
 
 /** A participant's note, with the event it belongs to. Newcomers get the last ones. */
 export interface SharedNote {
@@ -557,6 +611,25 @@ export interface StreamReport {
   readonly lag?: number;
   readonly violations?: number;
   readonly gate?: "event" | "off";
+}
+
+/** The operator's client reports its events while the session is recorded; nobody else is heard. */
+export interface TraceReport {
+  readonly type: "trace_report";
+  readonly events?: readonly (EventTrace)[];
+}
+
+/** Send traces from now on, or no more. Off at the beginning of a connection. */
+export interface TraceRequest {
+  readonly type: "trace_request";
+  readonly wanted?: boolean;
+}
+
+/** What the console has measured since the last such message, newest last. Only to a client that asked. */
+export interface Traces {
+  readonly type: "traces";
+  readonly pictures: readonly (PictureTrace)[];
+  readonly commands: readonly (CommandTrace)[];
 }
 
 /** Who is heard at the robot now; sent to everyone when it changes. */

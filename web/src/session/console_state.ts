@@ -207,6 +207,7 @@ export function applyMessage(state: ConsoleState, message: ServerMessage, wallMs
       return;
     case "pong":
     case "stop_taken": // the stop sender's
+    case "traces": // the engine's
       return;
     default:
       message satisfies never;

@@ -22,6 +22,7 @@ class Result:
     baseline_name: str = ""  # "reliable data channel"
     samples: int = 0
     conditions: str = ""  # of the measurement
+    stacked_on: float | None = None  # where its part of a stacked figure begins, in `unit`; None: it is no such part
 
     @property
     def met(self) -> bool | None:

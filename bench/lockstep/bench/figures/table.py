@@ -7,6 +7,7 @@ from lockstep.bench.figures.results import Result
 
 __all__ = ["render_markdown", "render_table"]
 
+BAR = 40  # characters of the longest stacked figure
 HEADINGS = ("", "value", "target", "", "baseline", "ratio")
 
 
@@ -18,7 +19,8 @@ def render_table(results: Sequence[Result]) -> str:
     for section, group in groupby(results, key=lambda result: result.section):
         members = list(group)
         lines += ["", section]
-        lines += [_line(_cells(member), widths) for member in members]
+        longest = max((_end(member) for member in members), default=0.0)
+        lines += [_line(_cells(member), widths) + _bar(member, longest) for member in members]
         lines += [f"  · {text}" for text in _unique(member.conditions for member in members)]
         lines += [f"  · baseline: {text}" for text in _unique(member.baseline_name for member in members)]
     return "\n".join(line.rstrip() for line in lines) + "\n"
@@ -51,6 +53,18 @@ def _cells(result: Result) -> tuple[str, ...]:
     baseline = "" if result.baseline is None else f"{_number(result.baseline)} {result.unit}"
     ratio = "" if result.ratio is None else f"{result.ratio:.2f}"
     return f"  {result.name}", value, target, met, baseline, ratio
+
+
+def _end(result: Result) -> float:
+    return 0.0 if result.stacked_on is None else result.stacked_on + (result.value or 0.0)
+
+
+def _bar(result: Result, longest: float) -> str:
+    """Draw a part of a stacked figure, where the parts above it end; at least a stroke."""
+    if result.stacked_on is None or longest <= 0:
+        return ""
+    begin, end = (round(BAR * each / longest) for each in (result.stacked_on, _end(result)))
+    return "   " + " " * begin + ("█" * (end - begin) or "▏")
 
 
 def _number(value: float) -> str:

@@ -31,7 +31,7 @@ from lockstep.bench.harness.event_log import capture_times
 from lockstep.bench.harness.processes import running_process
 from lockstep.bench.harness.stack import Bridge, Stack, running_stack
 
-__all__ = ["run"]
+__all__ = ["AIORTC", "CAMERA", "bare_page", "driving_in_circles", "measured_spell", "run"]
 
 SECTION = "capture_to_shown"
 SECONDS, QUICK_SECONDS = 12.0, 4.0
@@ -66,7 +66,7 @@ async def run(context: Context) -> list[Result]:
         async with running_stack(robot) as stack:
             seconds = float(context.scale(int(SECONDS), int(QUICK_SECONDS)))
             idle, driving = await _lockstep(stack, seconds)
-            baselines = {AIORTC: await _bare(stack.bridge, seconds)}
+            baselines = {AIORTC: await bare_page(stack.bridge, seconds)}
             for kind, name in RIVALS.items():
                 baselines[name] = await _rival(stack.bridge, kind, seconds)
             results += _compare(robot, idle, driving, baselines)
@@ -81,12 +81,12 @@ async def _lockstep(stack: Stack, seconds: float) -> tuple[Delays, Delays]:
         await console.until_live()
         sent = await _sent(stack)
         began = time.monotonic()
-        idle = await _spell(page, stack.bridge, seconds)
+        idle = await measured_spell(page, stack.bridge, seconds)
         megabits = (await _sent(stack) - sent) * 8 / (time.monotonic() - began) / 1e6
         codec = (await console.stats())["streams"][CAMERA]["codec"]
         idle = idle._replace(megabits=megabits, codec=codec)
-        async with _driving(console):
-            return idle, await _spell(page, stack.bridge, seconds)
+        async with driving_in_circles(console):
+            return idle, await measured_spell(page, stack.bridge, seconds)
 
 
 async def _sent(stack: Stack) -> float:
@@ -95,7 +95,7 @@ async def _sent(stack: Stack) -> float:
 
 
 @asynccontextmanager
-async def _driving(console: ConsolePage) -> AsyncIterator[None]:
+async def driving_in_circles(console: ConsolePage) -> AsyncIterator[None]:
     """Drive in circles with a held stick."""
     await console.arm()
     await console.press(RB)
@@ -106,7 +106,8 @@ async def _driving(console: ConsolePage) -> AsyncIterator[None]:
     await console.press(RB, False)
 
 
-async def _bare(bridge: Bridge, seconds: float) -> Delays:
+async def bare_page(bridge: Bridge, seconds: float) -> Delays:
+    """Measure the page of plain aiortc at the same bridge."""
     command = (sys.executable, "-m", "lockstep.bench.baseline.baseline_server", bridge.address)
     async with (
         running_process(*command) as (_, ready),
@@ -114,7 +115,7 @@ async def _bare(bridge: Bridge, seconds: float) -> Delays:
         open_probed_page(browser, ready["console"]) as page,
     ):
         await page.wait_for_function("() => window.drawProbe?.shown.length > 3")
-        return await _spell(page, bridge, seconds)
+        return await measured_spell(page, bridge, seconds)
 
 
 async def _rival(bridge: Bridge, kind: str, seconds: float) -> Delays:
@@ -144,7 +145,7 @@ async def _rival(bridge: Bridge, kind: str, seconds: float) -> Delays:
     )
 
 
-async def _spell(page: Page, bridge: Bridge, seconds: float) -> Delays:
+async def measured_spell(page: Page, bridge: Bridge, seconds: float) -> Delays:
     """Measure the pictures shown in `seconds`, after a short wait."""
     await asyncio.sleep(SETTLE)
     clock = await read_page_clock(page)

@@ -117,6 +117,7 @@ class CommandExecutor:
             if not self._actions.moving:  # else the action has the axes, and this command is neutral
                 self._shaper.drive(outcome.values, now)
             self._alarm.ring()
+            self._feedback.timing.executed(now)
             self._counters.executed += 1
             self._log.record("executed", outcome.event, issue=command.issue, values=outcome.values)
         elif isinstance(outcome, Answered):
@@ -148,6 +149,8 @@ class CommandExecutor:
         self._watchdogs.ticked(now, self._moves)
         self._robot.apply(self._signal.on(values) if self._core.warns(now) else values)
         self._robot.tick()
+        if self._feedback.timing.waits_for_tick:
+            self._feedback.timing.applied(now, self._now())
         self._feedback.limits_act(self._limits.acting)
         self._note_blind(self._limits.blind)
         if self._shaper.at_rest:

@@ -10,9 +10,12 @@ import secrets
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
+import msgspec
+
 from lockstep.protocol.description import Axis, StartWarning
-from lockstep.protocol.messages import Command, Feedback, Refusal, RefusalReason, StopState
+from lockstep.protocol.messages import Command, Feedback, Refusal, RefusalReason, RobotFeedback, StopState
 from lockstep.protocol.serial import FIRST_EVENT, event_after, event_gap, is_event, is_newer
+from lockstep.protocol.trace import CommandSpans
 from lockstep.robot_bridge.control.restart_interlock import RestartInterlock
 from lockstep.robot_bridge.robots.base import Measurement
 from lockstep.robot_bridge.stop.stop_latch import ResetOutcome, ResetTaken, StopGiven, StopLatch, WriteOutcome
@@ -272,10 +275,11 @@ class EventCore:
         unknown: Sequence[str] = (),
         *,
         time: float | None = None,
+        spans: CommandSpans | msgspec.UnsetType = msgspec.UNSET,
     ) -> Feedback:
         """Return the feedback of the pending event, which thereby becomes current, or of the current event again.
 
-        `time`: the time of issue, on the clock of capture times; None: `now`.
+        `time`: the time of issue, on the clock of capture times; None: `now`. `spans`: of the pending command.
         """
         if self._pending is not None:
             self._current, self._pending = self._pending, None
@@ -288,7 +292,7 @@ class EventCore:
         self._remember_issue(_Issued(now, nonce, self._interlock.spell))
         self._latch.shown(stop, now)
         self._issued_at = now
-        self._feedback = Feedback(
+        self._feedback = RobotFeedback(
             event=self._current,
             issue=self._issue,
             time=now if time is None else time,
@@ -304,6 +308,7 @@ class EventCore:
             nonce=nonce,
             neutral_needed=self._interlock.needed,
             warning=self._interlock.warns(now),
+            spans=spans,
         )
         return self._feedback
 

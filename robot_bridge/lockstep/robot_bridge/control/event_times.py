@@ -20,6 +20,13 @@ class EventTimes:
         if not self._changes or self._changes[-1].event != event:
             self._changes.append(Stamp(event, now))
 
+    def began(self, event: int) -> float | None:
+        """Return when `event` became current, s; None if that is not remembered."""
+        for change in reversed(self._changes):
+            if change.event == event:
+                return change.time
+        return None
+
     def at(self, time: float) -> Stamp | None:
         """Return the event that held at `time`; None for a time before the remembered events."""
         for change in reversed(self._changes):

@@ -6,6 +6,7 @@ import time
 from lockstep.protocol.description import RobotDescription
 from lockstep.protocol.messages import MAX_FAULTS, Feedback
 from lockstep.robot_bridge.control.clock import Clock
+from lockstep.robot_bridge.control.command_timing import CommandTiming
 from lockstep.robot_bridge.control.event_core import EventCore
 from lockstep.robot_bridge.control.event_times import EventTimes
 from lockstep.robot_bridge.control.last_known import LastKnown
@@ -23,6 +24,7 @@ class FeedbackIssuer:
     """Issues the feedback of an event. Call `issue` whenever the core says that one is due.
 
     Attributes:
+        timing: the times of the command that executes
         times: the event that held at each time
         rested_why: why the robot came to rest on its own, until a command executes; "": it did not
     """
@@ -37,6 +39,7 @@ class FeedbackIssuer:
         log: EventLog,
         now: Clock,
     ) -> None:
+        self.timing = CommandTiming()
         self.times = EventTimes()
         self.rested_why = ""
         self._robot = robot
@@ -53,9 +56,9 @@ class FeedbackIssuer:
 
     def issue(self, *, acts: bool = False) -> Feedback:
         """Measure and issue. `acts`: an action moves the robot."""
-        taken = time.monotonic()
+        taken, began = time.monotonic(), self._now()
         measured = self._robot.measure()
-        return self._issue(measured._replace(at_rest=measured.at_rest and not acts), taken)
+        return self._issue(measured._replace(at_rest=measured.at_rest and not acts), taken, began)
 
     def issue_failed(self, failure: str) -> Feedback:
         """Issue that the robot failed, with the last measured values if it cannot be measured any more."""
@@ -64,7 +67,7 @@ class FeedbackIssuer:
         except BaseException:  # the robot is not to be trusted any more
             axes, joints = ([math.nan] * len(each) for each in (self._description.axes, self._description.joints))
             measured = Measurement(axes=axes, joints=joints, wrench=[], ranges=[], at_rest=False, faults=[])
-        return self._issue(measured._replace(faults=[*measured.faults, failure]), time.monotonic())
+        return self._issue(measured._replace(faults=[*measured.faults, failure]), time.monotonic(), self._now())
 
     def limits_act(self, acting: frozenset[str]) -> None:
         """Note the limits that slow the robot in this tick; count each spell once, and record its begin and end."""
@@ -80,8 +83,8 @@ class FeedbackIssuer:
         self._source_faults.append(fault)
         self._core.want_issue()
 
-    def _issue(self, measured: Measurement, taken: float) -> Feedback:
-        """`taken`: time of the measurement on the clock of capture times."""
+    def _issue(self, measured: Measurement, taken: float, began: float) -> Feedback:
+        """`taken`: time of the measurement on the clock of capture times; `began`: its begin on the clock of motion."""
         measured, unknown = self._last_known.settle(measured)
         if self._source_faults or self.rested_why:
             rested = [self.rested_why] if self.rested_why else []
@@ -91,7 +94,9 @@ class FeedbackIssuer:
             faults=[fault[:MAX_FAULT] for fault in measured.faults[-MAX_FAULTS:]],
         )
         limits = sorted(self._acted | self._acting)
-        feedback = self._core.issue(measured, self._now(), limits, unknown, time=taken)
+        now = self._now()
+        spans = self.timing.measured(began, now)
+        feedback = self._core.issue(measured, now, limits, unknown, time=taken, spans=spans)
         measured_by = time.monotonic()  # a picture that was captured before may show less than this feedback has
         self.times.changed(feedback.event, measured_by)
         self._acted.clear()

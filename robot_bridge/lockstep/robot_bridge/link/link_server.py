@@ -9,6 +9,8 @@ from functools import cache
 from pathlib import Path
 from typing import Protocol
 
+import msgspec
+
 from lockstep.protocol.actions import Act, ActionCancel, Status
 from lockstep.protocol.description import RobotDescription
 from lockstep.protocol.framing import frame
@@ -26,6 +28,7 @@ from lockstep.protocol.messages import (
     Stop,
     encode_message,
 )
+from lockstep.protocol.trace import PictureSpans, span_ms
 from lockstep.robot_bridge.counters import BridgeCounters
 from lockstep.robot_bridge.errors import ListenError
 from lockstep.robot_bridge.link.applicants import Strangers
@@ -208,7 +211,7 @@ class LinkServer:
 
     def publish_media(self, media: Media) -> None:
         """Send a medium to every media link, newest wins per stream."""
-        encoded = encode_once(media)
+        encoded = encode_once(media) if media.spans is msgspec.UNSET else encode_waited(media, time.monotonic)
         for peer in self._admitted.media:
             peer.send_media(media, encoded)
 
@@ -271,6 +274,21 @@ class LinkServer:
         self._connections.discard(peer)
         self._counters.drops.update(peer.drops)
         self._all_gone.set()
+
+
+def encode_waited(media: Media, clock: Callable[[], float]) -> Callable[[], bytes]:
+    """As `encode_once`, with the time until that first call, when a link takes the picture, among its spans."""
+    since = clock()
+
+    def make() -> bytes:
+        spans = msgspec.UNSET if media.spans is msgspec.UNSET else _waited(media.spans, clock() - since)
+        return frame(encode_message(msgspec.structs.replace(media, spans=spans)))
+
+    return cache(make)
+
+
+def _waited(spans: PictureSpans, seconds: float) -> PictureSpans:
+    return msgspec.structs.replace(spans, link_wait_ms=span_ms(seconds))
 
 
 def encode_once(message: LinkMessage) -> Callable[[], bytes]:

@@ -39,7 +39,7 @@ class LinkTransport(asyncio.Protocol):
         self._reading_on: asyncio.TimerHandle | None = None  # None: reading is not paused
         self._transport: asyncio.Transport | None = None  # None before and after the connection
         self._control: NewestOutbox[str, bytes] = NewestOutbox()
-        self._media: MediaOutbox[bytes] = MediaOutbox()
+        self._media: MediaOutbox[Callable[[], bytes]] = MediaOutbox()
         self._full = False  # the socket takes no more for now
         self._buffered = 0  # bytes at the last look, to see whether the other side takes any
         self._moved = 0.0  # s, when the other side last took some
@@ -67,11 +67,11 @@ class LinkTransport(asyncio.Protocol):
             self._write(kind, make)
 
     def send_media(self, media: Media, make: Callable[[], bytes]) -> None:
-        """Send as `send_encoded` does, newest wins per stream."""
+        """Send as `send_encoded` does, newest wins per stream. `make` is called when the socket takes it."""
         if self._transport is None or self.session.ended is not None:
             return
         if self._full:
-            self._media.put(media, make)
+            self._media.put(media, lambda: make)
         else:
             self._transport.write(make())
 
@@ -152,9 +152,12 @@ class LinkTransport(asyncio.Protocol):
     def resume_writing(self) -> None:
         self._full = False
         while not self._full and self._transport is not None and self._closing_since is None:
-            data = self._control.pop() or self._media.pop()
+            data = self._control.pop()
             if data is None:
-                break
+                make = self._media.pop()
+                if make is None:
+                    break
+                data = make()
             self._transport.write(data)
 
     def connection_lost(self, error: Exception | None) -> None:

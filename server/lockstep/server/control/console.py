@@ -36,7 +36,10 @@ from lockstep.protocol.messages import (
     Stop,
     StopState,
     StopTaken,
+    plain_feedback,
+    spans_of,
 )
+from lockstep.protocol.trace_messages import TraceReport, TraceRequest
 from lockstep.server.actions.action_service import ActionService
 from lockstep.server.actions.status_service import StatusService
 from lockstep.server.audit.audit_trail import AuditTrail
@@ -57,6 +60,7 @@ from lockstep.server.control.seat_keeper import SeatKeeper
 from lockstep.server.control.speed_cap import SpeedCap
 from lockstep.server.control.stop_service import StopService
 from lockstep.server.control.stop_silence import StopSilence
+from lockstep.server.control.trace_service import TraceService, command_spans
 from lockstep.server.errors import ChannelError, Flood, Silenced
 from lockstep.server.event_clock import EventClock
 from lockstep.server.peers.channels import ChannelName
@@ -69,6 +73,7 @@ from lockstep.server.session_events import (
     CommandRefused,
     CommandRepeated,
     EpochBegan,
+    EventsTraced,
     FeedbackReceived,
     InputRefused,
     LinkDown,
@@ -144,7 +149,9 @@ class Console:
         self._fanout = FeedbackFanout(
             settings.observer_feedback_hz, self.seat.is_held_by, peers.drivers, peers.observers, relays
         )
+        self.traces = TraceService()
         self._forwarded_at = 0.0  # departure of the command in flight
+        self._forward_seconds = 0.0  # from its arrival to its departure
         self._shown_stop = StopState()  # state that was published last
         self._link_was_up = False
         self._robot_is_taken = False  # another console has the robot, and this was published
@@ -161,6 +168,7 @@ class Console:
                 ("resets", self.resets.run),
                 ("audit", self.audit.run),
                 ("participants", self.people.share),
+                ("traces", self.traces.run),
                 ("robot", self.robot.run),
             ):
                 tasks.create_task(keep_running(name, run, self._faults))
@@ -235,6 +243,10 @@ class Console:
                 if message.ping is not None:
                     peer.send("control", Pong(id=message.ping))
                 self._report_speed(peer, message)
+            case TraceRequest():
+                self.traces.request(peer, message.wanted)
+            case TraceReport() if self.seat.is_held_by(peer):
+                self._events.publish(EventsTraced(peer.actor, self.traces.reported(message, now)))
 
     def input_refused(self, peer: Peer, channel: str, error: ChannelError) -> None:
         self._events.publish(InputRefused(channel, error.name))
@@ -246,6 +258,7 @@ class Console:
         peer.send("control" if channel == "control" else "session", answer)
 
     def peer_ended(self, peer: Peer) -> None:
+        self.traces.forget(peer)
         self.seat.gone(peer)
         self.people.left(peer)
 
@@ -273,6 +286,7 @@ class Console:
         self._arbiter.epoch_ends()
         self.actions.epoch_ends()
         self.status.forget()
+        self.traces.epoch_ends()
         self.clock.begin(epoch)
         self.speed_cap.forget()
         self._events.publish(EpochBegan(description))
@@ -302,15 +316,22 @@ class Console:
 
     def feedback_received(self, feedback: Feedback) -> None:
         now = time.monotonic()
+        robot, feedback = spans_of(feedback), plain_feedback(feedback)
         if not self.clock.observe(feedback, now):
             return
         self._fanout.publish(encode_console_message(feedback))  # first: the operator's next command waits for it
+        back = time.monotonic() - now
         had_command = self._arbiter.in_flight is not None
         self._arbiter.feedback(feedback)
         self.resets.feedback(feedback.stop)
         self.speed_cap.fed_back(feedback, now)
-        is_answer = had_command and self._arbiter.in_flight is None
-        self._events.publish(FeedbackReceived(feedback, now, now - self._forwarded_at if is_answer else None))
+        if had_command and self._arbiter.in_flight is None:
+            turnaround = now - self._forwarded_at
+            spans = command_spans(robot, forward=self._forward_seconds, link=turnaround, back=back)
+            self.traces.executed(feedback.event, spans)
+            self._events.publish(FeedbackReceived(feedback, now, turnaround, spans))
+        else:
+            self._events.publish(FeedbackReceived(feedback, now, None))
         if feedback.stop != self._shown_stop:
             self._shown_stop = feedback.stop
             self._events.publish(StopShown(feedback.stop, feedback.event))
@@ -341,7 +362,7 @@ class Console:
 
     def _command(self, peer: Peer, command: Command, now: float) -> None:
         outcome = self._arbiter.command(peer.id, command, now)
-        if isinstance(outcome, Forward) and not self._forward(outcome):
+        if isinstance(outcome, Forward) and not self._forward(outcome, now):
             outcome = Refuse(Refusal(event=0, reason="link_down", current=self.clock.event))
         if isinstance(outcome, Answer) and not peer.may_be_answered_again():
             outcome = Absorbed()
@@ -390,9 +411,11 @@ class Console:
         peer.send(channel, refusal)
         self._events.publish(Refused(peer.actor, channel, refusal, "console"))
 
-    def _forward(self, outcome: Forward) -> bool:
+    def _forward(self, outcome: Forward, arrived: float) -> bool:
         self._forwarded_at = time.monotonic()
-        return self.robot.send(outcome.command)
+        is_sent = self.robot.send(outcome.command)
+        self._forward_seconds = self._forwarded_at - arrived
+        return is_sent
 
     def _report_speed(self, peer: Peer, report: Report) -> None:
         if not self.seat.is_held_by(peer):

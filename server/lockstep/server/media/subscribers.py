@@ -8,6 +8,7 @@ from lockstep.rtc.endpoint import Connection, Turns
 from lockstep.server.media.codecs.codec_choice import h264_profile
 from lockstep.server.media.encoding.frame_queue import Outbox
 from lockstep.server.media.metrics import MediaMetrics
+from lockstep.server.media.picture_traces import PictureTraces
 from lockstep.server.media.pipeline.fanout import FanOut
 from lockstep.server.media.pipeline.rtp_sender import RtpSender
 from lockstep.server.media.pipeline.stream import AudioStream, VideoStream
@@ -81,6 +82,7 @@ class Subscribers:
             turns=turns if isinstance(turns, DriverQueue) else None,
         )
         deliveries += [self._delivery(connection, peer, each, priority) for each in plan.streams]
+        peer.traces = PictureTraces([each.target.traced for each in deliveries if each.info.kind == "video"])
         if self._settings.quality:
             peer.quality.pace = connection.peer.pace
         return peer

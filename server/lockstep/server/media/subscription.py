@@ -1,11 +1,13 @@
 """The delivery of one stream to one peer."""
 
+import time
 from collections.abc import Callable
 
 from lockstep.protocol.carriers import Carrier
 from lockstep.server.media.codecs.h264 import Profile
 from lockstep.server.media.encoding.frame_queue import Outbox
 from lockstep.server.media.metrics import MediaMetrics
+from lockstep.server.media.picture_traces import SentPictures
 from lockstep.server.media.pipeline.frame import EncodedFrame
 from lockstep.server.media.pipeline.rtp_sender import RtpSender
 from lockstep.server.media.quality.encoding_target import PictureTier
@@ -36,6 +38,7 @@ class Subscription:
         self.held_back = False  # from the camera's own encoding, because its path has no room
         self.sends = False  # True from the connection's begin to the peer's end
         self.sender = sender
+        self.traced = SentPictures(stream)
         self._outbox = outbox
         self._on_dropped = on_dropped
         self._on_failed = on_failed
@@ -72,6 +75,8 @@ class Subscription:
         if sent is None:
             return False
         self._outbox.pop()
+        if self.traced.wanted:
+            self.traced.sent(frame, sender.rtp_time, time.monotonic())
         self._count(*sent)
         return self._outbox.peek() is not None and not sender.paced
 

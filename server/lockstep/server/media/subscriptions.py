@@ -7,6 +7,7 @@ from typing import NamedTuple
 from lockstep.protocol.console import Quality, Report, StreamInfo, Tier
 from lockstep.rtc.endpoint import Connection
 from lockstep.rtc.rtp.stage import BandwidthEstimate, KeyframeRequested, PacketsLeft, Reception, StreamEvent
+from lockstep.server.media.picture_traces import PictureTraces
 from lockstep.server.media.pipeline.rtp_sender import SenderStats
 from lockstep.server.media.pipeline.stream import Stream
 from lockstep.server.media.quality.peer_quality import PeerQuality
@@ -30,7 +31,11 @@ REPORTS_OFTEN = 1 / 3  # s
 
 
 class Subscriptions:
-    """One peer's subscriptions. Its connection calls `connected`, then `heard` for stream events; `close` ends it."""
+    """One peer's subscriptions. Its connection calls `connected`, then `heard` for stream events; `close` ends it.
+
+    Attributes:
+        traces: of the pictures that are sent to this peer, while it asks for them
+    """
 
     def __init__(
         self,
@@ -47,6 +52,7 @@ class Subscriptions:
         self.quality = quality
         self.voice = ""  # mid of the section that receives the peer's own sound; "" without one
         self.deliveries = deliveries
+        self.traces = PictureTraces()
         self._connection = connection
         self._on_close = on_close
         self._on_connected = on_connected

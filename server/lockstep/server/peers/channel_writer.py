@@ -38,6 +38,11 @@ class ChannelWriter:
         self.outbox.put_newest(text)
         self.flush()
 
+    def send_spare(self, text: str) -> None:
+        """Send unless something waits already: then nobody needs it."""
+        if self.outbox.empty and not self._connection.peer.has_waiting(self._channel):
+            self.send(text)
+
     def flush(self) -> None:
         """Hand on the messages in the outbox, as far as the channel takes them at once."""
         peer = self._connection.peer

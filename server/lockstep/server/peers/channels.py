@@ -21,6 +21,7 @@ from lockstep.protocol.console import (
 )
 from lockstep.protocol.errors import MessageError
 from lockstep.protocol.messages import Command, Ping, Reset, Rest, Stop
+from lockstep.protocol.trace_messages import TraceReport, TraceRequest
 from lockstep.rtc.token_bucket import TokenBucket
 from lockstep.server.errors import BinaryMessage, Flood, MalformedMessage, MessageTooLarge, UnknownChannel, WrongChannel
 from lockstep.server.stop.stop_presses import MAX_REASON, stop_text
@@ -46,19 +47,10 @@ class _AnyStop(msgspec.Struct, frozen=True, kw_only=True):
 
 
 CHANNELS: dict[ChannelName, tuple[type[ClientMessage], ...]] = {
-    "control": (Command, Rest, Report, Ping, Stop),  # a stop is accepted on every channel
+    "control": (Command, Rest, Report, Ping, TraceReport, Stop),  # a stop is accepted on every channel
     "session": (
-        SeatRequest,
-        SeatGrant,
-        SeatDecline,
-        SeatTake,
-        SeatRelease,
-        SilenceStops,
-        Rename,
-        Note,
-        Act,
-        ActionCancel,
-        Stop,
+        *(SeatRequest, SeatGrant, SeatDecline, SeatTake, SeatRelease, SilenceStops, Rename, Note),
+        *(Act, ActionCancel, TraceRequest, Stop),
     ),
     "stop": (Stop, Reset),
 }

@@ -21,10 +21,12 @@ from lockstep.protocol.console import (
     encode_console_message,
 )
 from lockstep.protocol.messages import Stop
+from lockstep.protocol.trace_messages import PictureTrace
 from lockstep.rtc.token_bucket import TokenBucket
 from lockstep.server.audit.records import Actor
 from lockstep.server.auth.tokens import Identity
 from lockstep.server.errors import ChannelError, Flood, TransportRefused
+from lockstep.server.media.picture_traces import PictureTraces
 from lockstep.server.peers.channels import ChannelName, MessageBudget, channel_of, parse_message, stop_in
 from lockstep.server.peers.repeat_reply_limiter import RepeatReplyLimiter
 from lockstep.server.util.display_names import clean_name
@@ -70,6 +72,8 @@ class PeerStreams(Protocol):
     def queues(self) -> bool: ...
     @property
     def round_trip_ms(self) -> float | None: ...
+    @property
+    def traces(self) -> PictureTraces: ...
 
     def report(self, report: Report, now: float) -> None: ...
     def drives(self, holds_seat: bool) -> None: ...
@@ -100,6 +104,7 @@ class MessageWriter(Protocol):
 
     def send(self, text: str) -> None: ...
     def send_newest(self, text: str) -> None: ...
+    def send_spare(self, text: str) -> None: ...
 
 
 class Peer(ABC):
@@ -225,6 +230,25 @@ class Peer(ABC):
         if "control" in self._writers and not self.ended:
             with self.contained("message out"):
                 self._writers["control"].send_newest(text)
+
+    def want_traces(self, wanted: bool) -> None:
+        """Begin or end noting which pictures are sent to it, and when."""
+        with self.contained("media"):
+            self._media.traces.want(wanted)
+
+    def take_traces(self, most: int) -> list[PictureTrace]:
+        """Return the newest pictures since the last call, `most` of each camera."""
+        try:
+            return self._media.traces.take(most)
+        except Exception as error:
+            self.failed("media", error)
+            return []
+
+    def send_spare(self, text: str) -> None:
+        """Send on the control channel unless something waits there: feedback comes first."""
+        if "control" in self._writers and not self.ended:
+            with self.contained("message out"):
+                self._writers["control"].send_spare(text)
 
     @property
     def round_trip(self) -> float:

@@ -12,6 +12,7 @@ from typing import Any, Protocol
 from lockstep.protocol.console import Quality, Report, StreamInfo, Tier
 from lockstep.server.auth.tokens import Identity
 from lockstep.server.errors import TransportRefused
+from lockstep.server.media.picture_traces import PictureTraces
 from lockstep.server.peers.channel_queue import ChannelQueue
 from lockstep.server.peers.channels import CHANNELS
 from lockstep.server.peers.peer import Peer, PeerHost, PeerLimits
@@ -159,6 +160,10 @@ class _LineWriter:
         self._outbox.put_newest(text)
         self._filled.set()
 
+    def send_spare(self, text: str) -> None:
+        if self._outbox.empty:
+            self.send(text)
+
     async def next(self) -> str:
         while (text := self._outbox.take()) is None:
             self._filled.clear()
@@ -174,6 +179,7 @@ class _NoMedia:
     loss: float | None = None
     queues = False
     round_trip_ms: float | None = None
+    traces = PictureTraces()
 
     @property
     def streams(self) -> list[StreamInfo]:

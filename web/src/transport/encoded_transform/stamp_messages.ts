@@ -29,7 +29,15 @@ export interface FrameNote {
   readonly rtpTimestamp: number;
   readonly mark: FrameMark;
   readonly dropped: boolean; // too old already or skipped; never decoded
+  readonly times: TransformTimes | null; // of a picture
   readonly packet: ArrayBuffer | null; // what the page decodes, without the trailer
+}
+
+/** When a frame passed the worker; ms since 1970 by the worker's clock. */
+export interface TransformTimes {
+  readonly receivedMs: number | null; // its last packet; null where the browser does not say
+  readonly enteredMs: number;
+  readonly leftMs: number;
 }
 
 export function isFrameNote(value: unknown): value is FrameNote {

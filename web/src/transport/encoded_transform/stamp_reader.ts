@@ -2,7 +2,13 @@ import { createArrivals, noteArrival, type Arrivals } from "../../gate/sound_bac
 import { createStampTable, noteMark, type StampTable } from "../../gate/stamp_table";
 import type { FrameMark } from "../../gate/gate_counters";
 import StampWorker from "./stamp_worker?worker&inline"; // a request of its own would cost a round trip
-import { isFrameNote, type SoundContext, type SoundSkip, type TransformOptions } from "./stamp_messages";
+import {
+  isFrameNote,
+  type SoundContext,
+  type SoundSkip,
+  type TransformOptions,
+  type TransformTimes,
+} from "./stamp_messages";
 
 const BOOK_LIMIT = 512; // frames; over 8 s of the fastest stream
 
@@ -12,6 +18,7 @@ export interface ReceiverStamps extends Arrivals {
   readonly packets: boolean; // its packets go to `onpacket`, not to the browser's decoder
   onstamp: (() => void) | null;
   onpacket: ((rtpTimestamp: number, packet: ArrayBuffer) => void) | null;
+  onframe: ((rtpTimestamp: number, times: TransformTimes) => void) | null; // of pictures, for their trace
 }
 
 function createStamps(packets: boolean): ReceiverStamps {
@@ -21,6 +28,7 @@ function createStamps(packets: boolean): ReceiverStamps {
     ...createArrivals(),
     onstamp: null,
     onpacket: null,
+    onframe: null,
   };
 }
 
@@ -91,6 +99,8 @@ export class StampReader {
   private note(data: unknown): void {
     if (!isFrameNote(data)) return;
     const stamps = this.receivers.get(data.receiver);
-    if (stamps !== undefined) notePacket(stamps, data.rtpTimestamp, data.mark, data.dropped, data.packet);
+    if (stamps === undefined) return;
+    if (data.times !== null) stamps.onframe?.(data.rtpTimestamp, data.times);
+    notePacket(stamps, data.rtpTimestamp, data.mark, data.dropped, data.packet);
   }
 }

@@ -4,11 +4,16 @@ import { judge } from "../../gate/media_gate";
 import type { FrameMark } from "../../gate/gate_counters";
 import { rtpGap } from "../../gate/sound_backlog";
 import { markOfTrailer, splitTrailer } from "../../gate/trailer";
-import type { FrameNote, SoundContext, SoundSkip, TransformOptions } from "./stamp_messages";
+import type { FrameNote, SoundContext, SoundSkip, TransformOptions, TransformTimes } from "./stamp_messages";
 
 interface EncodedFrame {
   data: ArrayBuffer;
-  getMetadata(): { rtpTimestamp?: number; senderCaptureTimeOffset?: number; captureTime?: number };
+  getMetadata(): {
+    rtpTimestamp?: number;
+    senderCaptureTimeOffset?: number;
+    captureTime?: number;
+    receiveTime?: number;
+  };
 }
 
 interface Transformer {
@@ -47,6 +52,7 @@ scope.onrtctransform = ({ transformer }) => {
 };
 
 function passes(frame: EncodedFrame, options: TransformOptions): boolean {
+  const enteredMs = performance.timeOrigin + performance.now();
   const metadata = frame.getMetadata();
   const mark = options.trailer ? takeTrailer(frame) : markOf(metadata);
   const dropped =
@@ -54,10 +60,20 @@ function passes(frame: EncodedFrame, options: TransformOptions): boolean {
   const packet = options.packets && !dropped ? frame.data : null;
   if (metadata.rtpTimestamp !== undefined) {
     const { receiver } = options;
-    const note = { receiver, rtpTimestamp: metadata.rtpTimestamp, mark, dropped, packet };
+    const times = options.kind === "video" ? timesOf(metadata.receiveTime, enteredMs) : null;
+    const note = { receiver, rtpTimestamp: metadata.rtpTimestamp, mark, dropped, times, packet };
     scope.postMessage(note, packet === null ? [] : [packet]);
   }
   return !dropped && packet === null;
+}
+
+/** `receiveTime` counts from this worker's own time origin. */
+function timesOf(receiveTime: number | undefined, enteredMs: number): TransformTimes {
+  return {
+    receivedMs: receiveTime === undefined ? null : performance.timeOrigin + receiveTime,
+    enteredMs,
+    leftMs: performance.timeOrigin + performance.now(),
+  };
 }
 
 /** `captureTime` counts from this worker's own time origin. */

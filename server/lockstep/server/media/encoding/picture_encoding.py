@@ -19,6 +19,7 @@ from lockstep.server.media.errors import MediaError
 from lockstep.server.media.metrics import DropCounter, MediaMetrics
 from lockstep.server.media.pipeline.frame import EncodedFrame
 from lockstep.server.media.pipeline.media_clock import PictureClock
+from lockstep.server.media.pipeline.picture_timing import PictureTiming
 from lockstep.server.media.pipeline.stage import SourceFrame
 from lockstep.server.media.quality.encoding_target import EncodingTarget
 
@@ -30,9 +31,12 @@ PACKETISE = {"H264": packetise_h264, "VP8": packetise_vp8}
 class SourcePicture:
     """A picture of the source, decoded and resized at most once for all encodings."""
 
-    def __init__(self, media: Media, capture_time: float, media_time: int, group: tuple[Media, ...] = ()) -> None:
-        """`group`: the pictures to decode for it, if it builds on others."""
+    def __init__(
+        self, media: Media, capture_time: float, media_time: int, group: tuple[Media, ...] = (), arrived: float = 0.0
+    ) -> None:
+        """`group`: the pictures to decode for it, if it builds on others. `arrived`: s, on the monotonic clock."""
         self.media = media
+        self.arrived = arrived
         self._group = group
         self.capture_time = capture_time
         self.media_time = media_time
@@ -130,7 +134,7 @@ class PictureQueue:
         self._began, self._others_served = now, 0
         due = [each for each in self._encodings.own if self._is_due(each, media.time, now)]
         group = self._group.take() if media.codec == "h264" and due else ()
-        self._source = SourcePicture(media, capture_time, self._clock.timestamp(media.time), group)
+        self._source = SourcePicture(media, capture_time, self._clock.timestamp(media.time), group, now)
         self._taken.inc(bool(due))
         self._orders = sorted(due, key=lambda each: (each.tier != "operator", each.encoded_at))
 
@@ -168,7 +172,7 @@ class TierEncoders:
         if not self._encoders.keys() <= job.needed:
             self._encoders = {each: encoder for each, encoder in self._encoders.items() if each in job.needed}
             self._count_encoders()
-        started = time.perf_counter()
+        started = time.monotonic()
         encoding, source = job.encoding, job.source
         try:
             encoder = self._encoder(encoding, job.plan)
@@ -176,6 +180,7 @@ class TierEncoders:
             encoded = encoder.encode(frame, source.media_time, job.keyframe)
         except MediaError as error:
             return [Encoded(encoding, (), error=error)]
+        finished = time.monotonic()
         packed = EncodedFrame(
             encoded.data,
             PACKETISE[encoding.codec],
@@ -188,7 +193,9 @@ class TierEncoders:
         )
         for trailer in job.variants:
             packed.payloads(trailer)
-        return [Encoded(encoding, (packed,), time.perf_counter() - started)]
+        ended = time.monotonic()
+        packed.timing = PictureTiming(source.media.spans, source.arrived, started, finished, ended)
+        return [Encoded(encoding, (packed,), ended - started)]
 
     def _encoder(self, encoding: TierEncoding, plan: EncodingTarget) -> PictureEncoder:
         encoder = self._encoders.get(encoding)

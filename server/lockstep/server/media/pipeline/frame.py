@@ -3,6 +3,7 @@
 from collections.abc import Callable
 
 from lockstep.protocol.carriers import append_trailer
+from lockstep.server.media.pipeline.picture_timing import PictureTiming
 
 __all__ = ["EncodedFrame", "frame_trailer"]
 
@@ -42,6 +43,7 @@ class EncodedFrame:
         "media_time",
         "stamp",
         "time",
+        "timing",
     )
 
     def __init__(
@@ -55,6 +57,7 @@ class EncodedFrame:
         capture_time: float,
         media_time: int,
         time: float = 0.0,
+        timing: PictureTiming | None = None,
     ) -> None:
         self.data = data
         self.keyframe = keyframe  # decodable without earlier frames; always so for sound
@@ -63,6 +66,7 @@ class EncodedFrame:
         self.capture_time = capture_time  # s since 1970
         self.media_time = media_time  # in the codec's RTP clock, from 0
         self.time = time  # s, at capture, on the monotonic clock of the source
+        self.timing = timing  # of a picture; None: not measured
         self._packetise = packetise
         self._plain: list[bytes] | None = None
         self._with_trailer: list[bytes] | None = None

@@ -8,6 +8,7 @@
 | VP8, or H.264 of a smaller profile | the console's encoding |
 """
 
+import time
 from collections import deque
 
 from lockstep.protocol.messages import Media
@@ -20,6 +21,7 @@ from lockstep.server.media.errors import PayloadError
 from lockstep.server.media.metrics import DropCounter
 from lockstep.server.media.pipeline.frame import EncodedFrame
 from lockstep.server.media.pipeline.media_clock import PictureClock
+from lockstep.server.media.pipeline.picture_timing import PictureTiming
 from lockstep.server.media.pipeline.stage import FrameStage, SourceFrame
 from lockstep.server.media.subscription import Subscription
 
@@ -77,7 +79,10 @@ class Passthrough(FrameStage):
             media_time=self._clock.timestamp(media.time),
             time=media.time,
         )
-        if encoded.payloads(trailer=False):
+        whole = bool(encoded.payloads(trailer=False))
+        at = frame.arrived_at  # nothing is encoded here: from its arrival on it is being packetised
+        encoded.timing = PictureTiming(media.spans, at, at, at, time.monotonic())
+        if whole:
             self.following.encoded(encoded, self._passed)
         else:
             self._dropped.count(PayloadError.name)

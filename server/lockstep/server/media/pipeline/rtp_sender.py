@@ -56,6 +56,12 @@ class RtpSender:
         """True while part of the last frame waits for the pacer."""
         return self._connection.peer.holds_back(self._mid)
 
+    @property
+    def rtp_time(self) -> int:
+        """RTP timestamp of the last frame's packets; 0 without a stream."""
+        stream = self._stream
+        return 0 if stream is None else (stream.parameters.timestamp_offset + self._media_time) & 0xFFFFFFFF
+
     def transmit(self, frame: EncodedFrame) -> tuple[int, int] | None:
         """Send a frame and return its packets and payload bytes; None, nothing sent, while the network is blocked."""
         if self._connection.is_blocked:

@@ -12,6 +12,7 @@ from lockstep.protocol.actions import ActionReason, ActionState, ParameterValue,
 from lockstep.protocol.console import Participant, Report
 from lockstep.protocol.description import RobotDescription
 from lockstep.protocol.messages import EventReference, RefusalReason, StopState
+from lockstep.protocol.trace import CommandSpans, PictureSpans
 
 __all__ = [
     "OWN_RECORDS",
@@ -31,6 +32,7 @@ __all__ = [
     "SignatureRecord",
     "StatusRecord",
     "StopRecord",
+    "TraceRecord",
     "Vector",
     "Whole",
     "WrenchRecord",
@@ -166,6 +168,16 @@ class ReportRecord(OwnRecord, frozen=True, kw_only=True):
     report: Report
 
 
+class TraceRecord(OwnRecord, frozen=True, kw_only=True):
+    """Where the time of `event` went (docs/traces.md). Several records of an event complete each other."""
+
+    peer: str = ""  # whose client has measured it; "": bridge and console
+    name: str = ""
+    command: CommandSpans = CommandSpans()
+    stream: str = ""  # camera of the picture; "": there is no picture in this record
+    picture: PictureSpans = PictureSpans()  # of the first picture of this camera that is stamped with the event
+
+
 class NoteRecord(OwnRecord, frozen=True, kw_only=True):
     """What somebody wrote to everyone."""
 
@@ -222,6 +234,7 @@ OWN_RECORDS: dict[str, type[OwnRecord]] = {
     "lockstep.Status": StatusRecord,
     "lockstep.Participants": ParticipantsRecord,
     "lockstep.Report": ReportRecord,
+    "lockstep.Trace": TraceRecord,
     "lockstep.Note": NoteRecord,
     "lockstep.Degraded": Degraded,
     "lockstep.Wrench": WrenchRecord,

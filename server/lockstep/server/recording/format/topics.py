@@ -33,6 +33,7 @@ from lockstep.server.recording.format.records import (
     SignatureRecord,
     StatusRecord,
     StopRecord,
+    TraceRecord,
     WrenchRecord,
 )
 
@@ -73,6 +74,7 @@ OWN_TOPICS: dict[type[OwnRecord], str] = {
     StatusRecord: "/lockstep/status",
     ParticipantsRecord: "/lockstep/participants",
     ReportRecord: "/lockstep/report",
+    TraceRecord: "/lockstep/trace",
     NoteRecord: "/lockstep/note",
     Degraded: "/lockstep/degraded",
     WrenchRecord: "/wrench",

@@ -8,6 +8,7 @@ from matplotlib.axes import Axes
 
 from lockstep.server.recording.report.drawing import BAD, BAND, FAINT, MEDIUM, ROBOT, STYLE, new_figure, svg_text
 from lockstep.server.recording.report.session import Series, Session, Shown
+from lockstep.server.recording.report.way_figures import slowest_table, ways_svg
 
 __all__ = ["Figure", "session_figures"]
 
@@ -19,6 +20,7 @@ class Figure(NamedTuple):
     title: str
     words: str
     svg: str
+    below: str = ""  # HTML that belongs to it
 
 
 class Panel(NamedTuple):
@@ -47,6 +49,8 @@ def session_figures(session: Session) -> list[Figure]:
     for stream, shown in session.streams.items():
         found.append(_stream_figure(session, stream, shown))
     found.append(_delays(session))
+    if (ways := _ways(session)) is not None:
+        found.append(ways)
     if session.force.values:
         found.append(_force(session))
     found.append(_axes(session))
@@ -81,6 +85,20 @@ def _delays(session: Session) -> Figure:
         ]
     ]
     return _figure(session, "delays", "Delays", "Each by one clock alone.", rows)
+
+
+def _ways(session: Session) -> Figure | None:
+    traced = session.traced
+    shown = [each for each in ("", *traced.streams) if traced.of(each)]
+    if not shown:
+        return None
+    words = (
+        "Of each short time the slowest event, from the stick to the feedback and from the capture to the canvas. "
+        "Each part is measured on one machine's own clock; network is what is left of the whole round. What the "
+        "operator's page has measured is known of the slowest events, and of its large view."
+    )
+    tables = "".join(slowest_table(traced, each) for each in shown)
+    return Figure("ways", "Where each millisecond went", words, ways_svg(traced, shown, session.seconds), tables)
 
 
 def _force(session: Session) -> Figure:

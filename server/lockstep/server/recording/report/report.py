@@ -38,7 +38,7 @@ def _page(recording: Path, session: Session, verdict: Verdict, figures: list[Fig
         f"</header><main>{_promises(verdict)}",
         *(
             f"<section id='{_text(each.name)}'><h2>{_text(each.title)}</h2><p class='quiet'>{_text(each.words)}</p>"
-            f"{each.svg}</section>"
+            f"{each.svg}{each.below}</section>"
             for each in figures
         ),
         "</main></body></html>",

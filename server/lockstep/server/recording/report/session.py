@@ -7,11 +7,12 @@ from pathlib import Path
 from lockstep.protocol.description import RobotDescription
 from lockstep.server.recording.format.info import RecordingInfo
 from lockstep.server.recording.format.payload import own_record_of
-from lockstep.server.recording.format.records import CommandRecord, FeedbackRecord, ReportRecord
+from lockstep.server.recording.format.records import CommandRecord, FeedbackRecord, ReportRecord, TraceRecord
 from lockstep.server.recording.format.topics import stream_of
 from lockstep.server.recording.reading.bookmarks import Mark
 from lockstep.server.recording.reading.event_rows import EventRow, event_rows
 from lockstep.server.recording.reading.reader import RecordingReader
+from lockstep.server.recording.report.traced_events import TracedEvents
 
 __all__ = ["Series", "Session", "Shown", "read_session"]
 
@@ -57,6 +58,7 @@ class Session:
     force: Series = field(default_factory=Series)  # N
     commanded: dict[str, Series] = field(default_factory=dict)  # by axis
     measured: dict[str, Series] = field(default_factory=dict)
+    traced: TracedEvents = field(default_factory=TracedEvents)  # where the time of each event went
 
 
 def read_session(path: Path) -> Session:
@@ -90,6 +92,8 @@ def read_session(path: Path) -> Session:
                     sent = {event: record.arrived}  # never more than one is on its way
                 case FeedbackRecord(event=event) if event in sent:
                     session.answered.add(at, (record.arrived - sent.pop(event)) / 1e6)
+                case TraceRecord() as trace:
+                    session.traced.add(trace, at)
                 case ReportRecord() as report:
                     _take_report(session, report, at)
         return session

@@ -26,6 +26,7 @@ from lockstep.server.recording.format.records import (
 )
 from lockstep.server.recording.times import LinkTimes, RecordClock
 from lockstep.server.recording.writing.queue_items import FeedbackItem, Item, MediaItem, OwnItem, RobotItem
+from lockstep.server.recording.writing.trace_records import TraceRecords
 from lockstep.server.session_events import (
     ActionAsked,
     ActionCancelled,
@@ -86,10 +87,12 @@ class SessionRecords:
         self._seat = Seat()
         self._participants = Participants(participants=[])
         self._queue: ItemQueue | None = None  # None: nothing is recorded
+        self._traces = TraceRecords(clock, self._put_own)
 
     def begin(self, queue: ItemQueue, times: RecordClock) -> None:
         """Put everything into `queue` from now on, first the state that holds."""
         self._queue, self._times = queue, times
+        self._traces.records = True
         self._put_own(self._participants_record(self._participants))
         self._put_own(self._seat_record(self._seat))
         if self._clock.feedback is not None:
@@ -99,6 +102,7 @@ class SessionRecords:
 
     def end(self) -> None:
         self._queue = None
+        self._traces.records = False
 
     def subscribe(self, events: SessionEvents) -> None:
         events.subscribe(LinkUp, self._link_changed)
@@ -120,6 +124,7 @@ class SessionRecords:
         events.subscribe(ActionCancelled, self._action_cancelled)
         events.subscribe(ActionUpdated, self._action_updated)
         events.subscribe(StatusReceived, self._status_received)
+        self._traces.subscribe(events)
 
     def _link_changed(self, event: LinkUp | LinkDown) -> None:
         state = event.state
@@ -296,6 +301,7 @@ class SessionRecords:
                 frame.data,
             )
         )
+        self._traces.take_frame(stream, frame)
 
     def _now(self) -> _Now:
         return {"epoch": self._clock.epoch, "event": self._clock.event}

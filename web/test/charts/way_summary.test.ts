@@ -1,0 +1,38 @@
+import { describe, expect, it } from "vitest";
+import { commandSummary, pictureSummary } from "../../src/charts/way_summary";
+import { TraceBook } from "../../src/engine/trace_book";
+
+function bookOf(decodes: readonly number[]): TraceBook {
+  const book = new TraceBook();
+  decodes.forEach((decode_ms, at) => {
+    const spans = { camera_wait_ms: 50, capture_ms: 1, decode_ms };
+    book.pictures.add({ stream: "front", stamp: at + 1, atMs: 1000 * (at + 1), spans });
+  });
+  return book;
+}
+
+describe("a stacked bar", () => {
+  it("has the median of every part that was measured, in the order of the way", () => {
+    const summary = pictureSummary(bookOf([2, 3, 40]), "front", 0, 9000);
+    expect(summary?.parts.map(({ name, medianMs }) => [name, medianMs])).toEqual([
+      ["capture_ms", 1],
+      ["decode_ms", 3],
+    ]);
+    expect(summary?.totalMs).toBe(4);
+  });
+
+  it("names the slowest event and its longest part", () => {
+    const summary = pictureSummary(bookOf([2, 40, 3]), "front", 0, 9000);
+    expect(summary?.slowest).toEqual({ event: 2, totalMs: 41, name: "decode_ms", ms: 40 });
+  });
+
+  it("covers the time that is shown alone, and one camera alone", () => {
+    expect(pictureSummary(bookOf([2, 3, 40]), "front", 1500, 2500)?.count).toBe(1);
+    expect(pictureSummary(bookOf([2]), "overview", 0, 9000)).toBeNull();
+  });
+
+  it("does not exist without a trace", () => {
+    expect(pictureSummary(new TraceBook(), "front", 0, 9000)).toBeNull();
+    expect(commandSummary(new TraceBook(), 0, 9000)).toBeNull();
+  });
+});
