@@ -19,7 +19,9 @@ PARTS = {
     "bench": {"protocol", "rtc", "robot_bridge", "client", "server", "emulator"},
 }
 # Of the bridge the console has the link's client, the commands, and what a bridge beside it says when it cannot start.
-FROM_THE_BRIDGE = {"link", "cli", "conformance", "description", "errors", "robots", "stop", "thread_name", "watchdog"}
+FROM_THE_BRIDGE = {
+    "link", "cli", "conformance", "description", "encoding", "errors", "robots", "stop", "thread_name", "watchdog"
+}  # fmt: skip
 # The console's folders and files, from the bottom to the top: each imports those before it.
 LAYERS = (
     "errors", "event_clock", "util", "telemetry", "evidence", "audit", "stop", "session_events", "webrtc", "media",

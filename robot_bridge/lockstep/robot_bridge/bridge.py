@@ -17,6 +17,7 @@ from lockstep.robot_bridge.control.limits.motion_limits import MotionLimits
 from lockstep.robot_bridge.control.tick_loop import TickLoop
 from lockstep.robot_bridge.counters import BridgeCounters
 from lockstep.robot_bridge.description.check_description import check_description
+from lockstep.robot_bridge.encoding.media_encoding import MediaEncoding
 from lockstep.robot_bridge.errors import RobotFailed, named
 from lockstep.robot_bridge.event_log import EventLog
 from lockstep.robot_bridge.link.check_link import check_link
@@ -86,6 +87,9 @@ class Bridge:
             *(robot, description, self._core, shaper, limits, self._watchdogs),
             *(self._stops, self._feedback, refusals, counters, self._log, now),
         )
+        encoding = None
+        if settings.encode is not None:
+            encoding = MediaEncoding(settings.encode, description, counters.left_out)
         self._links = LinkServer(
             executor,
             description,
@@ -97,13 +101,16 @@ class Bridge:
             addresses_file=None if settings.state_dir is None else settings.state_dir / ADDRESSES_FILE,
             secret=settings.secret,
             tls=None if settings.tls is None else settings.tls.bridge_context(),
+            encoding=encoding,
         )
         self._ticks = TickLoop(
             *(robot, description.hold, shaper, executor, self._stops),
             *(self._watchdogs, self._liveness, self._links, counters, now),
         )
         self._sources = MediaSources(
-            *(robot, self._core, self._feedback, self._links, counters, self._log), event_strip=settings.event_strip
+            *(robot, self._core, self._feedback, self._links, counters, self._log),
+            event_strip=settings.event_strip,
+            encoding=encoding,
         )
         self._running: asyncio.Task[None] | None = None
         self._closed = False
@@ -252,7 +259,7 @@ class Bridge:
         counters = self.counters
         _logger.info(
             "event %d, executed %d, issued %d, media %d, skipped ticks %d, stalls %d, limits %s, refusals %s, "
-            "bad input %s, drops %s, endings %s",
+            "bad input %s, drops %s, left out %s, endings %s",
             self._core.current,
             counters.executed,
             counters.issued,
@@ -263,6 +270,7 @@ class Bridge:
             dict(counters.refusals),
             dict(counters.bad_input),
             dict(self.drops),
+            dict(counters.left_out),
             dict(counters.endings),
         )
 

@@ -19,6 +19,7 @@ from lockstep.protocol.messages import (
     PROTOCOL_VERSION,
     Challenge,
     Command,
+    EncodeRequest,
     EventNotice,
     Feedback,
     Goodbye,
@@ -53,7 +54,7 @@ OWN_STALL = 0.5  # s between two ticks; more means that this side did not look, 
 FROM_CLIENT: dict[LinkRole, tuple[type[LinkMessage], ...]] = {
     "operator": (Command, Rest, Stop, Reset),
     "events": (Stop,),
-    "media": (Stop,),
+    "media": (Stop, EncodeRequest),
 }
 FROM_ROBOT: dict[LinkRole, tuple[type[LinkMessage], ...]] = {
     "operator": (Feedback, Refusal, StopTaken),
