@@ -16,6 +16,7 @@ from lockstep.server.media.uplink.uplink_estimator import UplinkEstimator
 __all__ = ["RobotEncoding"]
 
 TICK = 0.1  # s
+SOUND_BPS = 80_000.0  # of a microphone's Opus, with the messages around it
 REPEAT = 1.0  # s; the bridge of a link that came back knows nothing of what was asked before
 STEP = 0.06  # of the bitrate, below which a change is not worth a message
 UNWATCHED = EncodingTarget(50_000, 1.0)  # of a camera that nobody takes: enough to know that it gives pictures
@@ -44,6 +45,7 @@ class RobotEncoding:
         self._clock = clock
         self._ask: Callable[[EncodeRequest], bool] = lambda request: False
         self._cameras: list[_Camera] = []
+        self._sounds = 0  # microphones
         self._uplink = self._new_uplink()
         self._told_at = float("-inf")
 
@@ -53,7 +55,9 @@ class RobotEncoding:
 
     def configure(self, streams: Iterable[Stream]) -> None:
         """Take the robot's streams; once per epoch."""
-        self._cameras = [_Camera(stream) for stream in streams if isinstance(stream, VideoStream)]
+        given = list(streams)
+        self._cameras = [_Camera(stream) for stream in given if isinstance(stream, VideoStream)]
+        self._sounds = len(given) - len(self._cameras)
         self._uplink = self._new_uplink()
         for camera in self._cameras:
             camera.stream.passthrough.ask_by(self._keyframe_asker(camera))
@@ -97,7 +101,8 @@ class RobotEncoding:
             width, height = camera.stream.first_size
             pixels = width * height * camera.stream.frame_rate
             needs.append(CameraNeed(pixels, float(self._planned_bps(camera.stream))))
-        shares = dict(zip(map(id, taken), share_out(self._uplink.rate, needs), strict=True))
+        total = max(0.0, self._uplink.rate - self._sounds * SOUND_BPS)
+        shares = dict(zip(map(id, taken), share_out(total, needs), strict=True))
         targets = []
         for camera in self._cameras:
             share = shares.get(id(camera))

@@ -5,8 +5,8 @@ sides differ by an unknown offset; the medium that waited least shows it.
 
 | sign | rate |
 |---|---|
-| all media of half a second waited for more than 0.12 s | 85 % of what arrived meanwhile; then no change for a while |
-| some medium waited for less than 0.05 s, and the rate is used | up by 35 % a second until the first limit, then 8 % |
+| all media of half a second waited for more than 0.12 s | 85 % of what arrived, less until the queue is empty |
+| some medium waited for less than 0.05 s, and the rate is used | up by 35 % a second, beyond the last limit by 8 % |
 """
 
 from collections import deque
@@ -21,8 +21,9 @@ LEAST_SPAN = 0.1  # s between arrivals from which a rate can be told
 STANDING, EMPTY = 0.12, 0.05  # s that the least delayed medium waited
 CUT, DEEPEST = 0.85, 0.5
 FAST, SLOW = 1.35, 1.08  # a second
-USED = 0.6  # of the rate
-HOLD = 0.5  # s after a decrease, and the time that the queue needs to drain
+USED = 0.75  # of the rate
+HOLD = 0.5  # s after a decrease, besides the time that media waited
+HEADER = 180  # bytes of a message besides its payload, TCP's and IP's share included
 LIMITED_SECONDS = 60.0  # a path that was once too full counts as limited for so long
 
 
@@ -43,6 +44,7 @@ class UplinkEstimator:
         self._hold_until = 0.0
         self._decided_at: float | None = None
         self._limited_at: float | None = None  # time of the last decrease
+        self._limit = float("inf")  # bits per second that the path carried then, and a margin off
 
     def arrived(self, captured: float, now: float, size: int) -> None:
         """Take a medium of `size` bytes, captured at `captured` by the robot's clock."""
@@ -52,7 +54,7 @@ class UplinkEstimator:
         elif now - self._window_start >= BASE_SECONDS:
             self._window_start, self._previous, self._current = now, self._current, float("inf")
         self._current = min(self._current, offset)
-        self._arrivals.append((now, offset - min(self._current, self._previous), 8 * size))
+        self._arrivals.append((now, offset - min(self._current, self._previous), 8 * (size + HEADER)))
         while len(self._arrivals) > MOST_ARRIVALS or now - self._arrivals[0][0] > RATE_SECONDS:
             self._arrivals.popleft()
 
@@ -75,11 +77,12 @@ class UplinkEstimator:
         received = self._received()
         if waits > STANDING:
             carried = self.rate if received is None else min(self.rate, received)
-            self.rate = max(self._least_bps, DEEPEST * self.rate, CUT * carried)
+            self._limit = max(self._least_bps, CUT * carried)
+            self.rate = max(self._least_bps, DEEPEST * self.rate, self._limit * (1 - min(DEEPEST, waits)))
             self._hold_until = now + HOLD + waits
             self._limited_at = now
         elif waits < EMPTY and received is not None and received >= USED * self.rate:
-            growth = FAST if self._limited_at is None else SLOW
+            growth = FAST if self.rate < self._limit else SLOW
             self.rate *= growth**passed
         self.rate = min(self.rate, self.most_bps)
 
