@@ -21,8 +21,8 @@ PARTS = {
 # Of the bridge the console has the link's client, the commands, what a bridge beside it says when it cannot start, and
 # how a process reports to its service manager.
 FROM_THE_BRIDGE = {
-    *("link", "cli", "conformance", "description", "errors", "robots", "service_manager", "stop", "thread_name"),
-    "watchdog",
+    *("link", "cli", "conformance", "description", "encoding", "errors", "robots", "service_manager", "stop"),
+    *("thread_name", "watchdog"),
 }
 # The console's folders and files, from the bottom to the top: each imports those before it.
 LAYERS = (

@@ -114,6 +114,10 @@ async def test_a_bridge_alone_runs_a_robot_of_ones_own(wheels: dict[str, Path], 
     assert " up " not in said
     (tmp_path / "still.py").write_text(STILL)
     command = (str(programs / "lockstep"), "robot", "still:Still", "--port", "0", "--json", "--state-dir", "state")
+    refused = await asyncio.to_thread(
+        subprocess.run, [*command, "--encode", "h264"], cwd=tmp_path, capture_output=True, text=True
+    )
+    assert (refused.returncode, "lockstep-bridge[encode]" in refused.stderr) == (2, True), refused.stderr
     process = await asyncio.create_subprocess_exec(*command, cwd=tmp_path, stdout=asyncio.subprocess.PIPE)
     try:
         assert process.stdout is not None

@@ -20,6 +20,7 @@ __all__ = [
     "PROTOCOL_VERSION",
     "Challenge",
     "Command",
+    "EncodeRequest",
     "EventNotice",
     "EventReference",
     "Feedback",
@@ -40,6 +41,7 @@ __all__ = [
     "Stop",
     "StopState",
     "StopTaken",
+    "StreamRequest",
     "decode_message",
     "encode_message",
     "plain_feedback",
@@ -51,6 +53,8 @@ MAX_AXES = 256
 MAX_RAYS = 4096  # of a range ring
 MAX_FAULTS = 64
 MAX_LIMITS = 512
+MAX_STREAMS = 32  # cameras and microphones of a robot
+MAX_BITRATE = 100_000_000  # bit/s that may be asked for
 
 EventReference = Annotated[int, msgspec.Meta(ge=1, le=MAX_EVENT)]
 IssueNumber = Annotated[int, msgspec.Meta(ge=1, le=2**53 - 1)]  # a JavaScript number holds these exactly
@@ -64,7 +68,7 @@ StopNumber = Annotated[int, msgspec.Meta(ge=0, le=2**53 - 1)]
 Nonce = Annotated[int, msgspec.Meta(ge=0, le=2**53 - 1)]
 
 LinkRole = Literal["robot", "operator", "events", "media"]
-MediaCodec = Literal["yuv420p", "mjpeg", "h264", "pcm_s16le"]
+MediaCodec = Literal["yuv420p", "mjpeg", "h264", "pcm_s16le", "opus"]
 
 RefusalReason = Literal[
     "late",  # answers a feedback issued longer than max_event_age ago, or an issue the bridge no longer knows
@@ -116,6 +120,7 @@ class Hello(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", tag="he
     description: RobotDescription | None = None  # only the bridge sets it
     nonce: Proof = b""  # 32 random bytes of a client that knows the secret; else empty
     proof: Proof = b""  # that the sender knows the secret, for the nonces of both sides; else empty
+    encodes: Annotated[list[Text], msgspec.Meta(max_length=8)] = []  # codecs that the bridge encodes and is asked for
 
 
 class Challenge(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", tag="challenge"):
@@ -195,6 +200,22 @@ class Media(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", tag="me
     spans: PictureSpans | msgspec.UnsetType = msgspec.UNSET  # the bridge's own, of a picture; optional
 
 
+class StreamRequest(msgspec.Struct, frozen=True, kw_only=True):
+    """How a bridge that encodes should encode one stream."""
+
+    stream: Text
+    bitrate: Annotated[int, msgspec.Meta(ge=0, le=MAX_BITRATE)] = 0  # bit/s at most; 0: as the bridge likes
+    frame_rate: Annotated[float, msgspec.Meta(ge=0, le=240)] = 0.0  # pictures/s at most; 0: all
+    scale: Annotated[float, msgspec.Meta(gt=0, le=1)] = 1.0  # of both sides of the camera's own pictures
+    keyframes: Annotated[int, msgspec.Meta(ge=0, le=2**53 - 1)] = 0  # keyframes asked for so far on this link
+
+
+class EncodeRequest(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", tag="encode"):
+    """What a client of role `media` asks of a bridge that encodes. The newest message on a link replaces all before."""
+
+    streams: Annotated[list[StreamRequest], msgspec.Meta(max_length=MAX_STREAMS)]
+
+
 class Rest(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", tag="rest"):
     """Bring the axes to rest unless an event newer than `event` was executed; voids moving commands up to `event`."""
 
@@ -248,6 +269,7 @@ _WithoutFeedback = (
     | Refusal
     | EventNotice
     | Media
+    | EncodeRequest
     | Rest
     | Stop
     | StopTaken

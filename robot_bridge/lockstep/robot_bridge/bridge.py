@@ -19,6 +19,7 @@ from lockstep.robot_bridge.control.tick_alarm import TickAlarm
 from lockstep.robot_bridge.control.tick_loop import TickLoop
 from lockstep.robot_bridge.counters import BridgeCounters
 from lockstep.robot_bridge.description.check_description import check_description
+from lockstep.robot_bridge.encoding.media_encoding import MediaEncoding
 from lockstep.robot_bridge.errors import RobotFailed, named
 from lockstep.robot_bridge.event_log import EventLog
 from lockstep.robot_bridge.link.check_link import check_link
@@ -96,6 +97,9 @@ class Bridge:
             log=self._log,
             now=now,
         )
+        encoding = None
+        if settings.encode is not None:
+            encoding = MediaEncoding(settings.encode, description, counters.left_out)
         self._links = LinkServer(
             executor,
             description,
@@ -107,6 +111,7 @@ class Bridge:
             addresses_file=None if settings.state_dir is None else settings.state_dir / ADDRESSES_FILE,
             secret=settings.secret,
             tls=None if settings.tls is None else settings.tls.bridge_context(),
+            encoding=encoding,
         )
         self._ticks = TickLoop(
             *(robot, description.hold, shaper, executor, self._stops),
@@ -114,7 +119,9 @@ class Bridge:
             now,
         )
         self._sources = MediaSources(
-            *(robot, self._core, self._feedback, self._links, counters, self._log), event_strip=settings.event_strip
+            *(robot, self._core, self._feedback, self._links, counters, self._log),
+            event_strip=settings.event_strip,
+            encoding=encoding,
         )
         self._running: asyncio.Task[None] | None = None
         self._closed = False
@@ -263,7 +270,7 @@ class Bridge:
         counters = self.counters
         _logger.info(
             "event %d, executed %d, issued %d, media %d, skipped ticks %d, stalls %d, limits %s, refusals %s, "
-            "bad input %s, drops %s, endings %s",
+            "bad input %s, drops %s, left out %s, endings %s",
             self._core.current,
             counters.executed,
             counters.issued,
@@ -274,6 +281,7 @@ class Bridge:
             dict(counters.refusals),
             dict(counters.bad_input),
             dict(self.drops),
+            dict(counters.left_out),
             dict(counters.endings),
         )
 

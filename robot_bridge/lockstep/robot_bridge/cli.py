@@ -19,10 +19,12 @@ import uvloop
 from lockstep.protocol.errors import SecretError
 from lockstep.protocol.link_secret import LinkSecret
 from lockstep.robot_bridge.bridge import Bridge
+from lockstep.robot_bridge.encoding.encoder_choice import ENCODERS, encode_settings
 from lockstep.robot_bridge.errors import (
     BadRobot,
     BridgeError,
     DescriptionError,
+    EncoderMissing,
     InsecureLink,
     ModelError,
     SettingsError,
@@ -45,7 +47,16 @@ SECRET_VARIABLE = "LOCKSTEP_LINK_SECRET"
 EXIT_FAILED = 1
 EXIT_USAGE = 2
 # A retry does not help against these errors; it may against the others, such as a robot that is not switched on yet.
-CANNOT_BE_MEANT = (UnknownRobot, BadRobot, SettingsError, ModelError, DescriptionError, InsecureLink, SecretError)
+CANNOT_BE_MEANT = (
+    UnknownRobot,
+    BadRobot,
+    SettingsError,
+    ModelError,
+    DescriptionError,
+    EncoderMissing,
+    InsecureLink,
+    SecretError,
+)
 
 _logger = logging.getLogger(__name__)
 
@@ -108,6 +119,13 @@ def run(
     event_strip: Annotated[
         bool, typer.Option(help="Draw the event's number into each picture, for tests and measurements.")
     ] = False,
+    encode: Annotated[
+        str | None,
+        typer.Option(
+            help=f"Encode pictures to H.264 here, for a narrow uplink: {', '.join(ENCODERS)}. Needs "
+            "lockstep-bridge[encode]. Default: send them as the cameras give them."
+        ),
+    ] = None,
     operator_grace: Annotated[
         float,
         typer.Option(min=0, help="Seconds for which the bridge keeps the robot for a console whose link broke."),
@@ -139,6 +157,7 @@ def run(
             insecure=insecure_link,
             operator_grace=operator_grace,
             event_strip=event_strip,
+            encode=None if encode is None else encode_settings(encode),
         )
         _warn_of_state(place)
         check_link(settings)  # before the robot is made, which can take long

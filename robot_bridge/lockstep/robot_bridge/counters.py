@@ -14,6 +14,7 @@ class BridgeCounters:
     issued: int = 0  # feedback issued, refreshes included
     media: int = 0  # pictures and segments captured
     skipped_ticks: int = 0  # the loop was blocked for longer than could be caught up
+    left_out: Counter[str] = field(default_factory=Counter)  # pictures that were not encoded, {"link_busy": 4}
     stalls: int = 0  # the ticks were held up for longer than the watchdog allows; the robot came to rest
     watchdog: int = 0  # stalls in which a watchdog beside the loop brought the robot to rest
     actions: Counter[str] = field(default_factory=Counter)  # begun and ended, by state, {"done": 1}

@@ -6,6 +6,8 @@ BridgeError
 ├── BadRobot                the named class does not make a robot
 ├── SettingsError           a settings file cannot be used; names its line and key
 ├── ModelError              a MuJoCo model cannot be driven
+├── EncoderMissing          pictures are to be encoded, and PyAV is not installed
+├── EncodingFailed          a picture could not be encoded; the stream goes on
 ├── DescriptionError        the robot's description contradicts itself
 ├── BadParameter            a request for an action has a parameter that the action does not take
 ├── ListenError             the bridge cannot listen on the address
@@ -20,6 +22,8 @@ __all__ = [
     "BadRobot",
     "BridgeError",
     "DescriptionError",
+    "EncoderMissing",
+    "EncodingFailed",
     "InsecureLink",
     "ListenError",
     "ModelError",
@@ -73,6 +77,14 @@ class SettingsError(BridgeError):
 
 class ModelError(BridgeError):
     name = "model"
+
+
+class EncoderMissing(BridgeError):
+    name = "encoder_missing"
+
+
+class EncodingFailed(BridgeError):
+    name = "encoding_failed"
 
 
 class DescriptionError(BridgeError):

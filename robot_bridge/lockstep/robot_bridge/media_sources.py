@@ -13,6 +13,7 @@ from lockstep.robot_bridge.control.event_core import EventCore
 from lockstep.robot_bridge.control.event_times import EventTimes
 from lockstep.robot_bridge.control.feedback_issuer import FeedbackIssuer
 from lockstep.robot_bridge.counters import BridgeCounters
+from lockstep.robot_bridge.encoding.media_encoding import MediaEncoding
 from lockstep.robot_bridge.event_log import EventLog
 from lockstep.robot_bridge.link.link_server import LinkServer
 from lockstep.robot_bridge.robots.base import MediaSource, Robot, Stamp
@@ -35,8 +36,9 @@ class MediaSources:
         log: EventLog,
         *,
         event_strip: bool,
+        encoding: MediaEncoding | None = None,
     ) -> None:
-        """`event_strip`: draw the event into pictures, for measurements."""
+        """`event_strip`: draw the event into pictures, for measurements. `encoding`: encodes; None: nothing does."""
         self._robot = robot
         self._times = feedback.times
         self._stamper = _Stamper(core, feedback.times)
@@ -45,6 +47,9 @@ class MediaSources:
         self._counters = counters
         self._log = log
         self._mark = _marker() if event_strip else None
+        self._encoding = encoding
+        if encoding is not None:
+            encoding.send_to(links)
 
     async def run(self) -> None:
         """Run the sources until cancelled, or until all have ended."""
@@ -54,6 +59,8 @@ class MediaSources:
             self._failed(error)
             return
         async with asyncio.TaskGroup() as group:
+            if self._encoding is not None:
+                group.create_task(self._encoding.run())
             for source in sources:
                 group.create_task(self._run(source))
 
@@ -77,7 +84,11 @@ class MediaSources:
         self._log.record("media", media.stamp, stream=media.stream, captured=media.time)
         if media.codec != "pcm_s16le":
             media = with_spans(media, self._times.began(media.stamp), time.monotonic())
-        self._links.publish_media(media if self._mark is None else self._mark(media))
+        marked = media if self._mark is None else self._mark(media)
+        if self._encoding is None:
+            self._links.publish_media(marked)
+        else:
+            self._encoding.put(marked)
 
 
 def with_spans(media: Media, event_began: float | None, now: float) -> Media:

@@ -5,6 +5,7 @@ from pathlib import Path
 
 from lockstep.protocol.link_secret import LinkSecret
 from lockstep.protocol.serial import FIRST_EVENT
+from lockstep.robot_bridge.encoding.encoder_choice import EncodeSettings
 from lockstep.robot_bridge.link.link_tls import LinkTls
 
 __all__ = ["BridgeSettings"]
@@ -28,4 +29,5 @@ class BridgeSettings:
     tls: LinkTls | None = None
     insecure: bool = False  # listen beyond loopback although any client could drive
     event_strip: bool = False  # draw each picture's event into raw pictures, for tests and measurements
+    encode: EncodeSettings | None = None  # encode pictures beside the robot; None: send them as the sources make them
     log_interval: float = 60.0  # s between log lines with the counters

@@ -4,7 +4,7 @@ import asyncio
 import datetime
 import secrets
 import sys
-from collections.abc import AsyncIterator, Mapping
+from collections.abc import AsyncIterator, Mapping, Sequence
 from contextlib import asynccontextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -86,11 +86,13 @@ class Metrics:
 
 
 @asynccontextmanager
-async def running_bridge(robot: str, *, is_logged: bool = True, is_secured: bool = False) -> AsyncIterator[Bridge]:
+async def running_bridge(
+    robot: str, *, is_logged: bool = True, is_secured: bool = False, options: Sequence[str] = ()
+) -> AsyncIterator[Bridge]:
     """Start a bridge.
 
     `is_logged`: it writes its event log, which costs some processor time. `is_secured`: its link speaks TLS and asks
-    for a secret.
+    for a secret. `options`: further ones of the command.
 
     Raises:
         ProcessFailed: something that the robot needs is missing here.
@@ -101,7 +103,10 @@ async def running_bridge(robot: str, *, is_logged: bool = True, is_secured: bool
         state = ("--state-dir", str(Path(directory) / "bridge"))
         logging = ("--event-log", str(log)) if is_logged else ()
         security, settings = _security(Path(directory)) if is_secured else ((), {})
-        async with running_process(*command, *state, *logging, *security, environment=settings) as (process, ready):
+        async with running_process(*command, *state, *logging, *security, *options, environment=settings) as (
+            process,
+            ready,
+        ):
             yield Bridge(robot, process, ready["robot"], log, settings)
 
 

@@ -80,12 +80,19 @@ class Profile:
     robot_control: TwoWay = TwoWay()  # the robot link's operator and event connections
     bottleneck_to_operator: BottleneckSettings | None = None  # each client's own, shared by its media and control
     bottleneck_to_robot: BottleneckSettings | None = None
+    robot_bottleneck_to_operator: BottleneckSettings | None = None  # shared by the robot link's connections
+    robot_bottleneck_to_robot: BottleneckSettings | None = None
     client_outages: tuple[PlannedOutage, ...] = ()
     robot_outages: tuple[PlannedOutage, ...] = ()
     experiment: ExperimentTable = ExperimentTable()
 
     def bottleneck(self, direction: Direction) -> BottleneckSettings | None:
         return self.bottleneck_to_operator if direction == "to_operator" else self.bottleneck_to_robot
+
+    def robot_bottleneck(self, direction: Direction) -> BottleneckSettings | None:
+        if direction == "to_operator":
+            return self.robot_bottleneck_to_operator
+        return self.robot_bottleneck_to_robot
 
 
 def even_profile(name: str, impairment: Impairment) -> Profile:
@@ -148,8 +155,12 @@ class _Reader:
             signalling=self._path("signalling", table.client, table.signalling),
             robot_media=self._path("robot_media", table.robot, table.robot_media),
             robot_control=self._path("robot_control", table.robot, table.robot_control),
-            bottleneck_to_operator=self._bottleneck("to_operator", table.bottleneck.to_operator),
-            bottleneck_to_robot=self._bottleneck("to_robot", table.bottleneck.to_robot),
+            bottleneck_to_operator=self._bottleneck("bottleneck.to_operator", table.bottleneck.to_operator),
+            bottleneck_to_robot=self._bottleneck("bottleneck.to_robot", table.bottleneck.to_robot),
+            robot_bottleneck_to_operator=self._bottleneck(
+                "robot_bottleneck.to_operator", table.robot_bottleneck.to_operator
+            ),
+            robot_bottleneck_to_robot=self._bottleneck("robot_bottleneck.to_robot", table.robot_bottleneck.to_robot),
             client_outages=self._outages(table.outage, "client"),
             robot_outages=self._outages(table.outage, "robot"),
             experiment=table.experiment,
@@ -219,12 +230,12 @@ class _Reader:
         if table is None:
             return None
         if table.queue_bytes is not None and table.queue_ms is not None:
-            raise self._error(f"bottleneck.{where}", "has both queue_bytes and queue_ms; keep one")
+            raise self._error(where, "has both queue_bytes and queue_ms; keep one")
         queue = table.queue_bytes or DEFAULT_QUEUE
         if table.queue_ms is not None:
             queue = int(table.rate_kbps * table.queue_ms / 8)
             if queue < 1500:
-                raise self._error(f"bottleneck.{where}.queue_ms", "the queue holds no whole packet; make it longer")
+                raise self._error(f"{where}.queue_ms", "the queue holds no whole packet; make it longer")
         return BottleneckSettings(table.rate_kbps * 1000, queue)
 
     def _outages(self, tables: list[OutageTable], where: str) -> tuple[PlannedOutage, ...]:

@@ -95,5 +95,6 @@ class ProfileTable(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
     robot_media: PathTable = PathTable()
     robot_control: PathTable = PathTable()
     bottleneck: TwoBottlenecks = TwoBottlenecks()
+    robot_bottleneck: TwoBottlenecks = TwoBottlenecks()
     outage: list[OutageTable] = []
     experiment: ExperimentTable = ExperimentTable()

@@ -13,10 +13,11 @@ from contextlib import suppress
 from types import TracebackType
 from typing import Self
 
+from lockstep.emulator.impairment.bottleneck import Bottleneck
 from lockstep.emulator.impairment.deliveries import Deliveries
 from lockstep.emulator.impairment.outages import Outages
 from lockstep.emulator.impairment.path import PathStatistics
-from lockstep.emulator.impairment.profile import Direction, Profile
+from lockstep.emulator.impairment.profile import DIRECTIONS, Direction, Profile
 from lockstep.emulator.transport.stream_path import StreamPath
 from lockstep.protocol.errors import MessageError
 from lockstep.protocol.framing import MAX_MEDIA_FRAME
@@ -27,6 +28,7 @@ __all__ = ["TcpRelay"]
 HEADER = 4  # bytes of a frame's length
 READ = 1 << 18  # bytes
 WINDOW = 4 << 20  # bytes under way in one direction; beyond it the sender has to wait, as for TCP's window
+LITTLE = 4 << 10  # bytes that this machine keeps in front of a bottleneck: the sender is to meet the bottleneck's queue
 CONNECT_TIMEOUT = 10.0  # s
 Name = str  # "robot_media" or "robot_control"
 
@@ -44,6 +46,11 @@ class TcpRelay:
         self._outages = outages
         self._deliveries = deliveries
         self._count: Counter[Name] = Counter()  # connections so far
+        self._bottlenecks = {
+            direction: Bottleneck(settings.rate)
+            for direction in DIRECTIONS
+            if (settings := profile.robot_bottleneck(direction)) is not None
+        }
         self._tasks: set[asyncio.Task[None]] = set()
         self._server: asyncio.Server | None = None
 
@@ -81,19 +88,39 @@ class TcpRelay:
         try:
             cutter, begun = await _first_messages(reader)
             async with asyncio.timeout(CONNECT_TIMEOUT):
-                from_bridge, bridge = await asyncio.open_connection(*self._target)
+                from_bridge, bridge = await self._connect()
             _no_delay(bridge)
             _no_delay(writer)
             to_robot, to_operator = self._paths(_path_name(begun))
             async with asyncio.TaskGroup() as ways:
-                ways.create_task(_Way(to_robot, bridge, self._deliveries).run(reader, cutter, begun))
-                ways.create_task(_Way(to_operator, writer, self._deliveries).run(from_bridge, _Cutter(), []))
+                out = _Way(to_robot, bridge, self._deliveries, self._window("to_robot"))
+                back = _Way(to_operator, writer, self._deliveries, self._window("to_operator"))
+                ways.create_task(out.run(reader, cutter, begun))
+                ways.create_task(back.run(from_bridge, _Cutter(), []))
         except (OSError, TimeoutError, ExceptionGroup):
             pass  # one side broke off or was never there: closing tells the other side
         finally:
             for each in (writer, bridge):
                 if each is not None:
                     each.transport.abort()
+
+    async def _connect(self) -> tuple[asyncio.StreamReader, asyncio.StreamWriter]:
+        if "to_operator" not in self._bottlenecks:
+            return await asyncio.open_connection(*self._target)
+        own = socket.socket()
+        try:
+            own.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, LITTLE)
+            own.setblocking(False)
+            await asyncio.get_running_loop().sock_connect(own, self._target)
+            return await asyncio.open_connection(sock=own, limit=LITTLE)
+        except BaseException:
+            own.close()
+            raise
+
+    def _window(self, direction: Direction) -> int:
+        """Return the bytes that may be under way in one connection: those that fit the queue, as TCP finds out."""
+        settings = self._profile.robot_bottleneck(direction)
+        return WINDOW if settings is None else min(WINDOW, settings.queue)
 
     def _paths(self, name: Name) -> tuple[StreamPath, StreamPath]:
         two_way = self._profile.robot_media if name == "robot_media" else self._profile.robot_control
@@ -106,6 +133,7 @@ class TcpRelay:
                 two_way.towards(direction),
                 f"{self._seed} {name} {self._count[name]} {direction}",
                 back=two_way.towards(back).delay.mean,
+                bottleneck=self._bottlenecks.get(direction),
                 outages=self._outages,
             )
             made.statistics = self.statistics.setdefault((name, direction), made.statistics)
@@ -146,7 +174,8 @@ class _Cutter:
 class _Way:
     """One direction of one connection."""
 
-    def __init__(self, path: StreamPath, writer: asyncio.StreamWriter, deliveries: Deliveries) -> None:
+    def __init__(self, path: StreamPath, writer: asyncio.StreamWriter, deliveries: Deliveries, window: int) -> None:
+        self._window = window
         self._path = path
         self._writer = writer
         self._deliveries = deliveries
@@ -160,7 +189,7 @@ class _Way:
         while data := await reader.read(READ):
             for message in cutter.cut(data):
                 self._launch(message)
-            await self._until(WINDOW)
+            await self._until(self._window)
         for message in cutter.rest():
             self._launch(message)
         await self._until(0)

@@ -17,6 +17,7 @@ from lockstep.protocol.framing import frame
 from lockstep.protocol.link_secret import LinkSecret
 from lockstep.protocol.messages import (
     Command,
+    EncodeRequest,
     EventNotice,
     Feedback,
     Goodbye,
@@ -66,6 +67,24 @@ class LinkHandler(Protocol):
 
     def operator_lost(self) -> None:
         """The operator link ended, for any reason."""
+
+
+class EncodingSide(Protocol):
+    """The part of a bridge that encodes media and is asked how. All methods return at once."""
+
+    codecs: tuple[str, ...]
+
+    def joined(self, link: object) -> None:
+        """A media link was admitted."""
+
+    def asked(self, link: object, request: EncodeRequest) -> None:
+        """A media link says what it wants."""
+
+    def lost(self, stream: str) -> None:
+        """A media link could not take pictures of a stream, and needs a keyframe."""
+
+    def left(self, link: object) -> None:
+        """A link ended, admitted or not."""
 
 
 class LinkPeer(LinkTransport):
@@ -126,10 +145,19 @@ class LinkServer:
         addresses_file: Path | None = None,
         secret: LinkSecret | None = None,
         tls: ssl.SSLContext | None = None,
+        encoding: EncodingSide | None = None,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
+        """`encoding`: hears what media links ask for; None: media are sent as they are, and requests are ignored."""
         self._handler = handler
-        self._hello = Hello(role="robot", name=description.name, epoch=epoch, description=description)
+        self._encoding = encoding
+        self._hello = Hello(
+            role="robot",
+            name=description.name,
+            epoch=epoch,
+            description=description,
+            encodes=[] if encoding is None else list(encoding.codecs),
+        )
         self._counters = counters
         self._max_strangers = max_strangers
         self._addresses = KnownAddresses(addresses_file)
@@ -212,8 +240,13 @@ class LinkServer:
     def publish_media(self, media: Media) -> None:
         """Send a medium to every media link, newest wins per stream."""
         encoded = encode_once(media) if media.spans is msgspec.UNSET else encode_waited(media, time.monotonic)
-        for peer in self._admitted.media:
-            peer.send_media(media, encoded)
+        complete = [peer.send_media(media, encoded) for peer in self._admitted.media]
+        if self._encoding is not None and not all(complete):
+            self._encoding.lost(media.stream)
+
+    def media_have_room(self) -> bool:
+        """Return whether some media link takes a picture at once. Others that do not miss pictures up to a keyframe."""
+        return any(peer.has_room for peer in self._admitted.media)
 
     def drops(self) -> Counter[str]:
         """Return the messages that slow links have missed, ended links included."""
@@ -232,6 +265,9 @@ class LinkServer:
             self._acceptor.admitted(peer.address)
         if hello.role == "events":
             return Hello(role="robot", name=self._hello.name, epoch=self._hello.epoch)
+        if hello.role == "media" and self._encoding is not None:
+            peer.keep_little()
+            self._encoding.joined(peer)
         return self._hello
 
     def connected(self, peer: LinkPeer) -> None:
@@ -257,6 +293,9 @@ class LinkServer:
                     self._handler.link_bad_input(peer, event)
             case Hello():
                 self._handler.link_opened(peer)
+            case EncodeRequest():
+                if self._encoding is not None:
+                    self._encoding.asked(peer, event)
             case Command() | Rest() | Stop() | Reset() | Act() | ActionCancel():
                 self._handler.link_message(peer, event)
             case _:
@@ -267,6 +306,8 @@ class LinkServer:
             error = peer.session.ended.error  # the peer may have made it up
             self._counters.endings[error if error in GOODBYES else "other"] += 1
         self._strangers.forget(peer)
+        if self._encoding is not None:
+            self._encoding.left(peer)
         if self._admitted.remove(peer, peer.name, self._clock(), left=peer.session.left):
             self._handler.operator_lost()
 

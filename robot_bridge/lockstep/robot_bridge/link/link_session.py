@@ -20,6 +20,7 @@ from lockstep.protocol.messages import (
     PROTOCOL_VERSION,
     Challenge,
     Command,
+    EncodeRequest,
     EventNotice,
     Feedback,
     Goodbye,
@@ -54,7 +55,7 @@ OWN_STALL = 0.5  # s between two ticks; more means that this side did not look, 
 FROM_CLIENT: dict[LinkRole, tuple[type[LinkMessage], ...]] = {
     "operator": (Command, Rest, Stop, Reset, Act, ActionCancel),
     "events": (Stop,),
-    "media": (Stop,),
+    "media": (Stop, EncodeRequest),
 }
 FROM_ROBOT: dict[LinkRole, tuple[type[LinkMessage], ...]] = {
     "operator": (Feedback, Refusal, StopTaken, ActionUpdate, Status),

@@ -18,6 +18,7 @@ __all__ = ["TICK_INTERVAL", "LinkTransport"]
 
 TICK_INTERVAL = 0.05  # s between calls of `LinkTransport.tick`
 HIGH_WATER = 64 << 10  # bytes the kernel would not take before output waits in the outboxes
+LITTLE = 4 << 10  # the same for a link with encoded pictures; at 512 kbit/s that is a sixteenth of a second
 CLOSE_TIMEOUT = 1.0  # s for the goodbye to leave
 
 
@@ -66,14 +67,31 @@ class LinkTransport(asyncio.Protocol):
         if self.session.ended is None:
             self._write(kind, make)
 
-    def send_media(self, media: Media, make: Callable[[], bytes]) -> None:
-        """Send as `send_encoded` does, newest wins per stream. `make` is called when the socket takes it."""
+    @property
+    def has_room(self) -> bool:
+        """True if the socket takes a message at once."""
+        return self._transport is not None and self.session.ended is None and not self._full
+
+    def send_media(self, media: Media, make: Callable[[], bytes]) -> bool:
+        """Send as `send_encoded` does, newest wins per stream. False: pictures were dropped; a keyframe is needed.
+
+        `make` is called when the socket takes the message.
+        """
         if self._transport is None or self.session.ended is not None:
-            return
+            return True
         if self._full:
-            self._media.put(media, lambda: make)
-        else:
-            self._transport.write(make())
+            return self._media.put(media, lambda: make)
+        self._transport.write(make())
+        return True
+
+    def keep_little(self) -> None:
+        """Let hardly anything wait in this machine: what the network does not take now is to be left out instead."""
+        if self._transport is None:
+            return
+        self._transport.set_write_buffer_limits(high=LITTLE, low=0)
+        tcp = self._transport.get_extra_info("socket")
+        if tcp is not None and hasattr(socket, "TCP_NOTSENT_LOWAT"):
+            tcp.setsockopt(socket.IPPROTO_TCP, socket.TCP_NOTSENT_LOWAT, LITTLE)
 
     def fileno(self) -> int:
         """Return the socket's descriptor; -1 without a socket."""

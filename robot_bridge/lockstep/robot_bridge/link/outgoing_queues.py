@@ -16,6 +16,7 @@ __all__ = ["MediaOutbox", "NewestOutbox", "StreamQueue"]
 Key = TypeVar("Key")
 Item = TypeVar("Item")
 
+SOUND = ("pcm_s16le", "opus")
 ORDERED_DEPTH = 10  # segments or dependent pictures of a stream that may wait: 200 ms of sound
 
 
@@ -51,8 +52,8 @@ class StreamQueue(Generic[Item]):
     def __len__(self) -> int:
         return len(self._items)
 
-    def put(self, *, keyframe: bool, depth: int, make: Callable[[], Item]) -> None:
-        """Add a medium; `make` builds the item unless it is dropped at once.
+    def put(self, *, keyframe: bool, depth: int, make: Callable[[], Item]) -> bool:
+        """Add a medium; `make` builds the item unless it is dropped at once. False: a keyframe is needed now.
 
         A keyframe replaces the oldest beyond `depth`. Another picture that does not fit takes all that wait with it:
         the stream resumes with the next keyframe.
@@ -62,11 +63,12 @@ class StreamQueue(Generic[Item]):
                 self._is_broken = True
                 self._drop(len(self._items))
             self.dropped += 1
-            return
+            return False
         if keyframe:
             self._is_broken = False
             self._drop(len(self._items) - depth + 1)
         self._items.append(make())
+        return True
 
     def pop(self) -> Item:
         return self._items.popleft()
@@ -96,10 +98,12 @@ class MediaOutbox(Generic[Item]):
         """How many media of each stream were dropped."""
         return Counter({stream: queue.dropped for stream, queue in self._streams.items() if queue.dropped})
 
-    def put(self, media: Media, make: Callable[[], Item]) -> None:
-        """Add a medium; `make` builds the item unless it is dropped at once."""
-        depth = 1 if media.keyframe and media.codec != "pcm_s16le" else ORDERED_DEPTH
-        self._streams.setdefault(media.stream, StreamQueue()).put(keyframe=media.keyframe, depth=depth, make=make)
+    def put(self, media: Media, make: Callable[[], Item]) -> bool:
+        """Add a medium; `make` builds the item unless it is dropped at once. False: the stream needs a keyframe."""
+        depth = 1 if media.keyframe and media.codec not in SOUND else ORDERED_DEPTH
+        return self._streams.setdefault(media.stream, StreamQueue()).put(
+            keyframe=media.keyframe, depth=depth, make=make
+        )
 
     def pop(self) -> Item | None:
         """Return the next item, streams in turn; None if the outbox is empty."""

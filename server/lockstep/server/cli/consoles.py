@@ -14,6 +14,7 @@ import uvloop
 from pydantic import SecretStr
 
 from lockstep.protocol.link_secret import LinkSecret
+from lockstep.robot_bridge.encoding.encoder_choice import ENCODERS
 from lockstep.robot_bridge.robots.registry import is_robot, robot_names, simulated_names
 from lockstep.server.cli.options import (
     AllowedHosts,
@@ -136,6 +137,10 @@ def up(
     event_strip: Annotated[
         bool, typer.Option(help="Draw the event's number into each picture, for tests and measurements.")
     ] = False,
+    encode: Annotated[
+        str | None,
+        typer.Option(help=f"Encode pictures in the robot bridge, as over a narrow uplink: {', '.join(ENCODERS)}."),
+    ] = None,
     host: Host = None,
     port: Port = None,
     ice_host: IceHosts = None,
@@ -193,6 +198,7 @@ def up(
     options = [] if ros2 is None else ["--ros2", str(ros2)]
     options += [] if mjcf is None else ["--mjcf", str(mjcf)]
     options += ["--event-strip"] if event_strip else []
+    options += [] if encode is None else ["--encode", encode]
     secret = link_access(settings).secret or LinkSecret.draw()
     settings = settings.model_copy(update={"link_secret": SecretStr(secret.reveal()), "link_secret_file": None})
     bridges = {}

@@ -133,6 +133,7 @@ async def _session(
         relays=[relays],
         further_news=notices.for_newcomers,
     )
+    media.robot_encoding.ask_by(console.robot.ask_for_encoding)
     SessionMetrics(metrics).subscribe(events)
     SessionAudit(trail).subscribe(events)
     notices.subscribe(events)

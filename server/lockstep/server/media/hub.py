@@ -25,6 +25,7 @@ from lockstep.server.media.settings import MediaSettings
 from lockstep.server.media.sources.source_url import SourceSpec
 from lockstep.server.media.subscribers import Subscribers
 from lockstep.server.media.subscriptions import Subscriptions
+from lockstep.server.media.uplink.robot_encoding import RobotEncoding
 from lockstep.server.util.cooperative_scheduler import turns_of_loop
 from lockstep.server.webrtc.datagram_queue import DatagramQueues
 
@@ -41,6 +42,7 @@ class MediaHub:
     Attributes:
         subscribers: the peers that get the streams
         datagrams: the queues of all peers' datagrams
+        robot_encoding: what is asked of a robot bridge that encodes
     """
 
     def __init__(
@@ -72,6 +74,7 @@ class MediaHub:
         )
         self.subscribers = Subscribers(settings, self._metrics, fan_out, self._quality, wall_clock)
         self.datagrams = DatagramQueues(turns, time.monotonic)
+        self.robot_encoding = RobotEncoding(settings, self._quality.planned_bps)
         self._streams: dict[str, Stream] = {}
         self._configured = asyncio.Event()  # set when there are other streams
         self._recorder: FrameTaker | None = None
@@ -81,6 +84,7 @@ class MediaHub:
         """Encode the streams and control their quality, until cancelled."""
         async with asyncio.TaskGroup() as tasks:
             tasks.create_task(self._quality.run(), name="quality")
+            tasks.create_task(self.robot_encoding.run(), name="robot encoding")
             while True:
                 self._configured.clear()
                 running = [
@@ -100,6 +104,7 @@ class MediaHub:
         self._streams = {camera.name: self._maker.video(camera) for camera in description.cameras}
         for microphone in description.microphones:
             self._streams[microphone.name] = self._maker.audio(microphone)
+        self.robot_encoding.configure(self._streams.values())
         for spec in self._attached.values():
             name = self._stream_names[spec.name] = _free_name(spec.name, self._streams)
             self._streams[name] = self._attached_stream(spec, name)
@@ -126,6 +131,7 @@ class MediaHub:
         if not 0 <= media.time <= MAX_LINK_TIME:
             self._metrics.dropped.labels(stream.name, "bad_time").inc()
             return
+        self.robot_encoding.arrived(media, now)
         self._capture_clock.observe(media.time, self._wall_clock())
         stream.first.source(SourceFrame(media, now, self._capture_clock.wall_time(media.time)))
 

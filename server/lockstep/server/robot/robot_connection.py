@@ -14,6 +14,7 @@ from lockstep.protocol.console import RobotState
 from lockstep.protocol.description import RobotDescription
 from lockstep.protocol.messages import (
     Command,
+    EncodeRequest,
     Feedback,
     LinkMessage,
     LinkRole,
@@ -127,6 +128,11 @@ class RobotConnection:
         """Send over every link that is up, as `send`: TCP may repeat a lost packet on one of them for seconds."""
         sent = [keeper.send(stop) for keeper in self._keepers.values()]
         return any(sent)
+
+    def ask_for_encoding(self, request: EncodeRequest) -> bool:
+        """Tell a bridge that encodes how to. Return whether its link took the message; False for other bridges."""
+        media = self._keepers["media"]
+        return media.encodes and media.send(request)
 
     def bad_input(self) -> Counter[str]:
         """Return the counts of messages from the bridge that could not be read, by name of the error."""

@@ -49,6 +49,11 @@ class KeyframeScheduler:
         self._last = now
         return True
 
+    def served(self, now: float) -> None:
+        """A keyframe came that somebody else made: it serves all that was requested until now."""
+        self._joined = self._requested = False
+        self._last = now
+
     def _adapt(self, passed: float) -> None:
         if passed < SOON * self._spacing:
             self._spacing = min(max(MOST_SPACING, self._least_spacing), self._spacing * BACKOFF)

@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from lockstep.protocol.messages import Media
+from lockstep.server.media.codecs.opus_packet import OPUS_RATE
 from lockstep.server.media.codecs.packetise import packetise_sound
 from lockstep.server.media.codecs.sound_bundle import SoundBundle
 from lockstep.server.media.codecs.sound_encoder import (
@@ -18,6 +19,7 @@ from lockstep.server.media.codecs.sound_encoder import (
     create_sound_encoder,
 )
 from lockstep.server.media.encoding.encoder_worker import Encoded
+from lockstep.server.media.encoding.opus_passing import OpusPassing, PassedSound
 from lockstep.server.media.encoding.stream_encodings import StreamEncodings
 from lockstep.server.media.encoding.tier_encoding import TierEncoding
 from lockstep.server.media.errors import MediaError, PayloadError, UnsupportedCodecError
@@ -66,12 +68,16 @@ class SoundQueue:
 
 
 class SoundEncoders:
-    """An encoder for each codec in use; runs in the worker's thread."""
+    """An encoder for each codec in use; runs in the worker's thread.
+
+    Opus that the robot has encoded goes unchanged to those who take Opus; it is decoded only for others.
+    """
 
     def __init__(self, opus_bitrate_bps: int) -> None:
         self._opus_bitrate_bps = opus_bitrate_bps
         self._encoders: dict[str, SoundEncoder] = {}
         self._bundles: dict[str, SoundBundle] = {}  # of the codecs that a crowd takes
+        self._passing = OpusPassing()
 
     def encode(self, job: SoundJob) -> Sequence[Encoded]:
         orders: dict[str, list[tuple[TierEncoding, frozenset[bool]]]] = {}
@@ -81,14 +87,14 @@ class SoundEncoders:
         crowds = {encoding.codec for encoding, _ in job.orders if encoding.tier == "crowd"}
         self._bundles = {codec: bundle for codec, bundle in self._bundles.items() if codec in crowds}
         try:
-            segment = _segment(job)
+            sound = self._passing.take(job.media, job.capture_time) if job.media.codec == "opus" else _segment(job)
         except MediaError as error:
             return [Encoded(encoding, (), error=error) for encoding, _ in job.orders]
         results = []
         for codec, wanted in orders.items():
             started = time.perf_counter()
             try:
-                sounds: Sequence[EncodedSound] | MediaError = self._encode(segment, codec, job.expected_loss)
+                sounds: Sequence[EncodedSound] | MediaError = self._encode(sound, codec, job.expected_loss)
             except MediaError as error:
                 self._encoders.pop(codec, None)
                 self._bundles.pop(codec, None)
@@ -97,7 +103,14 @@ class SoundEncoders:
             results += [self._packed(encoding, sounds, variants, seconds) for encoding, variants in wanted]
         return results
 
-    def _encode(self, segment: Segment, codec: str, expected_loss: int) -> list[EncodedSound]:
+    def _encode(self, sound: Segment | PassedSound, codec: str, expected_loss: int) -> list[EncodedSound]:
+        if isinstance(sound, PassedSound):
+            if codec == "opus":
+                self._encoders.pop(codec, None)
+                return [sound.packet]
+            segment = self._passing.decoded(sound)
+        else:
+            segment = sound
         encoder = self._encoders.get(codec)
         if encoder is None:
             encoder = create_sound_encoder(codec, self._opus_bitrate_bps, expected_loss)
@@ -118,7 +131,8 @@ class SoundEncoders:
         if encoding.tier == "crowd":
             bundle = self._bundles.get(encoding.codec)
             if bundle is None:
-                samples = int(self._encoders[encoding.codec].rate * PACKET_SECONDS)
+                encoder = self._encoders.get(encoding.codec)
+                samples = int((OPUS_RATE if encoder is None else encoder.rate) * PACKET_SECONDS)
                 bundle = self._bundles[encoding.codec] = SoundBundle(encoding.codec, samples)
             sounds = [complete for sound in sounds for complete in bundle.add(sound)]
             # Peers move into the crowd or out of it between two bundles, when all of a codec have got the same sound.

@@ -22,6 +22,7 @@ class StreamEncodings:
         full: the best encoding target that a tier can get
         passed: the encoding that the camera itself makes; None for a microphone
         passes: True while the camera makes it
+        follows: True while the camera makes it as it is asked to, with keyframes on request: a robot that encodes
     """
 
     def __init__(
@@ -38,6 +39,7 @@ class StreamEncodings:
         self.codecs = codecs
         self.full = full
         self.passes = False
+        self.follows = False
         self._settings = settings
         self._metrics = metrics
         self._video = video
@@ -120,12 +122,12 @@ class StreamEncodings:
     def request_keyframe(self, target: Subscription, cause: str) -> None:
         """Request a keyframe for `target`; see `TierEncoding.request_keyframe`.
 
-        A camera takes no such requests: instead of its encoding, the target gets the console's.
+        Most cameras take no such requests: instead of their encoding, the target gets the console's.
         """
         for each in self:
             if target in each.targets:
                 each.request_keyframe(cause)
-                if each is self.passed:
+                if each is self.passed and not self.follows:
                     self.return_to_own(target)
 
     def return_to_own(self, target: Subscription) -> None:

@@ -24,15 +24,21 @@ class Admission(FrameStage):
     """
 
     def __init__(
-        self, following: FrameStage, choose: Callable[[], bool], arrived: Counter, dropped: DropCounter
+        self,
+        following: FrameStage,
+        choose: Callable[[], bool],
+        arrived: Counter,
+        dropped: DropCounter,
+        on_lost: Callable[[], None] = lambda: None,
     ) -> None:
         """`choose` chooses what is recorded of the next frame, and returns whether somebody takes the stream. It is
-        called for each frame."""
+        called for each frame. `on_lost` is called when a picture is dropped on which others may build."""
         super().__init__(following)
         self.newest: SourceFrame | None = None
         self.size: tuple[int, int] | None = None
         self._choose = choose
         self._arrived = arrived
+        self._on_lost = on_lost
         self._dropped = dropped
         self._rate = TokenBucket(MAX_RATE, MAX_AT_ONCE)
         self._last_stamp: int | None = None
@@ -42,6 +48,8 @@ class Admission(FrameStage):
         self._arrived.inc()
         if not self._rate.take(frame.arrived_at):
             self._dropped.count("too_often")
+            if media.codec == "h264":
+                self._on_lost()
             return
         # Without an H.264 picture, none that builds on it could be decoded; a stamp older than the last is still true.
         in_order = media.codec == "h264" or self._last_stamp is None

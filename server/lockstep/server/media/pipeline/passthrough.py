@@ -6,10 +6,14 @@
 | the same, until that keyframe, and after a lost picture: cameras take no keyframe requests | the console's encoding |
 | the same, while its path shows a limit: the camera's pictures cannot be made smaller | the console's encoding |
 | VP8, or H.264 of a smaller profile | the console's encoding |
+
+A robot bridge that encodes as it is asked makes keyframes, and fits the operator's path: its pictures are then passed
+on from the beginning, and after a lost picture the bridge is asked instead.
 """
 
 import time
 from collections import deque
+from collections.abc import Callable
 
 from lockstep.protocol.messages import Media
 from lockstep.server.media.codecs.group_of_pictures import GroupOfPictures
@@ -28,6 +32,10 @@ from lockstep.server.media.subscription import Subscription
 __all__ = ["Passthrough"]
 
 MEASURED_SECONDS, MOST_MEASURED = 2.0, 240
+MAX_BYTES = 4 << 20  # of one picture; far more than any that can be watched
+ANSWER_SECONDS = 3.0  # for a keyframe that was asked for; without it the camera counts as one that takes no requests
+DISTRUST_SECONDS = 30.0  # for which it then counts so
+NAL_TYPES = range(1, 24)  # of an access unit (ITU-T H.264, table 7-1)
 
 
 class Passthrough(FrameStage):
@@ -51,20 +59,98 @@ class Passthrough(FrameStage):
         self._dropped = dropped
         self._profile: Profile | None = None  # of the camera's pictures; None while it gives no H.264
         self._recent: deque[tuple[float, int]] = deque()  # time of capture and bytes
+        self._broken = False  # a picture is missing: those up to the next keyframe cannot be decoded
+        self._ask: Callable[[float], None] = lambda now: None
+        self._asked_at: float | None = None  # when a keyframe was asked for that has not come; None: none is owed
+        self._does = False  # the robot's bridge says that it does as it is asked to
+        self._distrusted_until = 0.0
+        self._waiting: frozenset[Subscription] = frozenset()  # targets that the next keyframe moves here
+
+    def ask_by(self, ask: Callable[[float], None]) -> None:
+        """Set how the robot is asked for a keyframe; called with the time."""
+        self._ask = ask
+
+    def follow(self, does: bool, now: float) -> None:
+        """Set whether the robot's bridge encodes this camera as it is asked to."""
+        self._does = does
+        self._decide_following(now)
+
+    def _decide_following(self, now: float) -> None:
+        follows = self._does and self._profile is not None and now >= self._distrusted_until
+        if follows == self._encodings.follows:
+            return
+        self._encodings.follows = follows
+        self._asked_at = None
+        if not follows:
+            self._waiting = frozenset()
+
+    def serve_requests(self, now: float) -> None:
+        """Ask the robot for a keyframe if somebody needs one, unless one is on its way."""
+        if not self._encodings.follows:
+            return
+        if self._asked_at is not None:
+            if now - self._asked_at > ANSWER_SECONDS:
+                self._distrusted_until = now + DISTRUST_SECONDS
+                self._decide_following(now)
+            return
+        waiting = frozenset(
+            target
+            for encoding in self._encodings.own
+            if encoding.codec == "H264"
+            for target in (*encoding.targets, *encoding.arriving)
+            if self._may_pass_to(target)
+        )
+        if waiting - self._waiting:
+            self._passed.keyframes.join()
+        self._waiting = waiting
+        if (waiting or self._passed.needed) and self._passed.keyframes.take(now):
+            self._asked_at = now
+            self._ask(now)
+
+    def lost(self) -> None:
+        """A picture was dropped before this stage: pass none on that may build on it."""
+        self._broken = True
+        self._passed.request_keyframe("drop")
 
     def source(self, frame: SourceFrame) -> None:
         if frame.media.codec == "h264":
+            if not self._is_whole(frame.media):
+                return
             self._pass(frame)
-            if not any(each.needed for each in self._encodings.own):
+            self.serve_requests(frame.arrived_at)
+            if not any(self._needs_console(each) for each in self._encodings.own):
                 return
         elif self._profile is not None:
             self._end()
         super().source(frame)
 
+    def _is_whole(self, media: Media) -> bool:
+        """Return whether the picture can be decoded, as far as its bytes and those before it show."""
+        if not _is_access_unit(media.payload):
+            self._dropped.count(PayloadError.name)
+            self.lost()
+            return False
+        if media.keyframe:
+            self._broken = False
+        elif self._broken:
+            self._dropped.count("no_reference")
+        return not self._broken
+
+    def _needs_console(self, encoding: TierEncoding) -> bool:
+        """Return whether the console has to make an encoding, because the robot's next keyframe does not replace it."""
+        if not encoding.needed or not self._encodings.follows:
+            return encoding.needed
+        if encoding.codec != "H264" or encoding.recorded:
+            return True
+        return not all(map(self._may_pass_to, (*encoding.targets, *encoding.arriving)))
+
     def _pass(self, frame: SourceFrame) -> None:
         media = frame.media
         if media.keyframe:
             self._begin(media)
+            self._decide_following(frame.arrived_at)
+            self._asked_at = None
+            self._passed.keyframes.served(frame.arrived_at)
         self._group.add(media)
         self._measure(media)
         if not self._passed.needed:
@@ -128,7 +214,7 @@ class Passthrough(FrameStage):
     def _end(self) -> None:
         """Move all targets to the console's encoding, from a keyframe on: the camera gives other pictures now."""
         self._profile = None
-        self._encodings.passes = False
+        self._encodings.passes = self._encodings.follows = False
         for target in list(self._passed.targets):
             self._encodings.return_to_own(target)
 
@@ -137,3 +223,12 @@ class Passthrough(FrameStage):
         if negotiated is None or self._profile is None or target.held_back:
             return False
         return accepts(negotiated, self._profile)
+
+
+def _is_access_unit(payload: bytes) -> bool:
+    """Return whether this may be a picture in Annex B form: it begins with a NAL unit of a known type."""
+    start = payload.find(b"\x00\x00\x01", 0, 8)
+    if not 0 <= start < len(payload) - 4 or len(payload) > MAX_BYTES:
+        return False
+    head = payload[start + 3]
+    return head & 0x80 == 0 and head & 0x1F in NAL_TYPES

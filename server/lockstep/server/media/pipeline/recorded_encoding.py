@@ -76,6 +76,11 @@ class RecordedEncoding(FrameStage):
             self._drop(encoding)
         self._current = self._next = self._meanwhile = None
 
+    @property
+    def takes(self) -> bool:
+        """True while the stream is recorded."""
+        return self._take is not None
+
     def choose_for_next(self) -> bool:
         """Choose the encoding that is recorded of the next frame. Return whether anybody takes that frame."""
         if self._take is None:
@@ -93,7 +98,7 @@ class RecordedEncoding(FrameStage):
             self._meanwhile = None
         if self._next is not None:
             self._begin(self._next)
-            if self._current is None and wanted is self._encodings.passed:
+            if self._current is None and wanted is self._encodings.passed and not self._encodings.follows:
                 self._meanwhile = self._own()
                 self._begin(self._meanwhile)
 
@@ -146,7 +151,7 @@ class RecordedEncoding(FrameStage):
         """Request a keyframe for a new file."""
         if self._current is None:
             return
-        if self._current.codec != PASSED:
+        if self._current.codec != PASSED or self._encodings.follows:
             self._current.request_keyframe("record")
         else:  # a camera's own: the encoding is chosen afresh, and the console's comes first
             for encoding in (self._current, self._next):

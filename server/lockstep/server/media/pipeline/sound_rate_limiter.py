@@ -6,6 +6,7 @@ from lockstep.server.media.pipeline.stage import FrameStage, SourceFrame
 __all__ = ["SoundRateLimiter"]
 
 MIN_RATE = 8_000  # Hz, assumed for sound that claims less
+OPUS_SECONDS = 0.02  # of a packet; shorter ones may come as rarely
 MAX_AHEAD = 2.0  # s of sound that may come at once
 FASTEST = 1.25  # s of sound in a second, afterwards
 
@@ -23,7 +24,10 @@ class SoundRateLimiter(FrameStage):
         media = frame.media
         self._room = min(MAX_AHEAD, self._room + max(0.0, frame.arrived_at - self._came_at) * FASTEST)
         self._came_at = frame.arrived_at
-        seconds = len(media.payload) / (2 * max(1, media.channels) * max(MIN_RATE, media.sample_rate))
+        if media.codec == "opus":
+            seconds = OPUS_SECONDS
+        else:
+            seconds = len(media.payload) / (2 * max(1, media.channels) * max(MIN_RATE, media.sample_rate))
         if seconds > self._room:
             self._dropped.count("too_often")
             return

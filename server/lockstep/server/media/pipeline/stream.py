@@ -64,6 +64,11 @@ class VideoStream(Stream):
         newest = self.first.newest
         return self.expects_h264 if newest is None else newest.media.codec == "h264"
 
+    @property
+    def is_wanted(self) -> bool:
+        """True while a peer or the recorder takes the pictures."""
+        return self.encodings.is_taken or self.recording.takes
+
     def is_giving(self, now: float) -> bool:
         """True while pictures come. A camera that gives none, or none any more, needs no share of a path."""
         patience = max(QUIET_SECONDS, QUIET_PICTURES / self.frame_rate)
@@ -105,7 +110,8 @@ class StreamMaker:
         if settings.video_frames_per_second is not None:
             thinned = PictureThinning(worker, settings.video_frames_per_second, dropped)
         passthrough = Passthrough(thinned, encodings, passed, clock, group, dropped)
-        admission = Admission(passthrough, recording.choose_for_next, metrics.frames_in.labels(name), dropped)
+        arrived = metrics.frames_in.labels(name)
+        admission = Admission(passthrough, recording.choose_for_next, arrived, dropped, passthrough.lost)
         return VideoStream(
             name,
             camera.label,

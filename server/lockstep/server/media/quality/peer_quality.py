@@ -55,7 +55,6 @@ class PeerQuality:
         self.tier = tier  # tier that its pictures are planned for
         self.encoded_as: PictureTier = tier  # tier whose pictures it gets: a tier may be served by another's encoder
         self.hears_as: PictureTier = "operator"  # tier whose sound packets it gets: a crowd's are longer
-        self.held_back = False  # from a camera's own pictures, which cannot be made smaller
         self.on_quality: Callable[[Quality], None] | None = None
         self.quality: Quality | None = None  # the last one sent
         self._clock = clock

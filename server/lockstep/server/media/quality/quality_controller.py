@@ -130,15 +130,24 @@ class QualityController:
             self._tell(peer)
         for peer in (*leaders, *settled):
             self._sound_for(peer)
-            if peer.held_back != (held_back := peer.path.limited or peer.tier == "low"):
-                peer.held_back = held_back
-                for camera in peer.cameras:
-                    camera.stream.passthrough.hold_back(camera.target, held_back)
+            held_back = peer.path.limited or peer.tier == "low"
+            for camera in peer.cameras:
+                # A robot that encodes as it is asked to makes what the operator's path carries.
+                fits = camera.stream.encodings.follows and peer.tier == "operator"
+                camera.stream.passthrough.hold_back(camera.target, held_back and not fits)
         if self._ticks % OBSERVER_TICKS == 0:
             for peer in leaders:
                 self._tell(peer)
             self._protect_sound(leaders or observers, now)
             self._measure(leaders, observers)
+
+    def planned_bps(self, stream: VideoStream) -> int:
+        """Return the bits per second of a camera that the operators' paths carry; all without an operator."""
+        return (
+            self._plans.get(("operator", stream.name), stream.encodings.full).bitrate_bps
+            if self.leaders()
+            else (stream.encodings.full.bitrate_bps)
+        )
 
     def _look_at_load(self, now: float) -> None:
         (since, before), busy = self._load_at, self._busy_seconds()

@@ -1,0 +1,1 @@
+"""What a robot's uplink has to carry: raw pictures against encoding at the bridge."""

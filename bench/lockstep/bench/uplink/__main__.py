@@ -1,0 +1,3 @@
+from lockstep.bench.uplink.cli import app
+
+app()

@@ -1,0 +1,189 @@
+"""Encodes a camera's pictures to H.264 with PyAV. Used from one thread."""
+
+import logging
+from fractions import Fraction
+
+import av
+from av.error import FFmpegError
+from av.video.codeccontext import VideoCodecContext
+from av.video.frame import PictureType
+from av.video.plane import VideoPlane
+
+from lockstep.protocol.messages import Media
+from lockstep.robot_bridge.encoding.encoder_choice import SOFTWARE
+from lockstep.robot_bridge.encoding.encoding_requests import EncodingGoal
+from lockstep.robot_bridge.encoding.picture_encoding import EncodedPicture
+from lockstep.robot_bridge.errors import EncodingFailed
+
+__all__ = ["H264Encoder"]
+
+CLOCK = 90_000  # Hz
+NEVER = 1_000_000  # pictures between keyframes that nobody asked for
+ASSUMED_RATE = 30.0  # Hz, of a camera whose rate nobody says
+# x264 takes a lower bitrate while it runs, but none above the one at which it was opened, and only when that is its
+# maximum too. So it is opened with room to spare.
+HEADROOM = 1.3
+LEAST = 0.35  # of that, down to which x264 follows while it runs
+HARDWARE = (0.6, 1.0)  # of the bitrate at which another encoder was opened: beyond, it is opened again
+KEYFRAME_SECONDS = 0.3  # of the bitrate that a keyframe may take at once
+MAX_PIXELS = 4096 * 2304
+MIN_SIDE = 16
+
+_logger = logging.getLogger(__name__)
+
+
+class H264Encoder:
+    """Constrained baseline; parameter sets in front of every keyframe; no reordering.
+
+    Attributes:
+        fell_back: why the software encoder took the place of the one that was asked for; "" while it did not
+    """
+
+    def __init__(self, encoder: str = SOFTWARE, frame_rate: float = ASSUMED_RATE) -> None:
+        """`frame_rate`: the camera's, in Hz."""
+        self.fell_back = ""
+        self._name = encoder
+        self._frame_rate = frame_rate
+        self._context: VideoCodecContext | None = None
+        self._opened = 0.0  # bit/s
+        self._opened_rate = 0.0  # Hz
+        self._pts = -1
+        self._jpeg: VideoCodecContext | None = None
+
+    def encode(self, media: Media, goal: EncodingGoal, keyframe: bool) -> EncodedPicture:
+        """Encode one picture, `yuv420p` or `mjpeg`.
+
+        Raises:
+            EncodingFailed: it is no picture, or the encoder refused it; the next one begins afresh with a keyframe.
+        """
+        try:
+            frame = self._frame(media)
+            size = goal.size(frame.width, frame.height)
+            if size != (frame.width, frame.height):
+                frame = frame.reformat(*size, interpolation="AREA")
+            context = self._fit(size, goal)
+            self._pts = max(self._pts + 1, round(media.time * CLOCK))
+            frame.pts, frame.time_base = self._pts, Fraction(1, CLOCK)
+            frame.pict_type = PictureType.I if keyframe else PictureType.NONE
+            packets = context.encode(frame)
+        except (FFmpegError, ValueError) as error:
+            self._context = None
+            raise EncodingFailed(str(error)) from error
+        if not packets:
+            raise EncodingFailed("the encoder held the picture back")
+        return EncodedPicture(b"".join(map(bytes, packets)), any(each.is_keyframe for each in packets), *size)
+
+    def _frame(self, media: Media) -> av.VideoFrame:
+        if media.codec == "mjpeg":
+            return self._from_jpeg(media)
+        if media.codec != "yuv420p":
+            raise EncodingFailed(f"{media.codec} pictures cannot be encoded")
+        return _from_yuv420p(media)
+
+    def _from_jpeg(self, media: Media) -> av.VideoFrame:
+        if self._jpeg is None:
+            self._jpeg = av.CodecContext.create("mjpeg", "r")
+            self._jpeg.options = {"max_pixels": str(MAX_PIXELS)}
+            self._jpeg.thread_count = 1
+        frames = self._jpeg.decode(av.Packet(media.payload))
+        if not frames:
+            raise EncodingFailed("not a whole JPEG picture")
+        return frames[-1].reformat(format="yuv420p", dst_color_range="MPEG")
+
+    def _fit(self, size: tuple[int, int], goal: EncodingGoal) -> VideoCodecContext:
+        """Return an encoder for this size and bitrate. A new one begins with a keyframe."""
+        rate = min(goal.frame_rate or self._frame_rate, self._frame_rate)
+        context = self._context
+        if context is None or (context.width, context.height) != size or not self._follows(goal.bitrate, rate):
+            context = self._open(size, goal.bitrate, rate)
+        if self._name == SOFTWARE and context.bit_rate != goal.bitrate:
+            context.bit_rate = goal.bitrate
+        return context
+
+    def _follows(self, bitrate: float, rate: float) -> bool:
+        least, most = (LEAST, 1.0) if self._name == SOFTWARE else HARDWARE
+        return least <= bitrate / self._opened <= most and rate == self._opened_rate
+
+    def _open(self, size: tuple[int, int], bitrate: int, rate: float) -> VideoCodecContext:
+        if self._name != SOFTWARE:
+            try:
+                context = self._open_as(self._name, size, bitrate, rate, _hardware_options(bitrate))
+                self._opened = bitrate / HARDWARE[1]
+                return context
+            except (FFmpegError, ValueError) as error:
+                self.fell_back = f"{self._name} cannot be opened: {error}"
+                _logger.warning("encoder_fallback: %s; %s takes its place", self.fell_back, SOFTWARE)
+                self._name = SOFTWARE
+        self._opened = bitrate * HEADROOM
+        return self._open_as(SOFTWARE, size, int(self._opened), rate, _software_options(bitrate))
+
+    def _open_as(
+        self, name: str, size: tuple[int, int], bitrate: int, rate: float, options: dict[str, str]
+    ) -> VideoCodecContext:
+        context = av.CodecContext.create(name, "w")
+        if not isinstance(context, VideoCodecContext):
+            raise ValueError(f"{name} is no encoder of pictures")
+        context.width, context.height = size
+        context.pix_fmt = "yuv420p"
+        context.bit_rate = bitrate
+        context.framerate = Fraction(rate).limit_denominator(1000)
+        context.time_base = Fraction(1, CLOCK)
+        context.gop_size = NEVER
+        context.max_b_frames = 0
+        context.thread_count = 1
+        context.options = options
+        context.open()
+        self._opened_rate = rate
+        self._context = context
+        return context
+
+
+def _software_options(bitrate: int) -> dict[str, str]:
+    return {
+        "preset": "ultrafast",
+        "tune": "zerolatency",
+        "profile": "baseline",
+        "forced-idr": "1",
+        "maxrate": str(int(bitrate * HEADROOM)),
+        "bufsize": str(int(bitrate * KEYFRAME_SECONDS)),
+        "x264-params": "scenecut=0:keyint=infinite:repeat-headers=1",
+    }
+
+
+def _hardware_options(bitrate: int) -> dict[str, str]:
+    """Options that the encoders have in common; one that does not know an option ignores it."""
+    return {
+        "forced-idr": "1",
+        "maxrate": str(bitrate),
+        "bufsize": str(int(bitrate * KEYFRAME_SECONDS)),
+        "profile": "baseline",
+    }
+
+
+def _from_yuv420p(media: Media) -> av.VideoFrame:
+    width, height = media.width, media.height
+    half = (width + 1) // 2, (height + 1) // 2
+    if width < MIN_SIDE or height < MIN_SIDE or width * height > MAX_PIXELS:
+        raise EncodingFailed(f"a picture of {width}x{height} pixels cannot be encoded")
+    if len(media.payload) != width * height + 2 * half[0] * half[1]:
+        raise EncodingFailed(f"{len(media.payload)} bytes are not a yuv420p picture of {width}x{height}")
+    # The encoder takes even sides only: a side with an odd number of pixels loses its last one.
+    frame = av.VideoFrame(width - width % 2, height - height % 2, "yuv420p")
+    data, at = memoryview(media.payload), 0
+    for plane, (columns, rows) in zip(frame.planes, ((width, height), half, half), strict=True):
+        _fill(plane, data[at : at + columns * rows], columns)
+        at += columns * rows
+    return frame
+
+
+def _fill(plane: VideoPlane, data: memoryview, columns: int) -> None:
+    """Copy rows of `columns` bytes into a plane, whose rows may be padded."""
+    if plane.line_size == columns and len(data) == plane.buffer_size:
+        plane.update(bytes(data))
+        return
+    padded = bytearray(plane.buffer_size)
+    for row in range(plane.height):
+        padded[row * plane.line_size : row * plane.line_size + plane.width] = data[
+            row * columns : row * columns + plane.width
+        ]
+    plane.update(bytes(padded))

@@ -1,0 +1,96 @@
+"""Estimates how many bits per second a robot's uplink carries, from the ages at which its media arrive. No I/O.
+
+The robot link is TCP: nothing is lost, but what the path does not carry waits, and arrives old. The clocks of both
+sides differ by an unknown offset; the medium that waited least shows it.
+
+| sign | rate |
+|---|---|
+| all media of half a second waited for more than 0.12 s | 85 % of what arrived, less until the queue is empty |
+| some medium waited for less than 0.05 s, and the rate is used | up by 35 % a second, beyond the last limit by 8 % |
+"""
+
+from collections import deque
+
+__all__ = ["UplinkEstimator"]
+
+BASE_SECONDS = 30.0  # the least age of this window and the one before is the path's own
+LOOK_SECONDS = 0.5  # for a standing queue
+RATE_SECONDS = 1.0  # over which the arriving bits are counted
+MOST_ARRIVALS = 2000
+LEAST_SPAN = 0.1  # s between arrivals from which a rate can be told
+STANDING, EMPTY = 0.12, 0.05  # s that the least delayed medium waited
+CUT, DEEPEST = 0.85, 0.5
+FAST, SLOW = 1.35, 1.08  # a second
+USED = 0.75  # of the rate
+HOLD = 0.5  # s after a decrease, besides the time that media waited
+HEADER = 180  # bytes of a message besides its payload, TCP's and IP's share included
+LIMITED_SECONDS = 60.0  # a path that was once too full counts as limited for so long
+
+
+class UplinkEstimator:
+    """Call `arrived` for every medium, and `decide` ten times a second.
+
+    Attributes:
+        rate: bits per second that all media of the robot may have together
+    """
+
+    def __init__(self, start_bps: float, least_bps: float, most_bps: float) -> None:
+        self.rate = start_bps
+        self._least_bps = least_bps
+        self.most_bps = most_bps
+        self._window_start: float | None = None
+        self._current = self._previous = float("inf")  # least arrival − capture, s
+        self._arrivals: deque[tuple[float, float, int]] = deque()  # time, wait in s, bits
+        self._hold_until = 0.0
+        self._decided_at: float | None = None
+        self._limited_at: float | None = None  # time of the last decrease
+        self._limit = float("inf")  # bits per second that the path carried then, and a margin off
+
+    def arrived(self, captured: float, now: float, size: int) -> None:
+        """Take a medium of `size` bytes, captured at `captured` by the robot's clock."""
+        offset = now - captured
+        if self._window_start is None:
+            self._window_start = now
+        elif now - self._window_start >= BASE_SECONDS:
+            self._window_start, self._previous, self._current = now, self._current, float("inf")
+        self._current = min(self._current, offset)
+        self._arrivals.append((now, offset - min(self._current, self._previous), 8 * (size + HEADER)))
+        while len(self._arrivals) > MOST_ARRIVALS or now - self._arrivals[0][0] > RATE_SECONDS:
+            self._arrivals.popleft()
+
+    def limited(self, now: float) -> bool:
+        """Return whether media waited on the path within the last minute."""
+        return self._limited_at is not None and now - self._limited_at < LIMITED_SECONDS
+
+    def waits(self, now: float) -> float | None:
+        """Return the wait of the medium that waited least of the last half second, s; None without two media."""
+        waits = [wait for time, wait, _ in self._arrivals if now - time <= LOOK_SECONDS]
+        return min(waits) if len(waits) >= 2 else None
+
+    def decide(self, now: float) -> None:
+        """Adapt the rate."""
+        passed = 0.0 if self._decided_at is None else min(1.0, now - self._decided_at)
+        self._decided_at = now
+        waits = self.waits(now)
+        if waits is None or now < self._hold_until:
+            return
+        received = self._received()
+        if waits > STANDING:
+            carried = self.rate if received is None else min(self.rate, received)
+            self._limit = max(self._least_bps, CUT * carried)
+            self.rate = max(self._least_bps, DEEPEST * self.rate, self._limit * (1 - min(DEEPEST, waits)))
+            self._hold_until = now + HOLD + waits
+            self._limited_at = now
+        elif waits < EMPTY and received is not None and received >= USED * self.rate:
+            growth = FAST if self.rate < self._limit else SLOW
+            self.rate *= growth**passed
+        self.rate = min(self.rate, self.most_bps)
+
+    def _received(self) -> float | None:
+        """Return the bits per second that arrived lately; None if too few came to tell."""
+        if len(self._arrivals) < 2:
+            return None
+        span = self._arrivals[-1][0] - self._arrivals[0][0]
+        if span < LEAST_SPAN:
+            return None
+        return (sum(bits for _, _, bits in self._arrivals) - self._arrivals[0][2]) / span

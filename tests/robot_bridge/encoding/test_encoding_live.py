@@ -1,0 +1,185 @@
+"""A bridge that encodes, over real TCP: its pictures, stamps and keyframes, and what a full link does to them."""
+
+import asyncio
+import socket
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from dataclasses import replace
+
+import av
+import pytest
+
+from lockstep.protocol.framing import MAX_MEDIA_FRAME, FrameReader, frame
+from lockstep.protocol.messages import EncodeRequest, Hello, Media, Ping, StreamRequest, decode_message, encode_message
+from lockstep.robot_bridge.bridge import Bridge
+from lockstep.robot_bridge.encoding.encoder_choice import EncodeSettings, encode_settings
+from lockstep.robot_bridge.errors import EncoderMissing, SettingsError
+from lockstep.robot_bridge.link.link_client import RobotLink
+from lockstep.robot_bridge.robots.event_strip import read_event_strip
+from lockstep.robot_bridge.settings import BridgeSettings
+from tests.robot_bridge.bridge_helpers import RecordingRobot, operator
+from tests.waiting import PATIENCE
+
+SETTINGS = BridgeSettings(port=0, encode=EncodeSettings(), event_strip=True)
+CAMERAS = ("overview", "front")
+CAMERA = CAMERAS[0]
+
+
+@asynccontextmanager
+async def encoding_bridge(settings: BridgeSettings = SETTINGS) -> AsyncIterator[Bridge]:
+    async with Bridge(RecordingRobot(media=True), settings) as bridge:
+        yield bridge
+
+
+async def pictures(link: RobotLink, count: int, stream: str = CAMERA) -> list[Media]:
+    found: list[Media] = []
+    async with asyncio.timeout(PATIENCE):
+        async for message in link:
+            if isinstance(message, Media) and message.stream == stream:
+                found.append(message)
+                if len(found) == count:
+                    break
+    return found
+
+
+def ask(link: RobotLink, **fields: float) -> None:
+    link.send(EncodeRequest(streams=[StreamRequest(stream=CAMERA, **fields)]))  # type: ignore[arg-type]
+
+
+class Decoder:
+    def __init__(self) -> None:
+        self._context = av.CodecContext.create("h264", "r")
+        self._context.thread_count = 1
+        self._context.flags |= av.codec.context.Flags.low_delay
+
+    def event_in(self, medium: Media) -> int | None:
+        (picture,) = self._context.decode(av.Packet(medium.payload))
+        return read_event_strip(picture.to_ndarray(format="gray"))
+
+
+async def test_a_picture_is_stamped_with_the_event_that_it_shows() -> None:
+    async with encoding_bridge() as bridge, RobotLink(*bridge.address, "media") as link:
+        assert link.hello.encodes == ["h264", "opus"]
+        ask(link, bitrate=2_000_000)
+        async with operator(bridge) as driver:
+            decoder, stamps = Decoder(), set()
+            for _ in range(20):
+                await driver.drive()
+                for medium in await pictures(link, 2):
+                    assert medium.codec == "h264"
+                    assert decoder.event_in(medium) == medium.stamp
+                    stamps.add(medium.stamp)
+    assert len(stamps) > 10
+
+
+async def test_a_link_begins_with_a_keyframe_and_gets_one_for_each_higher_count() -> None:
+    async with encoding_bridge() as bridge, RobotLink(*bridge.address, "media") as link:
+        assert (await pictures(link, 1))[0].keyframe
+        assert not any(each.keyframe for each in await pictures(link, 10))
+        for count in (1, 2):
+            ask(link, keyframes=count)
+            while not (await pictures(link, 1))[0].keyframe:
+                pass
+            ask(link, keyframes=count)  # a repeat
+            assert not any(each.keyframe for each in await pictures(link, 10))
+        async with RobotLink(*bridge.address, "media") as other:
+            assert (await pictures(other, 1))[0].keyframe or any(each.keyframe for each in await pictures(other, 5))
+
+
+async def test_size_and_rate_are_those_that_are_asked_for() -> None:
+    async with encoding_bridge() as bridge, RobotLink(*bridge.address, "media") as link:
+        whole = (await pictures(link, 1))[0]
+        ask(link, bitrate=200_000, frame_rate=5, scale=0.5)
+        while (first := (await pictures(link, 1))[0]).width == whole.width:
+            pass
+        assert (first.keyframe, first.width, first.height) == (True, whole.width // 2, whole.height // 2)
+        times = [each.time for each in await pictures(link, 6)]
+        assert min(later - earlier for earlier, later in zip(times, times[1:], strict=False)) > 0.1
+
+
+async def test_requests_that_make_no_sense_change_nothing() -> None:
+    async with encoding_bridge() as bridge, RobotLink(*bridge.address, "media") as link:
+        link.send(EncodeRequest(streams=[StreamRequest(stream="no such camera", keyframes=2**53 - 1)] * 32))
+        ask(link, bitrate=1, frame_rate=240, scale=1e-9)
+        assert await pictures(link, 5)
+        assert not bridge.counters.bad_input
+
+
+async def test_a_bridge_that_does_not_encode_sends_raw_pictures_and_ignores_requests() -> None:
+    async with (
+        encoding_bridge(replace(SETTINGS, encode=None)) as bridge,
+        RobotLink(*bridge.address, "media") as link,
+    ):
+        assert link.hello.encodes == []
+        ask(link, bitrate=100_000)
+        assert {each.codec for each in await pictures(link, 5)} == {"yuv420p"}
+
+
+async def test_a_link_that_hardly_reads_costs_no_picture_that_another_needs() -> None:
+    """What the slow link misses is counted, and nothing is left out for it."""
+    async with encoding_bridge() as bridge, RobotLink(*bridge.address, "media") as link, slow_link(bridge) as slow:
+        decoder = Decoder()
+        while not (medium := (await pictures(link, 1))[0]).keyframe:
+            pass
+        decoder.event_in(medium)
+        async with asyncio.timeout(PATIENCE):
+            while not bridge.drops[CAMERA]:
+                await slow.read(20)
+                for medium in await pictures(link, 1):
+                    assert decoder.event_in(medium) == medium.stamp
+
+
+async def test_pictures_are_left_out_before_they_are_encoded_while_no_link_takes_them() -> None:
+    """All that were encoded can be decoded in order, although the link took a fraction of what the camera gave."""
+    async with encoding_bridge() as bridge, slow_link(bridge) as slow:
+        decoder, shown = Decoder(), 0
+        async with asyncio.timeout(PATIENCE):
+            while shown < 30 or not bridge.counters.left_out["link_busy"]:
+                await asyncio.sleep(0.01)  # the network's rate
+                for message in await slow.read(150):
+                    if message.stream == CAMERA:
+                        assert decoder.event_in(message) == message.stamp
+                        shown += 1
+    assert not set(bridge.drops) & set(CAMERAS)
+
+
+class SlowLink:
+    """A media link whose receiver takes few bytes at a time, and says that it lives."""
+
+    def __init__(self, own: socket.socket) -> None:
+        self._socket = own
+        self._reader = FrameReader(MAX_MEDIA_FRAME)
+
+    async def send(self, message: Hello | EncodeRequest | Ping) -> None:
+        await asyncio.get_running_loop().sock_sendall(self._socket, frame(encode_message(message)))
+
+    async def read(self, size: int) -> list[Media]:
+        data = await asyncio.get_running_loop().sock_recv(self._socket, size)
+        assert data, "the bridge has ended the link"
+        await self.send(Ping(id=1))
+        self._reader.feed(data)
+        messages = [decode_message(bytes(payload)) for payload in self._reader.frames()]
+        return [each for each in messages if isinstance(each, Media)]
+
+
+@asynccontextmanager
+async def slow_link(bridge: Bridge) -> AsyncIterator[SlowLink]:
+    with socket.socket() as own:
+        own.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+        own.setblocking(False)
+        await asyncio.get_running_loop().sock_connect(own, bridge.address)
+        link = SlowLink(own)
+        await link.send(Hello(role="media"))
+        await link.send(EncodeRequest(streams=[StreamRequest(stream=name, bitrate=20_000_000) for name in CAMERAS]))
+        yield link
+
+
+def test_the_extra_is_named_where_pyav_is_missing(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
+    with pytest.raises(EncoderMissing, match=r"lockstep-bridge\[encode\]"):
+        encode_settings("h264")
+
+
+def test_an_encoder_that_does_not_exist_is_refused_by_name() -> None:
+    with pytest.raises(SettingsError, match="h265"):
+        encode_settings("h265")

@@ -1,0 +1,113 @@
+"""Pictures of a camera, encoded and decoded again."""
+
+import av
+import numpy as np
+import pytest
+
+from lockstep.protocol.messages import Media, MediaCodec
+from lockstep.robot_bridge.encoding.encoding_requests import EncodingGoal
+from lockstep.robot_bridge.encoding.picture_encoder import H264Encoder
+from lockstep.robot_bridge.errors import EncodingFailed
+from lockstep.server.media.codecs.h264 import inspect
+
+WHOLE = EncodingGoal(500_000, 0.0, 1.0)
+
+
+def raw(number: int, width: int = 320, height: int = 240, codec: MediaCodec = "yuv420p") -> Media:
+    """A moving block on noise, which is not cheap to encode."""
+    draw = np.random.default_rng(number)
+    luma = draw.integers(90, 110, (height, width), np.uint8)
+    luma[:40, 10 * number % (width - 40) :][:, :40] = 230
+    chroma = bytes([128]) * (2 * ((width + 1) // 2) * ((height + 1) // 2))
+    return Media(
+        stream="front",
+        codec=codec,
+        stamp=number + 1,
+        time=number / 30,
+        payload=luma.tobytes() + chroma,
+        width=width,
+        height=height,
+    )
+
+
+def decoded(units: list[bytes]) -> list[av.VideoFrame]:
+    context = av.CodecContext.create("h264", "r")
+    context.thread_count = 1
+    assert isinstance(context, av.VideoCodecContext)
+    context.flags |= av.codec.context.Flags.low_delay
+    return [frame for unit in units for frame in context.decode(av.Packet(unit))]
+
+
+def test_each_picture_is_one_access_unit_that_decodes_at_once() -> None:
+    encoder = H264Encoder()
+    pictures = [encoder.encode(raw(n), WHOLE, keyframe=n in (0, 7)) for n in range(10)]
+    assert [each.keyframe for each in pictures] == [n in (0, 7) for n in range(10)]
+    frames = decoded([each.data for each in pictures])
+    assert [(frame.width, frame.height) for frame in frames] == [(320, 240)] * 10
+    for number, frame in enumerate(frames):
+        assert frame.to_ndarray()[20, 10 * number + 20] > 180  # the block is where it was drawn
+    found = inspect(pictures[7].data)
+    assert found.keyframe
+    assert found.profile is not None
+    assert found.profile.constrained
+
+
+@pytest.mark.parametrize(("width", "height"), [(323, 241), (64, 48), (330, 250)])
+def test_sizes_whose_rows_are_padded_or_odd_come_out_right(width: int, height: int) -> None:
+    (frame,) = decoded([H264Encoder().encode(raw(0, width, height), WHOLE, keyframe=True).data])
+    assert (frame.width, frame.height) == (width - width % 2, height - height % 2)
+    luma = frame.to_ndarray()
+    assert luma[20, 20] > 180
+    assert abs(float(luma[height - 4, : frame.width].mean()) - 100) < 20
+
+
+def test_a_smaller_size_begins_with_a_keyframe() -> None:
+    encoder = H264Encoder()
+    encoder.encode(raw(0), WHOLE, keyframe=False)
+    encoder.encode(raw(1), WHOLE, keyframe=False)
+    small = encoder.encode(raw(2), EncodingGoal(500_000, 0.0, 0.5), keyframe=False)
+    assert (small.keyframe, small.width, small.height) == (True, 160, 120)
+
+
+def test_the_bitrate_follows_what_is_asked_for_without_a_keyframe() -> None:
+    encoder, sizes = H264Encoder(), []
+    for begin, bitrate in ((0, 600_000), (120, 300_000)):
+        goal = EncodingGoal(bitrate, 0.0, 1.0)
+        pictures = [encoder.encode(raw(n), goal, keyframe=False) for n in range(begin, begin + 120)]
+        sizes.append(8 * sum(len(each.data) for each in pictures[30:]) / 3)
+    assert not any(each.keyframe for each in pictures)
+    assert sizes[0] < 600_000 * 1.4
+    assert sizes[1] < 300_000 * 1.4
+
+
+def test_jpeg_pictures_are_encoded_too() -> None:
+    context = av.CodecContext.create("mjpeg", "w")
+    assert isinstance(context, av.VideoCodecContext)
+    context.width, context.height, context.pix_fmt, context.framerate = 160, 120, "yuvj420p", 30  # type: ignore[assignment]
+    (jpeg,) = context.encode(av.VideoFrame.from_ndarray(np.full((180, 160), 128, np.uint8), "yuvj420p"))
+    medium = Media(stream="front", codec="mjpeg", stamp=1, time=0.0, payload=bytes(jpeg))
+    encoded = H264Encoder().encode(medium, WHOLE, keyframe=True)
+    assert (encoded.width, encoded.height, encoded.keyframe) == (160, 120, True)
+
+
+@pytest.mark.parametrize(
+    "medium",
+    [
+        Media(stream="front", codec="yuv420p", stamp=1, time=0.0, payload=b"short", width=320, height=240),
+        Media(stream="front", codec="yuv420p", stamp=1, time=0.0, payload=b""),
+        Media(stream="front", codec="mjpeg", stamp=1, time=0.0, payload=b"not a picture"),
+        Media(stream="front", codec="h264", stamp=1, time=0.0, payload=b""),
+    ],
+)
+def test_what_is_no_picture_is_named_and_the_next_begins_afresh(medium: Media) -> None:
+    encoder = H264Encoder()
+    with pytest.raises(EncodingFailed):
+        encoder.encode(medium, WHOLE, keyframe=False)
+    assert encoder.encode(raw(1), WHOLE, keyframe=False).keyframe
+
+
+def test_the_software_encoder_takes_the_place_of_one_that_cannot_be_opened() -> None:
+    encoder = H264Encoder("h264_v4l2m2m")
+    assert encoder.encode(raw(0), WHOLE, keyframe=False).keyframe
+    assert encoder.fell_back.startswith("h264_v4l2m2m cannot be opened")
+    assert not encoder.encode(raw(1), WHOLE, keyframe=False).keyframe
