@@ -10,8 +10,10 @@ ConsoleError
 │   ├── NoSeat              only the holder of the control seat may do this
 │   ├── NotAllowed          the role does not permit this
 │   ├── Silenced            a supervisor has silenced the stops of this link
-│   └── OriginRefused       a page of another site
+│   ├── OriginRefused       a page of another site
+│   └── RobotUnknown        a robot that dials in and is not, or no longer, paired
 ├── RequestError            the request is not understood
+│   ├── AlreadyPaired       a robot is paired here: forget it first
 │   ├── AlreadyPublishing   one link publishes one camera
 │   ├── AlreadyRecording
 │   ├── BadJson
@@ -26,7 +28,9 @@ ConsoleError
 │   ├── LockedOut           a reset while somebody at the robot keeps it from being driven
 │   ├── NotAcceptable       an offer without anything that the console accepts
 │   ├── NotConnected
+│   ├── NotDialIn           the console connects to this robot; or its key is in the settings
 │   ├── NotFound
+│   ├── NotPairing          no pairing code is open
 │   ├── PreconditionFailed
 │   ├── TooManyInvitations
 │   ├── PreconditionRequired
@@ -65,6 +69,7 @@ from typing import NamedTuple
 __all__ = [
     "HTTP_ERRORS",
     "AccessError",
+    "AlreadyPaired",
     "AlreadyPublishing",
     "AlreadyRecording",
     "BadJson",
@@ -93,7 +98,9 @@ __all__ = [
     "NotAcceptable",
     "NotAllowed",
     "NotConnected",
+    "NotDialIn",
     "NotFound",
+    "NotPairing",
     "OriginRefused",
     "PreconditionFailed",
     "PreconditionRequired",
@@ -103,6 +110,7 @@ __all__ = [
     "ResetNotKept",
     "ResetTooSoon",
     "RobotFailed",
+    "RobotUnknown",
     "RobotUnreachable",
     "SceneUnavailable",
     "ShuttingDown",
@@ -175,11 +183,19 @@ class OriginRefused(AccessError):
     pass
 
 
+class RobotUnknown(AccessError):
+    pass
+
+
 class Silenced(AccessError):
     pass
 
 
 class RequestError(ConsoleError):
+    pass
+
+
+class AlreadyPaired(RequestError):
     pass
 
 
@@ -236,6 +252,14 @@ class NotAcceptable(RequestError):
 
 
 class NotConnected(RequestError):
+    pass
+
+
+class NotDialIn(RequestError):
+    pass
+
+
+class NotPairing(RequestError):
     pass
 
 
@@ -386,11 +410,13 @@ HTTP_ERRORS: dict[type[ConsoleError], HttpError] = {
     TokenInvalid: HttpError(401, "unauthorized", {"WWW-Authenticate": 'Bearer error="invalid_token"'}),
     LinkExpired: HttpError(401, "link_expired", {"WWW-Authenticate": 'Bearer error="invalid_token"'}),
     LinkRevoked: HttpError(401, "link_revoked", {"WWW-Authenticate": 'Bearer error="invalid_token"'}),
+    RobotUnknown: HttpError(401, "robot_unknown", {"WWW-Authenticate": "LockstepRobot"}),
     LinkOtherRobot: HttpError(403, "link_other_robot"),
     NoSeat: HttpError(403, "no_seat"),
     NotAllowed: HttpError(403, "not_allowed"),
     OriginRefused: HttpError(403, "origin_refused"),
     Silenced: HttpError(403, "silenced"),
+    AlreadyPaired: HttpError(409, "already_paired"),
     AlreadyPublishing: HttpError(409, "already_publishing", {"Retry-After": "2"}),
     AlreadyRecording: HttpError(409, "already_recording"),
     BadJson: HttpError(400, "bad_json"),
@@ -407,6 +433,8 @@ HTTP_ERRORS: dict[type[ConsoleError], HttpError] = {
     NotAcceptable: HttpError(406, "not_acceptable"),
     CameraTaken: HttpError(409, "camera_taken", {"Retry-After": "5"}),
     NotConnected: HttpError(409, "not_connected"),
+    NotDialIn: HttpError(409, "not_dial_in"),
+    NotPairing: HttpError(409, "not_pairing"),
     LockedOut: HttpError(409, "locked_out"),
     ResetTooSoon: HttpError(409, "too_soon", {"Retry-After": "1"}),
     PressUsed: HttpError(409, "press_used"),

@@ -28,6 +28,7 @@ AuditKind = Literal[
     "epoch",
     "recording",  # started, ended, downloaded, deleted
     "reading",  # of a recording; merged
+    "pairing",  # of a robot that dials in: a code, its use, a refusal, the end
     "publication",  # of a camera by WHIP: begun, ended
     "audit",  # records were lost before this one
 ]
@@ -38,7 +39,19 @@ CHATTER: frozenset[AuditKind] = frozenset({"joined", "renamed", "left", "claim",
 # Kinds that are written one by one only as often as their link's budget allows; the rest is counted together.
 # The others are either not caused by a link, or limited where they are asked for.
 LIMITED: frozenset[AuditKind] = frozenset(
-    {"joined", "renamed", "left", "seat", "claim", "invitation", "revocation", "recording", "reading", "publication"}
+    {
+        "joined",
+        "renamed",
+        "left",
+        "seat",
+        "claim",
+        "invitation",
+        "revocation",
+        "recording",
+        "reading",
+        "publication",
+        "pairing",
+    }
 )
 BURST = 30.0  # records of one kind and link at once
 RATE = 0.1  # Hz, afterwards
