@@ -48,7 +48,7 @@ def choose_access(
         kept = load_key(directory)
         if kept is None:
             raise NotPaired(
-                f"this robot has no key for {address.url}: a supervisor presses `Pair a robot` on the console's page,"
+                f"this robot has no key for {address.url}: a supervisor presses “Pair a robot” on the console's page,"
                 " which shows the code for --pair; or give --console-key-file"
             )
         return ConsoleAccess(address, kept, authority)

@@ -27,7 +27,7 @@ log = structlog.get_logger(__name__)
 
 DIAL_IN = "dial-in"  # instead of a robot's address
 WAITING = "waiting for the robot to dial in"
-UNPAIRED = "no robot is paired: a supervisor presses `Pair a robot`"
+UNPAIRED = "no robot is paired; a supervisor presses “Pair a robot”"
 NO_TOKEN = RobotToken(secrets.token_hex(32))  # fits no robot: a request is compared even while none is paired
 
 

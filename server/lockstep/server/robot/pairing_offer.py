@@ -25,10 +25,10 @@ OfferState = Literal["none", "waiting", "paired", "expired", "too_many_tries"]
 RefusalName = Literal["not_pairing", "code_expired", "code_used", "too_many_tries", "wrong_code", "wrong_certificate"]
 
 WORDS: dict[RefusalName, str] = {
-    "not_pairing": "no code with these first two signs is open here: press `Pair a robot` on the page",
-    "code_expired": "the code is too old: press `Pair a robot` on the page for a new one",
-    "code_used": "a robot was paired with this code already: press `Pair a robot` on the page for a new one",
-    "too_many_tries": "the code was typed wrongly too often: press `Pair a robot` on the page for a new one",
+    "not_pairing": "no code with these first two signs is open here: press “Pair a robot” on the page",
+    "code_expired": "the code is too old: press “Pair a robot” on the page for a new one",
+    "code_used": "a robot was paired with this code already: press “Pair a robot” on the page for a new one",
+    "too_many_tries": "the code was typed wrongly too often: press “Pair a robot” on the page for a new one",
     "wrong_code": "the code is not the one on the page",
     "wrong_certificate": "the robot saw another certificate than this console's. Somebody may be between the two; or a"
     " proxy is, whose certificate the robot has to trust: give its CA with --console-ca",

@@ -240,7 +240,7 @@ class _Line:
 
 async def _pair(websocket: WebSocket, here: Dependencies, dial_in: DialIn) -> None:
     if dial_in.offer.state(time.monotonic()) == "none":
-        raise NotPairing("no pairing code is open here: a supervisor presses `Pair a robot` on the page")
+        raise NotPairing("no pairing code is open here: a supervisor presses “Pair a robot” on the page")
     if dial_in.exchanges >= MAX_PAIRING or not here.guard.may_fail(websocket.scope):
         raise TooManyRequests("too many robots try to pair: wait, and try again")
     dial_in.exchanges += 1
