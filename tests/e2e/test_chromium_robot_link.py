@@ -7,9 +7,11 @@ from pathlib import Path
 import pytest
 from playwright.async_api import Browser, Page, expect
 
+from lockstep.bench.browsers.chromium import open_page
 from lockstep.bench.browsers.console_page import open_console
 from lockstep.bench.harness.processes import running_process
 from lockstep.bench.harness.stack import LOCKSTEP
+from tests.e2e.overview import until
 from tests.support.stack import running_console
 
 pytestmark = pytest.mark.browser
@@ -78,3 +80,34 @@ async def test_who_does_not_supervise_is_told_to_wait_for_the_robot(tmp_path: Pa
         await expect(console.page.get_by_text("no robot is paired").first).to_be_visible()
         await expect(console.page.get_by_role("button", name="Robot link…")).to_have_count(0)
         await _photo(console.page, "operator")
+
+
+async def test_the_overview_of_a_fleet_pairs_each_robot_by_itself(tmp_path: Path, chromium: Browser) -> None:
+    right = ("--robot", "right=dial-in")
+    async with (
+        running_console(tmp_path, "left=dial-in", tmp_path / "events.jsonl", right) as stack,
+        open_page(chromium, stack.supervisor, width=1280, height=800, pad=False) as page,
+    ):
+        await page.get_by_role("button", name="Robot links").click()
+        left, other = page.get_by_role("region", name="left"), page.get_by_role("region", name="right")
+        await left.get_by_role("button", name="Pair a robot").click()
+        await expect(left).to_contain_text("Waits for the robot")
+        await expect(other).to_contain_text("No robot is paired")
+        await _photo(page, "fleet-waiting")
+        shown = await left.get_by_label("Command for the robot's computer").input_value()
+        assert "/robots/left --pair " in shown
+        async with running_process(*_command(shown, tmp_path)):
+            await expect(left).to_contain_text("planar is connected")
+            await expect(other).to_contain_text("No robot is paired")
+            await _photo(page, "fleet-connected")
+            await page.get_by_role("button", name="Close").click()
+            await until(page, "r.left.state === 'free'")
+        swapped = [each.replace("/robots/left", "/robots/right") for each in _command(shown, tmp_path)]
+        process = await asyncio.create_subprocess_exec(*swapped[:-4], *swapped[-2:], stderr=asyncio.subprocess.PIPE)
+        assert process.stderr is not None
+        try:
+            while b"robot_unknown" not in await process.stderr.readline():
+                pass
+        finally:
+            process.terminate()
+            await process.communicate()

@@ -99,9 +99,7 @@ async def open_code(request: Request, caller: Caller) -> Response:
     code = await dial_in.open_code(caller.name)
     here.console.audit.record("pairing", caller.actor, "code", f"good for {OFFER_SECONDS:g} s")
     base = here.settings.public_url or str(request.base_url).rstrip("/")
-    if here.settings.public_url:
-        base += str(request.scope.get("root_path", ""))
-    url = base.replace("http", "ws", 1)
+    url = base.replace("http", "ws", 1) + str(request.scope.get("root_path", ""))
     command = f"lockstep robot NAME --console {url} --pair {code}"
     return json_answer(NewPairingCode(code=str(code), command=command, seconds=OFFER_SECONDS, tries=MAX_TRIES), 201)
 

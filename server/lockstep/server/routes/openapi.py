@@ -232,9 +232,7 @@ OPERATIONS: tuple[Operation, ...] = (
         body=ResetRequest,
     ),
     Operation("post", "/api/scene", "A ticket for the 3D scene.", 200, ScenePath, (SceneUnavailable,)),
-    Operation(
-        "get", "/api/dial-in", "How the robot that dials in is paired, and its state.", 200, RobotDialInfo
-    ),
+    Operation("get", "/api/dial-in", "How the robot that dials in is paired, and its state.", 200, RobotDialInfo),
     Operation(
         *("post", "/api/dial-in/code", "Make a code that pairs one robot.", 201, NewPairingCode),
         errors=(NotAllowed, NotDialIn, AlreadyPaired),
