@@ -138,9 +138,14 @@ async def running_fleet(
 
 
 @asynccontextmanager
-async def running_console(directory: Path, robot: str, event_log: Path) -> AsyncIterator[Stack]:
-    """Start `lockstep serve` for a robot that runs already, at "tcp://host:port"; `event_log` is its own."""
-    async with _running(directory, ("serve", "--json", "--robot", robot, "--port", "0"), event_log) as stack:
+async def running_console(
+    directory: Path, robot: str, event_log: Path, extra: tuple[str, ...] = ()
+) -> AsyncIterator[Stack]:
+    """Start `lockstep serve` for a robot that runs already, at "tcp://host:port"; `event_log` is its own.
+
+    `robot`: or "dial-in", for one that comes later.
+    """
+    async with _running(directory, ("serve", "--json", "--robot", robot, "--port", "0", *extra), event_log) as stack:
         yield stack
 
 

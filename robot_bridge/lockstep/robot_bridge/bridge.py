@@ -19,6 +19,7 @@ from lockstep.robot_bridge.control.tick_alarm import TickAlarm
 from lockstep.robot_bridge.control.tick_loop import TickLoop
 from lockstep.robot_bridge.counters import BridgeCounters
 from lockstep.robot_bridge.description.check_description import check_description
+from lockstep.robot_bridge.dial.dialer import Dialer
 from lockstep.robot_bridge.encoding.media_encoding import MediaEncoding
 from lockstep.robot_bridge.errors import RobotFailed, named
 from lockstep.robot_bridge.event_log import EventLog
@@ -43,7 +44,7 @@ _logger = logging.getLogger(__name__)
 
 
 class Bridge:
-    """One run of a robot: one epoch. `start` returns when the bridge listens; `close` leaves the robot at rest."""
+    """One run of a robot: one epoch. `start` returns when links may come; `close` leaves the robot at rest."""
 
     def __init__(
         self, robot: Robot, settings: BridgeSettings, now: clock.Clock = clock.now, *, liveness: Liveness | None = None
@@ -113,6 +114,7 @@ class Bridge:
             tls=None if settings.tls is None else settings.tls.bridge_context(),
             encoding=encoding,
         )
+        self._dialer = None if settings.console is None else Dialer(settings.console, self._links)
         self._ticks = TickLoop(
             *(robot, description.hold, shaper, executor, self._stops),
             *(self._watchdogs, self._liveness, self._links, alarm, counters),
@@ -142,7 +144,7 @@ class Bridge:
         return self._links.drops()
 
     async def start(self) -> None:
-        """Start the bridge; returns when it listens.
+        """Start the bridge; returns when it listens, and dials its console if it has one.
 
         Raises:
             ListenError: the address cannot be had.
@@ -157,7 +159,8 @@ class Bridge:
             if self._lockout is not None:
                 await asyncio.to_thread(self._lockout.start)
             await self._watchdogs.start()
-            self.address = await self._links.listen(self._settings.host, self._settings.port)
+            if self._settings.listen:
+                self.address = await self._links.listen(self._settings.host, self._settings.port)
             self._begin()
         except BaseException:
             await self.close()
@@ -245,6 +248,8 @@ class Bridge:
                 group.create_task(self._links.run())
                 group.create_task(self._run_reports())
                 group.create_task(self._sources.run())
+                if self._dialer is not None:
+                    group.create_task(self._dialer.run())
         except (asyncio.CancelledError, GeneratorExit):
             raise
         except BaseException as errors:

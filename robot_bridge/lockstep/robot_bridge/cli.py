@@ -19,14 +19,18 @@ import uvloop
 from lockstep.protocol.errors import SecretError
 from lockstep.protocol.link_secret import LinkSecret
 from lockstep.robot_bridge.bridge import Bridge
+from lockstep.robot_bridge.dial.choose_access import choose_access
 from lockstep.robot_bridge.encoding.encoder_choice import ENCODERS, encode_settings
 from lockstep.robot_bridge.errors import (
+    BadConsoleAddress,
     BadRobot,
     BridgeError,
     DescriptionError,
     EncoderMissing,
     InsecureLink,
     ModelError,
+    NotPaired,
+    PairingRefused,
     SettingsError,
     UnknownRobot,
 )
@@ -48,14 +52,8 @@ EXIT_FAILED = 1
 EXIT_USAGE = 2
 # A retry does not help against these errors; it may against the others, such as a robot that is not switched on yet.
 CANNOT_BE_MEANT = (
-    UnknownRobot,
-    BadRobot,
-    SettingsError,
-    ModelError,
-    DescriptionError,
-    EncoderMissing,
-    InsecureLink,
-    SecretError,
+    *(UnknownRobot, BadRobot, SettingsError, ModelError, DescriptionError, EncoderMissing, InsecureLink),
+    *(SecretError, BadConsoleAddress, NotPaired, PairingRefused),
 )
 
 _logger = logging.getLogger(__name__)
@@ -126,6 +124,24 @@ def run(
             "lockstep-bridge[encode]. Default: send them as the cameras give them."
         ),
     ] = None,
+    console: Annotated[
+        str | None,
+        typer.Option(help="Dial this console instead of waiting for it: wss://host[:port], or wss://…/robots/NAME."),
+    ] = None,
+    pair: Annotated[
+        str | None,
+        typer.Option(metavar="CODE", help="Pair with that console by the code that its page shows; -: read the code."),
+    ] = None,
+    console_key_file: Annotated[
+        Path | None,
+        typer.Option(help="File with the key that the console has too, instead of pairing."),
+    ] = None,
+    console_ca: Annotated[
+        Path | None, typer.Option(help="CA of the console's certificate. Default: those that this machine trusts.")
+    ] = None,
+    listen: Annotated[
+        bool, typer.Option(help="Besides --console, also listen on --host and --port as without it.")
+    ] = False,
     operator_grace: Annotated[
         float,
         typer.Option(min=0, help="Seconds for which the bridge keeps the robot for a console whose link broke."),
@@ -145,9 +161,12 @@ def run(
     known_as = (name,) if file is None else (file.stem, name)
     place = state_dir or default_place(known_as[0])
     try:
+        access = choose_access(console, pair, console_key_file, console_ca, place, known_as[0])
         settings = BridgeSettings(
             host=host,
             port=port,
+            listen=listen or access is None,
+            console=access,
             event_log=event_log,
             lockout_file=lockout_file,
             state_dir=place,
@@ -234,15 +253,20 @@ async def _serve(name: str, make: Callable[[], Robot], settings: BridgeSettings,
         loop.add_signal_handler(number, leave.set)
     liveness = Liveness(LIMIT, ServiceManager(os.environ))
     async with Bridge(make(), settings, liveness=liveness) as bridge:
-        _announce(name, bridge, "tcp" if settings.tls is None else "tls", as_json)
+        _announce(name, bridge, settings, as_json)
         await bridge.wait(leave)
         bridge.report()
 
 
-def _announce(name: str, bridge: Bridge, scheme: str, as_json: bool) -> None:
+def _announce(name: str, bridge: Bridge, settings: BridgeSettings, as_json: bool) -> None:
     host, port = bridge.address
-    url = f"{scheme}://{f'[{host}]' if ':' in host else host}:{port}"
-    typer.echo(json.dumps({"robot": url}) if as_json else f"{name} at {url}")
+    said = {}
+    if settings.listen:
+        said["robot"] = f"{'tcp' if settings.tls is None else 'tls'}://{f'[{host}]' if ':' in host else host}:{port}"
+    if settings.console is not None:
+        said["console"] = settings.console.address.url
+    where = " and ".join(f"{'at' if key == 'robot' else 'dials'} {url}" for key, url in said.items())
+    typer.echo(json.dumps(said) if as_json else f"{name} {where}")
     sys.stdout.flush()
     if as_json:  # the reader of that line may never read on, and a full pipe would hold up the ticks
         with contextlib.suppress(OSError):

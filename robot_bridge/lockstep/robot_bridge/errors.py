@@ -14,25 +14,37 @@ BridgeError
 ├── InsecureLink            the bridge will not listen there without a secret or client certificates
 ├── StateDirInUse           another bridge keeps its stop in the directory
 ├── StateDirUnusable        the directory that keeps the stop cannot be made, read or written
+├── BadConsoleAddress       a robot cannot dial that address
+├── NotPaired               the robot has no key for a console
+├── PairingRefused          the console did not take the pairing code, or is not the one that showed it
+├── ConsoleUnreachable      no console answers at the address
+├── WrongConsole            the certificate there is another one than the console's
+├── ConsoleRefused          the console does not take this robot
 └── RobotFailed             the robot adapter raised while running
 """
 
 __all__ = [
     "BadParameter",
+    "BadConsoleAddress",
     "BadRobot",
     "BridgeError",
+    "ConsoleRefused",
+    "ConsoleUnreachable",
     "DescriptionError",
     "EncoderMissing",
     "EncodingFailed",
     "InsecureLink",
     "ListenError",
     "ModelError",
+    "NotPaired",
+    "PairingRefused",
     "RobotFailed",
     "RobotUnavailable",
     "SettingsError",
     "StateDirInUse",
     "StateDirUnusable",
     "UnknownRobot",
+    "WrongConsole",
     "named",
 ]
 
@@ -105,6 +117,36 @@ class StateDirInUse(BridgeError):
 
 class StateDirUnusable(BridgeError):
     name = "state_dir"
+
+
+class BadConsoleAddress(BridgeError):
+    name = "bad_console_address"
+
+
+class NotPaired(BridgeError):
+    name = "not_paired"
+
+
+class PairingRefused(BridgeError):
+    name = "pairing_refused"
+
+
+class ConsoleUnreachable(BridgeError):
+    name = "console_unreachable"
+
+
+class WrongConsole(BridgeError):
+    name = "wrong_console"
+
+
+class ConsoleRefused(BridgeError):
+    """Attributes: status, of HTTP."""
+
+    name = "console_refused"
+
+    def __init__(self, detail: str, status: int) -> None:
+        super().__init__(detail)
+        self.status = status
 
 
 class RobotFailed(BridgeError):

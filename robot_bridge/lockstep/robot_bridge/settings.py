@@ -5,6 +5,7 @@ from pathlib import Path
 
 from lockstep.protocol.link_secret import LinkSecret
 from lockstep.protocol.serial import FIRST_EVENT
+from lockstep.robot_bridge.dial.console_access import ConsoleAccess
 from lockstep.robot_bridge.encoding.encoder_choice import EncodeSettings
 from lockstep.robot_bridge.link.link_tls import LinkTls
 
@@ -15,6 +16,8 @@ __all__ = ["BridgeSettings"]
 class BridgeSettings:
     host: str = "127.0.0.1"
     port: int = 5600  # 0: any free one
+    listen: bool = True  # False: nobody can connect; the bridge itself dials its console
+    console: ConsoleAccess | None = None  # the console that the bridge dials; None: it dials none
     event_log: Path | None = None  # JSON lines of everything that happens to events; None writes nothing
     state_dir: Path | None = None  # keeps the latched stop over restarts; None: in memory only, and feedback says so
     older_state_dirs: tuple[Path, ...] = ()  # their state is used if `state_dir` is new

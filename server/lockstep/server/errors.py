@@ -10,8 +10,10 @@ ConsoleError
 │   ├── NoSeat              only the holder of the control seat may do this
 │   ├── NotAllowed          the role does not permit this
 │   ├── Silenced            a supervisor has silenced the stops of this link
-│   └── OriginRefused       a page of another site
+│   ├── OriginRefused       a page of another site
+│   └── RobotUnknown        a robot that dials in and is not, or no longer, paired
 ├── RequestError            the request is not understood
+│   ├── AlreadyPaired       a robot is paired here: forget it first
 │   ├── AlreadyPublishing   one link publishes one camera
 │   ├── AlreadyRecording
 │   ├── BadJson
@@ -27,7 +29,9 @@ ConsoleError
 │   ├── NotAcceptable       an offer without anything that the console accepts
 │   ├── NotConnected
 │   ├── NotRenewable        an action that moves the robot, asked for over HTTP
+│   ├── NotDialIn           the console connects to this robot; or its key is in the settings
 │   ├── NotFound
+│   ├── NotPairing          no pairing code is open
 │   ├── PreconditionFailed
 │   ├── TooManyInvitations
 │   ├── PreconditionRequired
@@ -66,6 +70,7 @@ from typing import NamedTuple
 __all__ = [
     "HTTP_ERRORS",
     "AccessError",
+    "AlreadyPaired",
     "AlreadyPublishing",
     "AlreadyRecording",
     "BadJson",
@@ -94,8 +99,10 @@ __all__ = [
     "NotAcceptable",
     "NotAllowed",
     "NotConnected",
+    "NotDialIn",
     "NotFound",
     "NotRenewable",
+    "NotPairing",
     "OriginRefused",
     "PreconditionFailed",
     "PreconditionRequired",
@@ -105,6 +112,7 @@ __all__ = [
     "ResetNotKept",
     "ResetTooSoon",
     "RobotFailed",
+    "RobotUnknown",
     "RobotUnreachable",
     "SceneUnavailable",
     "ShuttingDown",
@@ -177,11 +185,19 @@ class OriginRefused(AccessError):
     pass
 
 
+class RobotUnknown(AccessError):
+    pass
+
+
 class Silenced(AccessError):
     pass
 
 
 class RequestError(ConsoleError):
+    pass
+
+
+class AlreadyPaired(RequestError):
     pass
 
 
@@ -242,6 +258,14 @@ class NotConnected(RequestError):
 
 
 class NotRenewable(RequestError):
+    pass
+
+
+class NotDialIn(RequestError):
+    pass
+
+
+class NotPairing(RequestError):
     pass
 
 
@@ -392,11 +416,13 @@ HTTP_ERRORS: dict[type[ConsoleError], HttpError] = {
     TokenInvalid: HttpError(401, "unauthorized", {"WWW-Authenticate": 'Bearer error="invalid_token"'}),
     LinkExpired: HttpError(401, "link_expired", {"WWW-Authenticate": 'Bearer error="invalid_token"'}),
     LinkRevoked: HttpError(401, "link_revoked", {"WWW-Authenticate": 'Bearer error="invalid_token"'}),
+    RobotUnknown: HttpError(401, "robot_unknown", {"WWW-Authenticate": "LockstepRobot"}),
     LinkOtherRobot: HttpError(403, "link_other_robot"),
     NoSeat: HttpError(403, "no_seat"),
     NotAllowed: HttpError(403, "not_allowed"),
     OriginRefused: HttpError(403, "origin_refused"),
     Silenced: HttpError(403, "silenced"),
+    AlreadyPaired: HttpError(409, "already_paired"),
     AlreadyPublishing: HttpError(409, "already_publishing", {"Retry-After": "2"}),
     AlreadyRecording: HttpError(409, "already_recording"),
     BadJson: HttpError(400, "bad_json"),
@@ -414,6 +440,8 @@ HTTP_ERRORS: dict[type[ConsoleError], HttpError] = {
     CameraTaken: HttpError(409, "camera_taken", {"Retry-After": "5"}),
     NotConnected: HttpError(409, "not_connected"),
     NotRenewable: HttpError(409, "not_renewable"),
+    NotDialIn: HttpError(409, "not_dial_in"),
+    NotPairing: HttpError(409, "not_pairing"),
     LockedOut: HttpError(409, "locked_out"),
     ResetTooSoon: HttpError(409, "too_soon", {"Retry-After": "1"}),
     PressUsed: HttpError(409, "press_used"),

@@ -18,6 +18,7 @@ from lockstep.server.media.settings import MediaSettings
 from lockstep.server.media.sources.source_settings import SourceSettings
 from lockstep.server.recording.settings import RecordingSettings
 from lockstep.server.robot.credentials import link_access
+from lockstep.server.robot.dial_in import DIAL_IN
 from lockstep.server.settings_file import SettingsFileSource
 from lockstep.server.sfu.settings import RelaySettings
 from lockstep.server.telemetry.logs import LogFormat
@@ -36,7 +37,7 @@ class Settings(NetworkSettings, LimitSettings, SourceSettings, RelaySettings, Fl
     config: Path | None = None  # TOML file of settings; those of the environment and of flags go before it
     host: str = "127.0.0.1"  # address that HTTP listens on
     port: Annotated[int, Field(ge=0, le=65535)] = 8000  # 0: any free port
-    robot: str = "tcp://127.0.0.1:5600"  # the robot bridge; tls://host:port where it speaks TLS
+    robot: str = "tcp://127.0.0.1:5600"  # the robot bridge; tls://host:port where it speaks TLS; dial-in: it comes
     link_secret: SecretStr | None = None  # the secret that the bridge asks for
     link_secret_file: Path | None = None  # file with the link secret; takes precedence
     link_tls_cert: Path | None = None  # client certificate, for a bridge that asks for one
@@ -127,13 +128,20 @@ class Settings(NetworkSettings, LimitSettings, SourceSettings, RelaySettings, Fl
     @model_validator(mode="after")
     def _check_robot(self) -> Self:
         parts = urlsplit(self.robot)
-        if parts.scheme not in ("tcp", "tls") or not parts.hostname or not parts.port:
-            raise ValueError(f"{self.robot!r} is not tcp://host:port or tls://host:port")
+        if self.dials_in:
+            pass
+        elif parts.scheme not in ("tcp", "tls") or not parts.hostname or not parts.port:
+            raise ValueError(f"{self.robot!r} is not tcp://host:port, tls://host:port or {DIAL_IN}")
         try:
             link_access(self)
         except SecretError as error:
             raise ValueError(error.detail) from error
         return self
+
+    @property
+    def dials_in(self) -> bool:
+        """True if the robot connects to the console."""
+        return self.robot == DIAL_IN
 
     @property
     def robot_uses_tls(self) -> bool:

@@ -12,6 +12,7 @@ import { GamepadStorage } from "../input/gamepad_storage";
 import { watchPageKeys } from "./shortcut_listener";
 import type { ConsoleApi } from "../transport/signalling/console_api";
 import { SessionApi } from "../transport/signalling/session_api";
+import { RobotLinkApi } from "../transport/signalling/robot_link_api";
 import { createAuditSheet } from "../ui/session/audit_sheet";
 import { createDelayPanel } from "../ui/status/delay_panel";
 import type { Panel } from "../ui/elements/dom";
@@ -22,6 +23,7 @@ import { createNotesPanel } from "../ui/session/notes_panel";
 import { createGamepadSheet } from "../ui/gamepad/gamepad_sheet";
 import { createPageTools, type PageTools } from "../ui/status/page_tools";
 import { createParticipantsPanel } from "../ui/session/participants_panel";
+import { createRobotLinkSheet } from "../ui/session/robot_link_sheet";
 import { createRecordButton } from "../ui/session/record_button";
 import { createSettingsPanel } from "../ui/driving/settings_panel";
 import { Sheets, type SheetContent } from "../ui/elements/sheet";
@@ -45,6 +47,8 @@ export class SidePanels {
   private readonly keys = once(() => createKeysSheet(this.engine));
   private readonly pads: () => SheetContent;
   private readonly inviting = once(() => createInviteSheet(this.engine, this.session));
+  private readonly pairing: () => SheetContent;
+  private mayPair = false;
   private readonly auditing = once(() => createAuditSheet(this.session));
 
   /** `redraw`: at once, after something was pressed. */
@@ -59,6 +63,9 @@ export class SidePanels {
     const pad = (controls.pad ??= new Pad(controls.events, new GamepadStorage()));
     this.pads = once(() => createGamepadSheet(pad));
     this.session = new SessionApi(api);
+    const robotLink = new RobotLinkApi(api);
+    this.pairing = once(() => createRobotLinkSheet([["", robotLink]]));
+    void this.lookForPairing(robotLink);
     this.sheets = new Sheets(() => root.querySelectorAll<HTMLElement>(BEHIND_SHEETS));
     this.record = createRecordButton(engine, this.session);
     this.pageTools = createPageTools({
@@ -104,6 +111,17 @@ export class SidePanels {
     else void this.charts.save();
   }
 
+  /** A supervisor of a robot that dials in may pair it; while none is paired there is nothing else to do. */
+  private async lookForPairing(api: RobotLinkApi): Promise<void> {
+    try {
+      const link = await api.state();
+      this.mayPair = link.mayPair;
+      if (link.mayPair && link.state === "unpaired" && !this.sheets.isOpen) this.sheets.open(this.pairing());
+    } catch {
+      this.mayPair = false; // the page says itself that the console does not answer
+    }
+  }
+
   private toggleScene(): void {
     this.grid.sceneSwitch?.toggle();
     this.redraw();
@@ -122,6 +140,7 @@ export class SidePanels {
       invite: () => this.sheets.open(this.inviting()),
       audit: () => this.sheets.open(this.auditing()),
       recordings: openRecordings,
+      robotLink: () => (this.mayPair ? () => this.sheets.open(this.pairing()) : null),
     });
     const notes = createNotesPanel(engine);
     const reading: Panel = {

@@ -14,7 +14,7 @@ def check_link(settings: BridgeSettings) -> None:
     Raises:
         InsecureLink: nothing would keep strangers from driving the robot.
     """
-    if settings.insecure or settings.secret is not None or is_loopback(settings.host):
+    if not settings.listen or settings.insecure or settings.secret is not None or is_loopback(settings.host):
         return
     if settings.tls is not None and settings.tls.authority is not None:
         return

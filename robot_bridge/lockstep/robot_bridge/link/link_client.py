@@ -43,8 +43,13 @@ class RobotLink:
         name: str = "",
         secret: LinkSecret | None = None,
         tls: ssl.SSLContext | None = None,
+        connect: Callable[[asyncio.Protocol], None] | None = None,
     ) -> None:
-        """`secret`: both sides prove that they know it. `tls`: made by `LinkTls.client_context`."""
+        """`secret`: both sides prove that they know it. `tls`: made by `LinkTls.client_context`.
+
+        `connect`: gives the link a connection that the bridge has opened, from `host`; None: the link opens one.
+        """
+        self._connect = connect
         self.role: LinkRole = role
         self.bad_input: Counter[str] = Counter()  # by name, {"malformed": 1}
         self.drops: Counter[str] = Counter()  # by message kind, {"feedback": 2}; media are in `media_drops`
@@ -109,6 +114,9 @@ class RobotLink:
             raise self._error()
 
     async def _open(self) -> None:
+        if self._connect is not None:
+            self._connect(self._transport)
+            return
         loop = asyncio.get_running_loop()
         try:
             await loop.create_connection(lambda: self._transport, self._host, self._port, ssl=self._tls)

@@ -1,4 +1,4 @@
-"""The bridge's listening side: admits links, hands their messages on, and sends to them by role."""
+"""The bridge's side of all links: admits them, hands their messages on, and sends to them by role."""
 
 import asyncio
 import ssl
@@ -90,8 +90,12 @@ class EncodingSide(Protocol):
 class LinkPeer(LinkTransport):
     """A link that is admitted or asks to be."""
 
-    def __init__(self, server: "LinkServer", clock: Callable[[], float], secret: LinkSecret | None) -> None:
+    def __init__(
+        self, server: "LinkServer", clock: Callable[[], float], secret: LinkSecret | None, *, dialled: bool = False
+    ) -> None:
+        """`dialled`: this bridge opened the connection."""
         now = clock()
+        self.dialled = dialled
         session = BridgeSession(now, self._admit, secret)
         self._reads = MessageRate(READ_RATE, READ_BURST, now)
         super().__init__(session, clock, self._reads)
@@ -130,7 +134,7 @@ class LinkPeer(LinkTransport):
 
 
 class LinkServer:
-    """Owns the listening socket and every link. After `listen`, `run` accepts links and keeps them alive."""
+    """Owns the listening socket, if there is one, and every link. `run` accepts links and keeps them alive."""
 
     def __init__(
         self,
@@ -167,7 +171,8 @@ class LinkServer:
         self._connections: set[LinkPeer] = set()  # all sockets, those that are closing included
         self._strangers: Strangers[LinkPeer] = Strangers(max_strangers)
         self._admitted: LinkAdmission[LinkPeer] = LinkAdmission(max_links=max_links, operator_grace=operator_grace)
-        self._acceptor: LinkAcceptor | None = None
+        self._acceptor: LinkAcceptor | None = None  # None while it does not listen
+        self._closed = False
         self._all_gone = asyncio.Event()
 
     @property
@@ -197,6 +202,10 @@ class LinkServer:
         )
         return str(address[0]), int(address[1])
 
+    def dialled_link(self, secret: LinkSecret) -> LinkPeer:
+        """Return a link for a connection that the bridge itself has opened, to the console with this secret."""
+        return LinkPeer(self, self._clock, secret, dialled=True)
+
     async def run(self) -> None:
         """Accept links until `close`, and run the heartbeats until cancelled."""
         async with asyncio.TaskGroup() as tasks:
@@ -209,6 +218,7 @@ class LinkServer:
 
     async def close(self, reason: str = "the bridge is closing") -> None:
         """Stop listening, say goodbye to all with this reason, and wait until they are gone."""
+        self._closed = True
         acceptor, self._acceptor = self._acceptor, None
         if acceptor is not None:
             await acceptor.close()
@@ -261,7 +271,7 @@ class LinkServer:
             return refused
         self._strangers.forget(peer)
         self._admitted.add(peer, hello)
-        if self._acceptor is not None:
+        if self._acceptor is not None and not peer.dialled:
             self._acceptor.admitted(peer.address)
         if hello.role == "events":
             return Hello(role="robot", name=self._hello.name, epoch=self._hello.epoch)
@@ -272,7 +282,7 @@ class LinkServer:
 
     def connected(self, peer: LinkPeer) -> None:
         self._connections.add(peer)
-        if self._acceptor is None:
+        if self._closed:
             peer.end("closing", "the bridge is closing")
         else:
             self._end_surplus(self._strangers.silent(peer, peer.address))

@@ -29,6 +29,7 @@ AuditKind = Literal[
     "epoch",
     "recording",  # started, ended, downloaded, deleted
     "reading",  # of a recording; merged
+    "pairing",  # of a robot that dials in: a code, its use, a refusal, the end
     "publication",  # of a camera by WHIP: begun, ended
     "audit",  # records were lost before this one
 ]
@@ -51,6 +52,7 @@ LIMITED: frozenset[AuditKind] = frozenset(
         "recording",
         "reading",
         "publication",
+        "pairing",
     }
 )
 BURST = 30.0  # records of one kind and link at once

@@ -227,8 +227,9 @@ def serve(
     robot: Annotated[
         list[str] | None,
         typer.Option(
-            help="Address of the robot bridge, tcp://host:port or tls://host:port. NAME=tcp://… names a robot of a "
-            "fleet; repeat for several, docs/fleet.md.",
+            help="Address of the robot bridge, tcp://host:port or tls://host:port; dial-in: the robot connects to this "
+            "console (`lockstep robot --console`). NAME=tcp://… or NAME=dial-in names a robot of a fleet; repeat for "
+            "several, docs/fleet.md.",
         ),
     ] = None,
     fleet: Annotated[

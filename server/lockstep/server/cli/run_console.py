@@ -25,6 +25,7 @@ from lockstep.server.http.transport.serve import running, wait_for_signal
 from lockstep.server.http.transport.tls import Certificate, ends_at, fingerprint, own_names, self_signed
 from lockstep.server.http.transport.uvicorn_http_limits import guarded_by
 from lockstep.server.robot.bridge_process import BridgeProcess
+from lockstep.server.robot.dial_in import DIAL_IN
 from lockstep.server.robot.robot_connection import RobotConnection
 from lockstep.server.settings import Settings
 from lockstep.server.state.console_links import ConsoleLinks, console_links, listening_url
@@ -187,8 +188,9 @@ async def _announce(application: FastAPI, links: ConsoleLinks, as_json: bool) ->
         await _wait_for_all(robots)
         for name, robot in robots.items():
             if not robot.up:
-                say(f"waiting for the robot{f' {name}' if name else ''} at {links.address(name)}: {robot.detail}")
-    if not links.robots:
+                at = "" if links.address(name) == DIAL_IN else f" at {links.address(name)}"
+                say(f"waiting for the robot{f' {name}' if name else ''}{at}: {robot.detail}")
+    if not links.robots and links.robot != DIAL_IN:  # a supervisor pairs a robot that dials in, with a link
         await robots[""].reached.wait()
     sys.stdout.write(json.dumps(links.fields()) + "\n" if as_json else links.for_people())
     sys.stdout.flush()

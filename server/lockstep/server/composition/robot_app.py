@@ -13,7 +13,18 @@ from lockstep.server.composition.app_factory import bare_app, guard_app, open_co
 from lockstep.server.composition.robot_session import running_session
 from lockstep.server.http.json_response import json_answer
 from lockstep.server.http.static_files import page_router
-from lockstep.server.routes import access, actions, ice, observer_websocket, recordings, session, sfu, whep, whip
+from lockstep.server.routes import (
+    access,
+    actions,
+    dial_in,
+    ice,
+    observer_websocket,
+    recordings,
+    session,
+    sfu,
+    whep,
+    whip,
+)
 from lockstep.server.routes import scene_proxy as proxy
 from lockstep.server.routes.openapi import openapi_document
 from lockstep.server.settings import Settings
@@ -73,6 +84,7 @@ def session_app(settings: Settings, lifespan: Lifespan[FastAPI] | None = None) -
     app.include_router(sfu.router)
     app.include_router(proxy.router)
     app.include_router(observer_websocket.router)
+    app.include_router(dial_in.router)
     app.add_middleware(LogContext)
     return app
 

@@ -15,6 +15,7 @@ from lockstep.server.control.session_metrics import SessionMetrics
 from lockstep.server.control.stop_silence import StopSilence
 from lockstep.server.event_clock import EventClock
 from lockstep.server.evidence.anchors import anchor_text
+from lockstep.server.http.transport.tls import own_pin
 from lockstep.server.media.hub import MediaHub
 from lockstep.server.media.sources.source_manager import SourceManager
 from lockstep.server.peers.peer_registry import PeerRegistry
@@ -26,6 +27,8 @@ from lockstep.server.recording.recording_store import RecordingStore
 from lockstep.server.recording.service import RecordingService
 from lockstep.server.recording.settings import recordings_directory
 from lockstep.server.recording.writing.recorder import Recorder
+from lockstep.server.robot.credentials import link_access
+from lockstep.server.robot.dial_in import DialIn
 from lockstep.server.scene.view import SceneView
 from lockstep.server.session_events import SessionEvents
 from lockstep.server.settings import Settings
@@ -119,6 +122,7 @@ async def _session(
     if voice.enabled:
         states.append(voice.state)
     notices = Notices(peers, states, stops.trouble)
+    dial_in = _dial_in(settings, context, directory) if settings.dials_in else None
     console = Console(
         settings,
         events,
@@ -131,6 +135,7 @@ async def _session(
         stops=stops,
         silence=silence,
         relays=[relays],
+        dial_in=dial_in,
         further_news=notices.for_newcomers,
     )
     media.robot_encoding.ask_by(console.robot.ask_for_encoding)
@@ -159,6 +164,7 @@ async def _session(
         relays=relays,
         voice=voice,
         publishers=publishers,
+        dial_in=dial_in,
         recordings=RecordingService(ConsoleLibrary(recorder), access, trail, console.seat.is_held_with),
     )
     try:
@@ -186,3 +192,7 @@ async def _session(
         made.recordings.close()
         if scene is not None:
             await scene.close()
+
+
+def _dial_in(settings: Settings, context: ConsoleContext, directory: StateDir) -> DialIn:
+    return DialIn(directory, link_access(settings).secret, lambda: own_pin(settings, context.state.directory.path))

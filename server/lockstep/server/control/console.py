@@ -67,6 +67,7 @@ from lockstep.server.peers.channels import ChannelName
 from lockstep.server.peers.feedback_fanout import FeedbackFanout, FeedbackReceiver
 from lockstep.server.peers.peer import Peer
 from lockstep.server.peers.peer_registry import PeerRegistry
+from lockstep.server.robot.dial_in import DialIn
 from lockstep.server.robot.robot_connection import MediaSink, RobotConnection
 from lockstep.server.session_events import (
     CommandForwarded,
@@ -120,6 +121,7 @@ class Console:
         stops: StopKeeper,
         silence: StopSilence,
         relays: Sequence[FeedbackReceiver] = (),
+        dial_in: DialIn | None = None,
         further_news: Callable[[], Iterable[ServerMessage]] = tuple,
     ) -> None:
         """Make the console; it publishes to `events`, whether anybody subscribes or not.
@@ -127,6 +129,7 @@ class Console:
         Args:
             audit: the trail that the console runs
             relays: get feedback as observers do
+            dial_in: where the robot connects to this console; None: the console connects to it
             further_news: returns messages for newcomers, besides those of the console itself
         """
         self.clock = clock
@@ -136,7 +139,7 @@ class Console:
         self._faults = faults
         self._media = media
         self._further_news = further_news
-        self.robot = RobotConnection(settings, self, media)
+        self.robot = RobotConnection(settings, self, media, dial_in)
         self.seat = SeatKeeper(seat, peers, self, events)
         self.people = ParticipantList(peers, clock, events, self.seat.renamed)
         self.speed_cap = SpeedCap(settings.speed_cap)

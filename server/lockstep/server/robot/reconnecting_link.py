@@ -12,6 +12,7 @@ from lockstep.protocol.errors import LinkError, LinkLost
 from lockstep.protocol.messages import LinkMessage, LinkRole
 from lockstep.robot_bridge.link.link_client import RobotLink
 from lockstep.server.robot.credentials import LinkCredentials
+from lockstep.server.robot.dial_in import DialIn
 from lockstep.server.util.backoff import Backoff
 from lockstep.server.util.cooperative_scheduler import turns_of_loop
 from lockstep.server.util.uncancelled import attempt
@@ -46,8 +47,13 @@ class ReconnectingLink:
         backoff: Backoff,
         access: LinkCredentials,
         name: str = "console",
+        dial_in: DialIn | None = None,
     ) -> None:
-        """`name`: tells the bridge for which console it keeps the robot after a link broke."""
+        """`name`: tells the bridge for which console it keeps the robot after a link broke.
+
+        `dial_in`: where the robot connects to this console; None: the console connects to `host`.
+        """
+        self._dial_in = dial_in
         self._name = name
         self._access = access
         self._host = host
@@ -96,10 +102,18 @@ class ReconnectingLink:
                 self._sink.link_closed(self._role, FAULT)
             await asyncio.sleep(self._backoff.next())
 
+    async def _next(self) -> RobotLink:
+        """Return the next link, not connected yet. Waits for a robot that dials in."""
+        secret, tls = self._access
+        if self._dial_in is None:
+            return RobotLink(self._host, self._port, self._role, name=self._name, secret=secret, tls=tls)
+        self._sink.link_closed(self._role, self._dial_in.words)
+        line = await self._dial_in.next_line(self._role)
+        return RobotLink(line.address, 0, self._role, name=self._name, secret=self._dial_in.key, connect=line.carry)
+
     async def _once(self) -> None:
         loop = asyncio.get_running_loop()
-        secret, tls = self._access
-        async with RobotLink(self._host, self._port, self._role, name=self._name, secret=secret, tls=tls) as link:
+        async with await self._next() as link:
             hello, since = link.hello, loop.time()
             if hello.description is None:
                 raise LinkLost("the bridge sent no description")

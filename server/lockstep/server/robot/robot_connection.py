@@ -27,6 +27,7 @@ from lockstep.protocol.messages import (
 )
 from lockstep.server.robot.console_name import console_name
 from lockstep.server.robot.credentials import LinkSettings, link_access
+from lockstep.server.robot.dial_in import DialIn
 from lockstep.server.robot.reconnecting_link import ReconnectingLink
 from lockstep.server.util.backoff import Backoff
 
@@ -80,7 +81,10 @@ class RobotConnection:
         detail: reason that it is down
     """
 
-    def __init__(self, settings: RobotSettings, host: RobotHost, media: MediaSink) -> None:
+    def __init__(
+        self, settings: RobotSettings, host: RobotHost, media: MediaSink, dial_in: DialIn | None = None
+    ) -> None:
+        """`dial_in`: where the robot connects to this console; None: the console connects to it."""
         self.epoch = ""
         self.description: RobotDescription | None = None
         self.reached = asyncio.Event()
@@ -89,15 +93,18 @@ class RobotConnection:
         self._media = media
         self._epochs: dict[LinkRole, str] = {}  # of each link, open now or last
         access = link_access(settings)
+        # A robot that dials in paces its tries itself, and is taken as soon as it comes.
+        cap = settings.link_backoff_cap if dial_in is None else settings.link_backoff
         self._keepers = {
             role: ReconnectingLink(
                 settings.robot_host,
                 settings.robot_port,
                 role,
                 self,
-                Backoff(settings.link_backoff, settings.link_backoff_cap, random.Random()),
+                Backoff(settings.link_backoff, cap, random.Random()),
                 access,
                 console_name(settings.state_dir),
+                dial_in,
             )
             for role in _ROLES
         }

@@ -16,6 +16,7 @@ from lockstep.protocol.console import RecordingState
 from lockstep.protocol.serial import MAX_EVENT
 from lockstep.server.errors import (
     HTTP_ERRORS,
+    AlreadyPaired,
     AlreadyPublishing,
     AlreadyRecording,
     BadJson,
@@ -37,6 +38,7 @@ from lockstep.server.errors import (
     NotAcceptable,
     NotAllowed,
     NotConnected,
+    NotDialIn,
     NotFound,
     NotRenewable,
     OriginRefused,
@@ -65,6 +67,7 @@ from lockstep.server.errors import (
 from lockstep.server.http.problem import PROBLEM_JSON, Problem
 from lockstep.server.routes.access import MAX_RECORDS, AuditPage, InvitationList, InvitationRequest, NewInvitation
 from lockstep.server.routes.actions import ActionList, ActionRequest, RobotStatus
+from lockstep.server.routes.dial_in import NewPairingCode, RobotDialInfo
 from lockstep.server.routes.observer_websocket import WatchTicket
 from lockstep.server.routes.recordings import (
     MAX_LISTED,
@@ -241,6 +244,19 @@ OPERATIONS: tuple[Operation, ...] = (
     ),
     Operation("get", "/api/status", "What the robot says of itself.", 200, RobotStatus),
     Operation("post", "/api/scene", "A ticket for the 3D scene.", 200, ScenePath, (SceneUnavailable,)),
+    Operation("get", "/api/dial-in", "How the robot that dials in is paired, and its state.", 200, RobotDialInfo),
+    Operation(
+        *("post", "/api/dial-in/code", "Make a code that pairs one robot.", 201, NewPairingCode),
+        errors=(NotAllowed, NotDialIn, AlreadyPaired),
+    ),
+    Operation(
+        *("delete", "/api/dial-in/code", "Withdraw the pairing code.", 200, RobotDialInfo),
+        errors=(NotAllowed, NotDialIn),
+    ),
+    Operation(
+        *("delete", "/api/dial-in/robot", "Forget the paired robot and end its links.", 200, RobotDialInfo),
+        errors=(NotAllowed, NotDialIn, NotFound, StateUnavailable),
+    ),
     Operation("get", "/api/invitations", "The links that the caller may see.", 200, InvitationList, (NotAllowed,)),
     Operation(
         *("post", "/api/invitations", "Invite a person.", 201, NewInvitation),

@@ -8,6 +8,7 @@ import structlog
 
 from lockstep.protocol.console import Role
 from lockstep.server.auth.invitations import Invitation, Invitations
+from lockstep.server.robot.dial_in import DIAL_IN
 from lockstep.server.settings import Settings
 from lockstep.server.state.persistent_state import ConsoleState
 from lockstep.server.util.state_dir import StateDirUnusable
@@ -49,7 +50,7 @@ class ConsoleLinks(NamedTuple):
 
     def _whereabouts(self) -> str:
         if not self.robots:
-            return f"The robot is at {self.robot}."
+            return "The robot dials in." if self.robot == DIAL_IN else f"The robot is at {self.robot}."
         each = "".join(f"\n    {name:<20} {address}" for name, address in self.robots.items())
         return f"The robots:{each}"
 

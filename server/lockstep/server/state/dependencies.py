@@ -21,6 +21,7 @@ from lockstep.server.peers.token_revocation import TokenRevocation
 from lockstep.server.publishing.publishers import Publishers
 from lockstep.server.recording.service import RecordingService
 from lockstep.server.recording.writing.recorder import Recorder
+from lockstep.server.robot.dial_in import DialIn
 from lockstep.server.scene.view import SceneView
 from lockstep.server.session_events import SessionEvents
 from lockstep.server.settings import Settings
@@ -62,6 +63,7 @@ class Dependencies:
     relays: SfuCoordinator
     voice: Talkback
     publishers: Publishers
+    dial_in: DialIn | None  # None: the console connects to the robot
     recordings: RecordingService
 
     @property

@@ -8,11 +8,13 @@ import { CONNECTION_ERROR_LABELS } from "../../transport/connection_error";
 import { Disposal } from "../../input/disposal";
 import { isStopKey } from "../../input/keyboard";
 import { watchPage } from "../../input/page_lifecycle";
-import type { ConsoleApi } from "../../transport/signalling/console_api";
+import { ConsoleApi } from "../../transport/signalling/console_api";
 import { button, h, setData, setHidden, setText, type Panel } from "../../ui/elements/dom";
 import { Sheets } from "../../ui/elements/sheet";
 import { DirectStop } from "../direct_stop";
 import { createFleetAudit } from "./audit_sheet";
+import { createRobotLinkSheet } from "../../ui/session/robot_link_sheet";
+import { RobotLinkApi } from "../../transport/signalling/robot_link_api";
 import { messageElement, NO_LINK, NO_ROBOTS, notFound, shutOut, type FleetMessage } from "./fleet_message";
 import { FleetPoll } from "../fleet_poll";
 import { StopAllSender } from "../stop_all_sender";
@@ -45,6 +47,7 @@ export class FleetPage {
     "Esc stops every robot",
   );
   private readonly auditing: HTMLButtonElement; // for supervisors
+  private readonly linking: HTMLButtonElement; // for supervisors
   private readonly stopBar: Panel;
   private readonly root = h("div", "fleet");
   private messageKey = "";
@@ -57,6 +60,7 @@ export class FleetPage {
   ) {
     const audit = createFleetAudit(api);
     this.auditing = button("quiet-button fleet-audit", "Audit trail", () => this.sheets.open(audit));
+    this.linking = button("quiet-button fleet-audit", "Robot links", () => this.openLinks());
     this.thumbnails = new Thumbnails(link.token ?? "", link);
     const direct = new DirectStop(link.token ?? "", (press, reply) =>
       tookStopReplies(this.stopping.stop, press, [reply]),
@@ -83,6 +87,14 @@ export class FleetPage {
     });
   }
 
+  /** The robots of this console that dial in, or may; those of other consoles have their own pages. */
+  private openLinks(): void {
+    const own = this.robots.filter((robot) => robot.console === "");
+    const api = ({ name }: FleetRobot): RobotLinkApi =>
+      new RobotLinkApi(new ConsoleApi(this.link.token ?? "", `./robots/${name}/`));
+    this.sheets.open(createRobotLinkSheet(own.map((robot) => [robot.name, api(robot)])));
+  }
+
   get robots(): readonly FleetRobot[] {
     return this.pollState.answer?.robots ?? [];
   }
@@ -101,6 +113,7 @@ export class FleetPage {
       h("span", "bar-brand", {}, "Lockstep"),
       title,
       this.summary,
+      this.linking,
       this.auditing,
       this.tools.element,
     );
@@ -194,7 +207,9 @@ export class FleetPage {
       tile?.showPicture(now);
     }
     if (phase !== "unknown") this.arrange(false);
-    setHidden(this.auditing, this.pollState.answer?.role !== "supervisor");
+    const supervises = this.pollState.answer?.role === "supervisor";
+    setHidden(this.auditing, !supervises);
+    setHidden(this.linking, !supervises);
     this.announce(before, phase);
     this.showBanner(phase);
     this.showMessage(phase);

@@ -3,7 +3,10 @@ import { button, h, setText } from "./dom";
 const TOLD_MS = 2500;
 
 /** A text that is there to be copied. */
-export function createCopyField(label: string): { element: HTMLElement; show(text: string): void } {
+export function createCopyField(
+  label: string,
+  copied = "The link is copied",
+): { element: HTMLElement; show(text: string): void } {
   const field = h("input", "field copy-text", { type: "text", readonly: "", "aria-label": label });
   const copy = button("field-button", "Copy", () => void copyText());
   const told = h("span", "copy-told", { role: "status" });
@@ -20,10 +23,10 @@ export function createCopyField(label: string): { element: HTMLElement; show(tex
     }, TOLD_MS);
   };
   const copyText = async (): Promise<void> => {
-    if (await written(field)) tell("Copied", "The link is copied");
+    if (await written(field)) tell("Copied", copied);
     else {
       field.focus();
-      tell("Copy", "This browser does not let the page copy: the link is selected, press Ctrl C");
+      tell("Copy", "This browser does not let the page copy: the text is selected, press Ctrl C");
     }
   };
   return {

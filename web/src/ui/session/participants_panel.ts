@@ -14,6 +14,8 @@ export interface ParticipantsTools {
   invite(): void;
   audit(): void;
   recordings(): void;
+  /** The dialogue of a robot that dials in; null while this person has none. */
+  robotLink(): (() => void) | null;
 }
 
 /** Who is here, and how each of them does. */
@@ -21,7 +23,8 @@ export function createParticipantsPanel(engine: ConsoleEngine, tools: Participan
   const invite = button("field-button", "Invite…", () => tools.invite());
   const audit = button("field-button quiet", "Audit trail…", () => tools.audit());
   const recordings = button("field-button quiet", "Recordings", () => tools.recordings());
-  const toolRow = h("div", "people-tools", {}, invite, recordings, audit);
+  const robotLink = button("field-button quiet", "Robot link…", () => tools.robotLink()?.());
+  const toolRow = h("div", "people-tools", {}, invite, recordings, audit, robotLink);
   const empty = h("p", "muted", {}, "Nobody is connected");
   const leading = h("ul", "people");
   const rename = createRenameForm(engine);
@@ -40,12 +43,15 @@ export function createParticipantsPanel(engine: ConsoleEngine, tools: Participan
     element,
     update() {
       const { participants, seat, welcome } = engine.state;
-      const made = [participants, seat, welcome, showsAll];
+      const mayPair = tools.robotLink() !== null;
+      const made = [participants, seat, welcome, showsAll, mayPair];
       if (made.every((each, at) => each === shown[at])) return;
       shown = made;
       const people = sortParticipants(participants, seat, welcome?.peer ?? null);
       const crowded = people.watching.length > FEW;
-      setHidden(toolRow, welcome === null);
+      setHidden(toolRow, welcome === null && !mayPair);
+      setHidden(recordings, welcome === null);
+      setHidden(robotLink, !mayPair);
       setHidden(invite, !mayDrive(engine.state));
       setHidden(audit, welcome?.role !== "supervisor");
       setHidden(empty, participants.length > 0);

@@ -5,18 +5,28 @@ import ipaddress
 import os
 import socket
 from pathlib import Path
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 from cryptography import x509
 from cryptography.hazmat.primitives import hashes, serialization
 from cryptography.hazmat.primitives.asymmetric import ec
 from cryptography.x509.oid import ExtendedKeyUsageOID, NameOID
 
-__all__ = ["Certificate", "ends_at", "fingerprint", "own_names", "self_signed"]
+from lockstep.protocol.dial_in import certificate_pin
+from lockstep.protocol.errors import SecretError
+
+__all__ = ["Certificate", "ends_at", "fingerprint", "own_names", "own_pin", "self_signed"]
 
 DAYS = 397  # more is refused by some browsers
 RENEW_DAYS = 30  # before its end, when it is renewed
 CERTIFICATE, KEY = "tls-cert.pem", "tls-key.pem"
+
+
+class TlsSettings(Protocol):
+    @property
+    def tls(self) -> object: ...
+    @property
+    def tls_cert(self) -> Path | None: ...
 
 
 class Certificate(NamedTuple):
@@ -29,15 +39,32 @@ class Certificate(NamedTuple):
 def self_signed(directory: Path, names: set[str], now: datetime.datetime) -> Certificate:
     """Return the certificate in `directory`; make a new one if it is missing, ends soon, or lacks one of `names`.
 
-    It is the same at every start, so a browser that was told to trust it does not ask again.
+    It is the same at every start, so a browser that was told to trust it does not ask again. A new one has the key of
+    the old one: robots that were paired with this console know it by its key.
     """
     kept = Certificate(directory / CERTIFICATE, directory / KEY)
     if not _is_good(kept, names, now):
         directory.mkdir(parents=True, exist_ok=True, mode=0o700)
-        key = ec.generate_private_key(ec.SECP256R1())
-        _write(kept.key, _pem(key))
+        key = _kept_key(kept.key)
+        if key is None:
+            key = ec.generate_private_key(ec.SECP256R1())
+            _write(kept.key, _pem(key))
         _write(kept.chain, _certificate(key, names, now).public_bytes(serialization.Encoding.PEM))
     return kept
+
+
+def own_pin(settings: TlsSettings, directory: Path) -> str | None:
+    """Return the pin of the console's certificate, as robots see it; None: it has none, or cannot read it.
+
+    `directory`: where a self-signed one is.
+    """
+    chain = settings.tls_cert or (directory / CERTIFICATE if settings.tls else None)
+    if chain is None:
+        return None
+    try:
+        return certificate_pin(_load(Certificate(chain, chain)).public_bytes(serialization.Encoding.DER))
+    except (OSError, ValueError, SecretError):
+        return None
 
 
 def own_names(listening_on: str) -> set[str]:
@@ -57,6 +84,14 @@ def fingerprint(certificate: Certificate) -> str:
 def ends_at(certificate: Certificate) -> float:
     """Return the time of the certificate's end, s since 1970."""
     return _load(certificate).not_valid_after_utc.timestamp()
+
+
+def _kept_key(path: Path) -> ec.EllipticCurvePrivateKey | None:
+    try:
+        key = serialization.load_pem_private_key(path.read_bytes(), None)
+    except (OSError, ValueError, TypeError):
+        return None
+    return key if isinstance(key, ec.EllipticCurvePrivateKey) and isinstance(key.curve, ec.SECP256R1) else None
 
 
 def _load(certificate: Certificate) -> x509.Certificate:

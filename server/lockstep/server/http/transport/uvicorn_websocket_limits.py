@@ -6,15 +6,20 @@ them; one that reads nothing would keep a connection that has ended.
 
 import asyncio
 import socket
+from typing import cast
 
 from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
 from websockets.frames import Frame
 from websockets.http11 import Request
 
+from lockstep.robot_bridge.link.websocket_transport import WebSocketTransport
 from lockstep.rtc.token_bucket import TokenBucket
 from lockstep.server.http.robot_paths import below_robot
 
-__all__ = ["LINES", "TOO_MANY_FRAMES", "GuardedWebSocket"]
+__all__ = ["DIAL", "LINES", "SOCKET", "TOO_MANY_FRAMES", "GuardedWebSocket"]
+
+DIAL = "/dial/"  # paths of robots that dial in (server/lockstep/server/routes/dial_in.py)
+SOCKET = "lockstep.socket"  # key of a dialled connection's `GuardedWebSocket` in the scope's extensions
 
 LINES = "/watch/"  # paths of observers' WebSockets (server/lockstep/server/routes/observer_websocket.py)
 LINE_BUFFER = 64 * 1024  # bytes that the kernel keeps for one that does not read; Linux doubles it
@@ -22,14 +27,34 @@ CONTROL_RATE, CONTROL_BURST = 5.0, 50.0  # Hz, of pings and pongs
 MAX_FRAGMENTS = 64  # of one message
 GOODBYE_SECONDS = 3.0  # from the console's end of a connection until it is aborted
 TOO_MANY_FRAMES = 1008  # RFC 6455 7.4.1
+UNSUPPORTED = 1003
 NOT_UTF8 = 1007
 
 
 class GuardedWebSocket(WebSocketsSansIOProtocol):
     _goodbye: asyncio.TimerHandle | None = None
     _control: TokenBucket | None = None
+    _link: asyncio.Protocol | None = None  # the robot link that the connection carries, past the app
+
+    def carry(self, link: asyncio.Protocol) -> None:
+        """Hand all binary messages to a link from now on, within the turn of the loop in which they come.
+
+        Raises ConnectionResetError: the robot has closed the connection.
+        """
+        if self.disconnected or self.close_sent or self.transport.is_closing():
+            raise ConnectionResetError("the robot has closed the connection meanwhile")
+        self._link = link
+        link.connection_made(WebSocketTransport(self.transport, self.conn))
+        if self.read_paused:  # a message came before the link, which no robot sends
+            self.transport.abort()
 
     def handle_connect(self, event: Request) -> None:
+        if below_robot(event.path).startswith(DIAL):
+            self.conn.available_extensions = []  # media are compressed already
+            super().handle_connect(event)
+            if hasattr(self, "scope"):  # it was a proper request
+                cast(dict[str, object], self.scope["extensions"])[SOCKET] = self
+            return
         if below_robot(event.path).startswith(LINES):
             # Short messages now and then: a compressor for each would cost more than it saves.
             self.conn.available_extensions = []
@@ -57,15 +82,36 @@ class GuardedWebSocket(WebSocketsSansIOProtocol):
             super().handle_cont(event)
 
     def send_receive_event_to_app(self) -> None:
-        if self.curr_msg_data_type == "text" and not _is_utf8(b"".join(self.frames)):
+        if self._link is not None:
+            self._hand_over(self._link)
+        elif self.curr_msg_data_type == "text" and not _is_utf8(b"".join(self.frames)):
             self._refuse(NOT_UTF8, "not UTF-8")
         else:
             super().send_receive_event_to_app()
+
+    def _hand_over(self, link: asyncio.Protocol) -> None:
+        data, self.frames = b"".join(self.frames), []
+        if self.curr_msg_data_type == "text":
+            self._refuse(UNSUPPORTED, "a robot link is binary")
+        elif not self.close_sent:
+            link.data_received(data)
+
+    def pause_writing(self) -> None:
+        super().pause_writing()
+        if self._link is not None:
+            self._link.pause_writing()
+
+    def resume_writing(self) -> None:
+        super().resume_writing()
+        if self._link is not None:
+            self._link.resume_writing()
 
     def connection_lost(self, exc: Exception | None) -> None:
         if self._goodbye is not None:
             self._goodbye.cancel()
         super().connection_lost(exc)
+        if self._link is not None:
+            self._link.connection_lost(exc)
 
     async def run_asgi(self) -> None:
         try:

@@ -1,0 +1,90 @@
+"""Keeps a robot's two links to its console open: for commands, and for pictures and sound. Tries for ever."""
+
+import asyncio
+import logging
+import random
+import ssl
+
+from lockstep.protocol.dial_in import TRUSTED, RobotToken
+from lockstep.protocol.messages import LinkRole
+from lockstep.robot_bridge.dial.console_access import ConsoleAccess
+from lockstep.robot_bridge.dial.console_connection import console_context, open_connection
+from lockstep.robot_bridge.dial.redial_times import RedialTimes
+from lockstep.robot_bridge.errors import BridgeError, ConsoleRefused, WrongConsole
+from lockstep.robot_bridge.link.link_server import LinkServer
+
+__all__ = ["Dialer"]
+
+ROLES: tuple[LinkRole, ...] = ("operator", "media")
+HEALTHY_AFTER = 5.0  # s of a link; then the next loss is followed by a try at once
+DENIED = (401, 403, 409)  # statuses that only a person ends: not paired, forgotten, not a console for dialling
+
+_logger = logging.getLogger(__name__)
+
+
+class Dialer:
+    """Dials; everything after that is as on every link: the console says hello, both prove that they know the key.
+
+    No fault of the console or of the path ends the robot: it comes to rest as when any link is lost.
+    """
+
+    def __init__(self, access: ConsoleAccess, links: LinkServer, jitter: random.Random | None = None) -> None:
+        """Raises SecretError: the authority's file cannot be used."""
+        self._access = access
+        self._links = links
+        self._jitter = jitter or random.Random()
+        self._context: ssl.SSLContext | None = None
+        if access.address.is_encrypted:
+            self._context = console_context(access.key.pin, access.authority)
+        self._expected = access.key.pin if self._context is not None and access.key.pin != TRUSTED else None
+        self._said: str | None = None  # the newest trouble that the log has; "": connected
+
+    async def run(self) -> None:
+        """Run until cancelled."""
+        async with asyncio.TaskGroup() as tasks:
+            for role in ROLES:
+                tasks.create_task(self._keep(role), name=f"dial {role}")
+
+    async def _keep(self, role: LinkRole) -> None:
+        times, loop = RedialTimes(self._jitter), asyncio.get_running_loop()
+        while True:
+            refused, since = False, loop.time()
+            try:
+                await self._once(role, times.patience())
+                if loop.time() - since > HEALTHY_AFTER:
+                    times.healthy()
+            except BridgeError as error:
+                refused = isinstance(error, WrongConsole) or (
+                    isinstance(error, ConsoleRefused) and error.status in DENIED
+                )
+                self._say(str(error))
+            except Exception as error:  # a fault here must not end the robot's bridge
+                _logger.error("dialling the console failed: %r", error, exc_info=error)
+            await asyncio.sleep(times.wait(refused=refused))
+
+    async def _once(self, role: LinkRole, patience: float) -> None:
+        key = self._access.key.key
+        connection = await open_connection(
+            self._access.address.path(role),
+            self._context,
+            expected=self._expected,
+            headers={"Authorization": RobotToken.of(key).header},
+            seconds=patience,
+            for_link=True,
+        )
+        try:
+            connection.carry(self._links.dialled_link(key))
+            self._say("")
+            await connection.ended.wait()
+        finally:
+            connection.transport.abort()
+
+    def _say(self, trouble: str) -> None:
+        """Log a trouble once, and its end."""
+        if trouble == self._said:
+            return
+        if trouble:
+            _logger.warning("the console cannot be reached, trying on: %s", trouble)
+        else:
+            _logger.info("dialled the console at %s", self._access.address.url)
+        self._said = trouble

@@ -1,0 +1,164 @@
+"""Where a robot comes in that dials its console: one robot, its two connections, and how it is paired and forgotten."""
+
+import asyncio
+import secrets
+import time
+from collections.abc import Callable
+from typing import Protocol
+
+import structlog
+
+from lockstep.protocol.dial_in import (
+    SALT_BYTES,
+    PairingCode,
+    PairingSecret,
+    RobotToken,
+)
+from lockstep.protocol.link_secret import LinkSecret
+from lockstep.protocol.messages import LinkRole
+from lockstep.server.robot.paired_robot import PairedRobot, forget_paired, load_paired, save_paired
+from lockstep.server.robot.pairing_offer import Exchange, Paired, PairingOffer, Refusal
+from lockstep.server.util.state_dir import StateDir, StateDirUnusable
+from lockstep.server.util.uncancelled import in_thread
+
+__all__ = ["DIAL_IN", "DialIn", "RobotLine"]
+
+log = structlog.get_logger(__name__)
+
+DIAL_IN = "dial-in"  # instead of a robot's address
+WAITING = "waiting for the robot to dial in"
+UNPAIRED = "no robot is paired; a supervisor presses “Pair a robot”"
+NO_TOKEN = RobotToken(secrets.token_hex(32))  # fits no robot: a request is compared even while none is paired
+
+
+class RobotLine(Protocol):
+    """A connection that a robot has opened to this console, and that carries one link."""
+
+    @property
+    def address(self) -> str: ...
+    @property
+    def is_closed(self) -> bool: ...
+
+    def carry(self, link: asyncio.Protocol) -> None: ...
+    def close(self) -> None: ...
+
+
+class DialIn:
+    """The place of one robot. Everything is called on the loop.
+
+    Attributes:
+        offer: the pairing code that is open
+        paired: the robot; None before one was paired, and with a key from the settings
+        trouble: why the state cannot be read; then no robot comes in
+        exchanges: robots that pair at this moment
+    """
+
+    def __init__(self, directory: StateDir, given: LinkSecret | None, own_pin: Callable[[], str | None]) -> None:
+        """`given`: the key that the settings name; with it nothing is paired. `own_pin` may wait for the disk."""
+        self.offer = PairingOffer()
+        self.paired: PairedRobot | None = None
+        self.trouble = ""
+        self.exchanges = 0
+        self._directory = directory
+        self._given = given
+        self._own_pin = own_pin
+        self._arrived: dict[LinkRole, RobotLine] = {}  # that wait for their link
+        self._carrying: dict[LinkRole, RobotLine] = {}
+        self._news = asyncio.Event()
+        self._changing = asyncio.Lock()
+        self._by = ""  # who has opened the code
+        if given is None:
+            try:
+                self.paired = load_paired(directory)
+            except StateDirUnusable as error:
+                self.trouble = str(error)
+                log.error("the paired robot is unknown, so no robot comes in", detail=str(error))
+
+    @property
+    def has_given_key(self) -> bool:
+        return self._given is not None
+
+    @property
+    def key(self) -> LinkSecret | None:
+        if self._given is not None:
+            return self._given
+        return None if self.paired is None else self.paired.key
+
+    @property
+    def address(self) -> str:
+        """Where the robot is connected from; "" while it is away."""
+        line = self._carrying.get("operator")
+        return "" if line is None or line.is_closed else line.address
+
+    @property
+    def words(self) -> str:
+        """Why there is no link, for people."""
+        return self.trouble or (UNPAIRED if self.key is None else WAITING)
+
+    # Connections
+
+    def knows(self, authorization: str) -> bool:
+        """Return whether a request is of the paired robot. Compares in constant time."""
+        key = self.key
+        fits = (NO_TOKEN if key is None else RobotToken.of(key)).fits(authorization)
+        return fits and key is not None
+
+    def arrived(self, role: LinkRole, line: RobotLine) -> None:
+        """Take a connection of the robot. A newer one replaces one that waits: the robot has given that up."""
+        before = self._arrived.get(role)
+        if before is not None:
+            before.close()
+        self._arrived[role] = line
+        self._news.set()
+
+    async def next_line(self, role: LinkRole) -> RobotLine:
+        """Wait for the next connection for this link."""
+        while True:
+            line = self._arrived.pop(role, None)
+            if line is not None and not line.is_closed:
+                self._carrying[role] = line
+                return line
+            self._news.clear()
+            await self._news.wait()
+
+    def _end_lines(self) -> None:
+        for line in (*self._arrived.values(), *self._carrying.values()):
+            line.close()
+        self._arrived.clear()
+        self._carrying.clear()
+
+    # Pairing
+
+    async def open_code(self, by: str) -> PairingCode:
+        """Make a code, which replaces any other. `by`: the person, for the list."""
+        code, salt = PairingCode.draw(), secrets.token_bytes(SALT_BYTES)
+        secret = await asyncio.to_thread(PairingSecret, code, salt)
+        self.offer.offer(code, salt, secret, time.monotonic())
+        self._by = by
+        return code
+
+    async def prove(self, exchange: Exchange, proof: bytes) -> Paired | Refusal:
+        """Judge a robot's proof; keep the robot before it is answered. Raises StateDirUnusable."""
+        pin = await in_thread(self._own_pin)
+        outcome = self.offer.prove(exchange, proof, pin, time.monotonic())
+        if isinstance(outcome, Paired):
+            paired = PairedRobot(outcome.key, outcome.robot, self._by, time.time())
+            async with self._changing:
+                await in_thread(lambda: save_paired(self._directory, paired))
+                self._end_lines()
+                self.paired, self.trouble = paired, ""
+        return outcome
+
+    async def forget(self) -> None:
+        """Forget the robot: its links end now, and it does not come in again.
+
+        Raises:
+            StateDirUnusable: forgotten until the console restarts; the disk does not take it.
+        """
+        self.paired = None
+        self.offer.withdraw()
+        self._end_lines()
+        async with self._changing:
+            self.paired = None
+            self._end_lines()
+            await in_thread(lambda: forget_paired(self._directory))

@@ -1,0 +1,114 @@
+import { isRecord } from "../protocol/schema_check";
+
+/** What became of the pairing code. */
+export type CodeState = "none" | "waiting" | "paired" | "expired" | "too_many_tries";
+
+/** How the console and its robot find each other. */
+export interface RobotLink {
+  readonly dialsIn: boolean; // false: the console connects to the robot, and nothing is paired
+  readonly state: "unpaired" | "away" | "connected";
+  readonly key: "" | "paired" | "settings"; // where the robot's key is from
+  readonly robot: string; // "planar", as the robot calls itself
+  readonly by: string; // who paired it
+  readonly at: number; // s since 1970; 0 if it was not paired
+  readonly address: string; // where it is connected from; "" while it is away
+  readonly detail: string; // why it is not connected
+  readonly mayPair: boolean;
+  readonly code: CodeState;
+  readonly seconds: number; // for which the code is good
+  readonly tries: number; // that are left
+  readonly refused: string; // why the newest robot was refused; "" if none was
+}
+
+export interface PairingCode {
+  readonly code: string; // "K7-3F9QW-2MXBD"
+  readonly command: string; // for the robot's computer
+}
+
+const REFUSED: Readonly<Record<string, string>> = {
+  wrong_code: "A robot was refused: its code was not this one.",
+  wrong_certificate:
+    "A robot was refused: it saw another certificate than this console's. Somebody may be between the two, or a proxy whose CA the robot does not know.",
+};
+
+/** The answer of GET /api/dial-in; null when it is none. */
+export function parseRobotLink(answer: unknown): RobotLink | null {
+  if (!isRecord(answer) || typeof answer["dials_in"] !== "boolean") return null;
+  const { state, key } = answer;
+  if (state !== "unpaired" && state !== "away" && state !== "connected") return null;
+  const pairing = isRecord(answer["pairing"]) ? answer["pairing"] : {};
+  return {
+    dialsIn: answer["dials_in"],
+    state,
+    key: key === "paired" || key === "settings" ? key : "",
+    robot: text(answer["robot"]),
+    by: text(answer["by"]),
+    at: number(answer["at"]),
+    address: text(answer["address"]),
+    detail: text(answer["detail"]),
+    mayPair: answer["may_pair"] === true,
+    code: codeState(pairing["state"]),
+    seconds: number(pairing["seconds"]),
+    tries: number(pairing["tries"]),
+    refused: text(pairing["refused"]),
+  };
+}
+
+/** The answer of POST /api/dial-in/code; null when it is none. */
+export function parsePairingCode(answer: unknown): PairingCode | null {
+  if (!isRecord(answer)) return null;
+  const { code, command } = answer;
+  return typeof code === "string" && typeof command === "string" ? { code, command } : null;
+}
+
+/** The first line: which robot, and whether it is there. */
+export function robotLinkTitle(link: RobotLink): string {
+  const name = link.robot === "" ? "The robot" : link.robot;
+  if (link.state === "connected") return `${name} is connected`;
+  if (link.state === "away") return `${name} is away`;
+  return "No robot is paired";
+}
+
+/** The second line: who paired it, from where it comes, or what to do. `time`: the day and time of pairing. */
+export function robotLinkAbout(link: RobotLink, time: string): string {
+  if (link.state === "unpaired")
+    return "A robot that is not paired cannot be driven. A code lets one robot in, once.";
+  const parts = [];
+  if (link.key === "settings") parts.push("Its key is in the console's settings");
+  if (link.key === "paired") parts.push(link.by === "" ? `Paired ${time}` : `Paired by ${link.by}, ${time}`);
+  if (link.address !== "") parts.push(`from ${link.address}`);
+  if (link.state === "away") parts.push("it dials in by itself when it runs and has a network");
+  return `${parts.join(" · ")}.`;
+}
+
+/** What is to be known of the code; "" while there is none. */
+export function codeLabel(link: RobotLink): string {
+  if (link.code === "waiting") {
+    const seconds = Math.ceil(link.seconds);
+    const clock = `${Math.floor(seconds / 60)}:${`${seconds % 60}`.padStart(2, "0")}`;
+    return `Waits for the robot · good for ${clock} · ${link.tries} ${link.tries === 1 ? "try" : "tries"} left`;
+  }
+  if (link.code === "expired") return "The code has expired. Make a new one.";
+  if (link.code === "too_many_tries") return "The code was typed wrongly too often. Make a new one.";
+  if (link.code === "paired" && link.state === "away") return "Paired. The robot connects now.";
+  return "";
+}
+
+/** Why a robot was just refused; "" while none was. */
+export function refusedLabel(link: RobotLink): string {
+  return link.code === "waiting" ? (REFUSED[link.refused] ?? "") : "";
+}
+
+function codeState(value: unknown): CodeState {
+  const known =
+    value === "waiting" || value === "paired" || value === "expired" || value === "too_many_tries";
+  return known ? value : "none";
+}
+
+function text(value: unknown): string {
+  return typeof value === "string" ? value : "";
+}
+
+function number(value: unknown): number {
+  return typeof value === "number" && Number.isFinite(value) ? value : 0;
+}

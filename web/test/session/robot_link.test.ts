@@ -1,0 +1,91 @@
+import { describe, expect, it } from "vitest";
+import {
+  codeLabel,
+  parsePairingCode,
+  parseRobotLink,
+  refusedLabel,
+  robotLinkAbout,
+  robotLinkTitle,
+  type RobotLink,
+} from "../../src/session/robot_link";
+
+const ANSWER = {
+  dials_in: true,
+  state: "unpaired",
+  key: "",
+  robot: "",
+  by: "",
+  at: 0,
+  address: "",
+  detail: "",
+  may_pair: true,
+  pairing: { state: "waiting", seconds: 581.2, tries: 5, refused: "" },
+};
+
+function link(changes: Partial<RobotLink> = {}): RobotLink {
+  const found = parseRobotLink(ANSWER);
+  if (found === null) throw new Error("not understood");
+  return { ...found, ...changes };
+}
+
+describe("the answer of the console", () => {
+  it("is read", () => {
+    expect(link()).toMatchObject({
+      dialsIn: true,
+      state: "unpaired",
+      code: "waiting",
+      tries: 5,
+      mayPair: true,
+    });
+  });
+
+  it.each([null, 7, {}, { dials_in: "yes" }, { ...ANSWER, state: "broken" }])("is refused: %j", (answer) => {
+    expect(parseRobotLink(answer)).toBeNull();
+  });
+
+  it("has defaults for what is missing or of a wrong kind", () => {
+    const found = parseRobotLink({ dials_in: false, state: "away", pairing: { state: "?", seconds: "x" } });
+    expect(found).toMatchObject({ code: "none", seconds: 0, robot: "", mayPair: false });
+  });
+
+  it("has a code and its command, or none", () => {
+    expect(parsePairingCode({ code: "K7", command: "lockstep" })).toEqual({
+      code: "K7",
+      command: "lockstep",
+    });
+    expect(parsePairingCode({ code: 7 })).toBeNull();
+    expect(parsePairingCode(null)).toBeNull();
+  });
+});
+
+describe("what people read", () => {
+  it("names the robot and its state", () => {
+    expect(robotLinkTitle(link())).toBe("No robot is paired");
+    expect(robotLinkTitle(link({ state: "away", robot: "planar" }))).toBe("planar is away");
+    expect(robotLinkTitle(link({ state: "connected" }))).toBe("The robot is connected");
+  });
+
+  it("says who paired it and from where it comes", () => {
+    const paired = link({ state: "connected", key: "paired", by: "Ann", address: "192.0.2.7" });
+    expect(robotLinkAbout(paired, "today")).toBe("Paired by Ann, today · from 192.0.2.7.");
+    const given = link({ state: "away", key: "settings" });
+    expect(robotLinkAbout(given, "")).toContain("Its key is in the console's settings · it dials in");
+  });
+
+  it("counts the code's time and tries", () => {
+    expect(codeLabel(link())).toBe("Waits for the robot · good for 9:42 · 5 tries left");
+    expect(codeLabel(link({ seconds: 9, tries: 1 }))).toContain("0:09 · 1 try left");
+    expect(codeLabel(link({ code: "expired" }))).toContain("expired");
+    expect(codeLabel(link({ code: "too_many_tries" }))).toContain("too often");
+    expect(codeLabel(link({ code: "paired", state: "away" }))).toContain("Paired");
+    expect(codeLabel(link({ code: "paired", state: "connected" }))).toBe("");
+    expect(codeLabel(link({ code: "none" }))).toBe("");
+  });
+
+  it("says why a robot was refused, while the code is open", () => {
+    expect(refusedLabel(link({ refused: "wrong_code" }))).toContain("not this one");
+    expect(refusedLabel(link({ refused: "wrong_certificate" }))).toContain("certificate");
+    expect(refusedLabel(link({ refused: "code_used" }))).toBe("");
+    expect(refusedLabel(link({ code: "expired", refused: "wrong_code" }))).toBe("");
+  });
+});
