@@ -33,13 +33,17 @@ class Ros2Robot(Robot):
         self._ros = RosSide(settings)
         try:
             self._drives: list[Drive] = []
+            base: BaseDrive | None = None
+            arm: ArmDrive | None = None
             if settings.base is not None:
                 base = BaseDrive(self._ros, settings.base, self.tick_seconds)
                 self._drives.append(base)
-                self.rest_call = REST_CALL
-                self.rest_arguments = rest_arguments(settings, settings.base, base.full_topic)
             if settings.arm is not None:
-                self._drives.append(ArmDrive(self._ros, settings.arm, self.tick_seconds))
+                arm = ArmDrive(self._ros, settings.arm, self.tick_seconds)
+                self._drives.append(arm)
+            self.rest_arguments = rest_arguments(settings, base and base.full_topic, arm and arm.full_topic)
+            if self.rest_arguments:
+                self.rest_call = REST_CALL
             self._ranges = None if settings.ranges is None else RangeSensor(self._ros, settings.ranges)
             self._wrench = None if settings.wrench is None else WrenchTopic(self._ros, settings.wrench)
             self._lockout = None if settings.lockout is None else LockoutTopic(self._ros, settings.lockout)

@@ -64,7 +64,7 @@ class Base(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
 
 class ArmCommand(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     topic: Topic = "/joint_trajectory_controller/joint_trajectory"
-    message: Literal["JointTrajectory", "JointState"] = "JointTrajectory"
+    message: Literal["JointTrajectory", "JointState", "Float64MultiArray"] = "JointTrajectory"
     rate: Rate = 25.0  # Hz
     horizon: Annotated[float, Meta(ge=0.02, le=0.5)] = 0.1  # s ahead that each trajectory ends
     lead: Annotated[float, Meta(gt=0, le=5)] = 0.5  # s at full speed that the setpoint may be ahead of the arm

@@ -1,4 +1,4 @@
-"""Drives an arm: publishes joint positions, ahead of the arm by a short horizon, and reads joint states."""
+"""Drives an arm: publishes joint positions, ahead of the arm by a short horizon, or velocities; reads joint states."""
 
 from typing import Any
 
@@ -11,19 +11,28 @@ from lockstep.robot_bridge.robots.ros2.ros_side import RosSide, header_ns
 from lockstep.robot_bridge.robots.ros2.sensing.latest_message import Newest
 from lockstep.robot_bridge.robots.ros2.settings import Arm
 
-__all__ = ["ArmDrive"]
+__all__ = ["PACKAGES", "ArmDrive", "velocities_message"]
+
+PACKAGES = {"JointTrajectory": "trajectory_msgs", "JointState": "sensor_msgs", "Float64MultiArray": "std_msgs"}
+
+
+def velocities_message(kind: Any, values: list[float]) -> Any:
+    """Return std_msgs/Float64MultiArray as the velocity controllers of ros2_control take it."""
+    message = kind()
+    message.data = values
+    return message
 
 
 class ArmDrive(Drive):
     """An arm with one axis per joint, the joint's velocity.
 
-    The last message of a motion is the setpoint itself, not ahead by the horizon: the arm stays there.
+    The last message of a motion is the setpoint itself, not ahead by the horizon: the arm stays there. A controller of
+    velocities gets zeros.
     """
 
     def __init__(self, ros: RosSide, settings: Arm, tick_seconds: float) -> None:
         command, states = settings.command, settings.states
-        package = "trajectory_msgs" if command.message == "JointTrajectory" else "sensor_msgs"
-        kind = ros.message(package, command.message)
+        kind = ros.message(PACKAGES[command.message], command.message)
         super().__init__(ros, kind, command.topic, command.rate, len(settings.joints), tick_seconds)
         self._names = [joint.name for joint in settings.joints]
         self._horizon = command.horizon
@@ -33,8 +42,8 @@ class ArmDrive(Drive):
         self._timeout = states.timeout
         self._book = JointCache(self._names)
         self._states: Newest[None] = Newest(states.topic, states.timeout)
-        make = self._trajectory if command.message == "JointTrajectory" else self._joint_state
-        self._make = make
+        makers = {"JointTrajectory": self._trajectory, "JointState": self._joint_state}
+        self._make = makers.get(command.message, self._velocities)
         ros.subscribe(ros.message("sensor_msgs", "JointState"), states.topic, self._take)
 
     def seen(self, now: float) -> bool:
@@ -86,6 +95,9 @@ class ArmDrive(Drive):
         message.position = self._points(said, values)
         message.velocity = values
         return message
+
+    def _velocities(self, said: Said, values: list[float]) -> Any:
+        return velocities_message(self._kind, values)
 
     def _points(self, said: Said, values: list[float]) -> list[float]:
         return self._setpoints.points if said is Said.ZERO else self._setpoints.ahead(values, self._horizon)
