@@ -1,9 +1,9 @@
-"""Plays a robot on ROS 2 topics: a base, an arm, a laser scanner, a force sensor, a camera and its URDF. Run with ROS' Python.
+"""Plays a robot on ROS 2 topics: a base, an arm, a laser scanner, a force sensor and a camera. Run with ROS' Python.
 
 It does what it is told until it is told otherwise, with no timeout of its own, so that whoever forgets a zero is found
 out. Each command and each picture is a JSON line in the log. Lines on standard input: `hush TOPIC`, `speak TOPIC`,
-`freeze TOPIC` (sends the same message over and over), `spoil TOPIC` (one message that makes no sense), `tick`
-(nothing). Each is answered after the robot's next tick.
+`freeze TOPIC` (sends the same message over and over), `spoil TOPIC` (one message that makes no sense), `status N`
+(of MoveIt Servo), `tick` (nothing). Each is answered after the robot's next tick.
 """
 
 import array
@@ -25,7 +25,7 @@ from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, qos_profile_sensor_data
 from sensor_msgs.msg import CompressedImage, Image, JointState, LaserScan
-from std_msgs.msg import Float64MultiArray, String
+from std_msgs.msg import Float64MultiArray, Int8, String
 from trajectory_msgs.msg import JointTrajectory
 
 from lockstep.robot_bridge.robots.event_strip import draw_event_strip
@@ -73,6 +73,9 @@ class RobotNode(Node):  # type: ignore[misc]
         )
         self.create_subscription(JointState, "/joint_command", self._take_joints, 10)
         self.create_subscription(Float64MultiArray, "/arm_velocity_controller/commands", self._take_velocities, 10)
+        self.create_subscription(TwistStamped, "/servo_node/delta_twist_cmds", self._take_tool, 10)
+        self._status = self.create_publisher(Int8, "/servo_node/status", 10)
+        self._status_code = 0
         self.declare_parameter("joints", list(JOINTS))  # as the controllers of ros2_control have it
         kept = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
         self._description = self.create_publisher(String, "/robot_description", kept)
@@ -89,6 +92,8 @@ class RobotNode(Node):  # type: ignore[misc]
             self._frozen.pop(topic, None)
         elif verb == "freeze":
             self._frozen[topic] = None
+        elif verb == "status":
+            self._status_code = int(topic)
         elif verb == "spoil":
             self._spoilt.add(topic)
 
@@ -123,8 +128,15 @@ class RobotNode(Node):  # type: ignore[misc]
         self._commanded = list(message.data)
         self.note("velocities", values=self._commanded)
 
+    def _take_tool(self, message: TwistStamped) -> None:
+        """As MoveIt Servo, roughly: twists of the tool become velocities of joints, one each."""
+        linear, angular = message.twist.linear, message.twist.angular
+        self._commanded = [linear.x, linear.y, linear.z, angular.x, angular.y, angular.z]
+        self.note("tool", values=self._commanded, frame=message.header.frame_id)
+
     def _tick(self) -> None:
         self._ticks += 1
+        self._status.publish(Int8(data=self._status_code))
         forward, turn = self._twist
         x, y, yaw = self._pose
         yaw = math.remainder(yaw + turn * TICK, math.tau)

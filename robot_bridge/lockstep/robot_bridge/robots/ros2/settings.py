@@ -17,6 +17,8 @@ __all__ = [
     "Odometry",
     "Ranges",
     "Ros2Settings",
+    "Servo",
+    "ServoStatus",
     "TwistCommand",
     "Wrench",
 ]
@@ -97,6 +99,31 @@ class Arm(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     states: JointStates = field(default_factory=JointStates)
 
 
+class ServoStatus(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """What MoveIt Servo says of itself, shown as a fault while it is not well."""
+
+    topic: Topic = "/servo_node/status"
+    message: Literal["ServoStatus", "Int8"] = "ServoStatus"  # Int8: before ROS 2 Jazzy
+    timeout: Timeout = 1.0
+
+
+class ServoCommand(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    topic: Topic = "/servo_node/delta_twist_cmds"
+    frame: str = "base_link"  # frame_id: the axes of the twist
+    rate: Rate = 50.0  # Hz
+
+
+class Servo(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """An arm whose tool is driven by twists: MoveIt Servo, or another node that turns them into joint motion."""
+
+    linear: Positive  # m/s, the fastest along x, y and z
+    angular: Positive  # rad/s, the fastest about x, y and z
+    joints: Annotated[tuple[Name, ...], Meta(min_length=1, max_length=64)]  # as in JointState: measured, shown
+    command: ServoCommand = field(default_factory=ServoCommand)
+    states: JointStates = field(default_factory=JointStates)
+    status: ServoStatus | None = None
+
+
 class Ranges(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """A LaserScan, gathered into `count` sectors all around; each shows the nearest distance in it."""
 
@@ -153,6 +180,7 @@ class Ros2Settings(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
     max_event_rate: Annotated[float, Meta(gt=0, le=100)] = 25.0  # Hz
     base: Base | None = None
     arm: Arm | None = None
+    servo: Servo | None = None  # instead of `arm`
     ranges: Ranges | None = None
     wrench: Wrench | None = None
     lockout: Lockout | None = None

@@ -34,8 +34,10 @@ def test_a_frame_has_a_pose_unless_a_joint_moves_it() -> None:
 def test_poses_follow_one_another() -> None:
     urdf = parse_urdf(
         f'<robot name="x">{LINKS}<link name="c"/>'
-        '<joint name="j" type="fixed"><parent link="a"/><child link="b"/><origin xyz="1 0 0" rpy="0 0 1.570796"/></joint>'
-        '<joint name="k" type="fixed"><parent link="b"/><child link="c"/><origin xyz="1 0 0" rpy="3.141593 0 0"/></joint>'
+        '<joint name="j" type="fixed"><parent link="a"/><child link="b"/>'
+        '<origin xyz="1 0 0" rpy="0 0 1.570796"/></joint>'
+        '<joint name="k" type="fixed"><parent link="b"/><child link="c"/>'
+        '<origin xyz="1 0 0" rpy="3.141593 0 0"/></joint>'
         "</robot>"
     )
     pose = urdf.pose("c")

@@ -13,7 +13,7 @@ from lockstep.robot_bridge.errors import BridgeError, SettingsError
 from lockstep.robot_bridge.robots.other_python import link_packages, with_packages
 from lockstep.robot_bridge.robots.ros2 import read_settings
 from lockstep.robot_bridge.robots.ros2.discovery.ask import Ask, AskAtTerminal, TakeGuesses
-from lockstep.robot_bridge.robots.ros2.discovery.draft import Draft, draft
+from lockstep.robot_bridge.robots.ros2.discovery.drafting.draft import Draft, draft
 
 __all__ = ["ros2_app"]
 

@@ -11,7 +11,7 @@ from typing import Any
 from lockstep.robot_bridge.errors import BridgeError
 from lockstep.robot_bridge.robots.ros2.discovery.graph import Graph, ParameterValue, Topic
 from lockstep.robot_bridge.robots.ros2.discovery.graph_side import GraphSide
-from lockstep.robot_bridge.robots.ros2.discovery.kinds import COMMANDS, DESCRIPTION, SENSORS
+from lockstep.robot_bridge.robots.ros2.discovery.kinds import COMMANDS, DESCRIPTION, SENSORS, SERVO_COMMAND_TYPE
 from lockstep.robot_bridge.robots.ros2.discovery.tally import Tally
 from lockstep.robot_bridge.robots.ros2.ros_side import header_ns
 
@@ -23,6 +23,7 @@ MAX_TOPICS = 1000
 MAX_LISTENERS = 60
 MAX_ASKED = 20  # nodes whose parameters are read
 WANTED = (
+    SERVO_COMMAND_TYPE,
     *("joints", "interface_name", "cmd_vel_timeout", "base_frame_id"),
     *("linear.x.max_velocity", "linear.x.min_velocity", "linear.y.max_velocity", "angular.z.max_velocity"),
 )

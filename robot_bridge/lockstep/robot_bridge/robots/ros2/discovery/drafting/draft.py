@@ -6,14 +6,14 @@ from typing import NamedTuple
 
 from lockstep.robot_bridge.errors import BridgeError
 from lockstep.robot_bridge.robots.ros2.discovery.ask import Ask
-from lockstep.robot_bridge.robots.ros2.discovery.choice import choose_robot
-from lockstep.robot_bridge.robots.ros2.discovery.draft_arm import draft_arm
-from lockstep.robot_bridge.robots.ros2.discovery.draft_base import draft_base
-from lockstep.robot_bridge.robots.ros2.discovery.draft_bodies import draft_bodies
-from lockstep.robot_bridge.robots.ros2.discovery.draft_sensors import draft_cameras, draft_ranges, draft_wrench
+from lockstep.robot_bridge.robots.ros2.discovery.drafting.choice import choose_robot
+from lockstep.robot_bridge.robots.ros2.discovery.drafting.draft_arm import draft_arm
+from lockstep.robot_bridge.robots.ros2.discovery.drafting.draft_base import draft_base
+from lockstep.robot_bridge.robots.ros2.discovery.drafting.draft_bodies import draft_bodies
+from lockstep.robot_bridge.robots.ros2.discovery.drafting.draft_sensors import draft_cameras, draft_ranges, draft_wrench
+from lockstep.robot_bridge.robots.ros2.discovery.drafting.yaml_text import CHECK, Section, Value, comment, render
 from lockstep.robot_bridge.robots.ros2.discovery.graph import Graph, parts_of_name
 from lockstep.robot_bridge.robots.ros2.discovery.urdf import BadUrdf, Urdf, parse_urdf
-from lockstep.robot_bridge.robots.ros2.discovery.yaml_text import CHECK, Section, Value, comment, render
 
 __all__ = ["Draft", "NothingToDrive", "draft"]
 
@@ -44,7 +44,7 @@ def draft(graph: Graph, ask: Ask, namespace: str | None, domain: int | None = No
     base, base_remarks = draft_base(graph, ask)
     arm, arm_remarks = draft_arm(graph, ask, urdf)
     remarks += base_remarks + arm_remarks
-    if base is None and arm is None:
+    if base is None and not arm:
         raise NothingToDrive(_nothing(graph, namespace, remarks))
     simulated = bool(graph.topics.get("/clock") and graph.topics["/clock"].publishers)
     cameras, camera_remarks = draft_cameras(graph, simulated)
@@ -52,7 +52,7 @@ def draft(graph: Graph, ask: Ask, namespace: str | None, domain: int | None = No
     top = _top(graph, ask, namespace, domain, urdf, base, simulated)
     parts = {
         "base": base,
-        "arm": arm,
+        **arm,
         "ranges": draft_ranges(graph, ask, urdf),
         "wrench": draft_wrench(graph, ask),
         "cameras": cameras,
@@ -60,7 +60,7 @@ def draft(graph: Graph, ask: Ask, namespace: str | None, domain: int | None = No
     top.values |= {key: section for key, section in parts.items() if section is not None}
     end = _end(graph, remarks)
     plain = _head(graph, namespace) + render(top) + end
-    joints = set[str]() if arm is None else _names(arm)
+    joints = _names(arm)
     bodies = None if urdf is None else draft_bodies(urdf, joints, has_base=base is not None)
     if bodies is None:
         return Draft(plain, "", remarks, _guesses(plain))
@@ -73,10 +73,15 @@ def _guesses(text: str) -> int:
     return sum(f"# {CHECK}" in line for line in text.splitlines()[2:])  # the head explains the word
 
 
-def _names(arm: Section) -> set[str]:
-    joints = arm.values["joints"]
-    rows = joints.items if isinstance(joints, Section) else []
-    return {str(row.value["name"]) for row in rows if isinstance(row.value, dict)}
+def _names(arm: dict[str, Section]) -> set[str]:
+    """Return the names of the joints that the description will have."""
+    names = set[str]()
+    for joints in (section.values["joints"] for section in arm.values()):
+        if isinstance(joints, Section):
+            names |= {str(row.value["name"]) for row in joints.items if isinstance(row.value, dict)}
+        elif isinstance(joints.value, list):
+            names |= set(map(str, joints.value))
+    return names
 
 
 def _urdf(graph: Graph) -> tuple[Urdf | None, list[str]]:

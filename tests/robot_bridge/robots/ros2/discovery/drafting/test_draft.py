@@ -7,24 +7,26 @@ import pytest
 
 from lockstep.robot_bridge.robots.ros2 import read_settings
 from lockstep.robot_bridge.robots.ros2.discovery.ask import TakeGuesses
-from lockstep.robot_bridge.robots.ros2.discovery.choice import robots
-from lockstep.robot_bridge.robots.ros2.discovery.draft import NothingToDrive, draft
-from lockstep.robot_bridge.robots.ros2.discovery.graph import Graph, Heard, Topic
+from lockstep.robot_bridge.robots.ros2.discovery.drafting.choice import robots
+from lockstep.robot_bridge.robots.ros2.discovery.drafting.draft import NothingToDrive, draft
+from lockstep.robot_bridge.robots.ros2.discovery.graph import Graph, Heard, ParameterValue, Topic
 from lockstep.robot_bridge.robots.ros2.discovery.kinds import (
     COMPRESSED,
     FLOATS,
     IMAGE,
+    INT8,
     JOINT_STATE,
     ODOMETRY,
     SCAN,
     TRAJECTORY,
     TWIST,
+    TWIST_STAMPED,
     WRENCH,
 )
 from lockstep.robot_bridge.robots.ros2.settings import Ros2Settings
 from tests.robot_bridge.robots.ros2.discovery.graphs import Person, base_graph, published, taken, topics
 
-URDF = (Path(__file__).parents[4] / "support" / "ros2" / "robot.urdf").read_text()
+URDF = (Path(__file__).parents[5] / "support" / "ros2" / "robot.urdf").read_text()
 
 
 def read(directory: Path, text: str) -> Ros2Settings:
@@ -70,7 +72,11 @@ def test_a_plain_twist_is_written_as_the_subscriber_takes_it(tmp_path: Path) -> 
 
 
 def test_what_the_controller_says_of_itself_is_used(tmp_path: Path) -> None:
-    parameters = {"linear.x.max_velocity": 0.1, "cmd_vel_timeout": 0.25, "base_frame_id": "chassis"}
+    parameters: dict[str, ParameterValue] = {
+        "linear.x.max_velocity": 0.1,
+        "cmd_vel_timeout": 0.25,
+        "base_frame_id": "chassis",
+    }
     drafted = draft(replace(base_graph(), parameters={"/driver": parameters}), TakeGuesses(), None)
     settings = read(tmp_path, drafted.text)
     assert settings.base is not None
@@ -192,6 +198,27 @@ def test_numbers_are_sent_only_to_a_controller_of_velocities(
 def test_velocities_in_an_order_that_is_not_known_are_not_sent() -> None:
     with pytest.raises(NothingToDrive, match="in what order, could not be found out"):
         draft(arm_graph("/arm_velocity_controller/commands", FLOATS), TakeGuesses(), None)
+
+
+def test_servo_is_driven_where_it_is_all_there_is(tmp_path: Path) -> None:
+    graph = Graph(
+        topics(
+            taken("/servo_node/delta_twist_cmds", TWIST_STAMPED, "/servo_node"),
+            published("/servo_node/status", INT8),
+            published("/joint_states", JOINT_STATE),
+        ),
+        {"/joint_states": Heard(count=9, rate=50.0, joints=("elbow", "wrist"))},
+    )
+    drafted = draft(graph, TakeGuesses(), None)
+    settings = read(tmp_path, drafted.text)
+    assert settings.base is None, "twists of a tool are not those of a base"
+    assert settings.servo is not None
+    assert settings.servo.joints == ("elbow", "wrist")
+    assert settings.servo.status is not None
+    assert settings.servo.status.message == "Int8"
+    assert "CHECK: Servo's parameter command_in_type is not known" in drafted.text
+    known = replace(graph, parameters={"/servo_node": {"moveit_servo.command_in_type": "speed_units"}})
+    assert "command_in_type" not in draft(known, TakeGuesses(), None).text
 
 
 def test_pictures_that_the_bridge_cannot_read_are_left_out_and_named(tmp_path: Path) -> None:

@@ -4,8 +4,8 @@ The description knows boxes, spheres, cylinders and capsules. A mesh is left out
 well; else the link has no shape.
 """
 
+from lockstep.robot_bridge.robots.ros2.discovery.drafting.yaml_text import Plain, Section, Value
 from lockstep.robot_bridge.robots.ros2.discovery.urdf import Shape, Urdf, UrdfJoint, UrdfLink
-from lockstep.robot_bridge.robots.ros2.discovery.yaml_text import Plain, Section, Value
 
 __all__ = ["draft_bodies"]
 

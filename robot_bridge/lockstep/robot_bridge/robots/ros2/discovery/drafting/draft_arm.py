@@ -1,14 +1,15 @@
-"""Drafts the `arm` of a robot's file."""
+"""Drafts the `arm` of a robot's file, or its `servo`."""
 
 from typing import NamedTuple
 
 from lockstep.robot_bridge.robots.ros2.discovery.ask import Ask
-from lockstep.robot_bridge.robots.ros2.discovery.choice import choose_topic
+from lockstep.robot_bridge.robots.ros2.discovery.drafting.choice import choose_topic
+from lockstep.robot_bridge.robots.ros2.discovery.drafting.draft_servo import SERVO_LEAF, draft_servo, states_section
+from lockstep.robot_bridge.robots.ros2.discovery.drafting.notes import others
+from lockstep.robot_bridge.robots.ros2.discovery.drafting.yaml_text import Plain, Section, Value
 from lockstep.robot_bridge.robots.ros2.discovery.graph import Graph, Topic
-from lockstep.robot_bridge.robots.ros2.discovery.kinds import FLOATS, JOINT_STATE, TRAJECTORY
-from lockstep.robot_bridge.robots.ros2.discovery.notes import others, rate_of, timeout_for
+from lockstep.robot_bridge.robots.ros2.discovery.kinds import FLOATS, JOINT_STATE, TRAJECTORY, TWIST_STAMPED
 from lockstep.robot_bridge.robots.ros2.discovery.urdf import Urdf, UrdfJoint
-from lockstep.robot_bridge.robots.ros2.discovery.yaml_text import Plain, Section, Value
 
 __all__ = ["draft_arm"]
 
@@ -25,16 +26,15 @@ class _Joints(NamedTuple):
     guess: bool
 
 
-def draft_arm(graph: Graph, ask: Ask, urdf: Urdf | None) -> tuple[Section | None, list[str]]:
-    """Return the section, or None without an arm, and remarks for the person."""
+def draft_arm(graph: Graph, ask: Ask, urdf: Urdf | None) -> tuple[dict[str, Section], list[str]]:
+    """Return the section `arm` or `servo`, nothing without an arm, and remarks for the person."""
     takers = graph.taken(TRAJECTORY)
     takers += [topic for topic in graph.taken(FLOATS) if _takes_velocities(graph, topic) and topic not in takers]
-    command = choose_topic(
-        "Which topic drives the arm?", takers, ask, lambda topic: (not topic.takes(TRAJECTORY), _is_gripper(topic))
-    )
+    takers += [topic for topic in graph.taken(TWIST_STAMPED) if topic.name.endswith(f"/{SERVO_LEAF}")]
+    command = choose_topic("Which topic drives the arm?", takers, ask, _rank)
     if command is None:
-        return None, []
-    topic, other = command
+        return {}, []
+    topic = command[0]
     states = choose_topic(
         "Which joint states are the arm's?",
         graph.published(JOINT_STATE),
@@ -42,13 +42,13 @@ def draft_arm(graph: Graph, ask: Ask, urdf: Urdf | None) -> tuple[Section | None
         lambda each: (not graph.said(each.name).count, each.name.rpartition("/")[2] != "joint_states"),
     )
     if states is None:
-        return None, [f"{topic.name} takes commands of joints, but no joint states are published: there is no arm"]
+        return {}, [f"{topic.name} takes commands of an arm, but no joint states are published: there is no arm"]
     joints = _joints(graph, topic, states[0], urdf)
-    if not joints.names or (joints.guess and not topic.takes(TRAJECTORY)):
-        return None, [
-            f"{topic.name}: which joints it moves, and in what order, could not be found out: there is no arm"
-        ]
-    return _section(graph, ask, urdf, joints, command, states), []
+    if not joints.names or (joints.guess and topic.takes(FLOATS)):
+        return {}, [f"{topic.name}: which joints it moves, and in what order, could not be found out: there is no arm"]
+    if topic.takes(TWIST_STAMPED):
+        return {"servo": draft_servo(graph, ask, joints.names, command, states)}, []
+    return {"arm": _section(graph, ask, urdf, joints, command, states)}, []
 
 
 def _section(
@@ -60,8 +60,6 @@ def _section(
     states: tuple[Topic, list[str]],
 ) -> Section:
     topic, other = command
-    source, other_states = states
-    heard = graph.said(source.name)
     is_trajectory = topic.takes(TRAJECTORY)
     kind = TRAJECTORY if is_trajectory else FLOATS
     node = next(each.node for each in topic.subscribers if each.kind == kind)
@@ -72,12 +70,7 @@ def _section(
             "message": Value(kind.rpartition("/")[2], "" if is_trajectory else "velocities, in the order of `joints`"),
         }
     )
-    section.values["states"] = Section(
-        values={
-            "topic": Value(source.name, rate_of(heard, graph.seconds) + others(other_states), not heard.count),
-            "timeout": Value(timeout_for(heard.rate), "s without a message until the arm must not move"),
-        }
-    )
+    section.values["states"] = states_section(graph, states)
     asked = ask.number("Fastest joint of the arm, rad/s", TURNING, 1e-3, FASTEST)
     known = {} if urdf is None else urdf.joints
     rows = Section(items=[_row(name, known.get(name), asked, ask) for name in joints.names])
@@ -126,6 +119,10 @@ def _takes_velocities(graph: Graph, topic: Topic) -> bool:
     """Whether the numbers are velocities: to a controller of positions they would be a leap."""
     interface = graph.parameter(topic.subscribers, "interface_name")
     return interface == "velocity" if interface is not None else "velocity" in topic.name.lower()
+
+
+def _rank(topic: Topic) -> tuple[object, ...]:
+    return (topic.takes(TWIST_STAMPED), not topic.takes(TRAJECTORY), _is_gripper(topic))
 
 
 def _is_gripper(topic: Topic) -> bool:

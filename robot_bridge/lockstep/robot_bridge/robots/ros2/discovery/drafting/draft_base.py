@@ -1,17 +1,17 @@
 """Drafts the `base` of a robot's file."""
 
 from lockstep.robot_bridge.robots.ros2.discovery.ask import Ask
-from lockstep.robot_bridge.robots.ros2.discovery.choice import choose_topic
+from lockstep.robot_bridge.robots.ros2.discovery.drafting.choice import choose_topic
+from lockstep.robot_bridge.robots.ros2.discovery.drafting.draft_servo import SERVO_LEAF
+from lockstep.robot_bridge.robots.ros2.discovery.drafting.notes import others, rate_of, timeout_for
+from lockstep.robot_bridge.robots.ros2.discovery.drafting.yaml_text import Section, Value
 from lockstep.robot_bridge.robots.ros2.discovery.graph import Graph, Topic, namespace_of, parts_of_name
 from lockstep.robot_bridge.robots.ros2.discovery.kinds import ODOMETRY, TWIST, TWIST_STAMPED
-from lockstep.robot_bridge.robots.ros2.discovery.notes import others, rate_of, timeout_for
-from lockstep.robot_bridge.robots.ros2.discovery.yaml_text import Section, Value
 
-__all__ = ["SERVO_LEAF", "draft_base"]
+__all__ = ["draft_base"]
 
 FORWARD, TURN = 0.2, 0.5  # m/s and rad/s: a slow walk, where nothing says how fast the robot is
 FASTEST_FORWARD, FASTEST_TURN = 20.0, 20.0
-SERVO_LEAF = "delta_twist_cmds"  # MoveIt Servo's: twists of a tool
 RADIUS = 0.3  # m
 
 
