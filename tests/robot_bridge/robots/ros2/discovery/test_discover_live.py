@@ -11,7 +11,15 @@ from lockstep.protocol.messages import Feedback
 from lockstep.robot_bridge.link.link_client import RobotLink
 from lockstep.robot_bridge.robots.ros2 import read_settings
 from tests.robot_bridge.bridge_helpers import Operator
-from tests.support.ros2 import PATIENCE, have_ros, ros_environment, ros_python, running_ros_bridge, running_ros_robot
+from tests.support.ros2 import (
+    PATIENCE,
+    STAY,
+    have_ros,
+    ros_environment,
+    ros_python,
+    running_ros_bridge,
+    running_ros_robot,
+)
 
 pytestmark = [
     pytest.mark.skipif(not have_ros(), reason="there are no wheels of ROS 2 for this machine"),
@@ -78,7 +86,7 @@ async def test_the_file_drives_the_graph_that_it_was_written_from_without_an_edi
                 while driver.feedback.joints[0] < 0.02 or driver.feedback.joints[3] < 0.02:
                     await driver.drive([0.2, 0.0, 0.3, 0.0, 0.0, 0.0, 0.0, 0.0])
                 await driver.heard(lambda feedback: feedback.at_rest)
-            await node.ended_in_one_zero()
+            await node.noted("twist", lambda twists: twists[-1]["values"] == STAY)
 
         code, printed = await discover(out, node.environment)
         assert (code, "is there already" in printed) == (2, True)
