@@ -9,13 +9,13 @@ from typing import Annotated
 
 import typer
 
-from lockstep.robot_bridge.errors import BridgeError, SettingsError
+from lockstep.robot_bridge.errors import BridgeError, RobotUnavailable, SettingsError
 from lockstep.robot_bridge.robots.other_python import link_packages, with_packages
 from lockstep.robot_bridge.robots.ros2 import read_settings
 from lockstep.robot_bridge.robots.ros2.discovery.ask import Ask, AskAtTerminal, TakeGuesses
 from lockstep.robot_bridge.robots.ros2.discovery.drafting.draft import Draft, draft
 
-__all__ = ["ros2_app"]
+__all__ = ["ros2_app", "write"]
 
 EXIT_FAILED = 1
 EXIT_USAGE = 2
@@ -52,6 +52,8 @@ def discover(
     """Look at the live ROS 2 graph and write the file that `--ros2` takes. Nothing is published; nothing moves."""
     if out.exists() and not force:
         raise _failed(f"{out} is there already: give another --out, or --force", EXIT_USAGE)
+    if not out.absolute().parent.is_dir():
+        raise _failed(f"there is no folder {out.parent}", EXIT_USAGE)
     if robot_python is not None:
         arguments = ["--out", str(out), "--seconds", str(seconds)]
         arguments += [] if namespace is None else ["--namespace", namespace]
@@ -62,7 +64,9 @@ def discover(
     typer.echo(f"Listening for {seconds:g} s. Nothing is published.")
     try:
         drafted = _look_and_draft(seconds, domain, namespace, ask)
-        _write(out, drafted)
+        write(out, drafted)
+    except RobotUnavailable as error:
+        raise _failed(f"{error.detail}, or name a Python that has it with --robot-python", EXIT_FAILED) from error
     except BridgeError as error:
         raise _failed(error.detail, EXIT_USAGE if isinstance(error, SettingsError) else EXIT_FAILED) from error
     except OSError as error:
@@ -77,16 +81,17 @@ def discover(
 def _look_and_draft(seconds: float, domain: int | None, namespace: str | None, ask: Ask) -> Draft:
     from lockstep.robot_bridge.robots.ros2.discovery.graph_side import GraphSide
     from lockstep.robot_bridge.robots.ros2.discovery.look import look
+    from lockstep.robot_bridge.robots.ros2.discovery.meshes import mesh_box
 
     ros = GraphSide(domain)
     try:
         graph = look(ros, seconds)
     finally:
         ros.close()
-    return draft(graph, ask, namespace, domain)
+    return draft(graph, ask, namespace, domain, mesh_box)
 
 
-def _write(out: Path, drafted: Draft) -> None:
+def write(out: Path, drafted: Draft) -> None:
     """Write the file, once the bridge's own reader takes it; without the bodies if they make it too long.
 
     Raises:

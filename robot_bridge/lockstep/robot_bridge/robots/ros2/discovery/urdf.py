@@ -12,7 +12,7 @@ from xml.parsers import expat
 
 from lockstep.robot_bridge.robots.ros2.discovery.pose import Pose, from_rpy
 
-__all__ = ["BadUrdf", "Shape", "Urdf", "UrdfJoint", "UrdfLink", "parse_urdf"]
+__all__ = ["BadUrdf", "Box", "Shape", "Urdf", "UrdfJoint", "UrdfLink", "parse_urdf"]
 
 MAX_CHARACTERS = 4 << 20
 MAX_PARTS = 2000  # links or joints
@@ -23,6 +23,13 @@ Vector = tuple[float, float, float]
 
 class BadUrdf(ValueError):
     """The text is not a URDF that can be used; the message says why."""
+
+
+class Box(NamedTuple):
+    """The box around a mesh, in its own frame and units."""
+
+    centre: Vector
+    half: Vector
 
 
 class Shape(NamedTuple):

@@ -9,7 +9,7 @@ from lockstep.robot_bridge.robots.ros2.discovery.ask import Ask
 from lockstep.robot_bridge.robots.ros2.discovery.drafting.choice import choose_robot
 from lockstep.robot_bridge.robots.ros2.discovery.drafting.draft_arm import draft_arm
 from lockstep.robot_bridge.robots.ros2.discovery.drafting.draft_base import draft_base
-from lockstep.robot_bridge.robots.ros2.discovery.drafting.draft_bodies import draft_bodies
+from lockstep.robot_bridge.robots.ros2.discovery.drafting.draft_bodies import FindBox, draft_bodies
 from lockstep.robot_bridge.robots.ros2.discovery.drafting.draft_sensors import draft_cameras, draft_ranges, draft_wrench
 from lockstep.robot_bridge.robots.ros2.discovery.drafting.yaml_text import CHECK, Section, Value, comment, render
 from lockstep.robot_bridge.robots.ros2.discovery.graph import Graph, parts_of_name
@@ -33,8 +33,14 @@ class Draft(NamedTuple):
     guesses: int  # lines that begin their comment with CHECK
 
 
-def draft(graph: Graph, ask: Ask, namespace: str | None, domain: int | None = None) -> Draft:
-    """Return a robot's file.
+def draft(
+    graph: Graph,
+    ask: Ask,
+    namespace: str | None,
+    domain: int | None = None,
+    find_box: FindBox = lambda _: None,
+) -> Draft:
+    """Return a robot's file. `find_box`: of a mesh of the URDF, by its name.
 
     Raises:
         NothingToDrive: nobody takes commands, or nothing says where the robot is.
@@ -61,7 +67,7 @@ def draft(graph: Graph, ask: Ask, namespace: str | None, domain: int | None = No
     end = _end(graph, remarks)
     plain = _head(graph, namespace) + render(top) + end
     joints = _names(arm)
-    bodies = None if urdf is None else draft_bodies(urdf, joints, has_base=base is not None)
+    bodies = None if urdf is None else draft_bodies(urdf, joints, find_box, has_base=base is not None)
     if bodies is None:
         return Draft(plain, "", remarks, _guesses(plain))
     top.values["bodies"] = bodies
