@@ -7,7 +7,7 @@ import pytest
 
 from lockstep.robot_bridge.robots.ros2 import read_settings
 from lockstep.robot_bridge.robots.ros2.discovery.ask import TakeGuesses
-from lockstep.robot_bridge.robots.ros2.discovery.drafting.choice import robots
+from lockstep.robot_bridge.robots.ros2.discovery.drafting.choice import SeveralRobots, robots
 from lockstep.robot_bridge.robots.ros2.discovery.drafting.draft import NothingToDrive, draft
 from lockstep.robot_bridge.robots.ros2.discovery.graph import Graph, Heard, ParameterValue, Topic
 from lockstep.robot_bridge.robots.ros2.discovery.kinds import (
@@ -131,6 +131,22 @@ def test_several_robots_are_told_apart_by_their_namespaces(tmp_path: Path) -> No
         assert settings.base is not None
         assert (settings.base.command.topic, settings.base.odometry.topic) == ("/robot2/cmd_vel", "/robot2/odom")
         assert "/robot1" not in drafted.text
+
+
+def test_nobody_guesses_which_of_several_robots_is_meant() -> None:
+    with pytest.raises(SeveralRobots, match="/robot1, /robot2. Name one with --namespace"):
+        draft(two_robots(), TakeGuesses(), None)
+
+
+def test_a_topic_that_a_person_chose_is_no_guess(tmp_path: Path) -> None:
+    graph = base_graph(taken("/cmd_vel_teleop", TWIST))
+    guessed = draft(graph, TakeGuesses(), None)
+    chosen = draft(graph, Person(Which_topic_drives_the_base=1), None)
+    settings = read(tmp_path, chosen.text)
+    assert settings.base is not None
+    assert (settings.base.command.topic, settings.base.command.message) == ("/cmd_vel_teleop", "Twist")
+    assert "CHECK: taken by /driver; not /cmd_vel_teleop" in guessed.text
+    assert "# taken by /driver; not /cmd_vel" in chosen.text
 
 
 def test_controllers_of_one_robot_are_not_several_robots() -> None:

@@ -2,13 +2,18 @@
 
 from collections.abc import Callable, Sequence
 
+from lockstep.robot_bridge.errors import BridgeError
 from lockstep.robot_bridge.robots.ros2.discovery.ask import Ask
 from lockstep.robot_bridge.robots.ros2.discovery.graph import Graph, Topic, namespace_of, parts_of_name
 from lockstep.robot_bridge.robots.ros2.discovery.kinds import COMMANDS, JOINT_STATE, ODOMETRY
 
-__all__ = ["choose_robot", "choose_topic", "robots"]
+__all__ = ["SeveralRobots", "choose_robot", "choose_topic", "robots"]
 
 MAX_OPTIONS = 20
+
+
+class SeveralRobots(BridgeError):
+    name = "several_robots"
 
 
 def robots(graph: Graph) -> list[str]:
@@ -20,9 +25,17 @@ def robots(graph: Graph) -> list[str]:
 
 
 def choose_robot(graph: Graph, ask: Ask, namespace: str | None) -> tuple[Graph, str]:
-    """Return the part of the graph that is the wanted robot, and its namespace; "/" for the whole graph."""
+    """Return the part of the graph that is the wanted robot, and its namespace; "/" for the whole graph.
+
+    Raises:
+        SeveralRobots: there is nobody to ask for one of them. To guess would be to drive another robot.
+    """
     if namespace is None:
         found = robots(graph)
+        if found and not ask.answers:
+            raise SeveralRobots(
+                f"there are several robots: {', '.join(found[:MAX_OPTIONS])}. Name one with --namespace"
+            )
         namespace = found[ask.choose("There are several robots. Which one?", found)] if found else "/"
     namespace = "/" + namespace.strip("/")
     return graph.within(namespace), namespace

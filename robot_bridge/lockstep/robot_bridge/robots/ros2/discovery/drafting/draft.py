@@ -44,6 +44,7 @@ def draft(
 
     Raises:
         NothingToDrive: nobody takes commands, or nothing says where the robot is.
+        SeveralRobots: there are several, none was named, and nobody is asked.
     """
     graph, namespace = choose_robot(graph, ask, namespace)
     urdf, remarks = _urdf(graph)

@@ -66,7 +66,7 @@ def _section(
     section = Section()
     section.values["command"] = Section(
         values={
-            "topic": Value(topic.name, f"taken by {node}{others(other)}", bool(other)),
+            "topic": Value(topic.name, f"taken by {node}{others(other)}", bool(other) and not ask.answers),
             "message": Value(kind.rpartition("/")[2], "" if is_trajectory else "velocities, in the order of `joints`"),
         }
     )

@@ -51,7 +51,7 @@ def _section(graph: Graph, ask: Ask, command: tuple[Topic, list[str]], odometry:
     section.values["turn"] = _speed(graph, topic, ask, "turning", "angular.z.max_velocity", TURN)
     radius = ask.number("Radius of the circle that holds the robot, m", RADIUS, 0.01, 10.0)
     section.values["radius"] = Value(radius, _said(ask, "m, of the circle that holds the whole robot"), not ask.answers)
-    section.values["command"] = _command(graph, topic, other_commands, heard.child_frame)
+    section.values["command"] = _command(graph, ask, topic, other_commands, heard.child_frame)
     stale = timeout_for(heard.rate)
     section.values["odometry"] = Section(
         values={
@@ -62,13 +62,13 @@ def _section(graph: Graph, ask: Ask, command: tuple[Topic, list[str]], odometry:
     return section
 
 
-def _command(graph: Graph, topic: Topic, other: list[str], child_frame: str) -> Section:
+def _command(graph: Graph, ask: Ask, topic: Topic, other: list[str], child_frame: str) -> Section:
     is_stamped = topic.takes(TWIST_STAMPED)
     node = next(each.node for each in topic.subscribers if each.kind == (TWIST_STAMPED if is_stamped else TWIST))
     note = f"taken by {node}{others(other)}"
     if topic.publishers:
         note += f"; {topic.publishers[0].node} publishes there too: use a mux if both drive"
-    section = Section(values={"topic": Value(topic.name, note, bool(other))})
+    section = Section(values={"topic": Value(topic.name, note, bool(other) and not ask.answers)})
     if len({each.kind for each in topic.subscribers} & {TWIST, TWIST_STAMPED}) > 1:
         section.head.append("Subscribers take both Twist and TwistStamped here: ROS delivers to one kind only.")
     section.values["message"] = Value("TwistStamped" if is_stamped else "Twist", "as the subscriber takes it")

@@ -29,7 +29,9 @@ def draft_servo(
     section.values["joints"] = Value(joints, f"of {states[0].name}", True)
     section.values["command"] = Section(
         values={
-            "topic": Value(topic.name, f"taken by {topic.subscribers[0].node}{others(other)}", bool(other)),
+            "topic": Value(
+                topic.name, f"taken by {topic.subscribers[0].node}{others(other)}", bool(other) and not ask.answers
+            ),
             "frame": Value("base_link", "the axes of the twist: a guess", True),
         }
     )
