@@ -14,6 +14,7 @@ from tests.robot_bridge.bridge_helpers import Operator
 from tests.support.ros2 import (
     PATIENCE,
     STAY,
+    TWO_BASES,
     have_ros,
     ros_environment,
     ros_python,
@@ -91,6 +92,30 @@ async def test_the_file_drives_the_graph_that_it_was_written_from_without_an_edi
         code, printed = await discover(out, node.environment)
         assert (code, "is there already" in printed) == (2, True)
         assert out.read_text() == text
+
+
+async def test_one_of_several_robots_is_named_and_only_that_one_is_driven(tmp_path: Path) -> None:
+    out = tmp_path / "robot.yaml"
+    async with running_ros_robot(tmp_path, TWO_BASES) as node:
+        code, printed = await discover(out, node.environment, "--yes")
+        assert code == 1
+        assert "there are several robots: /robot1, /robot2" in printed
+        code, printed = await discover(out, node.environment, "--yes", "--namespace", "/robot2")
+        assert code == 0, printed
+        async with (
+            running_ros_bridge(tmp_path, node, out) as bridge,
+            RobotLink(*bridge.address, "operator", name="test") as link,
+        ):
+            driver = Operator(link)
+            await driver.next(Feedback)
+            async with asyncio.timeout(2 * PATIENCE):
+                await driver.heard(lambda feedback: feedback.faults == [] and feedback.unknown == [])
+                await driver.arm()
+                while driver.feedback.joints[0] < 0.02:
+                    await driver.drive([0.2, 0.0])
+                await driver.heard(lambda feedback: feedback.at_rest)
+            twists = await node.noted("twist", lambda twists: twists[-1]["values"] == STAY)
+    assert {twist["robot"] for twist in twists} == {"robot2"}
 
 
 async def test_an_empty_graph_is_named_with_what_to_check(tmp_path: Path) -> None:
