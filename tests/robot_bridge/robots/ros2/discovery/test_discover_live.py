@@ -68,6 +68,9 @@ async def test_the_file_drives_the_graph_that_it_was_written_from_without_an_edi
         assert (wrist.lower, wrist.upper) == (None, None)
         assert settings.ranges is not None
         assert settings.ranges.yaw == pytest.approx(1.5708)
+        assert description.ranges is not None
+        (scanner,) = (body for body in description.bodies if body.name == description.ranges.body)
+        assert (scanner.parent, scanner.position) == ("base", (0.2, 0.0, 0.2))
         assert [(camera.width, camera.height, camera.captured) for camera in settings.cameras] == [
             (320, 240, "header"),
             (320, 240, "header"),

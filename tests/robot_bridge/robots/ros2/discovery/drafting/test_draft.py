@@ -277,8 +277,21 @@ def test_a_scanner_that_hangs_upside_down_is_marked(tmp_path: Path) -> None:
     assert "CHECK: frame 'laser' is tilted or upside down" in drafted.text
     settings = read(tmp_path, drafted.text)
     assert settings.ranges is not None
+    assert settings.ranges.body is None
     assert (settings.ranges.timeout, settings.ranges.range_max) == (1.6, 6.0)
     assert settings.wrench is not None
+
+
+def test_a_scanner_is_where_the_urdf_has_it_also_without_the_other_bodies(tmp_path: Path) -> None:
+    graph = base_graph(published("/scan", SCAN))
+    heard = {**graph.heard, "/scan": Heard(count=9, rate=5.0, frame="laser", range_min=0.1, range_max=6.0)}
+    drafted = draft(replace(graph, heard=heard, descriptions={"/robot_description": URDF}), TakeGuesses(), None)
+    for text in (drafted.text, drafted.without_bodies):
+        settings = read(tmp_path, text)
+        assert settings.ranges is not None
+        (scanner,) = (body for body in settings.bodies if body.name == settings.ranges.body)
+        assert (scanner.parent, list(scanner.position)) == ("base", [0.2, 0, 0.2])
+    assert len(read(tmp_path, drafted.text).bodies) > len(read(tmp_path, drafted.without_bodies).bodies)
 
 
 def test_a_description_that_cannot_be_used_is_named(tmp_path: Path) -> None:

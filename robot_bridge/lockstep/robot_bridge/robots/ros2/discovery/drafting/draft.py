@@ -56,23 +56,20 @@ def draft(
     simulated = bool(graph.topics.get("/clock") and graph.topics["/clock"].publishers)
     cameras, camera_remarks = draft_cameras(graph, simulated)
     remarks += camera_remarks
+    ranges, scanner = draft_ranges(graph, ask, urdf, has_base=base is not None)
     top = _top(graph, ask, namespace, domain, urdf, base, simulated)
-    parts = {
-        "base": base,
-        **arm,
-        "ranges": draft_ranges(graph, ask, urdf),
-        "wrench": draft_wrench(graph, ask),
-        "cameras": cameras,
-    }
+    parts = {"base": base, **arm, "ranges": ranges, "wrench": draft_wrench(graph, ask), "cameras": cameras}
+    if scanner is not None:
+        parts["bodies"] = Section(items=[scanner])
     top.values |= {key: section for key, section in parts.items() if section is not None}
-    end = _end(graph, remarks)
-    plain = _head(graph, namespace) + render(top) + end
-    joints = _names(arm)
-    bodies = None if urdf is None else draft_bodies(urdf, joints, find_box, has_base=base is not None)
+    head, end = _head(graph, namespace), _end(graph, remarks)
+    plain = head + render(top) + end
+    bodies = None if urdf is None else draft_bodies(urdf, _names(arm), find_box, has_base=base is not None)
     if bodies is None:
         return Draft(plain, "", remarks, _guesses(plain))
+    bodies.items += [] if scanner is None else [scanner]
     top.values["bodies"] = bodies
-    text = _head(graph, namespace) + render(top) + end
+    text = head + render(top) + end
     return Draft(text, plain, remarks, _guesses(text))
 
 

@@ -10,7 +10,7 @@ from lockstep.robot_bridge.robots.ros2.discovery.drafting.yaml_text import Plain
 from lockstep.robot_bridge.robots.ros2.discovery.pose import Pose
 from lockstep.robot_bridge.robots.ros2.discovery.urdf import Box, Shape, Urdf, UrdfJoint, UrdfLink
 
-__all__ = ["FindBox", "draft_bodies"]
+__all__ = ["BASE_BODY", "FindBox", "draft_bodies"]
 
 BASE_BODY = "base"  # the body at the pose of the odometry
 MAX_BODIES = 200

@@ -4,6 +4,7 @@ import math
 
 from lockstep.robot_bridge.robots.ros2.discovery.ask import Ask
 from lockstep.robot_bridge.robots.ros2.discovery.drafting.choice import choose_topic
+from lockstep.robot_bridge.robots.ros2.discovery.drafting.draft_bodies import BASE_BODY
 from lockstep.robot_bridge.robots.ros2.discovery.drafting.notes import others, rate_of, timeout_for
 from lockstep.robot_bridge.robots.ros2.discovery.drafting.yaml_text import Plain, Section, Value
 from lockstep.robot_bridge.robots.ros2.discovery.graph import Graph, Heard, Topic
@@ -18,24 +19,33 @@ MAX_FRAME_RATE, MIN_FRAME_RATE = 30.0, 0.1
 MIN_SIDE, MAX_SIDE = 16, 8192
 LEVEL = math.cos(math.radians(10))
 BASE_FRAMES = ("base_link", "base_footprint")
+SCANNER = "scanner"
 COMPRESSED_END = "/compressed"
 
 
-def draft_ranges(graph: Graph, ask: Ask, urdf: Urdf | None) -> Section | None:
+def draft_ranges(graph: Graph, ask: Ask, urdf: Urdf | None, *, has_base: bool) -> tuple[Section | None, Value | None]:
+    """Return the section, and the body at the scanner's place where the URDF says that it is not the base's own."""
     chosen = choose_topic(
         "Which laser scan is drawn?", _speaking(graph, SCAN), ask, lambda topic: (not topic.name.endswith("/scan"),)
     )
     if chosen is None:
-        return None
+        return None, None
     topic, other = chosen
     heard = graph.said(topic.name)
     section = Section(values={"topic": Value(topic.name, rate_of(heard, graph.seconds) + others(other))})
+    pose = None if urdf is None else urdf.pose(heard.frame)
+    place: Value | None = None
+    if urdf is not None and pose is not None and pose.upright >= LEVEL and any(map(abs, pose.position)):
+        name = next(each for each in (SCANNER, f"{SCANNER}_") if each not in urdf.links)
+        parent = BASE_BODY if has_base else ""
+        place = Value({"name": name, "parent": parent, "position": list(pose.position)}, "where the scanner is")
+        section.values["body"] = Value(name, "at its place in the URDF")
     section.values["timeout"] = Value(timeout_for(heard.rate, 1.0))
     section.values["yaw"] = _yaw(heard, urdf)
     if 0 <= heard.range_min < heard.range_max <= 1e6:
         section.values["range_min"] = Value(heard.range_min, "m, as its messages say")
         section.values["range_max"] = Value(heard.range_max)
-    return section
+    return section, place
 
 
 def _yaw(heard: Heard, urdf: Urdf | None) -> Value:
