@@ -1,4 +1,4 @@
-"""The command `lockstep` on a robot that has no console: `robot` and `check`."""
+"""The command `lockstep` on a robot that has no console: `robot`, `ros2` and `check`."""
 
 from importlib.metadata import version
 from typing import Annotated
@@ -7,6 +7,7 @@ import typer
 
 from lockstep.robot_bridge.cli import robot_app
 from lockstep.robot_bridge.conformance.cli import check
+from lockstep.robot_bridge.robots.ros2.discovery.cli import ros2_app
 
 __all__ = ["app", "main"]
 
@@ -16,6 +17,7 @@ app = typer.Typer(
     help="Run a robot bridge. The console is not installed here.",
 )
 app.add_typer(robot_app, name="robot", help="Run a robot and its bridge until interrupted.")
+app.add_typer(ros2_app, name="ros2")
 app.command()(check)
 
 

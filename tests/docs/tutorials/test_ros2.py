@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 
 from lockstep.client import Console
+from lockstep.robot_bridge.robots.ros2 import read_settings
 from tests.docs.tutorials.reader import Reader
 from tests.support.ros2 import PATIENCE, have_ros, ros_environment, ros_python
 
@@ -51,6 +52,20 @@ async def test_a_reader_drives_the_base_and_sees_its_topics_fall_silent(reader: 
             reader.compare("\n".join(await _until(watching, lambda faults: len(faults) == 4)))
 
 
+async def test_a_reader_has_the_file_of_the_running_robot_written(reader: Reader) -> None:
+    reader.take("python3 -m venv rosenv")
+    node = reader.take("rosenv/bin/python docs/examples/ros2/turtlebot.py")
+    reader.take("source .venv/bin/activate\nlockstep up")
+    reader.take("source .venv/bin/activate\nLINK=")
+    async with reader.process(f"{node} & echo started; wait", "started"):
+        said = await reader.run("source .venv/bin/activate\nlockstep ros2 discover")
+    reader.compare(said)
+    settings, _ = read_settings(reader.folder / "mine.yaml")
+    assert settings.base is not None
+    assert settings.base.command.topic == "/cmd_vel"
+    assert [camera.name for camera in settings.cameras] == ["camera"]
+
+
 @pytest.mark.long
 @pytest.mark.timeout(500)
 async def test_the_bridge_alone_passes_the_check(reader: Reader) -> None:
@@ -58,6 +73,7 @@ async def test_the_bridge_alone_passes_the_check(reader: Reader) -> None:
     node = reader.take("rosenv/bin/python docs/examples/ros2/turtlebot.py")
     reader.take("source .venv/bin/activate\nlockstep up")
     reader.take("source .venv/bin/activate\nLINK=")
+    reader.take("source .venv/bin/activate\nlockstep ros2 discover")
     bridge = reader.take("rosenv/bin/python -m lockstep.robot_bridge") + f" --port {reader.port('5600')}"
     async with reader.process(f"{node} & echo started; wait", "started"), reader.process(bridge, "tcp://"):
         assert "40 ok, 2 not applicable" in await reader.run("lockstep check")

@@ -19,6 +19,7 @@ __all__ = [
     "EXAMPLES",
     "PATIENCE",
     "STAY",
+    "TWO_BASES",
     "RosBridge",
     "RosRobot",
     "have_ros",
@@ -31,6 +32,7 @@ __all__ = [
 ROOT = Path(__file__).parents[3]
 EXAMPLES = ROOT / "docs" / "examples" / "ros2"
 NODE = Path(__file__).with_name("robot_node.py")
+TWO_BASES = Path(__file__).with_name("two_bases_node.py")
 # RTPS well-known ports (DDSI-RTPS 9.6.1.1): 7400 + 250 x domain is where a domain's participants find each other.
 DOMAINS = range(1, 100)
 FIRST_PORT, PORTS_PER_DOMAIN = 7400, 250
@@ -120,10 +122,10 @@ def _zeros(twists: list[dict[str, Any]]) -> int:
 
 
 @asynccontextmanager
-async def running_ros_robot(directory: Path) -> AsyncIterator[RosRobot]:
+async def running_ros_robot(directory: Path, node: Path = NODE) -> AsyncIterator[RosRobot]:
     log = directory / "robot_node.jsonl"
     environment = ros_environment()
-    async with running_process(ros_python(), str(NODE), str(log), environment=environment) as (process, _):
+    async with running_process(ros_python(), str(node), str(log), environment=environment) as (process, _):
         yield RosRobot(process, environment, log)
 
 

@@ -2,8 +2,8 @@
 
 It does what it is told until it is told otherwise, with no timeout of its own, so that whoever forgets a zero is found
 out. Each command and each picture is a JSON line in the log. Lines on standard input: `hush TOPIC`, `speak TOPIC`,
-`freeze TOPIC` (sends the same message over and over), `spoil TOPIC` (one message that makes no sense), `tick`
-(nothing). Each is answered after the robot's next tick.
+`freeze TOPIC` (sends the same message over and over), `spoil TOPIC` (one message that makes no sense), `status N`
+(of MoveIt Servo), `tick` (nothing). Each is answered after the robot's next tick.
 """
 
 import array
@@ -23,13 +23,15 @@ from geometry_msgs.msg import Twist, TwistStamped, WrenchStamped
 from nav_msgs.msg import Odometry
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
-from rclpy.qos import qos_profile_sensor_data
+from rclpy.qos import DurabilityPolicy, QoSProfile, qos_profile_sensor_data
 from sensor_msgs.msg import CompressedImage, Image, JointState, LaserScan
+from std_msgs.msg import Float64MultiArray, Int8, String
 from trajectory_msgs.msg import JointTrajectory
 
 from lockstep.robot_bridge.robots.event_strip import draw_event_strip
 
 JOINTS = ("shoulder_pan_joint", "shoulder_lift_joint", "elbow_joint", "wrist_1_joint", "wrist_2_joint", "wrist_3_joint")
+URDF = Path(__file__).with_name("robot.urdf")
 WIDTH, HEIGHT = 320, 240
 TICK = 0.02  # s
 PICTURE_EVERY, SCAN_EVERY = 3, 4  # ticks
@@ -46,6 +48,7 @@ class RobotNode(Node):  # type: ignore[misc]
         self._positions = [0.0, -1.0, 1.0, 0.0, 0.0, 0.0]
         self._setpoints = list(self._positions)
         self._velocities = [0.0] * len(JOINTS)
+        self._commanded: list[float] = []  # velocities; empty: the joints go to their setpoints
         self._ticks = 0
         self.ticked = threading.Event()
         self._pictures = 0
@@ -69,6 +72,14 @@ class RobotNode(Node):  # type: ignore[misc]
             JointTrajectory, "/joint_trajectory_controller/joint_trajectory", self._take_trajectory, 10
         )
         self.create_subscription(JointState, "/joint_command", self._take_joints, 10)
+        self.create_subscription(Float64MultiArray, "/arm_velocity_controller/commands", self._take_velocities, 10)
+        self.create_subscription(TwistStamped, "/servo_node/delta_twist_cmds", self._take_tool, 10)
+        self._status = self.create_publisher(Int8, "/servo_node/status", 10)
+        self._status_code = 0
+        self.declare_parameter("joints", list(JOINTS))  # as the controllers of ros2_control have it
+        kept = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+        self._description = self.create_publisher(String, "/robot_description", kept)
+        self._description.publish(String(data=URDF.read_text()))
         self.create_timer(TICK, self._tick)
 
     def tell(self, line: str) -> None:
@@ -81,6 +92,8 @@ class RobotNode(Node):  # type: ignore[misc]
             self._frozen.pop(topic, None)
         elif verb == "freeze":
             self._frozen[topic] = None
+        elif verb == "status":
+            self._status_code = int(topic)
         elif verb == "spoil":
             self._spoilt.add(topic)
 
@@ -97,7 +110,7 @@ class RobotNode(Node):  # type: ignore[misc]
     def _take_trajectory(self, message: JointTrajectory) -> None:
         point = message.points[0]
         span = point.time_from_start.sec + point.time_from_start.nanosec / 1e9
-        self._setpoints = list(point.positions)
+        self._setpoints, self._commanded = list(point.positions), []
         self.note(
             "trajectory",
             names=list(message.joint_names),
@@ -107,17 +120,29 @@ class RobotNode(Node):  # type: ignore[misc]
         )
 
     def _take_joints(self, message: JointState) -> None:
-        self._setpoints = list(message.position)
+        self._setpoints, self._commanded = list(message.position), []
         self.note("joints", positions=self._setpoints, velocities=list(message.velocity), measured=self._positions)
+
+    def _take_velocities(self, message: Float64MultiArray) -> None:
+        """A velocity controller without a timeout: it goes on with what it was told last."""
+        self._commanded = list(message.data)
+        self.note("velocities", values=self._commanded)
+
+    def _take_tool(self, message: TwistStamped) -> None:
+        """As MoveIt Servo, roughly: twists of the tool become velocities of joints, one each."""
+        linear, angular = message.twist.linear, message.twist.angular
+        self._commanded = [linear.x, linear.y, linear.z, angular.x, angular.y, angular.z]
+        self.note("tool", values=self._commanded, frame=message.header.frame_id)
 
     def _tick(self) -> None:
         self._ticks += 1
+        self._status.publish(Int8(data=self._status_code))
         forward, turn = self._twist
         x, y, yaw = self._pose
         yaw = math.remainder(yaw + turn * TICK, math.tau)
         self._pose = [x + forward * math.cos(yaw) * TICK, y + forward * math.sin(yaw) * TICK, yaw]
         for number, (point, position) in enumerate(zip(self._setpoints, self._positions, strict=True)):
-            velocity = ARM_SPEED * (point - position)
+            velocity = self._commanded[number] if self._commanded else ARM_SPEED * (point - position)
             self._velocities[number] = velocity if abs(velocity) > 1e-4 else 0.0
             self._positions[number] += self._velocities[number] * TICK
         self._send("/odom", self._odometry)
@@ -167,7 +192,7 @@ class RobotNode(Node):  # type: ignore[misc]
 
     def _scan(self, stamp: Any, spoilt: bool) -> LaserScan:
         message = LaserScan()
-        message.header.stamp = stamp
+        message.header.stamp, message.header.frame_id = stamp, "laser"
         message.angle_min, message.angle_max = -math.pi, math.pi
         message.angle_increment = 0.0 if spoilt else math.tau / 360
         message.range_min, message.range_max = 0.1, 12.0

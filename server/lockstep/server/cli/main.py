@@ -29,6 +29,14 @@ def _robot() -> typer.Typer:
     return commands
 
 
+def _ros2() -> typer.Typer:
+    from lockstep.robot_bridge.robots.ros2.discovery.cli import ros2_app
+
+    commands = typer.Typer()
+    commands.add_typer(ros2_app, name="ros2")
+    return commands
+
+
 def _check() -> typer.Typer:
     from lockstep.robot_bridge.conformance.cli import check
 
@@ -59,6 +67,7 @@ def _recordings() -> typer.Typer:
 LOADERS: dict[Callable[[], typer.Typer], tuple[str, ...]] = {
     _console: ("up", "serve"),
     _robot: ("robot",),
+    _ros2: ("ros2",),
     _check: ("check",),
     _access: ("invite", "invitations", "revoke", "audit"),
     _recordings: ("record", "recordings", "replay", "verify", "export", "report"),

@@ -12,8 +12,7 @@ from tempfile import TemporaryDirectory
 
 import msgspec
 
-import lockstep.protocol
-import lockstep.robot_bridge
+from lockstep.robot_bridge.robots.other_python import link_packages, with_packages
 from lockstep.robot_bridge.watchdog.liveness import EXIT_HUNG
 from lockstep.server.util.backoff import Backoff
 
@@ -81,8 +80,7 @@ class BridgeProcess:
         ]
         environment = self._environment
         if self._is_foreign:
-            paths = (environment.get("PYTHONPATH", ""), self._folder_of_the_bridge())
-            environment = environment | {"PYTHONPATH": os.pathsep.join(filter(None, paths))}
+            environment = with_packages(environment, self._folder_of_the_bridge())
         if (setpriv := shutil.which("setpriv")) is not None:
             command = [setpriv, "--pdeathsig", "TERM", *command]  # also when the console is killed
         try:
@@ -134,11 +132,7 @@ class BridgeProcess:
     def _folder_of_the_bridge(self) -> str:
         if self._alone is None:
             self._alone = TemporaryDirectory(prefix="lockstep-bridge-")
-            namespace = Path(self._alone.name) / "lockstep"
-            namespace.mkdir()
-            for part in (lockstep.protocol, lockstep.robot_bridge):
-                package = Path(part.__path__[0]).resolve()
-                (namespace / package.name).symlink_to(package, target_is_directory=True)
+            link_packages(Path(self._alone.name))
         return self._alone.name
 
     async def _read_address(self, process: asyncio.subprocess.Process) -> str:

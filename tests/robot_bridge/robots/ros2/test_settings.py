@@ -86,6 +86,7 @@ def test_an_anchor_may_stand_for_what_is_said_twice(tmp_path: Path) -> None:
         (ARM.replace("1.0", "1.0, brake: 0.1"), "line 4: arm.joints[0].brake: braking from 1 would take"),
         (ARM + "geofences: []\n" + "wrench: {}\n", "line 6: wrench: missing required field `topic`"),
         (ARM + "    - {name: elbow, maximum: 1.0}\n", "axis name 'arm.elbow' is empty or used twice"),
+        (ARM + "servo: {linear: 1, angular: 1, joints: [a]}\n", "line 5: servo: the joints of an arm are driven by"),
         (BASE + "ranges: {body: roof}\n", "sensor ranges names the body 'roof'"),
     ],
 )

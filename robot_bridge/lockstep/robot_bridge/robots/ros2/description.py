@@ -19,13 +19,15 @@ from lockstep.protocol.description import (
     WrenchSensor,
 )
 from lockstep.robot_bridge.robots.ros2.controls import arm_layers, base_layer
-from lockstep.robot_bridge.robots.ros2.settings import Arm, ArmJoint, Base, BaseAxis, Ros2Settings
+from lockstep.robot_bridge.robots.ros2.settings import Arm, ArmJoint, Base, BaseAxis, Ros2Settings, Servo
 from lockstep.robot_bridge.yaml_file import SettingsPlace
 
-__all__ = ["BASE_JOINTS", "describe"]
+__all__ = ["BASE_JOINTS", "SERVO_AXES", "describe"]
 
 BASE_JOINTS: Final = ("base.x", "base.y", "base.yaw")
 BASE_BODY: Final = "base"
+# Four axes are a layer: two sticks move a tool and turn it about its vertical.
+SERVO_AXES: Final = ("tool.x", "tool.y", "tool.z", "tool.rz", "tool.rx", "tool.ry")
 SLEW_TIME: Final = 0.5  # s from rest to full speed unless the settings say otherwise
 BRAKE_SHARE: Final = 0.5  # of `hold`, from full speed to rest
 _COLOUR = (0.25, 0.55, 0.85, 1.0)
@@ -38,8 +40,10 @@ def describe(settings: Ros2Settings) -> RobotDescription:
         SettingsPlace: the settings contradict each other.
     """
     base, arm = settings.base, settings.arm
-    if base is None and arm is None:
-        raise SettingsPlace((), "there is nothing to drive: give a base, an arm or both")
+    if base is None and arm is None and settings.servo is None:
+        raise SettingsPlace((), "there is nothing to drive: give a base, an arm, a servo, or a base and one of those")
+    if arm is not None and settings.servo is not None:
+        raise SettingsPlace(("servo",), "the joints of an arm are driven by `arm` or by `servo`, not by both")
     if base is None and settings.geofences:
         raise SettingsPlace(("geofences",), "zones need a base")
     for number, camera in enumerate(settings.cameras):
@@ -48,6 +52,8 @@ def describe(settings: Ros2Settings) -> RobotDescription:
             raise SettingsPlace(keys, "simulated time is not the bridge's time: set captured: arrival, and a latency")
     base_axes = () if base is None else _base_axes(base, settings.hold)
     arm_axes = () if arm is None else tuple(_arm_axis(arm, number, settings.hold) for number in range(len(arm.joints)))
+    if settings.servo is not None:
+        arm_axes = _servo_axes(settings.servo, settings.hold)
     layers: tuple[ControlLayer, ...] = ()
     if base is not None:
         layers += (base_layer("base.vx", "base.vy" if base.left else None, "base.wz" if base.turn else None),)
@@ -120,6 +126,28 @@ def _arm_axis(arm: Arm, number: int, hold: float) -> Axis:
     )
 
 
+def _servo_axes(servo: Servo, hold: float) -> tuple[Axis, ...]:
+    words = {"x": "Tool along x", "y": "Tool along y", "z": "Tool along z"}
+    words |= {"rz": "Tool about z", "rx": "Tool about x", "ry": "Tool about y"}
+    axes = []
+    for name in SERVO_AXES:
+        direction = name.partition(".")[2]
+        turns = direction.startswith("r")
+        fastest = servo.angular if turns else servo.linear
+        axes.append(
+            Axis(
+                name=name,
+                label=words[direction],
+                unit="rad/s" if turns else "m/s",
+                minimum=-fastest,
+                maximum=fastest,
+                slew=fastest / SLEW_TIME,
+                brake=_brake(None, fastest, hold, ()),
+            )
+        )
+    return tuple(axes)
+
+
 def _brake(brake: float | None, fastest: float, hold: float, keys: tuple[str | int, ...]) -> float:
     if brake is None:
         return fastest / (BRAKE_SHARE * hold)
@@ -133,6 +161,8 @@ def _joints(settings: Ros2Settings) -> tuple[Joint, ...]:
     base: tuple[Joint, ...] = ()
     if settings.base is not None:
         base = tuple(Joint(name=name, unit="rad" if name == "base.yaw" else "m") for name in BASE_JOINTS)
+    if settings.servo is not None:
+        return base + tuple(Joint(name=name, unit="rad") for name in settings.servo.joints)
     arm = () if settings.arm is None else settings.arm.joints
     return base + tuple(
         Joint(name=joint.name, unit=joint.unit, minimum=joint.lower, maximum=joint.upper) for joint in arm

@@ -8,6 +8,7 @@ from lockstep.robot_bridge.robots.base import Measurement, MediaSource, Robot
 from lockstep.robot_bridge.robots.ros2.drives.arm_drive import ArmDrive
 from lockstep.robot_bridge.robots.ros2.drives.base_drive import BaseDrive
 from lockstep.robot_bridge.robots.ros2.drives.drive import Drive
+from lockstep.robot_bridge.robots.ros2.drives.servo_drive import ServoDrive
 from lockstep.robot_bridge.robots.ros2.drives.watchdog_rest import REST_CALL, rest_arguments
 from lockstep.robot_bridge.robots.ros2.ros_side import RosSide
 from lockstep.robot_bridge.robots.ros2.sensing.camera import CameraSource
@@ -32,14 +33,19 @@ class Ros2Robot(Robot):
         self._description = description
         self._ros = RosSide(settings)
         try:
-            self._drives: list[Drive] = []
-            if settings.base is not None:
-                base = BaseDrive(self._ros, settings.base, self.tick_seconds)
-                self._drives.append(base)
+            tick = self.tick_seconds
+            base = None if settings.base is None else BaseDrive(self._ros, settings.base, tick)
+            arm = None if settings.arm is None else ArmDrive(self._ros, settings.arm, tick)
+            servo = None if settings.servo is None else ServoDrive(self._ros, settings.servo, tick)
+            self._drives: list[Drive] = [drive for drive in (base, arm, servo) if drive is not None]
+            self.rest_arguments = rest_arguments(
+                settings,
+                base=None if base is None else base.full_topic,
+                arm=None if arm is None else arm.full_topic,
+                servo=None if servo is None else servo.full_topic,
+            )
+            if self.rest_arguments:
                 self.rest_call = REST_CALL
-                self.rest_arguments = rest_arguments(settings, settings.base, base.full_topic)
-            if settings.arm is not None:
-                self._drives.append(ArmDrive(self._ros, settings.arm, self.tick_seconds))
             self._ranges = None if settings.ranges is None else RangeSensor(self._ros, settings.ranges)
             self._wrench = None if settings.wrench is None else WrenchTopic(self._ros, settings.wrench)
             self._lockout = None if settings.lockout is None else LockoutTopic(self._ros, settings.lockout)

@@ -17,6 +17,8 @@ __all__ = [
     "Odometry",
     "Ranges",
     "Ros2Settings",
+    "Servo",
+    "ServoStatus",
     "TwistCommand",
     "Wrench",
 ]
@@ -64,7 +66,7 @@ class Base(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
 
 class ArmCommand(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     topic: Topic = "/joint_trajectory_controller/joint_trajectory"
-    message: Literal["JointTrajectory", "JointState"] = "JointTrajectory"
+    message: Literal["JointTrajectory", "JointState", "Float64MultiArray"] = "JointTrajectory"
     rate: Rate = 25.0  # Hz
     horizon: Annotated[float, Meta(ge=0.02, le=0.5)] = 0.1  # s ahead that each trajectory ends
     lead: Annotated[float, Meta(gt=0, le=5)] = 0.5  # s at full speed that the setpoint may be ahead of the arm
@@ -95,6 +97,31 @@ class Arm(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     joints: Annotated[tuple[ArmJoint, ...], Meta(min_length=1, max_length=64)]
     command: ArmCommand = field(default_factory=ArmCommand)
     states: JointStates = field(default_factory=JointStates)
+
+
+class ServoStatus(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """What MoveIt Servo says of itself, shown as a fault while it is not well."""
+
+    topic: Topic = "/servo_node/status"
+    message: Literal["ServoStatus", "Int8"] = "ServoStatus"  # Int8: before ROS 2 Jazzy
+    timeout: Timeout = 1.0
+
+
+class ServoCommand(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    topic: Topic = "/servo_node/delta_twist_cmds"
+    frame: str = "base_link"  # frame_id: the axes of the twist
+    rate: Rate = 50.0  # Hz
+
+
+class Servo(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """An arm whose tool is driven by twists: MoveIt Servo, or another node that turns them into joint motion."""
+
+    linear: Positive  # m/s, the fastest along x, y and z
+    angular: Positive  # rad/s, the fastest about x, y and z
+    joints: Annotated[tuple[Name, ...], Meta(min_length=1, max_length=64)]  # as in JointState: measured, shown
+    command: ServoCommand = field(default_factory=ServoCommand)
+    states: JointStates = field(default_factory=JointStates)
+    status: ServoStatus | None = None
 
 
 class Ranges(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -153,6 +180,7 @@ class Ros2Settings(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
     max_event_rate: Annotated[float, Meta(gt=0, le=100)] = 25.0  # Hz
     base: Base | None = None
     arm: Arm | None = None
+    servo: Servo | None = None  # instead of `arm`
     ranges: Ranges | None = None
     wrench: Wrench | None = None
     lockout: Lockout | None = None

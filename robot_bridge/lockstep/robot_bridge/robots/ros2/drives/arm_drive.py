@@ -1,44 +1,48 @@
-"""Drives an arm: publishes joint positions, ahead of the arm by a short horizon, and reads joint states."""
+"""Drives an arm: publishes joint positions, ahead of the arm by a short horizon, or velocities; reads joint states."""
 
 from typing import Any
 
 from lockstep.robot_bridge.control import clock
 from lockstep.robot_bridge.robots.ros2.drives.command_stream import Said
 from lockstep.robot_bridge.robots.ros2.drives.drive import Drive, Sensed
-from lockstep.robot_bridge.robots.ros2.drives.joint_cache import BadJointState, JointCache
+from lockstep.robot_bridge.robots.ros2.drives.joint_feedback import JointFeedback
 from lockstep.robot_bridge.robots.ros2.drives.setpoints import Setpoints
-from lockstep.robot_bridge.robots.ros2.ros_side import RosSide, header_ns
-from lockstep.robot_bridge.robots.ros2.sensing.latest_message import Newest
+from lockstep.robot_bridge.robots.ros2.ros_side import RosSide
 from lockstep.robot_bridge.robots.ros2.settings import Arm
 
-__all__ = ["ArmDrive"]
+__all__ = ["PACKAGES", "ArmDrive", "velocities_message"]
+
+PACKAGES = {"JointTrajectory": "trajectory_msgs", "JointState": "sensor_msgs", "Float64MultiArray": "std_msgs"}
+
+
+def velocities_message(kind: Any, values: list[float]) -> Any:
+    """Return std_msgs/Float64MultiArray as the velocity controllers of ros2_control take it."""
+    message = kind()
+    message.data = values
+    return message
 
 
 class ArmDrive(Drive):
     """An arm with one axis per joint, the joint's velocity.
 
-    The last message of a motion is the setpoint itself, not ahead by the horizon: the arm stays there.
+    The last message of a motion is the setpoint itself, not ahead by the horizon: the arm stays there. A controller of
+    velocities gets zeros.
     """
 
     def __init__(self, ros: RosSide, settings: Arm, tick_seconds: float) -> None:
-        command, states = settings.command, settings.states
-        package = "trajectory_msgs" if command.message == "JointTrajectory" else "sensor_msgs"
-        kind = ros.message(package, command.message)
+        command = settings.command
+        kind = ros.message(PACKAGES[command.message], command.message)
         super().__init__(ros, kind, command.topic, command.rate, len(settings.joints), tick_seconds)
         self._names = [joint.name for joint in settings.joints]
         self._horizon = command.horizon
         self._setpoints = Setpoints([joint.maximum * command.lead for joint in settings.joints])
         self._moving = False
-        self._still = states.still
-        self._timeout = states.timeout
-        self._book = JointCache(self._names)
-        self._states: Newest[None] = Newest(states.topic, states.timeout)
-        make = self._trajectory if command.message == "JointTrajectory" else self._joint_state
-        self._make = make
-        ros.subscribe(ros.message("sensor_msgs", "JointState"), states.topic, self._take)
+        self._feedback = JointFeedback(ros, settings.states, self._names)
+        makers = {"JointTrajectory": self._trajectory, "JointState": self._joint_state}
+        self._make = makers.get(command.message, self._velocities)
 
     def seen(self, now: float) -> bool:
-        return not self._book.missing(self._timeout, now)
+        return self._feedback.is_complete(now)
 
     def advance(self, said: Said, values: list[float], dt: float) -> Any:
         now = clock.now()
@@ -54,20 +58,15 @@ class ArmDrive(Drive):
         return self._make(said, values)
 
     def sense(self, now: float) -> Sensed:
-        known = self._book.fresh(self._timeout, now)
+        known = self._feedback.known(now)
         velocities = [joint.velocity for joint in known]
-        still = all(abs(velocity) <= self._still for velocity in velocities)  # False if one is NaN
-        return Sensed(velocities, [joint.position for joint in known], still)
+        return Sensed(velocities, [joint.position for joint in known], self._feedback.is_still(known))
 
     def joints(self, now: float) -> list[float]:
-        return [joint.position for joint in self._book.fresh(self._timeout, now)]
+        return [joint.position for joint in self._feedback.known(now)]
 
     def sensor_faults(self, now: float) -> list[str]:
-        found = self._states.faults(now)
-        missing = self._book.missing(self._timeout, now)
-        if missing and not found:
-            found.append(f"{self._states.topic}: no positions of {', '.join(missing[:8])}")
-        return found
+        return self._feedback.faults(now)
 
     def _trajectory(self, said: Said, values: list[float]) -> Any:
         """Return a trajectory of positions alone: controllers refuse one that ends with a velocity."""
@@ -87,15 +86,8 @@ class ArmDrive(Drive):
         message.velocity = values
         return message
 
+    def _velocities(self, said: Said, values: list[float]) -> Any:
+        return velocities_message(self._kind, values)
+
     def _points(self, said: Said, values: list[float]) -> list[float]:
         return self._setpoints.points if said is Said.ZERO else self._setpoints.ahead(values, self._horizon)
-
-    def _take(self, message: Any) -> None:
-        now = clock.now()
-        try:
-            self._book.take(message, header_ns(message.header), now)
-            self._states.put(None, now)
-        except BadJointState as error:
-            self._states.refuse(str(error), now)
-        except (TypeError, ValueError, OverflowError) as error:
-            self._states.refuse(f"joint states: {type(error).__name__}", now)

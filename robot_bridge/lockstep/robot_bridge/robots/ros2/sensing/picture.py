@@ -10,7 +10,7 @@ from lockstep.robot_bridge.robots.ros2.sensing.jpeg_size import jpeg_size
 if TYPE_CHECKING:
     from typing_extensions import Buffer
 
-__all__ = ["BadPicture", "CompressedMessage", "ImageMessage", "Payload", "from_compressed", "from_image"]
+__all__ = ["ENCODINGS", "BadPicture", "CompressedMessage", "ImageMessage", "Payload", "from_compressed", "from_image"]
 
 Pixels = npt.NDArray[np.uint8]
 
@@ -30,6 +30,7 @@ _YUV422: Final = {
     "yuv422_yuy2": (0, 1, 3),
     "yuyv": (0, 1, 3),
 }
+ENCODINGS: Final = frozenset({*_COLOUR, *_GREY, *_YUV422})
 
 
 class BadPicture(ValueError):

@@ -1,0 +1,107 @@
+"""Looks at a live graph for some seconds: topics, what their messages say, parameters of the nodes that take commands.
+
+Bounded in everything: topics, listeners, the time that it takes.
+"""
+
+import time
+from collections.abc import Callable
+from functools import partial
+from typing import Any
+
+from lockstep.robot_bridge.errors import BridgeError
+from lockstep.robot_bridge.robots.ros2.discovery.graph import Graph, ParameterValue, Topic
+from lockstep.robot_bridge.robots.ros2.discovery.graph_side import GraphSide
+from lockstep.robot_bridge.robots.ros2.discovery.kinds import COMMANDS, DESCRIPTION, SENSORS, SERVO_COMMAND_TYPE
+from lockstep.robot_bridge.robots.ros2.discovery.tally import Tally
+from lockstep.robot_bridge.robots.ros2.ros_side import header_ns
+
+__all__ = ["EmptyGraph", "look"]
+
+EVERY = 0.2  # s between looks
+FIRST_TOPIC = 10.0  # s to wait for any topic at all
+MAX_TOPICS = 1000
+MAX_LISTENERS = 60
+MAX_ASKED = 20  # nodes whose parameters are read
+WANTED = (
+    SERVO_COMMAND_TYPE,
+    *("joints", "interface_name", "cmd_vel_timeout", "base_frame_id"),
+    *("linear.x.max_velocity", "linear.x.min_velocity", "linear.y.max_velocity", "angular.z.max_velocity"),
+)
+
+
+class EmptyGraph(BridgeError):
+    name = "empty_graph"
+
+
+class _Listening:
+    """The subscriptions of a look, and what they heard; the callbacks run in the node's thread."""
+
+    def __init__(self, ros: GraphSide) -> None:
+        self._ros = ros
+        self.tallies: dict[str, Tally] = {}
+        self.descriptions: dict[str, str] = {}
+
+    def follow(self, topics: dict[str, Topic]) -> None:
+        """Listen to sensors that came since the last call."""
+        for topic in topics.values():
+            for kind in SENSORS:
+                if topic.publishes(kind) and topic.name not in self.tallies and len(self.tallies) < MAX_LISTENERS:
+                    self.tallies[topic.name] = Tally()
+                    self._listen(kind, topic.name, partial(self._take, self.tallies[topic.name]))
+            is_new = topic.name not in self.descriptions and len(self.descriptions) < MAX_LISTENERS
+            if topic.name.endswith("/robot_description") and topic.publishes(DESCRIPTION) and is_new:
+                self.descriptions[topic.name] = ""
+                self._listen(DESCRIPTION, topic.name, partial(self._take_text, topic.name), kept=True)
+
+    def _listen(self, kind: str, topic: str, callback: Callable[[Any], None], kept: bool = False) -> None:
+        package, _, name = kind.partition("/msg/")
+        self._ros.listen(self._ros.message(package, name), topic, callback, kept)
+
+    def _take(self, tally: Tally, message: Any) -> None:
+        header = header_ns(message.header)
+        tally.take(message, time.monotonic(), (self._ros.now_ns() - header) / 1e9 if header else None)
+
+    def _take_text(self, topic: str, message: Any) -> None:
+        self.descriptions[topic] = str(message.data)
+
+
+def look(ros: GraphSide, seconds: float) -> Graph:
+    """Look for so many seconds, and longer while the graph still grows (three times as long at most).
+
+    Raises:
+        EmptyGraph: nobody was found.
+        RobotUnavailable: the package of a common message is missing.
+    """
+    listening = _Listening(ros)
+    ros.start()
+    began = changed = time.monotonic()
+    topics: dict[str, Topic] = {}
+    while True:
+        now = time.monotonic()
+        found = {topic.name: topic for topic in ros.topics()[:MAX_TOPICS]}
+        if found.keys() != topics.keys():
+            changed = now
+            began = now if not topics else began
+        topics = found
+        listening.follow(topics)
+        if not topics and now - began > max(FIRST_TOPIC, seconds):
+            raise EmptyGraph(
+                "no topic of another node was found. Does the robot run? Does `ros2 topic list` show its topics here? "
+                "Compare with the robot's: ROS_DOMAIN_ID, RMW_IMPLEMENTATION, ROS_AUTOMATIC_DISCOVERY_RANGE (or "
+                "ROS_LOCALHOST_ONLY) and ROS_STATIC_PEERS"
+            )
+        if topics and now - began > seconds and (now - changed > 1.0 or now - began > 3 * seconds):
+            break
+        time.sleep(EVERY)
+    return Graph(
+        topics=topics,
+        heard={name: tally.heard() for name, tally in listening.tallies.items()},
+        parameters=_parameters(ros, topics),
+        descriptions=dict(listening.descriptions),
+        seconds=time.monotonic() - began,
+    )
+
+
+def _parameters(ros: GraphSide, topics: dict[str, Topic]) -> dict[str, dict[str, ParameterValue]]:
+    nodes = {each.node: None for topic in topics.values() for each in topic.subscribers if each.kind in COMMANDS}
+    return {node: ros.parameters(node, WANTED) for node in list(nodes)[:MAX_ASKED]}
