@@ -17,6 +17,7 @@ __all__ = ["Pause", "Trip", "console_trips", "drive_on", "link_trips", "round_an
 
 SPEEDS = {"base.vx": 0.15, "base.wz": 0.6, "tool.vz": 0.03}  # the base drives a circle of 0.25 m; the tool nods
 TICK = 0.004  # s, the robot's control tick
+RATE = 25.0  # events a second at most; above, the gate may also wait for pictures
 TIMER = 0.0015  # s, accuracy of a sleep
 ARMINGS = 5  # attempts in a row to arm a robot that a busy machine holds up
 MARGIN = 0.0005  # s on top of the shortest interval between two events
@@ -54,7 +55,7 @@ class Pause:
     """
 
     def __init__(self, description: RobotDescription, seed: int) -> None:
-        self._interval = 1 / description.max_event_rate + MARGIN
+        self._interval = 1 / min(RATE, description.max_event_rate) + MARGIN
         self._spread = random.Random(seed)
 
     async def after(self, sent: float) -> None:
@@ -83,7 +84,7 @@ async def drive_on(console: Console, values: Mapping[str, float] | Sequence[floa
 
 
 async def console_trips(console: Console, count: int, *, seconds: float = 60.0, seed: int = 1) -> list[Trip]:
-    """Drive `count` events, or for `seconds`, as fast as the robot's highest event rate allows.
+    """Drive `count` events, or for `seconds`, as fast as `RATE` and the robot's highest event rate allow.
 
     Each command is asked for only when the gate is open, so that waiting for the event rate is no part of the trip: it
     is sent by the call itself. The first command, which may meet a gate that is still shut, is not counted; nor is one
