@@ -77,6 +77,8 @@ class RobotActions:
         if not self._session.holds_seat:
             raise ActionRefused("no_seat")
         sender = self._driving.driver.sender
+        if sender.newest is not None and sender.newest.stop.stopped:
+            raise ActionRefused("stopped", sender.newest.stop.reason)
         if action.moves and not sender.ready:
             raise NotArmed
         nonce = 0 if sender.newest is None else sender.newest.nonce
