@@ -157,6 +157,13 @@ describe("a status item", () => {
     expect(shownItems(status, 0)).toMatchObject([{ tone: "wait", detail: "charge it" }]);
   });
 
+  it("comes first when something is wrong with it", () => {
+    const items = [item(), item({ name: "gps", age: 9 }), item({ name: "lamp", level: "warning" })];
+    const motor = item({ name: "motor", level: "error" });
+    const shown = shownItems({ type: "status", event: 1, items: [...items, motor] }, 0);
+    expect(shown.map((each) => each.name)).toEqual(["motor", "lamp", "gps", "battery"]);
+  });
+
   it("gets old on this page's own clock", () => {
     const status = { type: "status" as const, event: 1, items: [item({ level: "error" })] };
     expect(shownItems(status, 4700)[0]?.tone).toBe("bad");
