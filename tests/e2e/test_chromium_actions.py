@@ -7,6 +7,8 @@ from lockstep.bench.browsers.console_page import RB, ConsolePage, open_console
 from tests.client.truth import until_logged
 from tests.support.stack import Stack
 
+A = 0  # the pad's button
+
 pytestmark = pytest.mark.browser
 
 
@@ -58,6 +60,19 @@ async def test_without_arming_a_motion_says_why_not_and_the_light_goes_on(stack:
         await expect(light).to_have_text("off")
         await expect(console.page.locator('.status-item[data-item="battery"]')).to_have_attribute("data-tone", "good")
     assert not [record for record in await stack.events("action") if record["name"] == "home"]
+
+
+@pytest.mark.parametrize("how", ["pad", "key"])
+async def test_the_pad_and_the_keyboard_ask_and_cancel_too(stack: Stack, chromium: Browser, how: str) -> None:
+    async with open_console(chromium, stack.operator) as console:
+        await _away(console)
+        for wanted in ("running", "cancelled"):
+            if how == "pad":
+                await console.press(A)
+                await console.press(A, False)
+            else:
+                await console.page.keyboard.press("1")
+            await expect(_action(console, "home")).to_have_attribute("data-state", wanted)
 
 
 @pytest.mark.parametrize(

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import msgspec
 
+from lockstep.protocol.actions import Act, ActionCancel, ActionUpdate, Status, StatusItem
 from lockstep.protocol.framing import frame
 from lockstep.protocol.link_secret import LinkSecret
 from lockstep.protocol.messages import (
@@ -90,6 +91,18 @@ def seeds() -> dict[str, bytes]:
         "http": b"GET / HTTP/1.1\r\nHost: robot\r\n\r\n",
         "tls": bytes.fromhex("1603010200010001fc0303") + NONCE,
         "nothing": b"",
+        "zz-actions": hello
+        + wire(
+            Act(id="5f", name="home", nonce=7),
+            Act(id="60", name="light", parameters={"on": True}, nonce=7),
+            Command(event=2, issue=1, values=[0.0] * 3, action="5f"),
+            ActionCancel(id="5f"),
+            ActionCancel(),
+        ),
+        "zz-status": wire(
+            ActionUpdate(id="5f", name="home", state="running", progress=0.5, event=3, moves=True),
+            Status(event=3, items=[StatusItem(name="battery", label="Battery", kind="battery", value=0.5)]),
+        ),
     }
 
 

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import msgspec
 
+from lockstep.protocol.actions import Act, ActionCancel
 from lockstep.protocol.console import (
     ClientMessage,
     Rename,
@@ -105,6 +106,8 @@ def channel_seeds() -> dict[str, bytes]:
         "seat-request": SeatRequest(),
         "seat-release": SeatRelease(),
         "rename": Rename(name="Ann"),
+        "act": Act(id="5f", name="light", parameters={"on": True, "level": 0.5, "mode": "low"}, nonce=7),
+        "action-cancel": ActionCancel(id="5f"),
     }
     texts: dict[str, object] = {
         "huge-event": {"type": "command", "event": 2**64, "issue": 1, "values": []},
@@ -118,6 +121,8 @@ def channel_seeds() -> dict[str, bytes]:
         "long-name": {"type": "rename", "name": "\u202e" * 3000},
         "list": [1, 2, 3],
         "null": None,
+        "act-many": {"type": "act", "id": "x", "name": "home", "parameters": {f"p{n}": n for n in range(9)}},
+        "act-deep": {"type": "act", "id": "x" * 65, "name": "", "parameters": {"a": [{}], "": 1e999}},
     }
     raw = {
         "not-json": b"hello",

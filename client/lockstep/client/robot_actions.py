@@ -77,8 +77,12 @@ class RobotActions:
         if not self._session.holds_seat:
             raise ActionRefused("no_seat")
         sender = self._driving.driver.sender
+        if sender.newest is not None and sender.newest.stop.stopped:
+            raise ActionRefused("stopped", sender.newest.stop.reason)
         if action.moves and not sender.ready:
             raise NotArmed
+        if action.moves and sender.action:
+            raise ActionRefused("busy", "this connection moves the robot by another action")
         nonce = 0 if sender.newest is None else sender.newest.nonce
         id = secrets.token_hex(16)
         self._transport.send("session", Act(id=id, name=name, parameters=dict(parameters), nonce=nonce))

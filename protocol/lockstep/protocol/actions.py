@@ -95,9 +95,9 @@ class ActionUpdate(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", 
 
     id: ActionId  # of the request
     name: Name  # of the action
-    state: ActionState
+    state: ActionState  # "running", or a final one
     reason: ActionReason = ""  # why it was refused or cancelled
-    progress: Share = 0.0
+    progress: Share = 0.0  # from 0 to 1
     text: Text = ""  # what it does now, its result, or what went wrong; for people
     moves: bool = False  # it moves the robot
     event: Annotated[int, msgspec.Meta(ge=1, le=MAX_EVENT)]  # the current one when this was said
@@ -114,11 +114,11 @@ class StatusItem(msgspec.Struct, frozen=True, kw_only=True):
     """One thing that a robot says of itself."""
 
     name: Name  # stable, "battery"
-    label: Name  # "Battery"
+    label: Name  # for people, "Battery"
     kind: StatusKind = "text"  # battery: a share from 0 to 1; hardware_stop and switch: true or false
     value: StatusValue  # number, true or false, or text, as the kind says
     unit: Unit = ""  # of a number, "°C"
-    level: StatusLevel = "ok"
+    level: StatusLevel = "ok"  # by the robot's own limits
     text: Text = ""  # why the level is not ok, for people
     age: Seconds = 0.0  # s, how old the reading was when the bridge sent it, by the bridge's own clock
     old_after: Seconds = 5.0  # s; a reading of this age counts as old

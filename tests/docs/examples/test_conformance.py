@@ -15,7 +15,8 @@ async def test_every_case_that_applies_passes(robot: Robot) -> None:
     wrong = [result for result in results if result.outcome not in (Outcome.OK, Outcome.NOT_APPLICABLE)]
     assert wrong == []
     skipped = {result.case.name for result in results if result.outcome is Outcome.NOT_APPLICABLE}
-    assert skipped == {"secret", "warning"}
+    # A robot from before there were actions is right without them, and one that is at home already has no way to go.
+    assert {name for name in skipped if not name.startswith("action_")} == {"secret", "warning"}
 
 
 def test_every_case_names_a_heading_of_the_protocol_page() -> None:

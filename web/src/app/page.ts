@@ -19,7 +19,7 @@ import { createLimitsStrip } from "../ui/driving/limits_strip";
 import { createOverlay, overlayLabels } from "../ui/views/overlay";
 import { createSeatBar } from "../ui/session/seat_bar";
 import { createStatusBar } from "../ui/status/status_bar";
-import { createRobotStrip } from "../ui/robot/robot_strip";
+import { createRobotStrip, type RobotStrip } from "../ui/robot/robot_strip";
 import { createStopPanel } from "../ui/driving/stop_panel";
 import { watchTouch } from "../ui/elements/touch_detection";
 import { ViewGrid } from "../ui/views/view_grid";
@@ -38,6 +38,7 @@ export class Page {
   private side: SidePanels | null = null; // until its code is there
   private readonly later = new DeferredLoader(() => note(this.engine.state, "error", NOT_LOADED, Date.now()));
   private startedMs = Infinity;
+  private robot: RobotStrip | null = null;
   private readonly panels: Panel[];
   private drawnMs = 0;
 
@@ -51,6 +52,7 @@ export class Page {
       mainStream: () => this.grid.mainStream(),
       isOccupied: () => this.isOccupied(),
       armedChanged: () => this.draw(performance.now()),
+      actionPressed: (index) => this.robot?.press(index),
       feedbackTaken: (now) => this.grid.update(this.engine, now),
       pictureDrawn: () => this.grid.scene?.settle(),
     };
@@ -90,7 +92,7 @@ export class Page {
     );
     const alarm = createAlarmStrip(engine);
     const banner = createBanner(engine);
-    const robot = createRobotStrip(engine);
+    const robot = (this.robot = createRobotStrip(engine));
     const event = createEventPanel(engine);
     grid.card = event.element;
     const force = later.panel((parts) => parts.createForceGauge(engine, false));

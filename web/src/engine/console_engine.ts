@@ -57,6 +57,7 @@ export interface ConsoleEngineEvents {
   mainStream(): string | null; // name of the camera in the large view
   isOccupied(): boolean; // a text field has the keyboard, or something stands over the pictures
   armedChanged(): void;
+  actionPressed(index: number): void; // on a gamepad: as its button on the page
   feedbackTaken(now: number): void; // pictures may have become stale
   pictureDrawn(): void; // of the main stream
 }
@@ -138,6 +139,16 @@ export class ConsoleEngine {
       stop: () => this.stop("stop key"),
       arm: () => this.toggleArmed(),
       nextLayer: () => this.nextLayer(),
+      action: (index) => page.actionPressed(index),
+      actionKey: (index, code) => {
+        const { description } = this.state.robot ?? {};
+        const drives = description?.layers.some((layer) =>
+          layer.bindings.some((each) => each.key_positive === code || each.key_negative === code),
+        );
+        if (drives !== false || index >= (description?.actions.length ?? 0)) return false;
+        page.actionPressed(index);
+        return true;
+      },
       isArmed: () => this.isArmed(),
       answerClaim: (grant) => this.session.answerShown(grant),
       lost: () => this.disarm("pad_lost"),

@@ -38,6 +38,8 @@ export const CALIBRATION_STEPS: readonly CalibrationStep[] = [
   step("slow", "press"),
   step("turbo", "press"),
   step("layer", "press"),
+  step("action_1", "press"),
+  step("action_2", "press"),
 ];
 
 /** letting_go: it waits until nothing moves. asking: it waits for the answer. done: every question was asked. */
@@ -148,7 +150,14 @@ export function layoutOf(calibration: Calibration): PadLayout | null {
       cross_down: press("cross_down"),
       cross_left: press("cross_left"),
     },
-    actions: { deadman, arm, stop, slow: presses("slow"), turbo: presses("turbo"), layer: presses("layer") },
+    actions: {
+      ...{ deadman, arm, stop },
+      slow: presses("slow"),
+      turbo: presses("turbo"),
+      layer: presses("layer"),
+      action_1: presses("action_1"),
+      action_2: presses("action_2"),
+    },
   };
 }
 

@@ -11,6 +11,8 @@ export const CONTROL_NAMES: Readonly<Record<ControlName, string>> = {
   slow: "Slow",
   turbo: "Turbo",
   layer: "Next layer",
+  action_1: "First action",
+  action_2: "Second action",
   left_x: "Left stick, sideways",
   left_y: "Left stick, up and down",
   right_x: "Right stick, sideways",
@@ -52,6 +54,11 @@ const ASKED: Readonly<Record<ControlName, readonly [what: string, about: string]
     "Press the button for the next layer",
     "A layer is a set of axes that the sticks move. You may skip this step.",
   ],
+  action_1: [
+    "Press the button for the robot's first action",
+    "Such as Home: the first button in the row of actions. You may skip this step.",
+  ],
+  action_2: ["Press the button for the robot's second action", "You may skip this step."],
 };
 
 export interface CalibrationPrompt {

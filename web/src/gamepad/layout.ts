@@ -3,7 +3,7 @@
 export const STICKS = ["left_x", "left_y", "right_x", "right_y"] as const;
 export const TRIGGERS = ["left_trigger", "right_trigger"] as const;
 export const CROSS = ["cross_up", "cross_right", "cross_down", "cross_left"] as const;
-export const ACTIONS = ["deadman", "arm", "stop", "slow", "turbo", "layer"] as const;
+export const ACTIONS = ["deadman", "arm", "stop", "slow", "turbo", "layer", "action_1", "action_2"] as const;
 
 export type StickName = (typeof STICKS)[number];
 export type TriggerName = (typeof TRIGGERS)[number];
@@ -46,6 +46,8 @@ export const STANDARD_LAYOUT: PadLayout = {
     slow: [button(4)],
     turbo: [button(10)],
     layer: [button(3)],
+    action_1: [button(0)],
+    action_2: [button(2)],
   },
 };
 

@@ -10,6 +10,8 @@ export interface PadEvents {
   stop(): void;
   arm(): void;
   nextLayer(): void;
+  /** The robot's action at this place of its description was asked for. */
+  action(index: number): void;
   lost(): void;
   /** The one whose deadman is held reports no more: it is out of range, or out of power. */
   silent(): void;
@@ -124,6 +126,8 @@ export class Pad {
     if (isNew("stop")) this.events.stop();
     if (inUse && isNew("arm")) this.events.arm();
     if (inUse && isNew("layer")) this.events.nextLayer();
+    if (inUse && isNew("action_1")) this.events.action(0);
+    if (inUse && isNew("action_2")) this.events.action(1);
   }
 
   private knownOf(gamepad: Gamepad): Known {

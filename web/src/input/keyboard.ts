@@ -6,6 +6,8 @@ export interface KeyboardEvents {
   arm(): void;
   nextLayer(): void;
   isArmed(): boolean;
+  /** Asks for the robot's action at this place, unless the key drives the robot; says whether it is taken. */
+  actionKey(index: number, code: string): boolean;
   /** Answers whoever asks for the seat; says whether anybody does. */
   answerClaim(grant: boolean): boolean;
   /** Keys that drive, or a touch stick, are held otherwise. `at`: when that happened, by the page's clock. */
@@ -19,6 +21,7 @@ const ANSWER_KEYS: ReadonlyMap<string, boolean> = new Map([
   ["F8", true],
   ["F9", false],
 ]);
+const ACTION_KEY = /^Digit([1-9])$/;
 export const FIELDS = "input, textarea, select";
 
 /** Whether this key says STOP: everywhere, but that a field keeps the one that deletes in it. */
@@ -88,10 +91,15 @@ export class Keyboard {
 
   private drive(event: KeyboardEvent): void {
     event.preventDefault();
-    if (event.repeat) return;
+    if (event.repeat || this.acts(event)) return;
     if (event.code === "Tab") this.events.nextLayer();
     else this.keys.add(event.code);
     this.events.changed(event.timeStamp);
+  }
+
+  private acts(event: KeyboardEvent): boolean {
+    const digit = ACTION_KEY.exec(event.code)?.[1];
+    return digit !== undefined && this.events.actionKey(Number(digit) - 1, event.code);
   }
 
   /** The space bar still counts as held where it works a button: arming needs it seen released. */
@@ -99,6 +107,7 @@ export class Keyboard {
     if (event.repeat) return;
     this.keys.add(event.code);
     if (onControl) return;
+    if (this.acts(event)) return;
     if (event.code === "Space") event.preventDefault();
     if (ARM_KEYS.has(event.code)) this.events.arm();
   }

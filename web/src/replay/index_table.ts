@@ -13,7 +13,8 @@ export interface ReplayChunk {
 /** `[event, arrived, chunk]`. */
 export type ReplayEntry = readonly [number, number, number];
 
-export type MarkKind = "contact" | "refusal" | "stop" | "reset" | "seat" | "note" | "fault" | "link" | "action";
+export type MarkKind =
+  "contact" | "refusal" | "stop" | "reset" | "seat" | "note" | "fault" | "link" | "action";
 
 export interface ReplayMark {
   readonly event: number;
@@ -37,7 +38,17 @@ export interface ReplayIndex {
   readonly lost: number;
 }
 
-const KINDS: readonly string[] = ["contact", "refusal", "stop", "reset", "seat", "note", "fault", "link", "action"];
+const KINDS: readonly string[] = [
+  "contact",
+  "refusal",
+  "stop",
+  "reset",
+  "seat",
+  "note",
+  "fault",
+  "link",
+  "action",
+];
 
 /** null: it is no index. */
 export function parseIndex(value: unknown): ReplayIndex | null {

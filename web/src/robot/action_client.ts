@@ -27,6 +27,8 @@ export class ActionClient {
     nonce: number,
     now: number,
   ): boolean {
+    // A second click before the answer would take the first request's renewals.
+    if (action.moves && this.renewed(now) !== "") return false;
     const id = this.draw();
     if (!this.tell({ type: "act", id, name: action.name, parameters, nonce })) return false;
     if (action.moves) this.moving = { id, moves: true, atMs: now, answered: false };

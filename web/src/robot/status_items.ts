@@ -10,9 +10,12 @@ export interface ShownItem {
   readonly detail: string; // why, and how old it is
 }
 
+/** What is wrong comes first: a row may be longer than the screen. */
+const WORST: readonly Tone[] = ["bad", "wait", "off", "good"];
+
 /** `sinceMs`: since the status arrived, on this page's own clock; no clock is compared with another. */
 export function shownItems(status: Status | null, sinceMs: number): ShownItem[] {
-  return (status?.items ?? []).map((item) => {
+  const shown = (status?.items ?? []).map((item) => {
     const age = item.age + Math.max(0, sinceMs) / 1000;
     const isOld = age >= item.old_after;
     const words = [item.text, isOld ? `old: ${ageWords(age)}` : ""].filter((each) => each !== "");
@@ -24,6 +27,7 @@ export function shownItems(status: Status | null, sinceMs: number): ShownItem[] 
       detail: words.join(" · "),
     };
   });
+  return shown.sort((left, right) => WORST.indexOf(left.tone) - WORST.indexOf(right.tone));
 }
 
 function toneOf(item: StatusItem): Tone {

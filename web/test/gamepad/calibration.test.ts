@@ -210,9 +210,9 @@ describe("calibration", () => {
   });
 
   it("makes a layout of all answers, and none before", () => {
-    const hand = new Hand().to("layer");
+    const hand = new Hand().to("layer").press(3).press(0);
     expect(layoutOf(hand.calibration)).toBeNull();
-    hand.press(3);
+    hand.press(2);
     const layout = layoutOf(hand.calibration);
     expect(layout?.actions).toEqual({
       deadman: [{ kind: "button", index: 5 }],
@@ -221,6 +221,8 @@ describe("calibration", () => {
       slow: [],
       turbo: [],
       layer: [{ kind: "button", index: 3 }],
+      action_1: [{ kind: "button", index: 0 }],
+      action_2: [{ kind: "button", index: 2 }],
     });
     expect(layout?.sticks.left_x).toMatchObject({ index: 0 });
     expect(layout?.triggers).toEqual({ left_trigger: null, right_trigger: null });

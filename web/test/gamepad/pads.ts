@@ -35,5 +35,7 @@ export const ODD_LAYOUT: PadLayout = {
     slow: [],
     turbo: [],
     layer: [],
+    action_1: [],
+    action_2: [],
   },
 };

@@ -125,6 +125,15 @@ describe("an action that this page asked for", () => {
     expect(sent.at(-1)).toEqual({ type: "action_cancel", id: "id3" });
   });
 
+  it("keeps its renewals when it is asked for twice before the answer", () => {
+    const { sent, actions } = client();
+    actions.act(HOME, {}, 1, 0);
+    expect(actions.act(HOME, {}, 1, 100)).toBe(false);
+    expect(actions.act(LIGHT, {}, 1, 100)).toBe(true);
+    expect(sent).toHaveLength(2);
+    expect(actions.renewed(200)).toBe("id1");
+  });
+
   it("is not renewed if it moves nothing", () => {
     const { actions } = client();
     actions.act(LIGHT, { on: true }, 1, 0);
@@ -155,6 +164,13 @@ describe("a status item", () => {
       items: [item({ level: "warning", text: "charge it" })],
     };
     expect(shownItems(status, 0)).toMatchObject([{ tone: "wait", detail: "charge it" }]);
+  });
+
+  it("comes first when something is wrong with it", () => {
+    const items = [item(), item({ name: "gps", age: 9 }), item({ name: "lamp", level: "warning" })];
+    const motor = item({ name: "motor", level: "error" });
+    const shown = shownItems({ type: "status", event: 1, items: [...items, motor] }, 0);
+    expect(shown.map((each) => each.name)).toEqual(["motor", "lamp", "gps", "battery"]);
   });
 
   it("gets old on this page's own clock", () => {

@@ -12,8 +12,13 @@ const SHOWN_MS = 8000;
 /** How long a question waits for its second click. */
 const CONFIRM_MS = 5000;
 
+export interface RobotStrip extends Panel {
+  /** As a click on the action at this place; of one that is not there nothing happens. */
+  press(index: number): void;
+}
+
 /** Across the page: what the robot says of itself, and a button for each of its actions. Its height never changes. */
-export function createRobotStrip(engine: ConsoleEngine): Panel {
+export function createRobotStrip(engine: ConsoleEngine): RobotStrip {
   const status = h("ul", "status-items", { "aria-label": "Status of the robot" });
   const buttons = h("div", "action-buttons", { role: "group", "aria-label": "Actions of the robot" });
   const words = h("p", "action-words", { role: "status" });
@@ -23,6 +28,7 @@ export function createRobotStrip(engine: ConsoleEngine): Panel {
   let shownStatus = "";
   return {
     element,
+    press: (index) => actions[index]?.press(),
     update(now) {
       const { state } = engine;
       const wanted = state.robot?.description.actions ?? described ?? [];
@@ -95,7 +101,7 @@ class ActionButton {
     private readonly engine: ConsoleEngine,
     private readonly action: Action,
   ) {
-    this.main = button("action-button", "", () => this.pressed());
+    this.main = button("action-button", "", () => this.press());
     this.main.append(this.fill, this.label);
     this.form = createParameterForm(action);
     this.element = h("div", "action", { "data-action": action.name }, this.main, ...this.form.elements);
@@ -120,7 +126,7 @@ class ActionButton {
     this.form.disable(runs);
   }
 
-  private pressed(): void {
+  press(): void {
     const { engine, action } = this;
     const now = performance.now();
     const update = newestOf(engine.state.actions, action.name);

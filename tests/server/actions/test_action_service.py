@@ -1,0 +1,202 @@
+"""Who may ask for an action, and what everyone is told of it."""
+
+import asyncio
+from types import SimpleNamespace
+from typing import Any, cast
+
+import msgspec
+import pytest
+
+from lockstep.protocol.actions import Act, ActionCancel, ActionReason, ActionState, ActionUpdate
+from lockstep.protocol.description import Action, RobotDescription
+from lockstep.server.actions import action_service
+from lockstep.server.actions.action_service import ActionService
+from lockstep.server.audit.records import Actor
+from lockstep.server.errors import ConsoleError, LinkDown, NotFound, NotRenewable, TooManyRequests, Unconfirmed
+from lockstep.server.event_clock import EventClock
+from lockstep.server.peers.peer import Peer
+from lockstep.server.session_events import ActionAsked, ActionCancelled, ActionRefused, ActionUpdated, SessionEvents
+from lockstep.server.telemetry.metrics import Metrics
+from tests.makers import feedback
+
+ADA = Actor("Ada", "operator", "p1", "link-1")
+DESCRIPTION = RobotDescription(
+    name="r",
+    label="R",
+    axes=(),
+    actions=(Action(name="home", label="Home"), Action(name="light", label="Light", moves=False)),
+)
+
+
+class Robot:
+    def __init__(self) -> None:
+        self.up = True
+        self.detail = "away"
+        self.description: RobotDescription | None = DESCRIPTION
+        self.sent: list[Act | ActionCancel] = []
+
+    def send(self, message: Act | ActionCancel) -> bool:
+        self.sent.append(message)
+        return self.up
+
+
+class Bench:
+    def __init__(self) -> None:
+        self.robot = Robot()
+        self.clock = EventClock()
+        self.clock.begin("e")
+        self.clock.observe(feedback(7, nonce=77), 0.0)
+        self.holder = "p1"
+        self.told: list[Any] = []
+        self.published: list[msgspec.Struct] = []
+        events = SessionEvents(Metrics(process=False).faults)
+        for kind in (ActionAsked, ActionCancelled, ActionRefused, ActionUpdated):
+            events.subscribe(kind, self.published.append)
+        self.service = ActionService(self.robot, self.clock, lambda peer: peer.id == self.holder, events)
+
+    def peer(self, id: str = "p1", role: str = "operator") -> Peer:
+        actor = ADA._replace(peer=id, role=role, link=id)
+        made = SimpleNamespace(id=id, role=role, name="Ada", actor=actor, identity=SimpleNamespace(token_id=id))
+        made.send = lambda channel, message: self.told.append(message)
+        return cast(Peer, made)
+
+    def kinds(self) -> list[str]:
+        return [type(each).__name__ for each in self.published]
+
+
+def act(id: str = "a", name: str = "home") -> Act:
+    return Act(id=id, name=name, nonce=77, by="somebody else")
+
+
+def update(
+    id: str = "a",
+    state: ActionState = "running",
+    *,
+    moves: bool = True,
+    reason: ActionReason = "",
+    progress: float = 0.0,
+) -> ActionUpdate:
+    return ActionUpdate(id=id, name="home", state=state, moves=moves, event=7, reason=reason, progress=progress)
+
+
+def test_the_holders_request_goes_to_the_robot_under_the_holders_name() -> None:
+    bench = Bench()
+    bench.service.act_by_peer(bench.peer(), act())
+    assert bench.robot.sent == [msgspec.structs.replace(act(), by="Ada")]
+    assert bench.told == []
+    assert bench.kinds() == ["ActionAsked"]
+
+
+@pytest.mark.parametrize(
+    ("id", "role", "up", "reason"),
+    [
+        ("p2", "observer", True, "not_allowed"),
+        ("p2", "operator", True, "no_seat"),
+        ("p2", "supervisor", True, "no_seat"),
+        ("p1", "operator", False, "link_down"),
+    ],
+)
+def test_others_and_without_a_link_are_refused_by_name(id: str, role: str, up: bool, reason: str) -> None:
+    bench = Bench()
+    bench.robot.up = up
+    bench.service.act_by_peer(bench.peer(id, role), act())
+    assert [(each.state, each.reason) for each in bench.told] == [("refused", reason)]
+    assert bench.robot.sent == []
+    assert bench.service.newest() == [], "others are not told"
+    assert bench.kinds() == ["ActionRefused"]
+
+
+def test_a_flood_of_requests_is_refused() -> None:
+    bench = Bench()
+    for number in range(30):
+        bench.service.act_by_peer(bench.peer(), act(f"n{number}"))
+    assert len(bench.robot.sent) < 15
+    assert {each.reason for each in bench.told} == {"too_often"}
+
+
+def test_the_holder_and_supervisors_cancel_and_nobody_else() -> None:
+    bench = Bench()
+    bench.service.updated(update())
+    bench.service.cancel_by_peer(bench.peer("p2"), ActionCancel(id="a"))
+    bench.service.cancel_by_peer(bench.peer("p3", "observer"), ActionCancel(id="a"))
+    assert bench.robot.sent == []
+    bench.service.cancel_by_peer(bench.peer("p4", "supervisor"), ActionCancel(id="a"))
+    bench.service.cancel_by_peer(bench.peer(), ActionCancel())
+    assert bench.robot.sent == [ActionCancel(id="a"), ActionCancel()]
+
+
+def test_a_seat_that_changes_hands_cancels_only_what_moves() -> None:
+    bench = Bench()
+    bench.service.updated(update("light", moves=False))
+    bench.service.cancel("", Actor())
+    assert bench.robot.sent == []
+    bench.service.updated(update("a"))
+    bench.service.cancel("", Actor())
+    assert bench.robot.sent == [ActionCancel()]
+
+
+def test_what_moves_is_known_to_have_ended_when_the_link_is_lost() -> None:
+    bench = Bench()
+    bench.service.updated(update("a"))
+    bench.service.updated(update("light", moves=False))
+    bench.service.link_down()
+    assert [(each.id, each.state, each.reason) for each in bench.service.newest()] == [
+        ("a", "cancelled", "link_down"),
+        ("light", "running", ""),
+    ]
+    bench.service.epoch_ends()
+    assert bench.service.newest() == []
+
+
+def test_a_flood_of_progress_is_thinned_and_every_end_is_told() -> None:
+    bench = Bench()
+    for number in range(1000):
+        bench.service.updated(update(progress=number / 1000))
+    bench.service.updated(update(state="done", progress=1.0))
+    told = [each for each in bench.published if isinstance(each, ActionUpdated)]
+    assert len(told) < 200
+    assert told[-1].update.state == "done"
+    for number in range(100):
+        bench.service.updated(update(f"n{number}", "done"))
+    assert len(bench.service.newest()) == 32
+
+
+async def by_http(bench: Bench, name: str = "light") -> ActionUpdate:
+    return await bench.service.act_by_http(ADA, name, {"on": True})
+
+
+async def test_over_http_the_robots_first_answer_is_returned() -> None:
+    bench = Bench()
+    asking = asyncio.create_task(by_http(bench))
+    await asyncio.sleep(0)
+    (sent,) = bench.robot.sent
+    assert isinstance(sent, Act)
+    assert (sent.nonce, sent.by, sent.parameters) == (77, "Ada", {"on": True})
+    bench.service.updated(update(sent.id, "done", moves=False))
+    assert (await asking).state == "done"
+
+
+@pytest.mark.parametrize(
+    ("name", "up", "error"),
+    [("home", True, NotRenewable), ("fly", True, NotFound), ("light", False, LinkDown), ("light", True, Unconfirmed)],
+)
+async def test_over_http_what_cannot_be_done_is_refused_by_name(
+    name: str, up: bool, error: type[ConsoleError], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(action_service, "ANSWER_SECONDS", 0.01)
+    bench = Bench()
+    bench.robot.up = up
+    with pytest.raises(error):
+        await by_http(bench, name)
+
+
+async def test_over_http_a_flood_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(action_service, "ANSWER_SECONDS", 0.0)
+    bench = Bench()
+    raised = []
+    for _ in range(15):
+        try:
+            await by_http(bench)
+        except ConsoleError as error:
+            raised.append(type(error))
+    assert TooManyRequests in raised
