@@ -16,6 +16,8 @@ from lockstep.client import (
     SignallingRefused,
 )
 from lockstep.protocol.carriers import Carrier
+from lockstep.protocol.trace import known_spans
+from lockstep.protocol.trace_messages import Traces
 from tests.client.truth import collecting, drawn_event, executed_after, logged_stamps, until_logged
 from tests.support.stack import Stack
 
@@ -209,3 +211,25 @@ async def test_a_console_that_was_left_is_lost(stack: Stack) -> None:
     with pytest.raises(ConsoleLost):
         await Console(stack.operator).rest()
     assert await executed_after(stack, 0.0)
+
+
+async def test_a_client_that_asks_is_told_where_the_time_of_its_pictures_and_commands_goes(stack: Stack) -> None:
+    async with Console(stack.operator, codec="H264", audio=False) as console:
+        await console.take_seat()
+        for _ in range(20):
+            await drive_on(console, {"base.wz": 0.3})
+        assert console.traces() == Traces()
+        console.trace()
+        traces = Traces()
+        while not (traces.pictures and traces.commands):
+            await drive_on(console, {"base.wz": 0.3})
+            traces = console.traces()
+        console.trace(wanted=False)
+        cameras = {camera.name for camera in console.description.cameras}
+    assert {each.stream for each in traces.pictures} <= cameras
+    for picture in traces.pictures:
+        told = known_spans(picture.spans).keys()
+        assert {"capture_ms", "link_wait_ms", "encoder_wait_ms", "encode_ms", "packetise_ms", "send_ms"} <= told
+    for command in traces.commands:
+        told = known_spans(command.spans).keys()
+        assert {"forward_ms", "link_ms", "tick_wait_ms", "apply_ms", "measure_ms", "back_ms"} == told - {"rate_wait_ms"}

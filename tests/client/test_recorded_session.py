@@ -12,12 +12,13 @@ import pytest
 from lockstep.bench.harness.driving import drive_on
 from lockstep.client import Console
 from lockstep.emulator import Network, load_profile
+from lockstep.protocol.trace import known_spans
 from lockstep.robot_bridge.robots.event_strip import read_event_strip
 from lockstep.server.cli.audit import verify_audit
 from lockstep.server.evidence.anchors import parse_anchor
 from lockstep.server.evidence.signer import evidence_signer
 from lockstep.server.recording.format.payload import own_record_of
-from lockstep.server.recording.format.records import CommandRecord, FeedbackRecord
+from lockstep.server.recording.format.records import CommandRecord, FeedbackRecord, TraceRecord
 from lockstep.server.recording.reading.reader import Record, RecordingReader
 from lockstep.server.recording.verify.verify_file import verify_file
 from lockstep.server.util.state_dir import StateDir
@@ -185,3 +186,20 @@ def _is_heard(session: Session, stream: str, event: int, captured: float) -> boo
         and -SAME <= captured - each["captured"] <= SEGMENT + LOOK_AHEAD
         for each in session.log
     )
+
+
+def test_every_executed_event_says_where_its_time_went(session: Session) -> None:
+    commands: set[int] = set()
+    pictures: set[int] = set()
+    with RecordingReader(session.recording) as reader:
+        for record in reader.records():
+            match own_record_of(record.schema, record.data):
+                case TraceRecord(stream="") as trace:
+                    assert {"forward_ms", "link_ms", "tick_wait_ms", "measure_ms"} <= known_spans(trace.command).keys()
+                    commands.add(trace.event)
+                case TraceRecord() as trace:
+                    assert {"capture_ms", "link_wait_ms", "encode_ms"} <= known_spans(trace.picture).keys()
+                    pictures.add(trace.event)
+    executed = {line["event"] for line in session.log if line["kind"] == "executed"}
+    assert commands == executed
+    assert len(pictures & executed) > EVENTS / 2

@@ -62,3 +62,26 @@ async def test_on_a_small_screen_the_charts_stand_over_the_pictures_and_nobody_d
         await expect(page.get_by_role("button", name="STOP")).to_be_visible()
         await page.get_by_role("button", name="10 min").click()
         await expect(page.get_by_role("button", name="10 min")).to_have_attribute("aria-pressed", "true")
+
+
+async def test_the_charts_show_where_each_millisecond_goes(stack: Stack, chromium: Browser) -> None:
+    async with open_console(chromium, stack.operator) as console:
+        page = console.page
+        await console.until_live()
+        await page.keyboard.press("c")
+        picture, command = page.locator("[data-chart=picture_way]"), page.locator("[data-chart=command_way]")
+        await expect(picture).to_have_attribute("data-empty", "false")
+        await expect(command).to_have_attribute("data-empty", "true")
+        await expect(picture.locator(".way-part[data-clock=between]")).to_have_count(0)
+        async with console.driving():
+            await expect(command).to_have_attribute("data-empty", "false", timeout=20_000)
+            for clock in ("bridge", "console", "between", "page"):
+                for way in (picture, command):
+                    await expect(way.locator(f".way-part[data-clock={clock}]").first).to_be_attached(timeout=20_000)
+        traces = await page.evaluate("window.lockstep.traces()")
+    for traced in traces["commands"]:
+        inside = [ms for name, ms in traced["spans"].items() if name not in ("input_ms", "take_ms")]
+        assert sum(inside) >= traced["totalMs"] - 0.01  # the remainder is what the spans leave of the round, or 0
+    whole = [each["spans"] for each in traces["pictures"] if "between_ms" in each["spans"]]
+    assert whole
+    assert all({"capture_ms", "encode_ms", "send_ms", "decode_ms", "draw_ms"} <= each.keys() for each in whole)

@@ -15,6 +15,7 @@ from lockstep.protocol.messages import (
     Command,
     Feedback,
     Hello,
+    LinkMessage,
     LinkMessageOnWire,
     MediaCodec,
     Ping,
@@ -43,7 +44,7 @@ from tests.robot_bridge.bridge_helpers import running_bridge
 TEXT = (Path(__file__).parents[2] / "docs" / "robot-link.md").read_text()
 KINDS: tuple[type[msgspec.Struct], ...] = get_args(LinkMessageOnWire)
 
-EXAMPLE: list[LinkMessageOnWire] = [
+EXAMPLE: list[LinkMessage] = [
     Hello(role="operator", name="demo"),
     Ping(id=1),
     Command(event=2, issue=1, values=[0.5, 0.0, -0.25], nonce=4503599627370497),
@@ -119,7 +120,7 @@ def test_the_roles_are_all_described() -> None:
     }
 
 
-def tag(kind: type[LinkMessageOnWire]) -> str:
+def tag(kind: type[LinkMessage]) -> str:
     return str(kind.__struct_config__.tag)
 
 

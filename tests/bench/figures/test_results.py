@@ -71,3 +71,11 @@ def test_markdown_has_a_table_for_each_section_and_marks_misses() -> None:
     assert "### lossy\n\n`make bench ARGS=lossy`\n" in markdown
     assert "| p99 | 45 ms | ≤ 20 | **MISSED** | 90 ms | 0.50 |" in markdown
     assert "| p99 | 1 ms | ≤ 2 | met |  |  |" in markdown
+
+
+def test_a_stacked_figure_is_drawn_part_on_part() -> None:
+    parts = [figure(10.0, name="a", stacked_on=0.0), figure(0.0, name="b", stacked_on=10.0)]
+    lines = render_table([*parts, figure(30.0, name="c", stacked_on=10.0), figure(5.0, name="sum")]).splitlines()
+    bars = [line.partition(" ms")[2].rstrip() for line in lines[3:7]]
+    assert [bar.count("█") for bar in bars] == [10, 0, 30, 0]
+    assert bars[0].index("█") + 10 == bars[2].index("█") == bars[1].index("▏")

@@ -40,13 +40,13 @@ export class WayFigure {
     setText(this.words, [slowestWords(summary), note].filter((text) => text !== "").join(" · "));
   }
 
-  private fill({ name, medianMs, p95Ms }: WayPart): void {
+  private fill({ name, ms, p95Ms }: WayPart): void {
     const parts = this.drawn.get(name);
     if (parts === undefined) return;
     const { label, about } = SPAN_LABELS[name];
-    parts.segment.style.flexGrow = String(Math.max(medianMs, 0.001));
-    parts.segment.title = `${label}: median ${milliseconds(medianMs)} ms, 95 % below ${milliseconds(p95Ms)} ms; ${about}`;
-    setText(parts.figure, milliseconds(medianMs));
+    parts.segment.style.flexGrow = String(Math.max(ms, 0.001));
+    parts.segment.title = `${label}: ${milliseconds(ms)} ms, 95 % below ${milliseconds(p95Ms)} ms; ${about}`;
+    setText(parts.figure, milliseconds(ms));
   }
 
   /** Only when other parts were measured: a figure that is read must not jump. */
@@ -74,7 +74,7 @@ export class WayFigure {
       groups.set(clock, group);
     }
     this.keys.replaceChildren(...CLOCKS.flatMap((clock) => groups.get(clock) ?? []));
-    this.keys.setAttribute("aria-label", `${this.title}: median of each part in ms`);
+    this.keys.setAttribute("aria-label", `${this.title}: its parts in ms`);
   }
 }
 

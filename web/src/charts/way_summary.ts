@@ -1,5 +1,6 @@
 import { COMMAND_WAY, PICTURE_WAY } from "../protocol/ways";
-import { createSamples, quantile } from "../util/samples";
+import { quantile } from "../util/samples";
+import { sumOfSpans } from "../util/span_values";
 import type { TraceBook, TracedCommand, TracedPicture } from "../engine/trace_book";
 
 export type SpanName = (typeof COMMAND_WAY)[number]["name"] | (typeof PICTURE_WAY)[number]["name"];
@@ -9,8 +10,8 @@ export type SpanClock = (typeof PICTURE_WAY)[number]["clock"];
 export interface WayPart {
   readonly name: SpanName;
   readonly clock: SpanClock; // on whose clock it was measured; "between": what is left between clocks
-  readonly medianMs: number;
-  readonly p95Ms: number;
+  readonly ms: number; // mean of the middle half
+  readonly p95Ms: number; // of all
 }
 
 /** The one that took longest, and its longest part. */
@@ -21,7 +22,10 @@ export interface SlowestWay {
   readonly ms: number;
 }
 
-/** A stacked bar: medians of each part over some seconds. */
+/**
+ * A stacked bar: the mean of each part over the middle half, by their total, of all that was traced in some seconds. So
+ * the parts add up to what is usual; medians of parts would not.
+ */
 export interface WaySummary {
   readonly count: number;
   readonly parts: readonly WayPart[]; // in the order of the way; only those that were measured
@@ -32,7 +36,7 @@ export interface WaySummary {
 
 interface Traced {
   readonly event: number;
-  readonly spans: Readonly<Partial<Record<SpanName, number>>>;
+  readonly spans: { readonly [name in SpanName]?: number };
 }
 
 type Way = readonly { readonly name: SpanName; readonly clock: SpanClock }[];
@@ -64,39 +68,44 @@ export function commandSummary(book: TraceBook, fromMs: number, untilMs: number)
   );
 }
 
-/** The cameras of the pictures that were traced, those seen last first. */
-export function tracedStreams(book: TraceBook, fromMs: number): string[] {
-  return [...new Set(book.pictures.newest(({ atMs }) => atMs >= fromMs).map(({ stream }) => stream))];
-}
-
-function summaryOf(way: Way, traced: readonly Traced[]): WaySummary | null {
+function summaryOf(way: Way, all: readonly Traced[]): WaySummary | null {
+  const hasRemainder = all.some(({ spans }) => spans.between_ms !== undefined);
+  // Without it a way is shorter for want of a part; where some have it, the others say nothing of the whole.
+  const traced = hasRemainder ? all.filter(({ spans }) => spans.between_ms !== undefined) : all;
   if (traced.length === 0) return null;
+  const names = way.map(({ name }) => name);
+  const ordered = traced
+    .map(({ event, spans }) => ({ event, spans, totalMs: sumOfSpans(spans, names) }))
+    .toSorted((left, right) => left.totalMs - right.totalMs);
+  const quarter = Math.floor(ordered.length / 4);
+  const middle = ordered.slice(quarter, ordered.length - quarter);
   const parts = way.flatMap(({ name, clock }) => {
-    const samples = createSamples(traced.length);
-    for (const { spans } of traced) if (spans[name] !== undefined) samples.values.push(spans[name]);
-    const [medianMs, p95Ms] = [quantile(samples, 0.5), quantile(samples, 0.95)];
-    return medianMs === null || p95Ms === null ? [] : [{ name, clock, medianMs, p95Ms }];
+    const values = ordered.flatMap(({ spans }) => spans[name] ?? []);
+    const p95Ms = quantile({ limit: values.length, values }, 0.95);
+    return p95Ms === null ? [] : [{ name, clock, ms: meanOf(middle, name), p95Ms }];
   });
   return {
-    count: traced.length,
+    count: ordered.length,
     parts,
-    totalMs: parts.reduce((sum, { medianMs }) => sum + medianMs, 0),
-    slowest: slowestOf(way, traced),
-    hasRemainder: parts.some(({ clock }) => clock === "between"),
+    totalMs: parts.reduce((sum, { ms }) => sum + ms, 0),
+    slowest: slowestOf(way, ordered.at(-1)),
+    hasRemainder,
   };
 }
 
-function slowestOf(way: Way, traced: readonly Traced[]): SlowestWay | null {
-  let slowest: SlowestWay | null = null;
-  for (const { event, spans } of traced) {
-    const parts = way.flatMap(({ name }) => {
-      const ms = spans[name];
-      return ms === undefined ? [] : [{ name, ms }];
-    });
-    const totalMs = parts.reduce((sum, { ms }) => sum + ms, 0);
-    const longest = parts.toSorted((left, right) => right.ms - left.ms)[0];
-    if (longest !== undefined && totalMs > (slowest?.totalMs ?? -1))
-      slowest = { event, totalMs, name: longest.name, ms: longest.ms };
-  }
-  return slowest;
+/** What was not measured in one took no time there: a command that carries no change of the input has not waited. */
+function meanOf(traced: readonly Traced[], name: SpanName): number {
+  return traced.reduce((sum, { spans }) => sum + (spans[name] ?? 0), 0) / traced.length;
+}
+
+function slowestOf(
+  way: Way,
+  slowest: (Traced & { readonly totalMs: number }) | undefined,
+): SlowestWay | null {
+  if (slowest === undefined) return null;
+  const { event, spans, totalMs } = slowest;
+  const longest = way
+    .flatMap(({ name }) => (spans[name] === undefined ? [] : [{ name, ms: spans[name] }]))
+    .toSorted((left, right) => right.ms - left.ms)[0];
+  return longest === undefined ? null : { event, totalMs, ...longest };
 }

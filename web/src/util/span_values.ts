@@ -9,6 +9,9 @@ export function setSpan<Name extends string>(spans: SpanValues<Name>, name: Name
 }
 
 /** The sum of those spans that were measured. */
-export function sumOfSpans<Name extends string>(spans: SpanValues<Name>, names: readonly Name[]): number {
+export function sumOfSpans<Name extends string>(
+  spans: Readonly<SpanValues<Name>>,
+  names: readonly Name[],
+): number {
   return names.reduce((sum, name) => sum + (spans[name] ?? 0), 0);
 }

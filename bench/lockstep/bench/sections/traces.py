@@ -15,7 +15,7 @@ from lockstep.bench.browsers.probed_page import DRAW_PROBE, open_probed_page
 from lockstep.bench.context import Context
 from lockstep.bench.figures.results import Result
 from lockstep.bench.figures.samples import median
-from lockstep.bench.figures.way_results import sum_of_medians, way_results
+from lockstep.bench.figures.way_results import sum_of_spans, way_results
 from lockstep.bench.harness.stack import Stack, running_stack
 from lockstep.bench.sections.capture_to_shown import AIORTC, CAMERA, bare_page, driving_in_circles, measured_spell
 from lockstep.protocol.trace import COMMAND_WAY, PICTURE_WAY
@@ -61,7 +61,7 @@ async def _driven(stack: Stack, seconds: float) -> tuple[list[float], dict[str, 
 def _pictures(robot: str, traced: list[dict[str, Any]], drawn: list[float], bare: list[float]) -> list[Result]:
     whole = [each["spans"] for each in traced if each["stream"] == CAMERA and "between_ms" in each["spans"]]
     rows = way_results(SECTION, f"{robot}: picture", FROM_CAPTURE, whole, conditions=CONDITIONS)
-    total = sum_of_medians(rows)
+    total = sum_of_spans(rows)
     return [
         *rows,
         _sum(f"{robot}: picture, sum, to the probe", total, len(whole), median(drawn), PROBE),
@@ -73,7 +73,7 @@ def _commands(robot: str, traced: list[dict[str, Any]]) -> list[Result]:
     spans = [each["spans"] for each in traced]
     rows = way_results(SECTION, f"{robot}: command", FROM_SENDING, spans, conditions=CONDITIONS)
     whole = median([each["totalMs"] for each in traced])
-    return [*rows, _sum(f"{robot}: command, sum, to the page", sum_of_medians(rows), len(spans), whole, PAGE)]
+    return [*rows, _sum(f"{robot}: command, sum, to the page", sum_of_spans(rows), len(spans), whole, PAGE)]
 
 
 def _sum(name: str, value: float, samples: int, baseline: float, baseline_name: str) -> Result:

@@ -2,9 +2,12 @@
 
 from pathlib import Path
 
+from lockstep.protocol.trace import CommandSpans, PictureSpans
+from lockstep.server.recording.format.records import TraceRecord
 from lockstep.server.recording.report.report import write_report
 from lockstep.server.recording.report.session import read_session
-from tests.server.recording.makers import Story
+from lockstep.server.recording.report.traced_events import TracedEvents, slowest, slowest_by_time
+from tests.server.recording.makers import EPOCH, START, Story, own_entry, rewritten
 
 
 def test_a_session_becomes_series_over_time(tmp_path: Path) -> None:
@@ -25,3 +28,42 @@ def test_the_report_draws_every_stream_and_says_what_was_kept(tmp_path: Path) ->
     assert text.count("<svg") == 6  # events, camera, microphone, delays, force, axes
     assert "front: server" in text
     assert "times not" not in text
+
+
+def _trace(event: int, **fields: object) -> TraceRecord:
+    return TraceRecord(epoch=EPOCH, event=event, **fields)  # type: ignore[arg-type]
+
+
+def test_records_of_one_event_complete_each_other() -> None:
+    traced = TracedEvents()
+    traced.add(_trace(5, command=CommandSpans(forward_ms=1.0)), 0.1)
+    traced.add(_trace(5, stream="front", picture=PictureSpans(camera_wait_ms=9.0, capture_ms=2.0)), 0.2)
+    page = PictureSpans(draw_ms=3.0)
+    traced.add(_trace(5, peer="p1", command=CommandSpans(input_ms=4.0), stream="front", picture=page), 0.3)
+    (event,) = traced.of("")
+    assert event.spans("") == {"input_ms": 4.0, "forward_ms": 1.0}
+    assert event.spans("front") == {"capture_ms": 2.0, "draw_ms": 3.0}  # the camera's wait comes before the way
+    assert (event.total(""), event.total("front")) == (5.0, 5.0)
+    assert traced.streams == ["front"]
+
+
+def test_a_slow_event_is_found_in_its_time_and_in_the_whole_session() -> None:
+    traced = TracedEvents()
+    for event in range(1, 101):
+        spans = CommandSpans(measure_ms=40.0 if event == 77 else 1.0)
+        traced.add(_trace(event, command=spans), event * 0.1)
+    assert slowest(traced.of(""), "", 1)[0].event == 77
+    bins = slowest_by_time(traced.of(""), "", 10.0, 10)
+    assert len(bins) == 10
+    assert [each.event for middle, each in bins if 7 <= middle < 8] == [77]
+
+
+def test_the_report_explains_the_slowest_moments(tmp_path: Path) -> None:
+    story = Story(events=80)
+    spans = PictureSpans(capture_ms=2.0, encode_ms=77.7)
+    entries = [*story.entries(), own_entry(_trace(40, stream="front", picture=spans), START + 3_000_000_000)]
+    path = rewritten(tmp_path / "a.mcap", sorted(entries, key=lambda entry: entry.arrived), lambda entry: [entry])
+    text = write_report(path, tmp_path / "a.html").read_text()
+    assert "Where each millisecond went" in text
+    assert "encode 77.7" in text
+    assert "Slowest commands" not in text
