@@ -119,7 +119,7 @@ class RobotEncoding:
             StreamRequest(
                 stream=camera.stream.name,
                 bitrate=target.bitrate_bps,
-                frame_rate=0.0 if target.frame_rate >= camera.stream.frame_rate else target.frame_rate,
+                frame_rate=self._frame_rate(camera.stream, target),
                 scale=target.scale,
                 keyframes=camera.keyframes,
             )
@@ -129,6 +129,11 @@ class RobotEncoding:
         follows = self._ask(EncodeRequest(streams=streams))
         for camera in self._cameras:
             camera.stream.passthrough.follow(follows, now)
+
+    def _frame_rate(self, stream: VideoStream, target: EncodingTarget) -> float:
+        """Return the rate to ask for; 0, all pictures, where nothing asks for fewer than the camera gives."""
+        is_all = target.frame_rate >= stream.frame_rate and self._settings.video_frames_per_second is None
+        return 0.0 if is_all else target.frame_rate
 
     def _keyframe_asker(self, camera: _Camera) -> Callable[[float], None]:
         def ask(now: float) -> None:
