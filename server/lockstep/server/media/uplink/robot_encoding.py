@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 
 from lockstep.protocol.messages import EncodeRequest, Media, StreamRequest
+from lockstep.server.media.metrics import MediaMetrics
 from lockstep.server.media.pipeline.stream import Stream, VideoStream
 from lockstep.server.media.quality.adaptation import Adaptation
 from lockstep.server.media.quality.budget import CameraNeed, share_out
@@ -37,11 +38,13 @@ class RobotEncoding:
         self,
         settings: MediaSettings,
         planned_bps: Callable[[VideoStream], int],
+        metrics: MediaMetrics,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         """`planned_bps`: bits per second of a camera that the operator's path carries."""
         self._settings = settings
         self._planned_bps = planned_bps
+        self._metrics = metrics
         self._clock = clock
         self._ask: Callable[[EncodeRequest], bool] = lambda request: False
         self._cameras: list[_Camera] = []
@@ -127,6 +130,8 @@ class RobotEncoding:
             if (target := camera.asked) is not None
         ]
         follows = self._ask(EncodeRequest(streams=streams))
+        self._metrics.uplink_rate.set(self._uplink.rate if follows else 0.0)
+        self._metrics.uplink_wait.set((self._uplink.waits(now) or 0.0) if follows else 0.0)
         for camera in self._cameras:
             camera.stream.passthrough.follow(follows, now)
 
