@@ -4,6 +4,7 @@ import asyncio
 from collections.abc import AsyncIterator
 from contextlib import aclosing, asynccontextmanager
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -24,7 +25,7 @@ CAMERA, MICROPHONE = "overview", "microphone"
 
 
 @asynccontextmanager
-async def robot_that_encodes(**settings: object) -> AsyncIterator[tuple[Bridge, Rig]]:
+async def robot_that_encodes(**settings: Any) -> AsyncIterator[tuple[Bridge, Rig]]:
     asked = BridgeSettings(port=0, encode=EncodeSettings(), event_strip=True)
     async with (
         Bridge(create_robot("planar"), asked) as bridge,
