@@ -7,6 +7,7 @@ from lockstep.emulator.impairment.delay import Constant, Lognormal, Normal, Pare
 from lockstep.emulator.impairment.impairment import PERFECT, Impairment, Reordering
 from lockstep.emulator.impairment.outages import PlannedOutage
 from lockstep.emulator.impairment.profile import (
+    BottleneckSettings,
     Profile,
     TwoWay,
     even_profile,
@@ -160,3 +161,12 @@ def test_an_even_profile_is_the_same_everywhere_but_at_the_robot() -> None:
     profile = even_profile("slow", slow)
     assert {profile.media, profile.control, profile.signalling} == {TwoWay(slow, slow)}
     assert profile.robot_media == TwoWay(PERFECT, PERFECT)
+
+
+def test_the_robot_link_has_a_bottleneck_of_its_own() -> None:
+    profile = parsed("[robot_bottleneck.to_operator]\nrate_kbps = 512\nqueue_ms = 500")
+    assert profile.robot_bottleneck("to_operator") == BottleneckSettings(512_000, 32_000)
+    assert profile.robot_bottleneck("to_robot") is None
+    assert profile.bottleneck("to_operator") is None
+    with pytest.raises(ProfileError, match=r"robot_bottleneck\.to_robot"):
+        parsed("[robot_bottleneck.to_robot]\nrate_kbps = 8\nqueue_ms = 1")

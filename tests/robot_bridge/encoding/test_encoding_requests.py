@@ -18,7 +18,7 @@ def asks(**fields: float) -> EncodeRequest:
 
 
 def requests_of(*links: str) -> EncodingRequests[str]:
-    requests: EncodingRequests[str] = EncodingRequests()
+    requests: EncodingRequests[str] = EncodingRequests(["front", "overview"])
     for link in links:
         requests.joined(link)
     return requests
@@ -59,6 +59,16 @@ def test_a_request_of_a_link_that_is_gone_counts_for_nothing() -> None:
     requests.left("a")
     requests.asked("a", asks(bitrate=800_000, keyframes=3))
     assert requests.goal("front").bitrate == FIRST_BITRATE
+
+
+def test_streams_that_the_robot_does_not_have_leave_nothing_behind() -> None:
+    requests = requests_of("a")
+    for number in range(100):
+        name = f"camera {number}"
+        requests.asked("a", EncodeRequest(streams=[StreamRequest(stream=name, bitrate=50_000, keyframes=1)]))
+        assert requests.goal(name).bitrate == FIRST_BITRATE
+    assert not requests._wanted
+    assert requests._served == {"a": {}}
 
 
 def test_a_keyframe_is_made_for_a_new_link_and_for_each_higher_count() -> None:
@@ -125,7 +135,7 @@ def test_pictures_that_come_evenly_are_left_out_evenly() -> None:
     )
 )
 def test_whoever_needs_a_keyframe_is_not_forgotten(steps: list[tuple[object, ...]]) -> None:
-    requests: EncodingRequests[object] = EncodingRequests()
+    requests: EncodingRequests[object] = EncodingRequests(["front", "overview"])
     owed, counts = True, {}  # counts: of the links that are there
     for step in steps:
         match step:

@@ -6,6 +6,8 @@ import struct
 import av
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from lockstep.protocol.messages import Media
 from lockstep.robot_bridge.encoding.sound_encoder import OpusEncoder
@@ -105,3 +107,12 @@ def test_the_tests_read_opus_as_ffmpeg_does() -> None:
 def test_what_is_no_opus_packet_is_named(packet: bytes) -> None:
     with pytest.raises(PayloadError):
         opus_samples(packet)
+
+
+@given(st.binary(max_size=1400))
+def test_no_bytes_of_a_robot_raise_anything_but_a_named_error(packet: bytes) -> None:
+    try:
+        samples = opus_samples(packet)
+    except PayloadError:
+        return
+    assert 0 < samples <= 5760

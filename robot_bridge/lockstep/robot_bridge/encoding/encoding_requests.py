@@ -4,7 +4,7 @@ A picture is encoded once for all media links, so the least that any of them ask
 needs goes to all.
 """
 
-from collections.abc import Hashable
+from collections.abc import Hashable, Iterable
 from typing import Generic, NamedTuple, TypeVar
 
 from lockstep.protocol.messages import EncodeRequest, StreamRequest
@@ -38,7 +38,9 @@ class EncodingGoal(NamedTuple):
 class EncodingRequests(Generic[Link]):
     """The newest requests of all media links. Call `joined`, `asked` and `left` for the links."""
 
-    def __init__(self) -> None:
+    def __init__(self, streams: Iterable[str]) -> None:
+        """`streams`: the names of the robot's streams; requests for others are ignored."""
+        self._streams = frozenset(streams)
         self._requests: dict[Link, dict[str, StreamRequest]] = {}
         self._served: dict[Link, dict[str, int]] = {}  # keyframes asked for so far, as far as they were passed on
         self._wanted: set[str] = set()  # streams that owe somebody a keyframe
@@ -58,7 +60,7 @@ class EncodingRequests(Generic[Link]):
         """Take a link's newest request, which replaces the one before. Ignored for a link that has not joined."""
         if link not in self._requests:
             return
-        self._requests[link] = {each.stream: each for each in request.streams}
+        self._requests[link] = {each.stream: each for each in request.streams if each.stream in self._streams}
         served = self._served[link]
         for name, each in self._requests[link].items():
             if each.keyframes > served.get(name, 0):

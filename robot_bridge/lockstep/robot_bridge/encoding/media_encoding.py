@@ -40,7 +40,8 @@ class MediaEncoding:
         self._settings = settings
         self._description = description
         self._counts = counts
-        self._requests: EncodingRequests[object] = EncodingRequests()
+        streams = [each.name for each in description.cameras] + [each.name for each in description.microphones]
+        self._requests: EncodingRequests[object] = EncodingRequests(streams)
         self._streams: dict[str, PictureEncoding | SoundEncoding] = {}
         self._publish: Callable[[Media], None] = lambda media: None
 

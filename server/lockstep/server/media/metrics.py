@@ -37,6 +37,16 @@ class MediaMetrics:
         self.encoders = Gauge(
             "lockstep_media_encoders", "Picture encoders that are open", ["stream", "codec"], registry=registry
         )
+        self.uplink_rate = Gauge(
+            "lockstep_robot_uplink_bits_per_second",
+            "What a robot that encodes is asked for, all media together; 0 for others",
+            registry=registry,
+        )
+        self.uplink_wait = Gauge(
+            "lockstep_robot_uplink_wait_seconds",
+            "Time that its media waited on their way, the least of half a second",
+            registry=registry,
+        )
         self.peers = Gauge("lockstep_media_peers", "Peers that get a stream", ["stream"], registry=registry)
 
 

@@ -6,15 +6,19 @@ from contextlib import asynccontextmanager
 from typing import Any, cast
 
 import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from prometheus_client import CollectorRegistry
 
 from lockstep.protocol.carriers import EVENT_REFERENCE_URI
 from lockstep.protocol.messages import EncodeRequest, Media, StreamRequest
 from lockstep.server.media.codecs.h264 import inspect
 from lockstep.server.media.hub import MediaHub
 from lockstep.server.media.pipeline.stream import VideoStream
+from lockstep.server.media.settings import MediaSettings
 from tests.server.media.camera_h264 import camera_pictures
 from tests.server.media.feeding import timestamps, value
-from tests.server.media.viewer import Viewer, picture, running_plane, viewing
+from tests.server.media.viewer import Viewer, description, picture, running_plane, viewing
 
 NATIVE = {EVENT_REFERENCE_URI: 9}
 
@@ -174,3 +178,27 @@ async def test_a_flood_of_pictures_breaks_no_chain_of_references() -> None:
         assert dropped(hub, "no_reference") == 1
         robot.give(camera_pictures(1, first=700)[0])
         assert dropped(hub, "no_reference") == 1
+
+
+NALS = st.builds(
+    lambda start, head, body: start + bytes([head]) + body,
+    st.sampled_from([b"\x00\x00\x01", b"\x00\x00\x00\x01"]),
+    st.integers(0, 255),
+    st.binary(max_size=60),
+)
+
+
+@given(st.lists(st.tuples(st.one_of(st.binary(max_size=80), NALS, st.lists(NALS).map(b"".join)), st.booleans())))
+@settings(suppress_health_check=[HealthCheck.too_slow], deadline=None)
+def test_no_bytes_of_a_robot_raise_anything(pictures: list[tuple[bytes, bool]]) -> None:
+    """All that comes is passed on or counted."""
+
+    async def feed() -> None:
+        hub = MediaHub(MediaSettings(), CollectorRegistry())
+        hub.configure(description())
+        hub.robot_encoding.ask_by(lambda request: True)
+        for number, (payload, keyframe) in enumerate(pictures, 1):
+            hub.feed(picture(number, number / 30, codec="h264", payload=payload, keyframe=keyframe), number / 30)
+            hub.robot_encoding.tick(number / 30)
+
+    asyncio.run(feed())

@@ -64,7 +64,7 @@ class Passthrough(FrameStage):
         self._asked_at: float | None = None  # when a keyframe was asked for that has not come; None: none is owed
         self._does = False  # the robot's bridge says that it does as it is asked to
         self._distrusted_until = 0.0
-        self._waiting: frozenset[Subscription] = frozenset()  # targets that the next keyframe moves here
+        self._waiting: frozenset[Subscription] = frozenset()  # targets of the console's encodings, at the last look
 
     def ask_by(self, ask: Callable[[float], None]) -> None:
         """Set how the robot is asked for a keyframe; called with the time."""
@@ -93,17 +93,14 @@ class Passthrough(FrameStage):
                 self._distrusted_until = now + DISTRUST_SECONDS
                 self._decide_following(now)
             return
+        # A keyframe moves those here that can take it; for the others the console then has few pictures to decode.
         waiting = frozenset(
-            target
-            for encoding in self._encodings.own
-            if encoding.codec == "H264"
-            for target in (*encoding.targets, *encoding.arriving)
-            if self._may_pass_to(target)
+            target for encoding in self._encodings.own for target in (*encoding.targets, *encoding.arriving)
         )
         if waiting - self._waiting:
             self._passed.keyframes.join()
         self._waiting = waiting
-        if (waiting or self._passed.needed) and self._passed.keyframes.take(now):
+        if self._passed.keyframes.take(now):
             self._asked_at = now
             self._ask(now)
 

@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 
 from lockstep.protocol.messages import EncodeRequest, Media, StreamRequest
+from lockstep.server.media.metrics import MediaMetrics
 from lockstep.server.media.pipeline.stream import Stream, VideoStream
 from lockstep.server.media.quality.adaptation import Adaptation
 from lockstep.server.media.quality.budget import CameraNeed, share_out
@@ -37,11 +38,13 @@ class RobotEncoding:
         self,
         settings: MediaSettings,
         planned_bps: Callable[[VideoStream], int],
+        metrics: MediaMetrics,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         """`planned_bps`: bits per second of a camera that the operator's path carries."""
         self._settings = settings
         self._planned_bps = planned_bps
+        self._metrics = metrics
         self._clock = clock
         self._ask: Callable[[EncodeRequest], bool] = lambda request: False
         self._cameras: list[_Camera] = []
@@ -119,7 +122,7 @@ class RobotEncoding:
             StreamRequest(
                 stream=camera.stream.name,
                 bitrate=target.bitrate_bps,
-                frame_rate=0.0 if target.frame_rate >= camera.stream.frame_rate else target.frame_rate,
+                frame_rate=self._frame_rate(camera.stream, target),
                 scale=target.scale,
                 keyframes=camera.keyframes,
             )
@@ -127,8 +130,15 @@ class RobotEncoding:
             if (target := camera.asked) is not None
         ]
         follows = self._ask(EncodeRequest(streams=streams))
+        self._metrics.uplink_rate.set(self._uplink.rate if follows else 0.0)
+        self._metrics.uplink_wait.set((self._uplink.waits(now) or 0.0) if follows else 0.0)
         for camera in self._cameras:
             camera.stream.passthrough.follow(follows, now)
+
+    def _frame_rate(self, stream: VideoStream, target: EncodingTarget) -> float:
+        """Return the rate to ask for; 0, all pictures, where nothing asks for fewer than the camera gives."""
+        is_all = target.frame_rate >= stream.frame_rate and self._settings.video_frames_per_second is None
+        return 0.0 if is_all else target.frame_rate
 
     def _keyframe_asker(self, camera: _Camera) -> Callable[[float], None]:
         def ask(now: float) -> None:
