@@ -202,6 +202,8 @@ class Bridge:
             return
         self._closed = True
         self._liveness.leaving()
+        if self._dialer is not None:
+            self._dialer.leave()
         try:
             await self._links.close()
             if self._running is not None:

@@ -194,3 +194,64 @@ async def test_a_console_in_a_cloud_is_seen_from_home_by_the_outer_address_that_
         link = links["observer"].replace(ROBOT_ADDRESS, CLOUD)
         client = await spaces.start("operator", python(WATCH, link, "30" if advertise else "6"), stdout=PIPE)
         assert await line(client) == seen
+
+
+PAIR = """
+import httpx, sys
+console, token = sys.argv[1].split("/#token=")
+answer = httpx.post(console + "/api/dial-in/code", headers={"Authorization": f"Bearer {token}"}, verify=False)
+print(answer.json()["command"], flush=True)
+"""
+
+TURN = """
+import asyncio, json, sys
+from pathlib import Path
+from lockstep.bench.harness.driving import drive_on
+from lockstep.client import Console
+
+async def main():
+    async with Console(sys.argv[1], tolerance=4, audio=False, connect_seconds=20, tls_ca=Path(sys.argv[2])) as console:
+        await console.take_seat()
+        for _ in range(5):
+            feedback = await drive_on(console, [0.0, 0.0, 0.3])
+        print(json.dumps({"event": feedback.event}), flush=True)
+
+asyncio.run(main())
+"""
+
+
+async def says(process: asyncio.subprocess.Process, *words: str) -> None:
+    """Wait until it has written a line with all these words on its standard error."""
+    assert process.stderr is not None
+    async with asyncio.timeout(60):
+        while said := (await process.stderr.readline()).decode():
+            if all(word in said for word in words):
+                return
+    raise AssertionError(f"it ended without {words}")
+
+
+async def test_a_robot_that_nobody_can_reach_pairs_with_a_console_in_a_cloud_and_comes_back_after_an_outage(
+    tmp_path: Path,
+) -> None:
+    """The robot and its driver are at home, behind a firewall; the console has its port for HTTP and one for media."""
+    environment = os.environ | {"LOCKSTEP_STATE_DIR": str(tmp_path / "console")}
+    serve = ["serve", "--json", "--robot", "dial-in", "--host", "0.0.0.0", "--port", "8000", "--tls", "self-signed"]
+    serve += ["--advertise", CLOUD, "--media-port", "40000"]
+    async with Namespaces("lte-drive", cloud=CLOUD) as spaces:
+        console = await spaces.start("robot", [LOCKSTEP, *serve], stdout=PIPE, stderr=PIPE, env=environment)
+        links = json.loads(await line(console))
+        pairing = await spaces.start("operator", python(PAIR, links["supervisor"]), stdout=PIPE)
+        command = (await line(pairing)).split()
+        assert command[:4] == ["lockstep", "robot", "NAME", "--console"]
+        dial = [LOCKSTEP, "robot", "planar", "--json", *command[3:], "--state-dir", str(tmp_path / "robot")]
+        robot = await spaces.start("operator", dial, stdout=PIPE)
+        assert json.loads(await line(robot)) == {"console": f"wss://{CLOUD}:8000"}
+        trusted = str(tmp_path / "console" / "tls-cert.pem")
+        drive = python(TURN, links["operator"], trusted)
+        first = json.loads(await line(await spaces.start("operator", drive, stdout=PIPE)))
+        await says(console, "role='operator'", "link up")
+        spaces.outage(4.0)
+        await says(console, "link down")
+        await says(console, "role='operator'", "link up")
+        again = json.loads(await line(await spaces.start("operator", drive, stdout=PIPE)))
+    assert again["event"] > first["event"] >= 5

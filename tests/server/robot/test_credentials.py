@@ -79,7 +79,7 @@ def test_a_secret_comes_from_the_file_first(tmp_path: Path) -> None:
         ({"link_secret": "too short"}, "at least 32 bytes"),
         ({"link_secret_file": "/nowhere/secret"}, "cannot read"),
         ({"robot": "tls://robot:5600", "link_tls_ca": "/nowhere/ca.pem"}, "cannot use the TLS files"),
-        ({"robot": "udp://robot:5600"}, "is not tcp://host:port or tls://host:port"),
+        ({"robot": "udp://robot:5600"}, "is not tcp://host:port, tls://host:port or dial-in"),
     ],
 )
 def test_what_is_no_good_is_said_at_the_start(given: dict[str, str], message: str) -> None:

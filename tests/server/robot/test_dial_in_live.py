@@ -2,6 +2,7 @@
 
 import asyncio
 import ssl
+from contextlib import AsyncExitStack
 from pathlib import Path
 
 import pytest
@@ -222,6 +223,18 @@ async def test_a_second_console_is_refused_while_the_first_holds_the_robot(tmp_p
             await until_up(rig)
             with pytest.raises(LinkRefused, match="taken"):
                 await RobotLink(*bridge.address, "operator", name="another console").connect()
+
+
+async def test_a_console_that_ends_in_order_leaves_the_robot_free_for_another(tmp_path: Path) -> None:
+    async with AsyncExitStack() as console:
+        rig = await console.enter_async_context(waiting_console(tmp_path))
+        key = await paired_key(rig)
+        async with dialling_bridge(address_of(rig), key, listen=True) as bridge:
+            await until_up(rig)
+            await console.aclose()
+            assert bridge.counters.endings["closing"] >= 1
+            async with RobotLink(*bridge.address, "operator", name="another console") as link:
+                assert link.connected
 
 
 async def test_a_paired_robot_is_known_after_a_restart_of_the_console(tmp_path: Path) -> None:

@@ -37,6 +37,7 @@ class Dialer:
         if access.address.is_encrypted:
             self._context = console_context(access.key.pin, access.authority)
         self._expected = access.key.pin if self._context is not None and access.key.pin != TRUSTED else None
+        self._leaving = False
         self._said: str | None = None  # the newest trouble that the log has; "": connected
 
     async def run(self) -> None:
@@ -45,9 +46,13 @@ class Dialer:
             for role in ROLES:
                 tasks.create_task(self._keep(role), name=f"dial {role}")
 
+    def leave(self) -> None:
+        """Dial no more; links that are open go on."""
+        self._leaving = True
+
     async def _keep(self, role: LinkRole) -> None:
         times, loop = RedialTimes(self._jitter), asyncio.get_running_loop()
-        while True:
+        while not self._leaving:
             refused, since = False, loop.time()
             try:
                 await self._once(role, times.patience())

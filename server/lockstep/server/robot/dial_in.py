@@ -162,3 +162,4 @@ class DialIn:
             self.paired = None
             self._end_lines()
             await in_thread(lambda: forget_paired(self._directory))
+            self.trouble = ""

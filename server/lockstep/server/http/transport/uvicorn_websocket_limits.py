@@ -12,6 +12,7 @@ from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIO
 from websockets.frames import Frame
 from websockets.http11 import Request
 
+from lockstep.robot_bridge.link.link_transport import LinkTransport
 from lockstep.robot_bridge.link.websocket_transport import WebSocketTransport
 from lockstep.rtc.token_bucket import TokenBucket
 from lockstep.server.http.robot_paths import below_robot
@@ -88,6 +89,16 @@ class GuardedWebSocket(WebSocketsSansIOProtocol):
             self._refuse(NOT_UTF8, "not UTF-8")
         else:
             super().send_receive_event_to_app()
+
+    def shutdown(self) -> None:
+        """Close the connection because the console ends. A robot hears that from its link, and is free at once."""
+        if self._link is None:
+            super().shutdown()
+            return
+        if isinstance(self._link, LinkTransport):
+            self._link.end("closing", "the console ends")
+        self.stop_keepalive()
+        self.transport.close()  # what was written leaves first
 
     def _hand_over(self, link: asyncio.Protocol) -> None:
         data, self.frames = b"".join(self.frames), []
