@@ -32,7 +32,7 @@ def test_a_warning_is_shown_in_servos_own_words_until_all_is_well() -> None:
     ros, topic = status(ServoStatus())
     assert ros.message_name == "moveit_msgs/ServoStatus"
     ros.take(SimpleNamespace(code=2, message="Very close\nto a singularity"))
-    assert topic.faults(clock.now()) == [f"{TOPIC}: Very closeto a singularity"]
+    assert topic.faults(clock.now()) == [f"{TOPIC}: Very close to a singularity"]
     ros.take(SimpleNamespace(code=0, message="No warnings"))
     assert topic.faults(clock.now()) == []
 

@@ -29,5 +29,6 @@ class ServoStatusTopic:
     def _take(self, message: Any) -> None:
         """Read ServoStatus (code, message) or Int8 (data), whose numbers differ from release to release; 0 is well."""
         code = int(getattr(message, "code", getattr(message, "data", 0)))
-        words = "".join(filter(str.isprintable, str(getattr(message, "message", ""))))[:MAX_STATUS]
+        text = " ".join(str(getattr(message, "message", "")).split())
+        words = "".join(filter(str.isprintable, text))[:MAX_STATUS]
         self._said.put("" if code == 0 else words or f"MoveIt Servo reports status {code}", clock.now())
