@@ -2,6 +2,8 @@
 
 import gc
 import importlib.util
+import subprocess
+import sys
 
 import pytest
 
@@ -25,3 +27,10 @@ def test_a_robot_without_a_console_has_the_commands_of_a_robot(monkeypatch: pyte
     main()
     assert importlib.util.find_spec("lockstep.server") is not None
     assert ran == ["of a robot"]
+
+
+def test_a_robots_commands_need_nothing_that_only_some_robots_need() -> None:
+    some = "{'numpy', 'yaml', 'mujoco', 'av'}"
+    look = f"import sys, lockstep.robot_bridge.commands; print(sorted({some} & set(sys.modules)))"
+    done = subprocess.run((sys.executable, "-c", look), capture_output=True, text=True, timeout=60, check=True)
+    assert done.stdout == "[]\n"

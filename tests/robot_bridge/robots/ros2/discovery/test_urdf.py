@@ -1,9 +1,12 @@
 """A URDF from a topic: joints, limits, frames; what is none is refused by name."""
 
 import math
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from lockstep.robot_bridge.robots.ros2.discovery.urdf import BadUrdf, parse_urdf
 
@@ -80,3 +83,14 @@ def test_poses_follow_one_another() -> None:
 def test_what_is_no_robot_is_refused_by_name(text: str, complaint: str) -> None:
     with pytest.raises(BadUrdf, match=complaint):
         parse_urdf(text)
+
+
+@given(st.data())
+def test_only_a_named_refusal_comes_out_of_a_text_that_was_damaged(data: st.DataObject) -> None:
+    start = data.draw(st.integers(0, len(URDF)))
+    end = data.draw(st.integers(start, min(len(URDF), start + 200)))
+    middle = data.draw(st.text(max_size=20) | st.sampled_from(['"', "<link name='laser'/>", "1e999", "&lt;", "-1"]))
+    with suppress(BadUrdf):
+        urdf = parse_urdf(URDF[:start] + middle + URDF[end:])
+        for link in urdf.links:
+            urdf.pose(link)

@@ -5,7 +5,7 @@ import subprocess
 import sys
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -13,7 +13,9 @@ from lockstep.robot_bridge.errors import BridgeError, RobotUnavailable, Settings
 from lockstep.robot_bridge.robots.other_python import link_packages, with_packages
 from lockstep.robot_bridge.robots.ros2 import read_settings
 from lockstep.robot_bridge.robots.ros2.discovery.ask import Ask, AskAtTerminal, TakeGuesses
-from lockstep.robot_bridge.robots.ros2.discovery.drafting.draft import Draft, draft
+
+if TYPE_CHECKING:
+    from lockstep.robot_bridge.robots.ros2.discovery.drafting.draft import Draft
 
 __all__ = ["ros2_app", "write"]
 
@@ -78,20 +80,23 @@ def discover(
     typer.echo(f"Now: lockstep up --ros2 {out} --robot-python {sys.executable}")
 
 
-def _look_and_draft(seconds: float, domain: int | None, namespace: str | None, ask: Ask) -> Draft:
+def _look_and_draft(seconds: float, domain: int | None, namespace: str | None, ask: Ask) -> "Draft":
+    """Import what needs numpy last: a robot without ROS need not have it, and is told that ROS is missing."""
     from lockstep.robot_bridge.robots.ros2.discovery.graph_side import GraphSide
     from lockstep.robot_bridge.robots.ros2.discovery.look import look
-    from lockstep.robot_bridge.robots.ros2.discovery.meshes import mesh_box
 
     ros = GraphSide(domain)
     try:
         graph = look(ros, seconds)
     finally:
         ros.close()
+    from lockstep.robot_bridge.robots.ros2.discovery.drafting.draft import draft
+    from lockstep.robot_bridge.robots.ros2.discovery.meshes import mesh_box
+
     return draft(graph, ask, namespace, domain, mesh_box)
 
 
-def write(out: Path, drafted: Draft) -> None:
+def write(out: Path, drafted: "Draft") -> None:
     """Write the file, once the bridge's own reader takes it; without the bodies if they make it too long.
 
     Raises:

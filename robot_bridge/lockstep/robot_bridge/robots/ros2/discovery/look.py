@@ -8,7 +8,7 @@ from collections.abc import Callable
 from functools import partial
 from typing import Any
 
-from lockstep.robot_bridge.errors import BridgeError
+from lockstep.robot_bridge.errors import BridgeError, RobotUnavailable
 from lockstep.robot_bridge.robots.ros2.discovery.graph import Graph, ParameterValue, Topic
 from lockstep.robot_bridge.robots.ros2.discovery.graph_side import GraphSide
 from lockstep.robot_bridge.robots.ros2.discovery.kinds import COMMANDS, DESCRIPTION, SENSORS, SERVO_COMMAND_TYPE
@@ -70,13 +70,15 @@ def look(ros: GraphSide, seconds: float) -> Graph:
 
     Raises:
         EmptyGraph: nobody was found.
-        RobotUnavailable: the package of a common message is missing.
+        RobotUnavailable: the package of a common message is missing, or the node ended.
     """
     listening = _Listening(ros)
     ros.start()
     began = changed = time.monotonic()
     topics: dict[str, Topic] = {}
     while True:
+        if ros.failure is not None:
+            raise RobotUnavailable(f"the ROS node ended: {ros.failure}") from ros.failure
         now = time.monotonic()
         found = {topic.name: topic for topic in ros.topics()[:MAX_TOPICS]}
         if found.keys() != topics.keys():

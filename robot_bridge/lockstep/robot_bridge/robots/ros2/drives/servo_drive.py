@@ -3,18 +3,15 @@
 import math
 from typing import Any
 
-from lockstep.robot_bridge.control import clock
 from lockstep.robot_bridge.robots.ros2.description import SERVO_AXES
 from lockstep.robot_bridge.robots.ros2.drives.command_stream import Said
 from lockstep.robot_bridge.robots.ros2.drives.drive import Drive, Sensed
 from lockstep.robot_bridge.robots.ros2.drives.joint_feedback import JointFeedback
 from lockstep.robot_bridge.robots.ros2.ros_side import RosSide
-from lockstep.robot_bridge.robots.ros2.sensing.latest_message import Newest
-from lockstep.robot_bridge.robots.ros2.settings import Servo, ServoCommand, ServoStatus
+from lockstep.robot_bridge.robots.ros2.sensing.servo_status import ServoStatusTopic
+from lockstep.robot_bridge.robots.ros2.settings import Servo, ServoCommand
 
 __all__ = ["ServoDrive", "tool_twist"]
-
-MAX_STATUS = 200  # characters
 
 
 def tool_twist(ros: RosSide, kind: Any, command: ServoCommand, values: list[float]) -> Any:
@@ -39,7 +36,7 @@ class ServoDrive(Drive):
         super().__init__(ros, kind, command.topic, command.rate, len(SERVO_AXES), tick_seconds)
         self._command = command
         self._feedback = JointFeedback(ros, settings.states, settings.joints)
-        self._status = None if settings.status is None else _StatusTopic(ros, settings.status)
+        self._status = None if settings.status is None else ServoStatusTopic(ros, settings.status)
 
     def seen(self, now: float) -> bool:
         return self._feedback.is_complete(now)
@@ -57,24 +54,3 @@ class ServoDrive(Drive):
 
     def sensor_faults(self, now: float) -> list[str]:
         return self._feedback.faults(now) + ([] if self._status is None else self._status.faults(now))
-
-
-class _StatusTopic:
-    """Servo's own word on why it slows down or halts: shown, and never a reason to move."""
-
-    def __init__(self, ros: RosSide, settings: ServoStatus) -> None:
-        package = "moveit_msgs" if settings.message == "ServoStatus" else "std_msgs"
-        self._said: Newest[str] = Newest(settings.topic, settings.timeout)
-        ros.subscribe(ros.message(package, settings.message), settings.topic, self._take)
-
-    def faults(self, now: float) -> list[str]:
-        said = self._said.fresh(now)
-        return self._said.faults(now) + (
-            [f"{self._said.topic}: {said.value}"] if said is not None and said.value else []
-        )
-
-    def _take(self, message: Any) -> None:
-        """Read ServoStatus (code, message) or Int8 (data), whose numbers differ from release to release; 0 is well."""
-        code = int(getattr(message, "code", getattr(message, "data", 0)))
-        words = "".join(filter(str.isprintable, str(getattr(message, "message", ""))))[:MAX_STATUS]
-        self._said.put("" if code == 0 else words or f"MoveIt Servo reports status {code}", clock.now())

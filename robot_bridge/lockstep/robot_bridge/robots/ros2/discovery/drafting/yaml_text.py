@@ -4,7 +4,6 @@ Names come from other machines: a name that is more than a plain word is written
 than ASCII escaped, and a comment has no character that could end its line.
 """
 
-import json
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -72,7 +71,7 @@ def plain(value: Plain) -> str:
     """Return a value in YAML's flow style."""
     if isinstance(value, str):
         is_word = _PLAIN.match(value) is not None and value.lower() not in _WORDS
-        return value if is_word else json.dumps(value)
+        return value if is_word else _quoted(value)
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, int):
@@ -83,3 +82,15 @@ def plain(value: Plain) -> str:
     if isinstance(value, Mapping):
         return "{" + ", ".join(f"{plain(key)}: {plain(each)}" for key, each in value.items()) + "}"
     return "[" + ", ".join(map(plain, value)) + "]"
+
+
+def _quoted(text: str) -> str:
+    """Return text in double quotes, in ASCII (YAML 1.1, 5.6; JSON's pairs of surrogates are no YAML)."""
+    return '"' + "".join(map(_escaped, text)) + '"'
+
+
+def _escaped(character: str) -> str:
+    code = ord(character)
+    if 0x20 <= code < 0x7F and character not in '"\\':
+        return character
+    return f"\\x{code:02x}" if code <= 0xFF else f"\\u{code:04x}" if code <= 0xFFFF else f"\\U{code:08x}"
