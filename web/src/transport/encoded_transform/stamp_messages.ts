@@ -23,13 +23,36 @@ export interface SoundSkip {
   readonly before: number; // RTP timestamp
 }
 
+/** Page to worker: where the decoded sound of this receiver goes; null: nowhere, for now. */
+export interface SoundRoute {
+  readonly receiver: number;
+  readonly codec: string; // "opus" or "PCMU"
+  readonly port: MessagePort | null; // of the audio worklet
+}
+
+/** Page to worker: the browser is to decode and play the sound of this receiver. */
+export interface SoundLeft {
+  readonly receiver: number;
+  readonly browserPlays: true;
+}
+
+export type SoundOrder = SoundSkip | SoundRoute | SoundLeft;
+
+/** Worker to page: the sound of this receiver cannot be decoded here. */
+export interface SoundFailure {
+  readonly failedReceiver: number;
+}
+
+export function isSoundFailure(value: unknown): value is SoundFailure {
+  return typeof value === "object" && value !== null && "failedReceiver" in value;
+}
+
 /** Worker to page, for every encoded frame. */
 export interface FrameNote {
   readonly receiver: number;
   readonly rtpTimestamp: number;
   readonly mark: FrameMark;
   readonly dropped: boolean; // too old already or skipped; never decoded
-  readonly packet: ArrayBuffer | null; // what the page decodes, without the trailer
 }
 
 export function isFrameNote(value: unknown): value is FrameNote {
