@@ -25,6 +25,7 @@ SECTIONS = (
     "lossy",
     "gates",
     "capture_to_shown",
+    "sound",
     "first_picture",
     "start",
     "observers",
