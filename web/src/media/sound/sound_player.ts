@@ -1,4 +1,5 @@
 import { judge, type GateMode } from "../../gate/media_gate";
+import { eventGap } from "../../gate/serial";
 import { createSoundJitter, noteLateness, targetS, type SoundJitter } from "./sound_jitter";
 import {
   advance,
@@ -30,7 +31,9 @@ export interface SoundPlayer {
   readonly queue: SoundQueue;
   jitter: SoundJitter;
   readonly blockS: number; // that the sound device takes at once
-  context: SoundContext;
+  context: SoundContext; // set by `judgeAgainst`
+  eventS: number; // between two events, on average; Infinity before two came
+  eventAt: number; // s on the sound device's clock: when the last came
   plays: boolean; // false: waits for enough sound to begin with
   lead: number; // s that sound waits that came as early as any, on average
   arrived: { readonly late: number; readonly now: number } | null; // the last packet: s after the earliest, and when
@@ -65,11 +68,15 @@ const SPLICE_EACH_S = 0.06;
 const SPLICE_EACH_HURRIED_S = 0.015;
 /** Sound that repeats itself less than that is cut only when much waits. */
 const LIKE = 0.5;
-/** What plays is as old as it may be: for so long nothing waits for what may come late. */
+/** What plays is soon as old as it may be, ... */
+const SOON_S = 0.1;
+/** ... and for so long nothing waits for what may come late. */
 const HURRY_S = 1;
 const HURRIED_TARGET_S = 0.02;
 /** Weight of one packet in `lead`. */
 const WEIGHT = 1 / 16;
+/** Weight of one event in `eventS`. */
+const EVENT_WEIGHT = 1 / 8;
 /** RTP timestamps that jump by more begin anew. */
 const JUMP_S = 3;
 /** Packets that wait; of more the oldest give way. */
@@ -86,6 +93,8 @@ export function createSoundPlayer(rate: number, blockS: number): SoundPlayer {
     jitter: createSoundJitter(rate),
     blockS,
     context: { feedback: null, tolerance: 0, gate: "event" },
+    eventS: Infinity,
+    eventAt: -Infinity,
     plays: false,
     lead: 0,
     arrived: null,
@@ -98,6 +107,17 @@ export function createSoundPlayer(rate: number, blockS: number): SoundPlayer {
     begun: [],
     leftOut: 0,
   };
+}
+
+/** The feedback or a setting changed. */
+export function judgeAgainst(player: SoundPlayer, context: SoundContext, now: number): void {
+  const before = player.context.feedback;
+  player.context = context;
+  const events = before === null || context.feedback === null ? 0 : eventGap(context.feedback, before);
+  if (events === 0) return;
+  const each = (now - player.eventAt) / Math.max(1, events);
+  player.eventS = player.eventS === Infinity ? each : player.eventS + (each - player.eventS) * EVENT_WEIGHT;
+  player.eventAt = now;
 }
 
 /** A packet came. `now`: s on the sound device's clock. */
@@ -200,7 +220,8 @@ function noteBegun(player: SoundPlayer, now: number): void {
   player.begun.push(packet.time);
   const { feedback, tolerance, gate } = player.context;
   const { gap } = judge(feedback, packet.stamp, tolerance, gate);
-  if (gate === "event" && gap !== null && gap >= tolerance) player.hurriesUntil = now + HURRY_S;
+  const soon = Math.floor(SOON_S / player.eventS); // events
+  if (gate === "event" && gap !== null && gap >= tolerance - soon) player.hurriesUntil = now + HURRY_S;
 }
 
 /** What would be heard next if nothing were joined there. */
@@ -241,7 +262,7 @@ function lastPeriod(player: SoundPlayer): Float32Array {
   const [width, least, most] = [FRAME_S, SHORTEST_S, LONGEST_S].map((seconds) => samples(player, seconds));
   // Backwards, a period later is a period earlier.
   const backwards = history.slice().reverse();
-  const { length } = findPeriod(backwards, 0, width ?? 0, least ?? 0, most ?? 0);
+  const { length } = findPeriod(backwards, width ?? 0, least ?? 0, most ?? 0);
   return history.slice(history.length - length);
 }
 
@@ -260,7 +281,7 @@ function shortened(player: SoundPlayer, length: number, ready: number, now: numb
   const each = samples(player, hurries ? SPLICE_EACH_HURRIED_S : SPLICE_EACH_S);
   if (tooMuch < SPARE_S || player.sinceSplice < each || ready < width + 2 * most) return null;
   const sound = peek(player.queue, 0, width + most);
-  const period = findPeriod(sound, 0, width, least, most);
+  const period = findPeriod(sound, width, least, most);
   if (period.likeness < LIKE && !hurries) return null;
   advance(player.queue, period.length + width);
   player.lead -= period.length / player.jitter.rate;

@@ -8,6 +8,8 @@ export interface Period {
 
 /** Steps of the first, coarse look at 16 kHz and above: a quarter of the samples is enough for it. */
 const COARSE = 4;
+const COARSE_WIDTH = 80;
+const NEARLY = 0.05;
 
 /** From one to the other over the whole length. */
 export function crossFade(from: Float32Array, to: Float32Array): Float32Array {
@@ -17,29 +19,38 @@ export function crossFade(from: Float32Array, to: Float32Array): Float32Array {
   });
 }
 
-/** Between `least` and `most`, where `width` samples of `sound` from `at` are most like those that much later. */
-export function findPeriod(
-  sound: Float32Array,
-  at: number,
-  width: number,
-  least: number,
-  most: number,
-  step = width >= 80 ? COARSE : 1,
-): Period {
-  let best: Period = { length: least, likeness: -1 };
-  for (let length = least; length <= most; length += step) {
-    const likeness = likenessOf(sound, at, at + length, width, step);
-    if (likeness > best.likeness) best = { length, likeness };
-  }
-  if (step === 1) return best;
-  const near = [Math.max(least, best.length - step), Math.min(most, best.length + step)] as const;
-  return findPeriod(sound, at, width, ...near, 1);
+/**
+ * Between `least` and `most`, where `width` samples of `sound` from its begin are most like those that much later; of
+ * lengths that are nearly as good the longest, so that few joins do.
+ */
+export function findPeriod(sound: Float32Array, width: number, least: number, most: number): Period {
+  const step = width >= COARSE_WIDTH ? COARSE : 1;
+  const found = likenesses(sound, width, least, most, step);
+  const best = Math.max(...found.map(({ likeness }) => likeness));
+  const isPeak = (at: number, likeness: number): boolean =>
+    likeness >= (found[at - 1]?.likeness ?? -1) && likeness >= (found[at + 1]?.likeness ?? -1);
+  const good = ({ likeness }: Period, at: number): boolean =>
+    likeness >= best - NEARLY && isPeak(at, likeness);
+  const coarse = found.findLast(good) ?? { length: least, likeness: -1 };
+  const [from, to] = [Math.max(least, coarse.length - step), Math.min(most, coarse.length + step)];
+  return likenesses(sound, width, from, to, 1).reduce(
+    (one, other) => (other.likeness > one.likeness ? other : one),
+    coarse,
+  );
 }
 
-function likenessOf(sound: Float32Array, one: number, other: number, width: number, step: number): number {
+function likenesses(sound: Float32Array, width: number, from: number, to: number, step: number): Period[] {
+  const count = Math.floor((to - from) / step) + 1;
+  return Array.from({ length: count }, (_, index) => {
+    const length = from + index * step;
+    return { length, likeness: likenessOf(sound, length, width, step) };
+  });
+}
+
+function likenessOf(sound: Float32Array, later: number, width: number, step: number): number {
   let [both, first, second] = [0, 0, 0];
   for (let at = 0; at < width; at += step) {
-    const [left, right] = [sound[one + at] ?? 0, sound[other + at] ?? 0];
+    const [left, right] = [sound[at] ?? 0, sound[later + at] ?? 0];
     both += left * right;
     first += left * left;
     second += right * right;

@@ -6,7 +6,14 @@ import {
   type ProcessorOptions,
   type ProcessorOrder,
 } from "./sound_messages";
-import { createSoundPlayer, nextFrame, playingRate, takePacket, waitingMs } from "./sound_player";
+import {
+  createSoundPlayer,
+  judgeAgainst,
+  nextFrame,
+  playingRate,
+  takePacket,
+  waitingMs,
+} from "./sound_player";
 import { createSoundResampler, resample } from "./sound_resampler";
 
 // Names of AudioWorkletGlobalScope, which TypeScript's libraries leave out (Web Audio 1.32).
@@ -59,7 +66,7 @@ class SoundProcessor extends AudioWorkletProcessor implements Processor {
       this.packets?.close();
       this.packets = order.packets;
       this.packets.onmessage = ({ data }: MessageEvent<unknown>) => this.take(data);
-    } else this.player.context = order;
+    } else judgeAgainst(this.player, order, currentTime);
   }
 
   private take(data: unknown): void {

@@ -8,7 +8,7 @@ const US_PER_TICK = 1_000_000 / OPUS_RATE;
 const MOST_SENT = 12;
 /** ... of those that wait for it the newest, a second of the shortest that the console sends. */
 const MOST_WAITING = 50;
-/** Packets in the decoder; it gives one sound for each. */
+/** Packets in the decoder, which gives one sound for each; with more it stands still. */
 const MOST_DECODING = 50;
 /** A decoder that fails so many times in a row, without any sound between, is of no use here. */
 const MOST_FAILURES = 5;
@@ -59,7 +59,11 @@ export class SoundDecoder {
   }
 
   private decode(data: ArrayBuffer, origin: Origin): void {
-    if (this.decoding.length >= MOST_DECODING || data.byteLength === 0) return;
+    if (data.byteLength === 0) return;
+    if (this.decoding.length >= MOST_DECODING) {
+      this.fail();
+      return;
+    }
     try {
       this.decoder = this.openDecoder(data);
       this.decoding.push(origin);

@@ -1,6 +1,7 @@
 import { beforeEach, describe, expect, it } from "vitest";
 import {
   createSoundPlayer,
+  judgeAgainst,
   nextFrame,
   playingRate,
   takePacket,
@@ -219,6 +220,24 @@ describe("the player of sound", () => {
     stream(300, 320, () => 0);
     expect(before).toBeGreaterThan(70);
     expect(ageMs()).toBeLessThan(45);
+  });
+
+  it("hurries earlier where events come so fast that the next sound would be too old", () => {
+    stream(0, 300, wandering);
+    for (let event = 1; event <= 21; event++) {
+      judgeAgainst(player, { feedback: event, tolerance: 22, gate: "event" }, lastMs / 1000 + event / 25);
+    }
+    stream(300, 302, () => 0); // 20 events behind
+    expect(player.hurriesUntil).toBeGreaterThan(lastMs / 1000);
+  });
+
+  it("does not hurry at that gap where events come slowly", () => {
+    stream(0, 300, wandering);
+    for (let event = 1; event <= 21; event++) {
+      judgeAgainst(player, { feedback: event, tolerance: 22, gate: "event" }, lastMs / 1000 + event / 2);
+    }
+    stream(300, 302, () => 0);
+    expect(player.hurriesUntil).toBe(-Infinity);
   });
 
   it("keeps a bounded number of packets, the newest", () => {
