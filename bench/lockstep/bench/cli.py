@@ -26,6 +26,7 @@ SECTIONS = (
     "gates",
     "capture_to_shown",
     "traces",
+    "sound",
     "first_picture",
     "start",
     "observers",

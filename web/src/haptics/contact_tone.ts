@@ -11,7 +11,7 @@ export class ContactTone {
   /** `strength`: 0 (silent) to 1. */
   sound(strength: number): void {
     if (strength <= 0 && this.voice === null) return;
-    this.voice ??= this.createVoice();
+    if (this.voice?.gain.context !== this.audio.open()) this.voice = this.createVoice();
     const { oscillator, gain } = this.voice;
     const now = gain.context.currentTime;
     gain.gain.cancelScheduledValues(now);

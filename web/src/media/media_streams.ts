@@ -74,6 +74,8 @@ export class MediaStreams {
   /** Judges the sound being played. */
   listen(): void {
     this.openSounds();
+    const renewed = this.audio.renewed(performance.now());
+    if (renewed !== null) for (const sound of this.sounds.values()) sound.moveTo(renewed);
     const context = this.context("audio");
     for (const sound of this.sounds.values()) sound.observe(context, this.isAudible());
   }
@@ -114,7 +116,8 @@ export class MediaStreams {
     if (Sound === null) return;
     for (const { info, section } of this.waitingSounds.splice(0)) {
       const context = (): GateContext => this.context("audio");
-      this.sounds.set(info.stream, new Sound(info, section, this.reader, this.audio.open(), context));
+      const sound = new Sound(info, section, this.reader, this.audio.open(), context, () => this.isAudible());
+      this.sounds.set(info.stream, sound);
     }
   }
 

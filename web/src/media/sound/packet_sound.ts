@@ -1,76 +1,62 @@
-import { rtpGap } from "../../gate/sound_backlog";
-import { decodeMuLaw, opusChannels } from "./sound_samples";
-import {
-  createSoundPlayout,
-  goOn,
-  hurry,
-  isOpened,
-  placeSegment,
-  playingAt,
-  type Segment,
-} from "./sound_playout";
-import type { ReceiverStamps } from "../../transport/encoded_transform/stamp_reader";
+import type { GateContext } from "../../gate/gate_counters";
+import type { ReceiverStamps, StampReader } from "../../transport/encoded_transform/stamp_reader";
+import { PROCESSOR, type PlayoutNote, type ProcessorOptions, type ProcessorOrder } from "./sound_messages";
+import type { SoundContext } from "./sound_player";
 import type { SoundSource } from "./sound_source";
+import workletUrl from "./sound_worklet?worker&url";
 
 const OPUS_RATE = 48_000;
-const US_PER_TICK = 1_000_000 / OPUS_RATE;
 const MU_LAW_RATE = 8000; // RFC 3551 4.5.14
 
-interface Decoded {
-  readonly buffer: AudioBuffer;
-  readonly rate: number; // of playing it
-  readonly fades: boolean;
-}
+const loaded = new WeakMap<AudioContext, Promise<void>>();
 
 /**
- * Sound that is decoded and played here, packet by packet: a browser's own buffer grows with every delay of a busy
- * machine, until what it plays is no longer within the tolerance.
+ * Sound that the page decodes in the transform worker and plays in its audio worklet, without the main thread in its
+ * way: a browser's own buffer grows with every delay of a busy machine, until what it plays is no longer within the
+ * tolerance.
  */
 export class PacketSound implements SoundSource {
   readonly node: GainNode;
-  private readonly playout;
-  private readonly players = new Map<Segment, readonly [AudioBufferSourceNode, Decoded]>();
-  private decoder: AudioDecoder | null = null;
-  private newest: number | null = null; // RTP timestamp
-  // RTP timestamps: decoders give one sound for each packet, with times of their own. Were one left out, what follows
-  // would count as older than it is, never as newer.
-  private decoding: number[] = [];
+  private player: AudioWorkletNode | null = null; // null until the worklet is loaded
+  private told: SoundContext | null = null;
+  private note: PlayoutNote | null = null; // the newest
+  private notedMs = 0;
+  private isClosed = false;
 
+  /** `begun` is called for each packet as it begins to play; `failed` where the browser has to play it. */
   constructor(
     private readonly stamps: ReceiverStamps,
+    private readonly reader: StampReader,
     private readonly codec: string,
     private readonly context: AudioContext,
+    private readonly begun: (rtpTimestamp: number) => void,
+    failed: () => void,
   ) {
     this.node = new GainNode(context);
-    this.playout = createSoundPlayout(codec === "PCMU" ? MU_LAW_RATE : OPUS_RATE);
-    stamps.onpacket = (time, packet) => this.take(time, new Uint8Array(packet));
+    stamps.onfailed = failed;
+    this.load().catch(() => {
+      if (!this.isClosed) failed();
+    });
   }
 
   playing(): number | undefined {
-    return playingAt(this.playout, this.context.currentTime);
+    return this.note?.playing ?? undefined;
   }
 
   waiting(): number {
-    const last = this.playout.segments.at(-1)?.end ?? 0;
-    return Math.max(0, last - this.context.currentTime) * 1000;
+    if (this.note === null) return 0;
+    return Math.max(0, this.note.waitingMs - (performance.now() - this.notedMs));
   }
 
-  catchUp(_playing: number, isTooOld: boolean, passes: (rtpTimestamp: number) => boolean): void {
-    if (!isTooOld) return;
-    const leftOut = goOn(this.playout, passes, this.context.currentTime);
-    if (leftOut.length === 0) return;
-    this.stamps.dropped += leftOut.length - 1; // the first was judged as it began
-    const moved = [...this.players];
-    this.players.clear();
-    for (const [segment, [player, decoded]] of moved) {
-      player.onended = null;
-      player.disconnect();
-      if (this.playout.segments.includes(segment)) this.start(segment, decoded);
-    }
+  tell({ feedback, tolerance, gate }: GateContext): void {
+    const { told } = this;
+    if (told?.feedback === feedback && told.tolerance === tolerance && told.gate === gate) return;
+    this.told = { feedback, tolerance, gate };
+    this.order(this.told);
   }
 
-  hurry(): void {
-    hurry(this.playout, performance.now() / 1000);
+  catchUp(): void {
+    // the worklet does, by the same rule
   }
 
   leavesOut(): boolean {
@@ -78,75 +64,63 @@ export class PacketSound implements SoundSource {
   }
 
   close(): void {
-    this.stamps.onpacket = null;
+    this.isClosed = true;
+    this.stamps.onfailed = null;
+    this.context.removeEventListener("statechange", this.connect);
+    this.reader.route(this.stamps, this.codec, null);
+    this.order({ close: true });
+    this.player?.disconnect();
     this.node.disconnect();
-    if (this.decoder !== null && this.decoder.state !== "closed") this.decoder.close();
-    this.decoder = null;
   }
 
-  /** One packet. What comes late or out of order is lost. */
-  private take(time: number, packet: Uint8Array): void {
-    if (this.newest !== null && rtpGap(time, this.newest) <= 0) return;
-    this.newest = time;
-    if (this.context.state !== "running" || !isOpened(this.context.currentTime)) return;
-    if (this.codec === "PCMU") this.play(decodeMuLaw(packet), MU_LAW_RATE, time);
-    else this.decode(packet, time);
+  private async load(): Promise<void> {
+    const { context } = this;
+    const known = loaded.get(context) ?? context.audioWorklet.addModule(workletUrl);
+    loaded.set(context, known);
+    await known;
+    if (this.isClosed) return;
+    const rate = this.codec === "PCMU" ? MU_LAW_RATE : OPUS_RATE;
+    const processorOptions: ProcessorOptions = { rate, blockS: context.baseLatency };
+    this.player = new AudioWorkletNode(context, PROCESSOR, {
+      numberOfInputs: 0,
+      outputChannelCount: [1],
+      processorOptions,
+    });
+    this.player.port.onmessage = ({ data }: MessageEvent<PlayoutNote>) => this.take(data);
+    this.player.connect(this.node);
+    if (this.told !== null) this.order(this.told);
+    context.addEventListener("statechange", this.connect);
+    this.connect();
   }
 
-  private decode(packet: Uint8Array, time: number): void {
-    if (this.decoder === null || this.decoder.state === "closed") {
-      this.decoding = [];
-      this.decoder = new AudioDecoder({
-        output: (decoded) => this.decoded(decoded),
-        error: () => undefined, // it is closed then; the next packet makes another
-      });
-      const numberOfChannels = opusChannels(packet);
-      this.decoder.configure({ codec: "opus", sampleRate: OPUS_RATE, numberOfChannels });
-    }
-    const timestamp = Math.round(time * US_PER_TICK);
-    this.decoding.push(time);
-    this.decoder.decode(new EncodedAudioChunk({ type: "key", timestamp, data: packet }));
-  }
-
-  private decoded(data: AudioData): void {
-    const samples = new Float32Array(data.numberOfFrames);
-    data.copyTo(samples, { planeIndex: 0, format: "f32-planar" });
-    const time = this.decoding.shift();
-    if (time !== undefined) this.play(samples, data.sampleRate, time);
-    data.close();
-  }
-
-  private play(samples: Float32Array<ArrayBuffer>, sampleRate: number, time: number): void {
-    if (samples.length === 0) return;
-    const buffer = new AudioBuffer({ length: samples.length, sampleRate });
-    buffer.copyToChannel(samples, 0);
-    const before = [...this.players.values()].at(-1)?.[1];
-    const { currentTime } = this.context;
-    const place = placeSegment(this.playout, time, buffer.duration, currentTime, performance.now() / 1000);
-    if (place === null) {
-      this.stamps.dropped += 1;
+  /** Packets go to the worklet while the sound device runs: what came before would play late. */
+  private readonly connect = (): void => {
+    const { codec, context, reader, stamps } = this;
+    if (context.state !== "running") {
+      reader.route(stamps, codec, null);
       return;
     }
-    const { segment, rate, repeat } = place;
-    if (repeat !== null && before !== undefined) this.start(repeat, { ...before, fades: true });
-    this.start(segment, { buffer, rate, fades: false });
+    const { port1, port2 } = new MessageChannel();
+    this.player?.port.postMessage({ packets: port2 } satisfies ProcessorOrder, [port2]);
+    reader.route(stamps, codec, port1);
+  };
+
+  private order(order: ProcessorOrder): void {
+    this.player?.port.postMessage(order);
   }
 
-  private start(segment: Segment, decoded: Decoded): void {
-    const { context } = this;
-    const { buffer, rate, fades } = decoded;
-    const player = new AudioBufferSourceNode(context, { buffer, playbackRate: rate });
-    player.connect(fades ? this.fading(segment) : this.node);
-    player.onended = () => this.players.delete(segment);
-    player.start(segment.start, 0, (segment.end - segment.start) * rate);
-    this.players.set(segment, [player, decoded]);
+  private take(note: PlayoutNote): void {
+    if (this.isClosed) return;
+    this.stamps.dropped += note.leftOut;
+    for (const playing of note.begun) {
+      this.keep({ ...note, playing });
+      this.begun(playing);
+    }
+    this.keep(note);
   }
 
-  private fading({ start, end }: Segment): GainNode {
-    const fade = new GainNode(this.context);
-    fade.gain.setValueAtTime(1, start);
-    fade.gain.linearRampToValueAtTime(0, end);
-    fade.connect(this.node);
-    return fade;
+  private keep(note: PlayoutNote): void {
+    this.note = note;
+    this.notedMs = performance.now();
   }
 }

@@ -9,14 +9,15 @@ export class SoundOutput {
   private readonly meter: AnalyserNode;
   private readonly samples: Float32Array<ArrayBuffer>;
 
-  constructor(
-    private readonly context: AudioContext,
-    source: AudioNode,
-  ) {
+  constructor(private readonly context: AudioContext) {
     this.gain = new GainNode(context, { gain: 0 });
     this.meter = new AnalyserNode(context, { fftSize: 1024 });
     this.samples = new Float32Array(this.meter.fftSize);
-    source.connect(this.gain).connect(this.meter).connect(context.destination);
+    this.gain.connect(this.meter).connect(context.destination);
+  }
+
+  connect(source: AudioNode): void {
+    source.connect(this.gain);
   }
 
   /** Lets sound through until the next call is due, or shuts it. */

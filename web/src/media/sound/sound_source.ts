@@ -1,3 +1,5 @@
+import type { GateContext } from "../../gate/gate_counters";
+
 /** Where the sound of one stream comes from. */
 export interface SoundSource {
   readonly node: AudioNode;
@@ -5,10 +7,10 @@ export interface SoundSource {
   playing(): number | undefined;
   /** Ms of sound that arrived and waits behind `playing`. */
   waiting(playing: number): number;
-  /** Works off what waits too long. `isTooOld`: what plays does not pass; `passes`: whether another packet would. */
-  catchUp(playing: number, isTooOld: boolean, passes: (rtpTimestamp: number) => boolean): void;
-  /** What plays is as old as the tolerance allows. */
-  hurry(): void;
+  /** What is judged against now. */
+  tell(context: GateContext): void;
+  /** Works off what waits too long. `isTooOld`: what plays does not pass. */
+  catchUp(playing: number, isTooOld: boolean): void;
   /** Whether sound is being left out so that it catches up. */
   leavesOut(): boolean;
   close(): void;

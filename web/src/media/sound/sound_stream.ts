@@ -17,25 +17,37 @@ export class SoundStream {
   readonly log = new RenderLog();
   isOpen = false;
   playing: number | null = null; // stamp of the sound that plays, heard or too old to be; null: none does
-  private readonly source: SoundSource;
-  private readonly output: SoundOutput;
+  private source: SoundSource;
+  private output: SoundOutput;
   private droppedAtStart: number; // before decoding, to begin with the newest
 
   constructor(
     readonly info: StreamInfo,
     readonly section: MediaSection,
-    reader: StampReader | null,
-    audio: AudioContext,
+    private readonly reader: StampReader | null,
+    private audio: AudioContext,
     private readonly context: () => GateContext,
+    private readonly isAudible: () => boolean,
   ) {
-    this.source = sourceOf(section, info.codec, reader, audio);
-    this.output = new SoundOutput(audio, this.source.node);
+    this.source = this.openSource();
+    this.output = new SoundOutput(audio);
+    this.output.connect(this.source.node);
     this.droppedAtStart = section.stamps?.dropped ?? 0;
     if (section.stamps !== null) section.stamps.onstamp = () => this.arrived();
   }
 
+  /** Plays on another sound device from now on. */
+  moveTo(audio: AudioContext): void {
+    this.close();
+    this.audio = audio;
+    this.source = this.openSource();
+    this.output = new SoundOutput(audio);
+    this.output.connect(this.source.node);
+  }
+
   /** Judges what plays now. Called at every feedback and every few milliseconds. */
   observe(context: GateContext, audible: boolean): void {
+    this.source.tell(context);
     const playing = this.source.playing();
     const { stamps } = this.section;
     const mark = playing === undefined || stamps === null ? UNMARKED : findMark(stamps.table, playing);
@@ -57,9 +69,7 @@ export class SoundStream {
   ): boolean {
     const waiting = this.source.waiting(playing);
     const passes = observeSound(this.gate, playing, mark, context, audible, now, waiting);
-    const { gap } = this.gate.counts;
-    if (context.gate === "event" && gap !== null && gap >= context.tolerance) this.source.hurry();
-    this.source.catchUp(playing, this.gate.isTooOld, (time) => this.wouldPass(time, context));
+    this.source.catchUp(playing, this.gate.isTooOld);
     const isEarly = now - (this.gate.playsSinceMs ?? now) < START_MS;
     if (this.isStarting() || (isEarly && this.source.leavesOut()))
       this.droppedAtStart = this.section.stamps?.dropped ?? 0;
@@ -79,14 +89,6 @@ export class SoundStream {
     const mark = findMark(stamps.table, stamps.newest) ?? UNMARKED;
     const { feedback, tolerance, gate } = this.context();
     noteSeen(this.gate.counts, judge(feedback, mark.stamp, tolerance, gate).gap);
-  }
-
-  private wouldPass(rtpTimestamp: number, context: GateContext): boolean {
-    const { stamps } = this.section;
-    const mark = stamps === null ? undefined : findMark(stamps.table, rtpTimestamp);
-    if (mark === undefined) return false;
-    const { feedback, tolerance, gate } = context;
-    return judge(feedback, mark.stamp, tolerance, gate).verdict === "render";
   }
 
   /** Whether the browser still plays what waited while it opened its sound device. */
@@ -116,16 +118,25 @@ export class SoundStream {
     this.output.close();
     this.source.close();
   }
-}
 
-function sourceOf(
-  section: MediaSection,
-  codec: string,
-  reader: StampReader | null,
-  context: AudioContext,
-): SoundSource {
-  const { track, stamps } = section;
-  if (stamps?.packets === true) return new PacketSound(stamps, codec, context);
-  if (track === null) throw new TypeError("sound without a track and without packets");
-  return new TrackSound(section, track, reader, codec === "PCMU" ? 8000 : 48_000, context);
+  private openSource(): SoundSource {
+    const { section, info, reader, audio } = this;
+    const { track, stamps } = section;
+    if (stamps?.packets === true && reader !== null) {
+      const begun = (): void => this.observe(this.context(), this.isAudible());
+      return new PacketSound(stamps, reader, info.codec, audio, begun, () => this.leaveToBrowser());
+    }
+    if (track === null) throw new TypeError("sound without a track and without packets");
+    return new TrackSound(section, track, reader, info.codec === "PCMU" ? 8000 : 48_000, audio);
+  }
+
+  /** The page cannot play it: the browser does, as long as this connection lasts. */
+  private leaveToBrowser(): void {
+    const { stamps, track } = this.section;
+    if (stamps === null || track === null) return;
+    this.reader?.leave(stamps);
+    this.source.close();
+    this.source = this.openSource();
+    this.output.connect(this.source.node);
+  }
 }

@@ -41,8 +41,8 @@ export class TrackSound implements SoundSource {
     if (before !== null) this.reader.skip(stamps, before);
   }
 
-  hurry(): void {
-    // the browser has its own rules for how long sound waits
+  tell(): void {
+    // the browser knows of no gate
   }
 
   leavesOut(): boolean {

@@ -23,6 +23,30 @@ export interface SoundSkip {
   readonly before: number; // RTP timestamp
 }
 
+/** Page to worker: where the decoded sound of this receiver goes; null: nowhere, for now. */
+export interface SoundRoute {
+  readonly receiver: number;
+  readonly codec: string; // "opus" or "PCMU"
+  readonly port: MessagePort | null; // of the audio worklet
+}
+
+/** Page to worker: the browser is to decode and play the sound of this receiver. */
+export interface SoundLeft {
+  readonly receiver: number;
+  readonly browserPlays: true;
+}
+
+export type SoundOrder = SoundSkip | SoundRoute | SoundLeft;
+
+/** Worker to page: the sound of this receiver cannot be decoded here. */
+export interface SoundFailure {
+  readonly failedReceiver: number;
+}
+
+export function isSoundFailure(value: unknown): value is SoundFailure {
+  return typeof value === "object" && value !== null && "failedReceiver" in value;
+}
+
 /** Worker to page, for every encoded frame. */
 export interface FrameNote {
   readonly receiver: number;
@@ -30,7 +54,6 @@ export interface FrameNote {
   readonly mark: FrameMark;
   readonly dropped: boolean; // too old already or skipped; never decoded
   readonly times: TransformTimes | null; // of a picture
-  readonly packet: ArrayBuffer | null; // what the page decodes, without the trailer
 }
 
 /** When a frame passed the worker; ms since 1970 by the worker's clock. */

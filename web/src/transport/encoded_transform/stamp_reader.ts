@@ -4,8 +4,9 @@ import type { FrameMark } from "../../gate/gate_counters";
 import StampWorker from "./stamp_worker?worker&inline"; // a request of its own would cost a round trip
 import {
   isFrameNote,
+  isSoundFailure,
   type SoundContext,
-  type SoundSkip,
+  type SoundOrder,
   type TransformOptions,
   type TransformTimes,
 } from "./stamp_messages";
@@ -15,10 +16,10 @@ const BOOK_LIMIT = 512; // frames; over 8 s of the fastest stream
 /** Stamps of one receiver's frames. */
 export interface ReceiverStamps extends Arrivals {
   readonly table: StampTable;
-  readonly packets: boolean; // its packets go to `onpacket`, not to the browser's decoder
+  packets: boolean; // the page decodes and plays them, and not the browser
   onstamp: (() => void) | null;
-  onpacket: ((rtpTimestamp: number, packet: ArrayBuffer) => void) | null;
   onframe: ((rtpTimestamp: number, times: TransformTimes) => void) | null; // of pictures, for their trace
+  onfailed: (() => void) | null; // the page cannot decode them: the browser does, from now on
 }
 
 function createStamps(packets: boolean): ReceiverStamps {
@@ -27,23 +28,20 @@ function createStamps(packets: boolean): ReceiverStamps {
     packets,
     ...createArrivals(),
     onstamp: null,
-    onpacket: null,
     onframe: null,
+    onfailed: null,
   };
 }
 
-/** A frame came; `packet` is null where the page does not decode it. */
-function notePacket(
-  stamps: ReceiverStamps,
-  rtpTimestamp: number,
-  mark: FrameMark,
-  dropped: boolean,
-  packet: ArrayBuffer | null,
-): void {
+function noteFrame(stamps: ReceiverStamps, rtpTimestamp: number, mark: FrameMark, dropped: boolean): void {
   noteMark(stamps.table, rtpTimestamp, mark);
   noteArrival(stamps, rtpTimestamp, dropped);
   stamps.onstamp?.();
-  if (packet !== null) stamps.onpacket?.(rtpTimestamp, packet);
+}
+
+/** WebCodecs and worklets, which are there on secure pages alone. */
+function canPlayPackets(): boolean {
+  return "AudioDecoder" in globalThis && "AudioWorkletNode" in globalThis;
 }
 
 /** null where the browser has no transforms: no picture passes the gate there. */
@@ -67,7 +65,7 @@ export class StampReader {
 
   /** Puts the transform in front of a receiver's decoder. Call before the first frame arrives. */
   attach(receiver: RTCRtpReceiver, kind: "audio" | "video", trailer: boolean): ReceiverStamps {
-    const packets = kind === "audio" && "AudioDecoder" in globalThis;
+    const packets = kind === "audio" && canPlayPackets();
     const options: TransformOptions = { receiver: this.nextReceiver++, kind, trailer, packets };
     const stamps = createStamps(packets);
     this.receivers.set(options.receiver, stamps);
@@ -85,10 +83,18 @@ export class StampReader {
 
   /** Leaves out sound that is older than the RTP timestamp `before`, before it is decoded. */
   skip(stamps: ReceiverStamps, before: number): void {
-    for (const [receiver, known] of this.receivers) {
-      const order: SoundSkip = { receiver, before };
-      if (known === stamps) this.worker.postMessage(order);
-    }
+    this.order(stamps, (receiver) => ({ receiver, before }));
+  }
+
+  /** Sends the decoded sound to an audio worklet; null: nowhere, for now. */
+  route(stamps: ReceiverStamps, codec: string, port: MessagePort | null): void {
+    this.order(stamps, (receiver) => ({ receiver, codec, port }), port === null ? [] : [port]);
+  }
+
+  /** Leaves this sound to the browser. */
+  leave(stamps: ReceiverStamps): void {
+    stamps.packets = false;
+    this.order(stamps, (receiver) => ({ receiver, browserPlays: true }));
   }
 
   close(): void {
@@ -96,11 +102,29 @@ export class StampReader {
     this.worker.terminate();
   }
 
+  private order(
+    stamps: ReceiverStamps,
+    order: (receiver: number) => SoundOrder,
+    transfer: Transferable[] = [],
+  ): void {
+    for (const [receiver, known] of this.receivers) {
+      if (known === stamps) this.worker.postMessage(order(receiver), transfer);
+    }
+  }
+
   private note(data: unknown): void {
+    if (isSoundFailure(data)) this.fail(data.failedReceiver);
     if (!isFrameNote(data)) return;
     const stamps = this.receivers.get(data.receiver);
     if (stamps === undefined) return;
     if (data.times !== null) stamps.onframe?.(data.rtpTimestamp, data.times);
-    notePacket(stamps, data.rtpTimestamp, data.mark, data.dropped, data.packet);
+    noteFrame(stamps, data.rtpTimestamp, data.mark, data.dropped);
+  }
+
+  private fail(receiver: number): void {
+    const stamps = this.receivers.get(receiver);
+    if (stamps === undefined) return;
+    stamps.packets = false;
+    stamps.onfailed?.();
   }
 }

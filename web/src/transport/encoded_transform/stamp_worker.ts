@@ -4,7 +4,15 @@ import { judge } from "../../gate/media_gate";
 import type { FrameMark } from "../../gate/gate_counters";
 import { rtpGap } from "../../gate/sound_backlog";
 import { markOfTrailer, splitTrailer } from "../../gate/trailer";
-import type { FrameNote, SoundContext, SoundSkip, TransformOptions, TransformTimes } from "./stamp_messages";
+import { SoundDecoders } from "./sound_decoders";
+import type {
+  FrameNote,
+  SoundContext,
+  SoundFailure,
+  SoundOrder,
+  TransformOptions,
+  TransformTimes,
+} from "./stamp_messages";
 
 interface EncodedFrame {
   data: ArrayBuffer;
@@ -24,17 +32,19 @@ interface Transformer {
 
 interface TransformScope {
   onrtctransform: ((event: { readonly transformer: Transformer }) => void) | null;
-  onmessage: ((event: MessageEvent<SoundContext | SoundSkip>) => void) | null;
-  postMessage(note: FrameNote, transfer: Transferable[]): void;
+  onmessage: ((event: MessageEvent<SoundContext | SoundOrder>) => void) | null;
+  postMessage(note: FrameNote | SoundFailure): void;
 }
 
 const scope = self as unknown as TransformScope;
 let context: SoundContext = { feedback: null, tolerance: 0, gate: "event" };
 const skips = new Map<number, number>(); // receiver -> RTP timestamp before which its sound is left out
+const sounds = new SoundDecoders((failedReceiver) => scope.postMessage({ failedReceiver }));
 
 scope.onmessage = ({ data }) => {
-  if ("receiver" in data) skips.set(data.receiver, data.before);
-  else context = data;
+  if (!("receiver" in data)) context = data;
+  else if ("before" in data) skips.set(data.receiver, data.before);
+  else sounds.obey(data);
 };
 
 scope.onrtctransform = ({ transformer }) => {
@@ -57,14 +67,13 @@ function passes(frame: EncodedFrame, options: TransformOptions): boolean {
   const mark = options.trailer ? takeTrailer(frame) : markOf(metadata);
   const dropped =
     options.kind === "audio" && (isSkipped(options.receiver, metadata.rtpTimestamp) || isTooOld(mark));
-  const packet = options.packets && !dropped ? frame.data : null;
   if (metadata.rtpTimestamp !== undefined) {
     const { receiver } = options;
     const times = options.kind === "video" ? timesOf(metadata.receiveTime, enteredMs) : null;
-    const note = { receiver, rtpTimestamp: metadata.rtpTimestamp, mark, dropped, times, packet };
-    scope.postMessage(note, packet === null ? [] : [packet]);
+    scope.postMessage({ receiver, rtpTimestamp: metadata.rtpTimestamp, mark, dropped, times });
   }
-  return !dropped && packet === null;
+  if (dropped || !options.packets) return !dropped;
+  return !sounds.keep(options.receiver, metadata.rtpTimestamp, mark.stamp, frame.data);
 }
 
 /** `receiveTime` counts from this worker's own time origin. */
