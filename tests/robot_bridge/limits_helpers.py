@@ -8,7 +8,7 @@ from lockstep.robot_bridge.control.limits.axis_shaper import AxisShaper
 from lockstep.robot_bridge.control.limits.motion_limits import MotionLimits
 from lockstep.robot_bridge.description.check_description import check_description
 
-__all__ = ["DT", "LIFT", "ExactBase", "ExactLift", "base_description", "inside"]
+__all__ = ["DT", "HOLD", "LIFT", "ExactBase", "ExactLift", "base_description", "inside"]
 
 DT = 0.004
 HOLD = 0.3

@@ -8,7 +8,7 @@ from lockstep.protocol.serial import FIRST_EVENT, event_gap
 
 __all__ = ["EventClock"]
 
-HISTORY = 1024  # changes remembered; at 25 events/s that is 40 s, longer than any medium takes to arrive
+HISTORY = 1024  # changes remembered; at 60 events/s that is 17 s, longer than any medium takes to arrive
 
 
 class Change(NamedTuple):

@@ -6,7 +6,7 @@ from lockstep.robot_bridge.robots.base import Stamp
 
 __all__ = ["EventTimes"]
 
-HISTORY = 512  # changes remembered; at 25 events/s that is 20 s
+HISTORY = 1024  # changes remembered; at 60 events/s that is 17 s
 
 
 class EventTimes:

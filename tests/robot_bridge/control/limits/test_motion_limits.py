@@ -1,4 +1,5 @@
 import math
+from itertools import cycle
 
 import msgspec
 import pytest
@@ -6,8 +7,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from lockstep.protocol.description import AxisGain
+from lockstep.robot_bridge.control.limits.axis_shaper import AxisShaper
 from lockstep.robot_bridge.control.limits.motion_limits import MotionLimits
-from tests.robot_bridge.limits_helpers import DT, LIFT, ExactBase, ExactLift, base_description, inside
+from lockstep.robot_bridge.control.ticker import Ticker
+from tests.robot_bridge.limits_helpers import DT, HOLD, LIFT, ExactBase, ExactLift, base_description, inside
 
 SQUARE = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)]
 ROOM = [(-3.0, -2.0), (3.0, -2.0), (3.0, 2.0), (-3.0, 2.0)]
@@ -27,6 +30,31 @@ def test_no_command_brings_a_measured_joint_past_its_limits(
         for _ in range(ticks):
             lift.drive([coarse, fine * 0.1], 1)
             assert -1e-9 <= lift.height <= 1 + 1e-9
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    start=st.floats(0.0, 1.0),
+    commands=st.lists(st.tuples(share, share, st.integers(1, 150)), max_size=12),
+    early=st.lists(st.floats(0.0, 1.0), min_size=1, max_size=20),
+)
+def test_a_robot_that_holds_its_values_until_the_next_tick_stays_within_limits_also_where_ticks_come_early(
+    start: float, commands: list[tuple[float, float, int]], early: list[float]
+) -> None:
+    lift = ExactLift(start)
+    lift.limits = MotionLimits(LIFT, lift, DT, longest_tick=2 * DT)
+    lift.shaper = AxisShaper(LIFT.axes, hold=HOLD, limiter=lift.limits)
+    metronome, now, shares = Ticker(DT, 0.0), 0.0, cycle(early)
+    values = [0.0, 0.0]
+    for coarse, fine, ticks in commands:
+        for _ in range(ticks):
+            latest, soonest = metronome.wait(now), metronome.early(now)
+            held = soonest + next(shares) * (latest - soonest)  # s from this tick to the next
+            lift.place[0] += (-0.5 * values[0] + values[1]) * held
+            assert -1e-9 <= lift.height <= 1 + 1e-9
+            now += held
+            lift.shaper.drive([coarse, fine * 0.1], now)
+            values = lift.shaper.step(now, DT)
 
 
 @settings(max_examples=80, deadline=None)
