@@ -34,7 +34,7 @@ MAX_PARAMETERS = 8
 MAX_STATUS_ITEMS = 64
 MAX_NUMBER = 1e12  # of a status value, in its unit
 
-# Letters that nothing has to escape, to the end of the text (`$` would let a line end pass): an id of a peer stands in logs and recordings.
+# Letters that nothing has to escape: an id stands in logs and recordings. `$` would let the end of a line pass.
 ActionId = Annotated[str, msgspec.Meta(pattern=r"^[0-9A-Za-z_-]{1,64}(?![\s\S])")]
 RenewedAction = Annotated[str, msgspec.Meta(pattern=r"^[0-9A-Za-z_-]{0,64}(?![\s\S])")]
 Name = Annotated[str, msgspec.Meta(min_length=1, max_length=200)]
