@@ -74,7 +74,7 @@ function showWords(engine: ConsoleEngine, element: HTMLElement, now: number): vo
     update === null ? whyNot(engine, now) : actionWords({ label: label ?? update.name }, update),
   );
   setData(element, "tone", update === null ? "off" : actionTone(update));
-  element.title = update === null ? "" : `by ${update.by}`;
+  element.title = update === null ? "" : `${element.textContent}, by ${update.by}`;
 }
 
 /** Why the first action that cannot be asked for cannot; "" for whoever may not drive. */
