@@ -17,7 +17,7 @@ export interface RobotStrip extends Panel {
   press(index: number): void;
 }
 
-/** Across the page: what the robot says of itself, and a button for each of its actions. Its height never changes. */
+/** A button for each action of the robot, and what the robot says of itself. Its height never changes. */
 export function createRobotStrip(engine: ConsoleEngine): RobotStrip {
   const status = h("ul", "status-items", { "aria-label": "Status of the robot" });
   const buttons = h("div", "action-buttons", { role: "group", "aria-label": "Actions of the robot" });
