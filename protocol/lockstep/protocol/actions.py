@@ -34,8 +34,9 @@ MAX_PARAMETERS = 8
 MAX_STATUS_ITEMS = 64
 MAX_NUMBER = 1e12  # of a status value, in its unit
 
-ActionId = Annotated[str, msgspec.Meta(min_length=1, max_length=64)]
-RenewedAction = Annotated[str, msgspec.Meta(max_length=64)]
+# Letters that nothing has to escape: an id stands in logs and recordings. `$` would let the end of a line pass.
+ActionId = Annotated[str, msgspec.Meta(pattern=r"^[0-9A-Za-z_-]{1,64}(?![\s\S])")]
+RenewedAction = Annotated[str, msgspec.Meta(pattern=r"^[0-9A-Za-z_-]{0,64}(?![\s\S])")]
 Name = Annotated[str, msgspec.Meta(min_length=1, max_length=200)]
 Text = Annotated[str, msgspec.Meta(max_length=500)]
 Unit = Annotated[str, msgspec.Meta(max_length=20)]

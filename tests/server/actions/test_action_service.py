@@ -1,6 +1,7 @@
 """Who may ask for an action, and what everyone is told of it."""
 
 import asyncio
+import json
 from types import SimpleNamespace
 from typing import Any, cast
 
@@ -8,7 +9,9 @@ import msgspec
 import pytest
 
 from lockstep.protocol.actions import Act, ActionCancel, ActionReason, ActionState, ActionUpdate
+from lockstep.protocol.console import decode_client_message
 from lockstep.protocol.description import Action, RobotDescription
+from lockstep.protocol.errors import MessageError
 from lockstep.server.actions import action_service
 from lockstep.server.actions.action_service import ActionService
 from lockstep.server.audit.records import Actor
@@ -104,6 +107,19 @@ def test_others_and_without_a_link_are_refused_by_name(id: str, role: str, up: b
     assert bench.robot.sent == []
     assert bench.service.newest() == [], "others are not told"
     assert bench.kinds() == ["ActionRefused"]
+
+
+def test_a_name_that_somebody_made_up_goes_no_farther() -> None:
+    bench = Bench()
+    bench.service.act_by_peer(bench.peer(), act(name="\u202ehome"))
+    assert [each.reason for each in bench.told] == ["unknown_action"]
+    assert bench.robot.sent == []
+
+
+@pytest.mark.parametrize("id", ["", "x" * 65, "a b", "a\n", "\u202e"])
+def test_an_id_is_letters_and_digits(id: str) -> None:
+    with pytest.raises(MessageError):
+        decode_client_message(json.dumps({"type": "act", "id": id, "name": "home"}))
 
 
 def test_a_flood_of_requests_is_refused() -> None:

@@ -118,11 +118,11 @@ export class Page {
     grid.element.append(
       h("div", "stage", {}, scale.element, contact.element, limits.element, overlay.element),
     );
-    const rail = h("aside", "rail", {}, event.element, tabs.element);
+    const rail = h("aside", "rail", {}, event.element, robot.element, tabs.element);
     const deck = h("footer", "deck", {}, arm.element, axes.element, left, right, stop.element);
     this.root.append(
       ...[bar.element, seat.element],
-      h("div", "strips", {}, alarm.element, banner.element, robot.element),
+      h("div", "strips", {}, alarm.element, banner.element),
       ...[grid.element, rail],
       ...[charts.element, sheets.element, deck, announcer.element],
     );

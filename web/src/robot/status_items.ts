@@ -10,7 +10,7 @@ export interface ShownItem {
   readonly detail: string; // why, and how old it is
 }
 
-/** What is wrong comes first: a row may be longer than the screen. */
+/** What is wrong comes first: a row may be longer than there is room. */
 const WORST: readonly Tone[] = ["bad", "wait", "off", "good"];
 
 /** `sinceMs`: since the status arrived, on this page's own clock; no clock is compared with another. */

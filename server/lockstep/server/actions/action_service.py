@@ -76,6 +76,9 @@ class ActionService:
             return "not_allowed"
         if not self._holds_seat(peer):
             return "no_seat"
+        description = self._robot.description
+        if description is not None and act.name not in [each.name for each in description.actions]:
+            return "unknown_action"  # here: what a peer makes up stands in no audit
         if not self._asks.spend(peer.identity.token_id or peer.id, time.monotonic()):
             return "too_often"
         return None if self._send(msgspec.structs.replace(act, by=peer.name), peer.actor) else "link_down"

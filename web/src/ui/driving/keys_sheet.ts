@@ -12,10 +12,7 @@ const ALWAYS: readonly Line[] = [
   [["Space"], "Hold to move; pad: right bumper. Let go to bring the robot to rest"],
   [["Shift"], "Slow while held; pad: left bumper"],
   [["Tab"], "Next control layer, while armed; pad: Y"],
-  [
-    ["1", "9"],
-    "The robot's first to ninth action, in the row over the pictures; pad: A and X for the first two",
-  ],
+  [["1", "9"], "The robot's first to ninth action; pad: A and X for the first two"],
   [["F8", "F9"], "Grant or decline the first request for the control seat"],
   [["V"], "Hold to talk, where the robot has a loudspeaker and you have control"],
   [["C"], "Live charts, open and close"],

@@ -17,7 +17,7 @@ export interface RobotStrip extends Panel {
   press(index: number): void;
 }
 
-/** Across the page: what the robot says of itself, and a button for each of its actions. Its height never changes. */
+/** A button for each action of the robot, and what the robot says of itself. Its height never changes. */
 export function createRobotStrip(engine: ConsoleEngine): RobotStrip {
   const status = h("ul", "status-items", { "aria-label": "Status of the robot" });
   const buttons = h("div", "action-buttons", { role: "group", "aria-label": "Actions of the robot" });
@@ -74,7 +74,7 @@ function showWords(engine: ConsoleEngine, element: HTMLElement, now: number): vo
     update === null ? whyNot(engine, now) : actionWords({ label: label ?? update.name }, update),
   );
   setData(element, "tone", update === null ? "off" : actionTone(update));
-  element.title = update === null ? "" : `by ${update.by}`;
+  element.title = update === null ? "" : `${element.textContent}, by ${update.by}`;
 }
 
 /** Why the first action that cannot be asked for cannot; "" for whoever may not drive. */
