@@ -28,3 +28,13 @@ def test_before_what_is_remembered_nothing_is_known() -> None:
         times.changed(number + 1, float(number))
     assert times.at(0.5) is None
     assert times.at(1.5) == Stamp(2, 1.5)
+
+
+def test_an_event_began_when_it_became_current_and_is_forgotten_with_the_history() -> None:
+    times = EventTimes()
+    times.changed(1, 10.0)
+    times.changed(2, 11.0)
+    assert (times.began(1), times.began(2), times.began(3)) == (10.0, 11.0, None)
+    for event in range(3, 3 + HISTORY):
+        times.changed(event, float(event))
+    assert times.began(2) is None

@@ -204,3 +204,18 @@ async def test_a_connection_that_is_lost_while_it_waits_is_not_read_on() -> None
     await asyncio.sleep(0.05)
     assert len(end.events) == count
     assert end.times_lost == 1
+
+
+def test_a_picture_that_waits_is_encoded_when_the_socket_takes_it() -> None:
+    end = opened()
+    made: list[int] = []
+
+    def make() -> bytes:
+        made.append(1)
+        return frame(encode_message(picture(1)))
+
+    end.pause_writing()
+    end.send_media(picture(1), make)
+    assert made == []
+    end.resume_writing()
+    assert made == [1]
