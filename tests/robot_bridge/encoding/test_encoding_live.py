@@ -12,6 +12,8 @@ import pytest
 from lockstep.protocol.framing import MAX_MEDIA_FRAME, FrameReader, frame
 from lockstep.protocol.messages import EncodeRequest, Hello, Media, Ping, StreamRequest, decode_message, encode_message
 from lockstep.robot_bridge.bridge import Bridge
+from lockstep.robot_bridge.conformance import CASES, Outcome, Subject, play_all
+from lockstep.robot_bridge.conformance.place import Place
 from lockstep.robot_bridge.encoding.encoder_choice import EncodeSettings, encode_settings
 from lockstep.robot_bridge.errors import EncoderMissing, SettingsError
 from lockstep.robot_bridge.link.link_client import RobotLink
@@ -172,6 +174,13 @@ async def slow_link(bridge: Bridge) -> AsyncIterator[SlowLink]:
         await link.send(Hello(role="media"))
         await link.send(EncodeRequest(streams=[StreamRequest(stream=name, bitrate=20_000_000) for name in CAMERAS]))
         yield link
+
+
+async def test_a_bridge_that_encodes_keeps_to_the_protocol() -> None:
+    cases = [case for case in CASES if case.name in ("hello", "permissions", "malformed", "media_role", "stamps")]
+    async with encoding_bridge() as bridge:
+        results = await play_all(Subject(Place(*bridge.address)), cases, lambda result: None)
+    assert [(each.case.name, each.detail) for each in results if each.outcome != Outcome.OK] == []
 
 
 def test_the_extra_is_named_where_pyav_is_missing(monkeypatch: pytest.MonkeyPatch) -> None:
