@@ -3,7 +3,8 @@
 import asyncio
 import ssl
 from pathlib import Path
-from typing import Any
+from types import TracebackType
+from typing import Any, Self
 
 import httpx
 
@@ -26,6 +27,14 @@ class Api:
         self._http = httpx.AsyncClient(
             base_url=stack.console, verify=context, headers=headers, trust_env=False, timeout=PATIENCE
         )
+
+    async def __aenter__(self) -> Self:
+        return self
+
+    async def __aexit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        await self._http.aclose()
 
     async def ask(self, method: str, path: str) -> dict[str, Any]:
         answer = await self._http.request(method, path)
@@ -53,8 +62,7 @@ async def ended(*command: str) -> tuple[int | None, str]:
 
 
 async def test_a_robot_pairs_by_a_code_and_comes_back_without_it_until_it_is_forgotten(tmp_path: Path) -> None:
-    async with running_console(tmp_path, "dial-in", tmp_path / "events", TLS) as stack:
-        api = Api(stack)
+    async with running_console(tmp_path, "dial-in", tmp_path / "events", TLS) as stack, Api(stack) as api:
         made = await api.ask("POST", "/api/dial-in/code")
         assert made["command"].startswith("lockstep robot NAME --console wss://127.0.0.1:")
         pairing = arguments(stack, tmp_path, "--pair", made["code"])
@@ -73,8 +81,7 @@ async def test_a_robot_pairs_by_a_code_and_comes_back_without_it_until_it_is_for
 
 
 async def test_a_command_that_cannot_be_meant_says_what_to_do_and_ends_with_2(tmp_path: Path) -> None:
-    async with running_console(tmp_path, "dial-in", tmp_path / "events", TLS) as stack:
-        api = Api(stack)
+    async with running_console(tmp_path, "dial-in", tmp_path / "events", TLS) as stack, Api(stack) as api:
         code, said = await ended(*arguments(stack, tmp_path))
         assert (code, "Pair a robot" in said) == (2, True)
         await api.ask("POST", "/api/dial-in/code")
