@@ -1,14 +1,18 @@
 # Three images from one file: `robot` (bridge and simulated robot), `console` (the service and its page), and `proxy`
-# (TLS). All run as a user of their own.
+# (TLS). All run as a user of their own. The images below it can be given by digest, as docker-compose.yml does.
 
-FROM node:24-bookworm-slim AS page
+ARG NODE_IMAGE=node:24-bookworm-slim
+ARG PYTHON_IMAGE=python:3.11-slim-bookworm
+ARG CADDY_IMAGE=caddy:2.10-alpine
+
+FROM ${NODE_IMAGE} AS page
 WORKDIR /src/web
 COPY web/package.json web/package-lock.json ./
 RUN npm ci --no-audit --no-fund
 COPY web ./
 RUN npm run build
 
-FROM python:3.11-slim-bookworm AS base
+FROM ${PYTHON_IMAGE} AS base
 ENV PYTHONUNBUFFERED=1 PYTHONDONTWRITEBYTECODE=1 PIP_NO_CACHE_DIR=1 PIP_DISABLE_PIP_VERSION_CHECK=1
 WORKDIR /src
 COPY requirements.lock ./
@@ -43,7 +47,7 @@ EXPOSE 8000
 ENTRYPOINT ["lockstep", "serve"]
 CMD ["--robot", "tcp://127.0.0.1:5600"]
 
-FROM caddy:2.10-alpine AS proxy
+FROM ${CADDY_IMAGE} AS proxy
 RUN adduser -D -H -u 10001 lockstep && chown -R lockstep /data /config
 COPY deploy/Caddyfile /etc/caddy/Caddyfile
 USER lockstep

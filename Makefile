@@ -48,7 +48,7 @@ test: $(VENV)/.dev setup ## Install what the tests need and run all of them
 	$(MAKE) --no-print-directory --keep-going test-web test-unit test-browser || exit 1; \
 	[ $$all = yes ] || { echo "Some packages are missing: the tests SKIPPED above for want of them did not run"; exit 1; }
 
-test-fast: $(VENV)/.dev web/node_modules/.installed ## Run the tests that take less than a minute together
+test-fast: $(VENV)/.dev $(PAGE) ## Run the tests that take less than a minute together
 	cd web && npm test --silent
 	$(BIN)/python -m pytest -q -m fast -n 2 --dist loadfile
 

@@ -18,13 +18,17 @@ PARTS = {
     "emulator": {"protocol", "server"},  # it lies beside the measurements, in `bench/`
     "bench": {"protocol", "rtc", "robot_bridge", "client", "server", "emulator"},
 }
-# Of the bridge the console has the link's client, the commands, and what a bridge beside it says when it cannot start.
-FROM_THE_BRIDGE = {"link", "cli", "conformance", "description", "errors", "robots", "stop", "thread_name", "watchdog"}
+# Of the bridge the console has the link's client, the commands, what a bridge beside it says when it cannot start, and
+# how a process reports to its service manager.
+FROM_THE_BRIDGE = {
+    *("link", "cli", "conformance", "description", "errors", "robots", "service_manager", "stop", "thread_name"),
+    "watchdog",
+}
 # The console's folders and files, from the bottom to the top: each imports those before it.
 LAYERS = (
     "errors", "event_clock", "util", "telemetry", "evidence", "audit", "stop", "session_events", "webrtc", "media",
-    "talkback", "auth", "http", "peers", "sfu", "robot", "federation", "publishing", "scene", "settings", "control",
-    "recording", "state", "routes", "composition", "fleet", "cli",
+    "talkback", "auth", "http", "peers", "sfu", "robot", "federation", "publishing", "scene", "settings_file",
+    "settings", "control", "recording", "state", "routes", "composition", "fleet", "cli",
 )  # fmt: skip
 
 

@@ -1,5 +1,6 @@
 """docker-compose.yml and the Dockerfile, as far as they can be checked without an engine."""
 
+import os
 import re
 import subprocess
 from pathlib import Path
@@ -102,8 +103,37 @@ def test_every_file_that_is_mounted_or_copied_exists() -> None:
     assert missing == []
 
 
+def _images_of_others() -> dict[str, str]:
+    """The image that each variable names unless it is set, in both files."""
+    texts = [(ROOT / name).read_text() for name in ("docker-compose.yml", "Dockerfile")]
+    found = re.findall(r"\$\{(\w+_IMAGE):-([^}]+)\}", texts[0])
+    found += re.findall(r"^ARG (\w+_IMAGE)=(\S+)$", texts[1], re.MULTILINE)
+    assert len({*found}) == len({name for name, _ in found}), "both files name the same image"
+    return dict(found)
+
+
 def test_images_of_others_are_pinned_to_a_version() -> None:
-    images = [service["image"] for service in SERVICES.values() if "image" in service]
-    images += re.findall(r"^FROM (\S+:\S+) AS", (ROOT / "Dockerfile").read_text(), re.MULTILINE)
-    assert len(images) >= 5
-    assert [image for image in images if not re.search(r":v?\d+", image)] == []
+    images = _images_of_others()
+    assert len(images) >= 7
+    assert [image for image in images.values() if not re.search(r":v?\d+", image)] == []
+
+
+def test_every_image_of_others_can_be_named_by_its_digest() -> None:
+    """Nothing is pulled but by a variable, which docs/deploy.md tells to set to a digest."""
+    variables = set(_images_of_others())
+    pulled = [service["image"] for service in SERVICES.values() if "image" in service]
+    assert [image for image in pulled if not image.startswith("${")] == []
+    stages = re.findall(r"^FROM (\S+) AS (\S+)$", (ROOT / "Dockerfile").read_text(), re.MULTILINE)
+    made = {name for _, name in stages}
+    assert [parent for parent, _ in stages if parent not in made and not parent.startswith("${")] == []
+    digest = "example.test/any@sha256:" + 64 * "0"
+    environment = {"PATH": os.environ["PATH"], "HOME": os.environ["HOME"], **dict.fromkeys(variables, digest)}
+    chosen = [part for profile in PROFILES for part in ("--profile", profile)]
+    done = subprocess.run(
+        ["docker-compose", *chosen, "config"], cwd=ROOT, env=environment, capture_output=True, text=True, timeout=60
+    )
+    assert done.returncode == 0, done.stderr
+    services = yaml.safe_load(done.stdout)["services"]
+    assert {each["image"] for each in services.values() if "build" not in each} == {digest}
+    built = {name: each["build"]["args"] for name, each in services.items() if "build" in each}
+    assert all(set(given.values()) == {digest} for given in built.values()), built

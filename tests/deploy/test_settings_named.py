@@ -5,6 +5,7 @@ import re
 from pathlib import Path
 
 from lockstep.robot_bridge import cli as robot_cli
+from lockstep.server.media.settings import MediaSettings
 from lockstep.server.settings import Settings
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -27,6 +28,7 @@ def _named(*paths: str) -> set[str]:
 
 def test_every_setting_in_the_deployment_files_and_their_guide_exists() -> None:
     known = {f"LOCKSTEP_{name.upper()}" for name in Settings.model_fields}
+    known |= {f"LOCKSTEP_MEDIA__{name.upper()}" for name in MediaSettings.model_fields}
     known |= set(re.findall(r"LOCKSTEP_[A-Z_]+", inspect.getsource(robot_cli)))
     named = _named("docker-compose.yml", "deploy/**/*", "docs/deploy.md")
     assert len(named) > 5

@@ -44,3 +44,8 @@ def test_the_bridge_is_started_again_when_it_hangs_and_ends_by_itself_before_sys
     assert {"Type=notify", "Restart=always"} <= set(lines)
     watchdog = next(float(line.partition("=")[2]) for line in lines if line.startswith("WatchdogSec="))
     assert LIMIT < watchdog < ALARM * LIMIT, "its own message comes first; systemd's SIGABRT says where it hung"
+
+
+def test_the_console_is_started_again_when_it_hangs() -> None:
+    lines = next(unit for unit in UNITS if unit.name == "lockstep-console.service").read_text().splitlines()
+    assert {"Type=notify", "Restart=always", "WatchdogSec=20"} <= set(lines)

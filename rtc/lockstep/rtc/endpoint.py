@@ -33,7 +33,7 @@ from lockstep.rtc.ice.port import Port, PortSettings
 from lockstep.rtc.peer import OfferedMedia, Peer, PeerSettings
 from lockstep.rtc.peer_events import PacketReceived, PeerEnded, PeerEvent
 from lockstep.rtc.sdp import Fragment, LocalMedia, SessionDescription
-from lockstep.rtc.sockets.server_links import RelayLink, RelayRefused, open_relay
+from lockstep.rtc.sockets.server_links import RelayLink, open_relay
 from lockstep.rtc.sockets.tcp_port import TcpPort, TcpPortSettings
 from lockstep.rtc.sockets.udp_socket import UdpSocket
 from lockstep.rtc.turn.servers import IceServer, MappedAddress, ServerUri, server_uris
@@ -492,10 +492,11 @@ class Endpoint:
         bound = {address[0] for address in self._sockets}
         self._hosts = [host for host in hosts if host in bound]
 
-    async def ask(self, servers: Sequence[IceServer]) -> list[RelayRefused | OSError]:
+    async def ask(self, servers: Sequence[IceServer]) -> list[Exception]:
         """Ask STUN servers for the mapped address, and TURN servers for relayed ones; `candidates` has the answers.
 
-        Earlier relayed addresses that carry no data are given back. Return the errors of servers without an answer.
+        Earlier relayed addresses that carry no data are given back. Return the errors of servers without an answer:
+        `OSError`, of which `RelayRefused` has the server's reason, and anything else for a fault of this endpoint.
         """
         self._give_back_unused()
         uris = sorted(server_uris(servers, self.counts), key=lambda each: each[0].scheme, reverse=True)  # TURN first
@@ -518,7 +519,7 @@ class Endpoint:
             self._probes.clear()
         outcomes = [task.result() for task in tasks if not task.cancelled()]
         self._told = [each for found in outcomes if isinstance(found, list) for each in found]
-        return [each for each in outcomes if isinstance(each, OSError)]
+        return [each for each in outcomes if isinstance(each, Exception)]
 
     async def _ask_server(self, uri: ServerUri, server: IceServer) -> list[LocalCandidate] | Exception:
         """Return what a server answers, or its error, which does not end the questions to others."""

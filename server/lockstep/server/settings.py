@@ -1,4 +1,4 @@
-"""Settings of the console: environment variables LOCKSTEP_*, overridden by flags."""
+"""Settings of the console: a TOML file, overridden by environment variables LOCKSTEP_*, overridden by flags."""
 
 import ipaddress
 from pathlib import Path
@@ -6,7 +6,7 @@ from typing import Annotated, Self
 from urllib.parse import urlsplit
 
 from pydantic import Field, SecretStr, field_validator, model_validator
-from pydantic_settings import SettingsConfigDict
+from pydantic_settings import BaseSettings, PydanticBaseSettingsSource, SettingsConfigDict
 
 from lockstep.protocol.console import SpeedCapMode
 from lockstep.protocol.errors import SecretError
@@ -18,6 +18,7 @@ from lockstep.server.media.settings import MediaSettings
 from lockstep.server.media.sources.source_settings import SourceSettings
 from lockstep.server.recording.settings import RecordingSettings
 from lockstep.server.robot.credentials import link_access
+from lockstep.server.settings_file import SettingsFileSource
 from lockstep.server.sfu.settings import RelaySettings
 from lockstep.server.telemetry.logs import LogFormat
 from lockstep.server.util.robot_names import is_named
@@ -32,6 +33,7 @@ class Settings(NetworkSettings, LimitSettings, SourceSettings, RelaySettings, Fl
 
     model_config = SettingsConfigDict(env_prefix="LOCKSTEP_", env_nested_delimiter="__", frozen=True, extra="ignore")
 
+    config: Path | None = None  # TOML file of settings; those of the environment and of flags go before it
     host: str = "127.0.0.1"  # address that HTTP listens on
     port: Annotated[int, Field(ge=0, le=65535)] = 8000  # 0: any free port
     robot: str = "tcp://127.0.0.1:5600"  # the robot bridge; tls://host:port where it speaks TLS
@@ -74,6 +76,18 @@ class Settings(NetworkSettings, LimitSettings, SourceSettings, RelaySettings, Fl
     media: MediaSettings = MediaSettings()
     recording: RecordingSettings = RecordingSettings()
 
+    @classmethod
+    def settings_customise_sources(
+        cls,
+        settings_cls: type[BaseSettings],
+        init_settings: PydanticBaseSettingsSource,
+        env_settings: PydanticBaseSettingsSource,
+        dotenv_settings: PydanticBaseSettingsSource,
+        file_secret_settings: PydanticBaseSettingsSource,
+    ) -> tuple[PydanticBaseSettingsSource, ...]:
+        """Return where settings come from, the first one first: flags, the environment, the file."""
+        return init_settings, env_settings, SettingsFileSource(settings_cls, init_settings, env_settings)
+
     @model_validator(mode="before")
     @classmethod
     def _robot_with_a_name(cls, given: dict[str, object]) -> dict[str, object]:
@@ -96,7 +110,9 @@ class Settings(NetworkSettings, LimitSettings, SourceSettings, RelaySettings, Fl
             ipaddress.ip_address(address)
         return value
 
-    @field_validator("secret", "state_dir", "audit_anchor", "link_secret", "link_secret_file", mode="before")
+    @field_validator(
+        *("config", "secret", "state_dir", "audit_anchor", "link_secret", "link_secret_file"), mode="before"
+    )
     @classmethod
     def _empty_is_unset(cls, value: object) -> object:
         return None if value == "" else value

@@ -7,7 +7,7 @@ import hmac
 import time
 from collections.abc import AsyncIterator
 from pathlib import Path
-from typing import cast
+from typing import Any, cast
 
 import pytest
 
@@ -15,9 +15,9 @@ from lockstep.rtc.channels import ChannelMessage
 from lockstep.rtc.endpoint import Connection, Endpoint, EndpointSettings
 from lockstep.rtc.peer_events import Connected, PeerEvent, Restarted
 from lockstep.rtc.sdp import parse_description, write_description
-from lockstep.rtc.sockets.server_links import RelayRefused
+from lockstep.rtc.sockets.server_links import RelayRefused, open_relay
 from lockstep.rtc.stun import Kind, Message, parse, serialize
-from lockstep.rtc.turn.servers import IceServer
+from lockstep.rtc.turn.servers import IceServer, ServerUri
 from tests.support.turn_server import TURN_SECRET, TurnServer, running_turn_server
 
 HOST = "127.0.0.1"
@@ -80,6 +80,21 @@ async def test_a_server_that_refuses_or_is_not_there_is_named_and_the_others_cou
         assert len(troubles) == 2
         assert [each.code for each in refused] == [401]
         assert str(refused[0]).startswith("401")
+
+
+async def test_a_fault_in_the_questions_to_one_server_is_named_and_the_others_count(
+    turn: TurnServer, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    async def fails_once(uri: ServerUri, *rest: Any) -> Any:
+        if uri.transport == "udp":
+            raise ValueError("planted")
+        return await open_relay(uri, *rest)
+
+    monkeypatch.setattr("lockstep.rtc.endpoint.open_relay", fails_once)
+    async with Endpoint([HOST]) as endpoint:
+        troubles = await endpoint.ask([server(turn), server(turn, "tcp")])
+        assert [each.candidate.type for each in endpoint.candidates] == ["host", "relay"]
+        assert [repr(each) for each in troubles] == ["ValueError('planted')"]
 
 
 async def test_addresses_that_carry_nothing_are_given_back(turn: TurnServer) -> None:

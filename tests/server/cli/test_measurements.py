@@ -14,4 +14,4 @@ def test_a_command_that_is_listed_is_there_and_explains_itself(name: str) -> Non
     assert about in CliRunner().invoke(app, ["--help"], terminal_width=200).output
     asked = CliRunner().invoke(app, [name, "--help"], terminal_width=200)
     assert asked.exit_code == 0
-    assert {"interoperability": "--way"}.get(name, "--seed") in asked.output
+    assert {"interoperability": "--way", "soak-day": "--minutes"}.get(name, "--seed") in asked.output

@@ -52,6 +52,27 @@ def test_recordings_of_each_robot_go_into_a_directory_of_its_own(tmp_path: Path)
     assert {each.recording.directory for each in found.values()} == {tmp_path / "left", tmp_path / "right"}
 
 
+def test_a_robot_that_sets_something_of_its_recordings_keeps_a_directory_of_its_own(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    tables = """
+        [robots.left]
+        robot = "tcp://h:1"
+        recording = { automatic = true }
+        [robots.right]
+        robot = "tcp://h:2"
+        recording = { automatic = true, directory = "/elsewhere" }
+        """
+    path = fleet_file(tmp_path, tables)
+    expected = {"left": tmp_path / "left", "right": Path("/elsewhere")}
+    by_flag = Settings(fleet_file=path, recording={"directory": tmp_path})  # type: ignore[arg-type]
+    monkeypatch.setenv("LOCKSTEP_RECORDING__DIRECTORY", str(tmp_path))
+    for settings in (by_flag, Settings(fleet_file=path)):
+        found = robot_settings(settings)
+        assert {name: each.recording.directory for name, each in found.items()} == expected
+        assert all(each.recording.automatic for each in found.values())
+
+
 @pytest.mark.parametrize(
     ("text", "name"),
     [

@@ -1,13 +1,16 @@
-"""Pages in Chromium through a soak: an operator's, which keeps driving, and an observer's, which watches."""
+"""Pages through a soak: an operator's in Chromium, which keeps driving, and observers' in any browser, which watch."""
 
 import asyncio
 import time
 from collections.abc import Callable
-from typing import Any
+from typing import Any, Protocol
 
 from playwright.async_api import Error, Page
 
-__all__ = ["OperatorPage", "WatchedPage"]
+from lockstep.bench.browsers.firefox import Firefox
+from lockstep.bench.harness.restarting_total import RestartingTotal
+
+__all__ = ["FirefoxDocument", "OperatorPage", "WatchedPage"]
 
 LOOK_SECONDS = 0.25
 PATIENCE = 30.0  # s of calm in which a page has to be live again without a reload
@@ -17,19 +20,53 @@ PRESS = "([button, pressed]) => window.testPad.press(button, pressed)"
 TILT = "([axis, value]) => window.testPad.tilt(axis, value)"
 
 
+class Document(Protocol):
+    """A page of any browser."""
+
+    async def evaluate(self, expression: str, /) -> Any: ...
+
+    async def reload(self) -> Any: ...
+
+
+class FirefoxDocument:
+    """A page in Firefox."""
+
+    def __init__(self, firefox: Firefox, link: str) -> None:
+        self._firefox = firefox
+        self._link = link
+
+    async def evaluate(self, expression: str) -> Any:
+        try:
+            return await self._firefox.evaluate(expression)
+        except RuntimeError as error:  # the page is between two documents
+            raise Error(str(error)) from error
+
+    async def reload(self) -> None:
+        await self._firefox.open(self._link)
+
+
 class WatchedPage:
     """Reads the page's statistics. If the page does not come back, it is reloaded, which is counted."""
 
-    def __init__(self, page: Page, calm_seconds: Callable[[], float]) -> None:
-        self.page = page
+    def __init__(self, document: Document, calm_seconds: Callable[[], float]) -> None:
         self.reloads = 0
-        self.violations = 0
+        self.statistics: dict[str, Any] | None = None  # the newest
         self.slowest_return = 0.0  # s of calm until it was live again
-        self.events = 0  # events seen to advance
+        self._document = document
+        self._rendered, self._violations = RestartingTotal(), RestartingTotal()
         self._calm_seconds = calm_seconds
         self._live_at = time.monotonic()
-        self._last: dict[str, Any] | None = None
         self._news = asyncio.Event()
+
+    @property
+    def rendered(self) -> int:
+        """Pictures that were rendered, over all its connections."""
+        return self._rendered.value
+
+    @property
+    def violations(self) -> int:
+        """Pictures and sounds that were rendered outside the tolerance, over all its connections."""
+        return self._violations.value
 
     async def run(self) -> None:
         """Watch the page until cancelled."""
@@ -41,7 +78,7 @@ class WatchedPage:
                 continue  # the page is between two documents
 
     async def look(self) -> None:
-        statistics: dict[str, Any] | None = await self.page.evaluate("window.lockstep?.stats() ?? null")
+        statistics: dict[str, Any] | None = await self._document.evaluate("window.lockstep?.stats() ?? null")
         if statistics is not None:
             self._count(statistics)
         now = time.monotonic()
@@ -53,8 +90,8 @@ class WatchedPage:
         elif min(now - self._live_at, self._calm_seconds()) > PATIENCE:
             self.reloads += 1
             self._live_at = now
-            await self.page.reload()
-        self._last = statistics
+            await self._document.reload()
+        self.statistics = statistics
         if statistics is not None:
             await self.act(statistics)
 
@@ -67,12 +104,13 @@ class WatchedPage:
         """Act as the page's user does in this state."""
 
     def _count(self, statistics: dict[str, Any]) -> None:
-        self.violations = max(self.violations, sum(each["violations"] for each in statistics["streams"].values()))
+        self._violations.see(sum(each["violations"] for each in statistics["streams"].values()))
+        self._rendered.see(_rendered(statistics))
 
     def _shows_something_new(self, statistics: dict[str, Any]) -> bool:
         """Return whether pictures advance, which needs everything to work."""
         shown = _rendered(statistics)
-        return self._last is None or shown != _rendered(self._last)
+        return self.statistics is None or shown != _rendered(self.statistics)
 
 
 class OperatorPage(WatchedPage):
@@ -80,6 +118,10 @@ class OperatorPage(WatchedPage):
 
     arms = 0
     seat_requests = 0
+
+    def __init__(self, page: Page, calm_seconds: Callable[[], float]) -> None:
+        super().__init__(page, calm_seconds)
+        self.page = page
 
     async def act(self, statistics: dict[str, Any]) -> None:
         if not statistics["connected"] or statistics["stop"]["stopped"]:

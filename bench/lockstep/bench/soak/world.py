@@ -25,13 +25,16 @@ OPEN_ENCODERS = re.compile(r'^lockstep_media_encoders\{codec="(\w+)",stream="[^"
 class World:
     """A context manager in which the bridge runs; then call `open_console` with the console's address of the robot."""
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, *options: str, **settings: str) -> None:
+        """`options` and `settings` (LOCKSTEP_…): more of them, for the console."""
         self.console_url = ""
-        self.operator = self.observer = ""
+        self.operator = self.observer = self.supervisor = ""
+        self._options = options
         self.bridge_kills = self.server_restarts = 0
         self._environment = {
             "LOCKSTEP_STATE_DIR": str(folder / "state"),
             "LOCKSTEP_SECRET": secrets.token_urlsafe(32),  # so that links outlive a restart
+            **settings,
         }
         self._bridge, self._server = BridgeLives(folder), Lives()
         self._server_port = 0
@@ -152,8 +155,9 @@ class World:
     async def _start_server(self) -> None:
         command = (LOCKSTEP, "serve", "--json", "--quiet")
         where = ("--robot", self._robot_address, "--port", str(self._server_port))
-        ready = await self._server.begin(*command, *where, **self._environment)
-        self.console_url, self.operator, self.observer = ready["console"], ready["operator"], ready["observer"]
+        ready = await self._server.begin(*command, *where, *self._options, **self._environment)
+        self.console_url = ready["console"]
+        self.operator, self.supervisor, self.observer = ready["operator"], ready["supervisor"], ready["observer"]
         self._server_port = int(self.console_url.rsplit(":", 1)[1])
 
 

@@ -19,6 +19,7 @@ from lockstep.server.cli.options import (
     AllowedHosts,
     Board,
     Cameras,
+    Config,
     Microphones,
     ObserversDirect,
     PublicUrl,
@@ -163,6 +164,7 @@ def up(
     quiet: Quiet = False,
     log_format: LogFormatOption = None,
     state_dir: StateDirOption = None,
+    config: Config = None,
 ) -> None:
     """Run a simulated robot and the console, and print the links that open it."""
     network = _network(public_url, allowed_host, board, tls, tls_cert, tls_key, stun, turn, turn_secret)
@@ -184,6 +186,7 @@ def up(
         observers_direct=observers_direct,
         log_format=log_format,
         state_dir=state_dir,
+        config=config,
         **network,
     )
     file = ros2 or mjcf
@@ -265,6 +268,7 @@ def serve(
     quiet: Quiet = False,
     log_format: LogFormatOption = None,
     state_dir: StateDirOption = None,
+    config: Config = None,
 ) -> None:
     """Run the console for a robot bridge that runs elsewhere."""
     network = _network(public_url, allowed_host, board, tls, tls_cert, tls_key, stun, turn, turn_secret)
@@ -292,6 +296,7 @@ def serve(
         observers_direct=observers_direct,
         log_format=log_format,
         state_dir=state_dir,
+        config=config,
         **network,
     )
     _run(settings, {}, as_json, quiet)

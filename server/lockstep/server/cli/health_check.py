@@ -9,6 +9,7 @@ from urllib.error import URLError
 from urllib.request import urlopen
 
 from lockstep.server.settings import Settings
+from lockstep.server.settings_file import SettingsFileUnusable
 
 __all__ = ["health_url", "main"]
 
@@ -28,7 +29,7 @@ def main() -> int:
     try:
         with urlopen(health_url(Settings()), timeout=SECONDS, context=here) as answer:
             return 0 if answer.status == 200 else 1
-    except (URLError, OSError) as error:
+    except (URLError, OSError, SettingsFileUnusable) as error:
         sys.stderr.write(f"{error}\n")
         return 1
 

@@ -36,6 +36,11 @@ COMMANDS = {
         "Drive with each client over each network.",
     ),
     "soak": ("lockstep.bench.soak.cli", "soak_command", "Drive for a long time while everything fails now and then."),
+    "soak-day": (
+        "lockstep.bench.soak_day.cli",
+        "soak_day_command",
+        "Go on with a day of use that is compressed into two hours.",
+    ),
 }
 
 

@@ -10,6 +10,7 @@ __all__ = [
     "AllowedHosts",
     "Board",
     "Cameras",
+    "Config",
     "Microphones",
     "ObserversDirect",
     "PublicUrl",
@@ -39,6 +40,9 @@ class SpeedCapChoice(StrEnum):
     OPERATOR = "operator"
 
 
+Config = Annotated[
+    Path | None, typer.Option(help="TOML file of settings; flags and the environment override it. docs/deploy.md")
+]
 PublicUrl = Annotated[str | None, typer.Option(help="The console's public address, such as that of a reverse proxy.")]
 AllowedHosts = Annotated[
     list[str] | None,

@@ -4,6 +4,7 @@ import asyncio
 import datetime
 import gc
 import json
+import os
 import socket
 import sys
 from collections.abc import Coroutine, Mapping
@@ -13,6 +14,7 @@ from pathlib import Path
 import typer
 from fastapi import FastAPI
 
+from lockstep.robot_bridge.service_manager import ServiceManager
 from lockstep.rtc.interfaces import own_addresses
 from lockstep.server.cli.console_address import write_address
 from lockstep.server.composition.robot_app import create_app
@@ -32,6 +34,7 @@ from lockstep.server.util.state_dir import StateDirUnusable
 __all__ = ["ConsoleFailed", "run_console", "say"]
 
 PATIENCE = 2.0  # s until people are told that the console waits for a robot
+SIGNS_OF_LIFE = 4  # in each time after which the service manager restarts a silent console
 GC_THRESHOLDS = (5_000, 20, 10)  # allocations, young collections, middle collections
 
 
@@ -56,6 +59,7 @@ async def run_console(
     """
     certificate = _certificate(settings, state.directory.path)
     stopping = asyncio.get_running_loop().create_task(wait_for_signal())
+    service = ServiceManager(os.environ)
     try:
         addresses = await _unless(stopping, _start(bridges))
         if addresses is None:
@@ -73,18 +77,30 @@ async def run_console(
             with suppress(StateDirUnusable):  # `lockstep invite` then needs --url
                 write_address(state.directory, url)
             background.append(tasks.create_task(_announce(application, links, as_json)))
+            background.append(tasks.create_task(_report(service)))
             failed = tasks.create_task(application.state.failed.wait())
             await asyncio.wait((stopping, failed), return_when=asyncio.FIRST_COMPLETED)
+            service.stopping()
             for task in (*background, failed):
                 task.cancel()
         if not stopping.done():
             raise ConsoleFailed
     finally:
+        service.close()
         listener.close()
         stopping.cancel()
         with suppress(asyncio.CancelledError):
             await stopping
         await asyncio.gather(*(bridge.close() for bridge in bridges.values()))
+
+
+async def _report(service: ServiceManager) -> None:
+    """Tell the service manager that the console listens, and from then on that its event loop goes on."""
+    service.ready()
+    if service.watchdog_seconds is not None:
+        while True:
+            service.alive()
+            await asyncio.sleep(service.watchdog_seconds / SIGNS_OF_LIFE)
 
 
 def say(text: str) -> None:

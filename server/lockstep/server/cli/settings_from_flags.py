@@ -4,6 +4,7 @@ import typer
 from pydantic import ValidationError
 
 from lockstep.server.settings import Settings
+from lockstep.server.settings_file import SettingsFileUnusable
 
 __all__ = ["make_settings"]
 
@@ -11,7 +12,7 @@ EXIT_USAGE = 2
 
 
 def make_settings(**flags: object) -> Settings:
-    """Return the settings of the environment, overridden by the flags that were given.
+    """Return the settings of the file and of the environment, overridden by the flags that were given.
 
     Raises:
         typer.Exit: a setting is invalid; the exit code is 2.
@@ -20,6 +21,9 @@ def make_settings(**flags: object) -> Settings:
     given = {name: ",".join(value) if isinstance(value, list) else value for name, value in given.items()}
     try:
         return Settings(**given)  # type: ignore[arg-type]
+    except SettingsFileUnusable as error:
+        typer.echo(f"lockstep: {error}", err=True)
+        raise typer.Exit(EXIT_USAGE) from error
     except ValidationError as error:
         for each in error.errors():
             typer.echo(f"lockstep: {'.'.join(map(str, each['loc'])) or 'robot'}: {each['msg']}", err=True)

@@ -38,7 +38,7 @@ def robot_settings(settings: Settings) -> dict[str, Settings]:
     check_names(name for name, _ in tables)
     if not tables:
         raise BadFleet("no_robots", f"{settings.fleet_file}: the file has no table [robots.NAME]")
-    common = {name: getattr(settings, name) for name in settings.model_fields_set - {"robots", "fleet_file"}}
+    common = {name: getattr(settings, name) for name in settings.model_fields_set - {"robots", "fleet_file", "config"}}
     return {name: _settings(name, common, table) for name, table in tables}
 
 
@@ -48,15 +48,26 @@ def _settings(name: str, common: Mapping[str, Any], table: Mapping[str, Any]) ->
         raise BadFleet("setting_of_the_console", f"robot {name}: {', '.join(foreign)} cannot be set for one robot")
     if "robot" not in table:
         raise BadFleet("robot_without_address", f'robot {name}: the table needs robot = "tcp://host:port"')
+    nested = {
+        key: {**common[key].model_dump(exclude_unset=True), **value}
+        for key, value in table.items()
+        if isinstance(value, dict) and key in common
+    }
     try:
-        made = Settings(**{**common, "robots": (), "fleet_file": None, **table})
+        made = Settings(**{**common, "robots": (), "fleet_file": None, **table, **nested})
     except ValidationError as error:
         where = ".".join(map(str, error.errors()[0]["loc"])) or "robot"
         raise BadFleet("bad_setting", f"robot {name}: {where}: {error.errors()[0]['msg']}") from error
-    if made.recording.directory is not None and "recording" not in table:
+    if made.recording.directory is not None and not _has_directory(table):
         own = made.recording.model_copy(update={"directory": made.recording.directory / name})
         made = made.model_copy(update={"recording": own})
     return made
+
+
+def _has_directory(table: Mapping[str, Any]) -> bool:
+    """Return whether the robot's recordings have a directory of their own."""
+    recording = table.get("recording")
+    return isinstance(recording, dict) and "directory" in recording
 
 
 def _tables(settings: Settings) -> dict[str, Mapping[str, Any]]:
@@ -67,6 +78,8 @@ def _tables(settings: Settings) -> dict[str, Mapping[str, Any]]:
     except (OSError, UnicodeError, tomllib.TOMLDecodeError) as error:
         raise BadFleet("fleet_unreadable", f"{settings.fleet_file}: {error}") from error
     tables = content.pop("robots", {})
+    if settings.fleet_file == settings.config:  # the console's own settings stand beside the tables
+        content = {}
     if content or not isinstance(tables, dict) or not all(isinstance(each, dict) for each in tables.values()):
         raise BadFleet("fleet_unreadable", f"{settings.fleet_file}: the file may hold only tables [robots.NAME]")
     return tables

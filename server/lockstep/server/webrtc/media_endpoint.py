@@ -73,7 +73,7 @@ class MediaEndpoint:
             if servers:
                 asked = [turn.IceServer(x.urls, x.username or None, x.credential or None) for x in servers]
                 for refusal in await endpoint.ask(asked):
-                    log.warning("a TURN server gave no address", detail=str(refusal))
+                    log.warning("a TURN server gave no address", detail=str(refusal) or repr(refusal))
             return endpoint.connect(controlling=controlling, settings=settings, listener=listener, turns=turns)
 
     def close(self) -> None:

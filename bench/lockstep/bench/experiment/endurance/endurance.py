@@ -9,6 +9,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
+from lockstep.bench.harness.restarting_total import RestartingTotal
 from lockstep.emulator.impairment.outages import PlannedOutage
 
 __all__ = ["Endurance", "Lost", "cut_for_long"]
@@ -36,22 +37,6 @@ def cut_for_long(outages: Sequence[PlannedOutage], at: float) -> bool:
     return False
 
 
-class _Total:
-    """Sums a count that begins at 0 again with every new connection."""
-
-    def __init__(self) -> None:
-        self._before = self._now = 0
-
-    def see(self, value: int) -> None:
-        if value < self._now:
-            self._before += self._now
-        self._now = value
-
-    @property
-    def value(self) -> int:
-        return self._before + self._now
-
-
 @dataclass
 class Endurance:
     """Counts of a run, from the client's statistics (`look`) and the console's counts (`ended`) as time goes on."""
@@ -68,7 +53,7 @@ class Endurance:
     _live_at: float = 0.0
     _was_live: bool = False
     _was_mine: bool = False
-    _totals: dict[tuple[str, str], _Total] = field(default_factory=dict)
+    _totals: dict[tuple[str, str], RestartingTotal] = field(default_factory=dict)
 
     def look(
         self, at: float, *, live: bool, mine: bool, driving: bool, streams: Mapping[str, Mapping[str, Any]]
@@ -86,7 +71,7 @@ class Endurance:
         self._was_live, self._was_mine = live, mine
         for name, each in streams.items():
             for what in ("rendered", "violations"):
-                self._totals.setdefault((f"{each['kind']} {what}", name), _Total()).see(each[what])
+                self._totals.setdefault((f"{each['kind']} {what}", name), RestartingTotal()).see(each[what])
 
     def ended(self, at: float, counts: Mapping[str, float]) -> list[Lost]:
         """Count the console's ended connections, by reason, and return only the new ones."""

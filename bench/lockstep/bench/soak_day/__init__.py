@@ -1,0 +1,1 @@
+"""Runs what a day of use consists of, in as many runs as it takes."""

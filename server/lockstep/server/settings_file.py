@@ -1,0 +1,85 @@
+"""Reads settings from a TOML file. Flags and environment variables override it."""
+
+import tomllib
+from collections.abc import Iterator, Mapping
+from difflib import get_close_matches
+from pathlib import Path
+from typing import Any, get_args
+
+from pydantic import BaseModel
+from pydantic.fields import FieldInfo
+from pydantic_settings import BaseSettings, PydanticBaseSettingsSource
+
+__all__ = ["SettingsFileSource", "SettingsFileUnusable", "read_settings_file"]
+
+ELSEWHERE = frozenset({"config"})  # a file that names another would need an order between them
+
+
+class SettingsFileUnusable(Exception):
+    """The file cannot be read, is not TOML, or names a setting that does not exist. The text says where."""
+
+
+class SettingsFileSource(PydanticBaseSettingsSource):
+    """The settings in the file that `config` names, by a flag or by the environment; none without it."""
+
+    def __init__(self, settings: type[BaseSettings], *sources: PydanticBaseSettingsSource) -> None:
+        """`sources`: where `config` may be set, the first one first."""
+        super().__init__(settings)
+        self._sources = sources
+
+    def get_field_value(self, field: FieldInfo, field_name: str) -> tuple[Any, str, bool]:
+        """Return nothing: a call of this source returns all fields at once."""
+        return None, field_name, False
+
+    def __call__(self) -> dict[str, Any]:
+        """Return the settings by name.
+
+        Raises:
+            SettingsFileUnusable: the file is no file of settings.
+        """
+        for source in self._sources:
+            path = source().get("config")
+            if path:
+                return read_settings_file(Path(path), self.settings_cls)
+        return {}
+
+
+def read_settings_file(path: Path, settings: type[BaseModel]) -> dict[str, Any]:
+    """Return the settings in `path` by name. Tables `[robots.NAME]` make it the fleet's file as well.
+
+    Raises:
+        SettingsFileUnusable: it cannot be read, is not TOML, or has a name that no setting has.
+    """
+    try:
+        content = tomllib.loads(path.read_text())
+    except (OSError, UnicodeError, tomllib.TOMLDecodeError) as error:
+        raise SettingsFileUnusable(f"{path}: {error}") from error
+    if isinstance(content.get("robots"), dict):
+        del content["robots"]
+        wrong = next((name for name in ("robot", "fleet_file") if name in content), None)
+        if wrong is not None:
+            raise SettingsFileUnusable(f"{path}: {wrong} cannot stand beside tables [robots.NAME]")
+        content["fleet_file"] = str(path)
+    unknown = next(_unknown(content, settings, ""), None)
+    if unknown is not None:
+        raise SettingsFileUnusable(f"{path}: {unknown}")
+    return content
+
+
+def _unknown(content: Mapping[str, Any], settings: type[BaseModel], within: str) -> Iterator[str]:
+    """Yield a sentence for each name that no setting has."""
+    names = settings.model_fields.keys() - ELSEWHERE
+    for name, value in content.items():
+        if name not in names:
+            near = get_close_matches(name, names, 1)
+            yield f"{within}{name} is not a setting{f'; did you mean {within}{near[0]}?' if near else ''}"
+        elif isinstance(value, dict):
+            inner = _nested(settings.model_fields[name])
+            if inner is not None:
+                yield from _unknown(value, inner, f"{within}{name}.")
+
+
+def _nested(field: FieldInfo) -> type[BaseModel] | None:
+    """Return the class of a setting that is a table."""
+    kinds = (field.annotation, *get_args(field.annotation))
+    return next((kind for kind in kinds if isinstance(kind, type) and issubclass(kind, BaseModel)), None)
