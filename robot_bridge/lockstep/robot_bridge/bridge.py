@@ -6,7 +6,7 @@ import logging
 import secrets
 from collections import Counter
 from types import TracebackType
-from typing import Self
+from typing import TYPE_CHECKING, Self
 
 from lockstep.robot_bridge.actions.action_runner import ActionRunner
 from lockstep.robot_bridge.control import clock
@@ -19,7 +19,7 @@ from lockstep.robot_bridge.control.tick_alarm import TickAlarm
 from lockstep.robot_bridge.control.tick_loop import TickLoop
 from lockstep.robot_bridge.counters import BridgeCounters
 from lockstep.robot_bridge.description.check_description import check_description
-from lockstep.robot_bridge.dial.dialer import Dialer
+from lockstep.robot_bridge.dial.console_access import ConsoleAccess
 from lockstep.robot_bridge.encoding.media_encoding import MediaEncoding
 from lockstep.robot_bridge.errors import RobotFailed, named
 from lockstep.robot_bridge.event_log import EventLog
@@ -35,6 +35,9 @@ from lockstep.robot_bridge.stop.stop_keeper import StopKeeper
 from lockstep.robot_bridge.watchdog.liveness import Liveness
 from lockstep.robot_bridge.watchdog.stall import watchdog_seconds
 from lockstep.robot_bridge.watchdog.watchdogs import Watchdogs
+
+if TYPE_CHECKING:
+    from lockstep.robot_bridge.dial.dialer import Dialer
 
 __all__ = ["Bridge"]
 
@@ -114,7 +117,7 @@ class Bridge:
             tls=None if settings.tls is None else settings.tls.bridge_context(),
             encoding=encoding,
         )
-        self._dialer = None if settings.console is None else Dialer(settings.console, self._links)
+        self._dialer = None if settings.console is None else _dialer(settings.console, self._links)
         self._ticks = TickLoop(
             *(robot, description.hold, shaper, executor, self._stops),
             *(self._watchdogs, self._liveness, self._links, alarm, counters),
@@ -291,6 +294,13 @@ class Bridge:
             dict(counters.left_out),
             dict(counters.endings),
         )
+
+
+def _dialer(access: ConsoleAccess, links: LinkServer) -> "Dialer":
+    """Return what dials the console. It is imported here, because a ROS installation's Python has no `websockets`."""
+    from lockstep.robot_bridge.dial.dialer import Dialer
+
+    return Dialer(access, links)
 
 
 def first_cause(error: BaseException) -> BaseException:

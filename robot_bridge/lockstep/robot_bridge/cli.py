@@ -26,6 +26,7 @@ from lockstep.robot_bridge.errors import (
     BadRobot,
     BridgeError,
     DescriptionError,
+    DiallingMissing,
     EncoderMissing,
     InsecureLink,
     ModelError,
@@ -52,7 +53,16 @@ EXIT_FAILED = 1
 EXIT_USAGE = 2
 # A retry does not help against these errors; it may against the others, such as a robot that is not switched on yet.
 CANNOT_BE_MEANT = (
-    *(UnknownRobot, BadRobot, SettingsError, ModelError, DescriptionError, EncoderMissing, InsecureLink),
+    *(
+        UnknownRobot,
+        BadRobot,
+        SettingsError,
+        ModelError,
+        DescriptionError,
+        DiallingMissing,
+        EncoderMissing,
+        InsecureLink,
+    ),
     *(SecretError, BadConsoleAddress, NotPaired, PairingRefused),
 )
 

@@ -31,6 +31,7 @@ __all__ = [
     "ConsoleRefused",
     "ConsoleUnreachable",
     "DescriptionError",
+    "DiallingMissing",
     "EncoderMissing",
     "EncodingFailed",
     "InsecureLink",
@@ -89,6 +90,10 @@ class SettingsError(BridgeError):
 
 class ModelError(BridgeError):
     name = "model"
+
+
+class DiallingMissing(BridgeError):
+    name = "dialling_missing"
 
 
 class EncoderMissing(BridgeError):

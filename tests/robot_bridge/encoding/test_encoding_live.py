@@ -96,7 +96,7 @@ async def test_size_and_rate_are_those_that_are_asked_for() -> None:
             pass
         assert (first.keyframe, first.width, first.height) == (True, whole.width // 2, whole.height // 2)
         times = [each.time for each in await pictures(link, 6)]
-        assert min(later - earlier for earlier, later in zip(times, times[1:], strict=False)) > 0.1
+        assert (times[-1] - times[0]) / 5 > 0.15, "a camera of 30 Hz, of which 5 pictures a second are encoded"
 
 
 async def test_requests_that_make_no_sense_change_nothing() -> None:

@@ -24,7 +24,10 @@ export const SPAN_LABELS: Record<SpanName, SpanLabel> = {
   send_ms: { label: "to the socket", about: "encrypting its packets, up to the socket or the pacer" },
   assemble_ms: { label: "assemble", about: "from its last packet until it is whole and in order" },
   transform_ms: { label: "transform", about: "reading its event stamp" },
-  decode_ms: { label: "decode", about: "until the decoded picture is there" },
+  decode_ms: {
+    label: "decode",
+    about: "until the decoded picture is there; from its last packet on, where it passes no transform",
+  },
   gate_ms: { label: "gate", about: "until the gate lets it pass" },
   draw_ms: { label: "draw", about: "onto the canvas" },
   between_ms: { label: "network", about: "both directions, and all that nobody measures" },

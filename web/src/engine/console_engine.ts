@@ -351,8 +351,7 @@ export class ConsoleEngine {
     else if (message.type === "action") {
       this.actionMs = now;
       this.actions.updated(message);
-    }
-    else if (message.type === "traces") this.tracing.told(message);
+    } else if (message.type === "traces") this.tracing.told(message);
   }
 
   /** Whoever drives next has to arm, and nothing of the one before is executed. */

@@ -1,7 +1,10 @@
 import { pictureOfElement, pictureOfFrame, type Picture } from "./picture";
 
-/** Takes each decoded picture with its RTP timestamp, and owns the picture from then on. */
-export type OnPicture = (picture: Picture, rtpTimestamp: number) => void;
+/**
+ * Takes each decoded picture with its RTP timestamp, and owns the picture from then on. `receivedMs`: performance.now()
+ * when its last packet came; null where the browser does not say.
+ */
+export type OnPicture = (picture: Picture, rtpTimestamp: number, receivedMs: number | null) => void;
 
 /** Chromium's mediacapture-transform on the page; not in TypeScript's library. */
 type TrackProcessor = new (init: { track: MediaStreamTrack; maxBufferSize?: number }) => {
@@ -9,7 +12,7 @@ type TrackProcessor = new (init: { track: MediaStreamTrack; maxBufferSize?: numb
 };
 
 interface RtpFrame {
-  metadata?(): { rtpTimestamp?: number };
+  metadata?(): { rtpTimestamp?: number; receiveTime?: number };
 }
 
 /** Decoded pictures of a track, as early as the browser gives them. Returns what ends them. */
@@ -26,9 +29,9 @@ function readProcessor(readable: ReadableStream<VideoFrame>, onpicture: OnPictur
     for (;;) {
       const { value, done } = await reader.read();
       if (done) return;
-      const rtpTimestamp = (value as RtpFrame).metadata?.().rtpTimestamp;
+      const { rtpTimestamp, receiveTime } = (value as RtpFrame).metadata?.() ?? {};
       if (rtpTimestamp === undefined) value.close();
-      else onpicture(pictureOfFrame(value), rtpTimestamp);
+      else onpicture(pictureOfFrame(value), rtpTimestamp, receiveTime ?? null);
     }
   };
   // The stream errs when its track ends with the connection, which is reported elsewhere.
@@ -49,7 +52,7 @@ function readElement(track: MediaStreamTrack, onpicture: OnPicture): () => void 
   const next = (_now: number, metadata: VideoFrameCallbackMetadata): void => {
     handle = video.requestVideoFrameCallback(next);
     if (metadata.rtpTimestamp !== undefined && video.videoWidth > 0)
-      onpicture(pictureOfElement(video), metadata.rtpTimestamp);
+      onpicture(pictureOfElement(video), metadata.rtpTimestamp, metadata.receiveTime ?? null);
   };
   handle = video.requestVideoFrameCallback(next);
   // Muted video may always play; it is interrupted only by being closed.

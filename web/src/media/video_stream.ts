@@ -1,7 +1,6 @@
 import { closePictureGate, createPictureGate, offerPicture, settlePicture } from "../gate/picture_gate";
-import { UNMARKED, type FrameMark, type GateContext } from "../gate/gate_counters";
+import type { FrameMark, GateContext } from "../gate/gate_counters";
 import { createRateMeter, noteOccurrence } from "../util/samples";
-import { findMark } from "../gate/stamp_table";
 import type { MediaSection } from "../transport/webrtc/media_section";
 import type { StreamInfo } from "../protocol/wire";
 import { openFrames, type OnPicture } from "./frame_source";
@@ -34,14 +33,15 @@ export class VideoStream {
     readonly canvas: HTMLCanvasElement,
     private readonly events: VideoStreamEvents,
   ) {
-    this.drawing = canvas.getContext("2d", { alpha: false });
+    // Desynchronized: a picture goes to the screen when it is drawn, and not with the page's next frame.
+    this.drawing = canvas.getContext("2d", { alpha: false, desynchronized: true });
     if (section.stamps !== null) {
       section.stamps.onstamp = () => this.settle();
       section.stamps.onframe = (rtpTimestamp, times) => this.trace.transformed(rtpTimestamp, times);
     }
-    const take: OnPicture = (picture, rtpTimestamp) => {
+    const take: OnPicture = (picture, rtpTimestamp, receivedMs) => {
       this.lastGoodMs = performance.now();
-      this.trace.decoded(rtpTimestamp, this.lastGoodMs);
+      this.trace.decoded(rtpTimestamp, this.lastGoodMs, receivedMs);
       offerPicture(this.gate, picture, rtpTimestamp, this.lookup, events.context(), this.draw);
     };
     this.endFrames = section.track === null ? () => undefined : openFrames(section.track, take);
@@ -57,10 +57,7 @@ export class VideoStream {
     closePictureGate(this.gate);
   }
 
-  private readonly lookup = (rtpTimestamp: number): FrameMark | undefined => {
-    const { stamps } = this.section;
-    return stamps === null ? UNMARKED : findMark(stamps.table, rtpTimestamp);
-  };
+  private readonly lookup = (rtpTimestamp: number): FrameMark | undefined => this.section.mark(rtpTimestamp);
 
   private readonly draw = (
     picture: Picture,

@@ -108,6 +108,7 @@ export class Peer {
   private listen(): void {
     const { connection, channels } = this.pending;
     this.pending.listen((channel, data, at) => this.events.message(channel, data, at));
+    this.pending.onunreadable = () => this.finish(new PeerEnd("lost", ""));
     for (const channel of Object.values(channels)) {
       channel.onclose = () => this.finish(consoleClosed(), true);
       if (channel.readyState === "closed") this.finish(consoleClosed(), true);

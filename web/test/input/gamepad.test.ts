@@ -30,7 +30,14 @@ function padOf(...reports: Report[]): { pad: Pad; plugged: string[] } {
   vi.stubGlobal("localStorage", { getItem: () => null, setItem: () => undefined });
   const plugged: string[] = [];
   const nothing = (): void => undefined;
-  const others = { stop: nothing, arm: nothing, nextLayer: nothing, lost: nothing, silent: nothing };
+  const others = {
+    stop: nothing,
+    arm: nothing,
+    nextLayer: nothing,
+    action: nothing,
+    lost: nothing,
+    silent: nothing,
+  };
   const pad = new Pad({ ...others, plugged: (words) => plugged.push(words) }, new GamepadStorage());
   return { pad, plugged };
 }

@@ -1,5 +1,6 @@
 // Put into the operator's page before its own scripts: notes when each decoded picture was drawn on a camera's canvas
-// (`at`), and when the browser began to compose the frame that shows it (`composed`). The page knows nothing of it.
+// (`at`), and when the page began its next frame (`composed`), which shows the picture unless the canvas has a surface
+// of its own (`surface`). The page knows nothing of it.
 (() => {
   const probe = { shown: [], stream: null };
   const prototype = CanvasRenderingContext2D.prototype;
@@ -11,7 +12,8 @@
     if (stream === undefined || (probe.stream !== null && stream !== probe.stream)) return;
     const rtp = image instanceof VideoFrame ? image.metadata().rtpTimestamp : undefined;
     if (rtp === undefined) return;
-    const entry = { rtp, at, composed: null };
+    const surface = this.getContextAttributes().desynchronized;
+    const entry = { rtp, at, composed: null, surface };
     probe.shown.push(entry);
     requestAnimationFrame(() => (entry.composed = performance.now()));
   };

@@ -4,10 +4,11 @@ The bridge logs the time of capture of each picture. A probe, put into the page 
 and the time of each drawing on the main camera's canvas; `bench.media_join` finds the captured picture, and
 `bench.page_clock` puts both on one clock. Rendering at the robot and the way over TCP are part of the time.
 
-A picture is "drawn" when the page has drawn it on its canvas. It is "shown" when the browser then begins to compose a
-frame, the same moment at which requestVideoFrameCallback tells a bare page about a picture of its <video>. The
-baselines are that bare page on `bench.baseline_server`, and pictures over WebSockets (`bench.rivals`), one after the
-other in the same run, at the same bridge, without an operator.
+A picture is "drawn" when the page has drawn it on its canvas, or a bare page has given it to the compositor
+(requestVideoFrameCallback's presentationTime). It is "shown" when the browser has drawn the frame with it into its
+window, as Chromium's trace tells (`bench.window_trace`). The baselines are that bare page on `bench.baseline_server`,
+and pictures over WebSockets (`bench.rivals`), one after the other in the same run, at the same bridge, without an
+operator.
 """
 
 import asyncio
@@ -17,12 +18,13 @@ from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from typing import Any, NamedTuple
 
-from playwright.async_api import Page
+from playwright.async_api import Browser, Page
 
 from lockstep.bench.browsers.chromium import PAD, running_chromium
 from lockstep.bench.browsers.console_page import LEFT_Y, RB, ConsolePage
 from lockstep.bench.browsers.page_clock import PageClock, read_page_clock
 from lockstep.bench.browsers.probed_page import DRAW_PROBE, open_probed_page
+from lockstep.bench.browsers.window_trace import WindowTrace, traced_window
 from lockstep.bench.context import Context
 from lockstep.bench.figures.media_join import join_pictures
 from lockstep.bench.figures.results import Result
@@ -81,12 +83,12 @@ async def _lockstep(stack: Stack, seconds: float) -> tuple[Delays, Delays]:
         await console.until_live()
         sent = await _sent(stack)
         began = time.monotonic()
-        idle = await measured_spell(page, stack.bridge, seconds)
+        idle = await measured_spell(browser, page, stack.bridge, seconds)
         megabits = (await _sent(stack) - sent) * 8 / (time.monotonic() - began) / 1e6
         codec = (await console.stats())["streams"][CAMERA]["codec"]
         idle = idle._replace(megabits=megabits, codec=codec)
         async with driving_in_circles(console):
-            return idle, await measured_spell(page, stack.bridge, seconds)
+            return idle, await measured_spell(browser, page, stack.bridge, seconds)
 
 
 async def _sent(stack: Stack) -> float:
@@ -115,7 +117,7 @@ async def bare_page(bridge: Bridge, seconds: float) -> Delays:
         open_probed_page(browser, ready["console"]) as page,
     ):
         await page.wait_for_function("() => window.drawProbe?.shown.length > 3")
-        return await measured_spell(page, bridge, seconds)
+        return await measured_spell(browser, page, bridge, seconds)
 
 
 async def _rival(bridge: Bridge, kind: str, seconds: float) -> Delays:
@@ -128,32 +130,50 @@ async def _rival(bridge: Bridge, kind: str, seconds: float) -> Delays:
         await page.wait_for_function("() => window.drawProbe?.shown.length > 3")
         await asyncio.sleep(SETTLE)
         clock = await read_page_clock(page)
-        await page.evaluate(TAKE)
-        bytes_before = await page.evaluate("window.drawProbe.bytes")
-        await asyncio.sleep(seconds)
-        shown = [entry for entry in await page.evaluate(TAKE) if entry["composed"] is not None]
-        received = await page.evaluate("window.drawProbe.bytes") - bytes_before
+        async with traced_window(browser) as traces:
+            await page.evaluate(TAKE)
+            bytes_before = await page.evaluate("window.drawProbe.bytes")
+            await asyncio.sleep(seconds)
+            pictures = await page.evaluate(TAKE)
+            received = await page.evaluate("window.drawProbe.bytes") - bytes_before
+    shown = _shown(pictures, clock, traces[0])
     await asyncio.sleep(LOG_DELAY)
     first, last = shown[0]["captured"], shown[-1]["captured"]
     spell = [time for time in capture_times(bridge.event_log, CAMERA) if first - LOG_ROUNDING <= time <= last]
     return Delays(
         drawn=[(clock.monotonic(entry["at"]) - entry["captured"]) * 1000 for entry in shown],
-        shown=[(clock.monotonic(entry["composed"]) - entry["captured"]) * 1000 for entry in shown],
+        shown=[(entry["shown"] - entry["captured"]) * 1000 for entry in shown],
         share=len(shown) / len(spell),
         uncertainty=clock.uncertainty * 1000,
         megabits=received * 8 / seconds / 1e6,
     )
 
 
-async def measured_spell(page: Page, bridge: Bridge, seconds: float) -> Delays:
+async def measured_spell(browser: Browser, page: Page, bridge: Bridge, seconds: float) -> Delays:
     """Measure the pictures shown in `seconds`, after a short wait."""
     await asyncio.sleep(SETTLE)
     clock = await read_page_clock(page)
-    await page.evaluate(TAKE)
-    await asyncio.sleep(seconds)
-    shown = [entry for entry in await page.evaluate(TAKE) if entry["composed"] is not None]
+    async with traced_window(browser) as traces:
+        await page.evaluate(TAKE)
+        await asyncio.sleep(seconds)
+        pictures = await page.evaluate(TAKE)
     await asyncio.sleep(LOG_DELAY)
-    return _delays(shown, capture_times(bridge.event_log, CAMERA), clock)
+    return _delays(_shown(pictures, clock, traces[0]), capture_times(bridge.event_log, CAMERA), clock)
+
+
+def _shown(pictures: list[dict[str, Any]], clock: PageClock, trace: WindowTrace) -> list[dict[str, Any]]:
+    """Return the pictures that reached the window, with the time when they did (s, monotonic)."""
+    found = []
+    for entry in pictures:
+        if entry["surface"]:
+            shown = trace.shown_by_surface(clock.monotonic(entry["at"]) - clock.uncertainty)
+        elif entry["composed"] is not None:
+            shown = trace.shown_by_page(clock.monotonic(entry["composed"]) - clock.uncertainty)
+        else:
+            continue
+        if shown is not None:
+            found.append({**entry, "shown": shown})
+    return found
 
 
 def _delays(shown: list[dict[str, Any]], captured: list[float], clock: PageClock) -> Delays:
@@ -164,7 +184,7 @@ def _delays(shown: list[dict[str, Any]], captured: list[float], clock: PageClock
     spell = [time for time in near if pairs[0][1] <= time <= pairs[-1][1]]
     return Delays(
         drawn=[(clock.monotonic(entry["at"]) - time) * 1000 for entry, time in pairs],
-        shown=[(clock.monotonic(entry["composed"]) - time) * 1000 for entry, time in pairs],
+        shown=[(entry["shown"] - time) * 1000 for entry, time in pairs],
         share=len(pairs) / len(spell),
         uncertainty=clock.uncertainty * 1000,
     )

@@ -52,7 +52,7 @@ async def _driven(stack: Stack, seconds: float) -> tuple[list[float], dict[str, 
         await page.evaluate("window.lockstep.trace(true)")
         async with driving_in_circles(console):
             began = await page.evaluate("performance.now()")
-            delays = await measured_spell(page, stack.bridge, seconds)
+            delays = await measured_spell(browser, page, stack.bridge, seconds)
             await asyncio.sleep(0.5)  # what the console has still to tell
             traced = await page.evaluate("window.lockstep.traces()")
     return delays.drawn, {kind: [each for each in all_ if each["atMs"] >= began] for kind, all_ in traced.items()}

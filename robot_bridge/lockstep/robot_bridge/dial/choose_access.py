@@ -1,6 +1,7 @@
 """Which console `lockstep robot` dials: by a code that pairs now, a key file, or what it was paired with before."""
 
 import asyncio
+import importlib.util
 import logging
 import sys
 from pathlib import Path
@@ -9,8 +10,7 @@ from lockstep.protocol.dial_in import PairingCode
 from lockstep.robot_bridge.dial.console_access import ConsoleAccess
 from lockstep.robot_bridge.dial.console_address import ConsoleAddress
 from lockstep.robot_bridge.dial.console_key import load_key, read_key_file, save_key
-from lockstep.robot_bridge.dial.pairing import code_digest, pair
-from lockstep.robot_bridge.errors import NotPaired
+from lockstep.robot_bridge.errors import DiallingMissing, NotPaired
 
 __all__ = ["choose_access"]
 
@@ -34,12 +34,15 @@ def choose_access(
 
     Raises:
         BadConsoleAddress, NotPaired, PairingRefused, ConsoleRefused, ConsoleUnreachable, WrongConsole: with what to do
+        DiallingMissing: this Python has no `websockets`, as that of a ROS installation.
         SecretError: a file, or the code, cannot be used.
     """
     if console is None:
         if code is not None or key_file is not None or authority is not None:
             raise NotPaired("--pair, --console-key-file and --console-ca need --console wss://…, the console's address")
         return None
+    if importlib.util.find_spec("websockets") is None:
+        raise DiallingMissing("--console needs the Python package websockets; install it for this interpreter")
     address = ConsoleAddress.parse(console)
     if key_file is not None:
         return ConsoleAccess(address, read_key_file(key_file), authority)
@@ -52,6 +55,8 @@ def choose_access(
                 " which shows the code for --pair; or give --console-key-file"
             )
         return ConsoleAccess(address, kept, authority)
+    from lockstep.robot_bridge.dial.pairing import code_digest, pair  # imports websockets
+
     wanted = PairingCode.parse(sys.stdin.readline() if code == "-" else code)
     try:
         kept = load_key(directory)

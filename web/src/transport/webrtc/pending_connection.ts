@@ -3,6 +3,7 @@ import type { IceServer } from "../signalling/ice_servers";
 import { preferCodecs } from "./codec_preference";
 import { askForCaptureTime } from "./header_extensions";
 import { receivedSection, type MediaSection } from "./media_section";
+import { SourceStamps, noteUnreadable, sourcesTell } from "./source_stamps";
 import type { StampReader } from "../encoded_transform/stamp_reader";
 import type { WhepAnswer } from "../signalling/whep";
 
@@ -41,6 +42,7 @@ export class PendingConnection {
   readonly channels: Readonly<Record<ChannelName, RTCDataChannel>>;
   readonly sections: OfferedSection[] = [];
   voice: RTCRtpTransceiver | null = null; // nothing is sent in it before somebody talks
+  onunreadable: (() => void) | null = null; // no picture has a stamp here: the next connection reads them otherwise
   private early: EarlyMessage[] = [];
   private heard: OnMessage | null = null;
   private made: RTCSessionDescriptionInit | null = null; // the newest offer
@@ -71,9 +73,19 @@ export class PendingConnection {
     this.takesTrailer ||= offered.includes(false);
     for (const [index, transceiver] of transceivers.entries()) {
       const kind = kinds[index] ?? "video";
-      const stamps = this.reader?.attach(transceiver.receiver, kind, this.takesTrailer) ?? null;
-      this.sections.push({ ...receivedSection(kind, transceiver.receiver, stamps), transceiver });
+      this.sections.push({ ...this.marked(kind, transceiver.receiver), transceiver });
     }
+  }
+
+  private marked(kind: "audio" | "video", receiver: RTCRtpReceiver): MediaSection {
+    if (this.reader !== null && kind === "video" && !this.takesTrailer && sourcesTell())
+      return receivedSection(kind, receiver, null, new SourceStamps(receiver, () => this.unreadable()));
+    return receivedSection(kind, receiver, this.reader?.attach(receiver, kind, this.takesTrailer) ?? null);
+  }
+
+  private unreadable(): void {
+    noteUnreadable();
+    this.onunreadable?.();
   }
 
   /** For this person's voice; a console without a loudspeaker leaves it inactive. */
