@@ -176,7 +176,8 @@ async def test_a_pad_that_reported_all_the_time_and_falls_silent_while_it_is_hel
         await console.until_live()
         await console.page.evaluate(REPORTS)
         async with console.driving():
-            await console.until("s.driving && window.looks > 300", 60)  # a pad that reports the same again is there
+            # More than 200 ticks, with up to a dozen looks for each: a pad that reports the same again is there.
+            await console.until("s.driving && window.looks > 3000", 60)
         await console.page.evaluate(
             "void (window.reports = false)"
         )  # out of range: stick and deadman stay as they were

@@ -49,7 +49,7 @@ export class Controls {
 
   /** `isTick`: at a tick pads are read in any case, so that one that has fallen silent is noticed. */
   sample(isTick: boolean): ControlSample {
-    if (isTick || this.hasPadNews) this.pad?.poll();
+    if (isTick || this.hasPadNews) this.pad?.poll(isTick);
     const { keyboard, sticks, readyPad: pad } = this;
     const touch = sticks.deadman ? sticks.inputs : null;
     const held: HeldInputs = { pad: pad?.inputs ?? null, keys: keyboard.keys, touch };

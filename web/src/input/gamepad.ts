@@ -35,6 +35,7 @@ interface Known {
   readonly id: string;
   readonly seen: SeenAtRest;
   readonly silence: ReportTimeout;
+  readMs: number; // Gamepad.timestamp of the report that was read last
   pressed: ReadonlySet<PadAction> | null; // null: not read yet, so nothing is a new press
 }
 
@@ -72,11 +73,14 @@ export class Pad {
 
   /** Whether a pad has reported since it was read. With pads that give no times it never has. */
   get hasNews(): boolean {
-    return this.all().some((pad) => this.known.get(pad.index)?.silence.stampMs !== pad.timestamp);
+    return this.all().some((pad) => this.known.get(pad.index)?.readMs !== pad.timestamp);
   }
 
-  /** Reads all pads, and tells of what was pressed since the last time. */
-  poll(): void {
+  /**
+   * Reads all pads, and tells of what was pressed since the last time. `isTick`: only reads at the ticks count for whether
+   * a pad has fallen silent, since its rule goes by their rate.
+   */
+  poll(isTick = true): void {
     const pads = this.all();
     this.notePlugs(pads);
     const before = this.state;
@@ -88,7 +92,8 @@ export class Pad {
     this.state = this.isSuspended ? null : state;
     const isOther = before?.gamepad.index !== state?.gamepad.index || before?.id !== state?.id;
     if (before?.ready === true && isOther) this.events.lost();
-    this.listen(pads, performance.now());
+    for (const pad of pads) this.knownOf(pad).readMs = pad.timestamp;
+    if (isTick) this.listen(pads, performance.now());
     if (!this.isSuspended) for (const each of states) this.tellPresses(each, each === state);
   }
 
@@ -137,6 +142,7 @@ export class Pad {
       id: gamepad.id,
       seen: new Set(),
       silence: createReportTimeout(),
+      readMs: -1,
       pressed: null,
     };
     this.known.set(gamepad.index, fresh);
