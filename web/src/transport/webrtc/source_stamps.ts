@@ -62,7 +62,8 @@ function markOf({ captureTimestamp, senderCaptureTimeOffset }: CapturedSource): 
 
 /** Whether sources may be asked: the browser's decoded pictures say their RTP timestamp, and no stamp was missed so far. */
 export function sourcesTell(): boolean {
-  return "MediaStreamTrackProcessor" in globalThis && "metadata" in VideoFrame.prototype && !isNoted();
+  const hasProcessor = "MediaStreamTrackProcessor" in globalThis && "VideoFrame" in globalThis;
+  return hasProcessor && "metadata" in VideoFrame.prototype && !isNoted();
 }
 
 /** From now on this tab reads stamps by transforms. */
