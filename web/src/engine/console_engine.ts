@@ -36,7 +36,7 @@ import type { ChannelName, Peer, PeerOptions } from "../transport/peer";
 import { newReader } from "../transport/encoded_transform/stamp_reader";
 import { SessionClient } from "../session/session_client";
 import { reportOf } from "./report";
-import { Tracing } from "./tracing";
+import type { Tracing } from "./tracing";
 import { StopSender } from "./stop_sender";
 import type { Talkback } from "../talkback/talkback";
 import type {
@@ -83,12 +83,7 @@ export class ConsoleEngine {
   speedShare = 1; // of full speed that the cap leaves
   firstPictureMs: number | null = null;
   readonly haptics = new Haptics(this);
-  readonly tracing = new Tracing({
-    tell: (channel, message) => this.tell(channel, message),
-    isConnected: () => this.state.welcome !== null,
-    drivesRecorded: () => this.state.recording?.state === "recording" && holdsSeat(this.state),
-    mainStream: () => this.page.mainStream(),
-  });
+  tracing: Tracing | null = null; // until its code is there, after the first picture
   readonly ticker: Ticker;
   private readonly disposal = new Disposal();
   peer: Peer | null = null;
@@ -258,7 +253,7 @@ export class ConsoleEngine {
   private connectionClosed(): void {
     this.disarm("connection_lost");
     this.haptics.forget();
-    this.tracing.connectionClosed();
+    this.tracing?.connectionClosed();
     this.peer = null;
     this.driver = null;
     this.streams.close();
@@ -293,13 +288,13 @@ export class ConsoleEngine {
       this.tookFeedback(message, before, now);
     else if (message.type === "refusal" && this.driver !== null) {
       driver.driverRefusal(this.driver, message, this.isArmed());
-      this.tracing.book.noteRefused(message.event);
+      this.tracing?.book.noteRefused(message.event);
       this.drive(now);
     } else if (message.type === "pong") this.tookPong(message.id, now);
     else if (message.type === "welcome") this.welcomed(message);
     else if (message.type === "robot") this.robotChanged(message, now);
     else if (message.type === "seat") this.session.seatMs = now;
-    else if (message.type === "traces") this.tracing.told(message);
+    else if (message.type === "traces") this.tracing?.told(message);
   }
 
   /** Whoever drives next has to arm, and nothing of the one before is executed. */
@@ -318,7 +313,7 @@ export class ConsoleEngine {
     this.drive(now);
     this.streams.changed();
     this.page.feedbackTaken(now);
-    this.tracing.book.noteAnswered(feedback.event, now, performance.now());
+    this.tracing?.book.noteAnswered(feedback.event, now, performance.now());
   }
 
   private tookPong(id: number, now: number): void {
@@ -364,7 +359,7 @@ export class ConsoleEngine {
     const change = arming.sampleDeadman(this.arming, sample.deadman, sample.signature, now);
     this.capSpeed(now);
     this.takeValues(sample);
-    this.tracing.noteIntention(this.values, now);
+    this.tracing?.noteIntention(this.values, now);
     if (this.driver !== null && change === "released") driver.driverRelease(this.driver, now);
     if (this.driver !== null && change === "taped_down") driver.driverDisarm(this.driver, now);
     if (change === "taped_down") this.page.armedChanged();
@@ -374,7 +369,7 @@ export class ConsoleEngine {
     this.stopping.step(now);
     this.charts?.step(now);
     this.haptics.step(now);
-    this.tracing.step(now);
+    this.tracing?.step(now);
     if (this.state.welcome !== null) this.heartbeat.step(now);
     this.connection.step(now);
   }
@@ -407,17 +402,17 @@ export class ConsoleEngine {
     const messages = driver.driverStep(this.driver, intention, this.canCommand(), now);
     for (const message of messages) {
       this.tell("control", message);
-      this.tracing.noteSent(message, now);
+      this.tracing?.noteSent(message, now);
     }
   }
 
-  private tell(channel: ChannelName, message: ClientMessage): boolean {
+  tell(channel: ChannelName, message: ClientMessage): boolean {
     return this.connection.send(channel, JSON.stringify(message));
   }
 
   private drawn(stream: VideoStream, stamp: number | null, at: number): void {
     this.firstPictureMs ??= at;
-    this.tracing.noteDrawn(stream.info.stream, stream.drawn);
+    this.tracing?.noteDrawn(stream.info.stream, stream.drawn);
     if (stamp === null || stream.info.stream !== this.page.mainStream() || this.driver === null) return;
     notePicture(this.driver.latency, stamp, at);
     noteShown(this.driver.gate, stamp);
