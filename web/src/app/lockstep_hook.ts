@@ -56,10 +56,10 @@ export function installHook(page: HookedPage): void {
     rendered: (stream) => (streams.videos.get(stream) ?? streams.sounds.get(stream))?.log.all() ?? [],
     feedbacks: () => streams.feedbacks.all(),
     traces: () => ({
-      pictures: engine.tracing.book.pictures.all(),
-      commands: engine.tracing.book.commands.all(),
+      pictures: engine.tracing?.book.pictures.all() ?? [],
+      commands: engine.tracing?.book.commands.all() ?? [],
     }),
-    trace: (wanted) => engine.tracing.show(wanted, performance.now()),
+    trace: (wanted) => engine.tracing?.show(wanted, performance.now()),
     scene: () => page.grid.scene?.statistics() ?? NO_SCENE,
     configure({ gate, pacing, tolerance }) {
       const { settings } = engine.state;

@@ -2,10 +2,11 @@ import { ChartSampler } from "../charts/chart_sampler";
 import { ChartsDrawer } from "../charts/charts_drawer";
 import type { WaySource } from "../charts/way_figures";
 import type { ConsoleEngine } from "../engine/console_engine";
+import { Tracing } from "../engine/tracing";
 import { readFragment } from "../util/url_fragment";
 import type { PageAction } from "../input/shortcuts";
 import { replayHash } from "../replay/replay_link";
-import { mayDrive } from "../session/console_state";
+import { holdsSeat, mayDrive } from "../session/console_state";
 import { countUnread, createUnread, markRead } from "../session/unread_notes";
 import { Pad } from "../input/gamepad";
 import { GamepadStorage } from "../input/gamepad_storage";
@@ -81,14 +82,21 @@ export class SidePanels {
     this.tabs = this.createTabs();
     const sampler = new ChartSampler(engine);
     engine.charts = sampler;
+    const tracing = new Tracing({
+      tell: (channel, message) => engine.tell(channel, message),
+      isConnected: () => engine.state.welcome !== null,
+      drivesRecorded: () => engine.state.recording?.state === "recording" && holdsSeat(engine.state),
+      mainStream: () => grid.mainStream(),
+    });
+    engine.tracing = tracing;
     const ways: WaySource = {
-      book: engine.tracing.book,
+      book: tracing.book,
       mainStream: () => grid.mainStream(),
       mayDrive: () => mayDrive(engine.state),
       isRelayed: () => engine.streams.relay !== null,
     };
     this.charts = new ChartsDrawer(sampler, ways, (open) => {
-      engine.tracing.show(open, performance.now());
+      tracing.show(open, performance.now());
       root.classList.toggle("shows-charts", open);
     });
     addEventListener("keydown", (event) => {

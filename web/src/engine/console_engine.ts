@@ -39,7 +39,7 @@ import { SessionClient } from "../session/session_client";
 import { ActionClient, drawId } from "../robot/action_client";
 import type { ActConditions } from "../robot/actions";
 import { reportOf } from "./report";
-import { Tracing } from "./tracing";
+import type { Tracing } from "./tracing";
 import { StopSender } from "./stop_sender";
 import type { Talkback } from "../talkback/talkback";
 import type {
@@ -92,12 +92,7 @@ export class ConsoleEngine {
   speedShare = 1; // of full speed that the cap leaves
   firstPictureMs: number | null = null;
   readonly haptics = new Haptics(this);
-  readonly tracing = new Tracing({
-    tell: (channel, message) => this.tell(channel, message),
-    isConnected: () => this.state.welcome !== null,
-    drivesRecorded: () => this.state.recording?.state === "recording" && holdsSeat(this.state),
-    mainStream: () => this.page.mainStream(),
-  });
+  tracing: Tracing | null = null; // until its code is there, after the first picture
   readonly ticker: Ticker;
   private readonly disposal = new Disposal();
   peer: Peer | null = null;
@@ -306,7 +301,7 @@ export class ConsoleEngine {
   private connectionClosed(): void {
     this.disarm("connection_lost");
     this.haptics.forget();
-    this.tracing.connectionClosed();
+    this.tracing?.connectionClosed();
     this.peer = null;
     this.driver = null;
     this.streams.close();
@@ -341,7 +336,7 @@ export class ConsoleEngine {
       this.tookFeedback(message, before, now);
     else if (message.type === "refusal" && this.driver !== null) {
       driver.driverRefusal(this.driver, message, this.isArmed());
-      this.tracing.book.noteRefused(message.event);
+      this.tracing?.book.noteRefused(message.event);
       this.drive(now);
     } else if (message.type === "pong") this.tookPong(message.id, now);
     else if (message.type === "welcome") this.welcomed(message);
@@ -351,7 +346,7 @@ export class ConsoleEngine {
     else if (message.type === "action") {
       this.actionMs = now;
       this.actions.updated(message);
-    } else if (message.type === "traces") this.tracing.told(message);
+    } else if (message.type === "traces") this.tracing?.told(message);
   }
 
   /** Whoever drives next has to arm, and nothing of the one before is executed. */
@@ -371,7 +366,7 @@ export class ConsoleEngine {
     else this.drive(now);
     this.streams.changed();
     this.page.feedbackTaken(now);
-    this.tracing.book.noteAnswered(feedback.event, now, performance.now());
+    this.tracing?.book.noteAnswered(feedback.event, now, performance.now());
   }
 
   private tookPong(id: number, now: number): void {
@@ -424,7 +419,7 @@ export class ConsoleEngine {
     this.stopping.step(now);
     this.charts?.step(now);
     this.haptics.step(now);
-    this.tracing.step(now);
+    this.tracing?.step(now);
     if (this.state.welcome !== null) this.heartbeat.step(now);
     this.connection.step(now);
   }
@@ -446,7 +441,7 @@ export class ConsoleEngine {
     const change = arming.sampleDeadman(this.arming, sample.deadman, sample.signature, now);
     this.capSpeed(now);
     this.takeValues(sample);
-    this.tracing.noteIntention(this.values, now);
+    this.tracing?.noteIntention(this.values, now);
     if (this.driver !== null && change === "released") driver.driverRelease(this.driver, now);
     if (this.driver !== null && change === "taped_down") driver.driverDisarm(this.driver, now);
     if (change === "taped_down") this.page.armedChanged();
@@ -481,18 +476,18 @@ export class ConsoleEngine {
     const messages = driver.driverStep(this.driver, intention, this.canCommand(), now);
     for (const message of messages) {
       this.tell("control", message);
-      this.tracing.noteSent(message, now);
+      this.tracing?.noteSent(message, now);
     }
     this.sendTimer.set(this.isArmed() ? driver.driverOpensIn(this.driver, now) : null);
   }
 
-  private tell(channel: ChannelName, message: ClientMessage): boolean {
+  tell(channel: ChannelName, message: ClientMessage): boolean {
     return this.connection.send(channel, JSON.stringify(message));
   }
 
   private drawn(stream: VideoStream, stamp: number | null, at: number): void {
     this.firstPictureMs ??= at;
-    this.tracing.noteDrawn(stream.info.stream, stream.drawn);
+    this.tracing?.noteDrawn(stream.info.stream, stream.drawn);
     if (stamp === null || stream.info.stream !== this.page.mainStream() || this.driver === null) return;
     notePicture(this.driver.latency, stamp, at);
     noteShown(this.driver.gate, stamp);
