@@ -426,11 +426,13 @@ export class ConsoleEngine {
 
   /**
    * A key or a finger did something. What waited behind a page that was held up is not what is held now: the tick that
-   * follows takes that.
+   * follows takes that. That nothing is held any more counts at once, however late it is told.
    */
   private inputChanged(at: number): void {
     const now = performance.now();
-    if (this.isArmed() && now - at < HELD_UP_MS && !this.ticker.isLate(now)) this.takeInput(now);
+    if (!this.isArmed()) return;
+    const isFresh = now - at < HELD_UP_MS && !this.ticker.isLate(now);
+    if (isFresh || !this.controls.deadman) this.takeInput(now);
   }
 
   /** Takes what the operator holds now, and sends what follows from it. */
@@ -492,6 +494,7 @@ export class ConsoleEngine {
     notePicture(this.driver.latency, stamp, at);
     noteShown(this.driver.gate, stamp);
     this.page.pictureDrawn();
+    this.ticker.catchUp(performance.now());
     this.drive(at);
   }
 }

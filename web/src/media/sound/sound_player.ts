@@ -45,6 +45,7 @@ export interface SoundPlayer {
   playing: number | null; // RTP timestamp of the packet that plays; null in a silence
   begun: number[]; // RTP timestamps of packets that began to play, until somebody takes them
   leftOut: number; // packets that came and did not play
+  loudness: number; // of the last sample: 0 while what plays is too old, else 1
 }
 
 /** Invented sound in the place of missing sound. */
@@ -106,6 +107,7 @@ export function createSoundPlayer(rate: number, blockS: number): SoundPlayer {
     playing: null,
     begun: [],
     leftOut: 0,
+    loudness: 1,
   };
 }
 
@@ -144,6 +146,7 @@ export function nextFrame(player: SoundPlayer, now: number): Float32Array {
   const length = samples(player, FRAME_S);
   const frame = new Float32Array(length);
   skipTooOld(player);
+  const loudness = allowedLoudness(player);
   for (let at = 0; at < length;) {
     if (!player.plays) begin(player, now);
     if (!player.plays) break;
@@ -153,7 +156,26 @@ export function nextFrame(player: SoundPlayer, now: number): Float32Array {
     player.history.copyWithin(0, piece.length);
     player.history.set(piece, player.history.length - piece.length);
   }
-  return frame;
+  return fadeTo(player, loudness, frame);
+}
+
+/**
+ * Sound that is too old goes on in silence while there is no other: the page's own gate shuts later, because it hears of
+ * the feedback at the same time but of what plays afterwards.
+ */
+function allowedLoudness(player: SoundPlayer): number {
+  const next = player.queue.packets[0];
+  if (next === undefined) return player.loudness;
+  const { feedback, tolerance, gate } = player.context;
+  return judge(feedback, next.stamp, tolerance, gate).verdict === "discard" ? 0 : 1;
+}
+
+/** A step would click. Sound that was never heard does not fade out: it is silent from its first sample on. */
+function fadeTo(player: SoundPlayer, loudness: number, frame: Float32Array): Float32Array {
+  const from = player.playing === null && loudness === 0 ? 0 : player.loudness;
+  player.loudness = loudness;
+  if (from === 1 && loudness === 1) return frame;
+  return frame.map((sample, at) => sample * (from + ((loudness - from) * (at + 1)) / frame.length));
 }
 
 /** How fast frames are to be played: 1, or a few per mille from it, so that what waits comes to what must. */

@@ -206,11 +206,27 @@ describe("the player of sound", () => {
     expect(steepest()).toBeLessThan(STEEPEST);
   });
 
-  it("goes on with sound that is too old while there is no other: the page's gate keeps it silent", () => {
+  it("goes on in silence with sound that is too old while there is no other", () => {
     player.context = { feedback: 10, tolerance: 2, gate: "event" };
     for (let index = 0; index < 10; index++) come(index, 1000, 5);
     playUntil(1100);
     expect(begun.length).toBeGreaterThan(3);
+    expect(Math.max(...heard.slice((FRAME_S + BLOCK_S) * RATE).map(Math.abs))).toBe(0);
+  });
+
+  it("falls silent within one frame of the feedback that makes its sound too old, and comes back without a click", () => {
+    player.context = { feedback: 5, tolerance: 2, gate: "event" };
+    for (let index = 0; index < 10; index++) come(index, 1000 + index, 5);
+    playUntil(1050);
+    const loud = heard.slice(-480).map(Math.abs);
+    player.context = { feedback: 9, tolerance: 2, gate: "event" };
+    playUntil(1060);
+    expect(Math.max(...loud)).toBeGreaterThan(LEVEL / 2);
+    expect(Math.max(...heard.slice(-240).map(Math.abs))).toBe(0);
+    player.context = { feedback: 5, tolerance: 2, gate: "off" };
+    playUntil(1090);
+    expect(Math.max(...heard.slice(-240).map(Math.abs))).toBeGreaterThan(LEVEL / 2);
+    expect(steepest()).toBeLessThan(STEEPEST);
   });
 
   it("hurries while what plays is as old as the tolerance allows", () => {
