@@ -13,7 +13,7 @@ from lockstep.server.recording.settings import RecordingSettings
 from lockstep.server.recording.verify.verify_file import verify_file
 from tests.support.stack import running_stack
 
-EVENTS = 40
+EVENTS = 200  # some seconds: a file that is younger than `LOST` may be empty
 LOST = 1.0  # s, at most
 SLOW = 2.0  # s that a busy machine may be late with writing
 

@@ -131,7 +131,7 @@ def run(
         str | None,
         typer.Option(
             help=f"Encode pictures to H.264 here, for a narrow uplink: {', '.join(ENCODERS)}. Needs "
-            "lockstep-bridge[encode]. Default: send them as the cameras give them."
+            "lockstep-bridge\\[encode]. Default: send them as the cameras give them."
         ),
     ] = None,
     console: Annotated[

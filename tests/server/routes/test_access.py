@@ -186,6 +186,7 @@ async def test_a_revocation_that_the_disk_did_not_take_is_written_as_soon_as_it_
 
         with monkeypatch.context() as disk:
             disk.setattr(rig.dependencies.state.directory, "write", full)
+            disk.setattr(rig.dependencies.state.directory, "overwrite", full)  # of the file that is set aside
             answer = await rig.http.delete(f"/api/invitations/{made['id']}", headers=rig.token("supervisor"))
             assert "the link has ended until this console restarts" in answer.json()["detail"]
             assert "nothing was changed" not in answer.json()["detail"]

@@ -2,11 +2,13 @@
 
 import asyncio
 import socket
+from contextlib import suppress
 from typing import Any
 
 import pytest
 import websockets
 from websockets.asyncio.client import connect
+from websockets.exceptions import ConnectionClosed
 from websockets.frames import Frame, Opcode
 
 from lockstep.protocol.console import (
@@ -171,7 +173,9 @@ async def test_bad_messages_are_named_and_counted_and_in_the_end_the_line_is_clo
             )
             line.heard.clear()
         assert rig.count("lockstep_bad_input_total", where="line", reason="malformed") == 3
-        await line.socket.send("{")
+        with suppress(ConnectionClosed):
+            while True:  # on a slow machine the first of them are forgiven by now
+                await line.socket.send("{")
         assert await line.ended() == (1008, "bad messages")
         assert rig.count("lockstep_peers_ended_total", why="bad messages") == 1
 
