@@ -1,5 +1,5 @@
 import { h, milliseconds, setData, setText } from "../ui/elements/dom";
-import { CLOCK_LABELS, SPAN_LABELS } from "./way_labels";
+import { CLOCK_LABELS, spanLabel } from "./way_labels";
 import type { SpanClock, SpanName, WayPart, WaySummary } from "./way_summary";
 
 const CLOCKS: readonly SpanClock[] = ["bridge", "console", "between", "page"];
@@ -36,14 +36,15 @@ export class WayFigure {
     }
     this.rebuild(summary.parts);
     setText(this.total, `${milliseconds(summary.totalMs)} ms ${this.about}`);
-    for (const part of summary.parts) this.fill(part);
+    const others = summary.parts.map(({ name }) => name);
+    for (const part of summary.parts) this.fill(part, others);
     setText(this.words, [slowestWords(summary), note].filter((text) => text !== "").join(" · "));
   }
 
-  private fill({ name, ms, p95Ms }: WayPart): void {
+  private fill({ name, ms, p95Ms }: WayPart, others: readonly SpanName[]): void {
     const parts = this.drawn.get(name);
     if (parts === undefined) return;
-    const { label, about } = SPAN_LABELS[name];
+    const { label, about } = spanLabel(name, others);
     parts.segment.style.flexGrow = String(Math.max(ms, 0.001));
     parts.segment.title = `${label}: ${milliseconds(ms)} ms, 95 % below ${milliseconds(p95Ms)} ms; ${about}`;
     setText(parts.figure, milliseconds(ms));
@@ -51,7 +52,8 @@ export class WayFigure {
 
   /** Only when other parts were measured: a figure that is read must not jump. */
   private rebuild(parts: readonly WayPart[]): void {
-    const names = parts.map(({ name }) => name).join();
+    const others = parts.map(({ name }) => name);
+    const names = others.join();
     if (names === this.names) return;
     this.names = names;
     this.drawn.clear();
@@ -63,7 +65,7 @@ export class WayFigure {
       shades.set(clock, Number(shade) + 1);
       const segment = h("span", "way-part", { "data-clock": clock, "data-shade": shade });
       const figure = h("span", "chart-figure");
-      const { label, about } = SPAN_LABELS[name];
+      const { label, about } = spanLabel(name, others);
       const swatch = h("span", "way-swatch", { "data-clock": clock, "data-shade": shade });
       const key = h("span", "way-key", { title: about }, swatch, h("span", "chart-name", {}, label), figure);
       this.bar.append(segment);
@@ -78,9 +80,12 @@ export class WayFigure {
   }
 }
 
-function slowestWords({ slowest, count }: WaySummary): string {
+function slowestWords({ slowest, count, parts }: WaySummary): string {
   if (slowest === null || count < 2) return "";
-  const { label } = SPAN_LABELS[slowest.name];
+  const { label } = spanLabel(
+    slowest.name,
+    parts.map(({ name }) => name),
+  );
   const [total, longest] = [milliseconds(slowest.totalMs), milliseconds(slowest.ms)];
   return `Slowest of ${count}: event ${slowest.event}, ${total} ms, of which ${label} ${longest} ms`;
 }

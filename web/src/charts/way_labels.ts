@@ -13,7 +13,7 @@ export const CLOCK_LABELS: Record<SpanClock, string> = {
   page: "This page",
 };
 
-export const SPAN_LABELS: Record<SpanName, SpanLabel> = {
+const SPAN_LABELS: Record<SpanName, SpanLabel> = {
   camera_wait_ms: { label: "camera's beat", about: "from the feedback to the next capture" },
   capture_ms: { label: "capture", about: "from the moment that the picture shows until it is whole" },
   bridge_encode_ms: { label: "encode at the robot", about: "where the robot encodes its pictures" },
@@ -24,10 +24,7 @@ export const SPAN_LABELS: Record<SpanName, SpanLabel> = {
   send_ms: { label: "to the socket", about: "encrypting its packets, up to the socket or the pacer" },
   assemble_ms: { label: "assemble", about: "from its last packet until it is whole and in order" },
   transform_ms: { label: "transform", about: "reading its event stamp" },
-  decode_ms: {
-    label: "decode",
-    about: "until the decoded picture is there; from its last packet on, where it passes no transform",
-  },
+  decode_ms: { label: "decode", about: "until the decoded picture is there" },
   gate_ms: { label: "gate", about: "until the gate lets it pass" },
   draw_ms: { label: "draw", about: "onto the canvas" },
   between_ms: { label: "network", about: "both directions, and all that nobody measures" },
@@ -41,3 +38,15 @@ export const SPAN_LABELS: Record<SpanName, SpanLabel> = {
   back_ms: { label: "back", about: "from the feedback's arrival until it is sent" },
   take_ms: { label: "take", about: "from the feedback's arrival at this page" },
 };
+
+/** Where pictures pass no transform, as in Chromium, the page does not learn when the decoder got them. */
+const WITH_DECODER: SpanLabel = {
+  label: "network, decoder",
+  about: "both directions, the browser's decoder, and all that nobody measures",
+};
+
+/** What a span is called beside the others of its way. */
+export function spanLabel(name: SpanName, others: readonly SpanName[]): SpanLabel {
+  const isOfPicture = others.includes("gate_ms") && !others.includes("decode_ms");
+  return name === "between_ms" && isOfPicture ? WITH_DECODER : SPAN_LABELS[name];
+}

@@ -1,10 +1,7 @@
 import { pictureOfElement, pictureOfFrame, type Picture } from "./picture";
 
-/**
- * Takes each decoded picture with its RTP timestamp, and owns the picture from then on. `receivedMs`: performance.now()
- * when its last packet came; null where the browser does not say.
- */
-export type OnPicture = (picture: Picture, rtpTimestamp: number, receivedMs: number | null) => void;
+/** Takes each decoded picture with its RTP timestamp, and owns the picture from then on. */
+export type OnPicture = (picture: Picture, rtpTimestamp: number) => void;
 
 /** Chromium's mediacapture-transform on the page; not in TypeScript's library. */
 type TrackProcessor = new (init: { track: MediaStreamTrack; maxBufferSize?: number }) => {
@@ -12,7 +9,7 @@ type TrackProcessor = new (init: { track: MediaStreamTrack; maxBufferSize?: numb
 };
 
 interface RtpFrame {
-  metadata?(): { rtpTimestamp?: number; receiveTime?: number };
+  metadata?(): { rtpTimestamp?: number };
 }
 
 /** Decoded pictures of a track, as early as the browser gives them. Returns what ends them. */
@@ -29,9 +26,9 @@ function readProcessor(readable: ReadableStream<VideoFrame>, onpicture: OnPictur
     for (;;) {
       const { value, done } = await reader.read();
       if (done) return;
-      const { rtpTimestamp, receiveTime } = (value as RtpFrame).metadata?.() ?? {};
+      const rtpTimestamp = (value as RtpFrame).metadata?.().rtpTimestamp;
       if (rtpTimestamp === undefined) value.close();
-      else onpicture(pictureOfFrame(value), rtpTimestamp, receiveTime ?? null);
+      else onpicture(pictureOfFrame(value), rtpTimestamp);
     }
   };
   // The stream errs when its track ends with the connection, which is reported elsewhere.
@@ -52,7 +49,7 @@ function readElement(track: MediaStreamTrack, onpicture: OnPicture): () => void 
   const next = (_now: number, metadata: VideoFrameCallbackMetadata): void => {
     handle = video.requestVideoFrameCallback(next);
     if (metadata.rtpTimestamp !== undefined && video.videoWidth > 0)
-      onpicture(pictureOfElement(video), metadata.rtpTimestamp, metadata.receiveTime ?? null);
+      onpicture(pictureOfElement(video), metadata.rtpTimestamp);
   };
   handle = video.requestVideoFrameCallback(next);
   // Muted video may always play; it is interrupted only by being closed.

@@ -11,12 +11,6 @@ export interface DrawnPicture {
   readonly spans: PictureSpans;
 }
 
-interface Offered {
-  readonly rtpTimestamp: number;
-  readonly atMs: number;
-  readonly receivedMs: number | null;
-}
-
 const WAITING = 64; // pictures between transform and canvas
 
 /**
@@ -27,7 +21,7 @@ const WAITING = 64; // pictures between transform and canvas
 export class PictureTrace {
   readonly log = new BoundedLog<DrawnPicture>(256);
   private readonly transforms = new Map<number, TransformTimes>();
-  private offered: Offered | null = null;
+  private offered: { readonly rtpTimestamp: number; readonly atMs: number } | null = null;
 
   transformed(rtpTimestamp: number, times: TransformTimes): void {
     this.transforms.set(rtpTimestamp, times);
@@ -37,12 +31,9 @@ export class PictureTrace {
     }
   }
 
-  /**
-   * `atMs`: performance.now() of the page; `receivedMs`: the same when the last packet came, for pictures that pass no
-   * transform. The gate keeps the newest picture only, and so does this.
-   */
-  decoded(rtpTimestamp: number, atMs: number, receivedMs: number | null): void {
-    this.offered = { rtpTimestamp, atMs, receivedMs };
+  /** `atMs`: performance.now() of the page. The gate keeps the newest picture only, and so does this. */
+  decoded(rtpTimestamp: number, atMs: number): void {
+    this.offered = { rtpTimestamp, atMs };
   }
 
   /** The picture that was offered last passed the gate at `beganMs` and is on the canvas at `drawnMs`. */
@@ -50,14 +41,14 @@ export class PictureTrace {
     const { offered } = this;
     if (offered === null) return null;
     this.offered = null;
-    const { rtpTimestamp, atMs, receivedMs } = offered;
+    const { rtpTimestamp, atMs } = offered;
     const times = this.transforms.get(rtpTimestamp);
     const spans: { -readonly [name in keyof PictureSpans]: PictureSpans[name] } = {};
     if (times !== undefined) {
       if (times.receivedMs !== null) setSpan(spans, "assemble_ms", times.enteredMs - times.receivedMs);
       setSpan(spans, "transform_ms", times.leftMs - times.enteredMs);
       setSpan(spans, "decode_ms", performance.timeOrigin + atMs - times.leftMs);
-    } else if (receivedMs !== null) setSpan(spans, "decode_ms", atMs - receivedMs);
+    }
     setSpan(spans, "gate_ms", beganMs - atMs);
     setSpan(spans, "draw_ms", drawnMs - beganMs);
     const picture: DrawnPicture = { rtpTimestamp, stamp, drawnMs, spans };

@@ -39,9 +39,9 @@ export class VideoStream {
       section.stamps.onstamp = () => this.settle();
       section.stamps.onframe = (rtpTimestamp, times) => this.trace.transformed(rtpTimestamp, times);
     }
-    const take: OnPicture = (picture, rtpTimestamp, receivedMs) => {
+    const take: OnPicture = (picture, rtpTimestamp) => {
       this.lastGoodMs = performance.now();
-      this.trace.decoded(rtpTimestamp, this.lastGoodMs, receivedMs);
+      this.trace.decoded(rtpTimestamp, this.lastGoodMs);
       offerPicture(this.gate, picture, rtpTimestamp, this.lookup, events.context(), this.draw);
     };
     this.endFrames = section.track === null ? () => undefined : openFrames(section.track, take);

@@ -7,7 +7,7 @@ describe("a picture's trace on the page", () => {
   it("has the spans between the points that its decoder called", () => {
     const trace = new PictureTrace();
     trace.transformed(90, { receivedMs: EPOCH + 100, enteredMs: EPOCH + 104, leftMs: EPOCH + 104.5 });
-    trace.decoded(90, 110, null);
+    trace.decoded(90, 110);
     const drawn = trace.drawn(7, 115, 116);
     expect(drawn?.rtpTimestamp).toBe(90);
     expect(drawn?.stamp).toBe(7);
@@ -21,26 +21,20 @@ describe("a picture's trace on the page", () => {
   it("leaves a span out where the browser does not say when the packets came", () => {
     const trace = new PictureTrace();
     trace.transformed(90, { receivedMs: null, enteredMs: EPOCH + 104, leftMs: EPOCH + 104.5 });
-    trace.decoded(90, 110, null);
+    trace.decoded(90, 110);
     expect(trace.drawn(7, 110, 111)?.spans).not.toHaveProperty("assemble_ms");
   });
 
   it("has only the page's gate and canvas where no transform saw the picture", () => {
     const trace = new PictureTrace();
-    trace.decoded(90, 110, null);
+    trace.decoded(90, 110);
     expect(trace.drawn(null, 112, 113)?.spans).toEqual({ gate_ms: 2, draw_ms: 1 });
-  });
-
-  it("counts decoding from the last packet where no transform saw the picture", () => {
-    const trace = new PictureTrace();
-    trace.decoded(90, 110, 103);
-    expect(trace.drawn(7, 112, 113)?.spans).toEqual({ decode_ms: 7, gate_ms: 2, draw_ms: 1 });
   });
 
   it("is of the picture that was offered last: the gate keeps no other", () => {
     const trace = new PictureTrace();
-    trace.decoded(90, 110, null);
-    trace.decoded(91, 120, null);
+    trace.decoded(90, 110);
+    trace.decoded(91, 120);
     expect(trace.drawn(7, 121, 122)?.rtpTimestamp).toBe(91);
     expect(trace.drawn(7, 123, 124)).toBeNull();
   });
@@ -48,7 +42,7 @@ describe("a picture's trace on the page", () => {
   it("never has a negative span, though a clock was set between two looks at it", () => {
     const trace = new PictureTrace();
     trace.transformed(90, { receivedMs: EPOCH + 200, enteredMs: EPOCH + 104, leftMs: EPOCH + 104 });
-    trace.decoded(90, 50, null);
+    trace.decoded(90, 50);
     expect(trace.drawn(7, 50, 51)?.spans).toMatchObject({ assemble_ms: 0, decode_ms: 0 });
   });
 
@@ -56,9 +50,9 @@ describe("a picture's trace on the page", () => {
     const trace = new PictureTrace();
     for (let at = 0; at < 1000; at++)
       trace.transformed(at, { receivedMs: null, enteredMs: EPOCH, leftMs: EPOCH });
-    trace.decoded(0, 1, null);
+    trace.decoded(0, 1);
     expect(trace.drawn(1, 1, 2)?.spans).not.toHaveProperty("decode_ms");
-    trace.decoded(999, 1, null);
+    trace.decoded(999, 1);
     expect(trace.drawn(1, 1, 2)?.spans).toHaveProperty("decode_ms");
   });
 });
