@@ -3,9 +3,13 @@
 import asyncio
 
 import msgspec
+import pytest
 
 from lockstep.protocol.description import RobotDescription
 from lockstep.protocol.messages import Command, Rest, Stop
+from lockstep.robot_bridge.bridge import Bridge
+from lockstep.robot_bridge.errors import DescriptionError
+from lockstep.robot_bridge.settings import BridgeSettings
 from tests.robot_bridge.bridge_helpers import DRIVE, NEUTRAL, RecordingRobot, operator, running_bridge
 
 PERIOD = 2.0  # s; a tick much sooner than that after the one before began on something that arrived
@@ -22,6 +26,26 @@ class SlowRobot(RecordingRobot):
 
 class PatientRobot(RecordingRobot):
     ticks_on_command = False
+
+
+class Hasty(RecordingRobot):
+    """Its watchdog is longer than a period, and shorter than two."""
+
+    tick_seconds = 0.15
+
+    def describe(self) -> RobotDescription:
+        return msgspec.structs.replace(super().describe(), hold=1.0, watchdog=0.2)
+
+
+class HastyAtItsBeats(Hasty):
+    ticks_on_command = False
+
+
+def test_a_watchdog_is_longer_than_two_ticks_may_lie_apart() -> None:
+    settings = BridgeSettings(port=0)
+    with pytest.raises(DescriptionError, match=r"watchdog must be longer than the 0\.3 s"):
+        Bridge(Hasty(), settings)
+    Bridge(HastyAtItsBeats(), settings)
 
 
 async def test_a_command_does_not_wait_for_the_beat_and_those_after_it_make_no_further_tick_in_its_period() -> None:

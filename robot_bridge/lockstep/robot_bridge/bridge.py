@@ -57,7 +57,7 @@ class Bridge:
         `liveness`: ends the process when the bridge hangs; the process must be the bridge's alone. None: nothing does.
 
         Raises:
-            DescriptionError: the robot's description contradicts itself.
+            DescriptionError: the robot's description contradicts itself, or its ticks.
             InsecureLink: any client that reaches the address could drive, and the settings do not say that this is
             wanted.
             SecretError: the TLS files cannot be used.
@@ -82,9 +82,9 @@ class Bridge:
         self._log = EventLog(settings.event_log)
         self._keeper = StopKeeper(settings.state_dir, settings.older_state_dirs)
         self._lockout = None if settings.lockout_file is None else LockoutFile(settings.lockout_file)
-        self._watchdogs = Watchdogs(robot, watchdog_seconds(description, robot.tick_seconds), now)
         self._liveness = liveness or Liveness()
         longest_tick = robot.tick_seconds * (2 if robot.ticks_on_command else 1)  # s from one tick to the next
+        self._watchdogs = Watchdogs(robot, watchdog_seconds(description, longest_tick), now)
         limits = MotionLimits(description, robot, robot.tick_seconds, longest_tick=longest_tick)
         shaper = AxisShaper(description.axes, hold=description.hold, limiter=limits)
         refusals, alarm = Refusals(counters, self._log), TickAlarm()

@@ -1,3 +1,4 @@
+import os
 from pathlib import Path
 
 import pytest
@@ -19,6 +20,19 @@ def test_a_key_is_kept_for_its_owner_alone_and_read_again(tmp_path: Path) -> Non
     assert found.key.reveal() == key.key.reveal()
     assert found[1:] == key[1:]
     assert (tmp_path / "new" / FILE).stat().st_mode & 0o777 == 0o600
+
+
+def test_a_key_and_the_name_of_its_file_reach_the_disk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    synced: list[str] = []
+    fsync = os.fsync
+
+    def watched(descriptor: int) -> None:
+        synced.append(os.readlink(f"/proc/self/fd/{descriptor}"))
+        fsync(descriptor)
+
+    monkeypatch.setattr(os, "fsync", watched)
+    save_key(tmp_path, ConsoleKey(LinkSecret.draw(), PIN))
+    assert synced == [str(tmp_path / f"{FILE}.new"), str(tmp_path)]
 
 
 def test_a_robot_that_was_never_paired_has_no_key(tmp_path: Path) -> None:

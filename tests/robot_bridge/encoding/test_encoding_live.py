@@ -7,10 +7,12 @@ from contextlib import asynccontextmanager
 from dataclasses import replace
 
 import av
+import msgspec
 import pytest
 
 from lockstep.protocol.framing import MAX_MEDIA_FRAME, FrameReader, frame
 from lockstep.protocol.messages import EncodeRequest, Hello, Media, Ping, StreamRequest, decode_message, encode_message
+from lockstep.protocol.trace import known_spans
 from lockstep.robot_bridge.bridge import Bridge
 from lockstep.robot_bridge.conformance import CASES, Outcome, Subject, play_all
 from lockstep.robot_bridge.conformance.place import Place
@@ -72,6 +74,15 @@ async def test_a_picture_is_stamped_with_the_event_that_it_shows() -> None:
                     assert decoder.event_in(medium) == medium.stamp
                     stamps.add(medium.stamp)
     assert len(stamps) > 10
+
+
+async def test_a_picture_says_how_long_its_encoding_took_beside_what_was_measured_before() -> None:
+    async with encoding_bridge() as bridge, RobotLink(*bridge.address, "media") as link:
+        for medium in await pictures(link, 3):
+            assert medium.spans is not msgspec.UNSET
+            known = known_spans(medium.spans)
+            assert {"capture_ms", "bridge_encode_ms", "link_wait_ms"} <= set(known)
+            assert known["bridge_encode_ms"] > 0
 
 
 async def test_a_link_begins_with_a_keyframe_and_gets_one_for_each_higher_count() -> None:

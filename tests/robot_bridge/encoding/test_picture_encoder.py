@@ -1,12 +1,15 @@
 """Pictures of a camera, encoded and decoded again."""
 
+from collections.abc import Callable
+from typing import Any
+
 import av
 import numpy as np
 import pytest
 
 from lockstep.protocol.messages import Media, MediaCodec
 from lockstep.robot_bridge.encoding.encoding_requests import EncodingGoal
-from lockstep.robot_bridge.encoding.picture_encoder import H264Encoder
+from lockstep.robot_bridge.encoding.picture_encoder import MOST_WRONG, H264Encoder
 from lockstep.robot_bridge.errors import EncodingFailed
 from lockstep.server.media.codecs.h264 import inspect
 
@@ -111,3 +114,79 @@ def test_the_software_encoder_takes_the_place_of_one_that_cannot_be_opened() -> 
     assert encoder.encode(raw(0), WHOLE, keyframe=False).keyframe
     assert encoder.fell_back.startswith("h264_v4l2m2m cannot be opened")
     assert not encoder.encode(raw(1), WHOLE, keyframe=False).keyframe
+
+
+@pytest.mark.parametrize("name", ["h264_v4l2m2m", "h264_nvenc", "h264_qsv"])
+def test_ffmpeg_takes_the_options_of_each_hardware_encoder_even_where_its_device_is_missing(name: str) -> None:
+    encoder = H264Encoder(name)
+    level = av.logging.get_level()
+    av.logging.set_level(av.logging.ERROR)
+    try:
+        with av.logging.Capture() as lines:
+            assert encoder.encode(raw(0), WHOLE, keyframe=False).keyframe
+    finally:
+        av.logging.set_level(level)
+    said = "".join(text for _, source, text in lines if source == name)
+    assert said or not encoder.fell_back
+    assert "option" not in said
+    assert "pixel format" not in said
+
+
+def stand_in(monkeypatch: pytest.MonkeyPatch, open_one: Callable[..., Any]) -> H264Encoder:
+    """Return an encoder that takes libx264, as `open_one` opens it, for h264_nvenc: no hardware can be had here."""
+    open_as = H264Encoder._open_as
+
+    def open_instead(self: H264Encoder, name: str, size: tuple[int, int], bitrate: int, rate: float, own: Any) -> Any:
+        if name != "h264_nvenc":
+            return open_as(self, name, size, bitrate, rate, own)
+        self._context = open_one(lambda options: open_as(self, "libx264", size, bitrate, rate, options))
+        return self._context
+
+    monkeypatch.setattr(H264Encoder, "_open_as", open_instead)
+    return H264Encoder("h264_nvenc")
+
+
+def test_an_encoder_that_delays_gives_no_older_picture_and_the_software_encoder_takes_its_place(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """libx264 without `zerolatency` stands in for hardware that delays: it looks ahead."""
+    encoder = stand_in(monkeypatch, lambda opened: opened({"preset": "ultrafast", "rc-lookahead": "2"}))
+    for number in range(MOST_WRONG):
+        assert not encoder.fell_back
+        with pytest.raises(EncodingFailed, match="held the picture back"):
+            encoder.encode(raw(number), WHOLE, keyframe=False)
+    assert encoder.fell_back.startswith("h264_nvenc cannot be used: it held the picture back")
+    pictures = [encoder.encode(raw(n), WHOLE, keyframe=False) for n in range(MOST_WRONG, 10)]
+    assert [each.keyframe for each in pictures] == [True] + [False] * (9 - MOST_WRONG)
+    for number, frame in enumerate(decoded([each.data for each in pictures]), MOST_WRONG):
+        assert frame.to_ndarray()[20, 10 * number + 20] > 180  # the block is where it was drawn
+
+
+class Miscounting:
+    """An encoder that gives its second picture under the time of the first."""
+
+    def __init__(self, context: Any) -> None:
+        self._context = context
+        self._times: list[int] = []
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._context, name)
+
+    def encode(self, frame: av.VideoFrame) -> list[Any]:
+        (packet,) = self._context.encode(frame)
+        self._times.append(packet.pts)
+        if len(self._times) == 2:
+            packet.pts = self._times[0]
+        return [packet]
+
+
+def test_after_a_packet_of_another_picture_the_encoder_is_opened_again_and_begins_with_a_keyframe(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """libx264 whose packet is given the wrong time stands in for such hardware."""
+    encoder = stand_in(monkeypatch, lambda opened: Miscounting(opened({"tune": "zerolatency"})))
+    for first in range(0, 2 * MOST_WRONG, 2):
+        assert encoder.encode(raw(first), WHOLE, keyframe=False).keyframe
+        with pytest.raises(EncodingFailed, match="another picture"):
+            encoder.encode(raw(first + 1), WHOLE, keyframe=False)
+    assert not encoder.fell_back  # never several in a row

@@ -4,6 +4,7 @@ import math
 import struct
 
 import av
+import msgspec
 import numpy as np
 import pytest
 from hypothesis import given
@@ -71,6 +72,16 @@ def test_after_a_gap_sound_has_its_own_time_and_stamp_again() -> None:
     packets = encoded(segment(0), segment(1), segment(2, late=1.0), segment(3, late=1.0))
     assert [each.time for each in packets] == pytest.approx([10.0, 10.02, 11.04, 11.06])
     assert packets[2].stamp == 3
+
+
+def test_after_a_gap_nothing_of_the_sound_before_it_is_heard() -> None:
+    """The encoder looks 6.5 ms ahead: it would begin the next run with what it has kept of the last."""
+    silence = msgspec.structs.replace(segment(25, late=10.0), payload=bytes(1920))
+    packets = encoded(*(segment(n) for n in range(25)), silence)
+    decoder = OpusDecoder()
+    before = [decoder.decode(each.payload) for each in packets[:-1]]
+    assert np.abs(before[-1]).max() > 6000
+    assert np.abs(OpusDecoder().decode(packets[-1].payload)).max() < 100
 
 
 @pytest.mark.parametrize(

@@ -25,6 +25,16 @@ def test_the_description_may_set_it() -> None:
     assert watchdog_seconds(msgspec.structs.replace(UNSET, watchdog=0.2), 0.004) == 0.2
 
 
+@pytest.mark.parametrize(
+    ("watchdog", "hold", "named"), [(0.2, 0.5, "watchdog"), (0.1, 0.5, "watchdog"), (None, 0.4, "half of hold")]
+)
+def test_a_watchdog_that_would_act_between_two_ticks_is_refused(
+    watchdog: float | None, hold: float, named: str
+) -> None:
+    with pytest.raises(DescriptionError, match=named):
+        watchdog_seconds(msgspec.structs.replace(UNSET, watchdog=watchdog, hold=hold), 0.2)
+
+
 @pytest.mark.parametrize("seconds", [0.0, -1.0, DESCRIPTION.hold, 2.0, float("nan")])
 def test_a_description_whose_watchdog_is_not_less_than_hold_is_refused(seconds: float) -> None:
     with pytest.raises(DescriptionError, match="watchdog"):

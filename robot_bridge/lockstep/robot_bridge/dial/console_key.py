@@ -56,7 +56,7 @@ def load_key(directory: Path) -> ConsoleKey | None:
 
 
 def save_key(directory: Path, key: ConsoleKey) -> None:
-    """Write the file as a whole, and to the disk, before the robot uses the key. Raises OSError."""
+    """Write the file as a whole, and to the disk with its name, before the robot uses the key. Raises OSError."""
     directory.mkdir(mode=0o700, parents=True, exist_ok=True)
     data = msgspec.json.encode(_Kept(console=key.console, key=key.key.reveal(), pin=key.pin, code=key.code))
     beside = directory / f"{FILE}.new"
@@ -67,6 +67,11 @@ def save_key(directory: Path, key: ConsoleKey) -> None:
         file.flush()
         os.fsync(file.fileno())
     os.replace(beside, directory / FILE)
+    folder = os.open(directory, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
+    try:
+        os.fsync(folder)  # until then the new file name is not on the disk
+    finally:
+        os.close(folder)
 
 
 def read_key_file(path: Path) -> ConsoleKey:

@@ -1,7 +1,9 @@
 """Encodes a camera's pictures to H.264 with PyAV. Used from one thread."""
 
 import logging
+from collections.abc import Sequence
 from fractions import Fraction
+from typing import NoReturn
 
 import av
 from av.error import FFmpegError
@@ -28,12 +30,17 @@ HARDWARE = (0.6, 1.0)  # of the bitrate at which another encoder was opened: bey
 KEYFRAME_SECONDS = 0.3  # of the bitrate that a keyframe may take at once
 MAX_PIXELS = 4096 * 2304
 MIN_SIDE = 16
+CONSTRAINED_BASELINE = 66 | 1 << 9  # FFmpeg's number
+MOST_WRONG = 3  # pictures in a row for which another encoder gives no packet of theirs; then SOFTWARE takes its place
+PIXELS = {"h264_qsv": "nv12"}  # of encoders that do not take yuv420p
 
 _logger = logging.getLogger(__name__)
 
 
 class H264Encoder:
-    """Constrained baseline; parameter sets in front of every keyframe; no reordering.
+    """Constrained baseline; parameter sets in front of every keyframe; no reordering, no delay.
+
+    What `encode` returns is the picture that it was given: an encoder that returns another one is opened again.
 
     Attributes:
         fell_back: why the software encoder took the place of the one that was asked for; "" while it did not
@@ -48,20 +55,22 @@ class H264Encoder:
         self._opened = 0.0  # bit/s
         self._opened_rate = 0.0  # Hz
         self._pts = -1
+        self._wrong = 0  # pictures in a row for which the encoder gave no packet of theirs
         self._jpeg: VideoCodecContext | None = None
 
     def encode(self, media: Media, goal: EncodingGoal, keyframe: bool) -> EncodedPicture:
         """Encode one picture, `yuv420p` or `mjpeg`.
 
         Raises:
-            EncodingFailed: it is no picture, or the encoder refused it; the next one begins afresh with a keyframe.
+            EncodingFailed: it is no picture; or the encoder refused it, or gave no packet or one of another picture:
+                then the next picture begins afresh with a keyframe.
         """
         try:
             frame = self._frame(media)
             size = goal.size(frame.width, frame.height)
-            if size != (frame.width, frame.height):
-                frame = frame.reformat(*size, interpolation="AREA")
             context = self._fit(size, goal)
+            if (*size, context.pix_fmt) != (frame.width, frame.height, frame.format.name):
+                frame = frame.reformat(*size, format=context.pix_fmt, interpolation="AREA")
             self._pts = max(self._pts + 1, round(media.time * CLOCK))
             frame.pts, frame.time_base = self._pts, Fraction(1, CLOCK)
             frame.pict_type = PictureType.I if keyframe else PictureType.NONE
@@ -69,9 +78,28 @@ class H264Encoder:
         except (FFmpegError, ValueError) as error:
             self._context = None
             raise EncodingFailed(str(error)) from error
-        if not packets:
-            raise EncodingFailed("the encoder held the picture back")
-        return EncodedPicture(b"".join(map(bytes, packets)), any(each.is_keyframe for each in packets), *size)
+        if len(packets) != 1 or packets[0].pts != frame.pts or packets[0].time_base != frame.time_base:
+            self._gave_wrong(packets)
+        self._wrong = 0
+        return EncodedPicture(bytes(packets[0]), packets[0].is_keyframe, *size)
+
+    def _gave_wrong(self, packets: Sequence[object]) -> NoReturn:
+        """Drop an encoder that gave no packet of its picture, with all that it still holds back: it is older.
+
+        Raises:
+            EncodingFailed: always.
+        """
+        self._context = None
+        why = "it gave a packet of another picture" if packets else "it held the picture back"
+        self._wrong += 1
+        if self._wrong >= MOST_WRONG and self._name != SOFTWARE:
+            self._fall_back(f"{self._name} cannot be used: {why}, {self._wrong} times in a row")
+        raise EncodingFailed(f"no picture of the encoder: {why}")
+
+    def _fall_back(self, why: str) -> None:
+        self.fell_back = why
+        _logger.warning("encoder_fallback: %s; %s takes its place", why, SOFTWARE)
+        self._name, self._wrong = SOFTWARE, 0
 
     def _frame(self, media: Media) -> av.VideoFrame:
         if media.codec == "mjpeg":
@@ -107,13 +135,11 @@ class H264Encoder:
     def _open(self, size: tuple[int, int], bitrate: int, rate: float) -> VideoCodecContext:
         if self._name != SOFTWARE:
             try:
-                context = self._open_as(self._name, size, bitrate, rate, _hardware_options(bitrate))
+                context = self._open_as(self._name, size, bitrate, rate, _hardware_options(self._name, bitrate))
                 self._opened = bitrate / HARDWARE[1]
                 return context
             except (FFmpegError, ValueError) as error:
-                self.fell_back = f"{self._name} cannot be opened: {error}"
-                _logger.warning("encoder_fallback: %s; %s takes its place", self.fell_back, SOFTWARE)
-                self._name = SOFTWARE
+                self._fall_back(f"{self._name} cannot be opened: {error}")
         self._opened = bitrate * HEADROOM
         return self._open_as(SOFTWARE, size, int(self._opened), rate, _software_options(bitrate))
 
@@ -124,7 +150,7 @@ class H264Encoder:
         if not isinstance(context, VideoCodecContext):
             raise ValueError(f"{name} is no encoder of pictures")
         context.width, context.height = size
-        context.pix_fmt = "yuv420p"
+        context.pix_fmt = PIXELS.get(name, "yuv420p")
         context.bit_rate = bitrate
         context.framerate = Fraction(rate).limit_denominator(1000)
         context.time_base = Fraction(1, CLOCK)
@@ -150,14 +176,19 @@ def _software_options(bitrate: int) -> dict[str, str]:
     }
 
 
-def _hardware_options(bitrate: int) -> dict[str, str]:
-    """Options that the encoders have in common; one that does not know an option ignores it."""
-    return {
-        "forced-idr": "1",
-        "maxrate": str(bitrate),
-        "bufsize": str(int(bitrate * KEYFRAME_SECONDS)),
-        "profile": "baseline",
-    }
+def _hardware_options(name: str, bitrate: int) -> dict[str, str]:
+    """Return what an encoder needs to give each picture at once; one that does not know an option ignores it.
+
+    h264_v4l2m2m has no option for that: it waits for its picture by itself.
+    """
+    options = {"maxrate": str(bitrate), "bufsize": str(int(bitrate * KEYFRAME_SECONDS)), "profile": "baseline"}
+    if name == "h264_nvenc":
+        options |= {"delay": "0", "zerolatency": "1", "forced-idr": "1"}
+    elif name == "h264_qsv":
+        options |= {"async_depth": "1", "forced_idr": "1"}
+    elif name == "h264_v4l2m2m":
+        options["profile"] = str(CONSTRAINED_BASELINE)  # it knows no names of profiles
+    return options
 
 
 def _from_yuv420p(media: Media) -> av.VideoFrame:

@@ -2,6 +2,7 @@
 
 import asyncio
 import logging
+import time
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
@@ -10,6 +11,7 @@ from typing import NamedTuple, Protocol
 import msgspec
 
 from lockstep.protocol.messages import Media
+from lockstep.protocol.trace import PictureSpans, join_spans, span_ms
 from lockstep.robot_bridge.encoding.encoding_requests import EncodingGoal, FrameRateGate, KeyframeSpacing
 from lockstep.robot_bridge.errors import EncodingFailed
 from lockstep.robot_bridge.thread_name import name_thread
@@ -107,14 +109,16 @@ class PictureEncoding:
     def _work(self, loop: asyncio.AbstractEventLoop, media: Media, goal: EncodingGoal, keyframe: bool) -> None:
         """Encode in the thread."""
         result: EncodedPicture | Exception
+        began = time.monotonic()
         try:
             result = self._encoder.encode(media, goal, keyframe)
         except Exception as error:  # an unexpected error of the library; the stream must go on
             result = error
         with suppress(RuntimeError):  # the loop has ended
-            loop.call_soon_threadsafe(self._encoded, media, result)
+            loop.call_soon_threadsafe(self._encoded, media, result, time.monotonic() - began)
 
-    def _encoded(self, media: Media, result: EncodedPicture | Exception) -> None:
+    def _encoded(self, media: Media, result: EncodedPicture | Exception, seconds: float) -> None:
+        """`seconds`: that the encoding took."""
         self._busy = False
         if self._loop is None:  # ended meanwhile
             return
@@ -133,6 +137,10 @@ class PictureEncoding:
                 width=result.width,
                 height=result.height,
                 keyframe=result.keyframe,
+                spans=join_spans(
+                    PictureSpans() if media.spans is msgspec.UNSET else media.spans,
+                    PictureSpans(bridge_encode_ms=span_ms(seconds)),
+                ),
             )
             self._emit(encoded)
         self._begin_next()

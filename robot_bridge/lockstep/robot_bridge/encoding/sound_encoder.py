@@ -70,10 +70,8 @@ class OpusEncoder:
         self._buffer += self._resampled(media, samples)
 
     def _begin(self, form: tuple[int, int]) -> None:
-        """Begin a run of sound without gaps."""
-        if self._form != form:
-            self._context = None
-        self._form, self._resampler = form, None
+        """Begin a run of sound without gaps, in which nothing of the one before sounds on: its stamps were older."""
+        self._form, self._context, self._resampler = form, None, None
         self._buffer.clear()
         self._marks.clear()
 

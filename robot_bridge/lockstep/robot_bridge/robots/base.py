@@ -66,7 +66,8 @@ class Robot(ABC):
 
     With `ticks_on_command` a command begins the tick of the present period of `tick_seconds` at once. There is still
     one tick in each period, so two ticks may follow each other closely, and the next one come up to two periods later.
-    Set it if the robot takes values at any time, and holds them until the next ones.
+    The slew is kept over periods: two steps of a ramp may come within a fraction of a millisecond. Set it if the robot
+    takes values at any time, holds them until the next ones, and smooths such a double step or stands it.
 
     A method that raises ends the bridge. Before it does, the rest values are applied at the axes' brake rates, again
     after each failure, then `stop` is called, then `close`; each call is made even if the others raised. A new object

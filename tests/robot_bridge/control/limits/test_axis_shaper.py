@@ -120,3 +120,18 @@ def test_whatever_is_commanded_values_stay_in_limits_and_at_rest_hold_after_the_
         assert axis.minimum <= applied <= axis.maximum
         if now >= last + HOLD:
             assert applied == axis.rest
+
+
+@given(st.lists(st.tuples(st.floats(1e-6, 2 * DT), st.none() | st.floats(-1, 1)), max_size=200))
+def test_a_tick_changes_a_value_by_no_more_than_the_rate_allows_for_its_period_or_the_time_before_it(
+    beats: list[tuple[float, float | None]],
+) -> None:
+    """Ticks that begin on commands are from nothing to two periods apart."""
+    shaper, now = AxisShaper(AXES, hold=HOLD), 0.0
+    for gap, command in beats:
+        now += gap
+        if command is not None:
+            shaper.drive([command, 0.5], now)
+        before = shaper.values
+        for axis, old, new in zip(AXES, before, shaper.step(now, DT), strict=True):
+            assert abs(new - old) <= max(axis.slew * DT, axis.brake * max(DT, gap)) + 1e-9

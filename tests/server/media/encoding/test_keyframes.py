@@ -1,4 +1,4 @@
-from lockstep.server.media.encoding.keyframes import JOIN_BURST, MOST_SPACING, KeyframeScheduler
+from lockstep.server.media.encoding.keyframes import JOIN_BURST, MOST_SPACING, OTHERS_SPACING, KeyframeScheduler
 
 FPS = 30
 
@@ -98,3 +98,40 @@ def test_a_path_without_room_is_spared_keyframes_that_nobody_asked_for() -> None
     assert scheduler.take(60.0)
     scheduler.request()
     assert scheduler.take(61.0)
+
+
+def test_on_a_path_without_room_others_than_the_operator_get_few_keyframes() -> None:
+    scheduler = KeyframeScheduler(10, 0.3)
+    scheduler.sparing = True
+    keyframes = []
+    for i in range(60 * FPS):
+        scheduler.join(other=True)
+        scheduler.request(other=True)
+        if scheduler.take(i / FPS):
+            keyframes.append(i / FPS)
+    gaps = [later - earlier for earlier, later in zip(keyframes, keyframes[1:], strict=False)]
+    assert min(gaps) >= OTHERS_SPACING
+    assert len(keyframes) == 12  # nobody is forgotten
+
+
+def test_the_operator_waits_for_nothing_that_others_asked_for() -> None:
+    scheduler = KeyframeScheduler(10, 0.3)
+    scheduler.sparing = True
+    for i in range(20 * FPS):
+        scheduler.join(other=True)
+        scheduler.request(other=True)
+        scheduler.take(i / FPS)
+    scheduler.take(20.0)
+    scheduler.request()
+    assert taken(scheduler, 20.0 + 1 / FPS, 12) == [8]
+    scheduler.join()
+    assert scheduler.take(20.5)
+
+
+def test_on_a_path_with_room_others_are_served_like_the_operator() -> None:
+    scheduler = KeyframeScheduler(10, 0.3)
+    scheduler.take(0.0)
+    scheduler.request(other=True)
+    assert taken(scheduler, 1 / FPS, 12) == [8]
+    scheduler.join(other=True)
+    assert scheduler.take(0.5)

@@ -1,5 +1,7 @@
 """The bound of how much sound may come."""
 
+import pytest
+
 from lockstep.server.media.pipeline.sound_rate_limiter import SoundRateLimiter
 from tests.server.media.pipeline.collecting import Collector, Counted, arrive
 from tests.server.media.viewer import sound
@@ -21,3 +23,26 @@ def test_sound_that_claims_an_impossible_rate_has_no_more_room() -> None:
     arrive(SoundRateLimiter(end, counted.dropped), sound(1, 0.0, payload=bytes(64_001), sample_rate=1, channels=0))
     assert end.sources == []
     assert counted.drops("too_often") == 1
+
+
+@pytest.mark.parametrize(
+    ("packet", "seconds"),
+    [
+        (b"\x1b\x02", 0.12),  # two frames of 60 ms
+        (b"\x18", 0.06),
+        (b"\x78", 0.02),
+        (b"\xe0", 0.02),  # 2.5 ms, which cost the loop as much as 20 ms
+    ],
+)
+def test_opus_counts_as_long_as_it_sounds(packet: bytes, seconds: float) -> None:
+    counted, end = Counted(), Collector()
+    arrive(SoundRateLimiter(end, counted.dropped), *[sound(1, 0.0, codec="opus", payload=packet)] * 150)
+    assert 2.0 / seconds - 1 <= len(end.sources) <= 2.0 / seconds
+    assert counted.drops("too_often") == 150 - len(end.sources)
+
+
+def test_what_is_no_opus_packet_is_counted_and_goes_no_further() -> None:
+    counted, end = Counted(), Collector()
+    arrive(SoundRateLimiter(end, counted.dropped), sound(1, 0.0, codec="opus", payload=b""))
+    assert end.sources == []
+    assert counted.drops("bad_payload") == 1

@@ -141,6 +141,40 @@ async def test_an_uplink_that_makes_pictures_late_is_asked_for_less() -> None:
         assert stream.encodings.passed.keyframes.sparing
 
 
+async def test_observers_cannot_fill_a_full_uplink_with_keyframes_and_the_operator_gets_one_at_once() -> None:
+    pictures = camera_pictures(140, gop=500)
+    async with (
+        robot_that_encodes() as (hub, robot),
+        viewing(hub, ["video"], uris=NATIVE, priority=True) as operator,
+        viewing(hub, ["video"], uris=NATIVE) as observer,
+    ):
+        await show(robot, operator, pictures[:30])
+        encodings = operator.media.deliveries[0].stream.encodings
+
+        def give(medium: Media) -> None:
+            hub.feed(medium, medium.time + 0.4)
+            hub.robot_encoding.tick(medium.time + 0.4)
+
+        for medium in pictures[30:90]:
+            give(medium)
+        assert encodings.passed is not None
+        assert encodings.passed.keyframes.sparing
+        before, target = robot.newest.keyframes, observer.media.deliveries[0].target
+        assert target in encodings.passed.targets
+        for medium in pictures[90:110]:
+            encodings.request_keyframe(target, "pli")
+            give(medium)
+        for number in range(110, 130, 2):
+            encodings.leave(target)
+            give(pictures[number])
+            encodings.join("H264", target)
+            give(pictures[number + 1])
+        assert robot.newest.keyframes == before
+        encodings.request_keyframe(operator.media.deliveries[0].target, "pli")
+        give(pictures[130])
+        assert robot.newest.keyframes == before + 1
+
+
 async def test_a_vp8_peer_gets_pictures_that_the_console_decodes_and_encodes() -> None:
     async with robot_that_encodes() as (hub, robot), viewing(hub, ["video"], codecs=["VP8"], uris=NATIVE) as viewer:
         await show(robot, viewer, camera_pictures(8, gop=50))

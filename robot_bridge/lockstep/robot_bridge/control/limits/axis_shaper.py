@@ -1,8 +1,13 @@
 """Shapes commanded axis values into applied ones: clamp, slew, hold, brake. No I/O, no clock.
 
 Every value stays inside an envelope around its rest value that closes at the axis' `brake` rate and has closed `hold`
-seconds after the last execution. So a command never outlives `hold`, and no ramp is ever steeper than `brake` unless
-ticks were missed. A limiter (position limits, geofences) has the last word.
+seconds after the last execution. So a command never outlives `hold`. A tick changes a value by no more than the rate
+(`slew`, `brake`) times the period; where the envelope moves it, by no more than `brake` times the seconds since the
+tick before.
+
+That bounds the rate over periods, not between any two moments: where a command may begin the tick of its period
+(`ticks_on_command`), two ticks, and so two steps of a ramp, may follow each other at once, and the next one come up to
+two periods later. A limiter (position limits, geofences) has the last word.
 """
 
 from collections.abc import Callable, Sequence

@@ -126,9 +126,13 @@ class StreamEncodings:
         """
         for each in self:
             if target in each.targets:
-                each.request_keyframe(cause)
+                each.request_keyframe(cause, other=self.is_other(target))
                 if each is self.passed and not self.follows:
                     self.return_to_own(target)
+
+    def is_other(self, target: Subscription) -> bool:
+        """Return whether a keyframe for `target` has to wait on a full path: the operator takes the stream too."""
+        return not target.priority and any(each.priority for each in self._subscriptions)
 
     def return_to_own(self, target: Subscription) -> None:
         """Move `target` from the camera's encoding to the console's with its next keyframe; it misses nothing."""

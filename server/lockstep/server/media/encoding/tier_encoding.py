@@ -86,9 +86,14 @@ class TierEncoding:
         self.keyframes.join()
         self._requests[cause].inc()
 
-    def request_keyframe(self, cause: str) -> None:
-        """Request a keyframe. `cause`: "pli" from the peer, "drop" if it could not keep up, "record" for recording."""
-        self.keyframes.request()
+    def request_keyframe(self, cause: str, *, other: bool = False) -> None:
+        """Request a keyframe.
+
+        Args:
+            cause: "pli" from the peer, "drop" if it could not keep up, "record" for recording
+            other: it is for another than the operator, see `StreamEncodings.is_other`
+        """
+        self.keyframes.request(other=other)
         self._requests[cause].inc()
 
     def monotone(self, capture_time: float) -> float:

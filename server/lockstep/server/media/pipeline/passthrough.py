@@ -65,6 +65,7 @@ class Passthrough(FrameStage):
         self._does = False  # the robot's bridge says that it does as it is asked to
         self._distrusted_until = 0.0
         self._waiting: frozenset[Subscription] = frozenset()  # targets of the console's encodings, at the last look
+        self._operators: frozenset[Subscription] = frozenset()  # those of them who drove
 
     def ask_by(self, ask: Callable[[float], None]) -> None:
         """Set how the robot is asked for a keyframe; called with the time."""
@@ -82,7 +83,7 @@ class Passthrough(FrameStage):
         self._encodings.follows = follows
         self._asked_at = None
         if not follows:
-            self._waiting = frozenset()
+            self._waiting = self._operators = frozenset()
 
     def serve_requests(self, now: float) -> None:
         """Ask the robot for a keyframe if somebody needs one, unless one is on its way."""
@@ -97,9 +98,12 @@ class Passthrough(FrameStage):
         waiting = frozenset(
             target for encoding in self._encodings.own for target in (*encoding.targets, *encoding.arriving)
         )
-        if waiting - self._waiting:
+        if new := waiting - self._waiting:
+            self._passed.keyframes.join(other=all(map(self._encodings.is_other, new)))
+        operators = frozenset(target for target in waiting if target.priority)
+        if operators - self._operators:
             self._passed.keyframes.join()
-        self._waiting = waiting
+        self._waiting, self._operators = waiting, operators
         if self._passed.keyframes.take(now):
             self._asked_at = now
             self._ask(now)
