@@ -55,7 +55,13 @@ class Bench:
         events = SessionEvents(Metrics(process=False).faults)
         for kind in (ActionAsked, ActionCancelled, ActionRefused, ActionUpdated):
             events.subscribe(kind, self.published.append)
-        self.service = ActionService(self.robot, self.clock, lambda peer: peer.id == self.holder, events)
+        self.proven = True  # the holder has sent its neutral command
+        self.service = ActionService(
+            self.robot, self.clock, self.holds_seat, lambda peer: self.proven and self.holds_seat(peer), events
+        )
+
+    def holds_seat(self, peer: Peer) -> bool:
+        return peer.id == self.holder
 
     def peer(self, id: str = "p1", role: str = "operator") -> Peer:
         actor = ADA._replace(peer=id, role=role, link=id)
@@ -114,6 +120,18 @@ def test_a_name_that_somebody_made_up_goes_no_farther() -> None:
     bench.service.act_by_peer(bench.peer(), act(name="\u202ehome"))
     assert [each.reason for each in bench.told] == ["unknown_action"]
     assert bench.robot.sent == []
+
+
+def test_a_new_holder_moves_nothing_before_its_own_neutral_command() -> None:
+    bench = Bench()
+    bench.proven = False
+    bench.service.act_by_peer(bench.peer(), act())
+    assert [(each.state, each.reason) for each in bench.told] == [("refused", "not_neutral")]
+    assert bench.robot.sent == []
+    bench.service.act_by_peer(bench.peer(), act("b", "light"))
+    bench.proven = True
+    bench.service.act_by_peer(bench.peer(), act("c"))
+    assert [each.id for each in bench.robot.sent] == ["b", "c"]
 
 
 @pytest.mark.parametrize("id", ["", "x" * 65, "a b", "a\n", "\u202e"])

@@ -47,11 +47,18 @@ class ActionService:
     """All methods but `act_by_http` are called on the loop and return at once."""
 
     def __init__(
-        self, robot: ActionsLink, clock: EventClock, holds_seat: Callable[[Peer], bool], events: SessionEvents
+        self,
+        robot: ActionsLink,
+        clock: EventClock,
+        holds_seat: Callable[[Peer], bool],
+        may_move: Callable[[Peer], bool],
+        events: SessionEvents,
     ) -> None:
+        """`may_move`: whether a moving command of this peer would be forwarded, as far as the seat is concerned."""
         self._robot = robot
         self._clock = clock
         self._holds_seat = holds_seat
+        self._may_move = may_move
         self._events = events
         self._asks = RateLimits(ASK_RATE, ASKS)
         self._progress = TokenBucket(UPDATE_RATE, UPDATES)
@@ -77,8 +84,13 @@ class ActionService:
         if not self._holds_seat(peer):
             return "no_seat"
         description = self._robot.description
-        if description is not None and act.name not in [each.name for each in description.actions]:
+        if description is None:
+            return "link_down"
+        action = next((each for each in description.actions if each.name == act.name), None)
+        if action is None:
             return "unknown_action"  # here: what a peer makes up stands in no audit
+        if action.moves and not self._may_move(peer):
+            return "not_neutral"  # it begins only where a moving command would execute
         if not self._asks.spend(peer.identity.token_id or peer.id, time.monotonic()):
             return "too_often"
         return None if self._send(msgspec.structs.replace(act, by=peer.name), peer.actor) else "link_down"

@@ -147,7 +147,7 @@ class Console:
         self.silence = silence
         self.stops = StopService(self.robot, stops, peers, clock, silence, events)
         self.resets = ResetService(self.robot, self.stops, peers, clock, seat, events)
-        self.actions = ActionService(self.robot, clock, self.seat.is_held_by, events)
+        self.actions = ActionService(self.robot, clock, self.seat.is_held_by, self.seat.may_move, events)
         self.status = StatusService()
         self._fanout = FeedbackFanout(
             settings.observer_feedback_hz, self.seat.is_held_by, peers.drivers, peers.observers, relays

@@ -1,0 +1,32 @@
+"""Actions that move the robot, asked for over real data channels of a real console with a real bridge."""
+
+from lockstep.protocol.actions import Act, ActionUpdate
+from lockstep.protocol.console import SeatRequest, SeatTake
+from tests.robot_bridge.bridge_helpers import DRIVE, NEUTRAL
+from tests.server.rig import TestPeer, eventually, running_rig
+
+
+async def _answer(peer: TestPeer, id: str) -> ActionUpdate:
+    """The first update of the action of this id."""
+    message = await peer.until(lambda each: isinstance(each, ActionUpdate) and each.id == id)
+    assert isinstance(message, ActionUpdate)
+    return message
+
+
+async def test_a_new_holder_that_has_sent_no_neutral_command_begins_no_motion() -> None:
+    async with running_rig() as rig, rig.peer("operator") as before, rig.peer("supervisor") as holder:
+        await before.feedback()
+        await holder.feedback()
+        before.send("session", SeatRequest())
+        await before.drive(NEUTRAL)
+        driven = await before.drive(DRIVE)
+        holder.send("session", SeatTake())
+        await holder.feedback(lambda each: each.event == driven.event)
+        await eventually(lambda: rig.dependencies.console.seat.rules.why == "taken")
+        await eventually(lambda: holder.newest_feedback().at_rest)
+        holder.send("session", Act(id="early", name="home", nonce=holder.newest_feedback().nonce))
+        refused = await _answer(holder, "early")
+        assert (refused.state, refused.reason) == ("refused", "not_neutral")
+        await holder.drive(NEUTRAL)
+        holder.send("session", Act(id="proper", name="home", nonce=holder.newest_feedback().nonce))
+        assert (await _answer(holder, "proper")).state in ("running", "done")
