@@ -113,7 +113,7 @@ async def test_a_wrong_code_is_refused_and_after_a_few_the_right_one_too(tmp_pat
         for _ in range(MAX_TRIES):
             with pytest.raises(PairingRefused, match="wrong_code"):
                 await pair(address_of(rig), wrong(code), "planar", None)
-        with pytest.raises(PairingRefused, match="too_many_tries"):
+        with pytest.raises(ConsoleRefused, match="not_pairing: too_many_tries"):
             await pair(address_of(rig), code, "planar", None)
         assert dial_in_of(rig).key is None
         assert "refused: wrong_code" in await kinds(rig)
@@ -123,7 +123,7 @@ async def test_a_code_works_once(tmp_path: Path) -> None:
     async with waiting_console(tmp_path) as rig:
         code = await code_for(rig)
         await pair(address_of(rig), code, "planar", None)
-        with pytest.raises(PairingRefused, match="code_used"):
+        with pytest.raises(ConsoleRefused, match="not_pairing: code_used"):
             await pair(address_of(rig), code, "planar", None)
 
 
@@ -312,3 +312,6 @@ async def test_a_robot_that_pairs_slowly_or_sends_garbage_costs_a_place_for_seco
             async with asyncio.timeout(PATIENCE):
                 await connection.wait_closed()
         await eventually(lambda: dial_in_of(rig).exchanges == 0)
+        assert rig.count("lockstep_bad_input_total", where="dial", reason="malformed") == 4
+        assert rig.count("lockstep_bad_input_total", where="dial", reason="too_slow") == 1
+        assert rig.count("lockstep_internal_errors_total", where="dial") == 0
