@@ -6,6 +6,7 @@ from contextlib import AsyncExitStack
 from pathlib import Path
 
 import pytest
+from starlette.websockets import WebSocket
 
 from lockstep.bench.harness.tcp_path import TcpPath
 from lockstep.protocol.console import SeatRequest
@@ -214,6 +215,32 @@ async def test_a_robot_that_is_forgotten_rests_is_out_at_once_and_does_not_come_
                     headers={"Authorization": RobotToken.of(key.key).header},
                 )
         assert (await kinds(rig))[-1] == "forgotten"
+
+
+async def test_a_robot_that_is_forgotten_while_its_websocket_opens_gets_no_link(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    opens = WebSocket.accept
+    async with waiting_console(tmp_path) as rig:
+        key = await paired_key(rig)
+        dial_in = dial_in_of(rig)
+
+        async def forgotten_then(websocket: WebSocket) -> None:
+            await opens(websocket)
+            await dial_in.forget()
+
+        monkeypatch.setattr(WebSocket, "accept", forgotten_then)
+        arrived: list[str] = []
+        monkeypatch.setattr(dial_in, "arrived", lambda role, line: arrived.append(role))
+        connection = await open_connection(
+            address_of(rig).path("operator"),
+            console_context(key.pin, None),
+            headers={"Authorization": RobotToken.of(key.key).header},
+        )
+        async with asyncio.timeout(PATIENCE):
+            await connection.wait_closed()
+        assert arrived == []
+        assert rig.count("lockstep_bad_input_total", where="dial", reason="robot_unknown") == 1
 
 
 async def test_a_second_console_is_refused_while_the_first_holds_the_robot(tmp_path: Path) -> None:

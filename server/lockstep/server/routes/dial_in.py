@@ -187,7 +187,7 @@ async def dial(websocket: WebSocket, name: str) -> None:
         if name == "pair":
             await _pair(websocket, here, dial_in)
         else:
-            await _carry(websocket, dial_in, name)
+            await _carry(websocket, here, dial_in, name)
     except ConsoleError as error:
         here.metrics.bad_input.labels("dial", http_error(error).name).inc()
         if isinstance(error, RobotUnknown) and not here.guard.may_fail(websocket.scope):
@@ -200,16 +200,21 @@ async def dial(websocket: WebSocket, name: str) -> None:
         await _close(websocket, GOING_AWAY)
 
 
-async def _carry(websocket: WebSocket, dial_in: DialIn, name: str) -> None:
+async def _carry(websocket: WebSocket, here: Dependencies, dial_in: DialIn, name: str) -> None:
     role = ROLES.get(name)
     if role is None:
         raise NotFound("robots dial /dial/operator, /dial/media and /dial/pair")
-    if not dial_in.knows(websocket.headers.get("authorization", "")):
+    authorization = websocket.headers.get("authorization", "")
+    if not dial_in.knows(authorization):
         raise RobotUnknown("this console does not know this robot, or has forgotten it: pair it (anew) by a code")
     socket = websocket.scope["extensions"].get(SOCKET)
     if not isinstance(socket, GuardedWebSocket):
         raise NotDialIn("this server cannot carry robot links")
     await websocket.accept()
+    if not dial_in.knows(authorization):  # the robot was forgotten meanwhile
+        here.metrics.bad_input.labels("dial", "robot_unknown").inc()
+        await _close(websocket, POLICY_VIOLATION)
+        return
     line = _Line(socket)
     dial_in.arrived(role, line)
     try:
