@@ -98,7 +98,9 @@ async def test_a_robot_without_a_key_is_refused_by_name_and_gets_no_websocket(tm
         assert not rig.dependencies.console.robot.up
 
 
-async def test_many_refusals_of_one_address_are_answered_too_many_requests(tmp_path: Path) -> None:
+async def test_many_refusals_of_one_address_are_answered_too_many_requests_and_fill_no_log(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture, capfd: pytest.CaptureFixture[str]
+) -> None:
     async with waiting_console(tmp_path, max_refused_burst=3) as rig:
         statuses = []
         for _ in range(5):
@@ -106,6 +108,8 @@ async def test_many_refusals_of_one_address_are_answered_too_many_requests(tmp_p
                 await open_connection(address_of(rig).path("media"), console_context("any", None))
             statuses.append(refused.value.status)
         assert statuses == [401, 401, 401, 429, 429]
+    said = capfd.readouterr()
+    assert "handshake" not in caplog.text + said.out + said.err
 
 
 async def test_a_wrong_code_is_refused_and_after_a_few_the_right_one_too(tmp_path: Path) -> None:
