@@ -195,6 +195,14 @@ def test_a_flood_of_progress_is_thinned_and_every_end_is_told() -> None:
     assert len(bench.service.newest()) == 32
 
 
+def test_only_an_action_that_runs_and_moves_is_renewed() -> None:
+    bench = Bench()
+    bench.service.updated(update("light", moves=False))
+    bench.service.updated(update("over", "done"))
+    bench.service.updated(update("a"))
+    assert [id for id in ("", "made-up", "light", "over", "a") if bench.service.renews(id)] == ["a"]
+
+
 async def by_http(bench: Bench, name: str = "light") -> ActionUpdate:
     return await bench.service.act_by_http(ADA, name, {"on": True})
 

@@ -1,7 +1,11 @@
 """Actions that move the robot, asked for over real data channels of a real console with a real bridge."""
 
+import pytest
+
 from lockstep.protocol.actions import Act, ActionUpdate
 from lockstep.protocol.console import SeatRequest, SeatTake
+from lockstep.protocol.messages import Command
+from lockstep.protocol.serial import event_after
 from tests.robot_bridge.bridge_helpers import DRIVE, NEUTRAL
 from tests.server.rig import TestPeer, eventually, running_rig
 
@@ -30,3 +34,19 @@ async def test_a_new_holder_that_has_sent_no_neutral_command_begins_no_motion() 
         await holder.drive(NEUTRAL)
         holder.send("session", Act(id="proper", name="home", nonce=holder.newest_feedback().nonce))
         assert (await _answer(holder, "proper")).state in ("running", "done")
+
+
+async def test_a_neutral_command_that_names_no_running_action_does_not_keep_the_seat(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    async with running_rig() as rig, rig.peer("operator") as peer:
+        moved: list[str] = []
+        monkeypatch.setattr(rig.dependencies.console.seat, "moved", lambda peer: moved.append(peer.id))
+        await peer.feedback()
+        peer.send("session", SeatRequest())
+        await peer.drive(NEUTRAL)
+        now = peer.newest_feedback()
+        event = event_after(now.event)
+        peer.send("control", Command(event=event, issue=now.issue, nonce=now.nonce, values=NEUTRAL, action="made-up"))
+        await peer.feedback(lambda each: each.event == event)
+        assert moved == []

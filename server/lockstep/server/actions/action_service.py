@@ -147,6 +147,11 @@ class ActionService:
         elif id:
             self._robot.send(ActionCancel(id=id))  # its first update may be on the way
 
+    def renews(self, id: str) -> bool:
+        """True if a command that names `id` lets an action go on that moves the robot."""
+        update = self._updates.get(id)
+        return update is not None and update.moves and update.state == "running"
+
     def updated(self, update: ActionUpdate) -> None:
         """Take the robot's news of an action."""
         before = self._updates.get(update.id)

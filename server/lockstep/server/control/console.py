@@ -371,7 +371,7 @@ class Console:
             outcome = Absorbed()
         match outcome:
             case Forward(forwarded):
-                if self._arbiter.moves(forwarded) or forwarded.action:
+                if self._arbiter.moves(forwarded) or self.actions.renews(forwarded.action):
                     self.seat.moved(peer)
                 self._events.publish(CommandForwarded(peer.actor, forwarded))
             case Refuse(refusal):
