@@ -15,10 +15,24 @@ from lockstep.protocol.errors import MessageError
 from lockstep.server.actions import action_service
 from lockstep.server.actions.action_service import ActionService
 from lockstep.server.audit.records import Actor
-from lockstep.server.errors import ConsoleError, LinkDown, NotFound, NotRenewable, TooManyRequests, Unconfirmed
+from lockstep.server.errors import (
+    ActionIdUsed,
+    ConsoleError,
+    LinkDown,
+    NotFound,
+    NotRenewable,
+    TooManyRequests,
+    Unconfirmed,
+)
 from lockstep.server.event_clock import EventClock
 from lockstep.server.peers.peer import Peer
-from lockstep.server.session_events import ActionAsked, ActionCancelled, ActionRefused, ActionUpdated, SessionEvents
+from lockstep.server.session_events import (
+    ActionAsked,
+    ActionCancelled,
+    ActionRefused,
+    ActionUpdated,
+    SessionEvents,
+)
 from lockstep.server.telemetry.metrics import Metrics
 from tests.makers import feedback
 
@@ -203,8 +217,48 @@ def test_only_an_action_that_runs_and_moves_is_renewed() -> None:
     assert [id for id in ("", "made-up", "light", "over", "a") if bench.service.renews(id)] == ["a"]
 
 
-async def by_http(bench: Bench, name: str = "light") -> ActionUpdate:
-    return await bench.service.act_by_http(ADA, name, {"on": True})
+async def by_http(bench: Bench, name: str = "light", id: str = "", nonce: int | None = None) -> ActionUpdate:
+    return await bench.service.act_by_http(ADA, name, {"on": True}, id, nonce)
+
+
+async def test_over_http_a_repeated_id_begins_nothing_again_and_gets_the_same_answer() -> None:
+    bench = Bench()
+    first, again = (asyncio.create_task(by_http(bench, id="mine", nonce=70)) for _ in range(2))
+    await asyncio.sleep(0)
+    (sent,) = bench.robot.sent
+    assert isinstance(sent, Act)
+    assert (sent.id, sent.nonce) == ("mine", 70)
+    bench.service.updated(update("mine", moves=False))
+    assert ((await first).state, (await again).state) == ("running", "running")
+    bench.service.updated(update("mine", "done", moves=False))
+    bench.robot.up = False
+    assert (await by_http(bench, id="mine")).state == "done"
+    assert len(bench.robot.sent) == 1
+
+
+async def test_over_http_an_id_of_another_request_is_refused() -> None:
+    bench = Bench()
+    bench.service.act_by_peer(bench.peer(), act("theirs", "light"))
+    asking = asyncio.create_task(by_http(bench, id="mine"))
+    await asyncio.sleep(0)
+    bench.service.updated(update("mine", "done", moves=False))
+    await asking
+    for id, name in (("theirs", "light"), ("mine", "home")):
+        with pytest.raises(ActionIdUsed):
+            await by_http(bench, name, id)
+    assert len(bench.robot.sent) == 2
+
+
+async def test_over_http_a_request_that_did_not_leave_may_be_repeated() -> None:
+    bench = Bench()
+    bench.robot.up = False
+    with pytest.raises(LinkDown):
+        await by_http(bench, id="mine")
+    bench.robot.up = True
+    asking = asyncio.create_task(by_http(bench, id="mine"))
+    await asyncio.sleep(0)
+    bench.service.updated(update("mine", "done", moves=False))
+    assert (await asking).state == "done"
 
 
 async def test_over_http_the_robots_first_answer_is_returned() -> None:

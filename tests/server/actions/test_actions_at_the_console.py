@@ -50,3 +50,19 @@ async def test_a_neutral_command_that_names_no_running_action_does_not_keep_the_
         peer.send("control", Command(event=event, issue=now.issue, nonce=now.nonce, values=NEUTRAL, action="made-up"))
         await peer.feedback(lambda each: each.event == event)
         assert moved == []
+
+
+async def test_over_http_a_repeated_request_with_an_id_and_an_old_nonce_begins_nothing_again() -> None:
+    async with running_rig() as rig, rig.peer("operator") as peer:
+        await peer.feedback()
+        peer.send("session", SeatRequest())
+        await peer.drive(NEUTRAL)
+        body = {"id": "a1", "nonce": peer.newest_feedback().nonce}
+        answers = [await rig.http.post("/api/actions/light", headers=peer.headers, json=body) for _ in range(2)]
+        assert [each.json()["id"] for each in answers] == ["a1", "a1"]
+        stale = await rig.http.post("/api/actions/light", headers=peer.headers, json={"id": "a2", "nonce": 1})
+        assert (stale.json()["state"], stale.json()["reason"]) == ("refused", "late")
+        other = await rig.http.post("/api/actions/home", headers=peer.headers, json=body)
+        assert (other.status_code, other.json()["error"]) == (409, "action_id_used")
+        bad = await rig.http.post("/api/actions/light", headers=peer.headers, json={"id": "a b"})
+        assert bad.status_code == 400

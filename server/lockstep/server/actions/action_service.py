@@ -9,7 +9,7 @@ import secrets
 import time
 from collections import OrderedDict
 from collections.abc import Callable, Mapping
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import msgspec
 
@@ -17,10 +17,16 @@ from lockstep.protocol.actions import Act, ActionCancel, ActionReason, ActionUpd
 from lockstep.protocol.description import RobotDescription
 from lockstep.rtc.token_bucket import TokenBucket
 from lockstep.server.audit.records import Actor
-from lockstep.server.errors import LinkDown, NotFound, NotRenewable, TooManyRequests, Unconfirmed
+from lockstep.server.errors import ActionIdUsed, LinkDown, NotFound, NotRenewable, TooManyRequests, Unconfirmed
 from lockstep.server.event_clock import EventClock
 from lockstep.server.peers.peer import Peer
-from lockstep.server.session_events import ActionAsked, ActionCancelled, ActionRefused, ActionUpdated, SessionEvents
+from lockstep.server.session_events import (
+    ActionAsked,
+    ActionCancelled,
+    ActionRefused,
+    ActionUpdated,
+    SessionEvents,
+)
 from lockstep.server.util.rate_limits import RateLimits
 
 __all__ = ["ActionService"]
@@ -28,6 +34,7 @@ __all__ = ["ActionService"]
 ASKS, ASK_RATE = 10, 5.0  # Hz, of one link
 UPDATES, UPDATE_RATE = 100, 50.0  # Hz, of the robot; further updates of progress alone are left out
 KEPT = 32  # newest actions whose state newcomers are told
+REMEMBERED = 256  # newest requests, as many as the bridge remembers
 ANSWER_SECONDS = 1.0  # for the robot to answer a request over HTTP
 
 
@@ -41,6 +48,14 @@ class ActionsLink(Protocol):
     @property
     def description(self) -> RobotDescription | None: ...
     def send(self, message: Act | ActionCancel) -> bool: ...
+
+
+class _Asked(NamedTuple):
+    """A request that was passed on."""
+
+    name: str
+    parameters: Mapping[str, ParameterValue]
+    answer: asyncio.Future[ActionUpdate] | None  # None: it came on a data channel
 
 
 class ActionService:
@@ -63,7 +78,7 @@ class ActionService:
         self._asks = RateLimits(ASK_RATE, ASKS)
         self._progress = TokenBucket(UPDATE_RATE, UPDATES)
         self._updates: OrderedDict[str, ActionUpdate] = OrderedDict()  # by id of the request, oldest first
-        self._waiting: dict[str, asyncio.Future[ActionUpdate]] = {}  # requests over HTTP
+        self._asked: OrderedDict[str, _Asked] = OrderedDict()  # by id of the request, oldest first
 
     def newest(self) -> list[ActionUpdate]:
         """Return how the newest actions do, oldest first."""
@@ -95,22 +110,36 @@ class ActionService:
             return "too_often"
         return None if self._send(msgspec.structs.replace(act, by=peer.name), peer.actor) else "link_down"
 
-    def _send(self, act: Act, by: Actor) -> bool:
+    def _send(self, act: Act, by: Actor, answer: asyncio.Future[ActionUpdate] | None = None) -> bool:
         if not self._robot.up or not self._robot.send(act):
             return False
+        if act.id not in self._asked:
+            self._asked[act.id] = _Asked(act.name, act.parameters, answer)
+            if len(self._asked) > REMEMBERED:
+                self._asked.popitem(last=False)
         if act.id not in self._updates:
             self._events.publish(ActionAsked(by, act))
         return True
 
-    async def act_by_http(self, by: Actor, name: str, parameters: Mapping[str, ParameterValue]) -> ActionUpdate:
+    async def act_by_http(
+        self, by: Actor, name: str, parameters: Mapping[str, ParameterValue], id: str = "", nonce: int | None = None
+    ) -> ActionUpdate:
         """Ask for an action that moves nothing; return the robot's answer. The caller has checked the right to ask.
 
+        Args:
+            id: of the request; "": the console draws one. With the id of an earlier request nothing begins: the answer
+                is the newest update of that one
+            nonce: of the feedback that the client has seen; None: of the newest, which makes every request fresh
+
         Raises:
+            ActionIdUsed: an earlier request with this id asked for something else.
             NotFound: the robot has no such action.
             NotRenewable: it moves the robot, and no armed events come over HTTP.
             TooManyRequests: of this link.
             LinkDown, Unconfirmed: the robot cannot be asked, or has not answered.
         """
+        if id in self._asked or id in self._updates:
+            return await self._again(id, name, parameters)
         description, feedback = self._robot.description, self._clock.feedback
         if description is None or feedback is None or not self._robot.up:
             raise LinkDown(self._robot.detail)
@@ -121,18 +150,24 @@ class ActionService:
             raise NotRenewable(f"{name} moves the robot: it needs armed events on the control channel")
         if not self._asks.spend(by.link or by.name, time.monotonic()):
             raise TooManyRequests("at most five actions a second")
-        act = Act(id=secrets.token_hex(16), name=name, parameters=dict(parameters), nonce=feedback.nonce, by=by.name)
-        answered: asyncio.Future[ActionUpdate] = asyncio.get_running_loop().create_future()
-        self._waiting[act.id] = answered
-        try:
-            if not self._send(act, by):
-                raise LinkDown(self._robot.detail)
-            async with asyncio.timeout(ANSWER_SECONDS):
-                return await answered
-        except TimeoutError:
-            raise Unconfirmed("the robot has not answered yet; GET /api/actions shows whether it does") from None
-        finally:
-            del self._waiting[act.id]
+        answer: asyncio.Future[ActionUpdate] = asyncio.get_running_loop().create_future()
+        act = Act(
+            id=id or secrets.token_hex(16),
+            name=name,
+            parameters=dict(parameters),
+            nonce=feedback.nonce if nonce is None else nonce,
+            by=by.name,
+        )
+        if not self._send(act, by, answer):
+            raise LinkDown(self._robot.detail)
+        return await _answered(answer)
+
+    async def _again(self, id: str, name: str, parameters: Mapping[str, ParameterValue]) -> ActionUpdate:
+        """Answer a repeated request from memory."""
+        asked, update = self._asked.get(id), self._updates.get(id)
+        if asked is None or asked.answer is None or (asked.name, asked.parameters) != (name, parameters):
+            raise ActionIdUsed("an earlier request with this id asked for something else, or on another way")
+        return await _answered(asked.answer) if update is None else update
 
     def cancel_by_peer(self, peer: Peer, cancel: ActionCancel) -> None:
         """Pass on what the seat's holder or a supervisor cancels. Others have STOP."""
@@ -157,8 +192,9 @@ class ActionService:
         before = self._updates.get(update.id)
         if update == before:
             return
-        if (waiting := self._waiting.get(update.id)) is not None and not waiting.done():
-            waiting.set_result(update)
+        asked = self._asked.get(update.id)
+        if asked is not None and asked.answer is not None and not asked.answer.done():
+            asked.answer.set_result(update)
         is_progress = before is not None and before.state == update.state
         if is_progress and not self._progress.take(time.monotonic()):
             return
@@ -177,3 +213,11 @@ class ActionService:
     def epoch_ends(self) -> None:
         """Forget all actions: the bridge that did them has ended."""
         self._updates.clear()
+
+
+async def _answered(answer: asyncio.Future[ActionUpdate]) -> ActionUpdate:
+    try:
+        async with asyncio.timeout(ANSWER_SECONDS):
+            return await asyncio.shield(answer)  # a repeat of the request waits for the same answer
+    except TimeoutError:
+        raise Unconfirmed("the robot has not answered yet; GET /api/actions shows whether it does") from None
