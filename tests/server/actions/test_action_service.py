@@ -31,10 +31,12 @@ from lockstep.server.session_events import (
     ActionCancelled,
     ActionRefused,
     ActionUpdated,
+    InputRefused,
     SessionEvents,
 )
 from lockstep.server.telemetry.metrics import Metrics
 from tests.makers import feedback
+from tests.waiting import eventually
 
 ADA = Actor("Ada", "operator", "p1", "link-1")
 DESCRIPTION = RobotDescription(
@@ -67,7 +69,7 @@ class Bench:
         self.told: list[Any] = []
         self.published: list[msgspec.Struct] = []
         events = SessionEvents(Metrics(process=False).faults)
-        for kind in (ActionAsked, ActionCancelled, ActionRefused, ActionUpdated):
+        for kind in (ActionAsked, ActionCancelled, ActionRefused, ActionUpdated, InputRefused):
             events.subscribe(kind, self.published.append)
         self.proven = True  # the holder has sent its neutral command
         self.service = ActionService(
@@ -215,6 +217,43 @@ def test_only_an_action_that_runs_and_moves_is_renewed() -> None:
     bench.service.updated(update("over", "done"))
     bench.service.updated(update("a"))
     assert [id for id in ("", "made-up", "light", "over", "a") if bench.service.renews(id)] == ["a"]
+
+
+def told(bench: Bench) -> list[ActionUpdate]:
+    return [each.update for each in bench.published if isinstance(each, ActionUpdated)]
+
+
+async def test_a_flood_of_new_states_is_thinned_counted_and_the_newest_of_each_action_is_told() -> None:
+    bench = Bench()
+    for number in range(20_000):
+        bench.service.updated(update(f"a{number % 2}", "running" if number // 2 % 2 else "done"))
+    assert len(told(bench)) < 300
+    refused = [each for each in bench.published if isinstance(each, InputRefused)]
+    assert {(each.channel, each.error) for each in refused} == {("robot", "too_many_action_states")}
+    assert len(refused) + len(told(bench)) == 20_000
+    bench.service.updated(update("a0", "failed"))
+    bench.service.updated(update("a1", "cancelled"))
+    running = asyncio.ensure_future(bench.service.run())
+    await eventually(lambda: {each.state for each in told(bench)[-2:]} == {"failed", "cancelled"})
+    running.cancel()
+    await asyncio.wait([running])
+    assert [each.state for each in bench.service.newest()] == ["failed", "cancelled"]
+
+
+async def test_a_flood_of_actions_that_nobody_asked_for_does_not_hide_the_end_of_one_that_somebody_did() -> None:
+    bench = Bench()
+    bench.service.act_by_peer(bench.peer(), act("asked"))
+    for number in range(1000):
+        bench.service.updated(update(f"n{number}", "done"))
+    bench.service.updated(update("asked"))
+    for number in range(1000):
+        bench.service.updated(update(f"m{number}", "done"))
+    bench.service.updated(update("asked", "done"))
+    assert len(bench.service.newest()) == 32
+    running = asyncio.ensure_future(bench.service.run())
+    await eventually(lambda: told(bench)[-1] == update("asked", "done"))
+    running.cancel()
+    await asyncio.wait([running])
 
 
 async def by_http(bench: Bench, name: str = "light", id: str = "", nonce: int | None = None) -> ActionUpdate:

@@ -25,6 +25,7 @@ from lockstep.server.session_events import (
     ActionCancelled,
     ActionRefused,
     ActionUpdated,
+    InputRefused,
     SessionEvents,
 )
 from lockstep.server.util.rate_limits import RateLimits
@@ -33,6 +34,7 @@ __all__ = ["ActionService"]
 
 ASKS, ASK_RATE = 10, 5.0  # Hz, of one link
 UPDATES, UPDATE_RATE = 100, 50.0  # Hz, of the robot; further updates of progress alone are left out
+STATES, STATE_RATE = 200, 20.0  # Hz, of the robot; of further new states each action's newest is told later
 KEPT = 32  # newest actions whose state newcomers are told
 REMEMBERED = 256  # newest requests, as many as the bridge remembers
 ANSWER_SECONDS = 1.0  # for the robot to answer a request over HTTP
@@ -59,7 +61,7 @@ class _Asked(NamedTuple):
 
 
 class ActionService:
-    """All methods but `act_by_http` are called on the loop and return at once."""
+    """Run `run` as a task. All other methods but `act_by_http` are called on the loop and return at once."""
 
     def __init__(
         self,
@@ -77,7 +79,10 @@ class ActionService:
         self._events = events
         self._asks = RateLimits(ASK_RATE, ASKS)
         self._progress = TokenBucket(UPDATE_RATE, UPDATES)
+        self._states = TokenBucket(STATE_RATE, STATES)
         self._updates: OrderedDict[str, ActionUpdate] = OrderedDict()  # by id of the request, oldest first
+        self._owed: dict[str, None] = {}  # ids in `_updates` of which a new state came too fast and is told later
+        self._is_owing = asyncio.Event()
         self._asked: OrderedDict[str, _Asked] = OrderedDict()  # by id of the request, oldest first
 
     def newest(self) -> list[ActionUpdate]:
@@ -189,20 +194,49 @@ class ActionService:
 
     def updated(self, update: ActionUpdate) -> None:
         """Take the robot's news of an action."""
-        before = self._updates.get(update.id)
+        now, before, asked = time.monotonic(), self._updates.get(update.id), self._asked.get(update.id)
         if update == before:
             return
-        asked = self._asked.get(update.id)
         if asked is not None and asked.answer is not None and not asked.answer.done():
             asked.answer.set_result(update)
-        is_progress = before is not None and before.state == update.state
-        if is_progress and not self._progress.take(time.monotonic()):
-            return
+        if before is not None and before.state == update.state:
+            if update.id in self._owed:
+                self._updates[update.id] = update
+            elif self._progress.take(now):
+                self._keep(update)
+                self._events.publish(ActionUpdated(update, new_state=False))
+        elif not self._owed and self._states.take(now):
+            self._keep(update)
+            self._events.publish(ActionUpdated(update, new_state=True))
+        else:
+            self._events.publish(InputRefused("robot", "too_many_action_states"))
+            if before is not None or asked is not None:  # else it is one that nobody here has asked for
+                self._keep(update)
+                self._owed[update.id] = None
+                self._is_owing.set()
+
+    def _keep(self, update: ActionUpdate) -> None:
         self._updates[update.id] = update
         if len(self._updates) > KEPT:
-            ended = next((id for id, each in self._updates.items() if each.state != "running"), None)
-            self._updates.pop(next(iter(self._updates)) if ended is None else ended)
-        self._events.publish(ActionUpdated(update, new_state=not is_progress))
+            told = (id for id, each in self._updates.items() if each.state != "running" and id not in self._owed)
+            evicted = next(told, next(iter(self._updates)))
+            del self._updates[evicted]
+            self._owed.pop(evicted, None)
+
+    async def run(self) -> None:
+        """Tell the states that came too fast, the newest of each action, until cancelled."""
+        while True:
+            await self._is_owing.wait()
+            await asyncio.sleep(self._states.wait(time.monotonic()))
+            self._tell_owed(time.monotonic())
+
+    def _tell_owed(self, now: float) -> None:
+        while self._owed and self._states.take(now):
+            id = next(iter(self._owed))
+            del self._owed[id]
+            self._events.publish(ActionUpdated(self._updates[id], new_state=True))
+        if not self._owed:
+            self._is_owing.clear()
 
     def link_down(self) -> None:
         """Note what the bridge does without this link: it cancels the action that moves the robot."""
@@ -213,6 +247,7 @@ class ActionService:
     def epoch_ends(self) -> None:
         """Forget all actions: the bridge that did them has ended."""
         self._updates.clear()
+        self._owed.clear()
 
 
 async def _answered(answer: asyncio.Future[ActionUpdate]) -> ActionUpdate:

@@ -169,6 +169,7 @@ class Console:
                 ("stops", self.stops.run),
                 ("disk of stops", self.stops.watch_disk),
                 ("resets", self.resets.run),
+                ("actions", self.actions.run),
                 ("audit", self.audit.run),
                 ("participants", self.people.share),
                 ("traces", self.traces.run),
