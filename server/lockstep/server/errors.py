@@ -13,6 +13,7 @@ ConsoleError
 │   ├── OriginRefused       a page of another site
 │   └── RobotUnknown        a robot that dials in and is not, or no longer, paired
 ├── RequestError            the request is not understood
+│   ├── ActionIdUsed        an earlier request for an action had this id
 │   ├── AlreadyPaired       a robot is paired here: forget it first
 │   ├── AlreadyPublishing   one link publishes one camera
 │   ├── AlreadyRecording
@@ -68,6 +69,7 @@ ConsoleError
 from typing import NamedTuple
 
 __all__ = [
+    "ActionIdUsed",
     "HTTP_ERRORS",
     "AccessError",
     "AlreadyPaired",
@@ -257,6 +259,10 @@ class NotConnected(RequestError):
     pass
 
 
+class ActionIdUsed(RequestError):
+    pass
+
+
 class NotRenewable(RequestError):
     pass
 
@@ -439,6 +445,7 @@ HTTP_ERRORS: dict[type[ConsoleError], HttpError] = {
     NotAcceptable: HttpError(406, "not_acceptable"),
     CameraTaken: HttpError(409, "camera_taken", {"Retry-After": "5"}),
     NotConnected: HttpError(409, "not_connected"),
+    ActionIdUsed: HttpError(409, "action_id_used"),
     NotRenewable: HttpError(409, "not_renewable"),
     NotDialIn: HttpError(409, "not_dial_in"),
     NotPairing: HttpError(409, "not_pairing"),

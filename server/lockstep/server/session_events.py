@@ -103,9 +103,9 @@ class Refused(SessionEvent, frozen=True):
 
 
 class InputRefused(SessionEvent, frozen=True):
-    """A peer has sent something that is no message."""
+    """A peer has sent something that is no message, or the robot something that the console does not take."""
 
-    channel: str
+    channel: str  # "robot": of the robot
     error: str  # its name
 
 

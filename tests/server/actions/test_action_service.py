@@ -15,12 +15,28 @@ from lockstep.protocol.errors import MessageError
 from lockstep.server.actions import action_service
 from lockstep.server.actions.action_service import ActionService
 from lockstep.server.audit.records import Actor
-from lockstep.server.errors import ConsoleError, LinkDown, NotFound, NotRenewable, TooManyRequests, Unconfirmed
+from lockstep.server.errors import (
+    ActionIdUsed,
+    ConsoleError,
+    LinkDown,
+    NotFound,
+    NotRenewable,
+    TooManyRequests,
+    Unconfirmed,
+)
 from lockstep.server.event_clock import EventClock
 from lockstep.server.peers.peer import Peer
-from lockstep.server.session_events import ActionAsked, ActionCancelled, ActionRefused, ActionUpdated, SessionEvents
+from lockstep.server.session_events import (
+    ActionAsked,
+    ActionCancelled,
+    ActionRefused,
+    ActionUpdated,
+    InputRefused,
+    SessionEvents,
+)
 from lockstep.server.telemetry.metrics import Metrics
 from tests.makers import feedback
+from tests.waiting import eventually
 
 ADA = Actor("Ada", "operator", "p1", "link-1")
 DESCRIPTION = RobotDescription(
@@ -53,9 +69,15 @@ class Bench:
         self.told: list[Any] = []
         self.published: list[msgspec.Struct] = []
         events = SessionEvents(Metrics(process=False).faults)
-        for kind in (ActionAsked, ActionCancelled, ActionRefused, ActionUpdated):
+        for kind in (ActionAsked, ActionCancelled, ActionRefused, ActionUpdated, InputRefused):
             events.subscribe(kind, self.published.append)
-        self.service = ActionService(self.robot, self.clock, lambda peer: peer.id == self.holder, events)
+        self.proven = True  # the holder has sent its neutral command
+        self.service = ActionService(
+            self.robot, self.clock, self.holds_seat, lambda peer: self.proven and self.holds_seat(peer), events
+        )
+
+    def holds_seat(self, peer: Peer) -> bool:
+        return peer.id == self.holder
 
     def peer(self, id: str = "p1", role: str = "operator") -> Peer:
         actor = ADA._replace(peer=id, role=role, link=id)
@@ -114,6 +136,18 @@ def test_a_name_that_somebody_made_up_goes_no_farther() -> None:
     bench.service.act_by_peer(bench.peer(), act(name="\u202ehome"))
     assert [each.reason for each in bench.told] == ["unknown_action"]
     assert bench.robot.sent == []
+
+
+def test_a_new_holder_moves_nothing_before_its_own_neutral_command() -> None:
+    bench = Bench()
+    bench.proven = False
+    bench.service.act_by_peer(bench.peer(), act())
+    assert [(each.state, each.reason) for each in bench.told] == [("refused", "not_neutral")]
+    assert bench.robot.sent == []
+    bench.service.act_by_peer(bench.peer(), act("b", "light"))
+    bench.proven = True
+    bench.service.act_by_peer(bench.peer(), act("c"))
+    assert [each.id for each in bench.robot.sent] == ["b", "c"]
 
 
 @pytest.mark.parametrize("id", ["", "x" * 65, "a b", "a\n", "\u202e"])
@@ -177,8 +211,93 @@ def test_a_flood_of_progress_is_thinned_and_every_end_is_told() -> None:
     assert len(bench.service.newest()) == 32
 
 
-async def by_http(bench: Bench, name: str = "light") -> ActionUpdate:
-    return await bench.service.act_by_http(ADA, name, {"on": True})
+def test_only_an_action_that_runs_and_moves_is_renewed() -> None:
+    bench = Bench()
+    bench.service.updated(update("light", moves=False))
+    bench.service.updated(update("over", "done"))
+    bench.service.updated(update("a"))
+    assert [id for id in ("", "made-up", "light", "over", "a") if bench.service.renews(id)] == ["a"]
+
+
+def told(bench: Bench) -> list[ActionUpdate]:
+    return [each.update for each in bench.published if isinstance(each, ActionUpdated)]
+
+
+async def test_a_flood_of_new_states_is_thinned_counted_and_the_newest_of_each_action_is_told() -> None:
+    bench = Bench()
+    for number in range(20_000):
+        bench.service.updated(update(f"a{number % 2}", "running" if number // 2 % 2 else "done"))
+    assert len(told(bench)) < 300
+    refused = [each for each in bench.published if isinstance(each, InputRefused)]
+    assert {(each.channel, each.error) for each in refused} == {("robot", "too_many_action_states")}
+    assert len(refused) + len(told(bench)) == 20_000
+    bench.service.updated(update("a0", "failed"))
+    bench.service.updated(update("a1", "cancelled"))
+    running = asyncio.ensure_future(bench.service.run())
+    await eventually(lambda: {each.state for each in told(bench)[-2:]} == {"failed", "cancelled"})
+    running.cancel()
+    await asyncio.wait([running])
+    assert [each.state for each in bench.service.newest()] == ["failed", "cancelled"]
+
+
+async def test_a_flood_of_actions_that_nobody_asked_for_does_not_hide_the_end_of_one_that_somebody_did() -> None:
+    bench = Bench()
+    bench.service.act_by_peer(bench.peer(), act("asked"))
+    for number in range(1000):
+        bench.service.updated(update(f"n{number}", "done"))
+    bench.service.updated(update("asked"))
+    for number in range(1000):
+        bench.service.updated(update(f"m{number}", "done"))
+    bench.service.updated(update("asked", "done"))
+    assert len(bench.service.newest()) == 32
+    running = asyncio.ensure_future(bench.service.run())
+    await eventually(lambda: told(bench)[-1] == update("asked", "done"))
+    running.cancel()
+    await asyncio.wait([running])
+
+
+async def by_http(bench: Bench, name: str = "light", id: str = "", nonce: int | None = None) -> ActionUpdate:
+    return await bench.service.act_by_http(ADA, name, {"on": True}, id, nonce)
+
+
+async def test_over_http_a_repeated_id_begins_nothing_again_and_gets_the_same_answer() -> None:
+    bench = Bench()
+    first, again = (asyncio.create_task(by_http(bench, id="mine", nonce=70)) for _ in range(2))
+    await asyncio.sleep(0)
+    (sent,) = bench.robot.sent
+    assert isinstance(sent, Act)
+    assert (sent.id, sent.nonce) == ("mine", 70)
+    bench.service.updated(update("mine", moves=False))
+    assert ((await first).state, (await again).state) == ("running", "running")
+    bench.service.updated(update("mine", "done", moves=False))
+    bench.robot.up = False
+    assert (await by_http(bench, id="mine")).state == "done"
+    assert len(bench.robot.sent) == 1
+
+
+async def test_over_http_an_id_of_another_request_is_refused() -> None:
+    bench = Bench()
+    bench.service.act_by_peer(bench.peer(), act("theirs", "light"))
+    asking = asyncio.create_task(by_http(bench, id="mine"))
+    await asyncio.sleep(0)
+    bench.service.updated(update("mine", "done", moves=False))
+    await asking
+    for id, name in (("theirs", "light"), ("mine", "home")):
+        with pytest.raises(ActionIdUsed):
+            await by_http(bench, name, id)
+    assert len(bench.robot.sent) == 2
+
+
+async def test_over_http_a_request_that_did_not_leave_may_be_repeated() -> None:
+    bench = Bench()
+    bench.robot.up = False
+    with pytest.raises(LinkDown):
+        await by_http(bench, id="mine")
+    bench.robot.up = True
+    asking = asyncio.create_task(by_http(bench, id="mine"))
+    await asyncio.sleep(0)
+    bench.service.updated(update("mine", "done", moves=False))
+    assert (await asking).state == "done"
 
 
 async def test_over_http_the_robots_first_answer_is_returned() -> None:

@@ -6,6 +6,7 @@ from contextlib import AsyncExitStack
 from pathlib import Path
 
 import pytest
+from starlette.websockets import WebSocket
 
 from lockstep.bench.harness.tcp_path import TcpPath
 from lockstep.protocol.console import SeatRequest
@@ -97,7 +98,9 @@ async def test_a_robot_without_a_key_is_refused_by_name_and_gets_no_websocket(tm
         assert not rig.dependencies.console.robot.up
 
 
-async def test_many_refusals_of_one_address_are_answered_too_many_requests(tmp_path: Path) -> None:
+async def test_many_refusals_of_one_address_are_answered_too_many_requests_and_fill_no_log(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture, capfd: pytest.CaptureFixture[str]
+) -> None:
     async with waiting_console(tmp_path, max_refused_burst=3) as rig:
         statuses = []
         for _ in range(5):
@@ -105,6 +108,8 @@ async def test_many_refusals_of_one_address_are_answered_too_many_requests(tmp_p
                 await open_connection(address_of(rig).path("media"), console_context("any", None))
             statuses.append(refused.value.status)
         assert statuses == [401, 401, 401, 429, 429]
+    said = capfd.readouterr()
+    assert "handshake" not in caplog.text + said.out + said.err
 
 
 async def test_a_wrong_code_is_refused_and_after_a_few_the_right_one_too(tmp_path: Path) -> None:
@@ -113,7 +118,7 @@ async def test_a_wrong_code_is_refused_and_after_a_few_the_right_one_too(tmp_pat
         for _ in range(MAX_TRIES):
             with pytest.raises(PairingRefused, match="wrong_code"):
                 await pair(address_of(rig), wrong(code), "planar", None)
-        with pytest.raises(PairingRefused, match="too_many_tries"):
+        with pytest.raises(ConsoleRefused, match="not_pairing: too_many_tries"):
             await pair(address_of(rig), code, "planar", None)
         assert dial_in_of(rig).key is None
         assert "refused: wrong_code" in await kinds(rig)
@@ -123,7 +128,7 @@ async def test_a_code_works_once(tmp_path: Path) -> None:
     async with waiting_console(tmp_path) as rig:
         code = await code_for(rig)
         await pair(address_of(rig), code, "planar", None)
-        with pytest.raises(PairingRefused, match="code_used"):
+        with pytest.raises(ConsoleRefused, match="not_pairing: code_used"):
             await pair(address_of(rig), code, "planar", None)
 
 
@@ -214,6 +219,32 @@ async def test_a_robot_that_is_forgotten_rests_is_out_at_once_and_does_not_come_
                     headers={"Authorization": RobotToken.of(key.key).header},
                 )
         assert (await kinds(rig))[-1] == "forgotten"
+
+
+async def test_a_robot_that_is_forgotten_while_its_websocket_opens_gets_no_link(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    opens = WebSocket.accept
+    async with waiting_console(tmp_path) as rig:
+        key = await paired_key(rig)
+        dial_in = dial_in_of(rig)
+
+        async def forgotten_then(websocket: WebSocket) -> None:
+            await opens(websocket)
+            await dial_in.forget()
+
+        monkeypatch.setattr(WebSocket, "accept", forgotten_then)
+        arrived: list[str] = []
+        monkeypatch.setattr(dial_in, "arrived", lambda role, line: arrived.append(role))
+        connection = await open_connection(
+            address_of(rig).path("operator"),
+            console_context(key.pin, None),
+            headers={"Authorization": RobotToken.of(key.key).header},
+        )
+        async with asyncio.timeout(PATIENCE):
+            await connection.wait_closed()
+        assert arrived == []
+        assert rig.count("lockstep_bad_input_total", where="dial", reason="robot_unknown") == 1
 
 
 async def test_a_second_console_is_refused_while_the_first_holds_the_robot(tmp_path: Path) -> None:
@@ -312,3 +343,6 @@ async def test_a_robot_that_pairs_slowly_or_sends_garbage_costs_a_place_for_seco
             async with asyncio.timeout(PATIENCE):
                 await connection.wait_closed()
         await eventually(lambda: dial_in_of(rig).exchanges == 0)
+        assert rig.count("lockstep_bad_input_total", where="dial", reason="malformed") == 4
+        assert rig.count("lockstep_bad_input_total", where="dial", reason="too_slow") == 1
+        assert rig.count("lockstep_internal_errors_total", where="dial") == 0

@@ -1,14 +1,18 @@
 """A robot link is kept until its keeper is cancelled."""
 
 import asyncio
+from pathlib import Path
 from typing import Any, Self
 
 import pytest
 
 from lockstep.protocol.messages import LinkRole
 from lockstep.server.robot.credentials import LinkCredentials
+from lockstep.server.robot.dial_in import DialIn
 from lockstep.server.robot.reconnecting_link import ReconnectingLink
 from lockstep.server.util.backoff import Backoff
+from lockstep.server.util.state_dir import StateDir
+from tests.waiting import eventually
 
 
 class Sink:
@@ -49,6 +53,32 @@ class FailsAsItEnds:
 
     async def __aexit__(self, *_: object) -> None:
         pass
+
+
+class Line:
+    address = "a robot"
+    is_closed = False
+
+    def carry(self, link: asyncio.Protocol) -> None:
+        raise AssertionError("it carries a link without a key")
+
+    def close(self) -> None:
+        self.is_closed = True
+
+
+async def test_a_line_that_comes_while_no_robot_is_paired_gets_no_link(tmp_path: Path) -> None:
+    """With no key a link would ask for no proof."""
+    dial_in = DialIn(StateDir(tmp_path), None, lambda: None)
+    sink, line, later = Sink(), Line(), Line()
+    keeper = ReconnectingLink("", 0, "operator", sink, Backoff(0.01, 0.01), LinkCredentials(), dial_in=dial_in)
+    running = asyncio.ensure_future(keeper.run())
+    dial_in.arrived("operator", line)
+    await eventually(lambda: line.is_closed)
+    dial_in.arrived("operator", later)
+    await eventually(lambda: later.is_closed)
+    running.cancel()
+    await asyncio.wait([running])
+    assert not sink.failed
 
 
 async def test_a_fault_in_ending_does_not_hide_that_it_was_cancelled(

@@ -9,7 +9,7 @@ import secrets
 import time
 from collections import OrderedDict
 from collections.abc import Callable, Mapping
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import msgspec
 
@@ -17,17 +17,26 @@ from lockstep.protocol.actions import Act, ActionCancel, ActionReason, ActionUpd
 from lockstep.protocol.description import RobotDescription
 from lockstep.rtc.token_bucket import TokenBucket
 from lockstep.server.audit.records import Actor
-from lockstep.server.errors import LinkDown, NotFound, NotRenewable, TooManyRequests, Unconfirmed
+from lockstep.server.errors import ActionIdUsed, LinkDown, NotFound, NotRenewable, TooManyRequests, Unconfirmed
 from lockstep.server.event_clock import EventClock
 from lockstep.server.peers.peer import Peer
-from lockstep.server.session_events import ActionAsked, ActionCancelled, ActionRefused, ActionUpdated, SessionEvents
+from lockstep.server.session_events import (
+    ActionAsked,
+    ActionCancelled,
+    ActionRefused,
+    ActionUpdated,
+    InputRefused,
+    SessionEvents,
+)
 from lockstep.server.util.rate_limits import RateLimits
 
 __all__ = ["ActionService"]
 
 ASKS, ASK_RATE = 10, 5.0  # Hz, of one link
 UPDATES, UPDATE_RATE = 100, 50.0  # Hz, of the robot; further updates of progress alone are left out
+STATES, STATE_RATE = 200, 20.0  # Hz, of the robot; of further new states each action's newest is told later
 KEPT = 32  # newest actions whose state newcomers are told
+REMEMBERED = 256  # newest requests, as many as the bridge remembers
 ANSWER_SECONDS = 1.0  # for the robot to answer a request over HTTP
 
 
@@ -43,20 +52,38 @@ class ActionsLink(Protocol):
     def send(self, message: Act | ActionCancel) -> bool: ...
 
 
+class _Asked(NamedTuple):
+    """A request that was passed on."""
+
+    name: str
+    parameters: Mapping[str, ParameterValue]
+    answer: asyncio.Future[ActionUpdate] | None  # None: it came on a data channel
+
+
 class ActionService:
-    """All methods but `act_by_http` are called on the loop and return at once."""
+    """Run `run` as a task. All other methods but `act_by_http` are called on the loop and return at once."""
 
     def __init__(
-        self, robot: ActionsLink, clock: EventClock, holds_seat: Callable[[Peer], bool], events: SessionEvents
+        self,
+        robot: ActionsLink,
+        clock: EventClock,
+        holds_seat: Callable[[Peer], bool],
+        may_move: Callable[[Peer], bool],
+        events: SessionEvents,
     ) -> None:
+        """`may_move`: whether a moving command of this peer would be forwarded, as far as the seat is concerned."""
         self._robot = robot
         self._clock = clock
         self._holds_seat = holds_seat
+        self._may_move = may_move
         self._events = events
         self._asks = RateLimits(ASK_RATE, ASKS)
         self._progress = TokenBucket(UPDATE_RATE, UPDATES)
+        self._states = TokenBucket(STATE_RATE, STATES)
         self._updates: OrderedDict[str, ActionUpdate] = OrderedDict()  # by id of the request, oldest first
-        self._waiting: dict[str, asyncio.Future[ActionUpdate]] = {}  # requests over HTTP
+        self._owed: dict[str, None] = {}  # ids in `_updates` of which a new state came too fast and is told later
+        self._is_owing = asyncio.Event()
+        self._asked: OrderedDict[str, _Asked] = OrderedDict()  # by id of the request, oldest first
 
     def newest(self) -> list[ActionUpdate]:
         """Return how the newest actions do, oldest first."""
@@ -77,28 +104,47 @@ class ActionService:
         if not self._holds_seat(peer):
             return "no_seat"
         description = self._robot.description
-        if description is not None and act.name not in [each.name for each in description.actions]:
+        if description is None:
+            return "link_down"
+        action = next((each for each in description.actions if each.name == act.name), None)
+        if action is None:
             return "unknown_action"  # here: what a peer makes up stands in no audit
+        if action.moves and not self._may_move(peer):
+            return "not_neutral"  # it begins only where a moving command would execute
         if not self._asks.spend(peer.identity.token_id or peer.id, time.monotonic()):
             return "too_often"
         return None if self._send(msgspec.structs.replace(act, by=peer.name), peer.actor) else "link_down"
 
-    def _send(self, act: Act, by: Actor) -> bool:
+    def _send(self, act: Act, by: Actor, answer: asyncio.Future[ActionUpdate] | None = None) -> bool:
         if not self._robot.up or not self._robot.send(act):
             return False
+        if act.id not in self._asked:
+            self._asked[act.id] = _Asked(act.name, act.parameters, answer)
+            if len(self._asked) > REMEMBERED:
+                self._asked.popitem(last=False)
         if act.id not in self._updates:
             self._events.publish(ActionAsked(by, act))
         return True
 
-    async def act_by_http(self, by: Actor, name: str, parameters: Mapping[str, ParameterValue]) -> ActionUpdate:
+    async def act_by_http(
+        self, by: Actor, name: str, parameters: Mapping[str, ParameterValue], id: str = "", nonce: int | None = None
+    ) -> ActionUpdate:
         """Ask for an action that moves nothing; return the robot's answer. The caller has checked the right to ask.
 
+        Args:
+            id: of the request; "": the console draws one. With the id of an earlier request nothing begins: the answer
+                is the newest update of that one
+            nonce: of the feedback that the client has seen; None: of the newest, which makes every request fresh
+
         Raises:
+            ActionIdUsed: an earlier request with this id asked for something else.
             NotFound: the robot has no such action.
             NotRenewable: it moves the robot, and no armed events come over HTTP.
             TooManyRequests: of this link.
             LinkDown, Unconfirmed: the robot cannot be asked, or has not answered.
         """
+        if id in self._asked or id in self._updates:
+            return await self._again(id, name, parameters)
         description, feedback = self._robot.description, self._clock.feedback
         if description is None or feedback is None or not self._robot.up:
             raise LinkDown(self._robot.detail)
@@ -109,18 +155,24 @@ class ActionService:
             raise NotRenewable(f"{name} moves the robot: it needs armed events on the control channel")
         if not self._asks.spend(by.link or by.name, time.monotonic()):
             raise TooManyRequests("at most five actions a second")
-        act = Act(id=secrets.token_hex(16), name=name, parameters=dict(parameters), nonce=feedback.nonce, by=by.name)
-        answered: asyncio.Future[ActionUpdate] = asyncio.get_running_loop().create_future()
-        self._waiting[act.id] = answered
-        try:
-            if not self._send(act, by):
-                raise LinkDown(self._robot.detail)
-            async with asyncio.timeout(ANSWER_SECONDS):
-                return await answered
-        except TimeoutError:
-            raise Unconfirmed("the robot has not answered yet; GET /api/actions shows whether it does") from None
-        finally:
-            del self._waiting[act.id]
+        answer: asyncio.Future[ActionUpdate] = asyncio.get_running_loop().create_future()
+        act = Act(
+            id=id or secrets.token_hex(16),
+            name=name,
+            parameters=dict(parameters),
+            nonce=feedback.nonce if nonce is None else nonce,
+            by=by.name,
+        )
+        if not self._send(act, by, answer):
+            raise LinkDown(self._robot.detail)
+        return await _answered(answer)
+
+    async def _again(self, id: str, name: str, parameters: Mapping[str, ParameterValue]) -> ActionUpdate:
+        """Answer a repeated request from memory."""
+        asked, update = self._asked.get(id), self._updates.get(id)
+        if asked is None or asked.answer is None or (asked.name, asked.parameters) != (name, parameters):
+            raise ActionIdUsed("an earlier request with this id asked for something else, or on another way")
+        return await _answered(asked.answer) if update is None else update
 
     def cancel_by_peer(self, peer: Peer, cancel: ActionCancel) -> None:
         """Pass on what the seat's holder or a supervisor cancels. Others have STOP."""
@@ -135,21 +187,56 @@ class ActionService:
         elif id:
             self._robot.send(ActionCancel(id=id))  # its first update may be on the way
 
+    def renews(self, id: str) -> bool:
+        """True if a command that names `id` lets an action go on that moves the robot."""
+        update = self._updates.get(id)
+        return update is not None and update.moves and update.state == "running"
+
     def updated(self, update: ActionUpdate) -> None:
         """Take the robot's news of an action."""
-        before = self._updates.get(update.id)
+        now, before, asked = time.monotonic(), self._updates.get(update.id), self._asked.get(update.id)
         if update == before:
             return
-        if (waiting := self._waiting.get(update.id)) is not None and not waiting.done():
-            waiting.set_result(update)
-        is_progress = before is not None and before.state == update.state
-        if is_progress and not self._progress.take(time.monotonic()):
-            return
+        if asked is not None and asked.answer is not None and not asked.answer.done():
+            asked.answer.set_result(update)
+        if before is not None and before.state == update.state:
+            if update.id in self._owed:
+                self._updates[update.id] = update
+            elif self._progress.take(now):
+                self._keep(update)
+                self._events.publish(ActionUpdated(update, new_state=False))
+        elif not self._owed and self._states.take(now):
+            self._keep(update)
+            self._events.publish(ActionUpdated(update, new_state=True))
+        else:
+            self._events.publish(InputRefused("robot", "too_many_action_states"))
+            if before is not None or asked is not None:  # else it is one that nobody here has asked for
+                self._keep(update)
+                self._owed[update.id] = None
+                self._is_owing.set()
+
+    def _keep(self, update: ActionUpdate) -> None:
         self._updates[update.id] = update
         if len(self._updates) > KEPT:
-            ended = next((id for id, each in self._updates.items() if each.state != "running"), None)
-            self._updates.pop(next(iter(self._updates)) if ended is None else ended)
-        self._events.publish(ActionUpdated(update, new_state=not is_progress))
+            told = (id for id, each in self._updates.items() if each.state != "running" and id not in self._owed)
+            evicted = next(told, next(iter(self._updates)))
+            del self._updates[evicted]
+            self._owed.pop(evicted, None)
+
+    async def run(self) -> None:
+        """Tell the states that came too fast, the newest of each action, until cancelled."""
+        while True:
+            await self._is_owing.wait()
+            await asyncio.sleep(self._states.wait(time.monotonic()))
+            self._tell_owed(time.monotonic())
+
+    def _tell_owed(self, now: float) -> None:
+        while self._owed and self._states.take(now):
+            id = next(iter(self._owed))
+            del self._owed[id]
+            self._events.publish(ActionUpdated(self._updates[id], new_state=True))
+        if not self._owed:
+            self._is_owing.clear()
 
     def link_down(self) -> None:
         """Note what the bridge does without this link: it cancels the action that moves the robot."""
@@ -160,3 +247,12 @@ class ActionService:
     def epoch_ends(self) -> None:
         """Forget all actions: the bridge that did them has ended."""
         self._updates.clear()
+        self._owed.clear()
+
+
+async def _answered(answer: asyncio.Future[ActionUpdate]) -> ActionUpdate:
+    try:
+        async with asyncio.timeout(ANSWER_SECONDS):
+            return await asyncio.shield(answer)  # a repeat of the request waits for the same answer
+    except TimeoutError:
+        raise Unconfirmed("the robot has not answered yet; GET /api/actions shows whether it does") from None

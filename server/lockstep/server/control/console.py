@@ -147,7 +147,7 @@ class Console:
         self.silence = silence
         self.stops = StopService(self.robot, stops, peers, clock, silence, events)
         self.resets = ResetService(self.robot, self.stops, peers, clock, seat, events)
-        self.actions = ActionService(self.robot, clock, self.seat.is_held_by, events)
+        self.actions = ActionService(self.robot, clock, self.seat.is_held_by, self.seat.may_move, events)
         self.status = StatusService()
         self._fanout = FeedbackFanout(
             settings.observer_feedback_hz, self.seat.is_held_by, peers.drivers, peers.observers, relays
@@ -169,6 +169,7 @@ class Console:
                 ("stops", self.stops.run),
                 ("disk of stops", self.stops.watch_disk),
                 ("resets", self.resets.run),
+                ("actions", self.actions.run),
                 ("audit", self.audit.run),
                 ("participants", self.people.share),
                 ("traces", self.traces.run),
@@ -371,7 +372,7 @@ class Console:
             outcome = Absorbed()
         match outcome:
             case Forward(forwarded):
-                if self._arbiter.moves(forwarded) or forwarded.action:
+                if self._arbiter.moves(forwarded) or self.actions.renews(forwarded.action):
                     self.seat.moved(peer)
                 self._events.publish(CommandForwarded(peer.actor, forwarded))
             case Refuse(refusal):

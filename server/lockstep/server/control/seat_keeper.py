@@ -52,6 +52,10 @@ class SeatKeeper:
     def is_held_by(self, peer: Peer) -> bool:
         return self.rules.holds(peer.id)
 
+    def may_move(self, peer: Peer) -> bool:
+        """True if `peer` holds the seat and has sent the neutral command that comes before any motion."""
+        return self.rules.may_move(peer.id)
+
     def is_held_with(self, link: str) -> bool:
         """True if a peer with the link of this id holds the seat."""
         holder = self._peers.by_id(self.rules.holder)

@@ -1,6 +1,6 @@
 """The rules of pairing at the console: one code at a time, once, for minutes, with few tries. No I/O, no clock.
 
-Call `offer` with a fresh code; for each robot that comes `begin`, then `prove`. `now` is monotonic, s.
+Call `offer` with a fresh code; for each robot that comes `ended`, `begin`, then `prove`. `now` is monotonic, s.
 """
 
 import secrets
@@ -84,6 +84,11 @@ class PairingOffer:
         if self._state == "waiting" and now >= self._until:
             self._state = "expired"
         return self._state
+
+    def ended(self, now: float) -> Refusal | None:
+        """Return why no code is open; None while one is."""
+        state = self.state(now)
+        return None if state == "waiting" else Refusal(ENDED[state])
 
     def seconds(self, now: float) -> float:
         """Return how long the code is good for; 0 without one."""

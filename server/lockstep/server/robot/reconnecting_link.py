@@ -108,8 +108,12 @@ class ReconnectingLink:
         if self._dial_in is None:
             return RobotLink(self._host, self._port, self._role, name=self._name, secret=secret, tls=tls)
         self._sink.link_closed(self._role, self._dial_in.words)
-        line = await self._dial_in.next_line(self._role)
-        return RobotLink(line.address, 0, self._role, name=self._name, secret=self._dial_in.key, connect=line.carry)
+        while True:
+            line = await self._dial_in.next_line(self._role)
+            key = self._dial_in.key
+            if key is not None:
+                return RobotLink(line.address, 0, self._role, name=self._name, secret=key, connect=line.carry)
+            line.close()  # forgotten meanwhile; a link without a key would ask the robot for no proof
 
     async def _once(self) -> None:
         loop = asyncio.get_running_loop()

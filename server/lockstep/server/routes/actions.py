@@ -6,7 +6,7 @@ from typing import Annotated
 import msgspec
 from fastapi import APIRouter, Depends, Request, Response
 
-from lockstep.protocol.actions import ActionUpdate, Parameters, Status
+from lockstep.protocol.actions import ActionUpdate, Parameters, RenewedAction, Status
 from lockstep.server.auth.tokens import Right
 from lockstep.server.errors import NoSeat, NotAllowed
 from lockstep.server.http.json_response import json_answer
@@ -16,6 +16,7 @@ from lockstep.server.state.dependencies import authorized, dependencies
 __all__ = ["ActionList", "ActionRequest", "RobotStatus", "router"]
 
 router = APIRouter()
+Nonce = Annotated[int, msgspec.Meta(ge=0, le=2**53 - 1)]
 Caller = Annotated[Right, Depends(authorized)]
 
 
@@ -29,6 +30,8 @@ class ActionRequest(msgspec.Struct, frozen=True):
     """Body of POST /api/actions/{name}."""
 
     parameters: Parameters = {}
+    id: RenewedAction = ""  # of the request: the same id begins nothing again; "": the console draws one
+    nonce: Nonce | None = None  # of a recent feedback; null: the console takes the newest
 
 
 class RobotStatus(msgspec.Struct, frozen=True):
@@ -52,7 +55,9 @@ async def act(request: Request, caller: Caller, name: str) -> Response:
         raise NotAllowed("observers watch")
     if not console.seat.is_held_with(caller.identity.token_id):
         raise NoSeat("take the control seat first, with a connection of this link")
-    return json_answer(await console.actions.act_by_http(caller.actor, name, wanted.parameters))
+    return json_answer(
+        await console.actions.act_by_http(caller.actor, name, wanted.parameters, wanted.id, wanted.nonce)
+    )
 
 
 @router.get("/api/status")

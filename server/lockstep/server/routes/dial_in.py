@@ -37,6 +37,7 @@ __all__ = ["NewPairingCode", "PairingInfo", "RobotDialInfo", "router"]
 PAIRING_SECONDS = 10.0  # for a robot's whole exchange
 MAX_PAIRING = 8  # robots that are in it at once
 ROLES: dict[str, LinkRole] = {"operator": "operator", "media": "media"}
+NOT_PAIRING = "no pairing code is open here: a supervisor presses “Pair a robot” on the page"
 GOING_AWAY, POLICY_VIOLATION = 1001, 1008  # RFC 6455 7.4.1
 
 router = APIRouter()
@@ -186,7 +187,7 @@ async def dial(websocket: WebSocket, name: str) -> None:
         if name == "pair":
             await _pair(websocket, here, dial_in)
         else:
-            await _carry(websocket, dial_in, name)
+            await _carry(websocket, here, dial_in, name)
     except ConsoleError as error:
         here.metrics.bad_input.labels("dial", http_error(error).name).inc()
         if isinstance(error, RobotUnknown) and not here.guard.may_fail(websocket.scope):
@@ -196,19 +197,24 @@ async def dial(websocket: WebSocket, name: str) -> None:
         pass  # gone already
     except Exception as error:
         here.metrics.faults.caught("dial", error)  # a fault of one connection must not reach uvicorn
-        await websocket.close(GOING_AWAY)
+        await _close(websocket, GOING_AWAY)
 
 
-async def _carry(websocket: WebSocket, dial_in: DialIn, name: str) -> None:
+async def _carry(websocket: WebSocket, here: Dependencies, dial_in: DialIn, name: str) -> None:
     role = ROLES.get(name)
     if role is None:
         raise NotFound("robots dial /dial/operator, /dial/media and /dial/pair")
-    if not dial_in.knows(websocket.headers.get("authorization", "")):
+    authorization = websocket.headers.get("authorization", "")
+    if not dial_in.knows(authorization):
         raise RobotUnknown("this console does not know this robot, or has forgotten it: pair it (anew) by a code")
     socket = websocket.scope["extensions"].get(SOCKET)
     if not isinstance(socket, GuardedWebSocket):
         raise NotDialIn("this server cannot carry robot links")
     await websocket.accept()
+    if not dial_in.knows(authorization):  # the robot was forgotten meanwhile
+        here.metrics.bad_input.labels("dial", "robot_unknown").inc()
+        await _close(websocket, POLICY_VIOLATION)
+        return
     line = _Line(socket)
     dial_in.arrived(role, line)
     try:
@@ -237,8 +243,8 @@ class _Line:
 
 
 async def _pair(websocket: WebSocket, here: Dependencies, dial_in: DialIn) -> None:
-    if dial_in.offer.state(time.monotonic()) == "none":
-        raise NotPairing("no pairing code is open here: a supervisor presses “Pair a robot” on the page")
+    if (ended := dial_in.offer.ended(time.monotonic())) is not None:
+        raise NotPairing(f"{ended.name}: {ended.detail}" if ended.name != "not_pairing" else NOT_PAIRING)
     if dial_in.exchanges >= MAX_PAIRING or not here.guard.may_fail(websocket.scope):
         raise TooManyRequests("too many robots try to pair: wait, and try again")
     dial_in.exchanges += 1
@@ -250,10 +256,10 @@ async def _pair(websocket: WebSocket, here: Dependencies, dial_in: DialIn) -> No
         await websocket.close()
     except TimeoutError:
         here.metrics.bad_input.labels("dial", "too_slow").inc()
-        await websocket.close(POLICY_VIOLATION)
+        await _close(websocket, POLICY_VIOLATION)
     except msgspec.MsgspecError:
         here.metrics.bad_input.labels("dial", "malformed").inc()
-        await websocket.close(POLICY_VIOLATION)
+        await _close(websocket, POLICY_VIOLATION)
     except RuntimeError as error:  # starlette's, for a robot that is gone
         raise WebSocketDisconnect(GOING_AWAY) from error
     finally:
@@ -290,10 +296,22 @@ def _address(websocket: WebSocket) -> str:
 
 
 async def _receive(websocket: WebSocket) -> bytes:
-    data = await websocket.receive_bytes()
+    message = await websocket.receive()
+    if message["type"] == "websocket.disconnect":
+        raise WebSocketDisconnect(message.get("code", GOING_AWAY))
+    data: bytes | None = message.get("bytes")
+    if data is None:
+        raise msgspec.DecodeError("text")  # a stranger's: pairing is binary
     if len(data) > MAX_PAIRING_MESSAGE:
         raise msgspec.DecodeError("too large")
     return data
+
+
+async def _close(websocket: WebSocket, code: int) -> None:
+    try:
+        await websocket.close(code)
+    except (RuntimeError, OSError, WebSocketDisconnect):
+        return  # it is closed already
 
 
 async def _refuse(websocket: WebSocket, error: ConsoleError) -> None:

@@ -16,6 +16,7 @@ from lockstep.protocol.console import RecordingState
 from lockstep.protocol.serial import MAX_EVENT
 from lockstep.server.errors import (
     HTTP_ERRORS,
+    ActionIdUsed,
     AlreadyPaired,
     AlreadyPublishing,
     AlreadyRecording,
@@ -238,7 +239,7 @@ OPERATIONS: tuple[Operation, ...] = (
     Operation("get", "/api/actions", "How the newest actions of the robot do.", 200, ActionList),
     Operation(
         *("post", "/api/actions/{name}", "Ask for an action that moves nothing.", 200, ActionUpdate),
-        errors=(NotAllowed, NoSeat, NotFound, NotRenewable, LinkDown, Unconfirmed, *WITH_JSON),
+        errors=(NotAllowed, NoSeat, NotFound, NotRenewable, ActionIdUsed, LinkDown, Unconfirmed, *WITH_JSON),
         body=ActionRequest,
         parameters=(ACTION,),
     ),

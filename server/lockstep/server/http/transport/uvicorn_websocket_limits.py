@@ -6,7 +6,7 @@ them; one that reads nothing would keep a connection that has ended.
 
 import asyncio
 import socket
-from typing import cast
+from typing import Any, cast
 
 from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
 from websockets.frames import Frame
@@ -123,6 +123,15 @@ class GuardedWebSocket(WebSocketsSansIOProtocol):
         super().connection_lost(exc)
         if self._link is not None:
             self._link.connection_lost(exc)
+
+    async def send(self, message: Any) -> None:  # uvicorn's type of it is private
+        """Send a message of the app. A refusal that has left ends the handshake; uvicorn would log an error for each.
+
+        Strangers are refused so, and would fill the log.
+        """
+        await super().send(message)
+        if message["type"] == "websocket.http.response.body" and not message.get("more_body", False):
+            self.handshake_complete = True
 
     async def run_asgi(self) -> None:
         try:
