@@ -13,3 +13,4 @@ export { createScaleBar } from "../ui/views/scale_bar";
 export { SceneSwitch } from "../scene/scene_switch";
 export { createTalkButton } from "../ui/session/talk_button";
 export { Talkback } from "../talkback/talkback";
+export { createRobotStrip } from "../ui/robot/robot_strip";

@@ -19,7 +19,7 @@ import { createLimitsStrip } from "../ui/driving/limits_strip";
 import { createOverlay, overlayLabels } from "../ui/views/overlay";
 import { createSeatBar } from "../ui/session/seat_bar";
 import { createStatusBar } from "../ui/status/status_bar";
-import { createRobotStrip, type RobotStrip } from "../ui/robot/robot_strip";
+import type { RobotStrip } from "../ui/robot/robot_strip";
 import { createStopPanel } from "../ui/driving/stop_panel";
 import { watchTouch } from "../ui/elements/touch_detection";
 import { ViewGrid } from "../ui/views/view_grid";
@@ -38,7 +38,7 @@ export class Page {
   private side: SidePanels | null = null; // until its code is there
   private readonly later = new DeferredLoader(() => note(this.engine.state, "error", NOT_LOADED, Date.now()));
   private startedMs = Infinity;
-  private robot: RobotStrip | null = null;
+  private robot: RobotStrip | null = null; // until its code is there
   private readonly panels: Panel[];
   private drawnMs = 0;
 
@@ -92,7 +92,7 @@ export class Page {
     );
     const alarm = createAlarmStrip(engine);
     const banner = createBanner(engine);
-    const robot = (this.robot = createRobotStrip(engine));
+    const robot = later.panel((parts) => (this.robot = parts.createRobotStrip(engine)));
     const event = createEventPanel(engine);
     grid.card = event.element;
     const force = later.panel((parts) => parts.createForceGauge(engine, false));

@@ -9,7 +9,7 @@ export const ACT_REFUSAL_LABELS: Readonly<Record<ActRefusal, string>> = {
   robot_down: "The robot cannot be reached",
   no_seat: "Get the control seat first",
   locked_out: "Somebody at the robot has locked it",
-  stopped: "The robot is stopped: reset it first",
+  stopped: "Reset the stop first",
   not_armed: "Arm first: this moves the robot",
   neutral_waits: "Arming: wait for the robot's answer",
   driving: "Let go of the hold-to-run control first",
