@@ -32,9 +32,9 @@ import { Haptics } from "../haptics/haptics";
 import { Heartbeat } from "../transport/heartbeat";
 import { Connection, type ConnectionState } from "../transport/connection";
 import type { ConsoleApi } from "../transport/signalling/console_api";
-import type { Preconnection } from "../transport/webrtc/preconnection";
+import { firstReader, type Preconnection } from "../transport/webrtc/preconnection";
 import type { ChannelName, Peer, PeerOptions } from "../transport/peer";
-import { newReader } from "../transport/encoded_transform/stamp_reader";
+import type { StampReader } from "../transport/encoded_transform/stamp_reader";
 import { SessionClient } from "../session/session_client";
 import { ActionClient, drawId } from "../robot/action_client";
 import type { ActConditions } from "../robot/actions";
@@ -114,7 +114,7 @@ export class ConsoleEngine {
     sticks: TouchSticks,
     readonly page: ConsoleEngineEvents,
     first: Preconnection | null,
-    private readonly reader = first === null ? newReader() : first.pending.reader,
+    private readonly reader: StampReader | null = first === null ? firstReader() : first.pending.reader,
   ) {
     this.streams = new MediaStreams(this.state, this.reader, this.audio, {
       canvas: (info) => page.canvas(info),

@@ -1,7 +1,7 @@
 import type { PageLink } from "../../util/url_fragment";
 import { ConsoleError } from "../signalling/http";
 import { PendingConnection, USUAL_CAMERAS, USUAL_MICROPHONES } from "./pending_connection";
-import { newReader } from "../encoded_transform/stamp_reader";
+import type { StampReader } from "../encoded_transform/stamp_reader";
 import { postOffer, type WhepAnswer } from "../signalling/whep";
 
 /** A connection that the page's first script has begun, for the rest of the page to go on with. */
@@ -23,14 +23,15 @@ type Refusal = Pick<ConsoleError, "status" | "error" | "detail" | "retryAfterMs"
 declare global {
   interface Window {
     lockstepFirst?: Preconnection;
+    lockstepReader?: () => StampReader | null; // the first script has the worker: nobody loads it twice
   }
 }
 
 const LIMIT_MS = 20_000;
 
 /** Makes the offer and posts it. Raises Error where there is no WebRTC. */
-export function preconnect(link: PageLink, token: string): Preconnection {
-  const pending = new PendingConnection(newReader(), link);
+export function preconnect(link: PageLink, token: string, reader: StampReader | null): Preconnection {
+  const pending = new PendingConnection(reader, link);
   pending.addSections(USUAL_CAMERAS, USUAL_MICROPHONES);
   pending.addVoice();
   const abort = new AbortController();
@@ -42,6 +43,11 @@ export function preconnect(link: PageLink, token: string): Preconnection {
     () => undefined,
   );
   return { pending, abort, posted, outcome };
+}
+
+/** A reader of stamps, of a page whose first script has begun no connection. */
+export function firstReader(): StampReader | null {
+  return window.lockstepReader?.() ?? null;
 }
 
 /** What the first script has begun, if it has and nobody has taken it yet. */
