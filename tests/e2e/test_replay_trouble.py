@@ -42,7 +42,7 @@ async def _ask(stack: Stack, method: str, path: str) -> dict[str, Any]:
 async def _record_a_drive_in_vp8_and_pcmu(stack: Stack) -> str:
     """Its id. In its second half somebody takes Opus."""
     async with (
-        Console(stack.operator, codec="VP8", sound_codec="PCMU", name="Ada") as console,
+        Console(stack.operator, codec="VP8", sound_codec="PCMU", name="Ada", event_rate=25.0) as console,
         AsyncExitStack() as others,
     ):
         await console.take_seat()

@@ -14,3 +14,5 @@ export { SceneSwitch } from "../scene/scene_switch";
 export { createTalkButton } from "../ui/session/talk_button";
 export { Talkback } from "../talkback/talkback";
 export { createRobotStrip } from "../ui/robot/robot_strip";
+export { ActionClient, drawId } from "../robot/action_client";
+export { createLimitsStrip } from "../ui/driving/limits_strip";

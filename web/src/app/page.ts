@@ -15,7 +15,6 @@ import { createBanner } from "../ui/status/banner";
 import { h, setData, type Panel } from "../ui/elements/dom";
 import { createEventPanel } from "../ui/driving/event_panel";
 import { DeferredLoader, type DeferredParts } from "./deferred_loader";
-import { createLimitsStrip } from "../ui/driving/limits_strip";
 import { createOverlay, overlayLabels } from "../ui/views/overlay";
 import { createSeatBar } from "../ui/session/seat_bar";
 import { createStatusBar } from "../ui/status/status_bar";
@@ -92,7 +91,10 @@ export class Page {
     );
     const alarm = createAlarmStrip(engine);
     const banner = createBanner(engine);
-    const robot = later.panel((parts) => (this.robot = parts.createRobotStrip(engine)));
+    const robot = later.panel((parts) => {
+      engine.actions = new parts.ActionClient((message) => engine.tell("session", message), parts.drawId);
+      return (this.robot = parts.createRobotStrip(engine));
+    });
     const event = createEventPanel(engine);
     grid.card = event.element;
     const force = later.panel((parts) => parts.createForceGauge(engine, false));
@@ -100,7 +102,7 @@ export class Page {
     const radar = later.panel((parts) => parts.createRangeRadar(engine));
     const places = later.panel((parts) => parts.createAxisPositionPanel(engine));
     const overlay = createOverlay(engine);
-    const limits = createLimitsStrip(engine);
+    const limits = later.panel((parts) => parts.createLimitsStrip(engine));
     const scale = later.panel((parts) => parts.createScaleBar(engine, () => grid.largeStream()));
     const talk = later.panel((parts) => parts.createTalkButton(engine, this.takeVoice(parts)));
     const seat = createSeatBar(engine, talk);

@@ -3,6 +3,7 @@ import { ChartsDrawer } from "../charts/charts_drawer";
 import type { WaySource } from "../charts/way_figures";
 import type { ConsoleEngine } from "../engine/console_engine";
 import { Tracing } from "../engine/tracing";
+import { PictureTrace } from "../media/picture_trace";
 import { readFragment } from "../util/url_fragment";
 import type { PageAction } from "../input/shortcuts";
 import { replayHash } from "../replay/replay_link";
@@ -89,6 +90,7 @@ export class SidePanels {
       mainStream: () => grid.mainStream(),
     });
     engine.tracing = tracing;
+    engine.streams.traceBy(() => new PictureTrace());
     const ways: WaySource = {
       book: tracing.book,
       mainStream: () => grid.mainStream(),

@@ -36,7 +36,7 @@ import { firstReader, type Preconnection } from "../transport/webrtc/preconnecti
 import type { ChannelName, Peer, PeerOptions } from "../transport/peer";
 import type { StampReader } from "../transport/encoded_transform/stamp_reader";
 import { SessionClient } from "../session/session_client";
-import { ActionClient, drawId } from "../robot/action_client";
+import type { ActionClient } from "../robot/action_client";
 import type { ActConditions } from "../robot/actions";
 import { reportOf } from "./report";
 import type { Tracing } from "./tracing";
@@ -78,7 +78,7 @@ export class ConsoleEngine {
   readonly connection: Connection;
   readonly stopping: StopSender;
   readonly session: SessionClient;
-  readonly actions: ActionClient;
+  actions: ActionClient | null = null; // until its code is there, after the first picture
   readonly controls: Controls;
   readonly events = createRateMeter();
   readonly audio = new AudioDevice();
@@ -129,7 +129,6 @@ export class ConsoleEngine {
     });
     this.stopping = new StopSender(api, this.connection);
     this.session = new SessionClient(this.state, name, (message) => this.tell("session", message));
-    this.actions = new ActionClient((message) => this.tell("session", message), drawId);
     this.controls = new Controls(sticks, {
       stop: () => this.stop("stop key"),
       arm: () => this.toggleArmed(),
@@ -211,7 +210,8 @@ export class ConsoleEngine {
   /** Asks for an action once. Armed commands let it go on until it ends, or this page disarms. */
   act(action: Action, parameters: Readonly<Record<string, boolean | number | string>>): void {
     const now = performance.now();
-    if (this.actions.act(action, parameters, this.state.feedback?.nonce ?? 0, now)) this.drive(now);
+    const nonce = this.state.feedback?.nonce ?? 0;
+    if (this.actions?.act(action, parameters, nonce, now) === true) this.drive(now);
   }
 
   toggleArmed(): void {
@@ -229,7 +229,7 @@ export class ConsoleEngine {
     if (!arming.disarm(this.arming, reason)) return;
     this.controls.release();
     this.haptics.still();
-    this.actions.forget();
+    this.actions?.forget();
     if (this.driver !== null) driver.driverDisarm(this.driver, performance.now());
     this.drive(performance.now());
     this.page.armedChanged();
@@ -345,7 +345,7 @@ export class ConsoleEngine {
     else if (message.type === "status") this.statusMs = now;
     else if (message.type === "action") {
       this.actionMs = now;
-      this.actions.updated(message);
+      this.actions?.updated(message);
     } else if (message.type === "traces") this.tracing?.told(message);
   }
 
@@ -474,7 +474,11 @@ export class ConsoleEngine {
   private drive(now: number): void {
     if (this.driver === null || this.state.welcome === null) return;
     noteHeard(this.driver.gate, this.streams.heard());
-    const intention = { armed: this.isArmed(), values: this.values, action: this.actions.renewed(now) };
+    const intention = {
+      armed: this.isArmed(),
+      values: this.values,
+      action: this.actions?.renewed(now) ?? "",
+    };
     const messages = driver.driverStep(this.driver, intention, this.canCommand(), now);
     for (const message of messages) {
       this.tell("control", message);

@@ -1,5 +1,5 @@
 import type { ConsoleState } from "../session/console_state";
-import { isSilenced } from "../session/participants";
+import { isSilenced } from "../session/silenced";
 import { createResetState, resetNotSent, resetNumber, tookResetRefusal } from "../stop/reset_state";
 import {
   createPress,

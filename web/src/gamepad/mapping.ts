@@ -9,7 +9,7 @@ import {
   type PressSource,
   type StickSource,
 } from "./layout";
-import { shapeStick, type PadShaping } from "./shaping";
+import { shapeStick, type PadShaping } from "./stick_shape";
 
 export type PadInput = NonNullable<Binding["pad"]>;
 

@@ -1,6 +1,6 @@
 import { STANDARD_LAYOUT, type PadLayout } from "./layout";
 import { lacks, type PadSnapshot } from "./mapping";
-import { DEFAULT_SHAPING, type PadShaping } from "./shaping";
+import { DEFAULT_SHAPING, type PadShaping } from "./stick_shape";
 import { isStandard } from "./standard_mapping";
 
 /** What is kept of one kind of pad. */

@@ -1,5 +1,5 @@
 import type { TouchInputs } from "../drive/axis_mapping";
-import { shapeStick } from "../gamepad/shaping";
+import { shapeStick } from "../gamepad/stick_shape";
 
 type Side = "left" | "right";
 

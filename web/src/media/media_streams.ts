@@ -4,6 +4,7 @@ import type { ConsoleState } from "../session/console_state";
 import { BoundedLog } from "../util/bounded_log";
 import type { AudioDevice } from "./sound/audio_device";
 import type { SoundStream } from "./sound/sound_stream";
+import type { PictureTrace } from "./picture_trace";
 import { VideoStream } from "./video_stream";
 import type { Peer } from "../transport/peer";
 import type { MediaSection } from "../transport/webrtc/media_section";
@@ -31,6 +32,7 @@ export class MediaStreams {
   readonly videos = new Map<string, VideoStream>();
   readonly sounds = new Map<string, SoundStream>();
   sound: typeof SoundStream | null = null; // until its code is there, after the first picture
+  private newTrace: (() => PictureTrace) | null = null; // the same
   relay: string | null = null; // that the streams come through; null: from the console
   readonly feedbacks = new BoundedLog<FeedbackArrival>();
   private newest: number | null = null; // event of the last feedback
@@ -42,6 +44,12 @@ export class MediaStreams {
     private readonly audio: AudioDevice,
     private readonly events: MediaStreamsEvents,
   ) {}
+
+  /** Traces the pictures of all cameras from now on. */
+  traceBy(newTrace: () => PictureTrace): void {
+    this.newTrace = newTrace;
+    for (const video of this.videos.values()) video.trace = newTrace();
+  }
 
   /** Opens the streams that the console named. */
   open(peer: Peer, streams: readonly StreamInfo[]): void {
@@ -122,9 +130,11 @@ export class MediaStreams {
   }
 
   private openVideo(info: StreamInfo, section: MediaSection): VideoStream {
-    return new VideoStream(info, section, this.events.canvas(info), {
+    const video = new VideoStream(info, section, this.events.canvas(info), {
       context: () => this.context("video"),
       drawn: (stream, stamp, at) => this.events.drawn(stream, stamp, at),
     });
+    video.trace = this.newTrace?.() ?? null;
+    return video;
   }
 }

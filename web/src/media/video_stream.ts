@@ -5,7 +5,7 @@ import type { MediaSection } from "../transport/webrtc/media_section";
 import type { StreamInfo } from "../protocol/wire";
 import { openFrames, type OnPicture } from "./frame_source";
 import type { Picture } from "./picture";
-import { PictureTrace, type DrawnPicture } from "./picture_trace";
+import type { DrawnPicture, PictureTrace } from "./picture_trace";
 import { RenderLog } from "./render_log";
 
 export interface VideoStreamEvents {
@@ -17,7 +17,7 @@ export interface VideoStreamEvents {
 export class VideoStream {
   readonly gate = createPictureGate<Picture>();
   readonly log = new RenderLog();
-  readonly trace = new PictureTrace();
+  trace: PictureTrace | null = null; // until its code is there, after the first picture
   readonly frames = createRateMeter();
   drawn: DrawnPicture | null = null; // the newest on the canvas
   width = 0;
@@ -37,11 +37,11 @@ export class VideoStream {
     this.drawing = canvas.getContext("2d", { alpha: false, desynchronized: true });
     if (section.stamps !== null) {
       section.stamps.onstamp = () => this.settle();
-      section.stamps.onframe = (rtpTimestamp, times) => this.trace.transformed(rtpTimestamp, times);
+      section.stamps.onframe = (rtpTimestamp, times) => this.trace?.transformed(rtpTimestamp, times);
     }
     const take: OnPicture = (picture, rtpTimestamp) => {
       this.lastGoodMs = performance.now();
-      this.trace.decoded(rtpTimestamp, this.lastGoodMs);
+      this.trace?.decoded(rtpTimestamp, this.lastGoodMs);
       offerPicture(this.gate, picture, rtpTimestamp, this.lookup, events.context(), this.draw);
     };
     this.endFrames = section.track === null ? () => undefined : openFrames(section.track, take);
@@ -76,7 +76,7 @@ export class VideoStream {
     this.lastDrawnMs = at;
     noteOccurrence(this.frames, at);
     this.log.add({ stamp, gap, feedback: this.events.context().feedback, at, age });
-    this.drawn = this.trace.drawn(stamp, began, at);
+    this.drawn = this.trace?.drawn(stamp, began, at) ?? null;
     this.events.drawn(this, stamp, at);
   };
 }

@@ -38,11 +38,6 @@ export function sortParticipants(
   };
 }
 
-/** Whether this peer's link may not stop the robot for now. */
-export function isSilenced(participants: readonly Participant[], peer: string | null): boolean {
-  return participants.some((person) => person.peer === peer && person.silenced);
-}
-
 export function summarise(people: readonly Participant[]): CrowdSummary {
   return {
     count: people.length,

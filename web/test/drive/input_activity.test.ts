@@ -3,7 +3,7 @@ import { arm, createArming, sampleDeadman, type ArmConditions } from "../../src/
 import { createInputActivity, noteInput } from "../../src/drive/input_activity";
 import { STANDARD_LAYOUT } from "../../src/gamepad/layout";
 import { readPad, type PadInputs } from "../../src/gamepad/mapping";
-import { DEFAULT_SHAPING } from "../../src/gamepad/shaping";
+import { DEFAULT_SHAPING } from "../../src/gamepad/stick_shape";
 import type { HeldInputs } from "../../src/drive/axis_mapping";
 
 const READY: ArmConditions = {

@@ -2,7 +2,7 @@ import { describe, expect, it } from "vitest";
 import { STANDARD_LAYOUT } from "../../src/gamepad/layout";
 import { deflection, lacks, readPad, type PadReading, type PadSnapshot } from "../../src/gamepad/mapping";
 import { isStandard } from "../../src/gamepad/standard_mapping";
-import { DEFAULT_SHAPING } from "../../src/gamepad/shaping";
+import { DEFAULT_SHAPING } from "../../src/gamepad/stick_shape";
 import { ODD_LAYOUT, padOf } from "./pads";
 
 const readStandard = (pad: PadSnapshot): PadReading =>

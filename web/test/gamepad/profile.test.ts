@@ -1,8 +1,9 @@
 import { describe, expect, it } from "vitest";
 import { choosePad } from "../../src/gamepad/selection";
-import { actionName, isSameSource, sourceName, STANDARD_LAYOUT } from "../../src/gamepad/layout";
+import { isSameSource, STANDARD_LAYOUT } from "../../src/gamepad/layout";
+import { actionName, sourceName } from "../../src/gamepad/source_names";
 import { padName, setupOf, withProfile } from "../../src/gamepad/profile";
-import { DEFAULT_SHAPING } from "../../src/gamepad/shaping";
+import { DEFAULT_SHAPING } from "../../src/gamepad/stick_shape";
 import { ODD_LAYOUT, padOf } from "./pads";
 
 const AXES = [0, 0, -1, 0, 0, -1, 3];

@@ -7,7 +7,7 @@ import {
   writeProfiles,
   type PadProfiles,
 } from "../../src/gamepad/profile_file";
-import { DEFAULT_SHAPING } from "../../src/gamepad/shaping";
+import { DEFAULT_SHAPING } from "../../src/gamepad/stick_shape";
 import { ODD_LAYOUT } from "./pads";
 
 const BOOK: PadProfiles = {

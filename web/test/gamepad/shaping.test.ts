@@ -1,5 +1,6 @@
 import { describe, expect, it } from "vitest";
-import { boundedShaping, DEFAULT_SHAPING, shapeStick, speedShare } from "../../src/gamepad/shaping";
+import { boundedShaping, speedShare } from "../../src/gamepad/shaping";
+import { DEFAULT_SHAPING, shapeStick } from "../../src/gamepad/stick_shape";
 
 const PLAIN = { ...DEFAULT_SHAPING, deadzone: 0, expo: 0 };
 

@@ -1,11 +1,6 @@
 import { describe, expect, it } from "vitest";
-import {
-  crowdLabel,
-  isSilenced,
-  participantLabel,
-  sortParticipants,
-  summarise,
-} from "../../src/session/participants";
+import { crowdLabel, participantLabel, sortParticipants, summarise } from "../../src/session/participants";
+import { isSilenced } from "../../src/session/silenced";
 import type { Participant } from "../../src/protocol/wire";
 import { seatOf } from "../messages";
 

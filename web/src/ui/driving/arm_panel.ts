@@ -1,6 +1,7 @@
 import { armRefusal } from "../../drive/arming";
 import { holdsSeat, isOperator } from "../../session/console_state";
-import { actionName, type PadAction } from "../../gamepad/layout";
+import type { PadAction } from "../../gamepad/layout";
+import { actionName } from "../../gamepad/source_names";
 import { isStandard } from "../../gamepad/standard_mapping";
 import { warningSeconds } from "../../drive/start_warning";
 import { ARM_REFUSAL_LABELS, DISARM_LABELS } from "../../drive/labels";

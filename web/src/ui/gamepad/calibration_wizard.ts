@@ -10,7 +10,7 @@ import {
 } from "../../gamepad/calibration";
 import type { PadLayout } from "../../gamepad/layout";
 import { readPad, type PadReading, type PadSnapshot, type SeenAtRest } from "../../gamepad/mapping";
-import type { PadShaping } from "../../gamepad/shaping";
+import type { PadShaping } from "../../gamepad/stick_shape";
 import { calibrationPrompt } from "../../gamepad/labels";
 import { button, h, setData, setHidden, setText } from "../elements/dom";
 import { ControlsView, RawView } from "./live_inputs";

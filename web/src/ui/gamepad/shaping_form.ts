@@ -1,4 +1,5 @@
-import { DEFAULT_SHAPING, SHAPING_BOUNDS, shapeStick, type PadShaping } from "../../gamepad/shaping";
+import { SHAPING_BOUNDS } from "../../gamepad/shaping";
+import { DEFAULT_SHAPING, shapeStick, type PadShaping } from "../../gamepad/stick_shape";
 import { percent } from "../../gamepad/labels";
 import { button, h, setText, svg } from "../elements/dom";
 

@@ -1,5 +1,6 @@
 import { actRefusal, isRunning, movingNow, newestOf } from "../../robot/actions";
-import { ACT_REFUSAL_LABELS, actionTone, actionWords } from "../../robot/action_labels";
+import { ACT_REFUSAL_LABELS } from "../../robot/act_refusal_labels";
+import { actionTone, actionWords } from "../../robot/action_labels";
 import { shownItems } from "../../robot/status_items";
 import { holdsSeat, mayDrive, note } from "../../session/console_state";
 import type { ConsoleEngine } from "../../engine/console_engine";
@@ -131,7 +132,7 @@ class ActionButton {
     const now = performance.now();
     const update = newestOf(engine.state.actions, action.name);
     if (update !== null && isRunning(update)) {
-      engine.actions.cancel(update.id);
+      engine.actions?.cancel(update.id);
       return;
     }
     const refusal = actRefusal(action, engine.state.actions, engine.actConditions(now));

@@ -1,4 +1,4 @@
-import { isSilenced } from "../../session/participants";
+import { isSilenced } from "../../session/silenced";
 import { stopAdvice } from "../../stop/stop_labels";
 import { warningSeconds, warningLabel } from "../../drive/start_warning";
 import type { ConsoleEngine } from "../../engine/console_engine";
