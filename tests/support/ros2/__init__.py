@@ -1,16 +1,20 @@
 """A ROS 2 robot for tests: a real node in a process of its own, over DDS on loopback."""
 
 import asyncio
+import atexit
+import fcntl
 import os
 import platform
 import random
 import socket
 import sys
+import tempfile
+from collections import deque
 from collections.abc import AsyncIterator, Callable, Iterator
 from contextlib import asynccontextmanager, closing
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 from lockstep.bench.harness.processes import Running, running_process
 from tests.support.event_logs import whole_lines, written
@@ -36,6 +40,7 @@ TWO_BASES = Path(__file__).with_name("two_bases_node.py")
 # RTPS well-known ports (DDSI-RTPS 9.6.1.1): 7400 + 250 x domain is where a domain's participants find each other.
 DOMAINS = range(1, 100)
 FIRST_PORT, PORTS_PER_DOMAIN = 7400, 250
+KEPT = 8  # domains that this process keeps to itself: more than run in it at once
 PATIENCE = 30.0  # s; DDS takes a while to find everybody on a busy machine
 STAY = [0.0, 0.0]
 
@@ -57,6 +62,15 @@ def ros_python() -> str:
     return str(python)
 
 
+_kept: deque[IO[bytes]] = deque()  # the locks of its newest domains
+
+
+@atexit.register
+def _let_go() -> None:
+    while _kept:
+        _kept.popleft().close()
+
+
 def ros_environment() -> dict[str, str]:
     """A domain that nobody else uses now, on this machine only."""
     return {
@@ -68,11 +82,30 @@ def ros_environment() -> dict[str, str]:
 
 
 def _free_domain() -> int:
+    """A domain that nobody uses. It is kept: two processes that choose at once must not choose the same."""
     for domain in random.SystemRandom().sample(DOMAINS, len(DOMAINS)):
+        lock = _locked(domain)
+        if lock is None:
+            continue
         base = FIRST_PORT + PORTS_PER_DOMAIN * domain
         if all(_is_free(base + offset) for offset in (0, 10, 11, 12, 13)):
+            _kept.append(lock)
+            if len(_kept) > KEPT:
+                _kept.popleft().close()
             return domain
+        lock.close()
     raise RuntimeError("every ROS domain is in use")
+
+
+def _locked(domain: int) -> IO[bytes] | None:
+    """The lock of a domain, until it is closed; None: another process has it."""
+    lock = (Path(tempfile.gettempdir()) / f"lockstep-test-ros-domain-{domain}").open("wb")
+    try:
+        fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError:
+        lock.close()
+        return None
+    return lock
 
 
 def _is_free(port: int) -> bool:
