@@ -13,11 +13,14 @@ export interface ShownItem {
 /** What is wrong comes first: a row may be longer than there is room. */
 const WORST: readonly Tone[] = ["bad", "wait", "off", "good"];
 
-/** `sinceMs`: since the status arrived, on this page's own clock; no clock is compared with another. */
-export function shownItems(status: Status | null, sinceMs: number): ShownItem[] {
+/**
+ * `sinceMs`: since the status arrived, on this page's own clock; no clock is compared with another. `isSilent`: nothing
+ * comes from the robot any more, so that every reading is old, however new it was.
+ */
+export function shownItems(status: Status | null, sinceMs: number, isSilent: boolean): ShownItem[] {
   const shown = (status?.items ?? []).map((item) => {
     const age = item.age + Math.max(0, sinceMs) / 1000;
-    const isOld = age >= item.old_after;
+    const isOld = isSilent || age >= item.old_after;
     const words = [item.text, isOld ? `old: ${ageWords(age)}` : ""].filter((each) => each !== "");
     return {
       name: item.name,

@@ -163,20 +163,21 @@ describe("a status item", () => {
       event: 1,
       items: [item({ level: "warning", text: "charge it" })],
     };
-    expect(shownItems(status, 0)).toMatchObject([{ tone: "wait", detail: "charge it" }]);
+    expect(shownItems(status, 0, false)).toMatchObject([{ tone: "wait", detail: "charge it" }]);
   });
 
   it("comes first when something is wrong with it", () => {
     const items = [item(), item({ name: "gps", age: 9 }), item({ name: "lamp", level: "warning" })];
     const motor = item({ name: "motor", level: "error" });
-    const shown = shownItems({ type: "status", event: 1, items: [...items, motor] }, 0);
+    const shown = shownItems({ type: "status", event: 1, items: [...items, motor] }, 0, false);
     expect(shown.map((each) => each.name)).toEqual(["motor", "lamp", "gps", "battery"]);
   });
 
   it("gets old on this page's own clock", () => {
     const status = { type: "status" as const, event: 1, items: [item({ level: "error" })] };
-    expect(shownItems(status, 4700)[0]?.tone).toBe("bad");
-    expect(shownItems(status, 4900)[0]).toMatchObject({ tone: "off", detail: "old: 5 s" });
-    expect(shownItems(null, 0)).toEqual([]);
+    expect(shownItems(status, 4700, false)[0]?.tone).toBe("bad");
+    expect(shownItems(status, 4900, false)[0]).toMatchObject({ tone: "off", detail: "old: 5 s" });
+    expect(shownItems(null, 0, false)).toEqual([]);
+    expect(shownItems(status, 2000, true)[0], "nothing comes any more").toMatchObject({ tone: "off" });
   });
 });

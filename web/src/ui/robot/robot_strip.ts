@@ -1,4 +1,5 @@
 import { actRefusal, isRunning, movingNow, newestOf } from "../../robot/actions";
+import { feedbackAge } from "../../drive/feedback_age";
 import { ACT_REFUSAL_LABELS } from "../../robot/act_refusal_labels";
 import { actionTone, actionWords } from "../../robot/action_labels";
 import { shownItems } from "../../robot/status_items";
@@ -38,7 +39,8 @@ export function createRobotStrip(engine: ConsoleEngine): RobotStrip {
         actions = wanted.map((action) => new ActionButton(engine, action));
         buttons.replaceChildren(...actions.map((each) => each.element));
       }
-      const items = shownItems(state.status, now - engine.statusMs);
+      const isSilent = feedbackAge(engine.measuredMs, now) !== null;
+      const items = shownItems(state.status, now - engine.statusMs, isSilent);
       setHidden(element, actions.length === 0 && items.length === 0);
       setHidden(buttons, !mayDrive(state) || actions.length === 0);
       for (const each of actions) each.update(now);
