@@ -198,12 +198,15 @@ class Console:
 
     @property
     def actions(self) -> list[ActionUpdate]:
-        """How the newest actions of the robot do, oldest first, whoever asked for them."""
+        """The states of the robot's newest actions, oldest first, whoever asked for them."""
         return list(self._live().news.updates.values())
 
     @property
     def status(self) -> list[StatusItem]:
-        """What the robot says of itself: battery, mode, temperatures. `age` (s) is that of now; empty before any."""
+        """What the robot reports of itself: battery, mode, temperatures. Empty before the first report.
+
+        `age` (s) of each item is its age now.
+        """
         news = self._live().news
         since = asyncio.get_running_loop().time() - news.status_at
         items = [] if news.status is None else news.status.items
@@ -222,18 +225,18 @@ class Console:
         return list(self._live().driving.arrivals)
 
     def trace(self, wanted: bool = True) -> None:
-        """Ask the console where the time of pictures and commands goes, or to say no more; see `traces`.
+        """Ask the console to send traces of pictures and commands, which `traces` returns, or to send no more.
 
         Args:
-            wanted: False ends it; a connection begins without
+            wanted: False ends the traces; a new connection has none
         """
         self._live().requests.trace(wanted=wanted)
 
     def traces(self) -> Traces:
         """Return the last thousand pictures' and commands' spans at the robot and the console, oldest first.
 
-        Empty before `trace`. The console tells them a few times a second, of each camera the newest pictures only, and
-        not while feedback waits on its way. docs/traces.md has the spans.
+        Empty before `trace`. The console sends traces a few times a second, with only the newest pictures of each
+        camera, and not while feedback waits to be sent. docs/traces.md explains the spans.
         """
         session = self._live().session
         return Traces(pictures=list(session.traced_pictures), commands=list(session.traced_commands))
@@ -370,21 +373,21 @@ class Console:
     ) -> ActionUpdate:
         """Ask for an action of the robot's description, once; return its last update when it is done.
 
-        While an action moves the robot, this sends neutral commands that renew it, as fast as answers come. Without
-        them the robot ends it within `hold`. `drive` with another value cancels it, and so does the cancellation of
-        this call.
+        While an action moves the robot, this call sends neutral commands that renew the action, as fast as answers
+        come. Without them the robot ends the action within `hold`. `drive` with values that move an axis cancels the
+        action, and so does the cancellation of this call.
 
         Args:
-            name: of one of `description.actions`
+            name: the name of one of `description.actions`
             parameters: values by name; those with a default may be left out
-            progress: called with each update: `running` with its progress from 0 to 1, and the last one
+            progress: called with each update: the `running` ones, with the progress from 0 to 1, and the last one
 
         Raises:
-            ActionRefused: it was not begun; `reason` says why.
-            NotArmed: `arm` comes first, as before driving.
-            ActionCancelled: it was begun and cancelled; `reason` says why.
-            ActionFailed: the robot failed at it.
-            ConsoleLost: the connection ended; the robot has ended what moves it.
+            ActionRefused: the action was not begun; `reason` says why.
+            NotArmed: call `arm` first, as before driving.
+            ActionCancelled: the action was begun and cancelled; `reason` says why.
+            ActionFailed: the robot failed at the action.
+            ConsoleLost: the connection ended; the robot has ended every action that moves it.
         """
         return await self._live().actions.act(name, parameters or {}, progress)
 

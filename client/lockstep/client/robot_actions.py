@@ -1,4 +1,4 @@
-"""The actions and the status of the robot, as the console tells them, and requests for actions."""
+"""The actions and the status of the robot, as the console reports them, and requests for actions."""
 
 import asyncio
 import secrets
@@ -28,11 +28,11 @@ ANSWER_SECONDS = 5.0  # for the robot to answer a request, or to end an action t
 
 
 class RobotNews:
-    """What the console has said of actions and status. No I/O.
+    """The actions and the status that the console has reported. No I/O.
 
     Attributes:
-        status: the newest; None before the first
-        status_at: its arrival, s on the loop's clock
+        status: the newest status; None before the first
+        status_at: the arrival of `status`, s on the loop's clock
     """
 
     def __init__(self) -> None:
@@ -95,7 +95,7 @@ class RobotActions:
         return _outcome(update, action)
 
     async def _watched(self, id: str, progress: Callable[[ActionUpdate], None] | None) -> ActionUpdate:
-        """Wait for the end of an action. Its answer has to come soon; its end may take any time."""
+        """Wait for the end of an action. The first answer has to come soon; the end may take any time."""
         told: ActionUpdate | None = None
         while told is None or told.state == "running":
             if told is None:

@@ -1,7 +1,7 @@
 """Actions of a robot and its status, on the robot link and on the console's channels (docs/robot-link.md, "Actions").
 
-An action is a thing that a robot does when it is asked once: go home, switch a light on, take a picture. A status item
-is a thing that a robot says of itself: its battery, its mode, a temperature.
+An action is something that a robot does once when it is asked: go home, switch a light on, take a picture. A status
+item is something that a robot reports of itself: its battery, its mode, a temperature.
 """
 
 import math
@@ -92,7 +92,7 @@ class ActionCancel(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", 
 
 
 class ActionUpdate(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", tag="action"):
-    """How an action does. `done`, `failed`, `cancelled` and `refused` are final."""
+    """The state of an action. `done`, `failed`, `cancelled` and `refused` are final."""
 
     id: ActionId  # of the request
     name: Name  # of the action
@@ -112,7 +112,7 @@ StatusValue = bool | Annotated[float, msgspec.Meta(ge=-MAX_NUMBER, le=MAX_NUMBER
 
 
 class StatusItem(msgspec.Struct, frozen=True, kw_only=True):
-    """One thing that a robot says of itself."""
+    """One thing that a robot reports of itself."""
 
     name: Name  # stable, "battery"
     label: Name  # for people, "Battery"

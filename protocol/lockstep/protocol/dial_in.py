@@ -1,4 +1,4 @@
-"""What a robot that dials its console shows, and what both derive from a code (docs/robot-link.md, "Dialling out").
+"""The token of a robot that dials its console, and the proofs of pairing (docs/robot-link.md, "Dialling out").
 
 No I/O, no clock. A *key* is a link secret that one robot and one console share. A *code* lets them agree on a key: a
 person reads it on the console's page and types it at the robot.
@@ -72,9 +72,10 @@ class PairingCode(NamedTuple):
 class PairingSecret:
     """A code's secret, stretched by scrypt (RFC 7914) once. Proofs and the key are HMACs with it.
 
-    The robot proves first, so a stranger that plays the robot learns nothing to try codes on. One that plays the
-    console gets a proof, and has to find the code before the robot gives up: then only does its own proof fit. `pin`
-    is in everything: who stands between the two with another certificate has proofs that fit neither side.
+    The robot proves first, so a stranger that plays the robot learns nothing against which codes could be tried. A
+    stranger that plays the console gets the robot's proof, but has to find the code before the robot gives up: only
+    then is its own proof right. Every proof and the key contain `pin`: a stranger between the two, who has another
+    certificate, gets proofs that are right for neither side.
     """
 
     def __init__(self, code: PairingCode, salt: bytes) -> None:
@@ -92,7 +93,7 @@ class PairingSecret:
         return LinkSecret(self._digest(b"lockstep-pair-1 key", robot_nonce, console_nonce, pin).hex())
 
     def _digest(self, label: bytes, robot_nonce: bytes, console_nonce: bytes, pin: str) -> bytes:
-        """The nonces have a fixed length, so no two different inputs are the same bytes."""
+        """Return the HMAC. The nonces have a fixed length, so different inputs are never the same bytes."""
         return hmac.digest(self._key, label + b"\0" + robot_nonce + console_nonce + pin.encode(), hashlib.sha256)
 
     def __repr__(self) -> str:
@@ -100,9 +101,10 @@ class PairingSecret:
 
 
 class RobotToken(NamedTuple):
-    """What a robot shows in its request, so that a console opens nothing for strangers. It does not give the key away.
+    """The token that a robot shows in its request, so that a console opens nothing for strangers.
 
-    It only lets a connection in; after that both sides prove that they know the key, as on every robot link.
+    It does not reveal the key, and only lets a connection in. After that both sides prove that they know the key, as on
+    every robot link.
     """
 
     text: str
@@ -118,7 +120,7 @@ class RobotToken(NamedTuple):
         return f"{SCHEME} {self.text}"
 
     def fits(self, header: str) -> bool:
-        """Compare in constant time."""
+        """Return whether the header has this token. Compares in constant time."""
         return hmac.compare_digest(header[:200].encode(errors="replace"), self.header.encode())
 
     def __repr__(self) -> str:
@@ -152,7 +154,7 @@ class PairingProof(msgspec.Struct, frozen=True, kw_only=True, tag="proof"):
 
 
 class PairingAnswer(msgspec.Struct, frozen=True, kw_only=True, tag="paired"):
-    """Console to robot, last: the console's proof, or why not."""
+    """Console to robot, last: the console's proof, or the reason of a refusal."""
 
     proof: Annotated[bytes, msgspec.Meta(max_length=32)] = b""  # empty when refused
     error: Annotated[str, msgspec.Meta(max_length=60)] = ""  # stable name; "" when paired

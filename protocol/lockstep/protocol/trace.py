@@ -1,8 +1,8 @@
 """Where each millisecond goes: the spans of a picture's and of a command's way (docs/traces.md). No I/O, no clock.
 
 Each machine measures its own spans on its own clock, so no clocks have to agree. A span that nobody has measured is
-absent. What lies between the clocks is one remainder for each event: a time that one clock has measured for the whole
-round, less the spans that lie in it.
+absent. The time that passes between the clocks is one remainder for each event: the whole round, as one clock has
+measured it, less the spans that lie in it.
 """
 
 import math
@@ -90,7 +90,7 @@ PICTURE_WAY: Final = (
     Span("gate_ms", "page"),
     Span("draw_ms", "page"),
 )
-"""As a picture passes them; the remainder stands where most of it arises."""
+"""In the order in which a picture passes them; the remainder stands where most of it arises."""
 
 COMMAND_WAY: Final = (
     Span("input_ms", "page"),
@@ -104,13 +104,14 @@ COMMAND_WAY: Final = (
     Span("back_ms", "console"),
     Span("take_ms", "page"),
 )
-"""As a command and its feedback pass them; each remainder covers both directions and stands in the first."""
+"""In the order in which a command and its feedback pass them; a remainder covers both directions, and stands where the
+command passes."""
 
 Spans = TypeVar("Spans", PictureSpans, CommandSpans)
 
 
 def span_ms(seconds: float) -> float:
-    """Return a duration as a span: in ms, in whole microseconds, within the bounds; 0 for one that is not finite."""
+    """Return a duration as a span: in ms, rounded to microseconds, within the bounds; 0 if it is not finite."""
     if not math.isfinite(seconds):
         return 0.0
     return round(min(max(seconds * 1000, 0.0), MAX_SPAN_MS), 3)
@@ -122,26 +123,27 @@ def known_spans(spans: PictureSpans | CommandSpans) -> dict[str, float]:
 
 
 def join_spans(one: Spans, other: Spans) -> Spans:
-    """Return the spans of both; where both have one, that of `other`."""
+    """Return the spans of both; where both have a span, that of `other` wins."""
     return msgspec.structs.replace(one, **known_spans(other))
 
 
 def spans_at_bridge(spans: Spans) -> Spans:
-    """Return the spans that are a bridge's to measure, and none of the others that it may have sent."""
+    """Return only the spans that a bridge measures, without others that it may have sent."""
     way = PICTURE_WAY if isinstance(spans, PictureSpans) else COMMAND_WAY
     others = {span.name: msgspec.UNSET for span in way if span.clock != "bridge"}
     return msgspec.structs.replace(spans, **others)
 
 
 def sum_of_spans(spans: PictureSpans | CommandSpans, names: Iterable[str] | None = None) -> float:
-    """Return the sum of the spans with these names, in ms; an absent one counts 0. None: all."""
+    """Return the sum of the spans with these names, in ms; an absent span counts 0. None means all names."""
     known = known_spans(spans)
     return sum(known.values()) if names is None else sum(known.get(name, 0.0) for name in names)
 
 
 def remainder_ms(whole_ms: float, *parts_ms: float) -> float:
-    """Return what is left of a time that one clock has measured, when the parts that lie in it are taken off.
+    """Return the rest of a time that one clock has measured, after the parts that lie in it are taken off.
 
-    Never negative: parts of a millisecond, measured on clocks of other rates and resolutions, may exceed the whole.
+    The rest is never negative, although the parts, measured on clocks of other rates and resolutions, may exceed the
+    whole by fractions of a millisecond.
     """
     return span_ms((whole_ms - sum(parts_ms)) / 1000)

@@ -20,10 +20,10 @@ class SettingsFileUnusable(Exception):
 
 
 class SettingsFileSource(PydanticBaseSettingsSource):
-    """The settings in the file that `config` names, by a flag or by the environment; none without it."""
+    """The settings in the file that the flag or variable `config` names; no settings without `config`."""
 
     def __init__(self, settings: type[BaseSettings], *sources: PydanticBaseSettingsSource) -> None:
-        """`sources`: where `config` may be set, the first one first."""
+        """`sources`: where `config` may be set, in the order in which they are asked."""
         super().__init__(settings)
         self._sources = sources
 
@@ -35,7 +35,7 @@ class SettingsFileSource(PydanticBaseSettingsSource):
         """Return the settings by name.
 
         Raises:
-            SettingsFileUnusable: the file is no file of settings.
+            SettingsFileUnusable: the file cannot be read, is not TOML, or names a setting that does not exist.
         """
         for source in self._sources:
             path = source().get("config")
@@ -45,10 +45,10 @@ class SettingsFileSource(PydanticBaseSettingsSource):
 
 
 def read_settings_file(path: Path, settings: type[BaseModel]) -> dict[str, Any]:
-    """Return the settings in `path` by name. Tables `[robots.NAME]` make it the fleet's file as well.
+    """Return the settings in `path` by name. With tables `[robots.NAME]` the file is the fleet's file as well.
 
     Raises:
-        SettingsFileUnusable: it cannot be read, is not TOML, or has a name that no setting has.
+        SettingsFileUnusable: the file cannot be read, is not TOML, or names a setting that does not exist.
     """
     try:
         content = tomllib.loads(path.read_text())
@@ -67,7 +67,7 @@ def read_settings_file(path: Path, settings: type[BaseModel]) -> dict[str, Any]:
 
 
 def _unknown(content: Mapping[str, Any], settings: type[BaseModel], within: str) -> Iterator[str]:
-    """Yield a sentence for each name that no setting has."""
+    """Yield a sentence for each name in the file that is not a setting."""
     names = settings.model_fields.keys() - ELSEWHERE
     for name, value in content.items():
         if name not in names:

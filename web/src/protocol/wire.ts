@@ -37,7 +37,7 @@ export interface ActionParameter {
   readonly default: boolean | number | string | null;
 }
 
-/** How an action does. `done`, `failed`, `cancelled` and `refused` are final. */
+/** The state of an action. `done`, `failed`, `cancelled` and `refused` are final. */
 export interface ActionUpdate {
   readonly type: "action";
   readonly id: string;
@@ -529,7 +529,7 @@ export interface Status {
   readonly items: readonly (StatusItem)[];
 }
 
-/** One thing that a robot says of itself. */
+/** One thing that a robot reports of itself. */
 export interface StatusItem {
   readonly name: string;
   readonly label: string;

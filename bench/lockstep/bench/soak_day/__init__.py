@@ -1,1 +1,1 @@
-"""Runs what a day of use consists of, in as many runs as it takes."""
+"""Compresses a day of use into two hours, in as many runs as it takes."""

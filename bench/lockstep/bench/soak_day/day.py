@@ -1,7 +1,7 @@
-"""What a day of use consists of, what runs have done of it, and whether the promises held. No I/O.
+"""The plan of a day of use, how much of the day runs have done, and whether the promises held. No I/O.
 
-A day is not the hours in which a robot stands, but what happens to it: people take over from each other, come and go,
-networks and processes fail, recordings begin and end, pictures are rendered. Runs of any length add up to it.
+A day is not the hours in which a robot stands, but its events: people take over from each other, come and go, networks
+and processes fail, recordings begin and end, pictures are rendered. Runs of any length add up to a day.
 """
 
 import random
@@ -59,7 +59,7 @@ class Action(NamedTuple):
 
 
 class Leg(msgspec.Struct, kw_only=True):
-    """One run: what was done in it, and what was found."""
+    """One run: its actions, and its findings."""
 
     began: str  # ISO 8601, for people
     seconds: float
@@ -75,7 +75,7 @@ class Leg(msgspec.Struct, kw_only=True):
 
 
 def plan(minutes: float, seed: int) -> list[Action]:
-    """Return the actions of a run in order: the share of a day that `minutes` are of `HOURS`, each kind at least once.
+    """Return the actions of a run in order: as much of a day as `minutes` are of `HOURS`, each kind at least once.
 
     Every kind is spread evenly, each action somewhere in its own slot. The same arguments give the same plan.
     """
@@ -112,7 +112,7 @@ def drift(samples: Sequence[float]) -> float | None:
 
 
 def summary(legs: Sequence[Leg]) -> dict[str, Any]:
-    """Return what all runs together have done of a day, and whether the promises held in each of them."""
+    """Return how much of a day all runs together have done, and whether the promises held in each run."""
     done: Counter[str] = Counter()
     pictures: Counter[str] = Counter()
     relayed: Counter[str] = Counter()

@@ -1,4 +1,4 @@
-"""One run of a day: pages in two browsers, some by way of two Janus, while a plan of disturbances is played."""
+"""One run of a day: pages in two browsers, some by way of two Janus servers, while a plan of disturbances runs."""
 
 import asyncio
 import datetime
@@ -40,7 +40,7 @@ VERIFY_SECONDS = 300.0
 
 
 async def run_leg(minutes: float, seed: int, say: Say) -> Leg:
-    """Play the plan, and return what was done and found.
+    """Carry out the plan, and return the actions that were done and the findings.
 
     Raises:
         NoAddress, FileNotFoundError, ProcessFailed: a part could not be started.
@@ -114,7 +114,7 @@ class _Leg:
         await asyncio.sleep(max(0.0, self._begin + self._minutes * 60 - LAST_LOOK - time.monotonic()))
 
     async def _act(self, action: Action) -> bool:
-        """Do it, and return whether it was done: what meets a console that is just away is not."""
+        """Do the action, and return whether it was done; while the console is down, it is not."""
         match action.kind:
             case "hand_over":
                 return await take_over(self._network.link(self._world.supervisor))
@@ -145,7 +145,7 @@ class _Leg:
         return True
 
     async def _cut(self, seconds: float) -> None:
-        """Cut the network: in turn packets are lost, or wait until the end; every fourth time on the robot link."""
+        """Cut the network: packets are lost, or wait until its end, in turn. Every fourth is on the robot link."""
         turn = self._done["cut_network"]
         self._world.trouble_begins()
         try:
@@ -181,7 +181,7 @@ class _Leg:
                 page.reloads += 1
 
     async def _sample(self, driving: OperatorPage) -> None:
-        """Note the console's memory, the operator's delays while all is calm, and which relay pictures came through."""
+        """Note the console's memory, the operator's delays while all is calm, and the number of pictures by relay."""
         seen = dict.fromkeys(self._pages, 0)
         while True:
             encoders, memory = await self._world.open_encoders(), self._world.server_memory()

@@ -1,4 +1,4 @@
-"""Two Janus beside the console, which are killed and started again at the same address."""
+"""Two Janus servers beside the console, which are killed and started again at the same address."""
 
 from contextlib import AsyncExitStack
 from pathlib import Path
@@ -15,7 +15,7 @@ COUNT = 2
 
 
 class NoAddress(Exception):
-    """This machine has no address but loopback, where Janus sends no media."""
+    """This machine has only loopback addresses, over which Janus sends no media."""
 
 
 class Relays:
@@ -35,7 +35,7 @@ class Relays:
 
     @property
     def options(self) -> list[str]:
-        """The console's options that name them."""
+        """The options that name the relays to the console."""
         return [f"--relay=janus:ws://{self._address}:{port}/{ROOM}" for port in self._ports]
 
     async def begin(self) -> None:
@@ -44,7 +44,7 @@ class Relays:
             await self._start(number)
 
     async def kill_one(self) -> None:
-        """Kill them in turn, as a crash does, and start the same one again; it remembers nothing."""
+        """Kill the next server in turn, as a crash does, and start it again; it remembers nothing."""
         number, self._turn = self._turn, (self._turn + 1) % COUNT
         await self._running[number].kill()
         await self._stacks[number].aclose()

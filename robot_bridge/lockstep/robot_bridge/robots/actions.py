@@ -8,11 +8,11 @@ __all__ = ["ActionDone", "ActionFailed", "ActionNotPossible", "ActionRun", "Acti
 
 
 class ActionNotPossible(Exception):
-    """Raised by `Robot.begin_action`: not now. The text tells a person why."""
+    """Raised by `Robot.begin_action` when the robot cannot begin the action now. The text tells a person why."""
 
 
 class ActionFailed(Exception):
-    """Raised by `ActionRun.step`: it did not work. The robot is at rest, or comes to rest by itself."""
+    """Raised by `ActionRun.step` when the action did not work. The robot is at rest, or comes to rest by itself."""
 
 
 class ActionStep(NamedTuple):
@@ -31,19 +31,19 @@ class ActionRun(ABC):
 
     @abstractmethod
     def step(self) -> ActionStep:
-        """Go on; called once a tick, before `apply`.
+        """Do the next part of the action. Called once a tick, before `apply`.
 
         Raises:
-            ActionFailed: it did not work.
+            ActionFailed: the action did not work.
         """
 
     @abstractmethod
     def cancel(self) -> None:
-        """Bring to rest whatever this action moves, now. No `step` follows."""
+        """Bring everything that this action moves to rest, now. No `step` follows."""
 
 
 class ActionDone(ActionRun):
-    """The run of an action that was done at once."""
+    """The run of an action that was already done when it began."""
 
     def __init__(self, text: str = "") -> None:
         self._text = text

@@ -65,9 +65,10 @@ class Robot(ABC):
     reach `apply` already clamped, slew-limited and, without a command to execute, at rest.
 
     With `ticks_on_command` a command begins the tick of the present period of `tick_seconds` at once. There is still
-    one tick in each period, so two ticks may follow each other closely, and the next one come up to two periods later.
-    The slew is kept over periods: two steps of a ramp may come within a fraction of a millisecond. Set it if the robot
-    takes values at any time, holds them until the next ones, and smooths such a double step or stands it.
+    one tick in each period, so two ticks may follow each other closely, and the next tick may come up to two periods
+    later. The slew rate holds over whole periods: two steps of a ramp may come within a fraction of a millisecond. Set
+    `ticks_on_command` if the robot takes values at any time, holds them until the next ones, and smooths or tolerates
+    such a double step.
 
     A method that raises ends the bridge. Before it does, the rest values are applied at the axes' brake rates, again
     after each failure, then `stop` is called, then `close`; each call is made even if the others raised. A new object
@@ -148,7 +149,7 @@ class Robot(ABC):
     def hardware_stop(self) -> bool | None:
         """Return whether a hardware stop of the robot is pressed; None if that is not known, or there is none.
 
-        Called in every tick. A pressed one counts as a lock, as `locked_out` does, and stands in the status.
+        Called in every tick. A pressed stop counts as a lock, as with `locked_out`, and the status shows it.
         """
         return None
 
@@ -159,12 +160,12 @@ class Robot(ABC):
         robot is stopped.
 
         Raises:
-            ActionNotPossible: not now; the text tells a person why.
+            ActionNotPossible: the robot cannot begin it now; the text tells a person why.
         """
         raise ActionNotPossible(f"{name} is not implemented")
 
     def status(self) -> Sequence[StatusItem]:
-        """Return all that the robot says of itself: battery, mode, temperatures. Called twice a second."""
+        """Return everything that the robot reports of itself: battery, mode, temperatures. Called twice a second."""
         return ()
 
     def sources(self) -> Sequence[MediaSource]:
