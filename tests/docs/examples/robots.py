@@ -19,11 +19,12 @@ __all__ = ["Robot", "description_of", "in_c", "in_python", "moving"]
 
 @dataclass
 class Robot:
-    """A robot at an address, its own record, and how often it may see a neutral or a moving command."""
+    """A robot at an address, its own record, and what ends it."""
 
     address: tuple[str, int]
     event_log: Path
     close: Callable[[], Any]
+    has_actions: bool
 
     async def records(self, *kinds: str) -> list[dict[str, Any]]:
         """What it has written down; call at the end, it is closed first."""
@@ -35,14 +36,14 @@ class Robot:
 @asynccontextmanager
 async def in_c(directory: Path) -> AsyncIterator[Robot]:
     async with running_c_robot(directory) as robot:
-        yield Robot(robot.address, robot.event_log, robot.end)
+        yield Robot(robot.address, robot.event_log, robot.end, has_actions=False)
 
 
 @asynccontextmanager
 async def in_python(directory: Path) -> AsyncIterator[Robot]:
     log = directory / "bridge.jsonl"
     async with Bridge(create(), BridgeSettings(port=0, event_log=log)) as bridge:
-        yield Robot(bridge.address, log, bridge.close)
+        yield Robot(bridge.address, log, bridge.close, has_actions=True)
 
 
 def moving(driver: Operator) -> list[float]:
