@@ -240,3 +240,20 @@ async def test_a_hardware_stop_that_is_pressed_locks_the_robot_and_stands_in_the
         robot.pressed = False
         await driver.heard(lambda feedback: not feedback.stop.locked_out)
         assert driver.feedback.stop.stopped, "the end of the lock releases nothing"
+
+
+class SlowLightRobot(OwnWayRobot):
+    """Its light goes on slowly, which a lost link does not end."""
+
+    def begin_action(self, name: str, parameters: Mapping[str, ParameterValue]) -> ActionRun:
+        return OwnMotion(self)
+
+
+async def test_an_action_that_runs_when_the_bridge_ends_has_its_end_in_the_log(tmp_path: Path) -> None:
+    log = tmp_path / "events.jsonl"
+    async with running_bridge(SlowLightRobot(), event_log=log) as bridge, operator(bridge) as driver:
+        assert (await ask(driver, "light")).state == "running"
+        await bridge.close()
+    states = [(line["state"], line["reason"]) for line in log_lines(log, "action")]
+    assert states == [("running", ""), ("cancelled", "interrupted")]
+    assert bridge.counters.actions["cancelled"] == 1

@@ -5,7 +5,6 @@ const ANSWER_MS = 3000;
 
 interface Asked {
   readonly id: string;
-  readonly moves: boolean;
   readonly atMs: number;
   answered: boolean;
 }
@@ -31,7 +30,7 @@ export class ActionClient {
     if (action.moves && this.renewed(now) !== "") return false;
     const id = this.draw();
     if (!this.tell({ type: "act", id, name: action.name, parameters, nonce })) return false;
-    if (action.moves) this.moving = { id, moves: true, atMs: now, answered: false };
+    if (action.moves) this.moving = { id, atMs: now, answered: false };
     return true;
   }
 

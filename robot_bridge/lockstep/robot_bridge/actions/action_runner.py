@@ -153,15 +153,18 @@ class ActionRunner:
 
     def close(self) -> None:
         """Cancel all actions, because the ticks end. Raises nothing."""
-        self._core.interrupt("interrupted", self._events.current)
+        ended = self._core.interrupt("interrupted", self._events.current)
         for id in list(self._runs):
             run = self._runs.pop(id)
-            self._core.finish(id, "cancelled", self._events.current, reason="interrupted")
+            update = self._core.finish(id, "cancelled", self._events.current, reason="interrupted")
+            ended += [] if update is None else [update]
             try:
                 run.cancel()
             except BaseException as error:  # nothing may keep the robot from resting
                 _logger.error("cancelling an action raised %r", error)
         self._rest()
+        for update in ended:
+            self._note(update)
 
     def _cancelled(self, updates: list[ActionUpdate]) -> None:
         for update in updates:

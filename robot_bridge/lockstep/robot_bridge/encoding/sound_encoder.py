@@ -18,8 +18,7 @@ __all__ = ["OpusEncoder"]
 RATE = 48_000  # Hz
 PACKET = 960  # samples, 20 ms
 LOOK_AHEAD = 312  # samples by which the decoded sound of a packet is older than its position: libopus, 6.5 ms
-BITRATE = 32_000  # bit/s, unless a client asks for less
-LEAST_BITRATE = 8_000
+BITRATE = 32_000  # bit/s
 EXPECTED_LOSS = 10  # percent, for which packets repair the one before (RFC 7587)
 DRIFT = 0.04  # s by which sound may come later than it should before it counts as a gap
 LAYOUTS = {1: "mono", 2: "stereo"}
@@ -45,7 +44,7 @@ class OpusEncoder:
         self._marks: deque[_Mark] = deque()
         self._due = 0.0  # s; when the next segment should have been captured
 
-    def encode(self, media: Media, bitrate: int = BITRATE) -> list[Media]:
+    def encode(self, media: Media) -> list[Media]:
         """Return the packets that a segment completes: none, one or several.
 
         Raises:
@@ -53,7 +52,7 @@ class OpusEncoder:
         """
         try:
             self._take(media)
-            return self._cut(media, min(BITRATE, max(LEAST_BITRATE, bitrate)))
+            return self._cut(media)
         except (FFmpegError, ValueError) as error:
             self._form = None
             raise EncodingFailed(str(error)) from error
@@ -85,12 +84,12 @@ class OpusEncoder:
         size = 2 * media.channels
         return b"".join(bytes(part.planes[0])[: part.samples * size] for part in parts)
 
-    def _cut(self, media: Media, bitrate: int) -> list[Media]:
+    def _cut(self, media: Media) -> list[Media]:
         size, packets = PACKET * 2 * media.channels, []
         while len(self._buffer) >= size:
             samples = bytes(self._buffer[:size])
             del self._buffer[:size]
-            data = self._compress(samples, LAYOUTS[media.channels], bitrate)
+            data = self._compress(samples, LAYOUTS[media.channels])
             while len(self._marks) > 1 and self._marks[1].position <= self._position - LOOK_AHEAD:
                 self._marks.popleft()
             oldest = self._marks[0]
@@ -107,7 +106,7 @@ class OpusEncoder:
             self._position += PACKET
         return packets
 
-    def _compress(self, samples: bytes, layout: str, bitrate: int) -> bytes:
+    def _compress(self, samples: bytes, layout: str) -> bytes:
         context = self._context
         if context is None:
             made = av.CodecContext.create("libopus", "w")
@@ -116,7 +115,7 @@ class OpusEncoder:
             context = made
             context.format, context.layout = "s16", layout
             context.sample_rate = RATE
-            context.bit_rate = bitrate
+            context.bit_rate = BITRATE
             context.time_base = Fraction(1, RATE)
             context.options = {
                 "application": "voip",

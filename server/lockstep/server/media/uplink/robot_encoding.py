@@ -65,11 +65,6 @@ class RobotEncoding:
         for camera in self._cameras:
             camera.stream.passthrough.ask_by(self._keyframe_asker(camera))
 
-    @property
-    def uplink_bps(self) -> float:
-        """The bits per second that all media of the robot may have."""
-        return self._uplink.rate
-
     def arrived(self, media: Media, now: float) -> None:
         """Take the arrival of a robot's medium."""
         self._uplink.arrived(media.time, now, len(media.payload))

@@ -37,7 +37,7 @@ class UplinkEstimator:
     def __init__(self, start_bps: float, least_bps: float, most_bps: float) -> None:
         self.rate = start_bps
         self._least_bps = least_bps
-        self.most_bps = most_bps
+        self._most_bps = most_bps
         self._window_start: float | None = None
         self._current = self._previous = float("inf")  # least arrival − capture, s
         self._arrivals: deque[tuple[float, float, int]] = deque()  # time, wait in s, bits
@@ -84,7 +84,7 @@ class UplinkEstimator:
         elif waits < EMPTY and received is not None and received >= USED * self.rate:
             growth = FAST if self.rate < self._limit else SLOW
             self.rate *= growth**passed
-        self.rate = min(self.rate, self.most_bps)
+        self.rate = min(self.rate, self._most_bps)
 
     def _received(self) -> float | None:
         """Return the bits per second that arrived lately; None if too few came to tell."""
