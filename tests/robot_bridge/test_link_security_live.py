@@ -16,9 +16,10 @@ from lockstep.protocol.messages import Feedback, Goodbye, Hello, Media, Ping, St
 from lockstep.robot_bridge.bridge import Bridge
 from lockstep.robot_bridge.errors import InsecureLink
 from lockstep.robot_bridge.link import link_acceptor
-from lockstep.robot_bridge.link.check_link import check_link, is_loopback
+from lockstep.robot_bridge.link.check_link import check_link
 from lockstep.robot_bridge.link.link_client import RobotLink
 from lockstep.robot_bridge.link.link_tls import LinkTls
+from lockstep.robot_bridge.loopback import is_loopback
 from lockstep.robot_bridge.settings import BridgeSettings
 from tests.robot_bridge.bridge_helpers import PATIENCE, Operator, RecordingRobot, raw_link
 from tests.support.certificates import Authority

@@ -16,6 +16,7 @@ from lockstep.protocol.errors import SecretError
 from lockstep.protocol.link_secret import LinkSecret
 
 __all__ = [
+    "DIAL",
     "MAX_PAIRING_MESSAGE",
     "TRUSTED",
     "PairingAnswer",
@@ -28,6 +29,7 @@ __all__ = [
     "certificate_pin",
 ]
 
+DIAL = "/dial/"  # the console's paths for robots begin so, below its own or a robot's address
 ALPHABET = "23456789ABCDEFGHJKMNPQRSTVWXYZ"  # without what people take for something else: 0 O, 1 I L, U V
 PLACE_SIGNS, SECRET_SIGNS = 2, 10  # 30^10 is 49 bits
 NONCE_BYTES = 32

@@ -23,6 +23,9 @@ export interface GateContext {
   readonly wallMs: number; // since 1970, for the age of what is rendered
 }
 
+/** What sound is judged against, also away from the page, where nobody asks for its age. */
+export type SoundContext = Omit<GateContext, "wallMs">;
+
 /** What is known of one received frame. */
 export interface FrameMark {
   readonly stamp: number | null; // null: it came without one

@@ -114,12 +114,9 @@ class _Soak:
             case "cut_network":
                 await self._cut(action.seconds, self._done["cut_network"])
             case "stop":
-                self._world.trouble_begins()
-                try:
+                with self._world.trouble():
                     await self._world.stop_for(action.seconds)
                     await self._world.until_reset()
-                finally:
-                    self._world.trouble_ends()
             case "join":
                 self._crowd.come()
             case "leave":
@@ -127,12 +124,9 @@ class _Soak:
 
     async def _cut(self, seconds: float, turn: int) -> None:
         """Cut the network: in turn packets are lost, or wait until the end; every fourth time on the robot link."""
-        self._world.trouble_begins()
-        try:
+        with self._world.trouble():
             self._network.outage(seconds, hold=turn % 2 == 1, robot=turn % 4 == 3)
             await asyncio.sleep(seconds)
-        finally:
-            self._world.trouble_ends()
 
     async def _until_live(self, *pages: WatchedPage) -> None:
         """Wait until every page shows new pictures after all is calm; one that does not is counted as a reload."""

@@ -6,6 +6,7 @@ import secrets
 import time
 from collections import Counter
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from types import TracebackType
 from typing import Self
@@ -63,29 +64,28 @@ class World:
 
     # Disturbances
 
-    def trouble_begins(self) -> None:
+    @contextmanager
+    def trouble(self) -> Iterator[None]:
+        """Something is out of order meanwhile."""
         self._troubles += 1
-
-    def trouble_ends(self) -> None:
-        self._troubles -= 1
-        self._calm_since = time.monotonic()
+        try:
+            yield
+        finally:
+            self._troubles -= 1
+            self._calm_since = time.monotonic()
 
     def calm_seconds(self) -> float:
         """Return the seconds for which everything has been in order; 0 while something is not."""
         return 0.0 if self._troubles else time.monotonic() - self._calm_since
 
     async def kill_bridge(self) -> None:
-        self.trouble_begins()
-        try:
+        with self.trouble():
             await self._bridge.kill()
             await self._bridge.begin()
             self.bridge_kills += 1
-        finally:
-            self.trouble_ends()
 
     async def restart_server(self, *, gently: bool) -> None:
-        self.trouble_begins()
-        try:
+        with self.trouble():
             if gently:
                 await self._server.end()
                 await asyncio.sleep(DOWN_SECONDS)
@@ -93,8 +93,6 @@ class World:
                 await self._server.kill()
             await self._start_server()
             self.server_restarts += 1
-        finally:
-            self.trouble_ends()
 
     async def stop_for(self, seconds: float) -> bool:
         """Press STOP as an observer over HTTP, and reset as the operator later. False if the console was away."""

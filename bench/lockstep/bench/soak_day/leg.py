@@ -133,11 +133,8 @@ class _Leg:
                 await self._world.restart_server(gently=self._done["restart_console"] % 2 == 0)
                 self._memory.clear()
             case "kill_relay":
-                self._world.trouble_begins()
-                try:
+                with self._world.trouble():
                     await self._relays.kill_one()
-                finally:
-                    self._world.trouble_ends()
             case "begin_recording":
                 return await self._record("/api/recordings", {"name": f"day {self._done['begin_recording']}"})
             case "end_recording":
@@ -147,20 +144,14 @@ class _Leg:
     async def _cut(self, seconds: float) -> None:
         """Cut the network: packets are lost, or wait until its end, in turn. Every fourth is on the robot link."""
         turn = self._done["cut_network"]
-        self._world.trouble_begins()
-        try:
+        with self._world.trouble():
             self._network.outage(seconds, hold=turn % 2 == 1, robot=turn % 4 == 3)
             await asyncio.sleep(seconds)
-        finally:
-            self._world.trouble_ends()
 
     async def _stop(self, seconds: float) -> None:
-        self._world.trouble_begins()
-        try:
+        with self._world.trouble():
             await self._world.stop_for(seconds)
             await self._world.until_reset()
-        finally:
-            self._world.trouble_ends()
 
     async def _record(self, path: str, body: dict[str, str] | None = None) -> bool:
         token = self._world.supervisor.partition("#token=")[2]

@@ -1,14 +1,13 @@
 """The address of a console as a robot is told it: wss://host[:port][/robots/NAME]. No I/O."""
 
-import ipaddress
 from typing import NamedTuple
 from urllib.parse import urlsplit
 
+from lockstep.protocol.dial_in import DIAL
 from lockstep.robot_bridge.errors import BadConsoleAddress
+from lockstep.robot_bridge.loopback import is_loopback
 
-__all__ = ["DIAL", "ConsoleAddress"]
-
-DIAL = "/dial/"  # the console's routes for robots (server/lockstep/server/routes/dial_in.py)
+__all__ = ["ConsoleAddress"]
 
 
 class ConsoleAddress(NamedTuple):
@@ -29,7 +28,7 @@ class ConsoleAddress(NamedTuple):
         scheme = {"https": "wss", "http": "ws"}.get(parts.scheme, parts.scheme)
         if scheme not in ("wss", "ws") or not parts.hostname or parts.query or parts.fragment or parts.username:
             raise BadConsoleAddress(f"{text[:200]!r} is not wss://host, wss://host:port or wss://host/robots/NAME")
-        if scheme == "ws" and not _is_loopback(parts.hostname):
+        if scheme == "ws" and not is_loopback(parts.hostname):
             raise BadConsoleAddress(
                 f"{text[:200]!r}: without TLS anybody on the way could drive the robot; use wss:// and let the console"
                 " speak TLS (`lockstep serve --tls self-signed`, or a proxy in front of it)"
@@ -44,10 +43,3 @@ class ConsoleAddress(NamedTuple):
     def path(self, name: str) -> str:
         """Return the URL of "operator", "media" or "pair"."""
         return f"{self.url}{DIAL}{name}"
-
-
-def _is_loopback(host: str) -> bool:
-    try:
-        return ipaddress.ip_address(host).is_loopback
-    except ValueError:
-        return host == "localhost"

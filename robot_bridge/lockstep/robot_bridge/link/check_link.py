@@ -1,11 +1,10 @@
 """Checks that the robot link may listen on its address, before it does."""
 
-import ipaddress
-
 from lockstep.robot_bridge.errors import InsecureLink
+from lockstep.robot_bridge.loopback import is_loopback
 from lockstep.robot_bridge.settings import BridgeSettings
 
-__all__ = ["check_link", "is_loopback"]
+__all__ = ["check_link"]
 
 
 def check_link(settings: BridgeSettings) -> None:
@@ -22,13 +21,3 @@ def check_link(settings: BridgeSettings) -> None:
         f"any client that reaches {settings.host or 'this machine'} could drive the robot: give --link-secret-file, or"
         " --link-tls-cert with --link-tls-ca for client certificates, or --insecure-link if that is wanted"
     )
-
-
-def is_loopback(host: str) -> bool:
-    """Return whether only this machine can reach `host`. A name other than localhost may lead anywhere."""
-    if host == "localhost":
-        return True
-    try:
-        return ipaddress.ip_address(host).is_loopback
-    except ValueError:
-        return False

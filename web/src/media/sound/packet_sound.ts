@@ -1,7 +1,7 @@
 import type { GateContext } from "../../gate/gate_counters";
 import type { ReceiverStamps, StampReader } from "../../transport/encoded_transform/stamp_reader";
 import { PROCESSOR, type PlayoutNote, type ProcessorOptions, type ProcessorOrder } from "./sound_messages";
-import type { SoundContext } from "./sound_player";
+import type { SoundContext } from "../../gate/gate_counters";
 import type { SoundSource } from "./sound_source";
 import workletUrl from "./sound_worklet?worker&url";
 

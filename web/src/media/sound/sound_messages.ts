@@ -1,5 +1,5 @@
 /** Between the page, the transform worker and the audio worklet. */
-import type { SoundContext } from "./sound_player";
+import type { SoundContext } from "../../gate/gate_counters";
 import type { SoundPacket } from "./sound_queue";
 
 export const PROCESSOR = "lockstep-sound";

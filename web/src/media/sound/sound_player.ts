@@ -1,4 +1,5 @@
-import { judge, type GateMode } from "../../gate/media_gate";
+import type { SoundContext } from "../../gate/gate_counters";
+import { judge } from "../../gate/media_gate";
 import { eventGap } from "../../gate/serial";
 import { createSoundJitter, noteLateness, targetS, type SoundJitter } from "./sound_jitter";
 import {
@@ -14,13 +15,6 @@ import {
   type SoundQueue,
 } from "./sound_queue";
 import { crossFade, findPeriod } from "./sound_splice";
-
-/** What sound is judged against. */
-export interface SoundContext {
-  readonly feedback: number | null; // event
-  readonly tolerance: number; // events
-  readonly gate: GateMode;
-}
 
 /**
  * Plays one microphone's packets, frame by frame of 5 ms, at their own sample rate; `sound_resampler.ts` makes the sound

@@ -1,5 +1,4 @@
 /** Between the page and the transform worker. */
-import type { GateMode } from "../../gate/media_gate";
 import type { FrameMark } from "../../gate/gate_counters";
 
 /** Options of one RTCRtpScriptTransform. */
@@ -8,13 +7,6 @@ export interface TransformOptions {
   readonly kind: "audio" | "video";
   readonly trailer: boolean; // the carrier is the trailer
   readonly packets: boolean; // sound that the page decodes and plays, and not the browser
-}
-
-/** Page to worker, at every feedback and change of settings: what sound is judged against. */
-export interface SoundContext {
-  readonly feedback: number | null;
-  readonly tolerance: number;
-  readonly gate: GateMode;
 }
 
 /** Page to worker: leave out sound of this receiver that is older than `before`, to work off a backlog. */

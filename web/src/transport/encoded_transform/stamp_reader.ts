@@ -1,11 +1,10 @@
 import { createArrivals, noteArrival, type Arrivals } from "../../gate/sound_backlog";
 import { createStampTable, noteMark, type StampTable } from "../../gate/stamp_table";
-import type { FrameMark } from "../../gate/gate_counters";
+import type { FrameMark, SoundContext } from "../../gate/gate_counters";
 import StampWorker from "./stamp_worker?worker&inline"; // a request of its own would cost a round trip
 import {
   isFrameNote,
   isSoundFailure,
-  type SoundContext,
   type SoundOrder,
   type TransformOptions,
   type TransformTimes,

@@ -1,18 +1,11 @@
 /** Transform worker: reads the stamp of every encoded frame before it is decoded, and takes the trailer off. */
 import { eventOfOffset } from "../../gate/capture_time";
 import { judge } from "../../gate/media_gate";
-import type { FrameMark } from "../../gate/gate_counters";
+import type { FrameMark, SoundContext } from "../../gate/gate_counters";
 import { rtpGap } from "../../gate/sound_backlog";
 import { markOfTrailer, splitTrailer } from "../../gate/trailer";
 import { SoundDecoders } from "./sound_decoders";
-import type {
-  FrameNote,
-  SoundContext,
-  SoundFailure,
-  SoundOrder,
-  TransformOptions,
-  TransformTimes,
-} from "./stamp_messages";
+import type { FrameNote, SoundFailure, SoundOrder, TransformOptions, TransformTimes } from "./stamp_messages";
 
 interface EncodedFrame {
   data: ArrayBuffer;

@@ -12,14 +12,14 @@ from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIO
 from websockets.frames import Frame
 from websockets.http11 import Request
 
+from lockstep.protocol.dial_in import DIAL
 from lockstep.robot_bridge.link.link_transport import LinkTransport
 from lockstep.robot_bridge.link.websocket_transport import WebSocketTransport
 from lockstep.rtc.token_bucket import TokenBucket
 from lockstep.server.http.robot_paths import below_robot
 
-__all__ = ["DIAL", "LINES", "SOCKET", "TOO_MANY_FRAMES", "GuardedWebSocket"]
+__all__ = ["LINES", "SOCKET", "TOO_MANY_FRAMES", "GuardedWebSocket"]
 
-DIAL = "/dial/"  # paths of robots that dial in (server/lockstep/server/routes/dial_in.py)
 SOCKET = "lockstep.socket"  # key of a dialled connection's `GuardedWebSocket` in the scope's extensions
 
 LINES = "/watch/"  # paths of observers' WebSockets (server/lockstep/server/routes/observer_websocket.py)
