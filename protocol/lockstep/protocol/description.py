@@ -25,6 +25,7 @@ __all__ = [
     "Microphone",
     "PadInput",
     "PlanarBase",
+    "Pose",
     "PositionLimit",
     "RangeRing",
     "RobotDescription",
@@ -43,16 +44,24 @@ TouchPad = Literal["left_x", "left_y", "right_x", "right_y"]
 
 
 class Axis(msgspec.Struct, frozen=True, kw_only=True):
-    """One value of a command, in physical units."""
+    """One value of a command, in physical units.
+
+    The value of a rate axis says how fast to move; `rest` means "do not move". The value of a goal axis says where to
+    be; null means "do not move", and the axis stays where it was when rest began (docs/robot-link.md, "Goal axes").
+    """
 
     name: str  # "base.vx"
     label: str  # "Forward"
     unit: str  # "m/s"
     minimum: float
     maximum: float
-    slew: float  # largest change per second while driving, in unit/s
-    brake: float  # change per second when coming to rest (hold ended, rest, stop), in unit/s
-    rest: float = 0.0  # the value that means "do not move"
+    slew: float  # unit/s, largest change per second while driving; of a goal axis its largest speed
+    brake: float  # unit/s, change per second when coming to rest (hold ended, rest, stop); of a goal axis unit/s^2
+    rest: float = 0.0  # the value of a rate axis that means "do not move"
+    kind: Literal["rate", "goal"] = "rate"
+    acceleration: float = 0.0  # unit/s^2, of a goal axis that is driven; 0: as `brake`
+    reach: float = 0.0  # unit, of a goal axis: how far from the measured value a goal may be
+    wrap: float | None = None  # unit, of a goal axis that turns on and on: its period; None: it does not
 
 
 class Joint(msgspec.Struct, frozen=True, kw_only=True):
@@ -207,6 +216,22 @@ class BodyTwist(msgspec.Struct, frozen=True, kw_only=True):
     angular: tuple[str, str, str] = ("", "", "")  # axes about x, y and z, rad/s
 
 
+class Pose(msgspec.Struct, frozen=True, kw_only=True):
+    """Goal axes that together are the pose of a body: a position and a rotation vector, in the axes of `frame`.
+
+    They move the joints that the axes `instead_of` move too. A command drives the ones or the others.
+    """
+
+    name: str  # "tool"
+    label: str
+    body: str
+    frame: str = ""  # body or camera in whose axes the pose is given; "" for the world
+    point: Vector3 = (0.0, 0.0, 0.0)  # m, the point of the body that is at the position, in its own frame
+    position: tuple[str, str, str]  # axes, m; "" without such an axis
+    rotation: tuple[str, str, str] = ("", "", "")  # axes, rad
+    instead_of: tuple[str, ...] = ()  # goal axes
+
+
 class Binding(msgspec.Struct, frozen=True, kw_only=True):
     """What moves an axis. A positive input drives the axis up to `scale * maximum`, after `invert`."""
 
@@ -275,6 +300,7 @@ class RobotDescription(msgspec.Struct, frozen=True, kw_only=True):
     geofences: tuple[Geofence, ...] = ()
     force_feeling: ForceFeeling | None = None
     body_twists: tuple[BodyTwist, ...] = ()
+    poses: tuple[Pose, ...] = ()
     start_warning: StartWarning | None = None
     actions: tuple[Action, ...] = ()
     hold: float = 0.3  # s a command is held before the robot comes to rest without another

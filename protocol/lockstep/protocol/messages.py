@@ -3,6 +3,7 @@
 Unknown fields are ignored, unknown kinds refused.
 """
 
+from collections.abc import Sequence
 from typing import Annotated, Literal
 
 import msgspec
@@ -60,6 +61,8 @@ EventReference = Annotated[int, msgspec.Meta(ge=1, le=MAX_EVENT)]
 IssueNumber = Annotated[int, msgspec.Meta(ge=1, le=2**53 - 1)]  # a JavaScript number holds these exactly
 PingId = Annotated[int, msgspec.Meta(ge=-(2**63), le=2**63 - 1)]
 AxisValues = Annotated[list[float], msgspec.Meta(max_length=MAX_AXES)]
+AxisGoals = Annotated[Sequence[float | None], msgspec.Meta(max_length=MAX_AXES)]
+Share = Annotated[float, msgspec.Meta(ge=0, le=1)]
 Text = Annotated[str, msgspec.Meta(max_length=500)]
 Texts = Annotated[list[Text], msgspec.Meta(max_length=MAX_LIMITS)]
 Proof = Annotated[bytes, msgspec.Meta(max_length=64)]
@@ -77,6 +80,8 @@ RefusalReason = Literal[
     "stopped",  # the robot is stopped
     "not_a_number",  # a value is NaN or infinite
     "wrong_size",  # not one value per axis
+    "jump",  # a goal is further from the measured value than the axis' reach
+    "conflict",  # two of its values move the same joints
     "malformed",  # not a message of the protocol
     "no_seat",  # the sender does not hold the control seat
     "seat_taken",  # another peer holds the control seat
@@ -134,9 +139,10 @@ class Command(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", tag="
 
     event: EventReference
     issue: IssueNumber
-    values: AxisValues  # one per axis of the description, in its units
+    values: AxisGoals  # one per axis of the description, in its units; null: a goal axis stays where it is
     nonce: Nonce = 0  # of the issue that it answers: proof that the sender has seen it
     action: RenewedAction = ""  # id of the moving action that the armed sender lets go on; "": none
+    speed: Share = 1.0  # of the goal axes' largest speed that is used at most
 
 
 class Feedback(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", tag="feedback"):
@@ -147,6 +153,7 @@ class Feedback(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", tag=
     time: float  # s, the bridge's monotonic clock when it was issued
     axes: AxisValues  # measured, in the axes' units
     joints: AxisValues = []  # measured, in the joints' units
+    goals: AxisGoals = []  # where the goal axes are commanded to be now, null for a rate axis; empty without any
     wrench: Annotated[
         list[float], msgspec.Meta(max_length=6)
     ] = []  # fx fy fz (N), tx ty tz (N m), in the sensor's frame; empty without a sensor

@@ -52,7 +52,7 @@ export interface ActionUpdate {
   readonly by: string;
 }
 
-/** One value of a command, in physical units. */
+/** One value of a command, in physical units. The value of a rate axis says how fast to move; `rest` means "do not move". The value of a goal axis says where to be; null means "do not move", and the axis stays where it was when rest began (docs/robot-link.md, "Goal axes"). */
 export interface Axis {
   readonly name: string;
   readonly label: string;
@@ -62,6 +62,10 @@ export interface Axis {
   readonly slew: number;
   readonly brake: number;
   readonly rest: number;
+  readonly kind: "goal" | "rate";
+  readonly acceleration: number;
+  readonly reach: number;
+  readonly wrap: number | null;
 }
 
 /** An axis that moves a joint: the joint's velocity is `gain` x (the axis' value - its rest value). None: the gain changes with the posture, and the robot adapter computes the axes' effect on the joint. */
@@ -124,9 +128,10 @@ export interface Command {
   readonly type: "command";
   readonly event: number;
   readonly issue: number;
-  readonly values: readonly (number)[];
+  readonly values: readonly (number | null)[];
   readonly nonce?: number;
   readonly action?: string;
+  readonly speed?: number;
 }
 
 /** A command's way from the stick to the robot, and its feedback's way back, in order; ms. */
@@ -172,6 +177,7 @@ export interface Feedback {
   readonly time: number;
   readonly axes: readonly (number)[];
   readonly joints: readonly (number)[];
+  readonly goals: readonly (number | null)[];
   readonly wrench: readonly (number)[];
   readonly ranges: readonly (number)[];
   readonly at_rest: boolean;
@@ -305,6 +311,18 @@ export interface Pong {
   readonly id: number;
 }
 
+/** Goal axes that together are the pose of a body: a position and a rotation vector, in the axes of `frame`. They move the joints that the axes `instead_of` move too. A command drives the ones or the others. */
+export interface Pose {
+  readonly name: string;
+  readonly label: string;
+  readonly body: string;
+  readonly frame: string;
+  readonly point: readonly [number, number, number];
+  readonly position: readonly [string, string, string];
+  readonly rotation: readonly [string, string, string];
+  readonly instead_of: readonly (string)[];
+}
+
 /** Keeps a measured joint between `minimum` and `maximum` by slowing the axes that move it; None: no bound. The bridge enforces it (docs/robot-link.md, "Limits"). Motion away from a bound is always free. */
 export interface PositionLimit {
   readonly name: string;
@@ -354,7 +372,7 @@ export interface RecordingState {
 export interface Refusal {
   readonly type: "refusal";
   readonly event: number;
-  readonly reason: "declined" | "late" | "link_down" | "locked_out" | "malformed" | "no_seat" | "not_a_number" | "not_allowed" | "not_kept" | "not_neutral" | "out_of_order" | "rested" | "seat_taken" | "silenced" | "stale_reset" | "stopped" | "too_often" | "too_soon" | "unseen" | "warning" | "wrong_size";
+  readonly reason: "conflict" | "declined" | "jump" | "late" | "link_down" | "locked_out" | "malformed" | "no_seat" | "not_a_number" | "not_allowed" | "not_kept" | "not_neutral" | "out_of_order" | "rested" | "seat_taken" | "silenced" | "stale_reset" | "stopped" | "too_often" | "too_soon" | "unseen" | "warning" | "wrong_size";
   readonly current: number;
   readonly detail: string;
   readonly stop: number;
@@ -407,6 +425,7 @@ export interface RobotDescription {
   readonly geofences: readonly (Geofence)[];
   readonly force_feeling: ForceFeeling | null;
   readonly body_twists: readonly (BodyTwist)[];
+  readonly poses: readonly (Pose)[];
   readonly start_warning: StartWarning | null;
   readonly actions: readonly (Action)[];
   readonly hold: number;

@@ -1,4 +1,6 @@
-"""Limits the shaped values by all position limits and geofences before they reach the robot. No I/O, no clock.
+"""Limits the shaped rates by all position limits and geofences before they reach the robot. No I/O, no clock.
+
+The *value* of an axis is here what it is to the limits: the value of a rate axis, the speed of a goal axis' goal.
 
 In every tick each limit asks: with these values, and all axes braking from the next tick on, does the robot stay within
 bounds? If not, the axes that lead out of them are scaled down, towards rest only: no axis moves that was not told to.
@@ -6,13 +8,14 @@ If even that would need a steeper ramp than the axes' brake, all limited axes br
 found to be good a tick before.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Protocol
 
 from lockstep.protocol.description import PositionLimit, RobotDescription
 from lockstep.robot_bridge.control.limits.geofence import FenceGuard
 from lockstep.robot_bridge.control.limits.joint_limit_guard import JointLimitGuard, is_by_posture
 from lockstep.robot_bridge.control.limits.position_guard import PositionGuard
+from lockstep.robot_bridge.control.limits.rate_axis import rest_rate
 from lockstep.robot_bridge.control.limits.stopping_distance import Demand, share_of
 
 __all__ = ["MotionLimits", "PositionSense"]
@@ -28,7 +31,7 @@ class PositionSense(Protocol):
 
 
 class MotionLimits:
-    """Limits the values of all axes. Call it once a tick, with the wanted values and the values under braking.
+    """Limits the values of all axes. Call it once a tick, with the wanted values.
 
     Attributes:
         acting: names of the limits that slow an axis now
@@ -50,7 +53,7 @@ class MotionLimits:
         self._linger = round(LINGER / tick_seconds)  # calls
         self._lingering: dict[str, int] = {}  # limit -> calls that it still counts as acting
         self._sense = sense
-        self._rest_values = [axis.rest for axis in description.axes]
+        self._rest_values = [rest_rate(axis) for axis in description.axes]
         self._positions = [
             PositionGuard(limit, description, reaction)
             for limit in description.position_limits
@@ -64,8 +67,8 @@ class MotionLimits:
         guarded.update(() if self._fence is None else self._fence.axes)
         self._guarded = tuple(sorted(guarded))
 
-    def __call__(self, values: list[float], braked: Sequence[float]) -> list[float]:
-        """Return the values that may be applied instead of `values`."""
+    def __call__(self, values: list[float], braked: Callable[[], Sequence[float]]) -> list[float]:
+        """Return the values that may be applied instead of `values`. `braked`: returns them after a tick of braking."""
         rests = self._rest_values
         for number in self._guarded:
             if values[number] != rests[number]:
@@ -75,7 +78,7 @@ class MotionLimits:
             self.acting = self.blind = frozenset()
         return values
 
-    def _limit(self, values: list[float], braked: Sequence[float]) -> list[float]:
+    def _limit(self, values: list[float], braked: Callable[[], Sequence[float]]) -> list[float]:
         shares: dict[int, float] = {}
         excessive: list[Demand] = []
         for demand in self._demands(values):
@@ -86,7 +89,7 @@ class MotionLimits:
                     shares[number] = min(share, shares.get(number, 1.0))
         if excessive or self._lingering:
             self._note(excessive)
-        return self._scaled(values, braked, shares) if shares else values
+        return self._scaled(values, braked(), shares) if shares else values
 
     def _note(self, excessive: list[Demand]) -> None:
         self._lingering = {name: left - 1 for name, left in self._lingering.items() if left > 1}
