@@ -161,7 +161,7 @@ class Clutch:
         self._clipped = ()
 
     def lost_feedback(self) -> None:
-        """Release, and do not engage before another feedback: the newest one may be of another state, or another run."""
+        """Release, and do not engage before another feedback: the newest one may be of another state, or run."""
         self.release()
         self._newest = None
 
