@@ -4,7 +4,7 @@ import math
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from lockstep.protocol.description import RobotDescription
+from lockstep.protocol.description import Axis, RobotDescription
 from lockstep.server.recording.format.info import RecordingInfo
 from lockstep.server.recording.format.payload import own_record_of
 from lockstep.server.recording.format.records import CommandRecord, FeedbackRecord, ReportRecord, TraceRecord
@@ -56,8 +56,9 @@ class Session:
     picture_delay: Series = field(default_factory=Series)  # ms, by the operator's own clock
     round_trip: Series = field(default_factory=Series)  # ms
     force: Series = field(default_factory=Series)  # N
-    commanded: dict[str, Series] = field(default_factory=dict)  # by axis
+    commanded: dict[str, Series] = field(default_factory=dict)  # by axis; NaN where a goal axis was to stay
     measured: dict[str, Series] = field(default_factory=dict)
+    applied: dict[str, Series] = field(default_factory=dict)  # by goal axis: where it was commanded to be then
     traced: TracedEvents = field(default_factory=TracedEvents)  # where the time of each event went
 
 
@@ -106,8 +107,18 @@ def _take_row(session: Session, row: EventRow, at: float) -> None:
         session.force.add(at, math.hypot(*feedback.wrench[:3]))
     for axis, value in zip(session.description.axes, feedback.axes, strict=False):
         session.measured.setdefault(axis.name, Series()).add(at, value)
-    for axis, value in zip(session.description.axes, [] if command is None else command.values, strict=False):
+    axes = list(zip(session.description.axes, feedback.axes, strict=False))
+    for (axis, measured), asked in zip(axes, [] if command is None else command.values, strict=False):
+        value = math.nan if asked is None else _beside(axis, measured, asked)
         session.commanded.setdefault(axis.name, Series()).add(at, value)
+    for (axis, measured), goal in zip(axes, feedback.goals, strict=False):
+        if goal is not None:
+            session.applied.setdefault(axis.name, Series()).add(at, _beside(axis, measured, goal))
+
+
+def _beside(axis: Axis, measured: float, goal: float) -> float:
+    """Return the goal, of an axis that turns on and on as the same place that is nearest to the measured value."""
+    return measured + math.remainder(goal - measured, axis.wrap) if axis.wrap else goal
 
 
 def _take_report(session: Session, record: ReportRecord, at: float) -> None:
