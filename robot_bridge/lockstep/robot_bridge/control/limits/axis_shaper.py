@@ -75,7 +75,7 @@ class AxisShaper:
         return all(axis.rate == axis.rest_rate and (released or not axis.is_driven) for axis in self._axes)
 
     def begin(self, places: Sequence[float], pursued: Sequence[float]) -> bool:
-        """Begin to command the goal axes where they are held: at the goals that the robot pursues. True if all are known.
+        """Command the goal axes from where they are held: from the goals that the robot pursues. True if all are known.
 
         `places`: measured, one per axis; NaN: not known. If one of the goals is further than its axis' reach from its
         place, the robot is not where it says, and the places count: all, since a pose and its joints belong together.
