@@ -34,10 +34,10 @@ export function figureOf(axis: Axis, place: number): { readonly main: string; re
 export function endLabel(axis: Axis, place: number): string {
   if (axis.unit === "rad") return degreesOf(place, 0);
   const { factor } = scaleFor(axis.unit, Math.max(Math.abs(axis.minimum), Math.abs(axis.maximum)));
-  return String(Number((place * factor).toPrecision(3))).replace("-", "−");
+  return String(Number((place * factor).toPrecision(3)));
 }
 
 function degreesOf(radians: number, digits: number): string {
   const text = (radians * DEGREES).toFixed(digits);
-  return `${/[1-9]/.test(text) ? text.replace("-", "−") : text.replace("-", "")}°`;
+  return `${/[1-9]/.test(text) ? text : text.replace("-", "")}°`;
 }

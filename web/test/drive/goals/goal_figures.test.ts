@@ -8,16 +8,16 @@ const jaw = goalAxisOf("jaw", { unit: "m", minimum: 0, maximum: 0.08 });
 
 describe("a goal axis in figures", () => {
   it("is read in degrees where the robot says radians, and in its own unit else", () => {
-    expect(figureOf(elbow, -0.5)).toEqual({ main: "−28.6°", beside: "-0.50 rad" });
+    expect(figureOf(elbow, -0.5)).toEqual({ main: "-28.6°", beside: "-0.50 rad" });
     expect(figureOf(elbow, -0.0001)).toEqual({ main: "0.0°", beside: "0.00 rad" });
     expect(figureOf(jaw, 0.0425)).toEqual({ main: "42.5 mm", beside: "" });
     expect(figureOf(axisOf("turn", { unit: "rad/s" }), 0.5)).toEqual({ main: "0.50 rad/s", beside: "" });
   });
 
   it("has short ends", () => {
-    expect(endLabel(elbow, -2)).toBe("−115°");
+    expect(endLabel(elbow, -2)).toBe("-115°");
     expect(endLabel(jaw, 0.08)).toBe("80");
-    expect(endLabel(jaw, -0.08)).toBe("−80");
+    expect(endLabel(jaw, -0.08)).toBe("-80");
   });
 
   it("knows when it is at an end, unless it has none", () => {
