@@ -2,6 +2,7 @@ import type { HeldInputs } from "../drive/axis_mapping";
 import { createInputActivity, noteInput } from "../drive/input_activity";
 import { Keyboard, type KeyboardEvents } from "./keyboard";
 import type { Pad, PadEvents, PadState } from "./gamepad";
+import type { GoalSliders } from "./goal_sliders";
 import type { TouchSticks } from "./touch_sticks";
 
 const SLOW_SHARE = 0.3;
@@ -17,6 +18,7 @@ export interface ControlSample {
 /** Gamepad, keyboard and touch as one set of controls. */
 export class Controls {
   pad: Pad | null = null; // until its code is there
+  sliders: GoalSliders | null = null; // likewise
   readonly keyboard: Keyboard;
   private readonly activity = createInputActivity();
 
@@ -40,7 +42,8 @@ export class Controls {
 
   /** Whether a deadman is held, by what is known now. */
   get deadman(): boolean {
-    return this.keyboard.deadman || this.sticks.deadman || this.readyPad?.deadman === true;
+    const { keyboard, sticks, sliders, readyPad: pad } = this;
+    return keyboard.deadman || sticks.deadman || sliders?.deadman === true || pad?.deadman === true;
   }
 
   private get readyPad(): PadState | null {
@@ -52,7 +55,9 @@ export class Controls {
     if (isTick || this.hasPadNews) this.pad?.poll(isTick);
     const { keyboard, sticks, readyPad: pad } = this;
     const touch = sticks.deadman ? sticks.inputs : null;
-    const held: HeldInputs = { pad: pad?.inputs ?? null, keys: keyboard.keys, touch };
+    const sliders = this.sliders?.sample(keyboard.keys) ?? null;
+    const keys = sliders?.otherKeys ?? keyboard.keys;
+    const held: HeldInputs = { pad: pad?.inputs ?? null, keys, touch, sliders };
     return {
       deadman: this.deadman,
       held,
@@ -65,6 +70,7 @@ export class Controls {
   release(): void {
     this.keyboard.release();
     this.sticks.release();
+    this.sliders?.release();
   }
 
   close(): void {
