@@ -24,7 +24,7 @@ from lockstep.server.errors import (
     http_error,
 )
 from lockstep.server.http.json_response import json_answer
-from lockstep.server.http.problem import PROBLEM_JSON, problem_body
+from lockstep.server.http.problem import problem_response
 from lockstep.server.http.transport.client_address import counted_address
 from lockstep.server.http.transport.uvicorn_websocket_limits import CLOSED_FOR, SOCKET, GuardedWebSocket
 from lockstep.server.robot.dial_in import DialIn
@@ -328,9 +328,7 @@ async def _close(websocket: WebSocket, code: int) -> None:
 async def _refuse(websocket: WebSocket, error: ConsoleError) -> None:
     """Answer instead of opening a WebSocket, as HTTP does (RFC 9457)."""
     entry = http_error(error)
-    body = problem_body(entry.status, entry.name, error.detail)
-    headers = {"Cache-Control": "no-store", **entry.headers}
     try:
-        await websocket.send_denial_response(Response(body, entry.status, headers, PROBLEM_JSON))
+        await websocket.send_denial_response(problem_response(entry.status, entry.name, error.detail, entry.headers))
     except (RuntimeError, OSError, WebSocketDisconnect):
         return  # it was open already, or is gone

@@ -12,10 +12,10 @@ from websockets.exceptions import ConnectionClosedError
 from websockets.frames import Frame, Opcode
 
 from lockstep.robot_bridge.link.paced_transport import PIECE
+from lockstep.server.http.transport import uvicorn_websocket_limits
 from lockstep.server.http.transport.uvicorn_websocket_limits import (
     FRAME_BURST,
     LAST_WORDS,
-    LINK_BURST,
     SOCKET,
     GuardedWebSocket,
 )
@@ -33,7 +33,7 @@ class Socket(asyncio.Transport):
         self.written = b""
         self.is_reading_now = True
         self.closed = self.aborted = False
-        self.gone = asyncio.Event()  # set when it was aborted
+        self.gone = asyncio.Event()  # set when it was closed
 
     def write(self, data: bytes | bytearray | memoryview) -> None:
         self.written += bytes(data)
@@ -43,6 +43,7 @@ class Socket(asyncio.Transport):
 
     def close(self) -> None:
         self.closed = True
+        self.gone.set()
 
     def abort(self) -> None:
         self.closed = self.aborted = True
@@ -204,14 +205,16 @@ async def test_a_link_gets_the_empty_frames_of_one_piece_in_a_turn_and_the_next_
     assert link.messages == read
 
 
-async def test_a_link_of_too_many_frames_a_second_is_closed() -> None:
+async def test_a_link_of_too_many_frames_a_second_is_closed(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(uvicorn_websocket_limits, "LINK_RATE", 0.001)
+    monkeypatch.setattr(uvicorn_websocket_limits, "LINK_BURST", 1000.0)
     server, link = Server(), Link()
     (await server.accepted()).carry(link)
-    while not server.socket.closed:
-        server.connection.data_received(EMPTY * (READ // len(EMPTY)))
-        await asyncio.sleep(0)
+    server.connection.data_received(EMPTY * (READ // len(EMPTY)))
+    async with asyncio.timeout(PATIENCE):
+        await server.socket.gone.wait()
     assert server.code == 1008
-    assert link.messages >= LINK_BURST
+    assert link.messages == 1000
     await server.end()
 
 
@@ -253,7 +256,8 @@ async def test_a_request_that_http_takes_and_the_websocket_does_not_leaves_no_co
         writer.close()
 
 
-async def test_a_flood_of_empty_messages_ends_an_observers_line_by_name() -> None:
+async def test_a_flood_of_empty_messages_ends_an_observers_line_by_name(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(uvicorn_websocket_limits, "FRAME_RATE", 0.001)
     async with running_rig(relay=NOWHERE, observers_direct=0, max_observer_rate=1e6, max_bad_messages=10**6) as rig:
         async with joined(address(rig, await ticket(rig))) as line:
             line.transport.write(Frame(Opcode.TEXT, b"").serialize(mask=True) * int(4 * FRAME_BURST))
