@@ -2,6 +2,8 @@
 
 import asyncio
 import json
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
 from pathlib import Path
 from typing import Any
 
@@ -49,6 +51,18 @@ async def _begun(console: Console, task: "asyncio.Task[ActionUpdate]") -> None:
     assert not task.done()
 
 
+@asynccontextmanager
+async def _homing(console: Console) -> AsyncIterator[asyncio.Task[ActionUpdate]]:
+    """The way home, begun; whatever becomes of it ends with the block."""
+    task = asyncio.create_task(console.act("home"))
+    try:
+        await _begun(console, task)
+        yield task
+    finally:
+        task.cancel()
+        await asyncio.gather(task, return_exceptions=True)
+
+
 async def test_home_brings_the_robot_home_and_everybody_sees_its_progress(stack: Stack) -> None:
     async with _console(stack.operator) as console, _console(stack.observer, "Grace") as observer:
         await _go_away(console)
@@ -83,64 +97,60 @@ async def test_a_stick_that_is_moved_cancels_what_moves(stack: Stack) -> None:
     async with _console(stack.operator) as console:
         for _ in range(ATTEMPTS):
             await _go_away(console)
-            homing = asyncio.create_task(console.act("home"))
-            await _begun(console, homing)
-            with pytest.raises(ActionRefused) as refused:
-                await console.act("home")
-            assert refused.value.reason == "busy"
-            assert not homing.done(), "the second request takes nothing from the first"
-            await drive_on(console, [0.0, 0.2, 0.0])
-            with pytest.raises(ActionCancelled) as cancelled:
-                await homing
-            if cancelled.value.reason != "not_renewed":  # a machine that holds this process up for 0.3 s does that
-                break
+            async with _homing(console) as homing:
+                with pytest.raises(ActionRefused) as refused:
+                    await console.act("home")
+                assert refused.value.reason == "busy"
+                assert not homing.done(), "the second request takes nothing from the first"
+                await drive_on(console, [0.0, 0.2, 0.0])
+                with pytest.raises(ActionCancelled) as cancelled:
+                    await homing
+                if cancelled.value.reason != "not_renewed":  # a machine that holds this process up for 0.3 s does that
+                    break
         assert cancelled.value.reason == "driving"
 
 
 async def test_a_stop_from_an_observer_cancels_and_after_the_reset_arming_comes_first(stack: Stack) -> None:
     async with _console(stack.operator) as console, _console(stack.observer, "Grace") as observer:
         await _go_away(console)
-        homing = asyncio.create_task(console.act("home"))
-        await _begun(console, homing)
-        await observer.stop("a child")
-        with pytest.raises(ActionCancelled) as cancelled:
-            await homing
-        assert cancelled.value.reason == "stopped"
-        with pytest.raises(ActionRefused) as refused:
-            await console.act("home")
-        assert refused.value.reason == "stopped"
-        await asyncio.sleep(1.0)  # the least age of a stop that a reset may name
-        await console.reset()
-        with pytest.raises(NotArmed):
-            await console.act("home")
-        await console.arm()
-        assert (await console.act("home")).state == "done"
+        async with _homing(console) as homing:
+            await observer.stop("a child")
+            with pytest.raises(ActionCancelled) as cancelled:
+                await homing
+            assert cancelled.value.reason == "stopped"
+            with pytest.raises(ActionRefused) as refused:
+                await console.act("home")
+            assert refused.value.reason == "stopped"
+            await asyncio.sleep(1.0)  # the least age of a stop that a reset may name
+            await console.reset()
+            with pytest.raises(NotArmed):
+                await console.act("home")
+            await console.arm()
+            assert (await console.act("home")).state == "done"
 
 
 async def test_a_seat_that_is_taken_cancels_what_moves(stack: Stack) -> None:
     here = await stack.from_here()
     async with _console(stack.operator) as console, _console(stack.supervisor, "Grace") as supervisor:
         await _go_away(console)
-        homing = asyncio.create_task(console.act("home"))
-        await _begun(console, homing)
-        await supervisor.take_seat()
-        with pytest.raises(ActionCancelled):
-            await homing
-        ended = await until_logged(here, "action", lambda record: record["state"] == "cancelled")
-        assert ended["reason"] in ("cancelled", "rested", "not_neutral")
+        async with _homing(console) as homing:
+            await supervisor.take_seat()
+            with pytest.raises(ActionCancelled):
+                await homing
+            ended = await until_logged(here, "action", lambda record: record["state"] == "cancelled")
+            assert ended["reason"] in ("cancelled", "rested", "not_neutral")
 
 
 async def test_a_client_that_ends_leaves_no_motion_behind(stack: Stack) -> None:
     here = await stack.from_here()
     async with _console(stack.operator) as console:
         await _go_away(console)
-        homing = asyncio.create_task(console.act("home"))
-        await _begun(console, homing)
-        homing.cancel()
-        with pytest.raises(asyncio.CancelledError):
-            await homing
-        ended = await until_logged(here, "action", lambda record: record["state"] == "cancelled")
-        assert ended["reason"] == "cancelled"
+        async with _homing(console) as homing:
+            homing.cancel()
+            with pytest.raises(asyncio.CancelledError):
+                await homing
+            ended = await until_logged(here, "action", lambda record: record["state"] == "cancelled")
+            assert ended["reason"] == "cancelled"
 
 
 async def test_the_status_is_told_with_units_and_age(stack: Stack) -> None:

@@ -7,7 +7,7 @@ from lockstep.bench.browsers.console_page import RB, ConsolePage, open_console
 from tests.client.truth import until_logged
 from tests.support.stack import Stack
 
-A = 0  # the pad's button
+A, X = 0, 2  # the pad's buttons
 
 pytestmark = pytest.mark.browser
 
@@ -60,6 +60,30 @@ async def test_without_arming_a_motion_says_why_not_and_the_light_goes_on(stack:
         await expect(light).to_have_text("off")
         await expect(console.page.locator('.status-item[data-item="battery"]')).to_have_attribute("data-tone", "good")
     assert not [record for record in await stack.events("action") if record["name"] == "home"]
+
+
+async def test_a_pad_asks_for_nothing_under_a_window_or_in_a_page_that_is_not_in_front(
+    stack: Stack, chromium: Browser
+) -> None:
+    async with open_console(chromium, stack.operator) as console:
+        await console.until_live()
+        await console.page.keyboard.press("h")
+        await expect(console.page.get_by_role("dialog")).to_be_visible()
+        await console.press(X)
+        await console.press(X, False)
+        said = console.page.get_by_text("First close the window over the picture")
+        await expect(said.first).to_be_attached()
+        await console.page.get_by_role("dialog").get_by_role("button", name="Close").click()
+        await expect(console.page.get_by_role("dialog")).to_be_hidden()
+        await console.page.evaluate("document.hasFocus = () => false")
+        await console.press(X)
+        await console.press(X, False)
+        await expect(console.page.get_by_text("The page is not in front").first).to_be_attached()
+        assert not await stack.events("action")
+        await console.page.evaluate("document.hasFocus = () => true")
+        await console.press(X)
+        await console.press(X, False)
+        await expect(_action(console, "light")).to_have_attribute("data-state", "done")
 
 
 @pytest.mark.parametrize("how", ["pad", "key"])

@@ -1,5 +1,6 @@
 """Settings of a TOML file, for a console with one robot and for a fleet."""
 
+import os
 import re
 import subprocess
 import sys
@@ -9,7 +10,8 @@ import pytest
 
 from lockstep.server.fleet.robots import robot_settings
 from lockstep.server.settings import Settings
-from lockstep.server.settings_file import SettingsFileUnusable
+from lockstep.server.settings_file import SettingsFileUnusable, exposed_secrets, read_settings_file
+from lockstep.server.util.robot_names import BadFleet
 
 DEPLOY = Path(__file__).resolve().parents[2] / "docs" / "deploy.md"
 ONE = """
@@ -131,3 +133,28 @@ def test_the_file_in_the_guide_is_a_file_of_settings(tmp_path: Path) -> None:
         settings = Settings(config=written(tmp_path, text.replace("/etc/lockstep", str(tmp_path))))
         if settings.is_fleet:
             robot_settings(settings)
+
+
+def test_what_is_no_file_too_long_or_too_deep_is_refused_and_not_waited_for(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "fifo")
+    with pytest.raises(SettingsFileUnusable, match="not a regular file"):
+        read_settings_file(tmp_path / "fifo", Settings)
+    with pytest.raises(SettingsFileUnusable, match="nested too deeply"):
+        read_settings_file(written(tmp_path, f"port = {'[' * 10_000}{']' * 10_000}"), Settings)
+    with (tmp_path / "large.toml").open("wb") as file:
+        file.truncate(1 << 40)
+    with pytest.raises(SettingsFileUnusable, match="longer than"):
+        read_settings_file(tmp_path / "large.toml", Settings)
+    for name in ("fifo", "console.toml", "large.toml"):
+        with pytest.raises(BadFleet) as raised:
+            robot_settings(Settings(fleet_file=tmp_path / name))
+        assert raised.value.name == "fleet_unreadable"
+
+
+def test_a_secret_in_a_file_that_everybody_may_read_is_told(tmp_path: Path) -> None:
+    path = written(tmp_path, 'secret = "s"\nport = 1\n[robots.left]\nlink_secret = "x"\n[federation]\nboard = ""\n')
+    path.chmod(0o640)
+    assert exposed_secrets(path, Settings) == []
+    path.chmod(0o644)
+    assert exposed_secrets(path, Settings) == ["link_secret", "secret"]
+    assert exposed_secrets(written(tmp_path, 'link_secret_file = "/run/secret"'), Settings) == []

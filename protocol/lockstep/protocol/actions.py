@@ -13,6 +13,7 @@ from lockstep.protocol.serial import MAX_EVENT
 
 __all__ = [
     "MAX_PARAMETERS",
+    "MAX_STATUS_BYTES",
     "MAX_STATUS_ITEMS",
     "Act",
     "ActionCancel",
@@ -28,10 +29,12 @@ __all__ = [
     "StatusKind",
     "StatusLevel",
     "fits_kind",
+    "status_item_bytes",
 ]
 
 MAX_PARAMETERS = 8
 MAX_STATUS_ITEMS = 64
+MAX_STATUS_BYTES = 48 << 10  # of all items as JSON: no peer takes a message of more than 64 KiB
 MAX_NUMBER = 1e12  # of a status value, in its unit
 
 # Letters that nothing has to escape: an id stands in logs and recordings. `$` would let the end of a line pass.
@@ -130,6 +133,11 @@ class Status(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", tag="s
 
     event: Annotated[int, msgspec.Meta(ge=1, le=MAX_EVENT)]  # the current one when this was said
     items: Annotated[list[StatusItem], msgspec.Meta(max_length=MAX_STATUS_ITEMS)] = []
+
+
+def status_item_bytes(item: StatusItem) -> int:
+    """Return the bytes of an item as JSON, as peers get it."""
+    return len(msgspec.json.encode(item)) + 1
 
 
 def fits_kind(item: StatusItem) -> bool:

@@ -1,16 +1,17 @@
 """Reads settings from a TOML file. Flags and environment variables override it."""
 
-import tomllib
 from collections.abc import Iterator, Mapping
 from difflib import get_close_matches
 from pathlib import Path
 from typing import Any, get_args
 
-from pydantic import BaseModel
+from pydantic import BaseModel, SecretStr
 from pydantic.fields import FieldInfo
 from pydantic_settings import BaseSettings, PydanticBaseSettingsSource
 
-__all__ = ["SettingsFileSource", "SettingsFileUnusable", "read_settings_file"]
+from lockstep.server.util.toml_file import TomlUnusable, read_toml
+
+__all__ = ["SettingsFileSource", "SettingsFileUnusable", "exposed_secrets", "read_settings_file"]
 
 ELSEWHERE = frozenset({"config"})  # a file that names another would need an order between them
 
@@ -51,9 +52,9 @@ def read_settings_file(path: Path, settings: type[BaseModel]) -> dict[str, Any]:
         SettingsFileUnusable: the file cannot be read, is not TOML, or names a setting that does not exist.
     """
     try:
-        content = tomllib.loads(path.read_text())
-    except (OSError, UnicodeError, tomllib.TOMLDecodeError) as error:
-        raise SettingsFileUnusable(f"{path}: {error}") from error
+        content, _ = read_toml(path)
+    except TomlUnusable as error:
+        raise SettingsFileUnusable(str(error)) from error
     if isinstance(content.get("robots"), dict):
         del content["robots"]
         wrong = next((name for name in ("robot", "fleet_file") if name in content), None)
@@ -64,6 +65,38 @@ def read_settings_file(path: Path, settings: type[BaseModel]) -> dict[str, Any]:
     if unknown is not None:
         raise SettingsFileUnusable(f"{path}: {unknown}")
     return content
+
+
+def exposed_secrets(path: Path, settings: type[BaseModel]) -> list[str]:
+    """Return the names of the secrets in `path`, if everybody on this machine may read it.
+
+    Raises:
+        SettingsFileUnusable: the file cannot be read, or is not TOML.
+    """
+    try:
+        content, for_all = read_toml(path)
+    except TomlUnusable as error:
+        raise SettingsFileUnusable(str(error)) from error
+    return sorted(set(_found(content, set(_secrets(settings))))) if for_all else []
+
+
+def _secrets(settings: type[BaseModel]) -> Iterator[str]:
+    """Yield the names of the settings that are secret."""
+    for name, field in settings.model_fields.items():
+        inner = _nested(field)
+        if SecretStr in (field.annotation, *get_args(field.annotation)):
+            yield name
+        elif inner is not None:
+            yield from _secrets(inner)
+
+
+def _found(content: Mapping[str, Any], names: set[str]) -> Iterator[str]:
+    """Yield those names that have a value, in whichever table."""
+    for name, value in content.items():
+        if isinstance(value, dict):
+            yield from _found(value, names)
+        elif name in names and value:
+            yield name
 
 
 def _unknown(content: Mapping[str, Any], settings: type[BaseModel], within: str) -> Iterator[str]:

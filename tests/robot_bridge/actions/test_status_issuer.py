@@ -4,7 +4,14 @@ from collections.abc import Sequence
 
 import pytest
 
-from lockstep.protocol.actions import MAX_STATUS_ITEMS, StatusItem, StatusKind, fits_kind
+from lockstep.protocol.actions import (
+    MAX_STATUS_BYTES,
+    MAX_STATUS_ITEMS,
+    StatusItem,
+    StatusKind,
+    fits_kind,
+    status_item_bytes,
+)
 from lockstep.robot_bridge.actions.status_issuer import StatusIssuer
 from lockstep.robot_bridge.robots.planar.robot import PlanarRobot
 
@@ -70,6 +77,26 @@ def test_what_does_not_fit_or_is_named_twice_or_too_many_is_left_out() -> None:
     status = StatusIssuer(SayingRobot([*bad, *many, many[0]])).look(0.0, 1)
     assert status is not None
     assert [each.name for each in status.items] == [f"n{number}" for number in range(MAX_STATUS_ITEMS)]
+
+
+def test_items_that_together_no_peer_could_take_are_left_out_by_name(caplog: pytest.LogCaptureFixture) -> None:
+    long = [
+        StatusItem(name=f"{number}", label="\N{SNOWMAN}" * 200, kind="text", value="x" * 500, text="y" * 500)
+        for number in range(MAX_STATUS_ITEMS)
+    ]
+    status = StatusIssuer(SayingRobot([*long, item(1.0, name="small")], pressed=False)).look(0.0, 1)
+    assert status is not None
+    names = [each.name for each in status.items]
+    assert names[:2] == ["hardware_stop", "0"]
+    assert names[-1] == "small", "what still fits is told"
+    assert sum(map(status_item_bytes, status.items)) <= MAX_STATUS_BYTES
+    assert "the status item '63' does not fit into the 49152 bytes of a status, and is left out" in caplog.text
+
+
+def test_text_that_is_no_unicode_is_left_out() -> None:
+    status = StatusIssuer(SayingRobot([item("\ud800", "text"), item(1.0, name="m")])).look(0.0, 1)
+    assert status is not None
+    assert [each.name for each in status.items] == ["m"]
 
 
 @pytest.mark.parametrize(

@@ -2,6 +2,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from lockstep.protocol.actions import MAX_STATUS_BYTES, MAX_STATUS_ITEMS, Status, StatusItem
 from lockstep.protocol.framing import MAX_CONTROL_FRAME, frame
 from lockstep.protocol.messages import (
     Command,
@@ -363,3 +364,11 @@ def test_any_bytes_give_events_bad_input_or_an_end(chunks: list[bytes], handshak
     assert (session.ended is not None) == (session.state is LinkState.ENDED)
     goodbyes = [isinstance(message, Goodbye) for message in session.take_outgoing()]
     assert not any(goodbyes[:-1]), "something followed the goodbye"
+
+
+def test_a_console_takes_no_status_that_no_peer_could_take() -> None:
+    bridge, client = open_pair()
+    item = StatusItem(name="a", label="A", kind="text", value="x" * 500, text="y" * 500)
+    large, small = Status(event=1, items=[item] * MAX_STATUS_ITEMS), Status(event=1, items=[item] * 30)
+    found = client.receive(wire(large, small), 0.0)
+    assert found == [BadInput("malformed", f"a status of more than {MAX_STATUS_BYTES} bytes"), small]

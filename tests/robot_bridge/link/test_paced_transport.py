@@ -3,6 +3,7 @@
 import asyncio
 
 import pytest
+from websockets.protocol import Protocol, Side
 
 from lockstep.protocol.framing import frame
 from lockstep.protocol.messages import Feedback, Hello, LinkMessage, encode_message
@@ -12,6 +13,8 @@ from lockstep.robot_bridge.link.paced_transport import (
     READ_BURST,
     READ_SHARE,
     READ_TURN,
+    PacedReader,
+    PacedSocket,
     PacedTransport,
     ReadBudget,
 )
@@ -29,6 +32,7 @@ class Socket(asyncio.Transport):
     def write(self, data: bytes | bytearray | memoryview) -> None: ...
     def set_write_buffer_limits(self, high: int | None = None, low: int | None = None) -> None: ...
     def close(self) -> None: ...
+    def abort(self) -> None: ...
 
     def pause_reading(self) -> None:
         self.pauses += 1
@@ -107,3 +111,57 @@ def test_a_budget_gives_its_share_of_the_time_and_no_more(seconds: float) -> Non
     assert budget.spend(2 * READ_BURST, now + 1000.0) == pytest.approx(READ_BURST / READ_SHARE), (
         "idle time is not saved"
     )
+
+
+class Frames:
+    """A WebSocket whose every frame costs `cost` seconds of the thread's time; the clock stands still."""
+
+    def __init__(self, cost: float) -> None:
+        self.cost = cost
+        self.busy = 0.0
+        self.count = 0
+        self.protocol = Protocol(Side.SERVER)
+        self.tcp = Socket()
+        self.reader = PacedReader(self.parse, clock=lambda: 0.0, worked=lambda: self.busy)
+        self.socket = PacedSocket(self.tcp, self.reader)
+
+    def parse(self, data: bytes) -> None:
+        self.protocol.receive_data(data)
+        frames = len(self.protocol.events_received())
+        self.count += frames
+        self.busy += frames * self.cost
+
+
+EMPTY = b"\x82\x80\x00\x00\x00\x00"  # 6 bytes: a frame without data, which no message of a link comes from
+
+
+async def test_frames_without_data_cost_the_budget_what_they_take_to_parse() -> None:
+    frames = Frames(READ_TURN / 100)
+    frames.reader.feed(EMPTY * 100_000)
+    assert 0 < frames.count <= PIECE // len(EMPTY) + 1, "one piece, and others have their turn"
+    assert frames.tcp.was_paused()
+    frames.reader.end()
+    read = frames.count
+    frames.reader.feed(EMPTY)
+    await asyncio.sleep(0)
+    assert frames.count == read, "nothing is read after the end"
+
+
+async def test_whoever_takes_the_data_pauses_the_reader_and_loses_nothing() -> None:
+    frames = Frames(0.0)
+    frames.socket.pause_reading()
+    frames.reader.feed(EMPTY * 10)
+    assert (frames.count, frames.tcp.was_paused()) == (0, True)
+    frames.socket.resume_reading()
+    await asyncio.sleep(0)
+    assert frames.count == 10
+
+
+@pytest.mark.parametrize("end", ["close", "abort"])
+async def test_what_comes_after_this_sides_end_is_dropped(end: str) -> None:
+    frames = Frames(READ_TURN)
+    frames.reader.feed(EMPTY * 100_000)
+    read = frames.count
+    getattr(frames.socket, end)()
+    await asyncio.sleep(0)
+    assert frames.count == read

@@ -6,6 +6,8 @@ import socket
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 
+import pytest
+
 from lockstep.bench.harness.free_port import free_port
 from lockstep.rtc.addresses import Datagram, Path
 from lockstep.rtc.channels import ChannelMessage, ChannelOpened
@@ -13,7 +15,7 @@ from lockstep.rtc.endpoint import Connection, Endpoint, EndpointSettings
 from lockstep.rtc.ice.tcp import TcpFraming, frame
 from lockstep.rtc.peer_events import Connected, PeerEnded, PeerEvent
 from lockstep.rtc.sdp import SessionDescription, parse_description, write_description
-from lockstep.rtc.sockets.tcp_port import TcpPort, TcpPortSettings
+from lockstep.rtc.sockets.tcp_port import EMPTY_BURST, STRANGER_DATAGRAMS, TcpPort, TcpPortSettings
 from tests.waiting import PATIENCE
 
 HOST = "127.0.0.1"
@@ -124,6 +126,7 @@ class Port:
 
     def __init__(self, **settings: float) -> None:
         self.used: set[Path] = set()
+        self.is_open = True  # False: nothing that comes is authentic
         self.received: list[bytes] = []
         self.paths: list[Path] = []
         self.closed: list[Path] = []
@@ -139,7 +142,8 @@ class Port:
     def _receive(self, datagrams: object, path: Path) -> None:
         assert isinstance(datagrams, list)
         self.received += datagrams
-        self.used.add(path)
+        if self.is_open:
+            self.used.add(path)
         self.paths.append(path)
 
     async def until(self, condition: Callable[[], bool]) -> None:
@@ -247,6 +251,36 @@ async def test_what_was_accepted_in_the_moment_of_the_end_is_closed() -> None:
             reader, writer = await asyncio.open_connection(sock=client)
             await ended(reader)
             writer.close()
+
+
+@pytest.mark.parametrize(
+    ("data", "reason"),
+    [
+        (b"\x00\x00" * 100_000, "too_many_empty_frames"),
+        (frame(b"x") * 100_000, "too_much_of_a_stranger"),
+        (frame(b"x" * 2000) * 100, "too_much_of_a_stranger"),
+    ],
+)
+async def test_a_stranger_that_floods_is_closed_and_nobody_gets_what_it_sent(data: bytes, reason: str) -> None:
+    async with running() as port:
+        port.is_open = False
+        reader, writer = await connected(port, data)
+        await ended(reader)
+        assert port.core.counts == {reason: 1}
+        assert len(port.received) <= STRANGER_DATAGRAMS
+        writer.close()
+
+
+async def test_frames_without_data_keep_a_path_open_and_a_flood_of_them_ends_it() -> None:
+    async with running() as port:
+        reader, writer = await connected(port, frame(b"check"))
+        await port.until(lambda: port.received == [b"check"])
+        writer.write(frame(b"") * int(EMPTY_BURST / 2) + frame(b"on"))
+        await port.until(lambda: port.received == [b"check", b"on"])
+        writer.write(frame(b"") * 100_000)
+        await ended(reader)
+        assert port.core.counts == {"too_many_empty_frames": 1}
+        writer.close()
 
 
 async def test_a_frame_that_nobody_sends_ends_the_connection() -> None:

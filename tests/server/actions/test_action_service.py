@@ -275,6 +275,48 @@ async def test_over_http_a_repeated_id_begins_nothing_again_and_gets_the_same_an
     assert len(bench.robot.sent) == 1
 
 
+async def test_over_http_a_repeated_id_gets_the_newest_of_its_action_even_when_newcomers_are_not_told_of_it() -> None:
+    bench = Bench()
+    asking = asyncio.create_task(by_http(bench, id="mine"))
+    await asyncio.sleep(0)
+    bench.service.updated(update("mine", moves=False))
+    assert (await asking).state == "running"
+    bench.service.updated(update("mine", "done", moves=False))
+    for number in range(action_service.KEPT):
+        bench.service.updated(update(f"n{number}", "done"))
+    assert "mine" not in {each.id for each in bench.service.newest()}
+    assert (await by_http(bench, id="mine")).state == "done"
+
+
+async def test_over_http_an_id_from_before_a_restart_of_the_bridge_is_unknown_and_whoever_waits_is_told() -> None:
+    bench = Bench()
+    asking = asyncio.create_task(by_http(bench, id="mine"))
+    await asyncio.sleep(0)
+    bench.service.updated(update("mine", "done", moves=False))
+    await asking
+    waiting = asyncio.create_task(by_http(bench, id="open"))
+    await asyncio.sleep(0)
+    bench.service.epoch_ends()
+    with pytest.raises(Unconfirmed, match="ended before it answered"):
+        await waiting
+    again = asyncio.create_task(by_http(bench, id="mine"))
+    await asyncio.sleep(0)
+    assert [each.id for each in bench.robot.sent if isinstance(each, Act)] == ["mine", "open", "mine"]
+    bench.service.updated(update("mine", "running", moves=False))
+    assert (await again).state == "running", "the answer of the new bridge"
+
+
+async def test_over_http_repeats_of_an_id_spend_the_budget_too() -> None:
+    bench = Bench()
+    asking = asyncio.create_task(by_http(bench, id="mine"))
+    await asyncio.sleep(0)
+    bench.service.updated(update("mine", "done", moves=False))
+    await asking
+    repeats = (by_http(bench, id="mine") for _ in range(action_service.ASKS + 20))
+    answers = await asyncio.gather(*repeats, return_exceptions=True)
+    assert TooManyRequests in {type(each) for each in answers}
+
+
 async def test_over_http_an_id_of_another_request_is_refused() -> None:
     bench = Bench()
     bench.service.act_by_peer(bench.peer(), act("theirs", "light"))

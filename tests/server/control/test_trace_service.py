@@ -107,19 +107,19 @@ async def test_a_report_is_completed_with_what_the_console_knows_itself() -> Non
     service = TraceService()
     service.executed(7, CommandSpans(forward_ms=1.0, apply_ms=2.0))
     reported = TraceReport(events=[EventTrace(event=7, command=CommandSpans(forward_ms=99.0, input_ms=5.0))])
-    (event,) = service.reported(reported, now=0.0)
+    (event,) = service.reported(reported, (), now=0.0)
     assert known_spans(event.command) == {"input_ms": 5.0, "forward_ms": 1.0, "apply_ms": 2.0}
     service.epoch_ends()
-    (other,) = service.reported(reported, now=1.0)
+    (other,) = service.reported(reported, (), now=1.0)
     assert known_spans(other.command) == {"input_ms": 5.0, "forward_ms": 99.0}
 
 
 async def test_a_client_that_reports_without_end_fills_no_recording() -> None:
     service = TraceService()
     report = TraceReport(events=[EventTrace(event=1)] * 32)
-    kept = sum(len(service.reported(report, now=0.0)) for _ in range(1000))
+    kept = sum(len(service.reported(report, (), now=0.0)) for _ in range(1000))
     assert kept == 200
-    assert len(service.reported(report, now=0.1)) == 10
+    assert len(service.reported(report, (), now=0.1)) == 10
 
 
 def test_the_link_is_what_the_robots_spans_leave_of_the_round_trip() -> None:
@@ -137,3 +137,17 @@ def test_the_link_is_what_the_robots_spans_leave_of_the_round_trip() -> None:
 
 def test_without_spans_of_the_robot_the_whole_round_trip_is_the_links() -> None:
     assert command_spans(CommandSpans(), forward=0.0, link=0.010, back=0.0).link_ms == 10.0
+
+
+def test_a_reported_picture_of_a_camera_that_the_client_does_not_get_is_left_out_and_the_command_stays() -> None:
+    service, picture = TraceService(), PictureSpans(draw_ms=1.0)
+    reported = TraceReport(
+        events=[EventTrace(event=7, command=SPANS, stream=name, picture=picture) for name in ("front", "made up", "")]
+    )
+    found = service.reported(reported, {"front"}, now=0.0)
+    assert [(each.stream, known_spans(each.picture)) for each in found] == [
+        ("front", {"draw_ms": 1.0}),
+        ("", {}),
+        ("", {}),
+    ]
+    assert [each.command for each in found] == [SPANS] * 3

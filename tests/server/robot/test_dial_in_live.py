@@ -343,6 +343,7 @@ async def test_a_robot_that_pairs_slowly_or_sends_garbage_costs_a_place_for_seco
             async with asyncio.timeout(PATIENCE):
                 await connection.wait_closed()
         await eventually(lambda: dial_in_of(rig).exchanges == 0)
-        assert rig.count("lockstep_bad_input_total", where="dial", reason="malformed") == 4
+        assert rig.count("lockstep_bad_input_total", where="dial", reason="malformed") == 3
+        assert rig.count("lockstep_bad_input_total", where="dial", reason="too_large") == 1
         assert rig.count("lockstep_bad_input_total", where="dial", reason="too_slow") == 1
         assert rig.count("lockstep_internal_errors_total", where="dial") == 0

@@ -2,7 +2,11 @@ import platform
 from collections import Counter
 from importlib.metadata import version
 
-from lockstep.server.telemetry.metrics import MAX_LIMITS, Metrics
+from lockstep.protocol.actions import Status, StatusItem
+from lockstep.robot_bridge.robots.planar.description import DESCRIPTION
+from lockstep.server.control.session_metrics import SessionMetrics
+from lockstep.server.session_events import EpochBegan, SessionEvents, StatusReceived
+from lockstep.server.telemetry.metrics import MAX_LIMITS, MAX_STATUS_NAMES, Metrics
 
 
 def test_what_the_links_count_is_added_once() -> None:
@@ -42,3 +46,35 @@ def test_a_robot_that_calls_its_limits_ever_new_names_makes_no_series_without_en
     found = metrics.registry.get_sample_value
     assert found("lockstep_limited_feedback_total", {"limit": "other"}) == MAX_LIMITS
     assert found("lockstep_limited_feedback_total", {"limit": "limit 0"}) == 2 * MAX_LIMITS + 1
+
+
+def status(**values: float | bool) -> Status:
+    return Status(event=1, items=[StatusItem(name=name, label=name, value=values[name]) for name in values])
+
+
+def test_the_numbers_of_a_status_are_gone_with_their_items_and_its_names_stay_few() -> None:
+    metrics = Metrics()
+    metrics.status_shown(status(battery=0.5, heat=40.0))
+    metrics.status_shown(status(battery=0.4))
+    value = metrics.registry.get_sample_value
+    assert (value("lockstep_status_value", {"item": "battery"}), value("lockstep_status_value", {"item": "heat"})) == (
+        0.4,
+        None,
+    )
+    metrics.status_shown(status(heat=41.0))
+    assert value("lockstep_status_value", {"item": "heat"}) == 41.0
+    for number in range(2 * MAX_STATUS_NAMES):
+        metrics.status_shown(status(**{f"n{number}": 1.0}))
+    assert value("lockstep_status_value", {"item": f"n{2 * MAX_STATUS_NAMES - 1}"}) is None
+
+
+def test_a_new_epoch_takes_the_status_of_the_last_one_with_it() -> None:
+    metrics = Metrics()
+    events = SessionEvents(metrics.faults)
+    SessionMetrics(metrics).subscribe(events)
+    events.publish(StatusReceived(status(battery=0.5)))
+    value = metrics.registry.get_sample_value
+    assert value("lockstep_status_items", {"level": "ok"}) == 1
+    events.publish(EpochBegan(DESCRIPTION))
+    assert value("lockstep_status_value", {"item": "battery"}) is None
+    assert value("lockstep_status_items", {"level": "ok"}) == 0

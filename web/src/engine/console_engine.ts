@@ -198,9 +198,13 @@ export class ConsoleEngine {
     };
   }
 
-  actConditions(now = performance.now()): ActConditions {
-    const { operator, connected, robotUp, holdsSeat, lockedOut, stopped, stopPressed } = this.conditions(now);
+  /** `remote`: asked by a pad or a key, which work wherever the eyes are; a click is on a button that is seen. */
+  actConditions(now: number, remote: boolean): ActConditions {
+    const all = this.conditions(now);
+    const { operator, connected, robotUp, holdsSeat, lockedOut, stopped, stopPressed } = all;
     return {
+      visible: !remote || (all.visible && document.hasFocus()),
+      occupied: remote && all.occupied,
       ...{ operator, connected, robotUp, holdsSeat, lockedOut },
       stopped: stopped || stopPressed,
       armed: this.isArmed(),

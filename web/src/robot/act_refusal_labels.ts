@@ -13,4 +13,6 @@ export const ACT_REFUSAL_LABELS: Readonly<Record<ActRefusal, string>> = {
   driving: "Let go of the hold-to-run control first",
   runs: "It runs already",
   busy: "Another action moves the robot",
+  hidden: "The page is not in front",
+  occupied: "First close the window over the picture, or leave the text field",
 };

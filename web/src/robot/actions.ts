@@ -40,7 +40,9 @@ export type ActRefusal =
   | "neutral_waits"
   | "driving"
   | "runs"
-  | "busy";
+  | "busy"
+  | "hidden"
+  | "occupied";
 
 export interface ActConditions {
   readonly operator: boolean;
@@ -52,6 +54,8 @@ export interface ActConditions {
   readonly armed: boolean;
   readonly proven: boolean; // a neutral command was answered since arming
   readonly deadman: boolean; // it is held: a stick may move at any moment
+  readonly visible: boolean; // the page is shown and has the keyboard
+  readonly occupied: boolean; // the keyboard or the picture belongs to something else: a text field, a dialogue
 }
 
 /** Why not; null: it may be asked for. Who wants a motion arms first, as before driving. */
@@ -66,6 +70,8 @@ export function actRefusal(
   if (!conditions.holdsSeat) return "no_seat";
   if (conditions.lockedOut) return "locked_out";
   if (conditions.stopped) return "stopped";
+  if (!conditions.visible) return "hidden";
+  if (conditions.occupied) return "occupied";
   if (updates.some((each) => each.name === action.name && isRunning(each))) return "runs";
   if (!action.moves) return null;
   if (movingNow(updates) !== null) return "busy";

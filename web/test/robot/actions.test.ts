@@ -17,6 +17,8 @@ const READY: ActConditions = {
   armed: true,
   proven: true,
   deadman: false,
+  visible: true,
+  occupied: false,
 };
 
 function update(change: Partial<ActionUpdate> = {}): ActionUpdate {
@@ -76,6 +78,12 @@ describe("what a person may ask for", () => {
     expect(actRefusal(LIGHT, [], { ...READY, holdsSeat: false })).toBe("no_seat");
     expect(actRefusal(LIGHT, [], { ...READY, stopped: true })).toBe("stopped");
     expect(actRefusal(LIGHT, [], { ...READY, lockedOut: true })).toBe("locked_out");
+  });
+
+  it("is nothing by a pad or a key where nobody looks at the robot", () => {
+    expect(actRefusal(LIGHT, [], { ...READY, visible: false })).toBe("hidden");
+    expect(actRefusal(LIGHT, [], { ...READY, occupied: true })).toBe("occupied");
+    expect(actRefusal(HOME, [], { ...READY, visible: false })).toBe("hidden");
   });
 
   it("is nothing that runs, and no second motion", () => {

@@ -5,7 +5,14 @@ import math
 
 import msgspec
 
-from lockstep.protocol.actions import MAX_STATUS_ITEMS, Status, StatusItem, fits_kind
+from lockstep.protocol.actions import (
+    MAX_STATUS_BYTES,
+    MAX_STATUS_ITEMS,
+    Status,
+    StatusItem,
+    fits_kind,
+    status_item_bytes,
+)
 from lockstep.robot_bridge.robots.base import Robot
 
 __all__ = ["StatusIssuer"]
@@ -43,9 +50,15 @@ class StatusIssuer:
         self._issued_at, self._pressed = now, pressed
         items = [] if pressed is None else [_hardware_stop(pressed)]
         names = {item.name for item in items}
+        room = MAX_STATUS_BYTES - sum(map(status_item_bytes, items))
         for item in self._robot.status():
             if item.name in names or not self._fits(item):
                 continue
+            size = status_item_bytes(item)
+            if size > room:
+                self._leave_out(item, f"does not fit into the {MAX_STATUS_BYTES} bytes of a status")
+                continue
+            room -= size
             names.add(item.name)
             items.append(item)
         if not items and not self._has_any:
@@ -57,13 +70,17 @@ class StatusIssuer:
         """Return whether a console would take this item; log the first that it would not."""
         try:
             msgspec.convert(msgspec.to_builtins(item), StatusItem)
-            fits = fits_kind(item)
-        except (msgspec.ValidationError, TypeError):
+            fits = fits_kind(item) and status_item_bytes(item) > 0  # which raises for text that is no Unicode
+        except (msgspec.ValidationError, TypeError, UnicodeError):
             fits = False
-        if not fits and len(self._left_out) < MAX_STATUS_ITEMS and item.name not in self._left_out:
-            self._left_out.add(item.name)
-            _logger.warning("the status item %r does not fit its kind or its bounds, and is left out", item.name[:200])
+        if not fits:
+            self._leave_out(item, "does not fit its kind or its bounds")
         return fits
+
+    def _leave_out(self, item: StatusItem, why: str) -> None:
+        if len(self._left_out) < MAX_STATUS_ITEMS and item.name not in self._left_out:
+            self._left_out.add(item.name)
+            _logger.warning("the status item %r %s, and is left out", item.name[:200], why)
 
 
 def _hardware_stop(pressed: bool) -> StatusItem:

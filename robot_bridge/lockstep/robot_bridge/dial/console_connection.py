@@ -16,6 +16,7 @@ from websockets.protocol import Event
 from lockstep.protocol.dial_in import TRUSTED, certificate_pin
 from lockstep.protocol.errors import SecretError
 from lockstep.robot_bridge.errors import ConsoleRefused, ConsoleUnreachable, WrongConsole
+from lockstep.robot_bridge.link.paced_transport import PacedReader, PacedSocket
 from lockstep.robot_bridge.link.websocket_transport import WebSocketTransport
 
 __all__ = ["ConsoleConnection", "console_context", "open_connection"]
@@ -47,6 +48,7 @@ class ConsoleConnection(ClientConnection):
         self._for_link = for_link
         self._link: asyncio.Protocol | None = None
         self._early: list[bytes] = []  # messages that came before `carry`, as the console's hello with its answer
+        self._reader = PacedReader(super().data_received)
 
     def carry(self, link: asyncio.Protocol) -> None:
         """Hand everything to this link from now on."""
@@ -59,7 +61,7 @@ class ConsoleConnection(ClientConnection):
             link.connection_lost(None)
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        super().connection_made(transport)
+        super().connection_made(PacedSocket(cast(asyncio.Transport, transport), self._reader))
         tls = transport.get_extra_info("ssl_object")
         certificate = None if tls is None else tls.getpeercert(binary_form=True)
         if certificate is not None:
@@ -69,6 +71,13 @@ class ConsoleConnection(ClientConnection):
                 self.pin = "unreadable"
         if self._expected is not None and self._expected != self.pin:
             self.transport.abort()  # before a request leaves, which would show the robot's token
+
+    def data_received(self, data: bytes) -> None:
+        self._reader.feed(data)
+
+    def eof_received(self) -> None:
+        self._reader.end()  # nothing more may come behind the end
+        super().eof_received()
 
     def process_event(self, event: Event) -> None:
         if not self._for_link or not isinstance(event, Frame) or event.opcode is Opcode.PONG:
@@ -83,6 +92,7 @@ class ConsoleConnection(ClientConnection):
                 self._link.data_received(data)
 
     def connection_lost(self, exc: Exception | None) -> None:
+        self._reader.end()
         super().connection_lost(exc)
         if self._link is not None:
             self._link.connection_lost(exc)

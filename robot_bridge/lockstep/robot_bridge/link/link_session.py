@@ -12,7 +12,15 @@ from typing import Literal, NamedTuple
 
 import msgspec
 
-from lockstep.protocol.actions import Act, ActionCancel, ActionUpdate, Status, fits_kind
+from lockstep.protocol.actions import (
+    MAX_STATUS_BYTES,
+    Act,
+    ActionCancel,
+    ActionUpdate,
+    Status,
+    fits_kind,
+    status_item_bytes,
+)
 from lockstep.protocol.errors import FramingError, MessageError
 from lockstep.protocol.framing import MAX_CONTROL_FRAME, MAX_HELLO_FRAME, MAX_MEDIA_FRAME, FrameReader
 from lockstep.protocol.link_secret import NONCE_BYTES, LinkSecret, draw_nonce
@@ -347,12 +355,11 @@ class ClientSession(LinkSession):
 
     def _receive_open(self, message: LinkMessage, now: float) -> LinkMessage | BadInput | None:
         """Refuse a feedback or a status that does not fit as bad input: no part could show or record it."""
-        if (
-            isinstance(message, Status)
-            and isinstance(message, self._allowed)
-            and not all(map(fits_kind, message.items))
-        ):
-            return BadInput("malformed", "a status item whose value is not of its kind")
+        if isinstance(message, Status) and isinstance(message, self._allowed):
+            if not all(map(fits_kind, message.items)):
+                return BadInput("malformed", "a status item whose value is not of its kind")
+            if sum(map(status_item_bytes, message.items)) > MAX_STATUS_BYTES:
+                return BadInput("malformed", f"a status of more than {MAX_STATUS_BYTES} bytes")
         described = None if self.hello is None else self.hello.description
         if isinstance(message, Feedback) and isinstance(message, self._allowed) and described is not None:
             wrong = misfit(message, described)

@@ -1,18 +1,29 @@
-"""Reads a link no faster than its share of the thread's time allows: further data waits at its source.
+"""Reads a connection no faster than its share of the thread's time allows: further data waits at its source.
 
 One event loop of a console serves many robots and all their operators. A bridge that sends data without end takes half
-of the loop's time at most with its two links, in turns of a millisecond or two.
+of the loop's time at most with its two links, in turns of a millisecond or two. That holds for all that its data cost:
+on a WebSocket the frames too, in which the link's messages come.
 """
 
 import asyncio
 import time
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
+from typing import Any, cast
 
 from lockstep.robot_bridge.link.link_session import LinkSession
 from lockstep.robot_bridge.link.link_transport import LinkTransport
 
-__all__ = ["PIECE", "READ_BURST", "READ_SHARE", "READ_TURN", "PacedTransport", "ReadBudget"]
+__all__ = [
+    "PIECE",
+    "READ_BURST",
+    "READ_SHARE",
+    "READ_TURN",
+    "PacedReader",
+    "PacedSocket",
+    "PacedTransport",
+    "ReadBudget",
+]
 
 READ_SHARE = 0.25  # of the thread's time
 READ_BURST = 0.1  # s of the thread's time at once
@@ -40,6 +51,179 @@ class ReadBudget:
         return max(0.0, -self._left / self._share)
 
 
+class PacedReader:
+    """Hands received data on in pieces, within a budget of the thread's time.
+
+    Its transport is paused while data wait here, so no more than one read of it does. Whoever takes the data may pause
+    the reader too.
+    """
+
+    def __init__(
+        self,
+        take: Callable[[bytes], None],
+        *,
+        share: float = READ_SHARE,
+        burst: float = READ_BURST,
+        missing: Callable[[], int] = lambda: 0,
+        clock: Callable[[], float] = time.monotonic,
+        worked: Callable[[], float] = time.thread_time,
+    ) -> None:
+        """Make a reader that reads once `begin` was called.
+
+        Args:
+            take: gets each piece
+            share: of the thread's time
+            burst: s of the thread's time at once
+            missing: returns the bytes of a large message that are still to come; they may be one piece
+            worked: returns the time that this thread has worked so far, s
+        """
+        self._take = take
+        self._share = share
+        self._missing = missing
+        self._clock = clock
+        self._worked = worked
+        self._budget = ReadBudget(share, burst, clock())
+        self._unread: deque[memoryview] = deque()
+        self._source: asyncio.ReadTransport | None = None  # None before the connection and after it
+        self._later: asyncio.Handle | None = None  # the call that reads on; None while everything is read, or paused
+        self._paused = False  # by whoever takes the data
+        self._reading = False
+
+    def allow(self, share: float, burst: float) -> None:
+        """Take another budget from now on."""
+        self._share = share
+        self._budget = ReadBudget(share, burst, self._clock())
+
+    def begin(self, source: asyncio.ReadTransport) -> None:
+        self._source = source
+
+    def end(self) -> None:
+        """Drop all data, now and from now on."""
+        if self._later is not None:
+            self._later.cancel()
+            self._later = None
+        self._unread.clear()
+        self._source = None
+
+    def feed(self, data: bytes) -> None:
+        """Take received data; hand on at once what there is time for."""
+        if self._source is None:
+            return
+        self._unread.append(memoryview(data))
+        if self._later is None and not self._paused and not self._reading:
+            self._read()
+        else:
+            self._source.pause_reading()  # somebody else had resumed it
+
+    def pause_reading(self) -> None:
+        self._paused = True
+        if self._source is not None:
+            self._source.pause_reading()
+
+    def resume_reading(self) -> None:
+        if not self._paused:
+            return
+        self._paused = False
+        if self._source is None or self._later is not None or self._reading:
+            return
+        if self._unread:
+            self._later = asyncio.get_running_loop().call_soon(self._read)
+        else:
+            self._source.resume_reading()
+
+    def _read(self) -> None:
+        self._later = None
+        if self._paused:
+            return  # the budget was used up meanwhile; `resume_reading` goes on
+        since, began = self._clock(), self._worked()
+        worked = self._hand_on(began)
+        ended = self._clock()
+        wait = self._budget.spend(worked, ended)
+        if self._source is None:
+            return
+        if (
+            self._unread and not self._paused
+        ):  # a flood: others come first, even if the thread gets little of its processor
+            wait = max(wait, min(ended - since, LONG_TURN) * (1 / self._share - 1))
+        if wait > 0 or (self._unread and not self._paused):
+            self._later = asyncio.get_running_loop().call_later(wait, self._read)
+        if self._later is not None or self._paused:
+            self._source.pause_reading()
+        else:
+            self._source.resume_reading()
+
+    def _hand_on(self, began: float) -> float:
+        """Hand on pieces for a turn; return the seconds of the thread's time that it took."""
+        self._reading = True
+        now = began
+        try:
+            while self._unread and not self._paused and now - began < READ_TURN:
+                self._take(self._next_piece())
+                now = self._worked()
+        finally:
+            self._reading = False
+        return now - began
+
+    def _next_piece(self) -> bytes:
+        """Return the next piece, or all that is there of a large message: reading it costs no more than copying it."""
+        first = self._unread.popleft()
+        end = max(PIECE, self._missing())
+        if len(first) > end:
+            self._unread.appendleft(first[end:])
+        return bytes(first[:end])
+
+
+class PacedSocket(asyncio.Transport):
+    """The transport of a protocol whose data come by a `PacedReader`: who pauses it pauses the reader.
+
+    Once it is closed on this side, the reader drops what has come.
+    """
+
+    def __init__(self, below: asyncio.Transport, reader: PacedReader) -> None:
+        super().__init__()
+        self._below = below
+        self._reader = reader
+        reader.begin(below)
+
+    def get_extra_info(self, name: str, default: Any = None) -> Any:
+        return self._below.get_extra_info(name, default)
+
+    def is_closing(self) -> bool:
+        return self._below.is_closing()
+
+    def close(self) -> None:
+        self._reader.end()
+        self._below.close()
+
+    def abort(self) -> None:
+        self._reader.end()
+        self._below.abort()
+
+    def pause_reading(self) -> None:
+        self._reader.pause_reading()
+
+    def resume_reading(self) -> None:
+        self._reader.resume_reading()
+
+    def write(self, data: bytes | bytearray | memoryview) -> None:
+        self._below.write(data)
+
+    def writelines(self, list_of_data: Iterable[bytes | bytearray | memoryview]) -> None:
+        self._below.writelines(list_of_data)
+
+    def can_write_eof(self) -> bool:
+        return self._below.can_write_eof()
+
+    def write_eof(self) -> None:
+        self._below.write_eof()
+
+    def set_write_buffer_limits(self, high: int | None = None, low: int | None = None) -> None:
+        self._below.set_write_buffer_limits(high, low)
+
+    def get_write_buffer_size(self) -> int:
+        return self._below.get_write_buffer_size()
+
+
 class PacedTransport(LinkTransport):
     """`worked`: returns the time that this thread has worked so far, s."""
 
@@ -50,46 +234,17 @@ class PacedTransport(LinkTransport):
         worked: Callable[[], float] = time.thread_time,
     ) -> None:
         super().__init__(session, clock)
-        self._worked = worked
-        self._budget = ReadBudget(READ_SHARE, READ_BURST, clock())
-        self._unread: deque[memoryview] = deque()
-        self._later: asyncio.TimerHandle | None = None  # the call that reads on; None while everything is read
+        self._reader = PacedReader(
+            super().data_received, missing=lambda: self.session.missing, clock=clock, worked=worked
+        )
+
+    def connection_made(self, transport: asyncio.BaseTransport) -> None:
+        self._reader.begin(cast(asyncio.ReadTransport, transport))
+        super().connection_made(transport)
 
     def data_received(self, data: bytes) -> None:
-        self._unread.append(memoryview(data))
-        if self._later is None:
-            self._read()
-
-    def _read(self) -> None:
-        self._later = None
-        since, began = self._clock(), self._worked()
-        now = began
-        while self._unread and now - began < READ_TURN:
-            super().data_received(self._next_piece())
-            now = self._worked()
-        ended = self._clock()
-        wait = self._budget.spend(now - began, ended)
-        if self._transport is None:
-            return
-        if self._unread:  # a flood: others come first, even if the thread gets little of its processor
-            wait = max(wait, min(ended - since, LONG_TURN) * (1 / READ_SHARE - 1))
-        if self._unread or wait > 0:
-            self._transport.pause_reading()
-            self._later = asyncio.get_running_loop().call_later(wait, self._read)
-        else:
-            self._transport.resume_reading()
-
-    def _next_piece(self) -> bytes:
-        """Return the next piece, or all that is there of a large message: reading it costs no more than copying it."""
-        first = self._unread.popleft()
-        end = max(PIECE, self.session.missing)
-        if len(first) > end:
-            self._unread.appendleft(first[end:])
-        return bytes(first[:end])
+        self._reader.feed(data)
 
     def connection_lost(self, error: Exception | None) -> None:
-        if self._later is not None:
-            self._later.cancel()
-            self._later = None
-        self._unread.clear()
+        self._reader.end()
         super().connection_lost(error)

@@ -9,7 +9,8 @@ import secrets
 import time
 from collections import OrderedDict
 from collections.abc import Callable, Mapping
-from typing import NamedTuple, Protocol
+from dataclasses import dataclass
+from typing import Protocol
 
 import msgspec
 
@@ -52,12 +53,15 @@ class ActionsLink(Protocol):
     def send(self, message: Act | ActionCancel) -> bool: ...
 
 
-class _Asked(NamedTuple):
+@dataclass(slots=True)
+class _Asked:
     """A request that was passed on."""
 
     name: str
     parameters: Mapping[str, ParameterValue]
-    answer: asyncio.Future[ActionUpdate] | None  # None: it came on a data channel
+    # The first update, or None if the bridge ended without one. None: it came on a data channel.
+    answer: asyncio.Future[ActionUpdate | None] | None
+    newest: ActionUpdate | None = None
 
 
 class ActionService:
@@ -115,7 +119,7 @@ class ActionService:
             return "too_often"
         return None if self._send(msgspec.structs.replace(act, by=peer.name), peer.actor) else "link_down"
 
-    def _send(self, act: Act, by: Actor, answer: asyncio.Future[ActionUpdate] | None = None) -> bool:
+    def _send(self, act: Act, by: Actor, answer: asyncio.Future[ActionUpdate | None] | None = None) -> bool:
         if not self._robot.up or not self._robot.send(act):
             return False
         if act.id not in self._asked:
@@ -144,6 +148,7 @@ class ActionService:
             LinkDown, Unconfirmed: the robot cannot be asked, or has not answered.
         """
         if id in self._asked or id in self._updates:
+            self._spend(by)
             return await self._again(id, name, parameters)
         description, feedback = self._robot.description, self._clock.feedback
         if description is None or feedback is None or not self._robot.up:
@@ -153,9 +158,8 @@ class ActionService:
             raise NotFound(f"the robot has no action {name!r}"[:200])
         if action.moves:
             raise NotRenewable(f"{name} moves the robot: it needs armed events on the control channel")
-        if not self._asks.spend(by.link or by.name, time.monotonic()):
-            raise TooManyRequests("at most five actions a second")
-        answer: asyncio.Future[ActionUpdate] = asyncio.get_running_loop().create_future()
+        self._spend(by)
+        answer: asyncio.Future[ActionUpdate | None] = asyncio.get_running_loop().create_future()
         act = Act(
             id=id or secrets.token_hex(16),
             name=name,
@@ -167,12 +171,16 @@ class ActionService:
             raise LinkDown(self._robot.detail)
         return await _answered(answer)
 
+    def _spend(self, by: Actor) -> None:
+        if not self._asks.spend(by.link or by.name, time.monotonic()):
+            raise TooManyRequests("at most five actions a second")
+
     async def _again(self, id: str, name: str, parameters: Mapping[str, ParameterValue]) -> ActionUpdate:
         """Answer a repeated request from memory."""
-        asked, update = self._asked.get(id), self._updates.get(id)
+        asked = self._asked.get(id)
         if asked is None or asked.answer is None or (asked.name, asked.parameters) != (name, parameters):
             raise ActionIdUsed("an earlier request with this id asked for something else, or on another way")
-        return await _answered(asked.answer) if update is None else update
+        return await _answered(asked.answer) if asked.newest is None else asked.newest
 
     def cancel_by_peer(self, peer: Peer, cancel: ActionCancel) -> None:
         """Pass on what the seat's holder or a supervisor cancels. Others have STOP."""
@@ -197,8 +205,10 @@ class ActionService:
         now, before, asked = time.monotonic(), self._updates.get(update.id), self._asked.get(update.id)
         if update == before:
             return
-        if asked is not None and asked.answer is not None and not asked.answer.done():
-            asked.answer.set_result(update)
+        if asked is not None:
+            asked.newest = update
+            if asked.answer is not None and not asked.answer.done():
+                asked.answer.set_result(update)
         if before is not None and before.state == update.state:
             if update.id in self._owed:
                 self._updates[update.id] = update
@@ -245,14 +255,21 @@ class ActionService:
                 self.updated(msgspec.structs.replace(update, state="cancelled", reason="link_down"))
 
     def epoch_ends(self) -> None:
-        """Forget all actions: the bridge that did them has ended."""
+        """Forget all actions and requests: the bridge that did them has ended, and the next one knows none of them."""
+        for asked in self._asked.values():
+            if asked.answer is not None and not asked.answer.done():
+                asked.answer.set_result(None)
+        self._asked.clear()
         self._updates.clear()
         self._owed.clear()
 
 
-async def _answered(answer: asyncio.Future[ActionUpdate]) -> ActionUpdate:
+async def _answered(answer: asyncio.Future[ActionUpdate | None]) -> ActionUpdate:
     try:
         async with asyncio.timeout(ANSWER_SECONDS):
-            return await asyncio.shield(answer)  # a repeat of the request waits for the same answer
+            update = await asyncio.shield(answer)  # a repeat of the request waits for the same answer
     except TimeoutError:
         raise Unconfirmed("the robot has not answered yet; GET /api/actions shows whether it does") from None
+    if update is None:
+        raise Unconfirmed("the robot bridge ended before it answered")
+    return update

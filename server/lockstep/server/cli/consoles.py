@@ -1,5 +1,6 @@
 """The commands that run a console: `up`, with a simulated robot, and `serve`."""
 
+import contextlib
 import logging
 import os
 import ssl
@@ -48,6 +49,7 @@ from lockstep.server.http.transport.serve import PortTaken, bind
 from lockstep.server.robot.bridge_process import BridgeFailed, BridgeProcess
 from lockstep.server.robot.credentials import link_access
 from lockstep.server.settings import Settings
+from lockstep.server.settings_file import SettingsFileUnusable, exposed_secrets
 from lockstep.server.state.persistent_state import open_state
 from lockstep.server.telemetry.logs import LogFormat, configure_logs
 from lockstep.server.util.file_limit import raise_file_limit
@@ -354,6 +356,14 @@ def _network(
     return dict(locals())
 
 
+def _warn_of_open_files(settings: Settings) -> None:
+    """Tell of files of settings that hold a secret and that everybody on this machine may read."""
+    for path in {each for each in (settings.config, settings.fleet_file) if each is not None}:
+        with contextlib.suppress(SettingsFileUnusable):  # the console says so itself, or runs without the file by now
+            for name in exposed_secrets(path, Settings):
+                say(f"{path} holds {name}, and everybody on this machine may read it: chmod o-r {path}")
+
+
 def _run(
     settings: Settings,
     bridges: Mapping[str, BridgeProcess],
@@ -365,6 +375,7 @@ def _run(
     configure_logs(logging.WARNING if quiet else logging.INFO, settings.log_format)
     for each in unknown_settings(os.environ, Settings):
         say(each)
+    _warn_of_open_files(settings)
     sys.setswitchinterval(SWITCH_INTERVAL)
     share_arenas()
     raise_file_limit()

@@ -8,7 +8,7 @@ from starlette.exceptions import HTTPException
 
 from lockstep.server.auth.tokens import Access
 from lockstep.server.errors import ConsoleError, http_error
-from lockstep.server.http.problem import PROBLEM_JSON, problem_body
+from lockstep.server.http.problem import problem_response
 from lockstep.server.http.security_headers import SecurityHeaders
 from lockstep.server.http.static_files import page_router
 from lockstep.server.http.trusted_host import HostNames, TrustedHost
@@ -56,5 +56,4 @@ async def _answer_validation_error(request: Request, error: Exception) -> Respon
 
 
 def _error(status: int, name: str, detail: str) -> Response:
-    body = problem_body(status, name, detail)
-    return Response(body, status, {"Cache-Control": "no-store"}, media_type=PROBLEM_JSON)
+    return problem_response(status, name, detail)

@@ -250,7 +250,8 @@ class Console:
             case TraceRequest():
                 self.traces.request(peer, message.wanted)
             case TraceReport() if self.seat.is_held_by(peer):
-                self._events.publish(EventsTraced(peer.actor, self.traces.reported(message, now)))
+                shown = {each.stream for each in peer.streams}
+                self._events.publish(EventsTraced(peer.actor, self.traces.reported(message, shown, now)))
 
     def input_refused(self, peer: Peer, channel: str, error: ChannelError) -> None:
         self._events.publish(InputRefused(channel, error.name))

@@ -4,6 +4,7 @@ from functools import cached_property
 
 from prometheus_client import Counter
 
+from lockstep.protocol.actions import Status
 from lockstep.server.audit.records import AuditTrouble
 from lockstep.server.session_events import (
     ActionRefused,
@@ -11,6 +12,7 @@ from lockstep.server.session_events import (
     CommandForwarded,
     CommandRefused,
     CommandRepeated,
+    EpochBegan,
     FeedbackReceived,
     InputRefused,
     LinkDown,
@@ -46,6 +48,7 @@ class SessionMetrics:
         events.subscribe(ActionUpdated, self._action_updated)
         events.subscribe(ActionRefused, self._action_refused)
         events.subscribe(StatusReceived, self._status_received)
+        events.subscribe(EpochBegan, self._epoch_began)
         events.subscribe(LinkUp, self._link_up)
         events.subscribe(LinkDown, self._link_down)
         events.subscribe(StopAsked, self._stop_asked)
@@ -97,6 +100,9 @@ class SessionMetrics:
 
     def _status_received(self, event: StatusReceived) -> None:
         self._metrics.status_shown(event.status)
+
+    def _epoch_began(self, event: EpochBegan) -> None:
+        self._metrics.status_shown(Status(event=1))  # the last one was another bridge's
 
     def _link_up(self, event: LinkUp) -> None:
         self._metrics.link_up.set(1)

@@ -6,11 +6,19 @@ it delays neither feedback nor pictures; what it did not carry is forgotten.
 
 import asyncio
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from typing import NamedTuple, Protocol
 
 from lockstep.protocol.console import encode_console_message
-from lockstep.protocol.trace import CommandSpans, join_spans, remainder_ms, span_ms, spans_at_bridge, sum_of_spans
+from lockstep.protocol.trace import (
+    CommandSpans,
+    PictureSpans,
+    join_spans,
+    remainder_ms,
+    span_ms,
+    spans_at_bridge,
+    sum_of_spans,
+)
 from lockstep.protocol.trace_messages import (
     MAX_TRACED_COMMANDS,
     CommandTrace,
@@ -85,15 +93,18 @@ class TraceService:
         self._commands.append(CommandTrace(event=event, spans=spans))
         self._count += 1
 
-    def reported(self, report: TraceReport, now: float) -> list[EventTrace]:
-        """Return the reported events, completed with what the console knows better; too many are left out."""
+    def reported(self, report: TraceReport, streams: Collection[str], now: float) -> list[EventTrace]:
+        """Return the reported events, completed with what the console knows better; too many are left out.
+
+        `streams`: that the client gets; it has shown no picture of any other.
+        """
         known = {each.event: each.spans for each in self._commands}
         return [
             EventTrace(
                 event=each.event,
                 command=join_spans(each.command, known.get(each.event, CommandSpans())),
-                stream=each.stream,
-                picture=each.picture,
+                stream=each.stream if each.stream in streams else "",
+                picture=each.picture if each.stream in streams else PictureSpans(),
             )
             for each in report.events
             if self._reports.take(now)

@@ -1,6 +1,5 @@
 """The settings of each robot of a fleet: the console's, and those in the fleet's file for that robot alone."""
 
-import tomllib
 from collections.abc import Mapping
 from typing import Any
 
@@ -8,6 +7,7 @@ from pydantic import ValidationError
 
 from lockstep.server.settings import Settings
 from lockstep.server.util.robot_names import BadFleet, check_names, parse_robots
+from lockstep.server.util.toml_file import TomlUnusable, read_toml
 
 __all__ = ["OWN", "robot_settings"]
 
@@ -74,9 +74,9 @@ def _tables(settings: Settings) -> dict[str, Mapping[str, Any]]:
     if settings.fleet_file is None:
         return {}
     try:
-        content = tomllib.loads(settings.fleet_file.read_text())
-    except (OSError, UnicodeError, tomllib.TOMLDecodeError) as error:
-        raise BadFleet("fleet_unreadable", f"{settings.fleet_file}: {error}") from error
+        content, _ = read_toml(settings.fleet_file)
+    except TomlUnusable as error:
+        raise BadFleet("fleet_unreadable", str(error)) from error
     tables = content.pop("robots", {})
     if settings.fleet_file == settings.config:  # the console's own settings stand beside the tables
         content = {}

@@ -1,10 +1,12 @@
-"""The body of every error over HTTP: problem details (RFC 9457), extended by the error's stable name."""
+"""The answer of every error over HTTP: problem details (RFC 9457), extended by the error's stable name."""
 
+from collections.abc import Mapping
 from http import HTTPStatus
 
 import msgspec
+from starlette.responses import Response
 
-__all__ = ["PROBLEM_JSON", "Problem", "problem_body"]
+__all__ = ["PROBLEM_JSON", "Problem", "problem_response"]
 
 PROBLEM_JSON = "application/problem+json"
 
@@ -19,8 +21,10 @@ class Problem(msgspec.Struct, frozen=True, kw_only=True):
     status: int
 
 
-def problem_body(status: int, error: str, detail: str) -> bytes:
-    return msgspec.json.encode(Problem(error=error, detail=detail, title=_title(status), status=status))
+def problem_response(status: int, error: str, detail: str, headers: Mapping[str, str] | None = None) -> Response:
+    """Return the answer; nothing keeps it."""
+    body = msgspec.json.encode(Problem(error=error, detail=detail, title=_title(status), status=status))
+    return Response(body, status, {**(headers or {}), "Cache-Control": "no-store"}, media_type=PROBLEM_JSON)
 
 
 def _title(status: int) -> str:

@@ -10,7 +10,7 @@ from starlette.datastructures import Headers
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from lockstep.server.errors import ConsoleError, HostRefused, InternalFault, TooManyRequests, http_error
-from lockstep.server.http.problem import PROBLEM_JSON, problem_body
+from lockstep.server.http.problem import problem_response
 from lockstep.server.http.robot_paths import below_robot
 from lockstep.server.http.transport.client_address import counted_address
 from lockstep.server.http.transport.connection_places import ConnectionPlaces, Place
@@ -176,12 +176,9 @@ async def _refuse(scope: Scope, send: Send, error: ConsoleError) -> None:
         await send({"type": "websocket.close", "code": POLICY_VIOLATION})
         return
     entry = http_error(error)
-    body = problem_body(entry.status, entry.name, error.detail)
-    headers = {"content-type": PROBLEM_JSON, "cache-control": "no-store", "content-length": str(len(body))}
-    headers |= {name.lower(): value for name, value in entry.headers.items()}
-    raw = [(name.encode(), value.encode()) for name, value in headers.items()]
-    await send({"type": "http.response.start", "status": entry.status, "headers": raw})
-    await send({"type": "http.response.body", "body": body})
+    answer = problem_response(entry.status, entry.name, error.detail, entry.headers)
+    await send({"type": "http.response.start", "status": answer.status_code, "headers": answer.raw_headers})
+    await send({"type": "http.response.body", "body": answer.body})
 
 
 def _is_address(name: str) -> bool:

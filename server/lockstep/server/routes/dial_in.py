@@ -24,9 +24,9 @@ from lockstep.server.errors import (
     http_error,
 )
 from lockstep.server.http.json_response import json_answer
-from lockstep.server.http.problem import PROBLEM_JSON, problem_body
+from lockstep.server.http.problem import problem_response
 from lockstep.server.http.transport.client_address import counted_address
-from lockstep.server.http.transport.uvicorn_websocket_limits import SOCKET, GuardedWebSocket
+from lockstep.server.http.transport.uvicorn_websocket_limits import CLOSED_FOR, SOCKET, GuardedWebSocket
 from lockstep.server.robot.dial_in import DialIn
 from lockstep.server.robot.pairing_offer import MAX_TRIES, OFFER_SECONDS, OfferState, Paired, Refusal
 from lockstep.server.state.dependencies import Dependencies, authorized, dependencies
@@ -36,6 +36,7 @@ __all__ = ["NewPairingCode", "PairingInfo", "RobotDialInfo", "router"]
 
 PAIRING_SECONDS = 10.0  # for a robot's whole exchange
 MAX_PAIRING = 8  # robots that are in it at once
+PAIRING_MESSAGES = 2  # of a robot: its hello and its proof
 ROLES: dict[str, LinkRole] = {"operator": "operator", "media": "media"}
 NOT_PAIRING = "no pairing code is open here: a supervisor presses “Pair a robot” on the page"
 GOING_AWAY, POLICY_VIOLATION = 1001, 1008  # RFC 6455 7.4.1
@@ -193,7 +194,10 @@ async def dial(websocket: WebSocket, name: str) -> None:
         if isinstance(error, RobotUnknown) and not here.guard.may_fail(websocket.scope):
             error = TooManyRequests("too many requests without a valid token from this address")
         await _refuse(websocket, error)
-    except (OSError, WebSocketDisconnect):
+    except WebSocketDisconnect as ended:
+        if ended.code in CLOSED_FOR:
+            here.metrics.bad_input.labels("dial", CLOSED_FOR[ended.code]).inc()
+    except OSError:
         pass  # gone already
     except Exception as error:
         here.metrics.faults.caught("dial", error)  # a fault of one connection must not reach uvicorn
@@ -207,9 +211,7 @@ async def _carry(websocket: WebSocket, here: Dependencies, dial_in: DialIn, name
     authorization = websocket.headers.get("authorization", "")
     if not dial_in.knows(authorization):
         raise RobotUnknown("this console does not know this robot, or has forgotten it: pair it (anew) by a code")
-    socket = websocket.scope["extensions"].get(SOCKET)
-    if not isinstance(socket, GuardedWebSocket):
-        raise NotDialIn("this server cannot carry robot links")
+    socket = _socket(websocket)
     await websocket.accept()
     if not dial_in.knows(authorization):  # the robot was forgotten meanwhile
         here.metrics.bad_input.labels("dial", "robot_unknown").inc()
@@ -218,10 +220,18 @@ async def _carry(websocket: WebSocket, here: Dependencies, dial_in: DialIn, name
     line = _Line(socket)
     dial_in.arrived(role, line)
     try:
-        while (await websocket.receive())["type"] != "websocket.disconnect":
+        while (message := await websocket.receive())["type"] != "websocket.disconnect":
             pass  # messages go to the link, past the app
+        raise WebSocketDisconnect(message.get("code", GOING_AWAY))
     finally:
         line.close()
+
+
+def _socket(websocket: WebSocket) -> GuardedWebSocket:
+    socket = websocket.scope["extensions"].get(SOCKET)
+    if not isinstance(socket, GuardedWebSocket):
+        raise NotDialIn("this server takes no robots that dial in")
+    return socket
 
 
 class _Line:
@@ -247,6 +257,7 @@ async def _pair(websocket: WebSocket, here: Dependencies, dial_in: DialIn) -> No
         raise NotPairing(f"{ended.name}: {ended.detail}" if ended.name != "not_pairing" else NOT_PAIRING)
     if dial_in.exchanges >= MAX_PAIRING or not here.guard.may_fail(websocket.scope):
         raise TooManyRequests("too many robots try to pair: wait, and try again")
+    _socket(websocket).expect(messages=PAIRING_MESSAGES, size=MAX_PAIRING_MESSAGE)
     dial_in.exchanges += 1
     try:
         await websocket.accept()
@@ -317,9 +328,7 @@ async def _close(websocket: WebSocket, code: int) -> None:
 async def _refuse(websocket: WebSocket, error: ConsoleError) -> None:
     """Answer instead of opening a WebSocket, as HTTP does (RFC 9457)."""
     entry = http_error(error)
-    body = problem_body(entry.status, entry.name, error.detail)
-    headers = {"Cache-Control": "no-store", **entry.headers}
     try:
-        await websocket.send_denial_response(Response(body, entry.status, headers, PROBLEM_JSON))
+        await websocket.send_denial_response(problem_response(entry.status, entry.name, error.detail, entry.headers))
     except (RuntimeError, OSError, WebSocketDisconnect):
         return  # it was open already, or is gone

@@ -10,7 +10,7 @@ from starlette.types import Scope
 
 from lockstep.server.audit.records import Actor
 from lockstep.server.errors import ConsoleError, TooManyRequests, http_error
-from lockstep.server.http.problem import PROBLEM_JSON, problem_body
+from lockstep.server.http.problem import problem_response
 from lockstep.server.state.console_context import ConsoleContext
 from lockstep.server.state.dependencies import Dependencies
 
@@ -77,5 +77,4 @@ async def _answer_validation_error(request: Request, error: Exception) -> Respon
 
 def _error_response(request: Request, status: int, name: str, detail: str, headers: dict[str, str]) -> Response:
     _bad_input(request.app.state).labels("http", name).inc()
-    body = problem_body(status, name, detail)
-    return Response(body, status, {**headers, "Cache-Control": "no-store"}, media_type=PROBLEM_JSON)
+    return problem_response(status, name, detail, headers)

@@ -93,7 +93,8 @@ class Metrics:
             ["item"],
             registry=registry,
         )
-        self._status_names: set[str] = set()  # names that have a gauge
+        self._status_names: set[str] = set()  # names that have, or had, a gauge
+        self._status_shown: set[str] = set()  # those of the newest status
         self.stopped = Gauge("lockstep_stopped", "1 if the robot is stopped, else 0", registry=registry)
         self.recording_failed = Gauge(
             "lockstep_recording_failed", "1 if a recording is wanted but cannot be written, else 0", registry=registry
@@ -131,16 +132,22 @@ class Metrics:
             self.limited.labels(name).inc()
 
     def status_shown(self, status: Status) -> None:
-        """Show the numbers of a status. The robot chooses the names: those beyond `MAX_STATUS_NAMES` are left out."""
+        """Show the numbers of a status, in place of the one before.
+
+        The robot chooses the names: those beyond `MAX_STATUS_NAMES` are left out.
+        """
         levels = Totals(item.level for item in status.items)
         for level in get_args(StatusLevel):
             self.status_items.labels(level).set(levels[level])
-        for item in status.items:
-            if isinstance(item.value, str):
-                continue
-            if item.name in self._status_names or len(self._status_names) < MAX_STATUS_NAMES:
-                self._status_names.add(item.name)
-                self.status_values.labels(item.name).set(item.value)
+        numbers = {item.name: item.value for item in status.items if not isinstance(item.value, str)}
+        for gone in self._status_shown - numbers.keys():
+            self.status_values.remove(gone)
+        self._status_shown &= numbers.keys()
+        for name, value in numbers.items():
+            if name in self._status_names or len(self._status_names) < MAX_STATUS_NAMES:
+                self._status_names.add(name)
+                self._status_shown.add(name)
+                self.status_values.labels(name).set(value)
 
     def collect(self, bad_input: Totals[str], drops: Totals[str]) -> None:
         """Update the counters from the totals that the robot links keep."""

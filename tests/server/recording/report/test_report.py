@@ -2,12 +2,15 @@
 
 from pathlib import Path
 
+import pytest
+
+from lockstep.protocol.console import Report, StreamReport
 from lockstep.protocol.trace import CommandSpans, PictureSpans
-from lockstep.server.recording.format.records import TraceRecord
+from lockstep.server.recording.format.records import ReportRecord, TraceRecord
 from lockstep.server.recording.report.report import write_report
 from lockstep.server.recording.report.session import read_session
-from lockstep.server.recording.report.traced_events import TracedEvents, slowest, slowest_by_time
-from tests.server.recording.makers import EPOCH, START, Story, own_entry, rewritten
+from lockstep.server.recording.report.traced_events import MOST_STREAMS, TracedEvents, slowest, slowest_by_time
+from tests.server.recording.makers import CODECS, EPOCH, START, Story, own_entry, rewritten
 
 
 def test_a_session_becomes_series_over_time(tmp_path: Path) -> None:
@@ -45,6 +48,28 @@ def test_records_of_one_event_complete_each_other() -> None:
     assert event.spans("front") == {"capture_ms": 2.0, "draw_ms": 3.0}  # the camera's wait comes before the way
     assert (event.total(""), event.total("front")) == (5.0, 5.0)
     assert traced.streams == ["front"]
+
+
+def test_of_any_number_of_cameras_only_those_with_most_pictures_are_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    traced = TracedEvents()
+    for number in range(3000):
+        stream = "front" if number % 3 == 0 else f"made up {number}"
+        traced.add(TraceRecord(epoch="e", event=number, stream=stream, picture=PictureSpans(encode_ms=1.0)), 0.0)
+    looks: list[str] = []
+    monkeypatch.setattr(TracedEvents, "of", lambda _, stream: looks.append(stream))
+    assert len(traced.streams) == MOST_STREAMS
+    assert traced.streams[0] == "front"
+    assert looks == [], "each name would cost a look at every event"
+
+
+def test_a_client_that_reports_ever_new_cameras_costs_no_figure_for_each(tmp_path: Path) -> None:
+    entries = list(Story(events=3).entries())
+    for number in range(100):
+        streams = [StreamReport(stream=f"made up {number}", carrier="native", stamp=1)]
+        record = ReportRecord(epoch=EPOCH, event=1, peer="p1", name="Ada", report=Report(event=1, streams=streams))
+        entries.append(own_entry(record, START + number))
+    path = rewritten(tmp_path / "a.mcap", sorted(entries, key=lambda entry: entry.arrived), lambda entry: [entry])
+    assert len(read_session(path).streams) <= MOST_STREAMS + len(CODECS)
 
 
 def test_a_slow_event_is_found_in_its_time_and_in_the_whole_session() -> None:

@@ -15,7 +15,7 @@ const SHOWN_MS = 8000;
 const CONFIRM_MS = 5000;
 
 export interface RobotStrip extends Panel {
-  /** As a click on the action at this place; of one that is not there nothing happens. */
+  /** Asks for the action at this place, by a pad or a key; of one that is not there nothing happens. */
   press(index: number): void;
 }
 
@@ -30,7 +30,7 @@ export function createRobotStrip(engine: ConsoleEngine): RobotStrip {
   let shownStatus = "";
   return {
     element,
-    press: (index) => actions[index]?.press(),
+    press: (index) => actions[index]?.press(true),
     update(now) {
       const { state } = engine;
       const wanted = state.robot?.description.actions ?? described ?? [];
@@ -85,7 +85,7 @@ function whyNot(engine: ConsoleEngine, now: number): string {
   const { state } = engine;
   if (!mayDrive(state)) return "";
   for (const action of state.robot?.description.actions ?? []) {
-    const refusal = actRefusal(action, state.actions, engine.actConditions(now));
+    const refusal = actRefusal(action, state.actions, engine.actConditions(now, false));
     if (refusal !== null) return `${action.label}: ${ACT_REFUSAL_LABELS[refusal]}`;
   }
   return "";
@@ -104,7 +104,7 @@ class ActionButton {
     private readonly engine: ConsoleEngine,
     private readonly action: Action,
   ) {
-    this.main = button("action-button", "", () => this.press());
+    this.main = button("action-button", "", () => this.press(false));
     this.main.append(this.fill, this.label);
     this.form = createParameterForm(action);
     this.element = h("div", "action", { "data-action": action.name }, this.main, ...this.form.elements);
@@ -114,7 +114,7 @@ class ActionButton {
     const { engine, action } = this;
     const update = newestOf(engine.state.actions, action.name);
     const runs = update !== null && isRunning(update);
-    const refusal = runs ? null : actRefusal(action, engine.state.actions, engine.actConditions(now));
+    const refusal = runs ? null : actRefusal(action, engine.state.actions, engine.actConditions(now, false));
     const asks = !runs && now - this.askedMs < CONFIRM_MS;
     const mayCancel = runs && (holdsSeat(engine.state) || engine.state.welcome?.role === "supervisor");
     setText(
@@ -129,7 +129,7 @@ class ActionButton {
     this.form.disable(runs);
   }
 
-  press(): void {
+  press(remote: boolean): void {
     const { engine, action } = this;
     const now = performance.now();
     const update = newestOf(engine.state.actions, action.name);
@@ -137,7 +137,7 @@ class ActionButton {
       engine.actions?.cancel(update.id);
       return;
     }
-    const refusal = actRefusal(action, engine.state.actions, engine.actConditions(now));
+    const refusal = actRefusal(action, engine.state.actions, engine.actConditions(now, remote));
     if (refusal !== null) {
       note(engine.state, "warning", `${action.label}: ${ACT_REFUSAL_LABELS[refusal]}`, Date.now());
       return;

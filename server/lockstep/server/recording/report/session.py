@@ -12,7 +12,7 @@ from lockstep.server.recording.format.topics import stream_of
 from lockstep.server.recording.reading.bookmarks import Mark
 from lockstep.server.recording.reading.event_rows import EventRow, event_rows
 from lockstep.server.recording.reading.reader import RecordingReader
-from lockstep.server.recording.report.traced_events import TracedEvents
+from lockstep.server.recording.report.traced_events import MOST_STREAMS, TracedEvents
 
 __all__ = ["Series", "Session", "Shown", "read_session"]
 
@@ -130,6 +130,8 @@ def _take_report(session: Session, record: ReportRecord, at: float) -> None:
     if report.round_trip_ms is not None:
         session.round_trip.add(at, report.round_trip_ms)
     for stream in report.streams:
+        if stream.stream not in session.streams and len(session.streams) >= MOST_STREAMS:
+            continue  # a client may say any name; each costs a figure
         shown = session.streams.setdefault(stream.stream, Shown())
         if stream.stamp:
             shown.stamp.add(at, stream.stamp)

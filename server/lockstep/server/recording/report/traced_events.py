@@ -1,5 +1,7 @@
 """Where the time of a recording's events went: its trace records, joined by event. No I/O."""
 
+import heapq
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
@@ -17,6 +19,7 @@ from lockstep.server.recording.format.records import TraceRecord
 
 __all__ = ["COMMAND", "PICTURE", "TracedEvent", "TracedEvents", "slowest", "slowest_by_time", "way_of"]
 
+MOST_STREAMS = 16  # of which a report tells; a recording may name any number
 COMMAND = COMMAND_WAY
 PICTURE = tuple(span for span in PICTURE_WAY if span.name != "camera_wait_ms")  # that one comes before the capture
 
@@ -63,9 +66,9 @@ class TracedEvents:
 
     @property
     def streams(self) -> list[str]:
-        """The cameras, the one with most traced pictures first."""
-        names = {stream for each in self._events.values() for stream in each.pictures}
-        return sorted(names, key=lambda name: (-len(self.of(name)), name))
+        """The cameras with most traced pictures, `MOST_STREAMS` of them at most, the one with most first."""
+        counts = Counter(stream for each in self._events.values() for stream in each.pictures)
+        return heapq.nsmallest(MOST_STREAMS, counts, key=lambda name: (-counts[name], name))
 
 
 def slowest(events: Sequence[TracedEvent], stream: str, count: int) -> list[TracedEvent]:
