@@ -23,20 +23,14 @@ DEGREES = 2.0  # a change of direction that is told
 class ForceSettings:
     """How a stick pushes: shares of what the device can do, 0 to 1.
 
-    Attributes:
-        strongest: no contact is felt more strongly
-        spring: towards the middle, while driving
-        damper: against motion, while driving
-        turned: for a stick that pushes the wrong way
-
     Raises:
         ValueError: a share is not within 0 to 1.
     """
 
-    strongest: float = 0.2
-    spring: float = 0.15
-    damper: float = 0.1
-    turned: bool = False
+    strongest: float = 0.2  # no contact is felt more strongly
+    spring: float = 0.15  # towards the middle, while driving
+    damper: float = 0.1  # against motion, while driving
+    turned: bool = False  # for a stick that pushes the wrong way
 
     def __post_init__(self) -> None:
         for name in ("strongest", "spring", "damper"):
