@@ -9,6 +9,7 @@ from playwright.async_api import Browser, Page, expect
 
 from lockstep.bench.browsers.chromium import PAD
 from lockstep.bench.browsers.console_page import FORWARD, RB, SMALL_WINDOW, START, STOP_BUTTON, ConsolePage
+from tests.e2e.accessibility import findings
 from tests.support.stack import Stack, running_stack
 
 pytestmark = pytest.mark.browser
@@ -147,6 +148,7 @@ async def test_the_settings_of_a_stick_hold_at_once_and_it_is_remembered(own_sta
         section = page.get_by_role("region", name="Force feedback")
         for name, share in (("Strongest force", "50"), ("Spring", "40"), ("Damper", "0")):
             await section.get_by_label(name).fill(share)
+        assert await findings(page) == []
         await _close_sheet(page)
         async with console.driving(FORWARD):
             await console.until(PUSHES)
