@@ -17,6 +17,7 @@ OTHERS = {  # not the programs' own
     "LOCKSTEP_TWO",
     "LOCKSTEP_EXTERNAL_IP",  # coturn
     "LOCKSTEP_ROBOT_NAME",  # the unit's own
+    "LOCKSTEP_LINK",  # of `lockstep pair` and `forget`
     "LOCKSTEP_NAME",  # stands for any in a sentence
 }
 

@@ -17,6 +17,7 @@ from typing import Any, NamedTuple
 
 import pytest
 import typer.main
+import yaml
 
 from lockstep.server.cli.main import app
 from lockstep.server.cli.measurements import COMMANDS
@@ -26,7 +27,7 @@ PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
 BLOCK = re.compile(r"^( *)```(\w*)\n(.*?)\n *```$", re.MULTILINE | re.DOTALL)
 WORDS = re.compile(r"(?:^|(?<=[\s`'/]))lockstep ((?:[a-z-]+|--)[^`#|;&)\n]*)", re.MULTILINE)
 HASHED = ("recording chain", "recording signature")  # texts that are hashed and signed, no commands
-LANGUAGES = {"sh", "console", "python", "toml", "json", "text", "hex", "mermaid", ""}
+LANGUAGES = {"sh", "console", "python", "toml", "yaml", "json", "text", "hex", "mermaid", ""}
 
 
 class Block(NamedTuple):
@@ -71,6 +72,11 @@ def test_bash_can_read_the_commands(block: Block) -> None:
 @of("toml")
 def test_toml_is_valid(block: Block) -> None:
     tomllib.loads(block.text)
+
+
+@of("yaml")
+def test_yaml_is_valid(block: Block) -> None:
+    yaml.safe_load(block.text)
 
 
 @of("json")

@@ -6,7 +6,7 @@ import { describe, expect, it } from "vitest";
 const LAYERS: readonly (readonly string[])[] = [
   ["util", "protocol"],
   ["gate"],
-  ["drive", "gamepad", "robot", "session", "stop"],
+  ["drive", "force_feedback", "gamepad", "robot", "session", "stop"],
   ["haptics", "input", "media", "sfu", "talkback", "transport"],
   ["engine", "fleet", "replay"],
   ["charts", "scene", "ui"],

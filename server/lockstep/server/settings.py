@@ -74,6 +74,8 @@ class Settings(NetworkSettings, LimitSettings, SourceSettings, RelaySettings, Fl
     scene_ticket_seconds: Annotated[float, Field(gt=0)] = 600.0
     max_scene_viewers: Annotated[int, Field(ge=1)] = 20
 
+    force_feedback: bool = False  # pages may use WebHID, for joysticks that push back
+
     media: MediaSettings = MediaSettings()
     recording: RecordingSettings = RecordingSettings()
 

@@ -2,6 +2,8 @@
 
 import asyncio
 
+import pytest
+
 from lockstep.protocol.messages import Media
 from lockstep.robot_bridge.conformance import CASES, Outcome, Result, Subject, play, play_all
 from lockstep.robot_bridge.conformance.place import Place
@@ -44,6 +46,20 @@ SAID = {  # of those that another fault could bring to the same end
 
 
 GOALS = [case.name for case in CASES if case.name.startswith("goal")]
+# Ten different faults, and the cases besides the named one that meet the same fault. No other case fails.
+MET_BY_OTHERS: dict[Fault, set[str]] = {
+    Fault.LATE_EXECUTES: set(),
+    Fault.REPEATS_COUNT: {"repeats_hold_nothing"},  # each repeat begins a new hold
+    Fault.NO_HOLD: {"repeats_hold_nothing"},
+    Fault.NO_REST: {"rest_ahead"},
+    Fault.NO_NEUTRAL: {"reset_then_neutral"},
+    Fault.FORGETS_STOP: set(),
+    Fault.RESETS_ANY_STOP: set(),
+    Fault.UNSEEN_EXECUTES: set(),  # the nonce is ignored
+    Fault.DIES_OF_MALFORMED: {"silent_link"},
+    Fault.STAMPS_AHEAD: set(),
+}
+
 MOTIONS = [case.name for case in CASES if case.name.startswith("action_") and case.name != "action_unknown"]
 
 
@@ -87,3 +103,18 @@ async def test_pictures_that_take_long_to_draw_are_judged_by_their_capture() -> 
             await watcher.find(Media)
         result = await play(subject(bridge), case)
     assert result.outcome is Outcome.OK, result
+
+
+async def failures_of(fault: Fault) -> set[str]:
+    async with running_plain_bridge(fault) as bridge:
+        results = await play_all(subject(bridge), CASES, lambda result: None)
+    return {result.case.name for result in results if result.outcome is Outcome.FAILED}
+
+
+@pytest.mark.timeout(180)  # each plays all cases, at the pace of the robot's hold
+async def test_of_all_cases_those_about_a_planted_fault_fail_and_no_others() -> None:
+    found = dict(zip(MET_BY_OTHERS, await asyncio.gather(*map(failures_of, MET_BY_OTHERS)), strict=True))
+    for fault, others in MET_BY_OTHERS.items():
+        named = FOUND_BY[fault]
+        assert named in found[fault], fault
+        assert found[fault] <= {named, *others}, fault

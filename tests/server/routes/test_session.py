@@ -228,6 +228,14 @@ async def test_every_answer_carries_the_security_headers() -> None:
             assert "server" not in headers
 
 
+async def test_pages_may_use_hid_devices_only_where_force_feedback_is_switched_on() -> None:
+    for on, allowed in ((False, "hid=()"), (True, "hid=(self)")):
+        async with running_rig(force_feedback=on) as rig:
+            permissions = (await rig.http.get("/")).headers["permissions-policy"].split(", ")
+            assert allowed in permissions
+            assert "usb=()" in permissions
+
+
 async def test_health_and_metrics_need_no_token() -> None:
     async with running_rig() as rig:
         assert (await rig.http.get("/healthz")).json() == {"status": "ok", "robot_link": "up", "links": "ok"}

@@ -26,6 +26,7 @@ __all__ = [
     "TWO_BASES",
     "RosBridge",
     "RosRobot",
+    "SERVICES",
     "have_ros",
     "ros_environment",
     "ros_python",
@@ -36,6 +37,7 @@ __all__ = [
 ROOT = Path(__file__).parents[3]
 EXAMPLES = ROOT / "docs" / "examples" / "ros2"
 NODE = Path(__file__).with_name("robot_node.py")
+SERVICES = Path(__file__).with_name("services_node.py")
 TWO_BASES = Path(__file__).with_name("two_bases_node.py")
 # RTPS well-known ports (DDSI-RTPS 9.6.1.1): 7400 + 250 x domain is where a domain's participants find each other.
 DOMAINS = range(1, 100)

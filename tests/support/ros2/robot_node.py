@@ -242,9 +242,9 @@ def listen(node: RobotNode) -> None:
         print(json.dumps({"done": line.strip()}), flush=True)
 
 
-def main() -> None:
+def main(kind: type[RobotNode] = RobotNode) -> None:
     rclpy.init()
-    node = RobotNode(Path(sys.argv[1]))
+    node = kind(Path(sys.argv[1]))
     executor = SingleThreadedExecutor()
     executor.add_node(node)
     threading.Thread(target=listen, args=(node,), daemon=True).start()

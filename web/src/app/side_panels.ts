@@ -9,6 +9,7 @@ import type { PageAction } from "../input/shortcuts";
 import { replayHash } from "../replay/replay_link";
 import { holdsSeat, mayDrive } from "../session/console_state";
 import { countUnread, createUnread, markRead } from "../session/unread_notes";
+import { ForceFeedbackLoader } from "../haptics/force_feedback_loader";
 import { Pad } from "../input/gamepad";
 import { GamepadStorage } from "../input/gamepad_storage";
 import { watchPageKeys } from "./shortcut_listener";
@@ -63,7 +64,8 @@ export class SidePanels {
   ) {
     const { controls } = engine;
     const pad = (controls.pad ??= new Pad(controls.events, new GamepadStorage()));
-    this.pads = once(() => createGamepadSheet(pad));
+    const forces = new ForceFeedbackLoader(engine);
+    this.pads = once(() => createGamepadSheet(pad, forces));
     this.session = new SessionApi(api);
     const robotLink = new RobotLinkApi(api);
     this.pairing = once(() => createRobotLinkSheet([["", robotLink]]));

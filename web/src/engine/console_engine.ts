@@ -451,6 +451,7 @@ export class ConsoleEngine {
     this.capSpeed(now);
     this.takeValues(sample, now);
     this.tracing?.noteIntention(this.values, now);
+    if (change !== null) this.haptics.stick?.stop();
     if (this.driver !== null && change === "released") driver.driverRelease(this.driver, now);
     if (this.driver !== null && change === "taped_down") driver.driverDisarm(this.driver, now);
     if (change === "taped_down") this.page.armedChanged();

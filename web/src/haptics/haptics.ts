@@ -19,12 +19,21 @@ export interface HapticsContext {
   conditions(now: number): Pick<ArmConditions, "connected" | "stopped" | "visible">;
 }
 
+/** A stick that pushes back. */
+export interface PushingStick {
+  /** `strength`: of the contact, 0 to 1; null while nothing may be felt. */
+  feel(strength: number | null, now: number): void;
+  stop(): void;
+  close(): void;
+}
+
 /** Lets the operator feel a contact as rumble and hear it as a tone: from the feedback itself, before any picture of it. */
 export class Haptics {
   readonly trace = createForceTrace();
   private force = 0; // N
   rumble: Rumble | null = null; // as the tone: until its code is there
   tone: ContactTone | null = null;
+  stick: PushingStick | null = null; // until one was chosen
   private dueMs = 0;
 
   constructor(private readonly context: HapticsContext) {}
@@ -44,6 +53,7 @@ export class Haptics {
   still(): void {
     this.rumble?.stop();
     this.tone?.sound(0);
+    this.stick?.stop();
   }
 
   /** What was felt belonged to a connection that ended. */
@@ -56,6 +66,7 @@ export class Haptics {
   close(): void {
     this.still();
     this.tone?.close();
+    this.stick?.close();
   }
 
   private feel(now: number): void {
@@ -67,6 +78,7 @@ export class Haptics {
     const pad = settings.rumble && context.isArmed() ? context.controls.pad?.state : null;
     this.rumble?.feel(pad?.gamepad ?? null, strength, now);
     this.tone?.sound(settings.contactTone && context.streams.isAudible() ? strength : 0);
+    this.stick?.feel(by === null ? null : strength, now);
   }
 
   /** How a contact feels; null while nothing may be felt. */

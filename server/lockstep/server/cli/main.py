@@ -54,6 +54,15 @@ def _access() -> typer.Typer:
     return commands
 
 
+def _pairing() -> typer.Typer:
+    from lockstep.server.cli.pairing import add_pairing_commands
+    from lockstep.server.cli.settings_from_flags import make_settings
+
+    commands = typer.Typer()
+    add_pairing_commands(commands, make_settings)
+    return commands
+
+
 def _recordings() -> typer.Typer:
     from lockstep.server.cli.recordings import add_recording_commands
     from lockstep.server.cli.settings_from_flags import make_settings
@@ -70,6 +79,7 @@ LOADERS: dict[Callable[[], typer.Typer], tuple[str, ...]] = {
     _ros2: ("ros2",),
     _check: ("check",),
     _access: ("invite", "invitations", "revoke", "audit"),
+    _pairing: ("pair", "forget"),
     _recordings: ("record", "recordings", "replay", "verify", "export", "report"),
 }
 

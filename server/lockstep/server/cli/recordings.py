@@ -12,12 +12,11 @@ import msgspec
 import typer
 
 from lockstep.server.cli.access import MakeSettings
-from lockstep.server.cli.console_address import read_address
+from lockstep.server.cli.console_request import ask_console
 from lockstep.server.cli.extras import load_extra
 from lockstep.server.cli.options import RobotOption, StateDirOption
 from lockstep.server.evidence.anchors import parse_anchor
 from lockstep.server.evidence.signer import is_public_key
-from lockstep.server.http.robot_paths import ROBOTS
 from lockstep.server.recording.errors import RecordingError
 from lockstep.server.recording.recording_store import RecordingEntry, RecordingStore
 from lockstep.server.recording.settings import recordings_directory
@@ -33,7 +32,6 @@ __all__ = ["DirectoryOption", "File", "add_recording_commands", "recording_file"
 
 EXIT_BROKEN = 1  # a promise is not kept
 EXIT_USAGE = 2
-HTTP_SECONDS = 30.0
 
 Json = Annotated[bool, typer.Option("--json", help="Print JSON.")]
 File = Annotated[Path, typer.Argument(help="A recording: its file, or its id in the recordings' directory.")]
@@ -62,17 +60,19 @@ def add_recording_commands(app: typer.Typer, make_settings: MakeSettings) -> Non
         as_json: Json = False,
     ) -> None:
         """Start to record."""
-        _say_state(_ask(make_settings(state_dir=state_dir), robot, "POST", "/api/recordings", {"name": name}), as_json)
+        _say_state(
+            ask_console(make_settings(state_dir=state_dir), robot, "POST", "/api/recordings", {"name": name}), as_json
+        )
 
     @record.command("stop")
     def record_stop(robot: RobotOption = "", state_dir: StateDirOption = None, as_json: Json = False) -> None:
         """End the recording; returns when the file is closed."""
-        _say_state(_ask(make_settings(state_dir=state_dir), robot, "POST", "/api/recordings/stop"), as_json)
+        _say_state(ask_console(make_settings(state_dir=state_dir), robot, "POST", "/api/recordings/stop"), as_json)
 
     @record.command("status")
     def record_status(robot: RobotOption = "", state_dir: StateDirOption = None, as_json: Json = False) -> None:
         """Say whether the session is recorded."""
-        _say_state(_ask(make_settings(state_dir=state_dir), robot, "GET", "/api/recordings")["state"], as_json)
+        _say_state(ask_console(make_settings(state_dir=state_dir), robot, "GET", "/api/recordings")["state"], as_json)
 
     @app.command()
     def recordings(
@@ -162,29 +162,6 @@ def add_recording_commands(app: typer.Typer, make_settings: MakeSettings) -> Non
         reporter: Any = load_extra("lockstep.server.recording.report.report", "report")  # needs matplotlib
         written = _or_usage(lambda: reporter.write_report(path, out or path.with_suffix(".html")))
         sys.stdout.write(f"{escaped(written)}\n")
-
-
-def _ask(settings: Settings, robot: str, method: str, path: str, body: dict[str, str] | None = None) -> dict[str, Any]:
-    """Return the answer of this state directory's console."""
-    import httpx
-
-    state = _state(settings)
-    url = settings.public_url or read_address(state.directory)
-    if not url:
-        raise _usage("no console has run with this state directory")
-    headers = {"Authorization": f"Bearer {state.access.issue('supervisor', 'command line')}"}
-    try:
-        # Its certificate may be self-signed; a writer of the state directory can name any address there anyway.
-        with httpx.Client(verify=not settings.tls, trust_env=False, timeout=HTTP_SECONDS) as http:
-            answer = http.request(
-                method, f"{url}{ROBOTS}/{robot}{path}" if robot else f"{url}{path}", headers=headers, json=body
-            )
-    except httpx.HTTPError as error:
-        raise _usage(f"the console at {url} does not answer: {error}") from error
-    found: dict[str, Any] = answer.json()
-    if answer.is_error:
-        raise _usage(f"{found.get('error')}: {found.get('detail')}")
-    return found
 
 
 def _say_state(state: dict[str, Any], as_json: bool) -> None:

@@ -106,7 +106,12 @@ def guard_app(app: FastAPI, settings: Settings) -> None:
         places=places,
         caught=_caught,
     )
-    app.add_middleware(SecurityHeaders, lasting_tls=settings.tls_cert is not None, relays=settings.relay_origins)
+    app.add_middleware(
+        SecurityHeaders,
+        lasting_tls=settings.tls_cert is not None,
+        relays=settings.relay_origins,
+        hid=settings.force_feedback,
+    )
 
 
 def _link_of(scope: Scope, known: KnownTokens) -> str:

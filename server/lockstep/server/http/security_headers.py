@@ -49,7 +49,7 @@ HEADERS = {
 # For documents alone (Permissions Policy, 4.1).
 PERMISSIONS = (
     "gamepad=(self), fullscreen=(self), screen-wake-lock=(self), clipboard-write=(self), autoplay=(self), "
-    "microphone=(self), camera=(), geolocation=(), usb=(), serial=(), hid=(), midi=(), payment=(), "
+    "microphone=(self), camera=(), geolocation=(), usb=(), serial=(), hid={hid}, midi=(), payment=(), "
     "display-capture=(), browsing-topics=()"
 )
 DOCUMENTS = ("text/html", "application/xhtml+xml")
@@ -59,13 +59,17 @@ HSTS = "max-age=31536000"  # RFC 6797; without sub-domains, which may be somebod
 class SecurityHeaders:
     """A middleware that adds the headers to every HTTP response."""
 
-    def __init__(self, app: ASGIApp, lasting_tls: bool = False, relays: tuple[str, ...] = ()) -> None:
+    def __init__(
+        self, app: ASGIApp, lasting_tls: bool = False, relays: tuple[str, ...] = (), hid: bool = False
+    ) -> None:
         """`lasting_tls`: browsers trust the certificate, so they may insist on TLS from now on.
 
-        `relays`: WebSocket origins that the page connects to besides its own.
+        `relays`: WebSocket origins that the page connects to besides its own. `hid`: the page may ask for HID devices
+        (WebHID), to drive force-feedback sticks.
         """
         self._app = app
         self._page_policy = PAGE_POLICY.replace("connect-src 'self'", " ".join(("connect-src 'self'", *relays)))
+        self._permissions = PERMISSIONS.format(hid="(self)" if hid else "()")
         self._headers = HEADERS | ({"Strict-Transport-Security": HSTS} if lasting_tls else {})
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
@@ -82,7 +86,7 @@ class SecurityHeaders:
                 policy = self._policy_with(own) if is_document else FILE_POLICY
                 headers["Content-Security-Policy"] = scene_policy(scope) if of_scene else policy
                 if is_document:
-                    headers["Permissions-Policy"] = PERMISSIONS
+                    headers["Permissions-Policy"] = self._permissions
                 for name, value in self._headers.items():
                     headers[name] = value
             await send(message)

@@ -123,3 +123,26 @@ def test_a_file_that_is_far_too_long_is_not_read_on(tmp_path: Path) -> None:
 def test_what_contains_itself_is_refused(tmp_path: Path) -> None:
     with pytest.raises(SettingsError, match="nested too deeply"):
         read_settings(written(tmp_path, "name: x\nbase: &b\n  forward: *b\n"))
+
+
+def test_services_become_actions_that_move_nothing(tmp_path: Path) -> None:
+    more = "services:\n  - {name: light, service: /light, type: SetBool}\n  - {name: beep, service: /beep}\n"
+    _, description = read_settings(written(tmp_path, BASE + more))
+    light, beep = description.actions
+    assert (light.moves, light.label, [each.name for each in light.parameters]) == (False, "light", ["on"])
+    assert (beep.moves, beep.parameters) == (False, ())
+
+
+@pytest.mark.parametrize(
+    ("text", "complaint"),
+    [
+        ("batteries:\n  - {topic: /a}\n  - {topic: /b}\n", "batteries[1].name: 'battery' is the name of another"),
+        ("services:\n  - {name: x, service: /x, type: Empty}\n", "services[0].type"),
+        ("services:\n  - {name: x, service: /x}\n  - {name: x, service: /y}\n", "name is empty or used twice"),
+        ("diagnostics: {most: 41}\n", "diagnostics.most"),
+    ],
+)
+def test_services_and_status_that_make_no_sense_are_named(tmp_path: Path, text: str, complaint: str) -> None:
+    with pytest.raises(SettingsError) as caught:
+        read_settings(written(tmp_path, BASE + text))
+    assert complaint in caught.value.detail

@@ -1,9 +1,10 @@
 import type { PadLayout } from "../../gamepad/layout";
 import { padName, setupOf } from "../../gamepad/profile";
 import { MAX_STORE_CHARS } from "../../gamepad/profile_file";
+import type { ForceFeedbackLoader } from "../../haptics/force_feedback_loader";
 import type { Pad } from "../../input/gamepad";
 import { saveFile } from "../elements/save_file";
-import { button, h, setData, setHidden, setText } from "../elements/dom";
+import { button, h, setData, setHidden, setText, type Panel } from "../elements/dom";
 import { ControlsView } from "./live_inputs";
 import { PadList } from "./pad_list";
 import { ShapingForm } from "./shaping_form";
@@ -11,8 +12,8 @@ import { CalibrationWizard } from "./calibration_wizard";
 import type { SheetContent } from "../elements/sheet";
 
 /** Which pad drives, what its parts do, and how it feels. */
-export function createGamepadSheet(pad: Pad): SheetContent {
-  return new PadSheet(pad);
+export function createGamepadSheet(pad: Pad, forces: ForceFeedbackLoader): SheetContent {
+  return new PadSheet(pad, forces);
 }
 
 class PadSheet implements SheetContent {
@@ -35,20 +36,26 @@ class PadSheet implements SheetContent {
   });
   private calibrated: Gamepad | null = null; // being calibrated
   private frame = 0;
+  private readonly forcePlace = h("div");
+  private force: Panel | null = null; // until its code is there; it stays away where there is no force feedback
 
-  constructor(private readonly pad: Pad) {
+  constructor(
+    private readonly pad: Pad,
+    private readonly forces: ForceFeedbackLoader,
+  ) {
     this.list = new PadList(pad, { calibrate: (gamepad) => this.calibrate(gamepad) });
     this.wizard = new CalibrationWizard({
       save: (layout) => this.keep(layout),
       cancel: () => this.leaveWizard(),
     });
     this.current.append(this.heading, this.controls.element, this.form.element);
-    this.overview.append(this.list.element, this.current, this.createFoot(), this.words);
+    this.overview.append(this.list.element, this.current, this.forcePlace, this.createFoot(), this.words);
     this.element.append(this.overview, this.wizard.element);
   }
 
   opened(): void {
     this.leaveWizard();
+    void this.addForces();
     const step = (now: number): void => {
       this.frame = requestAnimationFrame(step);
       this.update(now);
@@ -70,6 +77,7 @@ class PadSheet implements SheetContent {
 
   private updateOverview(): void {
     this.list.update();
+    this.force?.update(0);
     const { state, storage } = this.pad;
     setHidden(this.current, state?.ready !== true);
     setHidden(this.forget, state?.setup.calibrated !== true);
@@ -90,6 +98,14 @@ class PadSheet implements SheetContent {
       return;
     }
     this.wizard.update(live, setupOf(live, this.pad.storage.saved.profiles).shaping, now);
+  }
+
+  private async addForces(): Promise<void> {
+    const forces = await this.forces.load();
+    if (forces === null || this.force !== null) return;
+    const { createForceSection } = await import("./force_section");
+    this.force ??= createForceSection(forces);
+    this.forcePlace.replaceChildren(this.force.element);
   }
 
   private calibrate(gamepad: Gamepad): void {

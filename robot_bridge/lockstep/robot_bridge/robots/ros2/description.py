@@ -4,6 +4,8 @@ import math
 from typing import Final
 
 from lockstep.protocol.description import (
+    Action,
+    ActionParameter,
     Axis,
     AxisGain,
     Body,
@@ -19,7 +21,7 @@ from lockstep.protocol.description import (
     WrenchSensor,
 )
 from lockstep.robot_bridge.robots.ros2.controls import arm_layers, base_layer
-from lockstep.robot_bridge.robots.ros2.settings import Arm, ArmJoint, Base, BaseAxis, Ros2Settings, Servo
+from lockstep.robot_bridge.robots.ros2.settings import Arm, ArmJoint, Base, BaseAxis, Ros2Settings, Service, Servo
 from lockstep.robot_bridge.yaml_file import SettingsPlace
 
 __all__ = ["BASE_JOINTS", "SERVO_AXES", "describe"]
@@ -50,6 +52,10 @@ def describe(settings: Ros2Settings) -> RobotDescription:
         if settings.use_sim_time and camera.captured == "header":
             keys = ("cameras", number, "captured")
             raise SettingsPlace(keys, "simulated time is not the bridge's time: set captured: arrival, and a latency")
+    names = [battery.name for battery in settings.batteries]
+    for number, name in enumerate(names):
+        if name in names[:number]:
+            raise SettingsPlace(("batteries", number, "name"), f"{name!r} is the name of another battery")
     base_axes = () if base is None else _base_axes(base, settings.hold)
     arm_axes = () if arm is None else tuple(_arm_axis(arm, number, settings.hold) for number in range(len(arm.joints)))
     if settings.servo is not None:
@@ -79,10 +85,22 @@ def describe(settings: Ros2Settings) -> RobotDescription:
         position_limits=() if arm is None else tuple(filter(None, map(_position_limit, arm.joints))),
         planar_base=None if base is None else _planar_base(base),
         geofences=settings.geofences,
+        actions=tuple(map(_action, settings.services)),
         hold=settings.hold,
         watchdog=settings.watchdog,
         max_event_age=settings.max_event_age,
         max_event_rate=settings.max_event_rate,
+    )
+
+
+def _action(service: Service) -> Action:
+    on = ActionParameter(name="on", label="On", kind="switch", default=True)
+    return Action(
+        name=service.name,
+        label=service.label or service.name,
+        moves=False,
+        parameters=(on,) if service.type == "SetBool" else (),
+        confirm=service.confirm,
     )
 
 

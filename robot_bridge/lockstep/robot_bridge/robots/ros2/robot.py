@@ -1,9 +1,11 @@
 """A robot behind ROS 2 topics, as the bridge sees it."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
+from lockstep.protocol.actions import ParameterValue, StatusItem
 from lockstep.protocol.description import RobotDescription
 from lockstep.robot_bridge.control import clock
+from lockstep.robot_bridge.robots.actions import ActionRun
 from lockstep.robot_bridge.robots.base import Measurement, MediaSource, Robot
 from lockstep.robot_bridge.robots.ros2.drives.arm_drive import ArmDrive
 from lockstep.robot_bridge.robots.ros2.drives.base_drive import BaseDrive
@@ -11,8 +13,11 @@ from lockstep.robot_bridge.robots.ros2.drives.drive import Drive
 from lockstep.robot_bridge.robots.ros2.drives.servo_drive import ServoDrive
 from lockstep.robot_bridge.robots.ros2.drives.watchdog_rest import REST_CALL, rest_arguments
 from lockstep.robot_bridge.robots.ros2.ros_side import RosSide
+from lockstep.robot_bridge.robots.ros2.sensing.battery import BatteryTopic
 from lockstep.robot_bridge.robots.ros2.sensing.camera import CameraSource
+from lockstep.robot_bridge.robots.ros2.sensing.diagnostics import DiagnosticsTopic
 from lockstep.robot_bridge.robots.ros2.sensing.sensors import LockoutTopic, RangeSensor, WrenchTopic
+from lockstep.robot_bridge.robots.ros2.services import Services
 from lockstep.robot_bridge.robots.ros2.settings import Ros2Settings
 
 __all__ = ["Ros2Robot"]
@@ -49,6 +54,10 @@ class Ros2Robot(Robot):
             self._ranges = None if settings.ranges is None else RangeSensor(self._ros, settings.ranges)
             self._wrench = None if settings.wrench is None else WrenchTopic(self._ros, settings.wrench)
             self._lockout = None if settings.lockout is None else LockoutTopic(self._ros, settings.lockout)
+            self._batteries = [BatteryTopic(self._ros, battery) for battery in settings.batteries]
+            diagnostics = settings.diagnostics
+            self._diagnostics = None if diagnostics is None else DiagnosticsTopic(self._ros, diagnostics)
+            self._services = Services(self._ros, settings.services)
             self._cameras = [CameraSource(self._ros, camera) for camera in settings.cameras]
             self._ros.start()
             if self._lockout is not None:
@@ -88,6 +97,14 @@ class Ros2Robot(Robot):
 
     def locked_out(self) -> str:
         return "" if self._lockout is None else self._lockout.reason(clock.now())
+
+    def begin_action(self, name: str, parameters: Mapping[str, ParameterValue]) -> ActionRun:
+        return self._services.begin(name, parameters)
+
+    def status(self) -> Sequence[StatusItem]:
+        now = clock.now()
+        items = [item for battery in self._batteries for item in battery.items(now)]
+        return items + ([] if self._diagnostics is None else self._diagnostics.items(now))
 
     def positions(self) -> Sequence[float]:
         now = clock.now()

@@ -85,9 +85,27 @@ class RosSide:
         self._publishers.append(publisher)
         return publisher
 
-    def subscribe(self, kind: Any, topic: str, callback: Callable[[Any], None]) -> None:
-        """Subscribe to a sensor: the newest message only, from reliable and best-effort publishers alike."""
-        self._node.create_subscription(kind, topic, callback, self._profile("BEST_EFFORT"))
+    def subscribe(self, kind: Any, topic: str, callback: Callable[[Any], None], *, depth: int = 1) -> None:
+        """Subscribe to a sensor: the newest message only, from reliable and best-effort publishers alike.
+
+        `depth`: more, for a topic on which several nodes publish different things at once.
+        """
+        self._node.create_subscription(kind, topic, callback, self._profile("BEST_EFFORT", depth))
+
+    def service(self, name: str) -> Any:
+        """Import and return a class of std_srvs.
+
+        Raises:
+            RobotUnavailable: it is not installed.
+        """
+        try:
+            return getattr(import_module("std_srvs.srv"), name)
+        except (ImportError, AttributeError) as error:
+            raise RobotUnavailable(f"ROS 2 services std_srvs/{name} are missing: {error}") from error
+
+    def client(self, kind: Any, service: str) -> Any:
+        """Return a client, whose `call_async` answers on the node's thread. Make it before `start`."""
+        return self._node.create_client(kind, service)
 
     def now_ns(self) -> int:
         """Return the time of the ROS clock, which header stamps are made with."""
@@ -119,9 +137,9 @@ class RosSide:
         self._node.destroy_node()
         self._context.try_shutdown()
 
-    def _profile(self, reliability: str) -> Any:
+    def _profile(self, reliability: str, depth: int = 1) -> Any:
         return self._qos.QoSProfile(
-            depth=1,
+            depth=depth,
             reliability=self._qos.ReliabilityPolicy[reliability],
             durability=self._qos.DurabilityPolicy.VOLATILE,
             history=self._qos.HistoryPolicy.KEEP_LAST,

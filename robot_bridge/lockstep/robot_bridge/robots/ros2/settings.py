@@ -12,11 +12,14 @@ __all__ = [
     "ArmJoint",
     "Base",
     "BaseAxis",
+    "Battery",
     "CameraTopic",
+    "Diagnostics",
     "JointStates",
     "Odometry",
     "Ranges",
     "Ros2Settings",
+    "Service",
     "Servo",
     "ServoStatus",
     "TwistCommand",
@@ -160,6 +163,36 @@ class CameraTopic(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
     timeout: Timeout = 2.0
 
 
+class Battery(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """A sensor_msgs/BatteryState topic, shown in the robot's status."""
+
+    topic: Topic = "/battery_state"
+    name: Name = "battery"
+    label: str = "Battery"
+    timeout: Annotated[float, Meta(gt=0, le=600)] = 10.0  # s; then the console marks the reading as old
+    low: Annotated[float, Meta(ge=0, le=1)] = 0.2  # below it the level is a warning
+    empty: Annotated[float, Meta(ge=0, le=1)] = 0.05  # below it an error
+
+
+class Diagnostics(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """A diagnostic_msgs/DiagnosticArray topic, shown in the robot's status."""
+
+    topic: Topic = "/diagnostics"
+    timeout: Annotated[float, Meta(gt=0, le=600)] = 10.0  # s, as for a battery; a silent component is shown as old
+    most: Annotated[int, Meta(ge=1, le=40)] = 12  # components that are shown at once, the worst first
+
+
+class Service(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """A service that becomes an action of the robot. It must move nothing: see docs/ros2.md."""
+
+    name: Name
+    service: Topic
+    type: Literal["Trigger", "SetBool"] = "Trigger"  # of std_srvs
+    label: str = ""  # "": the name
+    confirm: str = ""  # question that a console asks first
+    timeout: Annotated[float, Meta(gt=0, le=600)] = 10.0  # s for the answer
+
+
 class Lockout(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """A std_msgs/Bool topic: true keeps everybody from driving, and so does silence for longer than `timeout`."""
 
@@ -184,6 +217,9 @@ class Ros2Settings(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
     ranges: Ranges | None = None
     wrench: Wrench | None = None
     lockout: Lockout | None = None
+    batteries: Annotated[tuple[Battery, ...], Meta(max_length=8)] = ()
+    diagnostics: Diagnostics | None = None
+    services: Annotated[tuple[Service, ...], Meta(max_length=32)] = ()
     cameras: Annotated[tuple[CameraTopic, ...], Meta(max_length=8)] = ()
     geofences: Annotated[tuple[Geofence, ...], Meta(max_length=32)] = ()
     bodies: tuple[Body, ...] = ()  # of the kinematic model, besides the base

@@ -1,0 +1,3 @@
+from lockstep.bench.robot_cuts.cli import app
+
+app()

@@ -1,0 +1,99 @@
+"""Requests of the command line to a running console: that of the state directory, or of a supervisor's link."""
+
+import json
+import ssl
+from pathlib import Path
+from typing import Any
+from urllib.parse import parse_qs, urlsplit
+
+import typer
+
+from lockstep.server.cli.console_address import read_address
+from lockstep.server.http.robot_paths import ROBOTS
+from lockstep.server.http.transport.tls import CERTIFICATE
+from lockstep.server.settings import Settings
+from lockstep.server.state.persistent_state import open_state
+from lockstep.server.util.display_names import escaped
+from lockstep.server.util.state_dir import StateDirUnusable
+
+__all__ = ["ask_by_link", "ask_console"]
+
+EXIT_USAGE = 2
+HTTP_SECONDS = 30.0
+
+
+def ask_console(
+    settings: Settings, robot: str, method: str, path: str, body: dict[str, str] | None = None
+) -> dict[str, Any]:
+    """Return the answer of this state directory's console, as a supervisor.
+
+    Args:
+        robot: of a fleet; "" for the only robot of a console
+        path: "/api/recordings"
+        body: sent as JSON
+
+    Raises:
+        typer.Exit: the console does not run, or refused; it has been said why.
+    """
+    try:
+        state = open_state(settings)
+    except StateDirUnusable as error:
+        raise _usage(str(error)) from error
+    url = settings.public_url or read_address(state.directory)
+    if not url:
+        raise _usage("no console has run with this state directory")
+    token = state.access.issue("supervisor", "command line")
+    # Its certificate may be self-signed; a writer of the state directory can name any address there anyway.
+    is_own = bool(settings.tls) or (state.directory.path / CERTIFICATE).exists()
+    return _ask(f"{url}{ROBOTS}/{robot}" if robot else url, token, not is_own, method, path, body)
+
+
+def ask_by_link(link: str, tls_ca: Path | None, robot: str, method: str, path: str) -> dict[str, Any]:
+    """Return the answer of the console that `link` opens, "https://host:port/#token=…", with the link's own rights.
+
+    `tls_ca`: a file with a certificate to trust instead of the system's.
+
+    Raises:
+        typer.Exit: it is no such link, or the console does not answer, or refused; it has been said why.
+    """
+    try:
+        parts = urlsplit(link)
+        token = parse_qs(parts.fragment).get("token", [""])[0]
+        is_link = parts.scheme in ("http", "https") and parts.hostname and token.isascii()
+    except ValueError:
+        is_link, token = False, ""
+    if not is_link or not token:
+        raise _usage("a link is https://host:port/#token=…, as `lockstep invite --role supervisor` prints it")
+    base = f"{parts.scheme}://{parts.netloc}{parts.path.rstrip('/')}"
+    try:
+        verify: ssl.SSLContext | bool = True if tls_ca is None else ssl.create_default_context(cafile=str(tls_ca))
+    except (OSError, ssl.SSLError) as error:
+        raise _usage(f"{tls_ca} is no certificate: {error}") from error
+    return _ask(f"{base}{ROBOTS}/{robot}" if robot else base, token, verify, method, path, None)
+
+
+def _ask(
+    base: str, token: str, verify: ssl.SSLContext | bool, method: str, path: str, body: dict[str, str] | None
+) -> dict[str, Any]:
+    import httpx
+
+    headers = {"Authorization": f"Bearer {token}"}
+    try:
+        with httpx.Client(verify=verify, trust_env=False, timeout=HTTP_SECONDS) as http:
+            answer = http.request(method, f"{base}{path}", headers=headers, json=body)
+    except (httpx.HTTPError, httpx.InvalidURL) as error:
+        raise _usage(f"the console at {base} does not answer: {error}") from error
+    try:
+        found = answer.json()
+    except (json.JSONDecodeError, UnicodeDecodeError) as error:
+        raise _usage(f"{base} is no console: it answers {answer.status_code}") from error
+    if not isinstance(found, dict):
+        raise _usage(f"{base} is no console: it answers {answer.status_code}")
+    if answer.is_error:
+        raise _usage(f"{found.get('error')}: {found.get('detail')}")
+    return found
+
+
+def _usage(text: str) -> typer.Exit:
+    typer.echo(f"lockstep: {escaped(text)}", err=True)
+    return typer.Exit(EXIT_USAGE)

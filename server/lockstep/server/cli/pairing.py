@@ -1,0 +1,102 @@
+"""The commands `pair` and `forget`, about robots that dial in: what a supervisor's page does, for scripts."""
+
+import json
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from lockstep.server.cli.access import MakeSettings
+from lockstep.server.cli.console_request import ask_by_link, ask_console
+from lockstep.server.cli.options import RobotOption, StateDirOption
+from lockstep.server.util.display_names import escaped, printable
+
+__all__ = ["add_pairing_commands"]
+
+EXIT_UNPAIRED = 1
+LOOK_SECONDS = 1.0
+
+Ask = Callable[[str, str], dict[str, Any]]
+Link = Annotated[
+    str,
+    typer.Option(
+        envvar="LOCKSTEP_LINK",
+        help="A supervisor's link, for a console elsewhere; the environment keeps it out of lists of processes. "
+        "Unset: the console of the state directory.",
+    ),
+]
+TlsCa = Annotated[
+    Path | None, typer.Option(help="A certificate to trust for the link, such as a console's own tls-cert.pem.")
+]
+Json = Annotated[bool, typer.Option("--json", help="Print JSON.")]
+
+
+def add_pairing_commands(app: typer.Typer, make_settings: MakeSettings) -> None:
+    """Add the commands. `make_settings` turns flags into settings, as for the other commands."""
+
+    def asking(link: str, tls_ca: Path | None, robot: str, state_dir: Path | None) -> Ask:
+        if link:
+            return lambda method, path: ask_by_link(link, tls_ca, robot, method, path)
+        settings = make_settings(state_dir=state_dir)
+        return lambda method, path: ask_console(settings, robot, method, path)
+
+    @app.command()
+    def pair(
+        wait: Annotated[
+            bool, typer.Option("--wait", help="Wait until a robot is paired; exit code 1 if none.")
+        ] = False,
+        withdraw: Annotated[bool, typer.Option("--withdraw", help="Withdraw the open code instead.")] = False,
+        robot: RobotOption = "",
+        link: Link = "",
+        tls_ca: TlsCa = None,
+        state_dir: StateDirOption = None,
+        as_json: Json = False,
+    ) -> None:
+        """Open a code by which one robot pairs with the console, and print the command for the robot's computer."""
+        ask = asking(link, tls_ca, robot, state_dir)
+        if withdraw:
+            _print(ask("DELETE", "/api/dial-in/code"), as_json, "the code is withdrawn")
+            return
+        made = ask("POST", "/api/dial-in/code")
+        _print(made, as_json, printable(str(made["command"])))
+        typer.echo(f"lockstep: the code is good once, for {made['seconds']:.0f} s and {made['tries']} tries", err=True)
+        if wait and not _is_paired(ask):
+            raise typer.Exit(EXIT_UNPAIRED)
+
+    @app.command()
+    def forget(
+        robot: RobotOption = "",
+        link: Link = "",
+        tls_ca: TlsCa = None,
+        state_dir: StateDirOption = None,
+        as_json: Json = False,
+    ) -> None:
+        """Forget the paired robot: its links end at once, and it does not come in again."""
+        found = asking(link, tls_ca, robot, state_dir)("DELETE", "/api/dial-in/robot")
+        _print(found, as_json, "the robot is forgotten")
+
+
+def _is_paired(ask: Ask) -> bool:
+    """Wait until a robot has used the code, or the code has ended. Says of robots that are refused meanwhile."""
+    said = ""
+    while True:
+        found = ask("GET", "/api/dial-in")
+        pairing = found["pairing"]
+        if found["key"] == "paired":
+            typer.echo(f"lockstep: {escaped(str(found['robot']))} is paired", err=True)
+            return True
+        if pairing["refused"] and pairing["refused"] != said:
+            said = pairing["refused"]
+            typer.echo(f"lockstep: a robot was refused: {escaped(str(said))}", err=True)
+        if pairing["state"] != "waiting":
+            typer.echo("lockstep: no robot was paired: the code has ended", err=True)
+            return False
+        time.sleep(LOOK_SECONDS)
+
+
+def _print(answer: dict[str, Any], as_json: bool, words: str) -> None:
+    sys.stdout.write((json.dumps(answer) if as_json else words) + "\n")
+    sys.stdout.flush()

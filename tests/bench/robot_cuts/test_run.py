@@ -1,0 +1,43 @@
+"""The robot's network is cut, in a namespace of its own; and what the figures say of findings."""
+
+import pytest
+
+from lockstep.bench.experiment.judge.outage_judge import Finding
+from lockstep.bench.robot_cuts.run import Way, figures, run_cuts
+from lockstep.emulator.errors import NamespacesUnavailable
+from lockstep.emulator.namespace.namespaces import ROBOT_ADDRESS
+from lockstep.emulator.namespace.tun import open_tun
+
+
+def finding(**parts: float | None) -> Finding:
+    good = {"rest_seconds": 0.2, "hold": 0.3, "oldest_answer": 0.1, "oldest_intention": 0.1, "max_event_age": 2.0}
+    return Finding(**{**good, "control_seconds": 0.5, **parts})  # type: ignore[arg-type]  # the names are its fields
+
+
+def test_the_figures_are_the_worst_of_all_cuts_and_count_the_good_ones() -> None:
+    bad = [finding(rest_seconds=0.4), finding(control_seconds=2.5), finding(oldest_answer=2.1)]
+    found = figures([finding(), *bad])
+    assert found["cuts"] == 4
+    assert (found["rest_ms_worst"], found["back_ms_worst"], found["oldest_answer_ms"]) == (400.0, 2500.0, 2100.0)
+    assert [found[name] for name in ("rested_within_hold", "back_within_2_s", "nothing_late")] == [3, 3, 3]
+
+
+def test_a_robot_that_never_rested_or_came_back_has_no_worst_figure() -> None:
+    found = figures([finding(), finding(rest_seconds=None, control_seconds=None)])
+    assert (found["rest_ms_worst"], found["back_ms_worst"]) == (None, None)
+    assert (found["rested_within_hold"], found["back_within_2_s"]) == (1, 1)
+
+
+@pytest.mark.timeout(120)
+@pytest.mark.parametrize("way", ["reached", "dial-in"])
+async def test_a_robot_rests_while_it_is_cut_off_and_is_driven_again(way: Way) -> None:
+    try:
+        open_tun(ROBOT_ADDRESS).close()
+    except NamespacesUnavailable as reason:
+        pytest.skip(str(reason))
+    said: list[str] = []
+    (found,) = await run_cuts(way, 1, 2.0, 1, said.append)
+    assert found.rest_seconds is not None
+    assert found.nothing_queued_executed
+    assert found.control_seconds is not None
+    assert said[0].startswith("cut 1: driven again")

@@ -1,0 +1,101 @@
+"""`lockstep pair` and `lockstep forget` as their users run them, beside a console and from elsewhere."""
+
+import asyncio
+import json
+import sys
+from pathlib import Path
+
+import pytest
+
+from lockstep.bench.harness.processes import running_process
+from lockstep.bench.harness.stack import LOCKSTEP
+from tests.support.stack import Stack, running_console, running_stack
+from tests.waiting import PATIENCE
+
+TLS = ("--tls", "self-signed", "--host", "127.0.0.1")
+PIPE = asyncio.subprocess.PIPE
+
+
+async def run(*arguments: str) -> tuple[int | None, str, str]:
+    """Exit code, output and errors."""
+    process = await asyncio.create_subprocess_exec(LOCKSTEP, *arguments, stdout=PIPE, stderr=PIPE)
+    async with asyncio.timeout(PATIENCE):
+        output, errors = await process.communicate()
+    return process.returncode, output.decode(), errors.decode()
+
+
+def robot_command(stack: Stack, directory: Path, code: str) -> tuple[str, ...]:
+    url = stack.console.replace("http", "ws", 1)
+    command = (sys.executable, "-m", "lockstep.robot_bridge", "planar", "--json", "--console", url)
+    return (*command, "--state-dir", str(directory / "robot"), "--pair", code)
+
+
+async def test_a_robot_is_paired_and_forgotten_from_beside_the_console(tmp_path: Path) -> None:
+    async with running_console(tmp_path, "dial-in", tmp_path / "events", TLS) as stack:
+        beside = ("--state-dir", str(tmp_path / "state"))
+        waiting = await asyncio.create_subprocess_exec(
+            *(LOCKSTEP, "pair", "--wait", "--json", *beside), stdout=PIPE, stderr=PIPE
+        )
+        assert waiting.stdout is not None
+        async with asyncio.timeout(PATIENCE):
+            made = json.loads(await waiting.stdout.readline())
+        assert made["command"].endswith(f"--pair {made['code']}")
+        async with running_process(*robot_command(stack, tmp_path, made["code"])):
+            async with asyncio.timeout(PATIENCE):
+                _, errors = await waiting.communicate()
+            assert waiting.returncode == 0
+            assert b"is paired" in errors
+            code, _, errors_again = await run("pair", *beside)
+            assert (code, "already_paired" in errors_again) == (2, True)
+            assert await run("forget", *beside) == (0, "the robot is forgotten\n", "")
+        code, _, said = await run("forget", *beside)
+        assert (code, "no robot is paired" in said) == (2, True)
+
+
+async def test_a_supervisors_link_does_the_same_from_elsewhere_and_an_operators_does_not(tmp_path: Path) -> None:
+    async with running_console(tmp_path, "dial-in", tmp_path / "events", TLS) as stack:
+        trusted = ("--tls-ca", str(tmp_path / "state" / "tls-cert.pem"))
+        code, output, errors = await run("pair", "--link", stack.supervisor, *trusted)
+        assert code == 0, errors
+        assert output.startswith("lockstep robot NAME --console wss://")
+        assert "5 tries" in errors
+        code, _, errors = await run("pair", "--link", stack.operator, *trusted)
+        assert (code, "lockstep: " in errors) == (2, True)
+        code, output, _ = await run("pair", "--withdraw", "--link", stack.supervisor, *trusted)
+        assert (code, output) == (0, "the code is withdrawn\n")
+        code, _, errors = await run("pair", "--link", stack.supervisor)
+        assert (code, "does not answer" in errors) == (2, True), "its certificate is nobody's"
+
+
+async def test_waiting_ends_when_the_code_does(tmp_path: Path) -> None:
+    async with running_console(tmp_path, "dial-in", tmp_path / "events", TLS):
+        beside = ("--state-dir", str(tmp_path / "state"))
+        waiting = await asyncio.create_subprocess_exec(*(LOCKSTEP, "pair", "--wait", *beside), stdout=PIPE, stderr=PIPE)
+        assert waiting.stdout is not None
+        async with asyncio.timeout(PATIENCE):
+            assert (await waiting.stdout.readline()).startswith(b"lockstep robot")
+            assert (await run("pair", "--withdraw", *beside))[0] == 0
+            _, errors = await waiting.communicate()
+        assert waiting.returncode == 1
+        assert b"no robot was paired" in errors
+
+
+async def test_a_console_that_connects_to_its_robot_pairs_none(tmp_path: Path) -> None:
+    async with running_stack(tmp_path):
+        code, _, errors = await run("pair", "--state-dir", str(tmp_path / "state"))
+    assert (code, "not_dial_in" in errors) == (2, True)
+
+
+@pytest.mark.parametrize("link", ["hello", "ftp://x/#token=1", "http://127.0.0.1:1/", "http://[/#token=1"])
+async def test_what_is_no_link_is_refused_before_anything_is_asked(link: str) -> None:
+    code, _, errors = await run("forget", "--link", link)
+    assert (code, "a link is https://" in errors) == (2, True)
+
+
+async def test_a_console_that_is_away_is_said_to_be(tmp_path: Path) -> None:
+    code, _, errors = await run("forget", "--state-dir", str(tmp_path))
+    assert (code, "no console has run" in errors) == (2, True)
+    code, _, errors = await run("forget", "--link", "http://127.0.0.1:1/#token=x")
+    assert (code, "does not answer" in errors) == (2, True)
+    code, _, errors = await run("forget", "--link", "http://127.0.0.1:1/#token=x", "--tls-ca", str(tmp_path / "none"))
+    assert (code, "is no certificate" in errors) == (2, True)

@@ -1,0 +1,64 @@
+"""The robot of robot_node.py with services, batteries and diagnostics. Run with ROS' Python.
+
+More lines on standard input: `charge X` (NaN: unknown) and `level NAME N` (of a component).
+"""
+
+from pathlib import Path
+
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from rclpy.callback_groups import ReentrantCallbackGroup
+from robot_node import RobotNode, main  # type: ignore[import-not-found]  # beside this file, which is run as a script
+from sensor_msgs.msg import BatteryState
+from std_srvs.srv import SetBool, Trigger
+
+EVERY = 0.1  # s
+
+
+class ServingRobot(RobotNode):  # type: ignore[misc]
+    def __init__(self, log: Path) -> None:
+        super().__init__(log)
+        self._charge, self._levels = 0.8, {"motors: left": 0, "lidar": 0}
+        self._battery = self.create_publisher(BatteryState, "/battery_state", 10)
+        self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", 10)
+        group = ReentrantCallbackGroup()
+        self.create_service(SetBool, "/light", self._light, callback_group=group)
+        self.create_service(Trigger, "/beep", self._beep, callback_group=group)
+        self.create_service(Trigger, "/calibrate", self._calibrate, callback_group=group)
+        self.create_timer(EVERY, self._report)
+
+    def tell(self, line: str) -> None:
+        verb, *words = line.split(" ")
+        if verb == "charge":
+            self._charge = float(words[0])
+        elif verb == "level":
+            self._levels[" ".join(words[:-1])] = int(words[-1])
+        else:
+            super().tell(line)
+
+    def _light(self, request: SetBool.Request, response: SetBool.Response) -> SetBool.Response:
+        self.note("light", on=request.data)
+        response.success, response.message = True, "on" if request.data else "off"
+        return response
+
+    def _beep(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        self.note("beep")
+        response.success, response.message = True, "it\x1b[31m beeped"
+        return response
+
+    def _calibrate(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        response.success, response.message = False, "the lid is open"
+        return response
+
+    def _report(self) -> None:
+        battery = BatteryState()
+        battery.header.stamp = self.get_clock().now().to_msg()
+        battery.voltage, battery.percentage = 24.5, self._charge
+        battery.charge = battery.capacity = float("nan")
+        self._battery.publish(battery)
+        for name, level in self._levels.items():  # each from a node of its own, as it were
+            status = DiagnosticStatus(level=bytes([level]), name=name, message="" if level == 0 else "too hot")
+            self._diagnostics.publish(DiagnosticArray(status=[status]))
+
+
+if __name__ == "__main__":
+    main(ServingRobot)
