@@ -63,7 +63,7 @@ export class SidePanels {
   ) {
     const { controls } = engine;
     const pad = (controls.pad ??= new Pad(controls.events, new GamepadStorage()));
-    this.pads = once(() => createGamepadSheet(pad));
+    this.pads = once(() => createGamepadSheet(pad, engine.display));
     this.session = new SessionApi(api);
     const robotLink = new RobotLinkApi(api);
     this.pairing = once(() => createRobotLinkSheet([["", robotLink]]));
@@ -157,7 +157,7 @@ export class SidePanels {
       element: notes.element,
       update: (now) => {
         notes.update(now);
-        if (!document.hidden && notes.element.checkVisibility()) markRead(this.unread, engine.state.notes);
+        if (engine.display.visible && notes.element.checkVisibility()) markRead(this.unread, engine.state.notes);
       },
     };
     const news = (): number => this.countNews();

@@ -1,5 +1,6 @@
 import type { HeldInputs } from "../drive/axis_mapping";
 import { createInputActivity, noteInput } from "../drive/input_activity";
+import type { PadInputs } from "../gamepad/mapping";
 import { Keyboard, type KeyboardEvents } from "./keyboard";
 import type { Pad, PadEvents, PadState } from "./gamepad";
 import type { TouchSticks } from "./touch_sticks";
@@ -14,10 +15,19 @@ export interface ControlSample {
   readonly signature: string; // the same while no hand shows
 }
 
+/** What the controllers or hands of a headset hold. */
+export interface HeadsetControls {
+  readonly deadman: boolean;
+  readonly inputs: PadInputs;
+  readonly gamepad: Gamepad | null; // of the hand that holds the deadman: what it may feel
+  release(): void;
+}
+
 /** Gamepad, keyboard and touch as one set of controls. */
 export class Controls {
   pad: Pad | null = null; // until its code is there
   readonly keyboard: Keyboard;
+  headset: HeadsetControls | null = null; // while its session lasts
   private readonly activity = createInputActivity();
 
   constructor(
@@ -38,9 +48,19 @@ export class Controls {
     return this.pad?.hasNews === true;
   }
 
+  /** Whether a deadman of the window is held. */
+  get usesWindow(): boolean {
+    return this.keyboard.deadman || this.sticks.deadman || this.readyPad?.deadman === true;
+  }
+
+  /** What a contact is felt with. */
+  get felt(): Gamepad | null {
+    return this.headset?.gamepad ?? this.pad?.state?.gamepad ?? null;
+  }
+
   /** Whether a deadman is held, by what is known now. */
   get deadman(): boolean {
-    return this.keyboard.deadman || this.sticks.deadman || this.readyPad?.deadman === true;
+    return this.usesWindow || this.headset?.deadman === true;
   }
 
   private get readyPad(): PadState | null {
@@ -52,7 +72,11 @@ export class Controls {
     if (isTick || this.hasPadNews) this.pad?.poll(isTick);
     const { keyboard, sticks, readyPad: pad } = this;
     const touch = sticks.deadman ? sticks.inputs : null;
-    const held: HeldInputs = { pad: pad?.inputs ?? null, keys: keyboard.keys, touch };
+    const held: HeldInputs = {
+      pad: (this.headset?.deadman === true ? this.headset : pad)?.inputs ?? null,
+      keys: keyboard.keys,
+      touch,
+    };
     return {
       deadman: this.deadman,
       held,
@@ -65,6 +89,7 @@ export class Controls {
   release(): void {
     this.keyboard.release();
     this.sticks.release();
+    this.headset?.release();
   }
 
   close(): void {

@@ -1,6 +1,7 @@
 import type { PadLayout } from "../../gamepad/layout";
 import { padName, setupOf } from "../../gamepad/profile";
 import { MAX_STORE_CHARS } from "../../gamepad/profile_file";
+import type { Display } from "../../input/display";
 import type { Pad } from "../../input/gamepad";
 import { saveFile } from "../elements/save_file";
 import { button, h, setData, setHidden, setText } from "../elements/dom";
@@ -11,8 +12,8 @@ import { CalibrationWizard } from "./calibration_wizard";
 import type { SheetContent } from "../elements/sheet";
 
 /** Which pad drives, what its parts do, and how it feels. */
-export function createGamepadSheet(pad: Pad): SheetContent {
-  return new PadSheet(pad);
+export function createGamepadSheet(pad: Pad, display: Display): SheetContent {
+  return new PadSheet(pad, display);
 }
 
 class PadSheet implements SheetContent {
@@ -36,7 +37,10 @@ class PadSheet implements SheetContent {
   private calibrated: Gamepad | null = null; // being calibrated
   private frame = 0;
 
-  constructor(private readonly pad: Pad) {
+  constructor(
+    private readonly pad: Pad,
+    private readonly display: Display,
+  ) {
     this.list = new PadList(pad, { calibrate: (gamepad) => this.calibrate(gamepad) });
     this.wizard = new CalibrationWizard({
       save: (layout) => this.keep(layout),
@@ -50,14 +54,14 @@ class PadSheet implements SheetContent {
   opened(): void {
     this.leaveWizard();
     const step = (now: number): void => {
-      this.frame = requestAnimationFrame(step);
+      this.frame = this.display.request(step);
       this.update(now);
     };
     step(performance.now());
   }
 
   closed(): void {
-    cancelAnimationFrame(this.frame);
+    this.display.cancel(this.frame);
     this.leaveWizard();
   }
 
