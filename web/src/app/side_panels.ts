@@ -3,6 +3,7 @@ import { ChartsDrawer } from "../charts/charts_drawer";
 import type { WaySource } from "../charts/way_figures";
 import type { ConsoleEngine } from "../engine/console_engine";
 import { Tracing } from "../engine/tracing";
+import { HeadsetEntry } from "../headset/headset_entry";
 import { PictureTrace } from "../media/picture_trace";
 import { readFragment } from "../util/url_fragment";
 import type { PageAction } from "../input/shortcuts";
@@ -70,11 +71,13 @@ export class SidePanels {
     void this.lookForPairing(robotLink);
     this.sheets = new Sheets(() => root.querySelectorAll<HTMLElement>(BEHIND_SHEETS));
     this.record = createRecordButton(engine, this.session);
+    const headset = new HeadsetEntry({ engine, grid });
     this.pageTools = createPageTools({
       charts: () => this.act("charts"),
       keys: () => this.act("keys"),
       pads: () => this.act("pads"),
       scene: () => this.toggleScene(),
+      headset: (className) => headset.createButtons(className),
     });
     this.tools = {
       element: this.pageTools.bar,
@@ -157,7 +160,8 @@ export class SidePanels {
       element: notes.element,
       update: (now) => {
         notes.update(now);
-        if (engine.display.visible && notes.element.checkVisibility()) markRead(this.unread, engine.state.notes);
+        if (engine.display.visible && notes.element.checkVisibility())
+          markRead(this.unread, engine.state.notes);
       },
     };
     const news = (): number => this.countNews();

@@ -40,6 +40,7 @@ import { SessionClient } from "../session/session_client";
 import type { ActionClient } from "../robot/action_client";
 import type { ActConditions } from "../robot/actions";
 import { reportOf } from "./report";
+import type { HeadsetStep } from "./headset_statistics";
 import type { Tracing } from "./tracing";
 import { StopSender } from "./stop_sender";
 import type { Talkback } from "../talkback/talkback";
@@ -85,7 +86,7 @@ export class ConsoleEngine {
   readonly audio = new AudioDevice();
   readonly display = new Display();
   charts: Stepped | null = null; // until its code is there
-  headset: Stepped | null = null; // while its session lasts
+  headset: HeadsetStep | null = null; // while its session lasts
   talkback: Talkback | null = null; // likewise
   connectionState: ConnectionState = { kind: "connecting" };
   driver: driver.Driver | null = null;

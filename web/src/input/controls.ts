@@ -20,6 +20,7 @@ export interface HeadsetControls {
   readonly deadman: boolean;
   readonly inputs: PadInputs;
   readonly gamepad: Gamepad | null; // of the hand that holds the deadman: what it may feel
+  readonly signature: string; // another one when a hand moves
   release(): void;
 }
 
@@ -81,7 +82,7 @@ export class Controls {
       deadman: this.deadman,
       held,
       slowShare: keyboard.slow ? SLOW_SHARE : 1,
-      signature: noteInput(this.activity, held),
+      signature: noteInput(this.activity, held) + (this.headset?.signature ?? ""),
     };
   }
 
