@@ -21,6 +21,7 @@ export function feedbackOf(event: number, rest: Partial<Feedback> = {}): Feedbac
     time: 0,
     axes: [0, 0],
     joints: [],
+    goals: [],
     wrench: [],
     ranges: [],
     at_rest: true,
@@ -40,7 +41,15 @@ export function refusalOf(event: number, reason: Refusal["reason"]): Refusal {
 }
 
 export function axisOf(name: string, rest: Partial<Axis> = {}): Axis {
-  return { name, label: name, unit: "m/s", minimum: -1, maximum: 2, slew: 1, brake: 1, rest: 0, ...rest };
+  return {
+    ...{ name, label: name, unit: "m/s", minimum: -1, maximum: 2, slew: 1, brake: 1, rest: 0 },
+    ...{ kind: "rate", acceleration: 0, reach: 0, wrap: null },
+    ...rest,
+  };
+}
+
+export function goalAxisOf(name: string, rest: Partial<Axis> = {}): Axis {
+  return axisOf(name, { unit: "rad", minimum: -2, kind: "goal", acceleration: 4, reach: 0.5, ...rest });
 }
 
 export function descriptionOf(axes: readonly Axis[]): RobotDescription {
@@ -62,6 +71,7 @@ export function descriptionOf(axes: readonly Axis[]): RobotDescription {
     start_warning: null,
     watchdog: null,
     body_twists: [],
+    poses: [],
     actions: [],
     hold: 0.3,
     max_event_age: 2,

@@ -7,6 +7,7 @@ export { SoundStream } from "../media/sound/sound_stream";
 export { SidePanels } from "./side_panels";
 export { createForceGauge } from "../ui/driving/force_gauge";
 export { createScene } from "../scene/page_scene";
+export { createAxisBars } from "../ui/driving/axis_bars";
 export { createAxisPositionPanel } from "../ui/driving/axis_position_panel";
 export { createRangeRadar } from "../ui/driving/range_radar";
 export { createScaleBar } from "../ui/views/scale_bar";

@@ -114,7 +114,10 @@ export class Page {
     const charts = later.panel((parts) => side(parts).charts);
     const sheets = later.panel((parts) => ({ element: side(parts).sheets.element, update: () => undefined }));
     const arm = createArmPanel(engine);
-    const axes = createAxisPanel(engine);
+    const axes = createAxisPanel(
+      engine,
+      later.panel((parts) => parts.createAxisBars(engine)),
+    );
     const stop = createStopPanel(engine);
     const announcer = createAnnouncer(engine);
     grid.gauges.append(places.element, force.element, radar.element);

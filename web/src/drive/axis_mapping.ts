@@ -4,29 +4,45 @@ import type { PadInputs } from "../gamepad/mapping";
 export type TouchInput = NonNullable<Binding["touch"]>;
 export type TouchInputs = Readonly<Record<TouchInput, number>>; // -1 to 1; right and up are positive
 
+/** Sliders of goal axes that are held; by the axes' names. */
+export interface SliderInputs {
+  readonly travels: Readonly<Record<string, number>>; // since it was taken, as a share of the axis' range
+  readonly pushes: Readonly<Record<string, number>>; // by the arrow keys: -1 or 1
+}
+
 /** Everything an operator holds at one moment. */
 export interface HeldInputs {
   readonly pad: PadInputs | null;
   readonly keys: ReadonlySet<string>; // KeyboardEvent.code
   readonly touch: TouchInputs | null;
+  readonly sliders?: SliderInputs | null;
 }
 
-/** One value per axis, in its unit. `scale` (0 to 1) slows everything down. */
+/** One value per axis, in its unit; null for goal axes, which are not driven by a rate. `scale` (0 to 1) slows down. */
 export function axisValues(
   axes: readonly Axis[],
   layer: ControlLayer | undefined,
   held: HeldInputs,
   scale: number,
-): number[] {
-  return axes.map((axis) => {
-    const bindings = layer?.bindings.filter((binding) => binding.axis === axis.name) ?? [];
-    const input = bindings.reduce((sum, binding) => sum + binding.scale * inputOf(binding, held), 0);
-    return valueOf(axis, clamp(input, -1, 1) * scale);
-  });
+): (number | null)[] {
+  return axes.map((axis) =>
+    axis.kind === "goal" ? null : valueOf(axis, inputFor(axis, layer, held) * scale),
+  );
 }
 
-export function restValues(axes: readonly Axis[]): number[] {
-  return axes.map((axis) => axis.rest);
+/** Of all that is bound to an axis: -1 to 1. */
+export function inputFor(axis: Axis, layer: ControlLayer | undefined, held: HeldInputs): number {
+  const bindings = layer?.bindings.filter((binding) => binding.axis === axis.name) ?? [];
+  return clamp(
+    bindings.reduce((sum, binding) => sum + binding.scale * inputOf(binding, held), 0),
+    -1,
+    1,
+  );
+}
+
+/** What moves nothing. */
+export function neutralValues(axes: readonly Axis[]): (number | null)[] {
+  return axes.map((axis) => (axis.kind === "goal" ? null : axis.rest));
 }
 
 function inputOf(binding: Binding, held: HeldInputs): number {

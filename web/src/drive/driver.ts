@@ -47,7 +47,8 @@ const FEW_SAMPLES = 8;
 /** What the operator wants now. */
 export interface Intention {
   readonly armed: boolean;
-  readonly values: readonly number[]; // one per axis; at rest unless the deadman is held
+  readonly values: readonly (number | null)[]; // one per axis; at rest unless the deadman is held
+  readonly speed?: number; // 0 to 1, of the goal axes' largest
   readonly action?: string; // id of the moving action that this page lets go on; "" for none
 }
 
@@ -67,7 +68,7 @@ export interface Driver {
   readonly gate: CommandGate;
   readonly repeat: RepeatTimer;
   readonly latency: Latency;
-  readonly neutral: readonly number[]; // the axes' rest values
+  readonly neutral: readonly (number | null)[]; // what moves no axis
   sends: number; // of the event in flight; its echo does not count
   lastSentMs: number; // the last of them
   repeatAtMs: number;
@@ -75,7 +76,7 @@ export interface Driver {
   echoesLeft: number;
   lossyUntilMs: number; // -Infinity before the first loss
   readonly pings: number[]; // their round trips in ms, newest last; none of a command is shorter
-  lastValues: readonly number[]; // sent last
+  lastValues: readonly (number | null)[]; // sent last
   neutralOwed: boolean; // one neutral command is due after disarming
   barred: boolean; // nothing but rests leaves until the person has armed
   unproven: boolean; // armed, and no neutral command was answered since
@@ -89,7 +90,7 @@ export function createDriver(
   pacing: Pacing,
   tolerance: number,
   minIntervalMs: number,
-  neutral: readonly number[],
+  neutral: readonly (number | null)[],
   calmIntervalMs = minIntervalMs,
 ): Driver {
   return {
@@ -256,8 +257,7 @@ function restDue(driver: Driver, now: number): ClientMessage | null {
 function commandDue(driver: Driver, intention: Intention, now: number): ClientMessage | null {
   const next = nextCommand(driver.gate);
   if (next === null || driver.barred) return null;
-  const isVoided = driver.barrier !== null && !isNewer(next.event, driver.barrier);
-  const mayMove = intention.armed && !isVoided && !driver.unproven;
+  const mayMove = intention.armed && driverMayMove(driver);
   const values = mayMove ? intention.values : driver.neutral;
   if (driver.gate.inFlight !== null) {
     if (now < Math.min(driver.repeatAtMs, driver.echoAtMs)) return null;
@@ -273,10 +273,20 @@ function commandDue(driver: Driver, intention: Intention, now: number): ClientMe
   }
   driver.lastValues = values;
   // Only an armed page lets an action go on: what it sends after disarming names none.
-  const { action = "" } = intention;
-  return action !== "" && mayMove
-    ? { type: "command", ...next, values, action }
-    : { type: "command", ...next, values };
+  const { action = "", speed = 1 } = intention;
+  return {
+    type: "command",
+    ...next,
+    values,
+    ...(action !== "" && mayMove ? { action } : {}),
+    ...(speed < 1 && mayMove ? { speed } : {}),
+  };
+}
+
+/** Whether the next command of one who is armed may move the robot. */
+export function driverMayMove({ gate, barrier, barred, unproven }: Driver): boolean {
+  const next = nextCommand(gate);
+  return next !== null && !barred && !unproven && (barrier === null || isNewer(next.event, barrier));
 }
 
 function noteSending(driver: Driver, sends: number, now: number): void {
@@ -318,7 +328,12 @@ function knowsFewCommands(driver: Driver): boolean {
   return driver.latency.toFeedback.values.length < FEW_SAMPLES;
 }
 
-function wantsToSend(driver: Driver, intention: Intention, values: readonly number[], now: number): boolean {
+function wantsToSend(
+  driver: Driver,
+  intention: Intention,
+  values: readonly (number | null)[],
+  now: number,
+): boolean {
   if (gateState(driver.gate, now) !== "open") return false;
   if (!intention.armed) return driver.neutralOwed;
   if (driver.unproven) return true;
@@ -327,6 +342,6 @@ function wantsToSend(driver: Driver, intention: Intention, values: readonly numb
   return !idles || now - driver.gate.lastSentMs >= IDLE_INTERVAL_MS;
 }
 
-function isSame(left: readonly number[], right: readonly number[]): boolean {
+function isSame(left: readonly (number | null)[], right: readonly (number | null)[]): boolean {
   return left.length === right.length && left.every((value, index) => value === right[index]);
 }

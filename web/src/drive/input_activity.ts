@@ -6,7 +6,7 @@ const TREMOR = 0.03;
 /** What is held, compared with what was held when it last changed: a deadman that is taped down changes nothing. */
 export interface InputActivity {
   keys: string; // pressed
-  values: readonly number[]; // of pad and touch
+  values: readonly number[]; // of pad, touch and sliders
   changes: number;
 }
 
@@ -17,7 +17,7 @@ export function createInputActivity(): InputActivity {
 /** Takes what is held now; returns a text that stays the same while no hand shows. */
 export function noteInput(activity: InputActivity, held: HeldInputs): string {
   const keys = [...held.keys].sort().join();
-  const values = [...valuesOf(held.pad), ...valuesOf(held.touch)];
+  const values = [...valuesOf(held.pad), ...valuesOf(held.touch), ...valuesOf(held.sliders?.travels ?? null)];
   if (keys !== activity.keys || isMoved(values, activity.values)) {
     activity.keys = keys;
     activity.values = values;

@@ -12,8 +12,9 @@ export function limitLabels(
   description: RobotDescription | null,
   cap: SpeedCapState | null,
   share: number,
+  refused: readonly string[] = [], // goals, in words
 ): LimitLabel[] {
-  const words: LimitLabel[] = [];
+  const words: LimitLabel[] = refused.map((text) => ({ tone: "fault", text }));
   for (const fault of feedback?.faults ?? []) words.push({ tone: "fault", text: fault });
   for (const name of feedback?.limits ?? [])
     words.push({ tone: "limit", text: limitLabel(name, description) });

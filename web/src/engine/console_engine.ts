@@ -1,4 +1,4 @@
-import { axisValues, restValues } from "../drive/axis_mapping";
+import { axisValues, neutralValues } from "../drive/axis_mapping";
 import * as arming from "../drive/arming";
 import * as driver from "../drive/driver";
 import {
@@ -42,6 +42,7 @@ import type { ActConditions } from "../robot/actions";
 import { reportOf } from "./report";
 import type { HeadsetStep } from "./headset_statistics";
 import type { Tracing } from "./tracing";
+import type { GoalDriving } from "../drive/goals/goal_driving";
 import { StopSender } from "./stop_sender";
 import type { Talkback } from "../talkback/talkback";
 import type {
@@ -91,7 +92,8 @@ export class ConsoleEngine {
   connectionState: ConnectionState = { kind: "connecting" };
   driver: driver.Driver | null = null;
   layer = 0;
-  values: readonly number[] = []; // commanded now
+  values: readonly (number | null)[] = []; // commanded now
+  goals: GoalDriving | null = null; // until its code is there; goal axes stay where they are before
   viewDelayMs: number | null = null; // how late the pictures are now; null: not known
   speedShare = 1; // of full speed that the cap leaves
   firstPictureMs: number | null = null;
@@ -347,6 +349,7 @@ export class ConsoleEngine {
       this.tookFeedback(message, before, now);
     else if (message.type === "refusal" && this.driver !== null) {
       driver.driverRefusal(this.driver, message, this.isArmed());
+      this.goals?.refused(message, now);
       this.tracing?.book.noteRefused(message.event);
       this.drive(now);
     } else if (message.type === "pong") this.tookPong(message.id, now);
@@ -410,7 +413,7 @@ export class ConsoleEngine {
       pacing,
       tolerance.video,
       1000 / rate,
-      restValues(axes),
+      neutralValues(axes),
       CALM_INTERVAL_MS,
     );
     this.heartbeat.begin();
@@ -454,7 +457,7 @@ export class ConsoleEngine {
     if (lost !== null) this.disarm(lost);
     const change = arming.sampleDeadman(this.arming, sample.deadman, sample.signature, now);
     this.capSpeed(now);
-    this.takeValues(sample);
+    this.takeValues(sample, now);
     this.tracing?.noteIntention(this.values, now);
     if (this.driver !== null && change === "released") driver.driverRelease(this.driver, now);
     if (this.driver !== null && change === "taped_down") driver.driverDisarm(this.driver, now);
@@ -462,14 +465,21 @@ export class ConsoleEngine {
     this.drive(now);
   }
 
-  private takeValues(sample: ControlSample): void {
-    const description = this.state.robot?.description;
-    if (description === undefined) this.values = [];
-    else if (this.arming.state !== "driving") this.values = restValues(description.axes);
-    else {
-      const share = sample.slowShare * this.speedShare;
-      this.values = axisValues(description.axes, description.layers[this.layer], sample.held, share);
+  private takeValues({ held, slowShare }: ControlSample, now: number): void {
+    const { robot, feedback } = this.state;
+    if (robot === null) {
+      this.values = [];
+      return;
     }
+    const { description } = robot;
+    const { axes } = description;
+    const layer = description.layers[this.layer];
+    const share = slowShare * this.speedShare;
+    const drives = this.arming.state === "driving";
+    const values = drives ? axisValues(axes, layer, held, share) : neutralValues(axes);
+    const moves = drives && this.driver !== null && driver.driverMayMove(this.driver);
+    const inputs = { description, layer, held, share, feedback, moves };
+    this.values = this.goals?.take(values, inputs, now) ?? values;
   }
 
   /** The console learns at once when the delay becomes known: until then it keeps the robot slow. */
@@ -489,6 +499,7 @@ export class ConsoleEngine {
     const intention = {
       armed: this.isArmed(),
       values: this.values,
+      speed: this.goals?.speed ?? 1,
       action: this.actions?.renewed(now) ?? "",
     };
     const messages = driver.driverStep(this.driver, intention, this.canCommand(), now);

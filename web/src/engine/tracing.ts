@@ -20,7 +20,7 @@ export class Tracing {
   private readonly shownIn = new Set<string>(); // where somebody looks at them now
   private shownMs = -Infinity; // when they were last
   private asked = false;
-  private values: readonly number[] = [];
+  private values: readonly (number | null)[] = [];
   private changedMs: number | null = null; // when the intention became one that no command has carried yet
   private reportedMs = 0;
 
@@ -40,7 +40,7 @@ export class Tracing {
   }
 
   /** What the operator wants now. The wait of a change begins with the first one that no command has carried. */
-  noteIntention(values: readonly number[], now: number): void {
+  noteIntention(values: readonly (number | null)[], now: number): void {
     if (values.length === this.values.length && values.some((value, at) => value !== this.values[at]))
       this.changedMs ??= now;
     this.values = values;

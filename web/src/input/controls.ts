@@ -3,6 +3,7 @@ import { createInputActivity, noteInput } from "../drive/input_activity";
 import type { PadInputs } from "../gamepad/mapping";
 import { Keyboard, type KeyboardEvents } from "./keyboard";
 import type { Pad, PadEvents, PadState } from "./gamepad";
+import type { GoalSliders } from "./goal_sliders";
 import type { TouchSticks } from "./touch_sticks";
 
 const SLOW_SHARE = 0.3;
@@ -27,6 +28,7 @@ export interface HeadsetControls {
 /** Gamepad, keyboard and touch as one set of controls. */
 export class Controls {
   pad: Pad | null = null; // until its code is there
+  sliders: GoalSliders | null = null; // likewise
   readonly keyboard: Keyboard;
   headset: HeadsetControls | null = null; // while its session lasts
   private readonly activity = createInputActivity();
@@ -51,7 +53,8 @@ export class Controls {
 
   /** Whether a deadman of the window is held. */
   get usesWindow(): boolean {
-    return this.keyboard.deadman || this.sticks.deadman || this.readyPad?.deadman === true;
+    const { keyboard, sticks, sliders, readyPad: pad } = this;
+    return keyboard.deadman || sticks.deadman || sliders?.deadman === true || pad?.deadman === true;
   }
 
   /** What a contact is felt with. */
@@ -73,11 +76,10 @@ export class Controls {
     if (isTick || this.hasPadNews) this.pad?.poll(isTick);
     const { keyboard, sticks, readyPad: pad } = this;
     const touch = sticks.deadman ? sticks.inputs : null;
-    const held: HeldInputs = {
-      pad: (this.headset?.deadman === true ? this.headset : pad)?.inputs ?? null,
-      keys: keyboard.keys,
-      touch,
-    };
+    const sliders = this.sliders?.sample(keyboard.keys) ?? null;
+    const keys = sliders?.otherKeys ?? keyboard.keys;
+    const inputs = (this.headset?.deadman === true ? this.headset : pad)?.inputs ?? null;
+    const held: HeldInputs = { pad: inputs, keys, touch, sliders };
     return {
       deadman: this.deadman,
       held,
@@ -90,6 +92,7 @@ export class Controls {
   release(): void {
     this.keyboard.release();
     this.sticks.release();
+    this.sliders?.release();
     this.headset?.release();
   }
 

@@ -19,6 +19,7 @@ export interface ReplayFeedback {
   readonly arrived: number;
   readonly time: number; // s, the robot bridge's own clock
   readonly axes: readonly number[];
+  readonly goals: readonly (number | null)[]; // applied; null of a rate axis, empty without goal axes
   readonly joints: readonly number[];
   readonly wrench: readonly number[];
   readonly ranges: readonly number[];
@@ -35,7 +36,7 @@ export interface ReplayCommand {
   readonly event: number;
   readonly issue: number;
   readonly arrived: number;
-  readonly values: readonly number[];
+  readonly values: readonly (number | null)[]; // null: a goal axis stays where it is
   readonly name: string; // of who sent it
 }
 
@@ -135,6 +136,7 @@ function parseFeedback(value: unknown, arrived: number): ReplayFeedback[] {
       arrived,
       time: numeric(value["time"]),
       axes: numbers(value["axes"]),
+      goals: goals(value["goals"]),
       joints: numbers(value["joints"]),
       wrench: numbers(value["wrench"]),
       ranges: numbers(value["ranges"]),
@@ -156,7 +158,7 @@ function parseCommand(value: unknown, arrived: number): ReplayCommand[] {
       event: numeric(value["event"]),
       issue: numeric(value["issue"]),
       arrived,
-      values: numbers(value["values"]),
+      values: goals(value["values"]),
       name: displayText(value["name"]),
     },
   ];
@@ -168,6 +170,11 @@ function numeric(value: unknown): number {
 
 function numbers(value: unknown): number[] {
   return Array.isArray(value) ? value.slice(0, MOST_NUMBERS).map(numeric) : [];
+}
+
+function goals(value: unknown): (number | null)[] {
+  if (!Array.isArray(value)) return [];
+  return value.slice(0, MOST_NUMBERS).map((each) => (each === null ? null : numeric(each)));
 }
 
 function text(value: unknown): string {

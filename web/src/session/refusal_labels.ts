@@ -10,6 +10,8 @@ export const REFUSAL_LABELS: Readonly<Record<RefusalReason, string>> = {
   stopped: "The robot is stopped",
   not_a_number: "The command has a value that is not a number",
   wrong_size: "The command does not have one value for each axis",
+  jump: "The goal is too far from where the robot is: let go, then begin again",
+  conflict: "Two controls move the same joints: let go of one",
   malformed: "The console could not read the message",
   no_seat: "You do not hold the control seat",
   seat_taken: "Somebody else holds the control seat",

@@ -1,5 +1,5 @@
 import { describe, expect, it } from "vitest";
-import { axisValues, restValues, type HeldInputs } from "../../src/drive/axis_mapping";
+import { axisValues, neutralValues, type HeldInputs } from "../../src/drive/axis_mapping";
 import type { PadInputs } from "../../src/gamepad/mapping";
 import type { Binding, ControlLayer } from "../../src/protocol/wire";
 import { axisOf } from "../messages";
@@ -43,11 +43,11 @@ const forward = layerOf(
 describe("axis values", () => {
   it("rest without a layer and without input", () => {
     expect(axisValues(axes, undefined, held({}), 1)).toEqual([0, 0.5]);
-    expect(axisValues(axes, forward, held({}), 1)).toEqual(restValues(axes));
+    expect(axisValues(axes, forward, held({}), 1)).toEqual(neutralValues(axes));
   });
 
   it("reach the limits either way", () => {
-    const push = (left_y: number): number[] =>
+    const push = (left_y: number): (number | null)[] =>
       axisValues(axes, forward, held({ pad: { ...NO_PAD, left_y } }), 1);
     expect(push(-1)[0]).toBe(2);
     expect(push(1)[0]).toBe(-1);

@@ -6,6 +6,7 @@ import {
   driverDisarm,
   driverFeedback,
   driverLoss,
+  driverMayMove,
   driverOpensIn,
   driverPingAnswered,
   driverRefusal,
@@ -324,4 +325,57 @@ it("a command names the nonce of the issue that it answers, its repeats that of 
   expect(driverStep(driver, MOVING, true, 101)).toMatchObject([{ issue: 3, nonce: 78 }]);
   driverFeedback(driver, feedbackOf(2, { nonce: 79 }), true, 102);
   expect(driverStep(driver, MOVING, true, 102)).toMatchObject([{ event: 3, issue: 1, nonce: 79 }]);
+});
+
+describe("a robot with goal axes", () => {
+  const STAY = [0, null];
+  const stays = { armed: true, values: STAY };
+
+  beforeEach(() => {
+    driver = createDriver("feedback", 4, 0, STAY);
+    proven(driver);
+    driverFeedback(driver, feedbackOf(1), true, 0);
+  });
+
+  it("is told to stay at the slow rate of an idle page, and a goal where it is moves it", () => {
+    expect(commands(driverStep(driver, stays, true, 0))).toHaveLength(1);
+    driverFeedback(driver, feedbackOf(2), true, 10);
+    expect(driverStep(driver, stays, true, 10)).toEqual([]);
+    const [command] = commands(driverStep(driver, { armed: true, values: [0, 0] }, true, 20));
+    expect(command).toEqual({ type: "command", event: 3, issue: 1, nonce: 0, values: [0, 0] });
+  });
+
+  it("is told the speed that the hand asks for, by commands that may move it", () => {
+    const slow = { armed: true, values: [0, 1], speed: 0.25 };
+    expect(commands(driverStep(driver, slow, true, 0))[0]).toMatchObject({ values: [0, 1], speed: 0.25 });
+    driverFeedback(driver, feedbackOf(2), true, 10);
+    driverDisarm(driver, 20);
+    const [after] = commands(driverStep(driver, { ...slow, armed: false }, true, 20));
+    expect(after).toMatchObject({ values: STAY });
+    expect(after).not.toHaveProperty("speed");
+  });
+
+  it("may be moved by the next command only when it was armed and proven, and is not resting", () => {
+    expect(driverMayMove(driver)).toBe(true);
+    driverRelease(driver, 0);
+    expect(driverMayMove(driver)).toBe(true); // the newest event is voided, the next one is not
+    commands(driverStep(driver, { armed: true, values: [0, 1] }, true, 0));
+    driverRelease(driver, 5);
+    expect(driverMayMove(driver)).toBe(false);
+    driverFeedback(driver, feedbackOf(2), true, 10);
+    expect(driverMayMove(driver)).toBe(true);
+    driverArm(driver);
+    expect(driverMayMove(driver)).toBe(false);
+    driverBar(driver);
+    expect(driverMayMove(driver)).toBe(false);
+    expect(driverMayMove(createDriver("feedback", 4, 0, STAY))).toBe(false);
+  });
+
+  it("is never sent a goal after disarming, not by a repeat either", () => {
+    driverStep(driver, { armed: true, values: [0, 1] }, true, 0);
+    driverDisarm(driver, 10);
+    for (let now = 10; now < 2000; now += 10)
+      for (const message of commands(driverStep(driver, { armed: false, values: [0, 1] }, true, now)))
+        expect(message).toMatchObject({ values: STAY });
+  });
 });

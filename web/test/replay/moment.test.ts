@@ -77,6 +77,35 @@ const chunks = [
   ),
 ];
 
+describe("the records of a robot with goal axes", () => {
+  it("keep null where an axis stays, and the goals that were applied", () => {
+    const parts: Part[] = [
+      {
+        topic: "/lockstep/command",
+        event: 5,
+        arrived: 10,
+        payload: JSON.stringify({
+          event: 5,
+          issue: 1,
+          values: [0.5, null],
+          outcome: "forwarded",
+          name: "Ada",
+        }),
+      },
+      {
+        topic: "/lockstep/feedback",
+        event: 5,
+        arrived: 20,
+        payload: JSON.stringify({ event: 5, issue: 1, axes: [0.5, 1], goals: [null, 1.25] }),
+      },
+    ];
+    const chunk = parseChunkBody(0, bodyOf(parts));
+    expect(chunk.commands[0]?.values).toEqual([0.5, null]);
+    expect(chunk.feedback[0]?.goals).toEqual([null, 1.25]);
+    expect(parseChunkBody(0, bodyOf([feedback(1, 1, 1)])).feedback[0]?.goals).toEqual([]);
+  });
+});
+
 describe("a moment", () => {
   it("has the newest picture that is not newer than its event, and what comes before that back to a keyframe", () => {
     const found = momentOf(chunks, { event: 6, until: null }).pictures.get("/camera/front");

@@ -1,13 +1,17 @@
-import { quantity, scaleFor } from "../../util/units";
+import { figureOf, shareOf } from "../../drive/goals/goal_figures";
 import type { Axis, RobotDescription } from "../../protocol/wire";
-import { h, setText } from "../../ui/elements/dom";
+import { h, setHidden, setText } from "../../ui/elements/dom";
 
 interface AxisRow {
   readonly element: HTMLElement;
-  show(commanded: number | undefined, measured: number | undefined): void;
+  show(
+    commanded: number | null | undefined,
+    measured: number | undefined,
+    applied: number | null | undefined,
+  ): void;
 }
 
-/** Each axis as commanded and as measured, in figures and as a bar. */
+/** Each axis as commanded and as measured, in figures and as a bar; of a goal axis also the goal that was applied. */
 export class AxisRows {
   readonly element = h("section", "card axis-rows", { "aria-label": "Command and feedback" });
   private readonly rows: readonly AxisRow[];
@@ -26,9 +30,14 @@ export class AxisRows {
   }
 
   /** `commanded` is empty when there is no command; an axis of `unknown` (by number) was not measured. */
-  show(commanded: readonly number[], measured: readonly number[], unknown: ReadonlySet<number>): void {
+  show(
+    commanded: readonly (number | null)[],
+    measured: readonly number[],
+    applied: readonly (number | null)[],
+    unknown: ReadonlySet<number>,
+  ): void {
     for (const [at, row] of this.rows.entries())
-      row.show(commanded[at], unknown.has(at) ? undefined : measured[at]);
+      row.show(commanded[at], unknown.has(at) ? undefined : measured[at], applied[at]);
   }
 }
 
@@ -36,32 +45,41 @@ function createRow(axis: Axis): AxisRow {
   const command = h("span", "axis-figure");
   const feedback = h("span", "axis-figure");
   const fill = h("span", "axis-fill");
+  const goal = h("span", "axis-goal");
   const mark = h("span", "axis-mark");
-  const track = h("span", "axis-track", { "aria-hidden": "true" }, fill, mark);
-  const share = (amount: number): number =>
-    Math.min(1, Math.max(0, (amount - axis.minimum) / (axis.maximum - axis.minimum || 1)));
-  const middle = share(axis.rest);
-  const scale = scaleFor(axis.unit, Math.max(Math.abs(axis.minimum), Math.abs(axis.maximum)));
+  const track = h("span", "axis-track", { "aria-hidden": "true" }, fill, goal, mark);
+  const isGoal = axis.kind === "goal";
+  // A rate is drawn from where it moves nothing; a place is a mark between the limits.
+  const middle = shareOf(axis, axis.rest);
+  const label = h("span", "axis-label", {}, axis.label);
   return {
     element: h(
       "div",
       "axis-row",
-      { "data-axis": axis.name },
-      h("span", "axis-label", {}, axis.label),
+      { "data-axis": axis.name, "data-kind": axis.kind },
+      label,
       command,
       feedback,
       track,
     ),
-    show(commanded, measured) {
-      const at = share(measured ?? axis.rest);
-      fill.style.left = percent(Math.min(at, middle));
-      fill.style.width = percent(Math.abs(at - middle));
-      mark.hidden = commanded === undefined;
-      mark.style.left = percent(share(commanded ?? axis.rest));
-      setText(command, commanded === undefined ? "–" : quantity(commanded, scale));
-      setText(feedback, measured === undefined ? "–" : quantity(measured, scale));
+    show(commanded, measured, applied) {
+      const at = shareOf(axis, measured ?? axis.rest);
+      fill.style.left = percent(isGoal ? at : Math.min(at, middle));
+      fill.style.width = isGoal ? "" : percent(Math.abs(at - middle));
+      setHidden(fill, isGoal && measured === undefined);
+      setHidden(goal, typeof applied !== "number");
+      goal.style.left = percent(shareOf(axis, applied ?? axis.rest));
+      setHidden(mark, typeof commanded !== "number");
+      mark.style.left = percent(shareOf(axis, commanded ?? axis.rest));
+      // Null says that the axis stays: that is no value that is missing.
+      setText(command, commanded === null ? "stays" : figure(axis, commanded));
+      setText(feedback, figure(axis, measured));
     },
   };
+}
+
+function figure(axis: Axis, value: number | undefined): string {
+  return value === undefined ? "–" : figureOf(axis, value).main;
 }
 
 function percent(share: number): string {

@@ -167,7 +167,7 @@ export class PlayerView {
     const unknown = new Set(
       feedback?.unknown.map((name) => description?.axes.findIndex((axis) => axis.name === name) ?? -1),
     );
-    this.axes?.show(command?.values ?? [], feedback?.axes ?? [], unknown);
+    this.axes?.show(command?.values ?? [], feedback?.axes ?? [], feedback?.goals ?? [], unknown);
     this.force.state.feedback = feedback;
     if (feedback !== null) noteForce(this.force.haptics.trace, event, forceOf(feedback.wrench));
     void this.sounds.show(moment.sounds, moment.damaged);

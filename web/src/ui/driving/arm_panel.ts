@@ -41,7 +41,10 @@ function armWords(engine: ConsoleEngine, now: number): string {
   const warned = warningSeconds(engine.state.feedback, engine.measuredMs, now);
   if (engine.isArmed() && warned > 0) return `The robot warns first: ${warned} s`;
   if (engine.arming.state === "driving") return "Let go to bring the robot to rest";
-  if (engine.arming.state === "armed") return `Hold ${deadmanName(engine)} to move`;
+  if (engine.arming.state === "armed") {
+    const hasGoals = engine.state.robot?.description.axes.some((axis) => axis.kind === "goal");
+    return `Hold ${deadmanName(engine)} to move${hasGoals ? ", or drag an axis" : ""}`;
+  }
   const refusal = armRefusal(engine.arming, engine.conditions(now));
   const focused = focusedControl();
   if (refusal === null && focused !== null && focused !== "Arm")

@@ -1,5 +1,6 @@
 import { holdsSeat } from "../../session/console_state";
 import { limitLabels } from "../../drive/limit_labels";
+import { goalRefusalWords, shownRefusal } from "../../drive/goals/goal_refusal";
 import type { ConsoleEngine } from "../../engine/console_engine";
 import { h, setHidden, type Panel } from "../elements/dom";
 
@@ -9,10 +10,13 @@ export function createLimitsStrip(engine: ConsoleEngine): Panel {
   let shown = "";
   return {
     element,
-    update() {
+    update(now) {
       const { state } = engine;
       const share = holdsSeat(state) ? engine.speedShare : (state.speedCap?.share ?? 1);
-      const words = limitLabels(state.feedback, state.robot?.description ?? null, state.speedCap, share);
+      const description = state.robot?.description ?? null;
+      const refusal = shownRefusal(engine.goals?.refusal ?? null, now);
+      const refused = refusal === null ? [] : [goalRefusalWords(refusal, description)];
+      const words = limitLabels(state.feedback, description, state.speedCap, share, refused);
       const key = JSON.stringify(words);
       if (key === shown) return;
       shown = key;

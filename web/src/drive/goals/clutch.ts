@@ -1,0 +1,150 @@
+import type { Axis, Feedback, RobotDescription } from "../../protocol/wire";
+import { wayTo, withinReach, type AxisValue } from "./goal_range";
+
+/** A goal axis that a device drives. */
+export interface ClutchAxis {
+  readonly index: number; // of the axis in the description
+  readonly axis: Pick<Axis, "reach" | "wrap">;
+  readonly scale: number; // goal for the device's motion, in units of the axis; negative: mirrored
+}
+
+/** What is bound of one axis. Places of an axis with `wrap` are counted on past its period: a turn keeps its direction. */
+interface Binding extends ClutchAxis {
+  origin: number; // the applied goal at which it was engaged
+  device: number; // newest reading
+  motion: number; // of the device since it was engaged
+  measured: number;
+  applied: number;
+}
+
+/** The measured values and applied goals that a clutch binds to. */
+type Measured = Pick<Feedback, "axes" | "goals" | "neutral_needed" | "stop">;
+
+/**
+ * A clutch between a device that has a pose and goal axes (docs/robot-link.md, "The clutch"): engaging moves nothing,
+ * then the goals follow the device. It holds no clock and no connection. `observe` every feedback, `engage` when the
+ * operator asks for it, and drive what `goals` returns.
+ *
+ * A goal further than a share of the axis' reach from the newest measured value is clipped there; the device's motion
+ * counts on meanwhile. Call `release` when the operator lets go, and when the seat or the arming is lost. The clutch
+ * releases itself when a reading is not known and when the robot needs a neutral command. The Python client has the same
+ * class, and both pass tests/vectors/clutch.json.
+ */
+export class Clutch {
+  private readonly bindings: readonly Binding[];
+  private newest: Measured | null = null;
+  private isEngaged = false;
+  private clippedAxes: readonly number[] = [];
+
+  constructor(axes: readonly ClutchAxis[]) {
+    this.bindings = axes.map((each) => ({
+      ...each,
+      origin: 0,
+      device: 0,
+      motion: 0,
+      measured: 0,
+      applied: 0,
+    }));
+  }
+
+  /** Whether the goals follow the device. */
+  get engaged(): boolean {
+    return this.isEngaged;
+  }
+
+  /** The axes, by number in this clutch, whose newest goal is nearer than the device asks for. */
+  get clipped(): readonly number[] {
+    return this.clippedAxes;
+  }
+
+  /** Takes the newest feedback. One without the axes' goals and measured values counts as lost. */
+  observe(feedback: Measured): void {
+    if (!this.isUsable(feedback)) {
+      this.lostFeedback();
+      return;
+    }
+    this.newest = feedback;
+    if (!this.isEngaged) return;
+    for (const each of this.bindings) {
+      each.measured += wayTo(each.axis, each.measured, feedback.axes[each.index] ?? 0);
+      each.applied = each.measured + wayTo(each.axis, each.measured, feedback.goals[each.index] ?? 0);
+    }
+  }
+
+  /**
+   * Binds the device's readings, one for each axis of the clutch, to the applied goals of the newest feedback; again, if
+   * it is engaged. Says whether it is engaged now: not without a feedback, and not with a reading that is not known.
+   */
+  engage(device: readonly AxisValue[]): boolean {
+    this.release();
+    const { newest } = this;
+    if (newest === null || !isKnown(device, this.bindings.length)) return false;
+    for (const [at, each] of this.bindings.entries()) {
+      each.origin = each.applied = newest.goals[each.index] ?? 0;
+      each.measured = each.origin + wayTo(each.axis, each.origin, newest.axes[each.index] ?? 0);
+      each.device = device[at] ?? 0;
+      each.motion = 0;
+    }
+    return (this.isEngaged = true);
+  }
+
+  /** One goal for each axis of the clutch; null for each unless it is engaged. */
+  goals(device: readonly AxisValue[]): AxisValue[] {
+    if (!isKnown(device, this.bindings.length)) this.release();
+    if (!this.isEngaged) return this.bindings.map(() => null);
+    const clipped: number[] = [];
+    const goals = this.bindings.map((each, at) => {
+      const reading = device[at] ?? 0;
+      each.motion += wayTo(each.axis, each.device, reading);
+      each.device = reading;
+      const wanted = each.origin + each.scale * each.motion;
+      const goal = withinReach(each.axis, wanted, each.measured, each.applied);
+      if (goal !== wanted) clipped.push(at);
+      return goal;
+    });
+    this.clippedAxes = clipped;
+    return goals;
+  }
+
+  /** Lets go: the goals are null until it is engaged anew, anywhere. */
+  release(): void {
+    this.isEngaged = false;
+    this.clippedAxes = [];
+  }
+
+  /** Lets go, and does not engage before another feedback: the newest one may be of another state, or another run. */
+  lostFeedback(): void {
+    this.release();
+    this.newest = null;
+  }
+
+  private isUsable(feedback: Measured): boolean {
+    if (feedback.neutral_needed || feedback.stop.stopped) return false;
+    return this.bindings.every(
+      ({ index }) => isNumber(feedback.axes[index]) && isNumber(feedback.goals[index]),
+    );
+  }
+}
+
+/** The clutch of a device with a reading for each of these goal axes, by name; null: the robot does not have them all. */
+export function clutchOf(
+  description: RobotDescription,
+  scales: readonly (readonly [axis: string, scale: number])[],
+): Clutch | null {
+  const axes: ClutchAxis[] = [];
+  for (const [name, scale] of scales) {
+    const index = description.axes.findIndex((axis) => axis.name === name);
+    const axis = description.axes[index];
+    if (axis?.kind !== "goal" || !Number.isFinite(scale)) return null;
+    axes.push({ index, axis, scale });
+  }
+  return new Clutch(axes);
+}
+
+function isKnown(device: readonly AxisValue[], count: number): device is readonly number[] {
+  return device.length === count && device.every(isNumber);
+}
+
+function isNumber(value: AxisValue | undefined): value is number {
+  return typeof value === "number" && Number.isFinite(value);
+}

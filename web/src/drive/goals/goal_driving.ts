@@ -1,0 +1,129 @@
+import { inputFor, type HeldInputs } from "../axis_mapping";
+import type { Axis, ControlLayer, Feedback, Refusal, RobotDescription } from "../../protocol/wire";
+import { Clutch } from "./clutch";
+import type { AxisValue } from "./goal_range";
+import type { GoalRefusal } from "./goal_refusal";
+import { createJog, stepJog, type AxisPlace, type Jog } from "./jog";
+
+/** A device that has a pose and drives goal axes by a clutch of its own: a headset, a leader arm. */
+export interface GoalDevice {
+  /** One value for each axis of the robot, null where it drives none. Asked only while its operator may drive. */
+  goals(feedback: Feedback): readonly AxisValue[];
+  /** Driving has ended, for whatever reason: it engages anew. */
+  release(): void;
+}
+
+/** What goal axes are driven with at one moment. */
+export interface GoalInputs {
+  readonly description: RobotDescription;
+  readonly layer: ControlLayer | undefined;
+  readonly held: HeldInputs;
+  readonly share: number; // of full speed
+  readonly feedback: Feedback | null; // newest
+  readonly moves: boolean; // the next command may move the robot
+}
+
+interface GoalAxis {
+  readonly index: number;
+  readonly axis: Axis;
+  readonly jog: Jog;
+  readonly clutch: Clutch; // of its slider
+}
+
+/**
+ * The values of a robot's goal axes. Sticks, keys and pushes jog them, sliders and devices drive them by a clutch;
+ * null where nobody does. Whenever the next command may not move the robot, everything is let go, and the first goal
+ * after that is the applied one.
+ */
+export class GoalDriving {
+  speed = 1; // of the axes' largest speed that the next command uses at most
+  refusal: GoalRefusal | null = null; // the newest
+  device: GoalDevice | null = null;
+  private description: RobotDescription | null = null;
+  private axes: readonly GoalAxis[] = [];
+
+  /** `values` with those of the goal axes put in. */
+  take(values: readonly AxisValue[], inputs: GoalInputs, now: number): readonly AxisValue[] {
+    const { description, feedback } = inputs;
+    if (description !== this.description) this.takeRobot(description);
+    if (this.axes.length === 0) return values;
+    if (!inputs.moves || feedback === null) {
+      this.release();
+      return values;
+    }
+    const posed = this.device?.goals(feedback) ?? [];
+    const taken = [...values];
+    let fastest = 0;
+    for (const each of this.axes) {
+      const [goal, share] = this.goalOf(each, posed[each.index] ?? null, inputs, feedback, now);
+      taken[each.index] = goal;
+      fastest = Math.max(fastest, share);
+    }
+    this.speed = fastest * inputs.share;
+    return taken;
+  }
+
+  /** Nobody drives: each hand engages anew. */
+  release(): void {
+    this.speed = 1;
+    for (const { jog, clutch } of this.axes) {
+      jog.goal = null;
+      clutch.lostFeedback();
+    }
+    this.device?.release();
+  }
+
+  /** A goal was refused: what leads the robot begins again where the robot is. */
+  refused(refusal: Refusal, now: number): void {
+    const { reason, detail } = refusal;
+    if (reason !== "jump" && reason !== "conflict") return;
+    this.refusal = { reason, detail, atMs: now };
+    this.release();
+  }
+
+  private takeRobot(description: RobotDescription): void {
+    this.release();
+    this.description = description;
+    this.axes = description.axes.flatMap((axis, index) =>
+      axis.kind === "goal"
+        ? [{ index, axis, jog: createJog(), clutch: new Clutch([{ index, axis, scale: 1 }]) }]
+        : [],
+    );
+  }
+
+  /** Goal, and the share of the axis' largest speed that it needs. */
+  private goalOf(
+    { index, axis, jog, clutch }: GoalAxis,
+    posed: AxisValue,
+    { layer, held, share }: GoalInputs,
+    feedback: Feedback,
+    now: number,
+  ): readonly [AxisValue, number] {
+    const place = placeOf(feedback, index, axis);
+    const travel = place === null ? undefined : held.sliders?.travels[axis.name];
+    const dragged = travel === undefined ? null : drag(clutch, axis, travel, feedback);
+    if (travel === undefined) clutch.release();
+    const led = posed ?? dragged;
+    const push = held.sliders?.pushes[axis.name] ?? inputFor(axis, layer, held);
+    const input = led === null ? push : 0;
+    const jogged = stepJog(jog, axis, input * share * axis.slew, place, now);
+    if (led !== null) return [led, 1];
+    return [jogged, jogged === null ? 0 : Math.min(1, Math.abs(input))];
+  }
+}
+
+/** `travel`: of the slider since it was taken, as a share of the axis' range. */
+function drag(clutch: Clutch, axis: Axis, travel: number, feedback: Feedback): AxisValue {
+  const reading = [travel * (axis.maximum - axis.minimum)];
+  clutch.observe(feedback);
+  if (!clutch.engaged) clutch.engage(reading);
+  return clutch.goals(reading)[0] ?? null;
+}
+
+function placeOf(feedback: Feedback, index: number, axis: Axis): AxisPlace | null {
+  const applied = feedback.goals[index];
+  const measured = feedback.axes[index];
+  if (typeof applied !== "number" || measured === undefined || feedback.unknown.includes(axis.name))
+    return null;
+  return { applied, measured };
+}

@@ -1,0 +1,158 @@
+import { describe, expect, it } from "vitest";
+import { axisValues, neutralValues, type HeldInputs } from "../../../src/drive/axis_mapping";
+import { GoalDriving, type GoalInputs } from "../../../src/drive/goals/goal_driving";
+import type { AxisValue } from "../../../src/drive/goals/goal_range";
+import type { ControlLayer } from "../../../src/protocol/wire";
+import { axisOf, descriptionOf, feedbackOf, goalAxisOf, refusalOf } from "../../messages";
+import { randomNumbers } from "../../random";
+
+const axes = [axisOf("base"), goalAxisOf("elbow"), goalAxisOf("wrist", { slew: 2 })];
+const description = descriptionOf(axes);
+const binding = { pad: null, touch: null, invert_pad: false, invert_touch: false, scale: 1 };
+const layer: ControlLayer = {
+  name: "joints",
+  label: "Joints",
+  bindings: [
+    { ...binding, axis: "base", key_positive: "KeyR", key_negative: "KeyF" },
+    { ...binding, axis: "elbow", key_positive: "KeyW", key_negative: "KeyS" },
+    { ...binding, axis: "wrist", key_positive: "KeyE", key_negative: "KeyD", scale: 0.5 },
+  ],
+};
+const feedback = feedbackOf(5, { axes: [0, 1, -1], goals: [null, 1.05, -1] });
+const REST: readonly AxisValue[] = [0, null, null];
+
+function heldOf(keys: readonly string[], travels: Record<string, number> = {}, pushes = {}): HeldInputs {
+  return { pad: null, keys: new Set(keys), touch: null, sliders: { travels, pushes } };
+}
+
+function inputsOf(held: HeldInputs, rest: Partial<GoalInputs> = {}): GoalInputs {
+  return { description, layer, held, share: 1, feedback, moves: true, ...rest };
+}
+
+function takeAt(driving: GoalDriving, inputs: GoalInputs, now: number): readonly AxisValue[] {
+  return driving.take(axisValues(axes, layer, inputs.held, inputs.share), inputs, now);
+}
+
+describe("goal axes", () => {
+  it("stay while nothing is held", () => {
+    const driving = new GoalDriving();
+    expect(neutralValues(axes)).toEqual(REST);
+    expect(takeAt(driving, inputsOf(heldOf([])), 0)).toEqual(REST);
+  });
+
+  it("of a robot without any are none of its business", () => {
+    const driving = new GoalDriving();
+    const rates = descriptionOf([axisOf("base")]);
+    expect(driving.take([0.5], inputsOf(heldOf([]), { description: rates }), 0)).toEqual([0.5]);
+    expect(driving.speed).toBe(1);
+  });
+
+  it("are jogged by keys from the applied goal, beside the rates", () => {
+    const driving = new GoalDriving();
+    const held = heldOf(["KeyW", "KeyR"]);
+    expect(takeAt(driving, inputsOf(held), 0)).toEqual([2, 1.05, null]);
+    expect(takeAt(driving, inputsOf(held), 10)[1]).toBeCloseTo(1.06);
+    expect(takeAt(driving, inputsOf(heldOf([])), 20)).toEqual(REST);
+  });
+
+  it("ask for no more speed than the hand does", () => {
+    const driving = new GoalDriving();
+    takeAt(driving, inputsOf(heldOf(["KeyE"])), 0);
+    expect(driving.speed).toBe(0.5);
+    takeAt(driving, inputsOf(heldOf(["KeyE"]), { share: 0.3 }), 10);
+    expect(driving.speed).toBeCloseTo(0.15);
+    takeAt(driving, inputsOf(heldOf(["KeyE", "KeyW"])), 20);
+    expect(driving.speed).toBe(1);
+    takeAt(driving, inputsOf(heldOf([], { elbow: 0 }), { share: 0.3 }), 30);
+    expect(driving.speed).toBeCloseTo(0.3);
+  });
+
+  it("follow a slider as far as it is dragged, and stay when it is let go", () => {
+    const driving = new GoalDriving();
+    expect(takeAt(driving, inputsOf(heldOf([], { elbow: 0.4 })), 0)[1]).toBe(1.05);
+    expect(takeAt(driving, inputsOf(heldOf([], { elbow: 0.45 })), 10)[1]).toBeCloseTo(1.25); // of 4 rad
+    expect(takeAt(driving, inputsOf(heldOf([], { elbow: 1 })), 20)[1]).toBeCloseTo(1.4); // 0.8 of reach
+    expect(takeAt(driving, inputsOf(heldOf([])), 30)).toEqual(REST);
+    expect(takeAt(driving, inputsOf(heldOf([], { elbow: -0.2 })), 40)[1]).toBe(1.05);
+  });
+
+  it("are pushed by arrow keys on a slider, which wins over its layer's keys", () => {
+    const driving = new GoalDriving();
+    const held = heldOf(["KeyS"], {}, { elbow: 1 });
+    expect(takeAt(driving, inputsOf(held), 0)[1]).toBe(1.05);
+    expect(takeAt(driving, inputsOf(held), 10)[1]).toBeCloseTo(1.06);
+  });
+
+  it("follow a device, which is let go whenever nothing may move", () => {
+    const driving = new GoalDriving();
+    let released = 0;
+    driving.device = { goals: () => [9, 1.3, null], release: () => (released += 1) };
+    expect(takeAt(driving, inputsOf(heldOf(["KeyE"])), 0)).toEqual([0, 1.3, -1]);
+    expect(driving.speed).toBe(1);
+    const before = released;
+    takeAt(driving, inputsOf(heldOf([]), { moves: false }), 10);
+    expect(released).toBe(before + 1);
+  });
+
+  it.each([
+    ["the next command may not move", { moves: false }],
+    ["there is no feedback", { feedback: null }],
+    ["the feedback has no goals", { feedback: feedbackOf(6, { axes: [0, 1, -1] }) }],
+    ["the position is not known", { feedback: feedbackOf(6, { ...feedback, unknown: ["elbow"] }) }],
+  ] as const)("stay and begin anew when %s", (_, lost) => {
+    const driving = new GoalDriving();
+    for (const held of [heldOf(["KeyW"]), heldOf([], { elbow: 0.1 })]) {
+      for (let now = 0; now < 100; now += 10) takeAt(driving, inputsOf(held), now);
+      const rates = neutralValues(axes);
+      expect(driving.take(rates, inputsOf(held, lost), 100)[1]).toBeNull();
+      expect(takeAt(driving, inputsOf(held), 110)[1]).toBe(1.05);
+    }
+  });
+
+  it("begin anew at another robot, and after a refused goal, which is remembered for a while", () => {
+    const driving = new GoalDriving();
+    const held = heldOf(["KeyW"]);
+    for (let now = 0; now < 100; now += 10) takeAt(driving, inputsOf(held), now);
+    driving.refused(refusalOf(6, "late"), 100);
+    expect(driving.refusal).toBeNull();
+    driving.refused(refusalOf(6, "jump"), 100);
+    expect(driving.refusal).toEqual({ reason: "jump", detail: "", atMs: 100 });
+    expect(takeAt(driving, inputsOf(held), 110)[1]).toBe(1.05);
+    takeAt(driving, inputsOf(held), 120);
+    const other = descriptionOf([axisOf("base"), goalAxisOf("elbow"), goalAxisOf("wrist")]);
+    expect(takeAt(driving, inputsOf(held, { description: other }), 130)[1]).toBe(1.05);
+  });
+
+  it("have applied goals that never jump, whatever is held, lost, refused and late", () => {
+    const random = randomNumbers(11);
+    for (let run = 0; run < 100; run++) {
+      const driving = new GoalDriving();
+      let applied = 2 * random() - 1;
+      let news = feedbackOf(1, { axes: [0, applied, 0], goals: [null, applied, 0] });
+      let last: AxisValue = null;
+      for (let now = 0; now < 2000; now += 10) {
+        const held = heldOf(
+          random() < 0.4 ? ["KeyW"] : random() < 0.3 ? ["KeyS"] : [],
+          random() < 0.3 ? { elbow: 4 * random() - 2 } : {},
+        );
+        const moves = random() > 0.1;
+        if (random() < 0.02) driving.refused(refusalOf(2, random() < 0.5 ? "jump" : "conflict"), now);
+        const [, goal = null] = takeAt(driving, inputsOf(held, { feedback: news, moves }), now);
+        if (!moves) expect(goal).toBeNull();
+        if (goal !== null && last === null) expect(goal).toBe(news.goals[1]);
+        if (goal !== null) {
+          const measured = news.axes[1] ?? 0;
+          expect(Math.abs(goal - measured)).toBeLessThanOrEqual(
+            Math.max(0.4, Math.abs(measured - (news.goals[1] ?? 0))) + 1e-9,
+          );
+        }
+        last = goal;
+        if (random() < 0.3) {
+          applied += goal === null ? 0 : Math.max(-0.02, Math.min(0.02, goal - applied));
+          const measured = applied + 0.05 * (random() - 0.5);
+          news = feedbackOf(now + 2, { axes: [0, measured, 0], goals: [null, applied, 0] });
+        }
+      }
+    }
+  });
+});
