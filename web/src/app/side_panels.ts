@@ -45,6 +45,7 @@ export class SidePanels {
   readonly charts: ChartsDrawer;
   readonly sheets: Sheets;
   private readonly unread = createUnread();
+  private readonly headset: HeadsetEntry;
   private readonly pageTools: PageTools;
   private readonly session: SessionApi;
   private readonly keys = once(() => createKeysSheet(this.engine));
@@ -71,13 +72,13 @@ export class SidePanels {
     void this.lookForPairing(robotLink);
     this.sheets = new Sheets(() => root.querySelectorAll<HTMLElement>(BEHIND_SHEETS));
     this.record = createRecordButton(engine, this.session);
-    const headset = new HeadsetEntry({ engine, grid });
+    this.headset = new HeadsetEntry({ engine, grid });
     this.pageTools = createPageTools({
       charts: () => this.act("charts"),
       keys: () => this.act("keys"),
       pads: () => this.act("pads"),
       scene: () => this.toggleScene(),
-      headset: (className) => headset.createButtons(className),
+      headset: (className) => this.headset.createButtons(className),
     });
     this.tools = {
       element: this.pageTools.bar,
@@ -147,6 +148,7 @@ export class SidePanels {
       createStreamTable(engine),
       createDelayPanel(engine, () => this.grid.mainStream()),
       createSettingsPanel(engine),
+      this.headset.createSettings(),
       createLogPanel(engine),
     ];
     const people = createParticipantsPanel(engine, {

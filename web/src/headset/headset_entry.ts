@@ -1,5 +1,6 @@
 import { note } from "../session/console_state";
-import { button, setHidden } from "../ui/elements/dom";
+import { button, setHidden, type Panel } from "../ui/elements/dom";
+import { createHeadsetSettings, HandSettingsStorage } from "./headset_settings";
 import type { HeadsetMode, HeadsetPage } from "./headset_session";
 
 const LABELS: Readonly<Record<HeadsetMode, string>> = {
@@ -14,6 +15,7 @@ export class HeadsetEntry {
   private readonly buttons = new Map<HeadsetMode, HTMLButtonElement[]>();
   private readonly supported = new Set<HeadsetMode>();
   private isOpening = false;
+  private readonly hand = new HandSettingsStorage();
 
   constructor(private readonly page: HeadsetPage) {
     const { xr } = navigator as { xr?: XRSystem }; // absent where the page has no TLS
@@ -30,6 +32,15 @@ export class HeadsetEntry {
       this.buttons.set(mode, [...(this.buttons.get(mode) ?? []), made]);
       return made;
     });
+  }
+
+  /** How hands drive, where a headset is there and the robot has a pose to drive. */
+  createSettings(): Panel {
+    const { state } = this.page.engine;
+    return createHeadsetSettings(
+      this.hand,
+      () => this.supported.size > 0 && (state.robot?.description.poses.length ?? 0) > 0,
+    );
   }
 
   private async look(xr: XRSystem): Promise<void> {
@@ -52,7 +63,7 @@ export class HeadsetEntry {
         xr.requestSession(mode, FEATURES),
         import("./headset_session"),
       ]);
-      await HeadsetSession.begin(session, this.page, mode);
+      await HeadsetSession.begin(session, this.page, mode, () => this.hand.settings);
     } catch (error) {
       const why = error instanceof Error ? error.message : String(error);
       note(engine.state, "error", `The headset view did not open: ${why}`, Date.now());

@@ -15,6 +15,9 @@ import {
   type HeadsetEvent,
   type Side,
 } from "../xr/headset_input";
+import type { RobotDescription } from "../protocol/wire";
+import type { HandSettings } from "../xr/hand_mapping";
+import { PoseDevice } from "../xr/pose_drive";
 import type { RigidPose } from "../xr/rigid";
 import { Battery } from "./battery";
 import { HeadsetView, type ViewCamera } from "./headset_view";
@@ -49,6 +52,7 @@ export class HeadsetSession implements HeadsetControls {
   private hands: readonly HandReading[] = [];
   private viewer: RigidPose | null = null;
   private frames = 0;
+  private poses: { readonly description: RobotDescription; readonly device: PoseDevice } | null = null;
   private isPlaced = false;
   private resetting: { readonly side: Side; readonly sinceMs: number } | null = null;
   private status: ReturnType<typeof headsetStatus> | null = null;
@@ -59,19 +63,25 @@ export class HeadsetSession implements HeadsetControls {
     private readonly renderer: WebGLRenderer,
     private readonly page: HeadsetPage,
     private readonly mode: HeadsetMode,
+    private readonly handSettings: () => HandSettings,
   ) {
     this.view = new HeadsetView(mode === "immersive-vr");
     this.battery = new Battery(() => page.engine.disarm("battery_low"));
   }
 
   /** Shows the page in `session` until it ends. Rejects, with the session ended, where the browser cannot draw it. */
-  static async begin(session: XRSession, page: HeadsetPage, mode: HeadsetMode): Promise<HeadsetSession> {
+  static async begin(
+    session: XRSession,
+    page: HeadsetPage,
+    mode: HeadsetMode,
+    handSettings: () => HandSettings,
+  ): Promise<HeadsetSession> {
     let renderer: WebGLRenderer | null = null;
     try {
       renderer = new WebGLRenderer({ antialias: true, alpha: true });
       renderer.xr.enabled = true;
       renderer.xr.setReferenceSpaceType("local-floor");
-      const made = new HeadsetSession(session, renderer, page, mode);
+      const made = new HeadsetSession(session, renderer, page, mode, handSettings);
       session.addEventListener("end", () => made.ended());
       await renderer.xr.setSession(session);
       made.start();
@@ -162,6 +172,7 @@ export class HeadsetSession implements HeadsetControls {
     if (engine.headset === this) {
       engine.headset = null;
       engine.controls.headset = null;
+      if (engine.goals?.device === this.poses?.device && engine.goals !== null) engine.goals.device = null;
       engine.display.leave();
       engine.tracing?.show(false, performance.now(), "headset");
     }
@@ -211,6 +222,21 @@ export class HeadsetSession implements HeadsetControls {
     const samples = this.hands.map(({ sample }) => sample);
     for (const event of takeFrame(this.input, samples, now)) this.carryOut(event, now);
     this.goOnResetting(now);
+    this.takePoses();
+  }
+
+  /** The hands lead the poses of the robot that is there now. */
+  private takePoses(): void {
+    const { goals, state } = this.page.engine;
+    const description = state.robot?.description;
+    if (goals === null || description === undefined || this.poses?.description === description) return;
+    const device = new PoseDevice(description, {
+      pose: (side) => (this.input.held.has(side) ? (this.input.hands.get(side)?.pose ?? null) : null),
+      forward: () => this.view.forward,
+      settings: () => this.handSettings(),
+    });
+    this.poses = { description, device };
+    goals.device = device;
   }
 
   private carryOut(event: HeadsetEvent, now: number): void {
