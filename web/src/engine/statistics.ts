@@ -63,6 +63,8 @@ export interface Statistics {
   readonly at_rest: boolean | null;
   readonly joints: readonly number[]; // measured; empty before the first feedback
   readonly axes: Readonly<Record<string, number | null>>; // measured; null where that is not known
+  readonly goals: Readonly<Record<string, number | null>>; // of the goal axes, as the robot applies them
+  readonly commanded: Readonly<Record<string, number | null>>; // by this page, now; null: it stays
   readonly layer: string | null; // the control layer that is active
   readonly faults: readonly string[];
   readonly first_picture_ms: number | null;
@@ -117,6 +119,8 @@ export function statisticsOf(engine: ConsoleEngine, mainStream: string | null): 
     at_rest: state.feedback?.at_rest ?? null,
     joints: state.feedback?.joints ?? [],
     axes: axesOf(engine),
+    goals: byAxis(engine, state.feedback?.goals ?? [], "goal"),
+    commanded: byAxis(engine, engine.values),
     layer: state.robot?.description.layers[engine.layer]?.name ?? null,
     faults: state.feedback?.faults ?? [],
     first_picture_ms: engine.firstPictureMs,
@@ -146,6 +150,19 @@ function axesOf(engine: ConsoleEngine): Statistics["axes"] {
     return [name, known ? (feedback.axes[index] ?? null) : null] as const;
   });
   return Object.fromEntries(named);
+}
+
+function byAxis(
+  engine: ConsoleEngine,
+  values: readonly (number | null)[],
+  kind?: "goal",
+): Record<string, number | null> {
+  const axes = engine.state.robot?.description.axes ?? [];
+  return Object.fromEntries(
+    axes.flatMap((axis, index) =>
+      kind === undefined || axis.kind === kind ? [[axis.name, values[index] ?? null] as const] : [],
+    ),
+  );
 }
 
 function streamsOf(engine: ConsoleEngine, now: number): Record<string, StreamStatistics> {
