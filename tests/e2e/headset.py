@@ -7,13 +7,19 @@ from typing import Any, Literal
 
 from playwright.async_api import Browser, expect
 
+from lockstep.bench.browsers import console_page
 from lockstep.bench.browsers.console_page import ConsolePage, open_console
 
-__all__ = ["Headset", "open_headset"]
+__all__ = ["HELD_UP", "TRIES", "Headset", "open_headset"]
 
 HERE = Path(__file__).parent
 IWER = HERE.parents[1] / "web" / "node_modules" / "iwer" / "build" / "iwer.min.js"
 DRIVEN = HERE / "headset.js"
+
+TRIES = 5
+HELD_UP = (*console_page.HELD_UP, "the headset stood still")
+# Of the middles of the view's buttons from the operator's eyes, in m: to the right, up and ahead.
+BUTTONS = {"stop": (0.76, -0.96, 1.42), "reset": (0.12, -1.3, 1.27), "recentre": (-0.8, -1.3, 1.27)}
 
 Side = Literal["left", "right"]
 Mode = Literal["AR", "VR"]
@@ -59,16 +65,31 @@ class Headset:
         """Evaluate on `testHeadset` as `h`."""
         return await self.page.evaluate(f"(() => {{ const h = testHeadset; return {script}; }})()")
 
-    async def drive(self, side: Side = "right") -> None:
-        """Squeeze and push the left stick ahead until the robot moves."""
+    async def point(self, side: Side, button: str) -> None:
+        """Point at a button of the view from where the hand is."""
+        await self.page.evaluate("(at) => testHeadset.aim(...at)", [side, *BUTTONS[button]])
+        await self.console.until(f"s.headset.pointed.{side} === {button!r}")
+
+    async def drive(self, side: Side = "right", ahead: float = 0) -> None:
+        """Squeeze and tilt the sticks, to turn on the spot or go `ahead`, until the robot moves."""
+        await self.tilt("left", 0, -ahead)
+        await self.tilt("right", 0 if ahead else -1, 0)
+        await self.drive_until("s.driving && s.at_rest === false", side)
+
+    async def drive_until(self, condition: str, side: Side = "right") -> None:
+        """Squeeze until `condition`; again if a busy machine ended that."""
         await self.console.until("s.seat && s.seat.mine")
-        await self.tilt("left", 0, -1)
-        await self.squeeze(side)
-        await self.console.until("s.driving && s.at_rest === false")
+        for _ in range(TRIES):
+            await self.squeeze(side, 0)
+            await self.squeeze(side)
+            await self.console.until(f"!s.armed || ({condition})", 60)
+            if (await self.console.stats())["armed"]:
+                return
+        raise AssertionError(f"it does not drive: {await self.console.stats()}")
 
 
 @asynccontextmanager
-async def open_headset(browser: Browser, link: str, *, width: int = 1280, height: int = 640) -> AsyncIterator[Headset]:
+async def open_headset(browser: Browser, link: str, *, width: int = 1024, height: int = 400) -> AsyncIterator[Headset]:
     """Open the console's page on a machine with a headset; each eye gets half of the window's width."""
     async with open_console(browser, link, width=width, height=height, scripts=(IWER, DRIVEN)) as console:
         await console.until_live()

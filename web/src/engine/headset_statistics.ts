@@ -11,6 +11,9 @@ export interface HeadsetStatistics {
   readonly panels: readonly HeadsetPanelStatistics[]; // the large one first
   readonly state: string; // as the view says it: "Driving"
   readonly text: string;
+  readonly reset: string | null; // what the button says that resets a stop; null: it is not there
+  readonly pointed: Readonly<Record<"left" | "right", string | null>>; // button that the hand points at
+  readonly way: Readonly<Record<string, number>>; // ms of each stretch from the camera to the eye: "Capture"
   readonly battery: number | null; // 0 to 1; null: not known
 }
 

@@ -57,6 +57,7 @@ export class HeadsetSession implements HeadsetControls {
   private resetting: { readonly side: Side; readonly sinceMs: number } | null = null;
   private status: ReturnType<typeof headsetStatus> | null = null;
   private statusMs = -Infinity;
+  private reset: ReturnType<typeof resetWords> = null;
 
   private constructor(
     private readonly session: XRSession,
@@ -139,6 +140,9 @@ export class HeadsetSession implements HeadsetControls {
       })),
       state: this.status?.title ?? "",
       text: this.status?.text ?? "",
+      reset: this.reset?.text ?? null,
+      pointed: { left: this.view.buttonAt("left"), right: this.view.buttonAt("right") },
+      way: Object.fromEntries((this.status?.way ?? []).map(({ name, ms }) => [name, ms])),
       battery: this.battery.level,
     };
   }
@@ -303,7 +307,7 @@ export class HeadsetSession implements HeadsetControls {
             ? restingStopLabel(true, heard, true)
             : "B or Y, or point and pull"
           : pressedStopLabel(fate, heard),
-      reset: resetWords(engine, now),
+      reset: (this.reset = resetWords(engine, now)),
     };
     this.view.update(state, this.hands, this.input.held, now);
     for (const panel of this.view.pictures)
