@@ -70,6 +70,14 @@ class Headset:
         await self.page.evaluate("(at) => testHeadset.aim(...at)", [side, *BUTTONS[button]])
         await self.console.until(f"s.headset.pointed.{side} === {button!r}")
 
+    async def holds(self, condition: str) -> bool:
+        """Return whether a condition of `ConsolePage.until` is true now."""
+        try:
+            await self.console.until(condition, 0)
+        except AssertionError:
+            return False
+        return True
+
     async def drive(self, side: Side = "right", ahead: float = 0) -> None:
         """Squeeze and tilt the sticks, to turn on the spot or go `ahead`, until the robot moves."""
         await self.tilt("left", 0, -ahead)
@@ -83,7 +91,7 @@ class Headset:
             await self.squeeze(side, 0)
             await self.squeeze(side)
             await self.console.until(f"!s.armed || ({condition})", 60)
-            if (await self.console.stats())["armed"]:
+            if await self.holds(condition):
                 return
         raise AssertionError(f"it does not drive: {await self.console.stats()}")
 
