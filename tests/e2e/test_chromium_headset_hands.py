@@ -7,7 +7,7 @@ import pytest
 import pytest_asyncio
 from playwright.async_api import Browser
 
-from tests.e2e.headset import Headset, open_headset
+from tests.e2e.headset import TRIES, Headset, open_headset
 from tests.e2e.posed_arm import PosedArm
 from tests.support.stack import Stack, running_stack
 
@@ -36,29 +36,48 @@ async def _engage(headset: Headset) -> None:
     await headset.drive_until("s.driving && s.commanded['tool.x'] !== null")
 
 
+async def _lead(headset: Headset, grip: list[float], to: list[float], reached: str, turn: float = 0) -> None:
+    """Take the tool with the hand at `grip` and lead it until `reached`, over the goals at the take-over, `b`.
+
+    Again, from where the robot is then, if a busy machine ended it.
+    """
+    for _ in range(TRIES):
+        await headset.squeeze(value=0)
+        await headset.place("right", grip)
+        await headset.page.evaluate("void (window.before = lockstep.stats().goals)")
+        await _engage(headset)
+        await headset.place("right", to, left=turn)
+        condition = f"((b) => {reached})(window.before)"
+        await headset.console.until(f"!s.armed || {condition}")
+        if await headset.holds(condition):
+            return
+    raise AssertionError(f"the hand does not lead the tool: {await headset.console.stats()}")
+
+
+def _near(axis: str, by: float) -> str:
+    return f"Math.abs(s.goals['tool.{axis}'] - b['tool.{axis}'] - {by}) < 0.02"
+
+
 async def test_a_controller_leads_the_tool_from_where_it_is_and_letting_go_anywhere_moves_nothing(
     posed: Stack, chromium: Browser
 ) -> None:
     async with open_headset(chromium, posed.operator) as headset:
         console = headset.console
         await headset.enter()
-        start = await _goals(headset)
         for grip in (GRIP, [-0.3, 0.9, -0.2]):  # the second time from elsewhere
-            await headset.squeeze(value=0)
-            await headset.place("right", grip)
-            before = await _goals(headset)
-            await _engage(headset)
-            await headset.place("right", _moved(grip, (0, 0.05, -0.1)))  # up, and away from the operator
-            await console.until(f"Math.abs(s.goals['tool.x'] - {before['tool.x'] + 0.1}) < 0.01")
-            await console.until(f"Math.abs(s.goals['tool.z'] - {before['tool.z'] + 0.05}) < 0.01")
-            await headset.place("right", _moved(grip, (0, 0.05, -0.1)), left=0.3)
-            await console.until(f"Math.abs(s.goals['tool.rz'] - {before['tool.rz'] + 0.3}) < 0.02")
+            to = _moved(grip, (0, 0.05, -0.1))  # up, and away from the operator
+            await _lead(headset, grip, to, f"{_near('x', 0.1)} && {_near('y', 0)} && {_near('z', 0.05)}")
             await headset.squeeze(value=0)
             await console.until("!s.armed && s.commanded['tool.x'] === null")
-        end = await _goals(headset)
-        # The grip goes round the point that a test turns the controller about: some centimetres.
-        assert abs(end["tool.x"] - start["tool.x"] - 0.2) < 0.08
-        assert abs(end["tool.y"] - start["tool.y"]) < 0.08
+        rested = await _goals(headset)
+        await headset.place("right", [0.3, 1.5, -0.5], left=1.0)  # nobody holds it
+        await _engage(headset)
+        await headset.squeeze(value=0)
+        await console.until("!s.armed && s.at_rest === true")
+        assert (await _goals(headset)) == pytest.approx(rested, abs=1e-3)
+        # The tool turns as the hand does: here about the point of the aim, a hand's length from the grip.
+        await _lead(headset, GRIP, GRIP, _near("rz", 0.3), turn=0.3)
+        await headset.squeeze(value=0)
         # No goal is further from the one before than a hand goes at once, and each drive begins where the last ended.
         values = [record["values"] for record in await posed.events("executed")]
         for axis in NAMES[3:6]:
@@ -92,18 +111,12 @@ async def test_sticks_drive_the_base_and_the_trigger_the_gripper_while_a_hand_le
 
 async def test_the_scale_and_what_is_held_still_are_chosen_on_the_page(posed: Stack, chromium: Browser) -> None:
     async with open_headset(chromium, posed.operator) as headset:
-        console = headset.console
         hands = headset.page.get_by_role("region", name="Hands in the headset")
         await hands.get_by_label("Tool's way by the hand's").select_option("0.5")
         await hands.get_by_label("The camera looks").select_option("180")
         await hands.get_by_label("Hold still: up and down").press("Space")
         await headset.enter()
-        await headset.place("right", GRIP)
-        before = await _goals(headset)
-        await _engage(headset)
-        await headset.place("right", _moved(GRIP, (0, 0.2, -0.2)))
-        await console.until(f"Math.abs(s.goals['tool.x'] - {before['tool.x'] - 0.1}) < 0.01")
-        assert abs((await _goals(headset))["tool.z"] - before["tool.z"]) < 1e-6
+        await _lead(headset, GRIP, _moved(GRIP, (0, 0.2, -0.2)), f"{_near('x', -0.1)} && {_near('z', 0)}")
 
 
 async def test_a_tracked_hand_that_closes_leads_the_tool_and_lets_go_when_it_opens(
@@ -114,16 +127,19 @@ async def test_a_tracked_hand_that_closes_leads_the_tool_and_lets_go_when_it_ope
         await headset.enter()
         await headset.do("void (h.device.primaryInputMode = 'hand')")
         await console.until("s.headset.hands.length === 2 && s.headset.hands.every((hand) => hand.tracked)")
-        await headset.place("right", GRIP)
-        before = await _goals(headset)
-        for _ in range(5):
+        for _ in range(TRIES):  # a busy machine may end it
             await headset.do("void (h.device.hands.right.poseId = 'default')")
-            await headset.do("h.seen()")
-            await headset.do("void (h.device.hands.right.poseId = 'point')")  # all fingers closed but the index finger
+            await headset.place("right", GRIP)
+            before = await _goals(headset)
+            await headset.do("void (h.device.hands.right.poseId = 'point')")  # all closed but the index finger
             await console.until("!s.armed || s.commanded['tool.x'] !== null")
-            if await headset.holds("s.commanded['tool.x'] !== null"):
+            await headset.place("right", _moved(GRIP, (0.1, 0, 0)))
+            reached = f"Math.abs(s.goals['tool.y'] - {before['tool.y'] - 0.1}) < 0.01"
+            await console.until(f"!s.armed || {reached}")
+            if await headset.holds(reached):
                 break
-        await headset.place("right", _moved(GRIP, (0.1, 0, 0)))
-        await console.until(f"Math.abs(s.goals['tool.y'] - {before['tool.y'] - 0.1}) < 0.01")
+        else:
+            raise AssertionError("the hand does not lead the tool")
         await headset.do("void (h.device.hands.right.poseId = 'default')")
         await console.until("!s.armed && s.commanded['tool.y'] === null")
+        assert "Squeeze" in (await console.stats())["headset"]["text"]

@@ -55,7 +55,7 @@ export function createHeadsetSettings(storage: HandSettingsStorage, shown: () =>
   });
   const element = h(
     "section",
-    "card settings",
+    "card hand-settings",
     { "aria-label": "Hands in the headset" },
     h("div", "card-head", {}, h("h2", "", {}, "Hands in the headset")),
     scale,
