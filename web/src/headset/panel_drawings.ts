@@ -177,15 +177,34 @@ function drawWay(
     context.fillRect(x, top + 46, Math.max(2, wide - 3), 26);
     x += wide;
   }
-  const each = width / way.length;
+  drawLegend(context, left, top + 92, width, way);
+}
+
+/** Each entry as wide as its words; all smaller where they would not fit. */
+function drawLegend(
+  context: Context,
+  left: number,
+  top: number,
+  width: number,
+  way: readonly WayGroup[],
+): void {
   context.textAlign = "left";
-  for (const [index, { name, ms }] of way.entries()) {
-    const at = left + index * each;
+  context.textBaseline = "alphabetic";
+  const words = way.map(({ name, ms }) => `${name} ${ms < 9.95 ? ms.toFixed(1) : ms.toFixed(0)}`);
+  const widthAt = (size: number): number => {
+    context.font = `600 ${size}px ${FAMILY}`;
+    return words.reduce((sum, each) => sum + context.measureText(each).width + 2.2 * size, 0);
+  };
+  const size = Math.min(31, (31 * width) / widthAt(31));
+  const spare = Math.max(0, width - widthAt(size)) / Math.max(1, way.length - 1);
+  let x = left;
+  for (const [index, { name }] of way.entries()) {
+    const text = words[index] ?? "";
     context.fillStyle = WAY_COLOURS[name];
-    context.fillRect(at, top + 92, 22, 22);
+    context.fillRect(x, top, 0.7 * size, 0.7 * size);
     context.fillStyle = TEXT;
-    context.font = `600 30px ${FAMILY}`;
-    context.fillText(`${name} ${ms < 9.95 ? ms.toFixed(1) : ms.toFixed(0)}`, at + 32, top + 114, each - 44);
+    context.fillText(text, x + size, top + 0.7 * size);
+    x += context.measureText(text).width + 2.2 * size + Math.min(spare, 60);
   }
 }
 

@@ -88,7 +88,8 @@ function stateWords(engine: ConsoleEngine, now: number): Pick<HeadsetStatus, "te
 function calmWords({ arming: { reason } }: ConsoleEngine): string {
   const squeeze = DISARM_LABELS.squeeze_released;
   if (reason === "start" || reason === "operator" || reason === "squeeze_released") return squeeze;
-  return `${DISARM_LABELS[reason].replace(/^Disarmed: (.)/, (_all, first: string) => first.toUpperCase())}. ${squeeze}`;
+  const why = DISARM_LABELS[reason].replace(/^Disarmed: (.)/, (_all, first: string) => first.toUpperCase());
+  return `${why.replace(". Arm to go on", "")}. ${squeeze}`;
 }
 
 function seatWords({ state }: ConsoleEngine): string {
