@@ -6,10 +6,10 @@ import { describe, expect, it } from "vitest";
 const LAYERS: readonly (readonly string[])[] = [
   ["util", "protocol"],
   ["gate"],
-  ["drive", "force_feedback", "gamepad", "robot", "session", "stop"],
+  ["drive", "force_feedback", "gamepad", "robot", "session", "stop", "xr"],
   ["haptics", "input", "media", "sfu", "talkback", "transport"],
   ["engine", "fleet", "replay"],
-  ["charts", "scene", "ui"],
+  ["charts", "headset", "scene", "ui"],
   ["app", "fleet/view", "replay/view"],
   [""], // the pages' first files
 ];

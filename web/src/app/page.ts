@@ -71,11 +71,12 @@ export class Page {
   start(): void {
     document.body.replaceChildren(this.root);
     this.startedMs = performance.now();
+    const { display } = this.engine;
     const frame = (now: number): void => {
-      requestAnimationFrame(frame);
+      display.request(frame);
       if (now - this.drawnMs >= REDRAW_MS) this.draw(now);
     };
-    requestAnimationFrame(frame);
+    display.request(frame);
     this.draw(performance.now());
   }
 

@@ -3,6 +3,7 @@ import { ChartsDrawer } from "../charts/charts_drawer";
 import type { WaySource } from "../charts/way_figures";
 import type { ConsoleEngine } from "../engine/console_engine";
 import { Tracing } from "../engine/tracing";
+import { HeadsetEntry } from "../headset/headset_entry";
 import { PictureTrace } from "../media/picture_trace";
 import { readFragment } from "../util/url_fragment";
 import type { PageAction } from "../input/shortcuts";
@@ -45,6 +46,7 @@ export class SidePanels {
   readonly charts: ChartsDrawer;
   readonly sheets: Sheets;
   private readonly unread = createUnread();
+  private readonly headset: HeadsetEntry;
   private readonly pageTools: PageTools;
   private readonly session: SessionApi;
   private readonly keys = once(() => createKeysSheet(this.engine));
@@ -65,18 +67,20 @@ export class SidePanels {
     const { controls } = engine;
     const pad = (controls.pad ??= new Pad(controls.events, new GamepadStorage()));
     const forces = new ForceFeedbackLoader(engine);
-    this.pads = once(() => createGamepadSheet(pad, forces));
+    this.pads = once(() => createGamepadSheet(pad, forces, engine.display));
     this.session = new SessionApi(api);
     const robotLink = new RobotLinkApi(api);
     this.pairing = once(() => createRobotLinkSheet([["", robotLink]]));
     void this.lookForPairing(robotLink);
     this.sheets = new Sheets(() => root.querySelectorAll<HTMLElement>(BEHIND_SHEETS));
     this.record = createRecordButton(engine, this.session);
+    this.headset = new HeadsetEntry({ engine, grid });
     this.pageTools = createPageTools({
       charts: () => this.act("charts"),
       keys: () => this.act("keys"),
       pads: () => this.act("pads"),
       scene: () => this.toggleScene(),
+      headset: (className) => this.headset.createButtons(className),
     });
     this.tools = {
       element: this.pageTools.bar,
@@ -146,6 +150,7 @@ export class SidePanels {
       createStreamTable(engine),
       createDelayPanel(engine, () => this.grid.mainStream()),
       createSettingsPanel(engine),
+      this.headset.createSettings(),
       createLogPanel(engine),
     ];
     const people = createParticipantsPanel(engine, {
@@ -159,7 +164,8 @@ export class SidePanels {
       element: notes.element,
       update: (now) => {
         notes.update(now);
-        if (!document.hidden && notes.element.checkVisibility()) markRead(this.unread, engine.state.notes);
+        if (engine.display.visible && notes.element.checkVisibility())
+          markRead(this.unread, engine.state.notes);
       },
     };
     const news = (): number => this.countNews();

@@ -28,7 +28,15 @@ export type DisarmReason =
   | "stop_pressed"
   | "locked_out"
   | "neutral_needed"
-  | "taped_down";
+  | "taped_down"
+  // in a headset's session:
+  | "squeeze_released"
+  | "tracking_lost"
+  | "headset_off"
+  | "headset_blurred"
+  | "headset_silent"
+  | "headset_left"
+  | "battery_low";
 
 export interface ArmConditions {
   readonly operator: boolean;

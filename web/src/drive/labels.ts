@@ -50,4 +50,11 @@ export const DISARM_LABELS: Readonly<Record<DisarmReason, string>> = {
   locked_out: "Disarmed: somebody at the robot locked it",
   neutral_needed: "Disarmed: the robot interrupted the motion. Arm to go on",
   taped_down: "Disarmed: hold-to-run was held a minute without change",
+  squeeze_released: "Squeeze the grip to drive",
+  tracking_lost: "Disarmed: the headset lost sight of the hand",
+  headset_off: "Disarmed: the headset was taken off",
+  headset_blurred: "Disarmed: the headset showed something else",
+  headset_silent: "Disarmed: the headset stood still",
+  headset_left: "Disarmed: the headset view was closed",
+  battery_low: "Disarmed: the battery is almost empty",
 };

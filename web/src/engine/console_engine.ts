@@ -19,6 +19,7 @@ import { createRateMeter, noteOccurrence } from "../util/samples";
 import { parseServerMessage } from "../protocol/wire_parser";
 import { ARM_REFUSAL_LABELS } from "../drive/labels";
 import { Controls, type ControlSample } from "../input/controls";
+import { Display } from "../input/display";
 import { Disposal } from "../input/disposal";
 import { keepKeyboardFree } from "../input/pointer_focus";
 import { SendTimer } from "../input/send_timer";
@@ -39,6 +40,7 @@ import { SessionClient } from "../session/session_client";
 import type { ActionClient } from "../robot/action_client";
 import type { ActConditions } from "../robot/actions";
 import { reportOf } from "./report";
+import type { HeadsetStep } from "./headset_statistics";
 import type { Tracing } from "./tracing";
 import type { GoalDriving } from "../drive/goals/goal_driving";
 import { StopSender } from "./stop_sender";
@@ -83,7 +85,9 @@ export class ConsoleEngine {
   readonly controls: Controls;
   readonly events = createRateMeter();
   readonly audio = new AudioDevice();
+  readonly display = new Display();
   charts: Stepped | null = null; // until its code is there
+  headset: HeadsetStep | null = null; // while its session lasts
   talkback: Talkback | null = null; // likewise
   connectionState: ConnectionState = { kind: "connecting" };
   driver: driver.Driver | null = null;
@@ -120,6 +124,7 @@ export class ConsoleEngine {
   ) {
     this.streams = new MediaStreams(this.state, this.reader, this.audio, {
       canvas: (info) => page.canvas(info),
+      visible: () => this.display.visible,
       drawn: (stream, stamp, at) => this.drawn(stream, stamp, at),
     });
     this.connection = new Connection(api, this.reader, options, first, {
@@ -193,8 +198,8 @@ export class ConsoleEngine {
       lockedOut: state.stop.locked_out !== "",
       stopped: state.stop.stopped,
       stopPressed: this.stopping.outranks(state.stop, now),
-      visible: !document.hidden,
-      occupied: this.page.isOccupied(),
+      visible: this.display.visible,
+      occupied: !this.display.isImmersive && this.page.isOccupied(),
     };
   }
 
@@ -291,17 +296,23 @@ export class ConsoleEngine {
 
   private watchPage(): void {
     watchPage(this.disposal, {
-      blurred: () => this.disarm("blur"),
+      blurred: () => this.blurred(),
       left: () => {
         this.disarm("hidden");
         this.connection.close();
       },
       visibilityChanged: () => {
-        if (document.hidden) this.disarm("hidden");
+        if (!this.display.visible) this.disarm("hidden");
         this.streams.listen();
       },
       networkChanged: () => this.connection.alarm(),
     });
+  }
+
+  /** Without the window's focus nobody knows which keys are held. A headset's controllers need no focus. */
+  private blurred(): void {
+    if (this.display.isImmersive && !this.controls.usesWindow) this.controls.keyboard.release();
+    else this.disarm("blur");
   }
 
   private connectionClosed(): void {
@@ -425,6 +436,7 @@ export class ConsoleEngine {
     this.talkback?.step(now);
     this.stopping.step(now);
     this.charts?.step(now);
+    this.headset?.step(now);
     this.haptics.step(now);
     this.tracing?.step(now);
     if (this.state.welcome !== null) this.heartbeat.step(now);

@@ -7,6 +7,7 @@ import { quantile, rateOf } from "../util/samples";
 import type { StopFate } from "../stop/stop_press";
 import { GATE_REASON_LABELS, GATE_LABELS } from "../drive/labels";
 import type { ConsoleEngine } from "./console_engine";
+import type { HeadsetStatistics } from "./headset_statistics";
 import { stalenessOf } from "./report";
 import type { StopState, StreamInfo } from "../protocol/wire";
 
@@ -69,6 +70,7 @@ export interface Statistics {
   readonly first_picture_ms: number | null;
   readonly sound: "on" | "off";
   readonly pad: { readonly id: string; readonly ready: boolean; readonly calibrated: boolean } | null;
+  readonly headset: HeadsetStatistics | null; // while its session lasts
   readonly bad_messages: number;
 }
 
@@ -124,6 +126,7 @@ export function statisticsOf(engine: ConsoleEngine, mainStream: string | null): 
     first_picture_ms: engine.firstPictureMs,
     sound: engine.streams.isAudible() ? "on" : "off",
     pad: padOf(engine),
+    headset: engine.headset?.statistics() ?? null,
     bad_messages: state.badMessages,
   };
 }

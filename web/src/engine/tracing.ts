@@ -17,7 +17,7 @@ export interface TracingEvents {
 /** Asks the console for traces while somebody looks at them or a recording keeps them, and keeps the book. */
 export class Tracing {
   readonly book = new TraceBook();
-  private isShown = false; // the charts are open
+  private readonly shownIn = new Set<string>(); // where somebody looks at them now
   private shownMs = -Infinity; // when they were last
   private asked = false;
   private values: readonly (number | null)[] = [];
@@ -27,9 +27,9 @@ export class Tracing {
   constructor(private readonly events: TracingEvents) {}
 
   /** Somebody looks at traces from now on, or no more. */
-  show(shown: boolean, now: number): void {
-    if (this.isShown && !shown) this.shownMs = now;
-    this.isShown = shown;
+  show(shown: boolean, now: number, where = "charts"): void {
+    if (shown) this.shownIn.add(where);
+    else if (this.shownIn.delete(where)) this.shownMs = now;
   }
 
   /** Another connection knows nothing of what was asked before. */
@@ -63,7 +63,7 @@ export class Tracing {
   step(now: number): void {
     if (!this.events.isConnected()) return;
     const recorded = this.events.drivesRecorded();
-    const wanted = this.isShown || now - this.shownMs < GOES_ON_MS || recorded;
+    const wanted = this.shownIn.size > 0 || now - this.shownMs < GOES_ON_MS || recorded;
     if (wanted !== this.asked && this.events.tell("session", { type: "trace_request", wanted }))
       this.asked = wanted;
     if (recorded && now - this.reportedMs >= REPORT_MS) this.report(now);

@@ -12,7 +12,7 @@ const FELT_MS = 1000; // a force that was measured longer ago is not felt
 /** What the operator may feel, and with which pad. */
 export interface HapticsContext {
   readonly state: Pick<ConsoleState, "robot" | "settings">;
-  readonly controls: { readonly pad: { readonly state: { readonly gamepad: Gamepad } | null } | null };
+  readonly controls: { readonly felt: Gamepad | null };
   readonly streams: { isAudible(): boolean };
   readonly measuredMs: number | null; // when the newest feedback came
   isArmed(): boolean;
@@ -75,8 +75,8 @@ export class Haptics {
     const { settings } = context.state;
     const by = this.feeling(now);
     const strength = by === null ? 0 : contactStrength(this.force, by);
-    const pad = settings.rumble && context.isArmed() ? context.controls.pad?.state : null;
-    this.rumble?.feel(pad?.gamepad ?? null, strength, now);
+    const felt = settings.rumble && context.isArmed() ? context.controls.felt : null;
+    this.rumble?.feel(felt, strength, now);
     this.tone?.sound(settings.contactTone && context.streams.isAudible() ? strength : 0);
     this.stick?.feel(by === null ? null : strength, now);
   }

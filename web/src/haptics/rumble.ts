@@ -16,7 +16,13 @@ export class Rumble {
       this.stop();
       return;
     }
-    if (this.pad !== null && (this.pad.index !== gamepad.index || this.pad.id !== gamepad.id)) this.stop();
+    if (
+      this.pad !== null &&
+      (this.pad.index !== gamepad.index ||
+        this.pad.id !== gamepad.id ||
+        (gamepad.index < 0 && this.pad.actuator !== actuator))
+    )
+      this.stop();
     this.pad = { index: gamepad.index, id: gamepad.id, actuator };
     this.carryOut(planRumble(this.plan, strength, now));
   }

@@ -1,5 +1,6 @@
 import type { HeldInputs } from "../drive/axis_mapping";
 import { createInputActivity, noteInput } from "../drive/input_activity";
+import type { PadInputs } from "../gamepad/mapping";
 import { Keyboard, type KeyboardEvents } from "./keyboard";
 import type { Pad, PadEvents, PadState } from "./gamepad";
 import type { GoalSliders } from "./goal_sliders";
@@ -15,11 +16,21 @@ export interface ControlSample {
   readonly signature: string; // the same while no hand shows
 }
 
+/** What the controllers or hands of a headset hold. */
+export interface HeadsetControls {
+  readonly deadman: boolean;
+  readonly inputs: PadInputs;
+  readonly gamepad: Gamepad | null; // of the hand that holds the deadman: what it may feel
+  readonly signature: string; // another one when a hand moves
+  release(): void;
+}
+
 /** Gamepad, keyboard and touch as one set of controls. */
 export class Controls {
   pad: Pad | null = null; // until its code is there
   sliders: GoalSliders | null = null; // likewise
   readonly keyboard: Keyboard;
+  headset: HeadsetControls | null = null; // while its session lasts
   private readonly activity = createInputActivity();
 
   constructor(
@@ -40,10 +51,20 @@ export class Controls {
     return this.pad?.hasNews === true;
   }
 
-  /** Whether a deadman is held, by what is known now. */
-  get deadman(): boolean {
+  /** Whether a deadman of the window is held. */
+  get usesWindow(): boolean {
     const { keyboard, sticks, sliders, readyPad: pad } = this;
     return keyboard.deadman || sticks.deadman || sliders?.deadman === true || pad?.deadman === true;
+  }
+
+  /** What a contact is felt with. */
+  get felt(): Gamepad | null {
+    return this.headset?.gamepad ?? this.pad?.state?.gamepad ?? null;
+  }
+
+  /** Whether a deadman is held, by what is known now. */
+  get deadman(): boolean {
+    return this.usesWindow || this.headset?.deadman === true;
   }
 
   private get readyPad(): PadState | null {
@@ -57,12 +78,13 @@ export class Controls {
     const touch = sticks.deadman ? sticks.inputs : null;
     const sliders = this.sliders?.sample(keyboard.keys) ?? null;
     const keys = sliders?.otherKeys ?? keyboard.keys;
-    const held: HeldInputs = { pad: pad?.inputs ?? null, keys, touch, sliders };
+    const inputs = (this.headset?.deadman === true ? this.headset : pad)?.inputs ?? null;
+    const held: HeldInputs = { pad: inputs, keys, touch, sliders };
     return {
       deadman: this.deadman,
       held,
       slowShare: keyboard.slow ? SLOW_SHARE : 1,
-      signature: noteInput(this.activity, held),
+      signature: noteInput(this.activity, held) + (this.headset?.signature ?? ""),
     };
   }
 
@@ -71,6 +93,7 @@ export class Controls {
     this.keyboard.release();
     this.sticks.release();
     this.sliders?.release();
+    this.headset?.release();
   }
 
   close(): void {

@@ -36,6 +36,11 @@ export class Ticker {
     if (this.isLate(now)) this.tick(now);
   }
 
+  /** A frame of a headset's session: it ticks too, if the timer has not meanwhile. */
+  frame(now: number): void {
+    if (now - this.tickMs >= TICK_MS) this.tick(now);
+  }
+
   /** Whether the page was held up and has not ticked since. */
   isLate(now: number): boolean {
     return now - this.tickMs > LATE_MS;

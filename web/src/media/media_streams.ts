@@ -24,6 +24,7 @@ export interface FeedbackArrival {
 
 export interface MediaStreamsEvents {
   canvas(info: StreamInfo): HTMLCanvasElement;
+  visible(): boolean; // whether the person sees the page
   drawn(stream: VideoStream, stamp: number | null, at: number): void;
 }
 
@@ -98,7 +99,7 @@ export class MediaStreams {
 
   /** Timers are slow on a hidden page, too slow to gate sound. */
   isAudible(): boolean {
-    return this.audio.isRunning() && this.state.settings.soundWanted && !document.hidden;
+    return this.audio.isRunning() && this.state.settings.soundWanted && this.events.visible();
   }
 
   context(kind: "audio" | "video"): GateContext {

@@ -11,6 +11,7 @@ export function createScene(engine: ConsoleEngine, grid: ViewGrid, api: ConsoleA
       const video = engine.streams.videos.get(grid.mainStream() ?? "");
       return sceneDue(engine.streams.context("video"), video?.gate.shown ?? null);
     },
+    display: engine.display,
     context: () => engine.streams.context("video"),
     onkey: (key) => engine.controls.keyboard.foreign(key),
   });

@@ -6,6 +6,7 @@ import {
   type ScenePose,
   type ScenePoses,
 } from "../gate/scene_poses";
+import type { Display } from "../input/display";
 import type { SceneRenderer } from "./scene_renderer";
 import type { RobotDescription } from "../protocol/wire";
 import { h, setText } from "../ui/elements/dom";
@@ -30,7 +31,10 @@ export class SceneDrawing {
   private pose: ScenePose | null = null; // shown
   private frame = 0; // asked of the browser; 0: none is
 
-  constructor(private readonly due: () => number | "all" | null) {}
+  constructor(
+    private readonly due: () => number | "all" | null,
+    private readonly display: Display,
+  ) {}
 
   open(description: RobotDescription): void {
     if (this.state !== "off") return;
@@ -39,7 +43,7 @@ export class SceneDrawing {
   }
 
   close(): void {
-    cancelAnimationFrame(this.frame);
+    this.display.cancel(this.frame);
     this.stage?.close();
     this.stage = null;
     this.canvas = null;
@@ -63,7 +67,7 @@ export class SceneDrawing {
   /** Something is due, or may be. */
   settle(): void {
     if (this.state !== "on" || this.frame !== 0) return;
-    this.frame = requestAnimationFrame(() => {
+    this.frame = this.display.request(() => {
       this.frame = 0;
       this.draw();
     });
@@ -79,7 +83,7 @@ export class SceneDrawing {
     try {
       const { SceneRenderer } = await import("./scene_renderer");
       if (this.canvas !== canvas) return;
-      this.stage = new SceneRenderer(canvas, description, DISTANCE);
+      this.stage = new SceneRenderer(canvas, description, this.display, DISTANCE);
       setText(this.scale, this.stage.scale);
       this.state = "on";
     } catch {

@@ -10,6 +10,7 @@ import {
   WebGLRenderer,
 } from "three";
 import { OrbitControls } from "three/addons/controls/OrbitControls.js";
+import type { Display } from "../input/display";
 import { lengthLabel, roundLength } from "../util/units";
 import type { RobotDescription } from "../protocol/wire";
 import { RobotModel } from "./robot_model";
@@ -43,6 +44,7 @@ export class SceneRenderer {
   constructor(
     private readonly canvas: HTMLCanvasElement,
     description: RobotDescription,
+    private readonly display: Display,
     private readonly distance = 4.2,
   ) {
     this.renderer = new WebGLRenderer({ canvas, antialias: true });
@@ -83,7 +85,7 @@ export class SceneRenderer {
   }
 
   close(): void {
-    cancelAnimationFrame(this.frame);
+    this.display.cancel(this.frame);
     this.resizes.disconnect();
     this.controls.dispose();
     this.renderer.dispose();
@@ -121,8 +123,8 @@ export class SceneRenderer {
   }
 
   private drawSoon(): void {
-    cancelAnimationFrame(this.frame);
-    this.frame = requestAnimationFrame(() => this.draw());
+    this.display.cancel(this.frame);
+    this.frame = this.display.request(() => this.draw());
   }
 
   private draw(): void {

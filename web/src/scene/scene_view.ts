@@ -3,6 +3,7 @@ import { eventGap } from "../gate/serial";
 import type { GateContext } from "../gate/gate_counters";
 import type { ConsoleApi } from "../transport/signalling/console_api";
 import type { Feedback, RobotDescription } from "../protocol/wire";
+import type { Display } from "../input/display";
 import { h, setData, setText } from "../ui/elements/dom";
 import { SceneDrawing } from "./scene_drawing";
 import { gateScene, type ForeignKey } from "./scene_frame";
@@ -16,6 +17,8 @@ export interface SceneSurroundings {
   /** Newest event that the scene may show. */
   due(): number | "all" | null;
   context(): GateContext;
+  /** Whose frames it draws in. */
+  readonly display: Display;
   /** Keys pressed while the frame has the focus, which the page itself never sees. */
   onkey(key: ForeignKey): void;
 }
@@ -56,7 +59,7 @@ export class SceneView {
     private readonly api: ConsoleApi,
     private readonly page: SceneSurroundings,
   ) {
-    this.drawing = new SceneDrawing(() => page.due());
+    this.drawing = new SceneDrawing(() => page.due(), page.display);
     this.element.append(this.drawing.element, this.words);
     gateScene(this.gate, () => this.frame?.contentWindow ?? null, page);
   }

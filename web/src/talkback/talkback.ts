@@ -24,6 +24,7 @@ export interface TalkbackContext {
   readonly controls: { readonly keyboard: { readonly keys: ReadonlySet<string> } };
   readonly page: { isOccupied(): boolean }; // a text field has the keyboard, or something stands over the pictures
   readonly audio: { open(): AudioContext };
+  readonly display: { readonly visible: boolean }; // whether the person sees the page
   hears(now: number): boolean; // the console has spoken lately
 }
 
@@ -40,7 +41,7 @@ export class Talkback {
       blurred: () => this.letGo(),
       left: () => this.letGo(),
       visibilityChanged: () => {
-        if (document.hidden) this.letGo();
+        if (!this.context.display.visible) this.letGo();
       },
       networkChanged: () => undefined,
     });
@@ -99,7 +100,7 @@ export class Talkback {
   step(now: number, gone = false): void {
     const { keyboard } = this.context.controls;
     const byKey = keyboard.keys.has(TALK_KEY) && !this.context.page.isOccupied() && !this.keyDrives();
-    const blocked = gone || document.hidden || this.voice.isLost() || this.obstacle() !== null;
+    const blocked = gone || !this.context.display.visible || this.voice.isLost() || this.obstacle() !== null;
     this.act(stepTalk(this.talk, this.isPressed || byKey, blocked, now));
     if (this.voice.isLost() && !this.talk.talking) this.shut();
   }

@@ -78,13 +78,25 @@ async def running_chromium(
 
 @asynccontextmanager
 async def open_page(
-    browser: Browser, link: str, *, width: int = 1280, height: int = 800, pad: bool = False, touch: bool = False
+    browser: Browser,
+    link: str,
+    *,
+    width: int = 1280,
+    height: int = 800,
+    pad: bool = False,
+    touch: bool = False,
+    scripts: Sequence[Path] = (),
 ) -> AsyncIterator[Page]:
-    """Open `link` in a page with its own context; uncaught errors of the page fail the test on leaving."""
+    """Open `link` in a page with its own context; uncaught errors of the page fail the test on leaving.
+
+    `scripts` run in the page before its own.
+    """
     context: BrowserContext = await browser.new_context(viewport={"width": width, "height": height}, has_touch=touch)
     try:
         if pad:
             await context.add_init_script(path=PAD)
+        for script in scripts:
+            await context.add_init_script(path=script)
         page = await context.new_page()
         errors: list[str] = []
         page.on("pageerror", lambda error: errors.append(str(error)))

@@ -1,8 +1,9 @@
 """Handles the page as its user does, and reads its statistics, for tests in Chromium."""
 
 import asyncio
-from collections.abc import AsyncIterator, Mapping
+from collections.abc import AsyncIterator, Mapping, Sequence
 from contextlib import asynccontextmanager
+from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
@@ -228,6 +229,7 @@ async def open_console(
     height: int = SMALL_WINDOW[1],
     pad: bool = True,
     touch: bool = False,
+    scripts: Sequence[Path] = (),
 ) -> AsyncIterator[ConsolePage]:
-    async with open_page(browser, link, width=width, height=height, pad=pad, touch=touch) as page:
+    async with open_page(browser, link, width=width, height=height, pad=pad, touch=touch, scripts=scripts) as page:
         yield ConsolePage(page)

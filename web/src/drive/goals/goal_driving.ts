@@ -52,10 +52,16 @@ export class GoalDriving {
       return values;
     }
     const posed = this.device?.goals(feedback) ?? [];
+    const idle = replaced(description, posed);
     const taken = [...values];
     let fastest = 0;
     for (const each of this.axes) {
       const [goal, share] = this.goalOf(each, posed[each.index] ?? null, inputs, feedback, now);
+      if (idle.has(each.axis.name)) {
+        each.jog.goal = null;
+        taken[each.index] = null;
+        continue;
+      }
       taken[each.index] = goal;
       fastest = Math.max(fastest, share);
     }
@@ -110,6 +116,17 @@ export class GoalDriving {
     if (led !== null) return [led, 1];
     return [jogged, jogged === null ? 0 : Math.min(1, Math.abs(input))];
   }
+}
+
+/** The axes that a device drives by a pose instead: a command for both is refused. */
+function replaced({ axes, poses }: RobotDescription, posed: readonly AxisValue[]): ReadonlySet<string> {
+  const led = new Set(
+    axes.filter((_axis, index) => typeof posed[index] === "number").map(({ name }) => name),
+  );
+  const driven = poses.filter(({ position, rotation }) =>
+    [...position, ...rotation].some((name) => led.has(name)),
+  );
+  return new Set(driven.flatMap(({ instead_of }) => instead_of));
 }
 
 /** `travel`: of the slider since it was taken, as a share of the axis' range. */

@@ -38,6 +38,7 @@ export class Thumbnail {
   ) {
     this.room = new MediaStreams(this.state, reader, silence, {
       canvas: () => this.canvas,
+      visible: () => !document.hidden,
       drawn: () => this.changed(),
     });
     this.connection = new Connection(api, reader, { ...options, watches: false, thumbnail: true }, null, {

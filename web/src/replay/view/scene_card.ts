@@ -1,5 +1,6 @@
 import type { ReplayFeedback } from "../chunk";
 import type { RobotDescription } from "../../protocol/wire";
+import { Display } from "../../input/display";
 import { grouped, h, setHidden, setText } from "../../ui/elements/dom";
 import type { SceneRenderer } from "../../scene/scene_renderer";
 
@@ -58,7 +59,7 @@ export class SceneCard {
     try {
       const { SceneRenderer } = await import("../../scene/scene_renderer");
       if (this.closed) return;
-      this.stage = new SceneRenderer(this.canvas, this.description);
+      this.stage = new SceneRenderer(this.canvas, this.description, new Display());
       this.state = "on";
       setText(this.scale, this.stage.scale);
     } catch {

@@ -2,6 +2,7 @@ import type { PadLayout } from "../../gamepad/layout";
 import { padName, setupOf } from "../../gamepad/profile";
 import { MAX_STORE_CHARS } from "../../gamepad/profile_file";
 import type { ForceFeedbackLoader } from "../../haptics/force_feedback_loader";
+import type { Display } from "../../input/display";
 import type { Pad } from "../../input/gamepad";
 import { saveFile } from "../elements/save_file";
 import { button, h, setData, setHidden, setText, type Panel } from "../elements/dom";
@@ -12,8 +13,8 @@ import { CalibrationWizard } from "./calibration_wizard";
 import type { SheetContent } from "../elements/sheet";
 
 /** Which pad drives, what its parts do, and how it feels. */
-export function createGamepadSheet(pad: Pad, forces: ForceFeedbackLoader): SheetContent {
-  return new PadSheet(pad, forces);
+export function createGamepadSheet(pad: Pad, forces: ForceFeedbackLoader, display: Display): SheetContent {
+  return new PadSheet(pad, forces, display);
 }
 
 class PadSheet implements SheetContent {
@@ -42,6 +43,7 @@ class PadSheet implements SheetContent {
   constructor(
     private readonly pad: Pad,
     private readonly forces: ForceFeedbackLoader,
+    private readonly display: Display,
   ) {
     this.list = new PadList(pad, { calibrate: (gamepad) => this.calibrate(gamepad) });
     this.wizard = new CalibrationWizard({
@@ -57,14 +59,14 @@ class PadSheet implements SheetContent {
     this.leaveWizard();
     void this.addForces();
     const step = (now: number): void => {
-      this.frame = requestAnimationFrame(step);
+      this.frame = this.display.request(step);
       this.update(now);
     };
     step(performance.now());
   }
 
   closed(): void {
-    cancelAnimationFrame(this.frame);
+    this.display.cancel(this.frame);
     this.leaveWizard();
   }
 

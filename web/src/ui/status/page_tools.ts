@@ -6,6 +6,7 @@ export interface PageToolEvents {
   keys(): void;
   pads(): void;
   scene(): void; // shows or hides it
+  headset(className: string): HTMLButtonElement[]; // made anew for each place
 }
 
 export interface PageTools {
@@ -30,7 +31,7 @@ export function createPageTools(events: PageToolEvents): PageTools {
     keys.setAttribute("aria-keyshortcuts", "H");
     charts.append(h("kbd", "", {}, "C"));
     keys.append(h("kbd", "", {}, "H"));
-    return h("div", className, {}, scene, charts, pads, keys);
+    return h("div", className, {}, ...events.headset("chip-button"), scene, charts, pads, keys);
   };
   return {
     bar: group("bar-extras"),

@@ -9,8 +9,16 @@ import { h, setData, setHidden, setText } from "../elements/dom";
 import type { SceneSwitch } from "../../scene/scene_switch";
 import type { SceneView } from "../../scene/scene_view";
 
+/** What the gate draws for one camera. */
+export interface PlacedPicture {
+  readonly name: string;
+  readonly label: string;
+  readonly canvas: HTMLCanvasElement;
+}
+
 interface View {
   readonly name: string;
+  readonly label: string;
   readonly element: HTMLElement;
   readonly caption: HTMLElement;
   readonly detail: HTMLElement;
@@ -72,6 +80,13 @@ export class ViewGrid {
   /** The camera in the large view; null while the scene is there. */
   largeStream(): string | null {
     return this.main === SCENE ? null : this.main;
+  }
+
+  /** The cameras' pictures as they are on the page, in their order. */
+  pictures(): PlacedPicture[] {
+    return [...this.views.values()].flatMap(({ name, label, canvas }) =>
+      canvas === null ? [] : [{ name, label, canvas }],
+    );
   }
 
   update(engine: ConsoleEngine, now: number): void {
@@ -161,7 +176,7 @@ export class ViewGrid {
     const bar = h("figcaption", "view-caption", {}, caption, detail);
     const element = h("figure", "view", { "data-view": name }, content, veil, bar, swap);
     setHidden(veil, true);
-    return { name, element, caption, detail, veil, veilWords, swap, canvas };
+    return { name, label, element, caption, detail, veil, veilWords, swap, canvas };
   }
 
   private addView(view: View): void {
@@ -271,7 +286,7 @@ function shapeOf({ canvas }: View): number {
 
 function showVeil(engine: ConsoleEngine, view: View, now: number): void {
   const video = engine.streams.videos.get(view.name);
-  const words = veilWords(engine, view, now);
+  const words = veilWords(engine, view.name, now);
   setHidden(view.veil, words === null);
   view.element.classList.toggle("is-stale", words !== null);
   if (words !== null) setText(view.veilWords, words);
@@ -281,12 +296,13 @@ function showVeil(engine: ConsoleEngine, view: View, now: number): void {
   setData(view.element, "gap", gap !== null && Math.abs(gap) > tolerance ? "bad" : "good");
 }
 
-function veilWords(engine: ConsoleEngine, view: View, now: number): string | null {
-  const video = engine.streams.videos.get(view.name);
+/** Why the picture of a camera does not show the robot's present state; null when it may be looked at. */
+export function veilWords(engine: ConsoleEngine, name: string, now: number): string | null {
+  const video = engine.streams.videos.get(name);
   if (video === undefined) return "Not connected";
   const unreachable = unreachableWords(engine);
   if (unreachable !== null) return unreachable;
-  const source = engine.state.sources.find((each) => each.stream === view.name);
+  const source = engine.state.sources.find((each) => each.stream === name);
   return (source && sourceLabel(source)) ?? stalenessOf(engine.streams, video, now);
 }
 

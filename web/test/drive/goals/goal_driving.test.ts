@@ -156,3 +156,21 @@ describe("goal axes", () => {
     }
   });
 });
+
+describe("a pose that a device drives", () => {
+  it("keeps still the axes that it stands for, whatever is held", () => {
+    const names = ["x", "y", "z"] as const;
+    const arm = [goalAxisOf("elbow"), ...names.map((name) => goalAxisOf(name))];
+    const pose = {
+      ...{ name: "tool", label: "Tool", body: "hand", frame: "", point: [0, 0, 0] as const },
+      ...{ position: names, rotation: ["", "", ""] as const, instead_of: ["elbow"] },
+    };
+    const robot = { ...descriptionOf(arm), poses: [pose] };
+    const driving = new GoalDriving();
+    const places = feedbackOf(5, { axes: [1, 0, 0, 0], goals: [1, 0, 0, 0] });
+    const inputs = inputsOf(heldOf(["KeyW"]), { description: robot, feedback: places });
+    expect(driving.take([null, null, null, null], inputs, 0)).toEqual([1, null, null, null]);
+    driving.device = { goals: () => [null, 0.1, 0.2, 0.3], release: () => undefined };
+    expect(driving.take([null, null, null, null], inputs, 10)).toEqual([null, 0.1, 0.2, 0.3]);
+  });
+});

@@ -1,0 +1,336 @@
+import { WebGLRenderer } from "three";
+import type { ConsoleEngine } from "../engine/console_engine";
+import type { HeadsetStatistics } from "../engine/headset_statistics";
+import type { HeadsetControls } from "../input/controls";
+import type { PadInputs } from "../gamepad/mapping";
+import { robotIsUp } from "../session/console_state";
+import { pressedStopLabel, restingStopLabel } from "../stop/stop_labels";
+import { veilWords, type PlacedPicture } from "../ui/views/view_grid";
+import {
+  createHeadsetInput,
+  grab,
+  isSilent,
+  letGo,
+  takeFrame,
+  type HeadsetEvent,
+  type Side,
+} from "../xr/headset_input";
+import type { RobotDescription } from "../protocol/wire";
+import type { HandSettings } from "../xr/hand_mapping";
+import { PoseDevice } from "../xr/pose_drive";
+import type { RigidPose } from "../xr/rigid";
+import { Battery } from "./battery";
+import { HeadsetView, type ViewCamera } from "./headset_view";
+import { headsetStatus, resetWords, type FrameFigures } from "./status";
+import { readHands, trackedPose, type HandReading } from "./xr_hands";
+
+export type HeadsetMode = "immersive-ar" | "immersive-vr";
+
+/** The page that the headset shows. */
+export interface HeadsetPage {
+  readonly engine: ConsoleEngine;
+  readonly grid: { pictures(): PlacedPicture[]; mainStream(): string | null };
+}
+
+const STATUS_MS = 100; // between two readings of what the panel says
+const HOLD_MS = 1000; // the reset is held this long
+const SMOOTH = 0.1; // share of the newest frame in the shown times
+
+/**
+ * One immersive session. Its frames are the page's frames, and whether it is visible says whether the page is: arming,
+ * gate and veils go on with the window silent. Each of its ends leaves the robot at rest and the page disarmed.
+ */
+export class HeadsetSession implements HeadsetControls {
+  readonly frame: { -readonly [Name in keyof FrameFigures]: FrameFigures[Name] } = {
+    intervalMs: null,
+    workMs: null,
+    waitedMs: null,
+  };
+  private readonly input = createHeadsetInput();
+  private readonly view: HeadsetView;
+  private readonly battery: Battery;
+  private hands: readonly HandReading[] = [];
+  private viewer: RigidPose | null = null;
+  private frames = 0;
+  private poses: { readonly description: RobotDescription; readonly device: PoseDevice } | null = null;
+  private isPlaced = false;
+  private resetting: { readonly side: Side; readonly sinceMs: number } | null = null;
+  private status: ReturnType<typeof headsetStatus> | null = null;
+  private statusMs = -Infinity;
+  private reset: ReturnType<typeof resetWords> = null;
+
+  private constructor(
+    private readonly session: XRSession,
+    private readonly renderer: WebGLRenderer,
+    private readonly page: HeadsetPage,
+    private readonly mode: HeadsetMode,
+    private readonly handSettings: () => HandSettings,
+  ) {
+    this.view = new HeadsetView(mode === "immersive-vr");
+    this.battery = new Battery(() => page.engine.disarm("battery_low"));
+  }
+
+  /** Shows the page in `session` until it ends. Rejects, with the session ended, where the browser cannot draw it. */
+  static async begin(
+    session: XRSession,
+    page: HeadsetPage,
+    mode: HeadsetMode,
+    handSettings: () => HandSettings,
+  ): Promise<HeadsetSession> {
+    let renderer: WebGLRenderer | null = null;
+    try {
+      renderer = new WebGLRenderer({ antialias: true, alpha: true });
+      renderer.xr.enabled = true;
+      renderer.xr.setReferenceSpaceType("local-floor");
+      const made = new HeadsetSession(session, renderer, page, mode, handSettings);
+      session.addEventListener("end", () => made.ended());
+      await renderer.xr.setSession(session);
+      made.start();
+      return made;
+    } catch (error) {
+      renderer?.dispose();
+      await session.end().catch(() => undefined);
+      throw error;
+    }
+  }
+
+  get deadman(): boolean {
+    return this.input.held.size > 0;
+  }
+
+  get inputs(): PadInputs {
+    return this.input.inputs;
+  }
+
+  get gamepad(): Gamepad | null {
+    return this.hands.find(({ sample }) => this.input.held.has(sample.side))?.gamepad ?? null;
+  }
+
+  /** The places of the hands, to the centimetre: one that holds still for a minute is no hand. */
+  get signature(): string {
+    const places = this.hands.map(({ sample }) =>
+      sample.pose?.position.map((part) => part.toFixed(2)).join(),
+    );
+    return places.join(" ");
+  }
+
+  release(): void {
+    letGo(this.input);
+  }
+
+  /** With every tick of the page, frames or not. */
+  step(now: number): void {
+    if (this.frames > 0 && isSilent(this.input, now)) this.page.engine.disarm("headset_silent");
+  }
+
+  statistics(): HeadsetStatistics {
+    return {
+      mode: this.mode,
+      visibility: this.session.visibilityState,
+      frames: this.frames,
+      frame_ms: this.frame.intervalMs,
+      work_ms: this.frame.workMs,
+      picture_wait_ms: this.frame.waitedMs,
+      held: [...this.input.held],
+      hands: this.hands.map(({ sample }) => ({ side: sample.side, tracked: sample.pose !== null })),
+      panels: this.view.pictures.map(({ streams, veil }) => ({
+        left: streams.left,
+        right: streams.right,
+        veil,
+      })),
+      state: this.status?.title ?? "",
+      text: this.status?.text ?? "",
+      reset: this.reset?.text ?? null,
+      pointed: { left: this.view.buttonAt("left"), right: this.view.buttonAt("right") },
+      way: Object.fromEntries((this.status?.way ?? []).map(({ name, ms }) => [name, ms])),
+      battery: this.battery.level,
+    };
+  }
+
+  private start(): void {
+    const { engine } = this.page;
+    const { session, renderer } = this;
+    renderer.xr.setFoveation(0); // what is at the edge of the view is text
+    engine.disarm("operator"); // who puts a headset on arms anew, in it
+    const seen = {
+      get visible(): boolean {
+        return session.visibilityState === "visible";
+      },
+    };
+    engine.display.enter(seen);
+    engine.controls.headset = this;
+    engine.headset = this;
+    engine.tracing?.show(true, performance.now(), "headset");
+    session.addEventListener("visibilitychange", () => this.visibilityChanged());
+    renderer.xr.getReferenceSpace()?.addEventListener("reset", () => this.spaceReset());
+    const loop = (_time: number, frame?: XRFrame): void => {
+      if (frame !== undefined) this.draw(frame);
+    };
+    renderer.setAnimationLoop(loop);
+  }
+
+  private ended(): void {
+    const { engine } = this.page;
+    engine.disarm("headset_left");
+    this.renderer.setAnimationLoop(null);
+    if (engine.headset === this) {
+      engine.headset = null;
+      engine.controls.headset = null;
+      if (engine.goals?.device === this.poses?.device && engine.goals !== null) engine.goals.device = null;
+      engine.display.leave();
+      engine.tracing?.show(false, performance.now(), "headset");
+    }
+    this.battery.close();
+    this.view.close();
+    this.renderer.dispose();
+    this.renderer.forceContextLoss();
+  }
+
+  private visibilityChanged(): void {
+    const { visibilityState } = this.session;
+    if (visibilityState === "hidden") this.page.engine.disarm("headset_off");
+    else if (visibilityState === "visible-blurred") this.page.engine.disarm("headset_blurred");
+  }
+
+  /** The headset calls another place its origin: every pose that was known means another place. */
+  private spaceReset(): void {
+    this.page.engine.disarm("tracking_lost");
+    this.isPlaced = false;
+  }
+
+  private draw(frame: XRFrame): void {
+    const began = performance.now();
+    const space = this.renderer.xr.getReferenceSpace();
+    if (space === null) return;
+    this.noteFrame(began);
+    this.read(frame, space, began);
+    const { engine } = this.page;
+    engine.controls.events.changed(began);
+    engine.ticker.frame(began);
+    engine.display.frame(began);
+    this.show(performance.now());
+    this.renderer.render(this.view.scene, this.view.camera);
+    this.frame.workMs = smooth(this.frame.workMs, performance.now() - began);
+  }
+
+  private noteFrame(now: number): void {
+    this.frames += 1;
+    if (this.frames > 1) this.frame.intervalMs = smooth(this.frame.intervalMs, now - this.input.frameMs);
+  }
+
+  private read(frame: XRFrame, space: XRReferenceSpace, now: number): void {
+    this.viewer = trackedPose(frame.getViewerPose(space));
+    if (this.viewer === null) this.page.engine.disarm("tracking_lost");
+    else if (!this.isPlaced) this.recentre();
+    this.hands = readHands(frame, space, this.session.inputSources);
+    const samples = this.hands.map(({ sample }) => sample);
+    for (const event of takeFrame(this.input, samples, now)) this.carryOut(event, now);
+    this.goOnResetting(now);
+    this.takePoses();
+  }
+
+  /** The hands lead the poses of the robot that is there now. */
+  private takePoses(): void {
+    const { goals, state } = this.page.engine;
+    const description = state.robot?.description;
+    if (goals === null || description === undefined || this.poses?.description === description) return;
+    const device = new PoseDevice(description, {
+      pose: (side) => (this.input.held.has(side) ? (this.input.hands.get(side)?.pose ?? null) : null),
+      forward: () => this.view.forward,
+      settings: () => this.handSettings(),
+    });
+    this.poses = { description, device };
+    goals.device = device;
+  }
+
+  private carryOut(event: HeadsetEvent, now: number): void {
+    const { engine } = this.page;
+    if (event.kind === "arm") this.arm(event.side);
+    else if (event.kind === "press") this.press(event.side, now);
+    else if (event.kind === "lost") engine.disarm(event.why);
+    else if (event.kind === "stop") engine.stop("headset button");
+    else if (event.kind === "layer") engine.nextLayer();
+    else this.recentre();
+  }
+
+  /** A squeeze arms by the page's own rules; refused, it is for nothing, and the hand has to open first. */
+  private arm(side: Side): void {
+    const { engine } = this.page;
+    if (this.viewer === null) return;
+    if (!engine.isArmed()) engine.toggleArmed();
+    if (engine.isArmed()) grab(this.input, side);
+  }
+
+  private press(side: Side, now: number): void {
+    const button = this.view.buttonAt(side);
+    if (button === "stop") this.page.engine.stop("headset button");
+    else if (button === "recentre") this.recentre();
+    else if (button === "leave") void this.session.end();
+    else if (button === "reset") this.resetting = { side, sinceMs: now };
+  }
+
+  /** As the page's own button: held for a second on a stop that was looked at first. */
+  private goOnResetting(now: number): void {
+    const { resetting } = this;
+    if (resetting === null) return;
+    const isHeld = this.input.hands.get(resetting.side)?.pressed === true;
+    if (!isHeld || this.view.buttonAt(resetting.side) !== "reset") this.resetting = null;
+    else if (now - resetting.sinceMs >= HOLD_MS) {
+      this.resetting = null;
+      this.page.engine.stopping.reset(resetting.sinceMs, now);
+    }
+  }
+
+  private recentre(): void {
+    if (this.viewer === null) return;
+    this.isPlaced = true;
+    this.view.recentre(this.viewer);
+  }
+
+  /** What the gate has drawn, and for what it is veiled now: nothing is drawn in between. */
+  private show(now: number): void {
+    const { engine, grid } = this.page;
+    const main = grid.mainStream();
+    if (this.status === null || now - this.statusMs >= STATUS_MS) {
+      this.status = headsetStatus(engine, main, this.frame, now);
+      this.statusMs = now;
+    }
+    const heard = engine.hears(now) && robotIsUp(engine.state);
+    const fate = engine.stopping.fate(now);
+    const state = {
+      cameras: grid.pictures().map((picture) => this.camera(picture, now)),
+      main,
+      status: this.status,
+      stop:
+        fate === null
+          ? engine.state.stop.stopped
+            ? restingStopLabel(true, heard, true)
+            : "B or Y, or point and pull"
+          : pressedStopLabel(fate, heard),
+      reset: (this.reset = resetWords(engine, now)),
+    };
+    this.view.update(state, this.hands, this.input.held, now);
+    for (const panel of this.view.pictures)
+      if (panel.streams.left === main && panel.waitedMs !== null && panel.uploadedMs === now)
+        this.frame.waitedMs = smooth(this.frame.waitedMs, panel.waitedMs);
+  }
+
+  private camera({ name, label, canvas }: PlacedPicture, now: number): ViewCamera {
+    const { engine } = this.page;
+    const video = engine.streams.videos.get(name);
+    const gap = video?.gate.counts.gap ?? null;
+    const tolerance = engine.state.settings.tolerance.video;
+    return {
+      name,
+      label,
+      canvas,
+      drawnMs: video?.lastDrawnMs ?? null,
+      gap: gap === null ? "" : `gap ${gap} of ${tolerance}`,
+      veil: veilWords(engine, name, now),
+    };
+  }
+}
+
+function smooth(before: number | null, value: number): number {
+  return before === null ? value : before + SMOOTH * (value - before);
+}

@@ -1,0 +1,81 @@
+import {
+  about,
+  difference,
+  inverse,
+  multiply,
+  nearestRotationVector,
+  ofRotationVector,
+  rotate,
+  rotationVector,
+  type Quaternion,
+  type RigidPose,
+  type Vector,
+} from "./rigid";
+
+/** WebXR has x to the right, y up and -z ahead; a robot's base has x ahead, y to the left and z up (REP 103). */
+const TO_REP_103: Quaternion = [0.5, -0.5, -0.5, 0.5];
+
+/** What the operator has chosen for the motion of the hands. */
+export interface HandSettings {
+  readonly scale: number; // the tool's way by the hand's: 0.5 halves it
+  readonly view: number; // heading of the camera's look in the base's frame, rad; 0 ahead, to the left positive
+  readonly locked: {
+    readonly x: boolean;
+    readonly y: boolean;
+    readonly z: boolean;
+    readonly rotation: boolean;
+  };
+}
+
+export const DEFAULT_HAND: HandSettings = {
+  scale: 1,
+  view: 0,
+  locked: { x: false, y: false, z: false, rotation: false },
+};
+
+/**
+ * How a hand in the headset's space moves a tool in the base's frame: who faces along `forward` looks where the camera
+ * looks, so that a hand that moves away from the operator moves the tool away in the picture.
+ *
+ * @param forward the operator's heading in the headset's space, rad (`heading`)
+ */
+export function baseFromSpace(forward: number, settings: HandSettings): Quaternion {
+  const ahead = about([0, 1, 0], -forward);
+  return multiply(about([0, 0, 1], settings.view), multiply(TO_REP_103, ahead));
+}
+
+/** A hand that is bound to a tool from one moment on. */
+export interface HandBinding {
+  readonly turn: Quaternion; // from the headset's space to the base's frame
+  readonly start: RigidPose; // of the hand, in the headset's space
+  readonly tool: Quaternion; // at the start, in the base's frame
+  readonly settings: HandSettings;
+  rotation: Vector; // the last one
+}
+
+/** `rotation`: the tool's goal at this moment, as a rotation vector in the base's frame. */
+export function bindHand(
+  hand: RigidPose,
+  rotation: Vector,
+  forward: number,
+  settings: HandSettings,
+): HandBinding {
+  const turn = baseFromSpace(forward, settings);
+  return { turn, start: hand, tool: ofRotationVector(rotation), settings, rotation };
+}
+
+/**
+ * The hand as six numbers for a clutch: how far it has moved since the binding (x, y, z in m, scaled), and the rotation
+ * vector of the tool that has turned as the hand has. At the start they are 0, 0, 0 and the tool's own rotation.
+ */
+export function handValues(binding: HandBinding, hand: RigidPose): readonly number[] {
+  const { turn, start, tool, settings } = binding;
+  const { locked, scale } = settings;
+  const [x, y, z] = rotate(turn, difference(hand.position, start.position));
+  if (!locked.rotation) {
+    const turned = multiply(hand.orientation, inverse(start.orientation)); // in the headset's space
+    const inBase = multiply(multiply(turn, turned), inverse(turn));
+    binding.rotation = nearestRotationVector(rotationVector(multiply(inBase, tool)), binding.rotation);
+  }
+  return [locked.x ? 0 : x * scale, locked.y ? 0 : y * scale, locked.z ? 0 : z * scale, ...binding.rotation];
+}
