@@ -1,4 +1,5 @@
 import math
+from collections.abc import Sequence
 from typing import Any
 
 import pytest
@@ -42,7 +43,9 @@ def _feedback(event: int, issue: int = 1, *, stopped: bool = False, number: int 
     )
 
 
-def _command(event: int, values: list[float] | None = None, *, issue: int = 1, nonce: int | None = None) -> Command:
+def _command(
+    event: int, values: Sequence[float | None] | None = None, *, issue: int = 1, nonce: int | None = None
+) -> Command:
     """As an answer to the feedback before it, unless `nonce` is another one's."""
     before = event - 1 or MAX_EVENT
     return Command(
@@ -377,10 +380,10 @@ class DeskMachine(RuleBasedStateMachine):
     @rule(
         peer=peers,
         offset=st.integers(-1, 2),
-        values=st.lists(st.floats() | st.just(0.0), min_size=1, max_size=3),
+        values=st.lists(st.floats() | st.just(0.0) | st.none(), min_size=1, max_size=3),
         seen=st.booleans(),
     )
-    def command(self, peer: str, offset: int, values: list[float], seen: bool) -> None:
+    def command(self, peer: str, offset: int, values: list[float | None], seen: bool) -> None:
         named = (self.event + offset - 1) % MAX_EVENT + 1
         known_stop = self.clock.stop.stopped or bool(self.presses.pending)
         nonce = 1000 * self.event + self.issue + (not seen)
@@ -393,7 +396,7 @@ class DeskMachine(RuleBasedStateMachine):
             assert not known_stop
             assert not self.on_the_way
             assert outcome.command.event == event_after(self.clock.event)
-            assert all(-1 <= value <= 2 for value in outcome.command.values)
+            assert all(value is not None and -1 <= value <= 2 for value in outcome.command.values)
             assert outcome.command.values == NEUTRAL or self.proven == peer
             self.on_the_way.append(outcome.command)
 

@@ -170,16 +170,26 @@ class Story:
         return _write(path, self.entries(), close=close, signing=signing)
 
 
-def rewritten(path: Path, entries: list[Entry], change: Callable[[Entry], list[Entry]]) -> Path:
+def rewritten(
+    path: Path,
+    entries: list[Entry],
+    change: Callable[[Entry], list[Entry]],
+    description: RobotDescription = DESCRIPTION,
+) -> Path:
     """A file with other records: `change` says what becomes of each. Its checksums and its index fit."""
-    _write(path, [each for entry in entries for each in change(entry)])
+    _write(path, [each for entry in entries for each in change(entry)], description=description)
     return path
 
 
 def _write(
-    path: Path, entries: list[Entry], *, close: bool = True, signing: RecordingSigning | None = None
+    path: Path,
+    entries: list[Entry],
+    *,
+    close: bool = True,
+    signing: RecordingSigning | None = None,
+    description: RobotDescription = DESCRIPTION,
 ) -> RecordingWriter:
-    writer = RecordingWriter(path, INFO, DESCRIPTION, CODECS, signing)
+    writer = RecordingWriter(path, INFO, description, CODECS, signing)
     for entry in entries:
         writer.flush_if_due(entry.arrived)
         writer.write(entry)

@@ -12,6 +12,7 @@ from lockstep.protocol.description import (
     BodyTwist,
     Joint,
     PlanarBase,
+    Pose,
     PositionLimit,
     RobotDescription,
 )
@@ -176,3 +177,111 @@ def test_what_it_is_now_stays_so_for_another_thread() -> None:
     assert later is not None
     assert poses["lift"].position == pytest.approx((0.0, 0.0, 0.2 - 0.3))
     assert later["lift"].position != poses["lift"].position
+
+
+def _goal_axis(name: str, wrap: float | None = None) -> Axis:
+    return Axis(
+        name=name,
+        label=name,
+        unit="rad",
+        minimum=-1,
+        maximum=1,
+        slew=1,
+        brake=4,
+        kind="goal",
+        reach=0.5,
+        wrap=wrap,
+    )
+
+
+ARM = RobotDescription(
+    name="r",
+    label="R",
+    axes=(_goal_axis("shoulder"), _goal_axis("up"), *map(_goal_axis, ("px", "py", "pz", "rx", "ry", "rz"))),
+    joints=(Joint(name="shoulder", unit="rad"), Joint(name="z", unit="m")),
+    bodies=(
+        Body(name="lift", parent="", joints=(BodyJoint(joint="z", kind="prismatic", axis=Z),)),
+        Body(name="arm", parent="lift", joints=(BodyJoint(joint="shoulder", kind="revolute", axis=Z),)),
+        Body(name="tool", parent="arm", position=(1.0, 0.0, 0.0)),
+    ),
+    position_limits=LIFT.position_limits,
+    poses=(
+        Pose(
+            name="tool",
+            label="Tool",
+            body="tool",
+            frame="lift",
+            point=(0.5, 0.0, 0.0),
+            position=("px", "py", "pz"),
+            rotation=("rx", "ry", "rz"),
+            instead_of=("shoulder", "up"),
+        ),
+    ),
+)
+NULLS: list[float | None] = [None] * 6
+
+
+def _at(
+    path: CommandedPath, values: list[float | None], goals: list[float | None], axes: list[float], **rest: object
+) -> None:
+    path.command(2, values)
+    tool = [1.5, 0.0, 0.0, 0.0, 0.0, 0.0]
+    _fed(path, 2, 1.0, axes, axes=[*axes, *tool], goals=[*goals, *tool], **rest)
+
+
+def test_a_goal_axis_is_drawn_where_its_newest_command_wants_it_within_its_range() -> None:
+    path = CommandedPath(ARM)
+    _at(path, [0.25, 7.0, *NULLS], [0.1, 0.1], [0.1, 0.1])
+    poses = path.poses()
+    assert poses is not None
+    assert poses["lift"].position == pytest.approx((0, 0, 0.1 - 2 * 0.9))  # by the gain of the position limit
+    assert poses["tool"].position[:2] == pytest.approx((math.cos(0.25), math.sin(0.25)))
+
+
+def test_a_goal_axis_that_stays_is_drawn_where_it_stays_until_the_robot_is_at_rest() -> None:
+    path = CommandedPath(ARM)
+    _at(path, [None, None, *NULLS], [0.5, 0.1], [0.25, 0.1])
+    poses = path.poses()
+    assert poses is not None
+    assert poses["tool"].position[:2] == pytest.approx((math.cos(0.5), math.sin(0.5)))
+    _at(path, [None, None, *NULLS], [0.5, 0.1], [0.25, 0.1], at_rest=True)
+    assert path.poses() is None
+
+
+def test_goals_that_are_a_pose_draw_its_body_there_and_leave_the_joints_alone() -> None:
+    path = CommandedPath(ARM)
+    _at(path, [None, None, 1.0, 0.5, 0.25, 0.0, 0.0, math.pi / 4], [0.5, 0.5], [0.0, 0.1])
+    poses = path.poses()
+    assert poses is not None
+    assert poses["arm"].orientation == pytest.approx((1, 0, 0, 0))
+    assert poses["lift"].position == pytest.approx((0, 0, 0.1))
+    back = 0.5 * math.sqrt(0.5)  # the point is half a metre ahead of the body
+    assert poses["tool"].position == pytest.approx((1.0 - back, 0.5 - back, 0.35))
+    assert poses["tool"].orientation == pytest.approx((math.cos(math.pi / 8), 0, 0, math.sin(math.pi / 8)))
+
+
+def test_a_goal_across_the_border_of_an_axis_that_turns_on_and_on_is_drawn_the_shorter_way() -> None:
+    description = RobotDescription(
+        name="r",
+        label="R",
+        axes=(_goal_axis("shoulder", wrap=2 * math.pi),),
+        joints=ARM.joints[:1],
+        bodies=(Body(name="arm", parent="", joints=(BodyJoint(joint="shoulder", kind="revolute", axis=Z),)),),
+        position_limits=(
+            PositionLimit(name="l", label="L", joint="shoulder", maximum=9, axes=(AxisGain(axis="shoulder"),)),
+        ),
+    )
+    path = CommandedPath(description)
+    path.command(2, [-3.0])
+    _fed(path, 2, 1.0, [3.0], axes=[3.0], goals=[3.0])
+    poses = path.poses()
+    assert poses is not None
+    turn = poses["arm"].orientation
+    assert 2 * math.atan2(turn[3], turn[0]) == pytest.approx(2 * math.pi - 3.0)
+
+
+def test_a_command_without_the_feedback_s_goals_says_nothing_of_where_goal_axes_stay() -> None:
+    path = CommandedPath(ARM)
+    path.command(2, [0.5, None, *NULLS])
+    _fed(path, 2, 1.0, [0.0, 0.0], axes=[0.0] * 8)
+    assert path.poses() is None

@@ -11,7 +11,7 @@ The outcomes of a command; the first condition that holds decides:
 | the sender does not hold the seat | refused `no_seat` |
 | the robot link is down, or no feedback has come yet | refused `link_down` |
 | not one value per axis | refused `wrong_size` |
-| a value is NaN or infinite | refused `not_a_number` |
+| a value is NaN or infinite, or the null of a rate axis | refused `not_a_number` |
 | stopped, or a stop is on its way to the bridge | refused `stopped` |
 | its event is the current one, and was the sender's own | answered with the current feedback |
 | its event is the one in flight, and is the sender's own | absorbed |
@@ -19,7 +19,10 @@ The outcomes of a command; the first condition that holds decides:
 | the console does not know the issue that it answers | refused `late` |
 | its nonce is not that of this issue | refused `unseen` |
 | it moves, and no neutral command of the sender was executed since that was last needed | refused `not_neutral` |
-| else | clamped to the axes' ranges and the speed cap, forwarded |
+| else | rates clamped to the axes' ranges and the speed cap, `speed` of the goals lowered to the cap, forwarded |
+
+Goals pass as they are: the bridge knows the newest measured values, which decide how far a goal may be, and an axis
+that is outside its range may stay there.
 
 A new holder of the seat has to send a neutral command first, and so has every holder after a stop, a reset, a new link
 or epoch, and whenever the robot says so (`Feedback.neutral_needed`). The command counts once it was executed.
@@ -33,8 +36,9 @@ from typing import NamedTuple
 
 import msgspec
 
-from lockstep.protocol.description import RobotDescription
+from lockstep.protocol.description import Axis, RobotDescription
 from lockstep.protocol.messages import Command, Feedback, Refusal, RefusalReason, Rest, StopTaken
+from lockstep.protocol.neutral import has_goals, neutral_value
 from lockstep.protocol.serial import event_after, is_newer
 from lockstep.server.control.seat import ControlSeat
 from lockstep.server.control.speed_cap import SpeedCap, within_share
@@ -135,7 +139,7 @@ class CommandArbiter:
             return self._refuse(command, "link_down")
         if len(command.values) != len(description.axes):
             return self._refuse(command, "wrong_size", f"{len(description.axes)} values are needed")
-        if not all(map(math.isfinite, command.values)):
+        if not all(map(_is_number, command.values, description.axes)):
             return self._refuse(command, "not_a_number")
         if self._stop_is_coming or feedback.stop.stopped:
             return self._refuse(command, "stopped")
@@ -176,7 +180,7 @@ class CommandArbiter:
             return False
         signal = "" if description.start_warning is None else description.start_warning.axis
         axes = zip(command.values, description.axes, strict=False)
-        return any(value != axis.rest and axis.name != signal for value, axis in axes)
+        return any(value != neutral_value(axis) and axis.name != signal for value, axis in axes)
 
     def rest(self, peer: str, rest: Rest) -> RestOutcome:
         """Forward a rest of the holder, always. If it names an event beyond the next one, it names the next instead."""
@@ -236,10 +240,17 @@ class CommandArbiter:
 
     def _clamped(self, command: Command, description: RobotDescription, share: float) -> Command:
         values = [
-            within_share(axis, value, share) for value, axis in zip(command.values, description.axes, strict=True)
+            value if value is None or axis.kind == "goal" else within_share(axis, value, share)
+            for value, axis in zip(command.values, description.axes, strict=True)
         ]
-        return msgspec.structs.replace(command, values=values)
+        speed = min(command.speed, share) if has_goals(description.axes) else command.speed
+        return msgspec.structs.replace(command, values=values, speed=speed)
 
     def _refuse(self, message: Command | Rest, reason: RefusalReason, detail: str = "") -> Refuse:
         refusal = Refusal(event=message.event, reason=reason, current=self._clock.event, detail=detail)
         return Refuse(refusal)
+
+
+def _is_number(value: float | None, axis: Axis) -> bool:
+    """Return whether the axis takes the value; only a goal axis takes null."""
+    return axis.kind == "goal" if value is None else math.isfinite(value)

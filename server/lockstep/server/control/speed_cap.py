@@ -1,9 +1,10 @@
 """The speed cap, which limits the speed by the delay of the operator's picture. No I/O, no clock.
 
-v <= v_max * min(1, 0.2 s / delay), the rule of the German ordinance on remote driving (StVFernLV). The delay is the
-longer of the one that the seat's holder reports (command to picture, on its own clock) and the one that the console
-measures, from a feedback's departure to the command that answers it. Nobody can answer before the feedback was there,
-because a command names its nonce, so neither a report nor a guess can make the path look shorter than it is.
+v <= v_max * min(1, 0.2 s / delay), the rule of the German ordinance on remote driving (StVFernLV). It caps the values
+of rate axes and the speed of goal axes. The delay is the longer of the one that the seat's holder reports (command to
+picture, on its own clock) and the one that the console measures, from a feedback's departure to the command that
+answers it. Nobody can answer before the feedback was there, because a command names its nonce, so neither a report nor
+a guess can make the path look shorter than it is.
 
 In doubt the robot is slow: a holder that reports no delay, or has not reported for a while, counts as `UNKNOWN_DELAY`
 late.
@@ -120,7 +121,7 @@ class SpeedCap:
 
 
 def within_share(axis: Axis, value: float, share: float) -> float:
-    """Return `value` clamped to `share` of the axis' range on its side of rest."""
+    """Return `value` of a rate axis clamped to `share` of the axis' range on its side of rest."""
     most = axis.rest + share * (axis.maximum - axis.rest)
     least = axis.rest - share * (axis.rest - axis.minimum)
     return min(max(value, least), most)

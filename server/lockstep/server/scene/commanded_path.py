@@ -3,6 +3,9 @@
 Beside the measured robot this shows the effect of slew, slip, a limit or an obstacle. Commands are those that the
 console forwarded under each event; each counts from the feedback of its event until the next one, by the bridge's
 clock, and no longer than the robot holds a command. At rest nothing counts.
+
+A goal axis says where it is to be: its newest command counts, or where it stays if that was null. It is drawn by the
+joint that a position limit names, by the joint of its own name, or by the pose that it is part of.
 """
 
 import copy
@@ -11,7 +14,8 @@ from collections import deque
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple, Self
 
-from lockstep.protocol.description import BodyTwist, PlanarBase, RobotDescription
+from lockstep.protocol.description import Axis, BodyTwist, PlanarBase, RobotDescription
+from lockstep.protocol.description import Pose as CommandedPose
 from lockstep.protocol.messages import Feedback
 from lockstep.server.scene.kinematics import Pose, about, inverse, joined, product, rotate, world_poses
 
@@ -27,6 +31,8 @@ class _Record(NamedTuple):
     time: float  # s, the bridge's
     joints: tuple[float, ...]
     at_rest: bool
+    axes: tuple[float, ...]
+    goals: tuple[float | None, ...]  # applied; empty without goal axes
 
 
 class _Span(NamedTuple):
@@ -36,13 +42,18 @@ class _Span(NamedTuple):
     seconds: float
 
 
+class _Goal(NamedTuple):
+    value: float  # in the axis' unit
+    offset: float  # from the measured value
+
+
 class CommandedPath:
     """`command` takes a forwarded command, `feedback` a feedback; `poses` returns the commanded poses."""
 
     def __init__(self, description: RobotDescription) -> None:
         self.seconds = min(max(description.hold, 0.0), 5.0)
         self._description = description
-        self._axes = [(axis.name, axis.rest) for axis in description.axes]
+        self._axes = [(axis.name, axis.rest if axis.kind == "rate" else None) for axis in description.axes]
         self._joints = [joint.name for joint in description.joints]
         self._gains = _gains(description)
         known = set(self._joints)
@@ -50,15 +61,17 @@ class CommandedPath:
         self._base = base if base is not None and {base.x, base.y, base.yaw} <= known else None
         bodies = {body.name for body in description.bodies}
         self._twists = [each for each in description.body_twists if {each.body, each.frame} <= bodies | {""}]
-        self._commands: dict[int, tuple[float, ...]] = {}
+        frames = bodies | {""}
+        self._poses = [each for each in description.poses if each.body in bodies and each.frame in frames]
+        self._commands: dict[int, tuple[float | None, ...]] = {}
         self._records: deque[_Record] = deque(maxlen=MAX_RECORDS)
 
     @property
     def known(self) -> bool:
         """True if the description tells the effect of any axis."""
-        return bool(self._gains or self._base or self._twists)
+        return bool(self._gains or self._base or self._twists or self._poses)
 
-    def command(self, event: int, values: Sequence[float]) -> None:
+    def command(self, event: int, values: Sequence[float | None]) -> None:
         self._commands.pop(event, None)
         self._commands[event] = tuple(values)
         while len(self._commands) > MAX_COMMANDS:
@@ -70,7 +83,8 @@ class CommandedPath:
         if self._records and feedback.time < self._records[-1].time:
             self._records.clear()
         at_rest = feedback.at_rest or feedback.stop.stopped
-        self._records.append(_Record(feedback.event, feedback.time, tuple(feedback.joints), at_rest))
+        joints, axes, goals = (tuple(each) for each in (feedback.joints, feedback.axes, feedback.goals))
+        self._records.append(_Record(feedback.event, feedback.time, joints, at_rest, axes, goals))
         while len(self._records) > 1 and self._records[1].time <= feedback.time - self.seconds:
             self._records.popleft()
 
@@ -82,17 +96,20 @@ class CommandedPath:
 
     def poses(self) -> dict[str, Pose] | None:
         """Return the poses of all bodies in the world; None if nothing was commanded, or the description lacks data."""
-        spans = list(self._spans())
-        if not self.known or not any(any(span.offsets.values()) for span in spans):
+        spans, goals = list(self._spans()), self._goals()
+        if not self.known or not (goals or any(any(span.offsets.values()) for span in spans)):
             return None
         began = dict(zip(self._joints, self._records[0].joints, strict=False))
         joints = dict(zip(self._joints, self._records[-1].joints, strict=False))
-        joints |= self._moved_joints(began, spans)
+        joints |= self._moved_joints(began, spans) | self._joints_at(goals, joints)
         poses = world_poses(self._description, joints)
         before = world_poses(self._description, began)
         for twist in self._twists:
             if twist.body in poses:
                 poses[twist.body] = _moved_body(twist, before, poses, spans)
+        for pose in self._poses:
+            if any(name in goals for name in (*pose.position, *pose.rotation)):
+                poses[pose.body] = _body_at(pose, poses, goals)
         return poses
 
     def _spans(self) -> list[_Span]:
@@ -107,7 +124,39 @@ class CommandedPath:
         values = self._commands.get(record.event)
         if record.at_rest or values is None:
             return {}
-        return {name: value - rest for (name, rest), value in zip(self._axes, values, strict=False)}
+        return {
+            name: value - rest
+            for (name, rest), value in zip(self._axes, values, strict=False)
+            if rest is not None and value is not None
+        }
+
+    def _goals(self) -> dict[str, _Goal]:
+        """Return the goals of the newest command, and where the other goal axes stay; none at rest."""
+        if not self._records or self._records[-1].at_rest:
+            return {}
+        newest, axes = self._records[-1], self._description.axes
+        asked = self._commands.get(newest.event, (None,) * len(axes))
+        goals = {
+            axis.name: _goal(axis, stays if value is None else value, measured)
+            for axis, value, stays, measured in zip(axes, asked, newest.goals, newest.axes, strict=False)
+            if axis.kind == "goal" and stays is not None
+        }
+        driven = {axis.name for axis, value in zip(axes, asked, strict=False) if value is not None}
+        for pose in self._description.poses:  # its axes and those that it replaces say two things of the same joints
+            own = {*pose.position, *pose.rotation}
+            for name in pose.instead_of if driven & own else own:
+                goals.pop(name, None)
+        return goals
+
+    def _joints_at(self, goals: Mapping[str, _Goal], joints: Mapping[str, float]) -> dict[str, float]:
+        """Return the joints whose goal axes are known, with these goals reached."""
+        found = {name: joints[name] + goal.offset for name, goal in goals.items() if name in joints}
+        for joint, gains in self._gains.items():
+            if joint in joints and gains.keys() & goals.keys():
+                found[joint] = joints[joint] + sum(
+                    gain * goals[axis].offset for axis, gain in gains.items() if axis in goals
+                )
+        return found
 
     def _moved_joints(self, began: Mapping[str, float], spans: list[_Span]) -> dict[str, float]:
         moved = {joint: began.get(joint, 0.0) for joint in self._gains}
@@ -157,6 +206,28 @@ def _moved_body(twist: BodyTwist, before: Mapping[str, Pose], after: Mapping[str
     x, y, z = rotate(orientation, twist.point)
     moved = Pose((point[0] - x, point[1] - y, point[2] - z), orientation)
     return joined(after.get(twist.frame, here), moved)
+
+
+def _goal(axis: Axis, value: float, measured: float) -> _Goal:
+    if axis.wrap:
+        return _Goal(value, math.remainder(value - measured, axis.wrap))
+    value = min(max(value, axis.minimum), axis.maximum)
+    return _Goal(value, value - measured)
+
+
+def _body_at(pose: CommandedPose, poses: Mapping[str, Pose], goals: Mapping[str, _Goal]) -> Pose:
+    """Return the body at the goals of the pose's axes; it keeps what these do not say."""
+    here = Pose((0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0))
+    frame = poses.get(pose.frame, here)
+    body = joined(inverse(frame), poses[pose.body])
+    point = joined(body, Pose(pose.point, here.orientation)).position
+    x, y, z = (goals[name].value if name in goals else place for name, place in zip(pose.position, point, strict=True))
+    orientation = body.orientation
+    if all(name in goals for name in pose.rotation):
+        turn = tuple(goals[name].value for name in pose.rotation)
+        orientation = about((turn[0], turn[1], turn[2]), math.hypot(*turn))
+    dx, dy, dz = rotate(orientation, pose.point)
+    return joined(frame, Pose((x - dx, y - dy, z - dz), orientation))
 
 
 def _vector(axes: tuple[str, str, str], offsets: Mapping[str, float], seconds: float) -> Vector:

@@ -1,8 +1,9 @@
 """`lockstep export --to lerobot`: a LeRobot dataset, version 3, of one episode. Needs pyarrow.
 
 One frame is one event `s`: the state is feedback `s`, the action command `s+1`, which answered it, and each picture the
-first one stamped `s`, or the newest older one. So a frame holds what belongs to the same state of the robot. The rate
-is the median one of the events that were recorded.
+first one stamped `s`, or the newest older one. So a frame holds what belongs to the same state of the robot. Where
+command `s+1` lets a goal axis stay, the action is the goal at which it stayed, by feedback `s+1`. The rate is the
+median one of the events that were recorded.
 """
 
 import json
@@ -29,7 +30,7 @@ from lockstep.server.recording.export.lerobot_meta import (
     statistics_of,
     tasks_table,
 )
-from lockstep.server.recording.format.records import FeedbackRecord
+from lockstep.server.recording.format.records import CommandRecord, FeedbackRecord
 from lockstep.server.recording.format.topics import CAMERA
 from lockstep.server.recording.reading.event_rows import WRENCH, event_rows
 from lockstep.server.recording.reading.pictures import RecordedPictures
@@ -99,8 +100,17 @@ def _frames(reader: RecordingReader, description: RobotDescription) -> Iterator[
     length = len(_state_names(description))
     for row, following in pairwise(event_rows(reader)):
         command = following.command
-        if command is not None and len(_state(row.feedback)) == length:
-            yield Frame(row.feedback, command.values)
+        action = None if command is None else _action(command, following.feedback)
+        if action is not None and len(_state(row.feedback)) == length:
+            yield Frame(row.feedback, action)
+
+
+def _action(command: CommandRecord, answer: FeedbackRecord) -> list[float] | None:
+    """Return the values of a command, and for a goal axis that is to stay its goal then; None if that is not known."""
+    stays = answer.goals or [None] * len(command.values)
+    values = [goal if value is None else value for value, goal in zip(command.values, stays, strict=False)]
+    known = [value for value in values if value is not None]
+    return known if len(known) == len(command.values) else None
 
 
 def _state_names(description: RobotDescription) -> list[str]:

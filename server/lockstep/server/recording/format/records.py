@@ -64,13 +64,14 @@ class CommandRecord(OwnRecord, frozen=True, kw_only=True):
     """A command that somebody sent; `event` is the one that it is to become."""
 
     issue: Annotated[int, msgspec.Meta(ge=1)]  # of the feedback that it answers
-    values: list[float]  # one per axis, in its unit; as forwarded, else as asked
+    values: list[float | None]  # one per axis, in its unit; as forwarded, else as asked; null: a goal axis stays
     peer: str
     name: str
     outcome: CommandOutcome
     reason: RefusalReason | Literal[""] = ""  # why it was refused
     nonce: int = 0  # as its sender named it; 0 in recordings from before there were nonces
     action: str = ""  # id of the moving action that it lets go on
+    speed: float = 1.0  # of the goal axes' largest speed that is used at most; as forwarded, else as asked
 
 
 class FeedbackRecord(OwnRecord, frozen=True, kw_only=True):
@@ -80,6 +81,7 @@ class FeedbackRecord(OwnRecord, frozen=True, kw_only=True):
     time: float  # s, the bridge's monotonic clock
     axes: list[float]
     joints: list[float] = []
+    goals: list[float | None] = []  # where the goal axes were commanded to be, null for a rate axis; empty without any
     wrench: list[float] = []
     ranges: list[float] = []
     at_rest: bool = True

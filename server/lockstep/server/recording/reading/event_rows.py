@@ -1,6 +1,6 @@
 """A recording as a table: one row for each event."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 from lockstep.protocol.description import RobotDescription
@@ -64,6 +64,7 @@ def columns_of(description: RobotDescription, streams: list[str]) -> dict[str, t
     }
     columns |= {f"command.{axis.name}": float for axis in description.axes}
     columns |= {f"axis.{axis.name}": float for axis in description.axes}
+    columns |= {f"goal.{axis.name}": float for axis in description.axes if axis.kind == "goal"}
     columns |= {f"joint.{joint.name}": float for joint in description.joints}
     if description.wrench is not None:
         columns |= {f"wrench.{name}": float for name in WRENCH}
@@ -76,7 +77,7 @@ def columns_of(description: RobotDescription, streams: list[str]) -> dict[str, t
 
 
 def values_of(row: EventRow, description: RobotDescription, streams: list[str]) -> list[Value]:
-    """Return the values in the order of `columns_of`; None: not known."""
+    """Return the values in the order of `columns_of`; None: not known, or a command for a goal axis to stay."""
     feedback, command = row.feedback, row.command
     values: list[Value] = [
         feedback.event,
@@ -89,6 +90,8 @@ def values_of(row: EventRow, description: RobotDescription, streams: list[str]) 
     ]
     values += _filled([] if command is None else command.values, len(description.axes))
     values += _filled(feedback.axes, len(description.axes))
+    goals = _filled(feedback.goals, len(description.axes))
+    values += [goal for axis, goal in zip(description.axes, goals, strict=True) if axis.kind == "goal"]
     values += _filled(feedback.joints, len(description.joints))
     if description.wrench is not None:
         values += _filled(feedback.wrench, len(WRENCH))
@@ -101,5 +104,5 @@ def values_of(row: EventRow, description: RobotDescription, streams: list[str]) 
     return values
 
 
-def _filled(values: list[float], count: int) -> list[float | None]:
+def _filled(values: Sequence[float | None], count: int) -> list[float | None]:
     return [*values[:count], *[None] * (count - len(values))]

@@ -1,11 +1,13 @@
 """Draws the thesis' figures of a recorded session, and others for an operator, as SVG text. Needs matplotlib."""
 
+import math
 from collections.abc import Callable
 from typing import NamedTuple
 
 import matplotlib as mpl
 from matplotlib.axes import Axes
 
+from lockstep.protocol.description import Axis
 from lockstep.server.recording.report.drawing import BAD, BAND, FAINT, MEDIUM, ROBOT, STYLE, new_figure, svg_text
 from lockstep.server.recording.report.session import Series, Session, Shown
 from lockstep.server.recording.report.way_figures import slowest_table, ways_svg
@@ -114,12 +116,14 @@ def _force(session: Session) -> Figure:
 
 
 def _axes(session: Session) -> Figure:
-    moved = [axis for axis in session.description.axes if any(session.commanded.get(axis.name, Series()).values)]
+    moved = [axis for axis in session.description.axes if _was_driven(axis, session.commanded.get(axis.name, Series()))]
     shown = moved or list(session.description.axes[:1])
 
     def drawing(name: str) -> Callable[[Axes], None]:
         def draw(axes: Axes) -> None:
             _line(session.commanded.get(name, Series()), FAINT, "commanded")(axes)
+            if name in session.applied:
+                _line(session.applied[name], MEDIUM, "applied goal")(axes)
             _line(session.measured.get(name, Series()), ROBOT, "measured")(axes)
             axes.legend(loc="upper left")
 
@@ -127,6 +131,13 @@ def _axes(session: Session) -> Figure:
 
     rows = [[Panel(axis.label, axis.unit, drawing(axis.name))] for axis in shown]
     return _figure(session, "axes", "Axes", "Those that were moved.", rows)
+
+
+def _was_driven(axis: Axis, commanded: Series) -> bool:
+    """Return whether a command moved the axis: a goal at 0 does, a rate of 0 does not."""
+    if axis.kind == "goal":
+        return not all(map(math.isnan, commanded.values))
+    return any(commanded.values)
 
 
 def _figure(

@@ -56,8 +56,9 @@ class Session:
     picture_delay: Series = field(default_factory=Series)  # ms, by the operator's own clock
     round_trip: Series = field(default_factory=Series)  # ms
     force: Series = field(default_factory=Series)  # N
-    commanded: dict[str, Series] = field(default_factory=dict)  # by axis
+    commanded: dict[str, Series] = field(default_factory=dict)  # by axis; NaN where a goal axis was to stay
     measured: dict[str, Series] = field(default_factory=dict)
+    applied: dict[str, Series] = field(default_factory=dict)  # by goal axis: where it was commanded to be then
     traced: TracedEvents = field(default_factory=TracedEvents)  # where the time of each event went
 
 
@@ -107,7 +108,10 @@ def _take_row(session: Session, row: EventRow, at: float) -> None:
     for axis, value in zip(session.description.axes, feedback.axes, strict=False):
         session.measured.setdefault(axis.name, Series()).add(at, value)
     for axis, value in zip(session.description.axes, [] if command is None else command.values, strict=False):
-        session.commanded.setdefault(axis.name, Series()).add(at, value)
+        session.commanded.setdefault(axis.name, Series()).add(at, math.nan if value is None else value)
+    for axis, value in zip(session.description.axes, feedback.goals, strict=False):
+        if value is not None:
+            session.applied.setdefault(axis.name, Series()).add(at, value)
 
 
 def _take_report(session: Session, record: ReportRecord, at: float) -> None:

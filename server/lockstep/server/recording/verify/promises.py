@@ -23,6 +23,7 @@ from lockstep.server.recording.format.records import (
     SeatRecord,
     StopRecord,
 )
+from lockstep.server.recording.verify.goals import GoalChecks
 from lockstep.server.recording.verify.verify_signature import SignatureReport
 
 __all__ = ["CHECKS", "Check", "CheckName", "Verdict", "Verifier", "Violation"]
@@ -36,6 +37,7 @@ CheckName = Literal[
     "seat",  # commands are forwarded for the seat's holder alone
     "stopped",  # no command is forwarded while the robot is stopped, or a stop is on its way to it
     "actions",  # each begins once, one moves the robot at a time, and only while commands name it
+    "goals",  # goal axes move no faster than they may, and no goal out of reach executes
     "stamps",  # no picture or sound is stamped newer than it is
     "rendered",  # the operator's page rendered nothing beyond its tolerance
     "signed",  # the file is as it was signed, to its end; or nothing is signed
@@ -49,6 +51,7 @@ CHECKS: tuple[CheckName, ...] = (
     "seat",
     "stopped",
     "actions",
+    "goals",
     "stamps",
     "rendered",
     "signed",
@@ -196,6 +199,7 @@ class Verifier:
         self._holder: str | None = None  # None: not known yet
         self._stops = _Stops()
         self._actions = _Actions()
+        self._goals = GoalChecks()
         self._stopped = False
         self._in_flight: CommandRecord | None = None
         self._linked = True
@@ -226,6 +230,7 @@ class Verifier:
         match record:
             case RobotRecord():
                 self._description = record.description
+                self._goals.describe(record.description)
                 self._linked = record.link == "up"
                 self._in_flight = None
             case SeatRecord():
@@ -264,6 +269,8 @@ class Verifier:
             self.fail("once", f"a command is not the next after event {self._newest.event}", command.event, micros)
         self._judge_nonce(command, micros)
         self._actions.command(command)
+        if wrong := self._goals.command(command):
+            self.fail("goals", wrong, command.event, micros)
         self._in_flight = command
 
     def _judge_nonce(self, command: CommandRecord, micros: int) -> None:
@@ -275,7 +282,7 @@ class Verifier:
             self.fail("in_time", text, command.event, micros)
 
     def _feedback(self, feedback: FeedbackRecord, micros: int, captured: int) -> None:
-        before = self._newest
+        before, in_flight = self._newest, self._in_flight
         self._checks["monotonic"].looked += 1
         self._offset = captured - round(feedback.time * 1e9)
         if before is None:
@@ -293,6 +300,10 @@ class Verifier:
             self.fail("stopped", wrong, feedback.event, micros)
         if wrong := self._actions.feedback(feedback, self._description):
             self.fail("actions", wrong, feedback.event, micros)
+        executed = in_flight is not None and in_flight.event == feedback.event
+        self._checks["goals"].looked += self._goals.looking
+        if wrong := self._goals.feedback(feedback, in_flight if executed else None):
+            self.fail("goals", wrong, feedback.event, micros)
         known = self._answered[feedback.event]
         known.times[feedback.issue] = feedback.time
         known.stopped[feedback.issue] = feedback.stop.stopped
