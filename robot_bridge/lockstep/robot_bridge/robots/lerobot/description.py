@@ -49,10 +49,8 @@ def describe(settings: LeRobotSettings, facts: DeviceFacts) -> RobotDescription:
     """
     _check_names("axes", settings.axes, {axis.name for axis in facts.axes})
     _check_names("cameras", settings.cameras, {camera.name for camera in facts.cameras})
-    if not facts.has_torque:
-        for key, value in (("stop", settings.stop), ("end", settings.end)):
-            if value == "torque_off":
-                raise SettingsPlace((key,), f"{facts.kind} has no motor bus whose torque can be switched off")
+    if settings.stop == "torque_off" and not facts.has_torque:
+        raise SettingsPlace(("stop",), f"{facts.kind} has no motor bus whose torque can be switched off")
     axes = tuple(_axis(each, settings.axes.get(each.name, AxisSettings()), settings.hold) for each in facts.axes)
     kind = facts.kind.replace("_", "-")
     return RobotDescription(

@@ -216,7 +216,7 @@ def _buses(robot: Any) -> list[tuple[str, Any]]:
 
 
 def _keep_torque(robot: Any) -> None:
-    """An arm without torque falls: only the setting `end` switches it off, and no process that ends in disorder."""
+    """An arm without torque falls: only the setting `stop` switches it off, and no process that ends in disorder."""
     for _, part in _parts(robot):
         if hasattr(getattr(part, "config", None), "disable_torque_on_disconnect"):
             part.config.disable_torque_on_disconnect = False

@@ -29,4 +29,4 @@ def to_yuv(picture: Any, width: int, height: int) -> bytes:
     if (pixels.shape[1] - width, pixels.shape[0] - height) not in ((0, 0), (0, 1), (1, 0), (1, 1)):
         raise BadPicture(f"picture of another size than {width}x{height}")
     rows = np.ascontiguousarray(pixels[:height, :width])
-    return from_image(_Rgb(height, width, "rgb8", width * 3, memoryview(rows).cast("B")), width, height).data
+    return from_image(_Rgb(height, width, "rgb8", width * 3, rows.data.cast("B")), width, height).data

@@ -51,7 +51,7 @@ class LeRobotRobot(Robot):
             [axis.name for axis in description.axes],
             rate=settings.rate,
             still=settings.still,
-            torque_off_at_end=settings.end == "torque_off",
+            torque_off_at_end=settings.stop == "torque_off",
             pictures=together,
         )
         self._cameras: list[LeRobotCamera] = []

@@ -46,8 +46,7 @@ class LeRobotSettings(Struct, frozen=True, kw_only=True, forbid_unknown_fields=T
     rate: Annotated[float, Meta(ge=1, le=500)] = 50.0  # Hz, of reading the state and sending the goals
     timeout: Annotated[float, Meta(gt=0, le=10)] = 0.5  # s without a new state until it counts as unknown
     still: Positive = 1.0  # unit within 0.2 s, below which an axis counts as at rest
-    stop: Literal["hold", "torque_off"] = "hold"  # what a latched stop does once the arm stands
-    end: Literal["hold", "torque_off"] = "hold"  # what remains when the bridge ends
+    stop: Literal["hold", "torque_off"] = "hold"  # what a latched stop does once the arm stands, and the bridge's end
     hold: Annotated[float, Meta(ge=0.05, le=5)] = 0.5
     max_event_age: Annotated[float, Meta(gt=0, le=10)] = 2.0
     max_event_rate: Annotated[float, Meta(gt=0, le=100)] = 25.0
