@@ -40,19 +40,19 @@ class Pipe:
         """Whether the process runs."""
         return self._process.poll() is None
 
-    def ask(self, do: str, seconds: float = 0.0, **values: Any) -> tuple[dict[str, Any], list[bytearray]]:
+    def ask(self, do: str, within: float = 0.0, **values: Any) -> tuple[dict[str, Any], list[bytearray]]:
         """Ask for something; return the answer and the bytes that follow it.
 
         Args:
             do: the request's name
-            seconds: s that the answer takes at most, by what was asked for
+            within: s that the answer takes at most, by what was asked for
             values: the request's fields
 
         Raises:
             LockstepError: the console or the robot said no.
             LockstepLost: the connection or the process ended, or the process does not answer.
         """
-        deadline = time.monotonic() + seconds + MARGIN
+        deadline = time.monotonic() + within + MARGIN
         text = json.dumps({"do": do, **values}).encode()
         stdin = self._process.stdin
         assert stdin is not None

@@ -19,6 +19,7 @@ __all__ = ["PipeServer"]
 
 
 AHEAD = 4  # requests that may wait for their answers
+MAX_CAMERAS = 12  # a console takes 16 media sections
 
 _logger = logging.getLogger(__name__)
 
@@ -152,7 +153,7 @@ class PipeServer:
             name=request.name,
             tolerance=request.tolerance,
             tls_ca=request.tls_ca,
-            video=16 if request.pictures else False,
+            video=MAX_CAMERAS if request.pictures else False,
             audio=False,
             connect_seconds=request.connect_seconds,
         )
