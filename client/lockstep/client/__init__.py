@@ -1,6 +1,7 @@
 """A console without a browser, for scripts, tests and policies."""
 
 from lockstep.client.console import Console
+from lockstep.client.control.clutch import Clutch
 from lockstep.client.errors import (
     ActionCancelled,
     ActionFailed,
@@ -10,6 +11,7 @@ from lockstep.client.errors import (
     ConnectFailed,
     ConsoleError,
     ConsoleLost,
+    GoalNotReached,
     LinkFormatError,
     NoSuchStream,
     NotArmed,
@@ -25,6 +27,7 @@ __all__ = [
     "ActionCancelled",
     "ActionFailed",
     "ActionRefused",
+    "Clutch",
     "CommandError",
     "CommandRefused",
     "ConnectFailed",
@@ -32,6 +35,7 @@ __all__ = [
     "ConsoleError",
     "ConsoleLost",
     "ConsoleStatistics",
+    "GoalNotReached",
     "LinkFormatError",
     "NoSuchStream",
     "NotArmed",

@@ -13,7 +13,9 @@ from msgspec.structs import replace
 from lockstep.client.connection import Connection
 from lockstep.client.connection_options import ConnectionOptions
 from lockstep.client.console_url import parse_link
+from lockstep.client.control.clutch import Clutch
 from lockstep.client.control.command_gate import GateState, Pacing
+from lockstep.client.control.goal_move import GoalMove
 from lockstep.client.errors import CommandError, CommandRefused, ConsoleError, ConsoleLost, NotArmed
 from lockstep.client.media.media_gate import GateMode
 from lockstep.client.media.newest_queue import NewestQueue, QueueClosed
@@ -26,6 +28,7 @@ from lockstep.protocol.carriers import Carrier
 from lockstep.protocol.console import Participant, Role, Seat, SharedNote
 from lockstep.protocol.description import RobotDescription
 from lockstep.protocol.messages import Feedback, StopState
+from lockstep.protocol.neutral import neutral_value, neutral_values
 from lockstep.protocol.trace_messages import Traces
 
 __all__ = ["Console"]
@@ -323,46 +326,114 @@ class Console:
         """Release the control seat, or withdraw a request for it."""
         self._live().requests.release_seat()
 
-    async def drive(self, values: Mapping[str, float] | Sequence[float]) -> Feedback:
+    async def drive(
+        self, values: Mapping[str, float | None] | Sequence[float | None], *, speed: float = 1.0
+    ) -> Feedback:
         """Send one command as soon as the gate is open; return the feedback that answers it.
 
         The first call arms: from then on, whenever 200 ms pass without another call, the console sends neutral values,
-        five times a second, until `rest`. A lost command is repeated; a command that arrived too late is tried again on
-        fresh feedback.
+        five times a second, until `rest`: rate axes are at rest then, and goal axes stay where they are. A lost command
+        is repeated; a command that arrived too late is tried again on fresh feedback.
 
         Args:
-            values: one value per axis in the description's order, or axis names with their values, other axes at rest;
-                in the axis' unit (such as m/s). The bridge limits a value to the axis' `minimum` and `maximum`
+            values: one value per axis in the description's order, or axis names with their values; other axes at rest,
+                or where they are. In the axis' unit (such as m/s, or rad of a goal axis); None, for goal axes only: it
+                stays. The bridge limits a value to the axis' `minimum` and `maximum`, and refuses a goal that is
+                further than `reach` from the measured value (`jump`)
+            speed: the share of the goal axes' largest speed that is used at most, 0 to 1
 
         Raises:
-            CommandError: an unknown axis, a wrong number of values, or a value that is not finite.
+            CommandError: an unknown axis, a wrong number of values, None for a rate axis, a value that is not finite,
+                or a speed that is not from 0 to 1.
             NotArmed: after a stop, a reset, a lost robot link or a new seat, `arm` comes first.
             CommandRefused: the robot is stopped, this console does not hold the seat, …
             ConsoleLost: the connection ended.
         """
+        command = self._command(values)
+        if not 0 <= speed <= 1:
+            raise CommandError("the speed is not from 0 to 1")
+        self._check_ready()
+        return await self._live().driving.driver.drive(command, speed)
+
+    def _check_ready(self) -> None:
+        """Raise CommandRefused unless the robot may move, as far as this connection knows."""
         connection = self._live()
-        command, pilot = self._command(values), connection.driving.driver.sender
+        pilot = connection.driving.driver.sender
         if connection.session.holds_seat and not pilot.ready:
             if pilot.newest is not None and pilot.newest.stop.stopped:
                 raise CommandRefused("stopped", pilot.newest.stop.reason)
             raise NotArmed
-        return await connection.driving.driver.drive(command)
 
-    def _command(self, values: Mapping[str, float] | Sequence[float]) -> list[float]:
+    def _command(self, values: Mapping[str, float | None] | Sequence[float | None]) -> list[float | None]:
         axes = self.description.axes
         if isinstance(values, Mapping):
             unknown = values.keys() - {axis.name for axis in axes}
             if unknown:
                 known = ", ".join(axis.name for axis in axes)
                 raise CommandError(f"no axis {', '.join(sorted(unknown))}; there are {known}")
-            command = [float(values.get(axis.name, axis.rest)) for axis in axes]
-        else:
-            command = [float(value) for value in values]
+            values = [values.get(axis.name, neutral_value(axis)) for axis in axes]
+        command = [None if value is None else float(value) for value in values]
         if len(command) != len(axes):
             raise CommandError(f"{len(command)} values for {len(axes)} axes")
-        if not all(math.isfinite(value) for value in command):
-            raise CommandError("a value is NaN or infinite")
+        for axis, value in zip(axes, command, strict=True):
+            if value is None and axis.kind == "rate":
+                raise CommandError(f"{axis.name} has no value, and only a goal axis stays without one")
+            if value is not None and not math.isfinite(value):
+                raise CommandError("a value is NaN or infinite")
         return command
+
+    async def move_to(
+        self,
+        goals: Mapping[str, float],
+        *,
+        speed: float = 1.0,
+        tolerance: Mapping[str, float] | float | None = None,
+    ) -> Feedback:
+        """Drive goal axes until they are measured at these values; return the feedback that shows it.
+
+        Goals may be further away than the axes' `reach`: each event asks for as much of the way as is allowed. Other
+        axes are at rest. Cancellation, and every error, sends a rest: the robot brakes and stays. `drive` and `act`
+        must not run meanwhile.
+
+        Args:
+            goals: by axis, in its unit, within its `minimum` and `maximum`
+            speed: the share of the axes' largest speed that is used at most, 0 to 1
+            tolerance: the distance that counts as there, in the axis' unit, for all axes or by axis; None: a twentieth
+                of the axis' `reach`
+
+        Raises:
+            CommandError: no goal axis of this name, or a goal out of its range.
+            GoalNotReached: no axis came nearer to its goal for 2 s.
+            NotArmed, CommandRefused, ConsoleLost: as for `drive`.
+        """
+        driver, move = self._live().driving.driver, GoalMove(self.description, goals, tolerance)
+        clock = asyncio.get_running_loop().time
+        answer = await self.drive(neutral_values(self.description.axes), speed=speed)
+        try:
+            while not move.arrived(answer, clock()):
+                answer = await self.drive(move.values(answer), speed=speed)
+        except BaseException:
+            with suppress(ConsoleLost):
+                driver.let_go()
+            raise
+        return answer
+
+    def clutch(self, scales: Mapping[str, float]) -> Clutch:
+        """Return a clutch that binds a device, such as a leader arm, to goal axes of this robot.
+
+        It sees each feedback. It is released, and has to be engaged anew, when the seat or the arming is lost, the
+        robot is stopped or needs a neutral command, no feedback came for the description's `max_event_age`, or nothing
+        was driven for 200 ms.
+
+        Args:
+            scales: goal axes by name, in the order of the device's readings, with the goal per device motion
+
+        Raises:
+            ValueError: no axis of this name, no goal axis, or a scale that is not finite.
+        """
+        clutch = Clutch(self.description, scales)
+        self._live().driving.driver.watch(clutch)
+        return clutch
 
     async def act(
         self,

@@ -7,6 +7,7 @@ ConsoleError
 ├── SignallingRefused       the console answered WHEP with an error
 ├── ConnectFailed           the console, or the way to it, did not work within the time allowed
 ├── ConsoleLost             an established connection ended; terminal, make a new Console
+├── GoalNotReached          `move_to`: the robot came no nearer: something is in its way, or a load pulls it
 ├── StopUnconfirmed         the robot has not confirmed a stop; it is not lost, but do not rely on it
 ├── ActionCancelled         an action began and was cancelled: a stick, a stop, a lost seat, no armed events, …
 ├── ActionFailed            an action began, and the robot failed at it
@@ -26,6 +27,7 @@ __all__ = [
     "ConnectFailed",
     "ConsoleError",
     "ConsoleLost",
+    "GoalNotReached",
     "LinkFormatError",
     "NoSuchStream",
     "NotArmed",
@@ -61,7 +63,7 @@ class LinkFormatError(ConsoleError):
 
 
 class CommandError(ConsoleError):
-    """The values name an axis that the robot does not have, are of a wrong number, or are not finite."""
+    """The values name an axis that the robot does not have, are of a wrong number, not finite, or out of range."""
 
 
 class NoSuchStream(ConsoleError):
@@ -93,6 +95,21 @@ class ConnectFailed(ConsoleError):
 
 class ConsoleLost(ConsoleError):
     """The connection ended. The bridge brings the robot to rest; a new Console connects again."""
+
+
+class GoalNotReached(ConsoleError):
+    """A goal axis came no nearer to its goal. The robot stays where it is.
+
+    Attributes:
+        axis: the axis' name
+        goal: the value that was asked for, in the axis' unit
+        measured: the newest measured value
+        applied: the applied goal; None: not known
+    """
+
+    def __init__(self, axis: str, unit: str, goal: float, measured: float, applied: float | None) -> None:
+        super().__init__(f"{axis} is at {measured:g} {unit} and comes no nearer to {goal:g} {unit}")
+        self.axis, self.goal, self.measured, self.applied = axis, goal, measured, applied
 
 
 class Refused(ConsoleError):

@@ -20,6 +20,7 @@ from lockstep.client.session import Session
 from lockstep.client.transport.transport import Transport
 from lockstep.protocol.actions import Act, ActionCancel, ActionUpdate, ParameterValue, Status
 from lockstep.protocol.description import Action
+from lockstep.protocol.neutral import neutral_values
 
 __all__ = ["RobotActions", "RobotNews"]
 
@@ -127,7 +128,7 @@ class RobotActions:
 
     async def _renew(self) -> None:
         """Send neutral commands as fast as answers come. Where they are refused, the robot ends the action itself."""
-        neutral = [axis.rest for axis in self._driving.robot.description.axes]
+        neutral = neutral_values(self._driving.robot.description.axes)
         with suppress(CommandRefused):
             while True:
                 await self._driving.driver.drive(neutral)

@@ -38,7 +38,7 @@ from lockstep.protocol.messages import (
 )
 from lockstep.protocol.serial import event_after, event_gap
 
-__all__ = ["Fault", "PlainBridge", "running_plain_bridge"]
+__all__ = ["Fault", "PlainBridge", "running_plain_bridge", "serving"]
 
 TICK = 0.01  # s
 HOLD = 0.2  # s
@@ -105,6 +105,7 @@ class PlainBridge:
 
     fault: Fault | None = None
     drawing: float = 0.0  # s from capturing a picture to sending it
+    description: RobotDescription = DESCRIPTION
     captured: deque[Media] = field(default_factory=deque)  # and not sent yet
     address: tuple[str, int] = ("127.0.0.1", 0)
     links: set[Link] = field(default_factory=set)
@@ -310,7 +311,7 @@ class PlainBridge:
         if is_taken and self.fault is not Fault.TWO_OPERATORS:
             send(writer, Goodbye(error="taken"))
             return None
-        described = None if hello.role == "events" else DESCRIPTION
+        described = None if hello.role == "events" else self.description
         send(writer, Hello(role="robot", epoch=self.epoch, description=described))
         link = Link(writer, hello.role)
         self.links.add(link)
@@ -370,6 +371,12 @@ def send(writer: asyncio.StreamWriter, message: LinkMessage) -> None:
 @asynccontextmanager
 async def running_plain_bridge(fault: Fault | None = None, drawing: float = 0.0) -> AsyncIterator[PlainBridge]:
     bridge = PlainBridge(fault, drawing)
+    async with serving(bridge):
+        yield bridge
+
+
+@asynccontextmanager
+async def serving(bridge: PlainBridge) -> AsyncIterator[None]:
     loop = asyncio.get_running_loop()
     timers: list[asyncio.TimerHandle] = []
 
@@ -381,7 +388,7 @@ async def running_plain_bridge(fault: Fault | None = None, drawing: float = 0.0)
     bridge.address = server.sockets[0].getsockname()
     tick()
     try:
-        yield bridge
+        yield
     finally:
         timers[0].cancel()
         server.close()

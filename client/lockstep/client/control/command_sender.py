@@ -84,7 +84,7 @@ class _Flight:
 class CommandSender:
     """The operator's side of the command loop."""
 
-    def __init__(self, gate: CommandGate, neutral: Sequence[float]) -> None:
+    def __init__(self, gate: CommandGate, neutral: Sequence[float | None]) -> None:
         self.gate = gate
         self.timer = RepeatTimer()
         self.action = ""  # id of the moving action that every command lets go on; "": none
@@ -98,6 +98,7 @@ class CommandSender:
         self.samples: deque[float] = deque(maxlen=4096)  # s from first sending to feedback
         self._neutral = list(neutral)
         self._values = list(neutral)
+        self._speed = 1.0  # share of the goal axes' largest speed that goes with the values
         self._want = _Want.NOTHING
         self._ticket = 0
         self._idle_at = NEVER
@@ -197,11 +198,11 @@ class CommandSender:
 
     # Intentions
 
-    def intend(self, values: Sequence[float], now: float) -> int:
+    def intend(self, values: Sequence[float | None], now: float, speed: float = 1.0) -> int:
         """Send these values next; a command in flight repeats with them. Arms, and ends a rest. Returns a ticket."""
         self.armed = True
         self._rest = None
-        self._values = list(values)
+        self._values, self._speed = list(values), speed
         self._want = _Want.VALUES
         self._idle_at = now + IDLE
         self._ticket += 1
@@ -211,7 +212,7 @@ class CommandSender:
         """Send a neutral command, after which the robot may move. Returns a ticket, whose outcome is its feedback."""
         self._rest = None
         self._arming, self._asked_again = True, False
-        self._values = list(self._neutral)
+        self._values, self._speed = list(self._neutral), 1.0
         self._want = _Want.VALUES
         self._ticket += 1
         return self._ticket
@@ -219,7 +220,7 @@ class CommandSender:
     def rest(self, now: float) -> None:
         """Send a rest at once, until it is proven, and one neutral command; then nothing. Disarms."""
         self.armed = self._arming = False
-        self._values = list(self._neutral)
+        self._values, self._speed = list(self._neutral), 1.0
         if self._rest is not None:
             return
         if self._want is _Want.VALUES and self.newest is not None:
@@ -247,7 +248,7 @@ class CommandSender:
             if self._rest.once:
                 self._rest = None
         if self.armed and self._want is _Want.NOTHING and self._flight is None and now >= self._idle_at:
-            self._values = list(self._neutral)
+            self._values, self._speed = list(self._neutral), 1.0
             self._want = _Want.NEUTRAL
         if self._flight is not None:
             messages += self._again(self._flight, now)
@@ -275,10 +276,8 @@ class CommandSender:
     def _next(self, now: float) -> Command:
         event, issue = self.gate.next()
         want = _Want.NEUTRAL if self._only_neutral(event) else self._want
-        command = Command(
-            event=event, issue=issue, values=self._values_for(want), nonce=self._nonce, action=self.action
-        )
-        neutral = command.values == self._neutral
+        command = self._command(event, issue, want)
+        neutral = self.moves_nothing(command)
         flight = _Flight(command, want, self._ticket if want is _Want.VALUES else 0, now, neutral=neutral)
         flight.repeat_at = now + self._wait(1)
         if now < self._lossy_until:
@@ -319,11 +318,22 @@ class CommandSender:
             return []
         flight.issue = self.gate.next().issue
         want = _Want.NEUTRAL if self._only_neutral(flight.command.event) else _Want.VALUES
-        values = self._values_for(want)
-        again = Command(
-            event=flight.command.event, issue=flight.issue, values=values, nonce=self._nonce, action=self.action
+        return [self._command(flight.command.event, flight.issue, want)] * copies
+
+    def _command(self, event: int, issue: int, want: _Want) -> Command:
+        is_neutral = want is not _Want.VALUES
+        return Command(
+            event=event,
+            issue=issue,
+            values=list(self._neutral if is_neutral else self._values),
+            nonce=self._nonce,
+            action=self.action,
+            speed=1.0 if is_neutral else self._speed,
         )
-        return [again] * copies
+
+    def moves_nothing(self, command: Command) -> bool:
+        """Return whether the command is neutral: each rate axis at rest, and no goal."""
+        return list(command.values) == self._neutral
 
     def _could_be_answered(self, flight: _Flight, now: float) -> bool:
         """True if an answer can have arrived. Before that a repeat says nothing about losses, and a salvo would fill
@@ -345,9 +355,6 @@ class CommandSender:
 
     def _only_neutral(self, event: int) -> bool:
         return event == self._void
-
-    def _values_for(self, want: _Want) -> list[float]:
-        return self._values if want is _Want.VALUES else self._neutral
 
     # After an answer
 

@@ -15,6 +15,7 @@ from lockstep.client.session import Session
 from lockstep.client.statistics import EventRate
 from lockstep.protocol.console import RobotState
 from lockstep.protocol.messages import Command, Feedback, Refusal, Rest
+from lockstep.protocol.neutral import neutral_values
 
 __all__ = ["Driving"]
 
@@ -69,8 +70,8 @@ class Driving:
             1 / rate,
             calm_interval=None if asked else CALM_INTERVAL,
         )
-        sender = CommandSender(gate, [axis.rest for axis in description.axes])
-        self._driver = Driver(sender, self._send)
+        sender = CommandSender(gate, neutral_values(description.axes))
+        self._driver = Driver(sender, self._send, description.max_event_age)
         self._session.seated, self._session.unseated = sender.seated, sender.unseated
         sender.holds_seat = self._session.holds_seat
         self.known.set()

@@ -4,6 +4,8 @@ import asyncio
 from collections.abc import Callable, Sequence
 from typing import Any
 
+from lockstep.client.control.clutch import Clutch
+from lockstep.client.control.clutches import Clutches
 from lockstep.client.control.command_sender import CommandSender
 from lockstep.client.errors import CommandRefused, ConsoleLost, NotArmed
 from lockstep.client.statistics import PictureDelay
@@ -15,8 +17,11 @@ __all__ = ["Driver"]
 class Driver:
     """Sends the commands and rests of a `CommandSender`, at once and at the right times."""
 
-    def __init__(self, sender: CommandSender, send: Callable[[Command | Rest], None]) -> None:
+    def __init__(
+        self, sender: CommandSender, send: Callable[[Command | Rest], None], max_event_age: float = 2.0
+    ) -> None:
         self.sender = sender
+        self._clutches = Clutches(sender, max_event_age)
         self.picture_delay = PictureDelay()
         self._send = send
         self._loop = asyncio.get_running_loop()
@@ -27,9 +32,16 @@ class Driver:
 
     def feedback(self, feedback: Feedback) -> bool:
         """Take a feedback; return True if it is newer than all before it."""
-        newer = self.sender.feedback(feedback, self._loop.time())
+        now = self._loop.time()
+        newer = self.sender.feedback(feedback, now)
+        if newer:
+            self._clutches.feedback(feedback, now)
         self.pump()
         return newer
+
+    def watch(self, clutch: Clutch) -> None:
+        """Show the clutch each feedback from now on, and release it when it has to be engaged anew."""
+        self._clutches.add(clutch, self._loop.time())
 
     def refusal(self, refusal: Refusal) -> None:
         self.sender.refusal(refusal)
@@ -45,7 +57,7 @@ class Driver:
         """Note that a message of this connection was lost."""
         self.sender.loss(self._loop.time())
 
-    async def drive(self, values: Sequence[float]) -> Feedback:
+    async def drive(self, values: Sequence[float | None], speed: float = 1.0) -> Feedback:
         """Send `values` as soon as the gate opens; return the feedback that answers them.
 
         Raises:
@@ -54,7 +66,7 @@ class Driver:
             ConsoleLost: the connection ended.
         """
         answered: asyncio.Future[Feedback] = self._future()
-        self._waiting.append((self.sender.intend(values, self._loop.time()), answered))
+        self._waiting.append((self.sender.intend(values, self._loop.time(), speed), answered))
         self.pump()
         return await answered
 
@@ -73,10 +85,17 @@ class Driver:
     async def rest(self) -> None:
         """Rest at once; return when the robot is proven to be at rest. Raises ConsoleLost."""
         self.sender.rest(self._loop.time())
+        self._clutches.release()
         rested: asyncio.Future[None] = self._future()
         self._rested.append(rested)
         self.pump()
         await rested
+
+    def let_go(self) -> None:
+        """Rest at once, and do not wait for its proof."""
+        self.sender.rest(self._loop.time())
+        self._clutches.release()
+        self.pump()
 
     def _future(self) -> "asyncio.Future[Any]":
         if self._lost is not None:
@@ -89,10 +108,13 @@ class Driver:
             self._timer.cancel()
             self._timer = None
         if self._lost is not None:
+            self._clutches.release()
             return
         now = self._loop.time()
         for message in self.sender.due(now):
+            self._clutches.sent(message)
             self._send(message)
+        self._clutches.settle()
         while self.sender.sent_at:
             self.picture_delay.sent(*self.sender.sent_at.popleft())
         self._hand_out()
