@@ -108,8 +108,11 @@ class LeRobotRobot(Robot):
             faults=faults,
         )
 
+    def measured_axes(self) -> Sequence[float]:
+        return self._values(self._fresh(time.monotonic()))
+
     def positions(self) -> Sequence[float]:
-        return self._joints(self._values(self._fresh(time.monotonic())))
+        return self._joints(self.measured_axes())
 
     def rest_from_thread(self) -> None:
         """The bus' thread goes on by itself: it has to send rest values for rates, and the same goals."""
