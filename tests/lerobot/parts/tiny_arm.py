@@ -1,4 +1,4 @@
-"""An arm of the tests behind LeRobot's own base classes, since no motors are here: no bus, no MuJoCo, two servos in numpy.
+"""An arm of the tests behind LeRobot's own base classes, since no motors are here: no bus, no MuJoCo, three servos.
 
 Each servo goes to its goal at a bounded speed; without torque the arm falls. The camera draws the first joint as a grey
 level. The file named by TINY_ARM makes trouble: "hang", "raise", "blind" (no state) or "dark" (no pictures) in it.
@@ -203,5 +203,3 @@ class TinyArm(Robot):
             camera.disconnect()
         self._connected = False
         print(f"disconnected, torque {'on' if self.bus.has_torque else 'off'}", flush=True)
-
-

@@ -1,5 +1,6 @@
 """Any robot that LeRobot drives (docs/lerobot.md). LeRobot is imported when a robot is made, in its own Python."""
 
+import gc
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -62,6 +63,8 @@ def create(path: Path | None, words: Sequence[str] = ()) -> Robot:
     from lockstep.robot_bridge.robots.lerobot.lerobot_side import connect
 
     device = connect(spec or settings.robot, settings.config, flags)
+    gc.collect()
+    gc.freeze()  # PyTorch's objects are many, and looking through them again and again would hold up the ticks
     try:
         return drive(device, settings)
     except SettingsPlace as place:

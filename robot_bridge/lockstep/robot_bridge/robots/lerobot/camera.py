@@ -55,6 +55,8 @@ class LeRobotCamera(MediaSource):
 
     async def run(self, stamp: Stamper, emit: Callable[[Media], None]) -> None:
         self._loop = asyncio.get_running_loop()
+        if self._newest is not None:
+            self._came.set()
         camera, sent = self._camera, 0.0
         try:
             while True:

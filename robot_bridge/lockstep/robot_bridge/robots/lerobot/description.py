@@ -62,6 +62,7 @@ def describe(settings: LeRobotSettings, facts: DeviceFacts) -> RobotDescription:
         cameras=tuple(_camera(each, settings.cameras.get(each.name, CameraSettings())) for each in facts.cameras),
         bodies=settings.bodies,
         hold=settings.hold,
+        watchdog=min(settings.watchdog, settings.hold / 2),
         max_event_age=settings.max_event_age,
         max_event_rate=settings.max_event_rate,
     )

@@ -48,6 +48,7 @@ class LeRobotSettings(Struct, frozen=True, kw_only=True, forbid_unknown_fields=T
     still: Positive = 1.0  # unit within 0.2 s, below which an axis counts as at rest
     stop: Literal["hold", "torque_off"] = "hold"  # what a latched stop does once the arm stands, and the bridge's end
     hold: Annotated[float, Meta(ge=0.05, le=5)] = 0.5
+    watchdog: Annotated[float, Meta(gt=0, le=5)] = 0.2  # s without a tick after which the goals stay as they are
     max_event_age: Annotated[float, Meta(gt=0, le=10)] = 2.0
     max_event_rate: Annotated[float, Meta(gt=0, le=100)] = 25.0
     axes: dict[str, AxisSettings] = {}  # by the name in `action_features`
