@@ -2,6 +2,7 @@
 
 import asyncio
 import queue
+import threading
 import time
 from contextlib import suppress
 
@@ -34,8 +35,17 @@ class Shots:
 
     def __init__(self) -> None:
         self.next: queue.Queue[object] = queue.Queue()
+        self._asked = 0
+        self._asking = threading.Condition()
+
+    def wait_until_asked(self, times: int) -> None:
+        with self._asking:
+            assert self._asking.wait_for(lambda: self._asked >= times, 10)
 
     def read(self) -> object:
+        with self._asking:
+            self._asked += 1
+            self._asking.notify_all()
         found = self.next.get(timeout=10)
         if isinstance(found, Exception):
             raise found
@@ -70,16 +80,19 @@ async def test_a_picture_has_the_stamp_of_its_capture_less_the_latency() -> None
     assert (media.codec, media.width, media.height, len(media.payload)) == ("yuv420p", 4, 4, 24)
 
 
-async def test_a_camera_read_apart_is_stamped_with_the_moment_of_the_picture_before() -> None:
+async def test_a_camera_read_apart_is_stamped_with_the_moment_of_the_picture_before_and_its_first_is_left_out() -> None:
     shots = Shots()
     camera = ApartCamera(CAMERA, latency=0.0, timeout=2, shots=shots)
     try:
         waiting = asyncio.create_task(first(camera, Clocked()))
-        await asyncio.sleep(0)
+        began = time.monotonic()
+        shots.next.put(np.full((4, 4, 3), 255, np.uint8))
+        await asyncio.to_thread(shots.wait_until_asked, 2)
         before = time.monotonic()
         shots.next.put(PICTURE)
         media = await waiting
-        assert media.time <= before  # it may have been taken at any time since the thread began to wait
+        assert began <= media.time <= before  # it may have been taken at any time after the first was read
+        assert media.payload[0] == 16
     finally:
         camera.close()
         shots.next.put(PICTURE)
@@ -101,6 +114,7 @@ def test_a_camera_that_fails_or_is_silent_is_a_fault() -> None:
     try:
         now = time.monotonic()
         assert camera.faults(now) == ["front: no picture has come yet"]
+        shots.next.put(PICTURE)
         shots.next.put(TimeoutError("no frame"))
         shots.next.put(PICTURE)
         deadline = time.monotonic() + 10

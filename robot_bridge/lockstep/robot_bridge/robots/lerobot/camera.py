@@ -120,7 +120,7 @@ class ApartCamera(LeRobotCamera):
 
     def _read_on(self) -> None:
         name_thread("lerobot-camera")
-        since = time.monotonic()
+        since: float | None = None  # when the picture before was read; nobody knows how old the first one is
         while not self._leave.is_set():
             try:
                 picture = self._shots.read()
@@ -129,7 +129,8 @@ class ApartCamera(LeRobotCamera):
                 self._leave.wait(PAUSE)
                 continue
             now = time.monotonic()
-            self.put(picture, since)
+            if since is not None:
+                self.put(picture, since)
             since = now
 
 
