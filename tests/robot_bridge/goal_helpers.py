@@ -1,12 +1,13 @@
 """A robot with goal axes for tests: it hangs below its goals, and its tool is driven in place of its joints."""
 
 import asyncio
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import msgspec
 
 from lockstep.protocol.description import Axis, Body, Pose, RobotDescription
 from lockstep.robot_bridge.robots.base import Measurement, Robot
+from tests.waiting import PATIENCE
 
 __all__ = ["ARM_AXES", "BASE", "ELBOW", "SHOULDER", "TURN", "HangingArm", "X", "Z"]
 
@@ -75,9 +76,15 @@ class HangingArm(Robot):
         self.pursued = [base, shoulder, elbow, turn, shoulder + elbow, shoulder - elbow]
         self._ticked.set()
 
-    async def tick_passes(self) -> None:
-        self._ticked.clear()
-        await self._ticked.wait()
+    async def until(self, condition: Callable[[], bool], what: str) -> None:
+        """Wait until the condition holds after a tick."""
+        try:
+            async with asyncio.timeout(PATIENCE):
+                while not condition():
+                    self._ticked.clear()
+                    await self._ticked.wait()
+        except TimeoutError:
+            raise AssertionError(f"never happened: {what}") from None
 
     def goals(self) -> Sequence[float]:
         return self.pursued

@@ -378,7 +378,7 @@ class Robot(RuleBasedStateMachine):
         super().__init__()
         self.now = 0.0
         self.event = MAX_EVENT - 3
-        self.executed: list[tuple[int, list[float]]] = []
+        self.executed: list[tuple[int, list[float | None]]] = []
         self.issue = 1
         self.sender = new_sender(self.event)
         self.network: list[Command] = []
@@ -414,7 +414,7 @@ class Robot(RuleBasedStateMachine):
         command = self.network[index] if keep else self.network.pop(index)
         if command.event == event_after(self.event):
             self.event, self.issue = command.event, 1
-            self.executed.append((command.event, command.values))
+            self.executed.append((command.event, list(command.values)))
         self.answers.append((self.event, self.issue))
 
     @rule()

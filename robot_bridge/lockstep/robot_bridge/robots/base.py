@@ -89,10 +89,11 @@ class Robot(ABC):
     def apply(self, values: Sequence[float]) -> None:
         """Drive the axes with these values during the coming tick, in the description's order and units.
 
-        The value of a goal axis is its applied goal: the place to be at. It is continuous but where it was read anew:
-        from `measured_axes` after `reset`, and from `goals` when a pose begins to be driven in place of other axes, or
-        they in its place. Of these two sets only the values of the one that is driven change. The bridge does not call
-        this before every goal axis has been measured.
+        The value of a goal axis is its applied goal: the place to be at. The first values after the start and after
+        `reset` are where the robot was measured then; they move nothing. From then on a value changes by no more than
+        a tick at `slew`, with one exception: of a pose and the axes that it stands in for, only those change that are
+        driven, and when one of these sets begins to be driven in place of the other, its values are first what `goals`
+        said. The bridge does not call this before every goal axis has been measured.
         """
 
     def tick(self) -> None:

@@ -83,8 +83,8 @@ class CommandedPath:
         if self._records and feedback.time < self._records[-1].time:
             self._records.clear()
         at_rest = feedback.at_rest or feedback.stop.stopped
-        joints, axes, goals = (tuple(each) for each in (feedback.joints, feedback.axes, feedback.goals))
-        self._records.append(_Record(feedback.event, feedback.time, joints, at_rest, axes, goals))
+        joints, axes = tuple(feedback.joints), tuple(feedback.axes)
+        self._records.append(_Record(feedback.event, feedback.time, joints, at_rest, axes, tuple(feedback.goals)))
         while len(self._records) > 1 and self._records[1].time <= feedback.time - self.seconds:
             self._records.popleft()
 
