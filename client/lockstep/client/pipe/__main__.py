@@ -9,8 +9,8 @@ from collections.abc import Sequence
 from contextlib import suppress
 from typing import BinaryIO
 
-from lockstep.protocol.pipe_frames import BadFrame
 from lockstep.client.pipe.server import PipeServer
+from lockstep.protocol.pipe_frames import BadFrame
 
 
 async def serve(output: BinaryIO) -> None:

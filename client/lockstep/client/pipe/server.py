@@ -11,9 +11,9 @@ import msgspec
 from lockstep.client.console import Console
 from lockstep.client.errors import ConsoleError, ConsoleLost, Refused
 from lockstep.client.media.stream import Picture
-from lockstep.protocol.pipe_frames import BadFrame, read_request, to_frame
 from lockstep.client.pipe.observation import NoFreshObservation, Observer
 from lockstep.client.pipe.reach import within_reach
+from lockstep.protocol.pipe_frames import BadFrame, read_request, to_frame
 
 __all__ = ["PipeServer"]
 
@@ -178,7 +178,9 @@ class PipeServer:
         console = self._connected()
         assert self._observer is not None  # made with the console
         found = await self._observer.take(request.seconds, request.max_age)
-        blocks: list[bytes | memoryview] = [_pixels(picture, *self._cameras[picture.stream]) for picture in found.pictures]
+        blocks: list[bytes | memoryview] = [
+            _pixels(picture, *self._cameras[picture.stream]) for picture in found.pictures
+        ]
         feedback = found.feedback
         names = [axis.name for axis in console.description.axes]
         goals = feedback.goals or [None] * len(names)
