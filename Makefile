@@ -7,6 +7,7 @@ PAGE := server/lockstep/server/web_dist/index.html
 PARTS := protocol rtc robot_bridge client server
 ROS2 := .ros2
 LEROBOT := .lerobot
+LEROBOT_PLUGINS := lerobot_plugins/lerobot_robot_lockstep lerobot_plugins/lerobot_teleoperator_lockstep
 DOCS := .docs
 RUN_PACKAGES := libegl1 libgl1-mesa-dri
 GSTREAMER_PACKAGES := python3-gi gir1.2-gst-plugins-bad-1.0 gstreamer1.0-plugins-good gstreamer1.0-plugins-bad gstreamer1.0-nice gstreamer1.0-x
@@ -71,7 +72,7 @@ check: $(VENV)/.dev web/node_modules/.installed ## Lint, types, dependencies, ge
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
 	$(BIN)/mypy
-	for part in . $(PARTS); do $(BIN)/deptry --no-ansi --config $$part/pyproject.toml $$part || exit 1; done
+	for part in . $(PARTS) $(LEROBOT_PLUGINS); do $(BIN)/deptry --no-ansi --config $$part/pyproject.toml $$part || exit 1; done
 	$(BIN)/python -m scripts.generate_wire --check
 	cd web && npm run --silent check
 	@$(MAKE) --no-print-directory docs
@@ -141,10 +142,11 @@ $(ROS2)/.installed: requirements-ros2.lock | $(BIN)/python
 	@touch $@
 
 # Apart from the rest: it wants older packages, and PyTorch with them (8.4 GB, two minutes). `make test-long` alone has it.
-$(LEROBOT)/.installed: requirements-lerobot.lock | $(BIN)/python
+$(LEROBOT)/.installed: requirements-lerobot.lock $(LEROBOT_PLUGINS:=/pyproject.toml) | $(BIN)/python
 	@echo "Installing LeRobot for the tests"
 	@$(PYTHON) -m venv $(LEROBOT)
 	@$(LEROBOT)/bin/python -m pip --disable-pip-version-check -q install --no-deps --require-hashes -r requirements-lerobot.lock
+	@$(LEROBOT)/bin/python -m pip --disable-pip-version-check -q install --no-build-isolation --no-deps $(addprefix -e ./,$(LEROBOT_PLUGINS))
 	@touch $@
 
 # Apart from the rest, so that running and testing need none of it.

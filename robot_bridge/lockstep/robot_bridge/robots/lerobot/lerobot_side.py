@@ -5,8 +5,9 @@ import logging
 import pkgutil
 import sys
 from collections.abc import Mapping, Sequence
-from contextlib import suppress
+from contextlib import redirect_stderr, suppress
 from importlib import import_module
+from io import StringIO
 from pathlib import Path
 from typing import Any, get_args
 
@@ -188,10 +189,14 @@ def _from_class(spec: str, flags: Sequence[str]) -> Any:
 def _parse(config: Any, flags: Sequence[str], kind: str) -> Any:
     """Read the flags as LeRobot's commands do, for the fields of one configuration."""
     words = [f"--{flag.removeprefix(PREFIX)}" for flag in flags]
+    said = StringIO()
     try:
-        return import_module("draccus").parse(config_class=config, args=words)
+        with redirect_stderr(said):  # argparse says there what it does not know, and exits
+            return import_module("draccus").parse(config_class=config, args=words)
     except (Exception, SystemExit) as error:
-        raise SettingsError(f"the configuration of {kind} does not fit: {' '.join(str(error).split())}") from error
+        lines = said.getvalue().strip().splitlines()
+        text = lines[-1] if isinstance(error, SystemExit) and lines else " ".join(str(error).split())
+        raise SettingsError(f"the configuration of {kind} does not fit: {text}") from error
 
 
 def _is_picture(shape: Any) -> bool:
