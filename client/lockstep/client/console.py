@@ -423,7 +423,8 @@ class Console:
 
         It sees each feedback. It is released, and has to be engaged anew, when the seat or the arming is lost, the
         robot is stopped or needs a neutral command, no feedback came for the description's `max_event_age`, or nothing
-        was driven for 200 ms.
+        was driven for 200 ms. When feedback comes back after such a gap, the console sends a rest, and a `drive` that
+        waits raises CommandRefused (`rested`): its goal is from before the gap.
 
         Args:
             scales: goal axes by name, in the order of the device's readings, with the goal per device motion

@@ -123,6 +123,26 @@ def test_the_report_draws_an_axis_that_was_driven_with_gaps_where_it_was_to_stay
     assert "J1" in axes.svg
 
 
+def test_the_report_draws_a_goal_of_an_axis_that_turns_on_and_on_beside_the_measured_value(tmp_path: Path) -> None:
+    turning = msgspec.structs.replace(ARM, axes=(ARM.axes[0], msgspec.structs.replace(ARM.axes[1], wrap=4.0)))
+
+    def further(entry: Entry) -> list[Entry]:
+        record = entry.record
+        if isinstance(record, RobotRecord):
+            record = msgspec.structs.replace(record, description=turning)
+        elif isinstance(record, FeedbackRecord):
+            record = msgspec.structs.replace(record, axes=[0.0, 1.9], goals=[None, -2.0])
+        elif isinstance(record, CommandRecord):
+            record = msgspec.structs.replace(record, values=[0.0, 10.0])
+        else:
+            return [entry]
+        return [own_entry(record, entry.arrived, entry.captured)]
+
+    session = read_session(rewritten(tmp_path / "a.mcap", Story(events=EVENTS).entries(), further, turning))
+    assert session.applied["j1"].values == pytest.approx([2.0] * EVENTS)
+    assert session.commanded["j1"].values == pytest.approx([2.0] * (EVENTS - 1))
+
+
 def faults(path: Path) -> list[str]:
     verdict = verify_file(path)
     assert {name for name, check in verdict.checks.items() if not check.ok} <= {"goals"}

@@ -4,7 +4,7 @@ import math
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from lockstep.protocol.description import RobotDescription
+from lockstep.protocol.description import Axis, RobotDescription
 from lockstep.server.recording.format.info import RecordingInfo
 from lockstep.server.recording.format.payload import own_record_of
 from lockstep.server.recording.format.records import CommandRecord, FeedbackRecord, ReportRecord, TraceRecord
@@ -107,11 +107,18 @@ def _take_row(session: Session, row: EventRow, at: float) -> None:
         session.force.add(at, math.hypot(*feedback.wrench[:3]))
     for axis, value in zip(session.description.axes, feedback.axes, strict=False):
         session.measured.setdefault(axis.name, Series()).add(at, value)
-    for axis, asked in zip(session.description.axes, [] if command is None else command.values, strict=False):
-        session.commanded.setdefault(axis.name, Series()).add(at, math.nan if asked is None else asked)
-    for axis, goal in zip(session.description.axes, feedback.goals, strict=False):
+    axes = list(zip(session.description.axes, feedback.axes, strict=False))
+    for (axis, measured), asked in zip(axes, [] if command is None else command.values, strict=False):
+        value = math.nan if asked is None else _beside(axis, measured, asked)
+        session.commanded.setdefault(axis.name, Series()).add(at, value)
+    for (axis, measured), goal in zip(axes, feedback.goals, strict=False):
         if goal is not None:
-            session.applied.setdefault(axis.name, Series()).add(at, goal)
+            session.applied.setdefault(axis.name, Series()).add(at, _beside(axis, measured, goal))
+
+
+def _beside(axis: Axis, measured: float, goal: float) -> float:
+    """Return the goal, of an axis that turns on and on as the same place that is nearest to the measured value."""
+    return measured + math.remainder(goal - measured, axis.wrap) if axis.wrap else goal
 
 
 def _take_report(session: Session, record: ReportRecord, at: float) -> None:
