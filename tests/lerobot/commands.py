@@ -11,7 +11,7 @@ from tests.support.stack import Stack
 __all__ = ["PATIENCE", "Arm", "environment", "lerobot_python", "run_lerobot"]
 
 ROOT = Path(__file__).parents[2]
-PATIENCE = 120.0  # s; PyTorch takes its time
+PATIENCE = 200.0  # s; PyTorch takes its time
 
 
 def lerobot_python() -> str:
@@ -58,22 +58,22 @@ async def run_lerobot(directory: Path, command: str, *flags: str, link: str = ""
     Raises:
         AssertionError: it failed.
     """
-    program = Path(lerobot_python()).with_name(command)
-    process = await asyncio.create_subprocess_exec(
-        str(program),
-        *flags,
-        stdin=asyncio.subprocess.DEVNULL,
-        stdout=asyncio.subprocess.PIPE,
-        stderr=asyncio.subprocess.STDOUT,
-        env={**os.environ, **environment(directory), "LOCKSTEP_LINK": link, "LOCKSTEP_PYTHON": sys.executable},
-    )
+    program, output = Path(lerobot_python()).with_name(command), directory / f"{command}.txt"
+    with output.open("wb") as file:
+        process = await asyncio.create_subprocess_exec(
+            str(program),
+            *flags,
+            stdin=asyncio.subprocess.DEVNULL,
+            stdout=file,
+            stderr=asyncio.subprocess.STDOUT,
+            env={**os.environ, **environment(directory), "LOCKSTEP_LINK": link, "LOCKSTEP_PYTHON": sys.executable},
+        )
     try:
         async with asyncio.timeout(PATIENCE):
-            printed, _ = await process.communicate()
-    finally:
-        if process.returncode is None:
-            process.kill()
             await process.wait()
-    text = printed.decode(errors="replace")
+    except TimeoutError:
+        process.kill()
+        await process.wait()
+    text = output.read_text(errors="replace")
     assert process.returncode == 0, text[-4000:]
     return text

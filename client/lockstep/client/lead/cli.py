@@ -14,15 +14,15 @@ from lockstep.client.lead.hands import KeyHand, PedalHand
 from lockstep.client.lead.leader import Leader, LeaderFailed, Newest
 from lockstep.client.lead.mapping import BadMapping, map_axes
 
-__all__ = ["main"]
+__all__ = ["arguments", "main"]
 
 PREFIX = "--teleop."
 EXIT_FAILED = 1
 EXIT_USAGE = 2
 
 
-def main(words: Sequence[str], program: str = "lockstep drive") -> int:
-    """Run the command; return its exit code."""
+def arguments(program: str) -> argparse.ArgumentParser:
+    """Return the command's parser."""
     parser = argparse.ArgumentParser(
         prog=program,
         description="Drive a robot's goal axes by a leader arm of LeRobot. It moves only while the key is held.",
@@ -41,6 +41,12 @@ def main(words: Sequence[str], program: str = "lockstep drive") -> int:
     parser.add_argument("--rate", type=float, default=60.0, help="readings of the leader a second")
     parser.add_argument("--tls-ca", help="certificate to trust instead of the system's")
     parser.add_argument("--name", default="leader", help="the name that other participants see")
+    return parser
+
+
+def main(words: Sequence[str], program: str = "lockstep drive") -> int:
+    """Run the command; return its exit code."""
+    parser = arguments(program)
     options, more = parser.parse_known_args(list(words))
     flags = [word for word in more if word.startswith(PREFIX) and "=" in word]
     if wrong := [word for word in more if word not in flags]:

@@ -52,6 +52,8 @@ class KeyHand:
             OSError: the standard input is no terminal.
         """
         loop, terminal = asyncio.get_running_loop(), sys.stdin.fileno()
+        if not os.isatty(terminal):
+            raise OSError("the standard input is no terminal whose space bar could be held: use --pedal")
         before = termios.tcgetattr(terminal)
         tty.setcbreak(terminal)
         loop.add_reader(terminal, self._read, terminal, loop)

@@ -1,7 +1,6 @@
 """A leader arm in LeRobot's Python, whose newest action is kept here."""
 
 import asyncio
-import os
 import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -61,12 +60,8 @@ class Leader:
             LeaderFailed: it cannot be used.
         """
         pipe = asyncio.subprocess.PIPE
-        # The paths of this environment are for another Python's packages.
-        environment = {name: value for name, value in os.environ.items() if name != "PYTHONHOME"}
         try:
-            self._process = await asyncio.create_subprocess_exec(
-                *self._command, stdin=pipe, stdout=pipe, env=environment
-            )
+            self._process = await asyncio.create_subprocess_exec(*self._command, stdin=pipe, stdout=pipe)
         except OSError as error:
             raise LeaderFailed(f"{self._command[0]} cannot be run: {error.strerror}") from error
         try:

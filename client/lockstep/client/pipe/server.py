@@ -196,8 +196,9 @@ class PipeServer:
     async def _drive(self, request: Drive) -> Answer:
         console = self._connected()
         self._raise_failed()
-        measured = [] if console.feedback is None else console.feedback.axes
-        values = within_reach(console.description.axes, measured, request.values)
+        newest = console.feedback
+        measured, applied = ([], []) if newest is None else (newest.axes, newest.goals)
+        values = within_reach(console.description.axes, measured, applied, request.values)
         if request.wait:
             await self._end_driving()
             feedback = await console.drive(values)

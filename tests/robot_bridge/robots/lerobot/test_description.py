@@ -1,15 +1,20 @@
 """The description of a robot of LeRobot: units as it has them, limits by default and by the settings."""
 
+from pathlib import Path
+
 import pytest
 
 from lockstep.robot_bridge.description.check_description import check_description
 from lockstep.robot_bridge.robots.lerobot.description import camera_latency, describe
 from lockstep.robot_bridge.robots.lerobot.device import AxisFacts, CameraFacts, DeviceFacts, Norm
 from lockstep.robot_bridge.robots.lerobot.settings import AxisSettings, CameraSettings, LeRobotSettings
-from lockstep.robot_bridge.yaml_file import SettingsPlace
+from lockstep.robot_bridge.yaml_file import SettingsPlace, YamlFile
 
 PAN = AxisFacts("shoulder_pan.pos", "degrees", -100.0, 100.0)
 FRONT = CameraFacts("front", 641, 481, 30.0, apart=True)
+
+
+ROOT = Path(__file__).parents[4]
 
 
 def facts(*axes: AxisFacts, cameras: tuple[CameraFacts, ...] = (), has_torque: bool = True) -> DeviceFacts:
@@ -105,3 +110,11 @@ def test_a_picture_that_comes_with_the_state_counts_as_older() -> None:
     assert camera_latency(FRONT, CameraSettings()) == 0.05
     assert camera_latency(FRONT._replace(apart=False), CameraSettings()) == 0.5
     assert camera_latency(FRONT, CameraSettings(latency=0.02)) == 0.02
+
+
+def test_the_example_of_the_documents_is_of_an_arm_with_a_camera() -> None:
+    settings = YamlFile(ROOT / "docs/examples/lerobot/arm.yaml").convert(LeRobotSettings)
+    assert settings.robot == "so101_follower"
+    description = describe(settings, facts(cameras=(FRONT,)))
+    assert (description.axes[0].slew, description.axes[0].reach) == (30, 20)
+    assert camera_latency(FRONT, settings.cameras["front"]) == 0.08
