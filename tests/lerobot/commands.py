@@ -3,12 +3,15 @@
 import asyncio
 import os
 import sys
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
+from lockstep.client import Console, NotArmed
+from lockstep.protocol.messages import Feedback
 from tests.support.stack import Stack
 
-__all__ = ["PATIENCE", "Arm", "environment", "lerobot_python", "run_lerobot"]
+__all__ = ["PATIENCE", "Arm", "environment", "lerobot_python", "reach", "run_lerobot"]
 
 ROOT = Path(__file__).parents[2]
 PATIENCE = 200.0  # s; PyTorch takes its time
@@ -50,6 +53,20 @@ class Arm:
 
     def trouble(self, what: str) -> None:
         (self.directory / "trouble").write_text(what)
+
+
+async def reach(console: Console, goals: dict[str, float]) -> Feedback:
+    """Arm and drive there; again if a busy machine has held the arm up meanwhile.
+
+    Raises:
+        NotArmed: each time.
+    """
+    for _ in range(4):
+        with suppress(NotArmed):
+            await console.arm()
+            return await console.move_to(goals)
+    await console.arm()
+    return await console.move_to(goals)
 
 
 async def run_lerobot(directory: Path, command: str, *flags: str, link: str = "") -> str:

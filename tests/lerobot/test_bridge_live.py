@@ -12,7 +12,7 @@ import lockstep.protocol
 import lockstep.robot_bridge
 from lockstep.client import CommandRefused, Console, ConsoleLost
 from lockstep.protocol.messages import Feedback
-from tests.lerobot.commands import PATIENCE, Arm, environment, lerobot_python
+from tests.lerobot.commands import PATIENCE, Arm, environment, lerobot_python, reach
 from tests.lerobot.conftest import SETTINGS, running_arm
 
 pytestmark = [pytest.mark.long, pytest.mark.timeout(300)]
@@ -39,7 +39,7 @@ async def test_its_axes_are_what_lerobot_calls_them_and_goals_move_it(arm: Arm) 
         assert console.feedback is not None
         assert console.feedback.axes == pytest.approx([10.0, -20.0, 50.0])  # nothing has moved it
         await console.take_seat()
-        reached = await console.move_to({"pan.pos": 60.0, "gripper.pos": 0.0})
+        reached = await reach(console, {"pan.pos": 60.0, "gripper.pos": 0.0})
         assert reached.axes[0] == pytest.approx(60.0, abs=2.0)
         with pytest.raises(CommandRefused, match="jump"):
             await console.drive({"pan.pos": 170.0})
@@ -53,7 +53,7 @@ async def test_a_camera_that_is_silent_is_a_fault_and_the_arm_is_driven_on(arm: 
         await console.take_seat()
         arm.trouble("dark")
         await feedback_with(console, "front: no picture for")
-        reached = await console.move_to({"pan.pos": 20.0})
+        reached = await reach(console, {"pan.pos": 20.0})
         assert reached.unknown == []
 
 
@@ -98,7 +98,7 @@ async def test_the_torque_goes_at_the_end_where_the_settings_say_so(tmp_path: Pa
         link = arm.stack.operator
         async with Console(link, audio=False) as console:
             await console.take_seat()
-            await console.move_to({"pan.pos": 20.0})
+            await reach(console, {"pan.pos": 20.0})
             await console.stop()
             async with asyncio.timeout(PATIENCE):
                 async for feedback in console.feedbacks():
@@ -110,7 +110,7 @@ async def test_the_torque_goes_at_the_end_where_the_settings_say_so(tmp_path: Pa
             await asyncio.sleep(0.5)
             assert console.feedback is not None
             assert console.feedback.axes[1] <= fallen.axes[1] + 1.0  # it does not leap back up
-            assert (await console.move_to({"lift.pos": -20.0})).axes[1] == pytest.approx(-20.0, abs=2.0)
+            assert (await reach(console, {"lift.pos": -20.0})).axes[1] == pytest.approx(-20.0, abs=2.0)
     assert any("disconnected, torque off" in line for line in arm.stack.running.lines)
 
 

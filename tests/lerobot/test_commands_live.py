@@ -16,7 +16,7 @@ import pytest
 from lockstep.bench.harness.processes import running_process
 from lockstep.bench.harness.stack import LOCKSTEP
 from lockstep.client import CommandRefused, Console
-from tests.lerobot.commands import PATIENCE, Arm, environment, lerobot_python, run_lerobot
+from tests.lerobot.commands import PATIENCE, Arm, environment, lerobot_python, reach, run_lerobot
 
 pytestmark = [pytest.mark.long, pytest.mark.timeout(400)]
 
@@ -177,5 +177,5 @@ async def test_a_page_leads_a_robot_of_lerobot(tmp_path: Path) -> None:
             before = await leader.ask("", PATIENCE)
             assert before["gripper.pos"] == 40.0
             await console.take_seat()
-            await console.move_to({"shoulder_pan.pos": 20.0})
+            await reach(console, {"shoulder_pan.pos": 20.0})
             assert (await leader.ask("", PATIENCE))["shoulder_pan.pos"] == pytest.approx(20.0, abs=2.0)
