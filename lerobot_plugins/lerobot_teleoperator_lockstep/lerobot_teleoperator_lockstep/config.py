@@ -7,7 +7,7 @@ from lerobot.teleoperators.config import TeleoperatorConfig
 
 __all__ = ["LockstepTeleoperatorConfig"]
 
-DEGREES = {"unit": "deg", "slew": 60.0, "reach": 30.0}
+DEGREES: dict[str, float | str] = {"unit": "deg", "slew": 60.0, "reach": 30.0}
 # An SO-101 follower in LeRobot's degrees; its calibration may allow less.
 SO101: dict[str, dict[str, float | str]] = {
     "shoulder_pan.pos": {"minimum": -110.0, "maximum": 110.0, **DEGREES},

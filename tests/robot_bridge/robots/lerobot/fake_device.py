@@ -1,7 +1,7 @@
 """A device of the tests in place of LeRobot, which is in another Python; tests/lerobot has its real classes."""
 
 import threading
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 from lockstep.robot_bridge.robots.lerobot.device import AxisFacts, CameraFacts, DeviceFacts, Shots
@@ -21,8 +21,8 @@ class FakeDevice:
         self.places: dict[str, Any] = {axis.name: at for axis in self.facts.axes}
         self.calls: list[tuple[str, Any]] = []
         self.called = threading.Condition()
-        self.on_act = lambda: None
-        self.on_observe = lambda: None
+        self.on_act: Callable[[], None] = _nothing
+        self.on_observe: Callable[[], None] = _nothing
         self.has_torque = True
 
     def camera(self, name: str) -> Shots:
@@ -64,3 +64,7 @@ class FakeDevice:
     def made(self, call: str) -> list[Any]:
         with self.called:
             return [value for each, value in self.calls if each == call]
+
+
+def _nothing() -> None:
+    pass
