@@ -45,6 +45,13 @@ def test_it_measures_degrees_and_has_their_joints_in_radians(robots: list[Robot]
     assert robot.positions() == measured.joints
 
 
+def test_the_motors_are_told_at_first_to_be_where_they_are(robots: list[Robot]) -> None:
+    device = FakeDevice(PAN, WHEEL, at=30.0)
+    make(robots, device)
+    device.wait("act", {"pan.pos": 30.0, "x.vel": 0.0})
+    assert device.made("act")[0] == {"pan.pos": 30.0, "x.vel": 0.0}
+
+
 def test_the_applied_goals_reach_the_device_under_its_own_names(robots: list[Robot]) -> None:
     device = FakeDevice()
     robot = make(robots, device)

@@ -58,6 +58,7 @@ class LeRobotRobot(Robot):
         beside: list[TogetherCamera] = []
         try:
             self._bus.start()
+            self._stay()
             for known, camera in zip(facts.cameras, description.cameras, strict=True):
                 given = settings.cameras.get(known.name, CameraSettings())
                 latency = camera_latency(known, given)
@@ -140,6 +141,12 @@ class LeRobotRobot(Robot):
         for camera in self._cameras:
             camera.close()
         self._bus.close()
+
+    def _stay(self) -> None:
+        """Tell the motors to be where they are: LeRobot switches them on, and they may have a goal from before."""
+        places = self.measured_axes()
+        if all(map(math.isfinite, places)):
+            self._bus.want(self._at_rest(places))
 
     def _at_rest(self, values: Sequence[float]) -> tuple[float, ...]:
         return tuple(value if rest is None else rest for value, rest in zip(values, self._rest, strict=True))
