@@ -12,6 +12,7 @@ import sys
 from typing import Any, BinaryIO
 
 import msgspec
+from msgspec.structs import replace
 
 from lockstep.protocol.description import RobotDescription
 from lockstep.protocol.errors import SecretError
@@ -56,7 +57,7 @@ def arm_of(request: Open) -> VirtualArm:
     """
     facts = DeviceFacts("lockstep", "", tuple(map(AxisFacts, request.axes)), (), has_torque=False)
     settings = LeRobotSettings(name=request.name, label="LeRobot", axes=request.axes, hold=request.hold)
-    description = describe(settings, facts)
+    description = replace(describe(settings, facts), joints=())  # it has no bodies that joints would move
     return VirtualArm(description, _places(description, request.start))
 
 
