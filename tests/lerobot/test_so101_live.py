@@ -47,6 +47,10 @@ def settings(bus: FeetechBus, more: str = "") -> str:
     return f"robot: so101_follower\nconfig: {{port: {bus.port}, id: desk}}\n{more}"
 
 
+def has_torque(bus: FeetechBus) -> bool:
+    return bus.servos[2].has_torque
+
+
 async def test_its_joints_are_degrees_and_follow_goals_and_its_torque_stays_on(bus: FeetechBus, tmp_path: Path) -> None:
     calibrated(tmp_path)
     async with (
@@ -95,12 +99,12 @@ async def test_a_stop_takes_the_torque_where_the_settings_say_so_and_a_reset_doe
         async with asyncio.timeout(PATIENCE):
             while bus.place(2) > 1500:  # noqa: ASYNC110
                 await asyncio.sleep(0.05)
-        assert not bus.servos[2].has_torque
+        assert not has_torque(bus)
         await asyncio.sleep(1.0)  # the bridge takes no reset within a second
         await console.reset()
         fallen = bus.place(2)
         async with asyncio.timeout(PATIENCE):
-            while not bus.servos[2].has_torque:  # noqa: ASYNC110
+            while not has_torque(bus):  # noqa: ASYNC110
                 await asyncio.sleep(0.02)
         await asyncio.sleep(0.5)
         assert bus.place(2) <= fallen + 20  # not back to where it was told to be before
