@@ -175,6 +175,8 @@ def run(
 ) -> None:
     """Run a robot and its bridge until interrupted."""
     more = words or []
+    if name.startswith("-"):  # an option that does not exist stands where the name belongs
+        _refuse([name])
     if name == "new":
         _write(more)
         return
