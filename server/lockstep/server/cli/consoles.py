@@ -120,11 +120,14 @@ def up(
         Path | None, typer.Option(help="Use a robot behind ROS 2 topics instead; this YAML file describes it.")
     ] = None,
     mjcf: Annotated[Path | None, typer.Option(help="Use your own MuJoCo model instead, from this MJCF file.")] = None,
+    lerobot: Annotated[
+        Path | None, typer.Option(help="Use a robot of LeRobot instead; this YAML file describes it.")
+    ] = None,
     robot_python: Annotated[
         str | None,
         typer.Option(
             envvar="LOCKSTEP_ROBOT_PYTHON",
-            help="Python interpreter for the bridge, such as that of a ROS installation. Default: the console's own.",
+            help="Python interpreter for the bridge, such as that of ROS or LeRobot. Default: the console's own.",
         ),
     ] = None,
     robot_port: Annotated[
@@ -196,18 +199,22 @@ def up(
         config=config,
         **network,
     )
-    file = ros2 or mjcf
+    file = ros2 or mjcf or lerobot
     options = [] if ros2 is None else ["--ros2", str(ros2)]
     options += [] if mjcf is None else ["--mjcf", str(mjcf)]
+    options += [] if lerobot is None else ["--lerobot", str(lerobot)]
     options += ["--event-strip"] if event_strip else []
     options += [] if encode is None else ["--encode", encode]
     secret = link_access(settings).secret or LinkSecret.draw()
     settings = settings.model_copy(update={"link_secret": SecretStr(secret.reveal()), "link_secret_file": None})
     bridges = {}
     kinds = _simulated(robot)
-    if (ros2 or mjcf) and "" not in kinds:
-        raise _usage("--ros2 and --mjcf are for one robot; run the others by `lockstep robot` and use `lockstep serve`")
-    unknown = [] if ros2 or mjcf or robot_python else sorted(kind for kind in kinds.values() if not is_robot(kind))
+    if file is not None and "" not in kinds:
+        raise _usage(
+            "--ros2, --mjcf and --lerobot are for one robot; "
+            "run the others by `lockstep robot` and use `lockstep serve`"
+        )
+    unknown = [] if file or robot_python else sorted(kind for kind in kinds.values() if not is_robot(kind))
     if unknown:
         raise _usage(f"no robot {unknown[0]!r}; there are {', '.join(robot_names())}")
     for number, (name, kind) in enumerate(kinds.items()):

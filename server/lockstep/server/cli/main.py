@@ -10,6 +10,7 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperGroup
 
+from lockstep.server.cli.driving import add_drive_command
 from lockstep.server.cli.measurements import add_bench_commands
 
 __all__ = ["LOADERS", "app", "main"]
@@ -112,6 +113,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     help="Drive a robot from a browser. `lockstep up` runs a simulated robot and the console.",
 )
+add_drive_command(app)
 add_bench_commands(app)
 
 

@@ -1,0 +1,90 @@
+"""Drives a robot by a leader, for as long as the operator holds the key or the pedal."""
+
+import asyncio
+from collections.abc import Callable
+from contextlib import suppress
+
+from lockstep.client.console import Console
+from lockstep.client.control.clutch import Clutch
+from lockstep.client.errors import CommandRefused, NotArmed
+from lockstep.client.lead.hands import Hand
+from lockstep.client.lead.leader import Newest
+from lockstep.protocol.messages import Feedback
+
+__all__ = ["lead"]
+
+LOOK = 0.01  # s between two looks at the key or pedal
+
+
+async def lead(
+    console: Console,
+    clutch: Clutch,
+    newest: Newest,
+    hand: Hand,
+    say: Callable[[str], None],
+) -> None:
+    """Drive until the operator quits. Every press binds the leader anew, so that nothing leaps.
+
+    Raises:
+        ConsoleLost: the connection ended; the robot comes to rest by itself.
+    """
+    clock = asyncio.get_running_loop().time
+    say(hand.words)
+    while await _pressed(hand, clock):
+        try:
+            await _drive_on(console, clutch, newest, hand, say)
+        except CommandRefused as error:
+            say(f"{error}; let go, and press again")
+        finally:
+            clutch.release()
+            await console.rest()
+
+
+async def _drive_on(console: Console, clutch: Clutch, newest: Newest, hand: Hand, say: Callable[[str], None]) -> None:
+    """Drive while the hand holds, and no longer.
+
+    Raises:
+        CommandRefused: the robot did not take a command.
+    """
+    clock = asyncio.get_running_loop().time
+    with suppress(NotArmed):
+        await console.arm()
+    if not clutch.engage(newest.readings(clock())):
+        say("not engaged: the leader is not known, or the robot is not ready; let go, and press again")
+        return
+    clipped: tuple[str, ...] = ()
+    say("drives")
+    while hand.held(clock()):
+        values = clutch.values(newest.readings(clock()))
+        if not clutch.engaged:
+            break
+        if clutch.clipped != clipped:
+            clipped = clutch.clipped
+            say(f"out of reach: {', '.join(clipped)}" if clipped else "drives")
+        if await _answered(asyncio.create_task(console.drive(values)), hand, clock) is None:
+            break
+    say("rests" if not hand.held(clock()) else "rests: the clutch was released; let go, and press again")
+
+
+async def _answered(command: "asyncio.Task[Feedback]", hand: Hand, clock: Callable[[], float]) -> Feedback | None:
+    """Return the answer to a command; None if the operator has let go meanwhile, which waits for nothing."""
+    try:
+        while not command.done():
+            await asyncio.wait([command], timeout=LOOK)
+            if not hand.held(clock()):
+                return None
+        return command.result()
+    finally:
+        if not command.done():
+            command.cancel()
+            await asyncio.wait([command])
+
+
+async def _pressed(hand: Hand, clock: Callable[[], float]) -> bool:
+    """Wait for a new press; return False when the operator quits. One that was held all along is none."""
+    for wanted in (False, True):
+        while hand.held(clock()) != wanted and not hand.quit.is_set():
+            with suppress(TimeoutError):
+                async with asyncio.timeout(LOOK):
+                    await hand.quit.wait()
+    return not hand.quit.is_set()

@@ -1,0 +1,55 @@
+"""Serves the standard input and output until the input ends."""
+
+import asyncio
+import logging
+import os
+import signal
+import sys
+from collections.abc import Sequence
+from contextlib import suppress
+from typing import BinaryIO
+
+from lockstep.client.pipe.server import PipeServer
+from lockstep.protocol.pipe_frames import BadFrame
+
+
+async def serve(output: BinaryIO) -> None:
+    """Serve. Frames go to `output`; nothing else may write there.
+
+    Raises:
+        BadFrame: the other side does not speak in frames.
+    """
+    loop = asyncio.get_running_loop()
+    # Ctrl-C reaches all processes of a terminal; the one that started this process ends it in order, by its pipe.
+    loop.add_signal_handler(signal.SIGINT, lambda: None)
+    reader = asyncio.StreamReader()
+    await loop.connect_read_pipe(lambda: asyncio.StreamReaderProtocol(reader), sys.stdin)
+
+    def write_now(parts: Sequence[bytes | memoryview]) -> None:
+        output.writelines(parts)
+        output.flush()
+
+    async def write(parts: Sequence[bytes | memoryview]) -> None:
+        await asyncio.to_thread(write_now, parts)
+
+    async with PipeServer(reader, write) as server:
+        serving = asyncio.create_task(server.serve())
+        loop.add_signal_handler(signal.SIGTERM, serving.cancel)
+        await asyncio.wait([serving])
+    if not serving.cancelled():
+        with suppress(BrokenPipeError):  # the other side has gone, and needs no answer
+            serving.result()
+
+
+def main() -> None:
+    logging.basicConfig(level=logging.WARNING, format="lockstep: %(levelname)s %(name)s: %(message)s")
+    output = os.fdopen(os.dup(1), "wb")
+    os.dup2(2, 1)  # a library that prints must not print into the frames
+    try:
+        asyncio.run(serve(output))
+    except BadFrame as error:
+        sys.exit(f"lockstep: {error}")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,132 @@
+"""LeRobot's Teleoperator class for a person at Lockstep's page."""
+
+from functools import cached_property
+from typing import Any
+
+from lerobot.teleoperators.teleoperator import Teleoperator
+from lerobot.utils.errors import DeviceAlreadyConnectedError, DeviceNotConnectedError
+from lerobot_robot_lockstep.config import link_of, python_of
+from lerobot_robot_lockstep.pipe import Pipe
+
+from lerobot_teleoperator_lockstep.config import LockstepTeleoperatorConfig
+
+__all__ = ["LockstepTeleoperator"]
+
+ANSWER_SECONDS = 5.0
+
+
+class LockstepTeleoperator(Teleoperator):
+    """Returns the applied goals: what the robot is told, after every limit. When nobody drives, they stand still."""
+
+    config_class = LockstepTeleoperatorConfig
+    name = "lockstep"
+
+    def __init__(self, config: LockstepTeleoperatorConfig) -> None:
+        super().__init__(config)
+        self.config = config
+        self._pipe: Pipe | None = None
+        self._known: dict[str, Any] | None = None
+        self._connected = False
+        self.address = ""  # of the bridge, with "page"
+
+    @cached_property
+    def action_features(self) -> dict[str, type]:
+        if self.config.source == "page":
+            return dict.fromkeys(self.config.axes, float)
+        return {axis["name"]: float for axis in self._session()["axes"]}
+
+    @property
+    def feedback_features(self) -> dict[str, Any]:
+        return {}
+
+    @property
+    def is_connected(self) -> bool:
+        return self._connected and self._pipe is not None and self._pipe.alive
+
+    @property
+    def is_calibrated(self) -> bool:
+        return True
+
+    def calibrate(self) -> None:
+        """There is nothing to calibrate."""
+
+    def configure(self) -> None:
+        """There is nothing to configure."""
+
+    def connect(self, calibrate: bool = True) -> None:
+        """Connect to the session, or begin to listen for a console.
+
+        Raises:
+            LockstepError: the console says no, or the address cannot be had.
+        """
+        if self.is_connected:
+            raise DeviceAlreadyConnectedError
+        if self.config.source == "session":
+            self._session()
+        else:
+            self._listen()
+        self._connected = True
+
+    def get_action(self) -> dict[str, float]:
+        """Return the applied goal of each axis; of a rate axis the measured rate.
+
+        Raises:
+            LockstepError: the robot's state is not known.
+            DeviceNotConnectedError: the connection ended.
+        """
+        if not self.is_connected or self._pipe is None:
+            raise DeviceNotConnectedError
+        if self.config.source == "page":
+            answer, _ = self._pipe.ask("action", ANSWER_SECONDS)
+            return {name: float(value) for name, value in answer["values"].items()}
+        seconds = self.config.observation_timeout_s
+        answer, _ = self._pipe.ask("observe", seconds, seconds=seconds)
+        measured, goals = answer["values"], answer["goals"]
+        return {name: float(measured[name] if goals[name] is None else goals[name]) for name in measured}
+
+    def send_feedback(self, feedback: dict[str, Any]) -> None:
+        """A page takes no feedback of LeRobot: it has its robot's own."""
+        raise NotImplementedError
+
+    def disconnect(self) -> None:
+        """End the connection, or the bridge."""
+        if self._pipe is None:
+            raise DeviceNotConnectedError
+        self._connected = False
+        pipe, self._pipe, self._known = self._pipe, None, None
+        pipe.close()
+
+    def _session(self) -> dict[str, Any]:
+        """Return what the console says of the robot."""
+        config = self.config
+        if self._pipe is None or not self._pipe.alive:
+            self._pipe, self._known = Pipe(python_of(config.python), "lockstep.client.pipe"), None
+        if self._known is None:
+            self._known, _ = self._pipe.ask(
+                "open",
+                config.connect_timeout_s,
+                link=link_of(config.link),
+                name=f"{config.id or 'lerobot'} (actions)",
+                tls_ca=config.tls_ca,
+                pictures=False,
+                connect_seconds=config.connect_timeout_s,
+            )
+        return self._known
+
+    def _listen(self) -> None:
+        config = self.config
+        module = "lockstep.robot_bridge.robots.lerobot.teleoperator_process"
+        pipe = Pipe(python_of(config.python), module)
+        try:
+            answer, _ = pipe.ask(
+                "open",
+                config.connect_timeout_s,
+                axes=config.axes,
+                start=config.start,
+                host=config.host,
+                port=config.port,
+            )
+        except BaseException:
+            pipe.close()
+            raise
+        self._pipe, self.address = pipe, str(answer["robot"])

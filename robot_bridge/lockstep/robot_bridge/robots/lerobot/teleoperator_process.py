@@ -1,0 +1,145 @@
+"""The bridge behind LeRobot's teleoperator `lockstep` with `page`: `python -m …teleoperator_process`, asked on a pipe.
+
+A console connects to this bridge as to any robot. LeRobot asks for the applied goals at its own rate. At the end of the
+pipe the bridge ends too.
+"""
+
+import asyncio
+import logging
+import os
+import signal
+import sys
+from typing import Any, BinaryIO
+
+import msgspec
+from msgspec.structs import replace
+
+from lockstep.protocol.description import RobotDescription
+from lockstep.protocol.errors import SecretError
+from lockstep.protocol.link_secret import LinkSecret
+from lockstep.protocol.pipe_frames import BadFrame, read_request, to_frame
+from lockstep.robot_bridge.bridge import Bridge
+from lockstep.robot_bridge.errors import BridgeError
+from lockstep.robot_bridge.robots.lerobot.description import describe
+from lockstep.robot_bridge.robots.lerobot.device import AxisFacts, DeviceFacts
+from lockstep.robot_bridge.robots.lerobot.settings import AxisSettings, LeRobotSettings
+from lockstep.robot_bridge.robots.lerobot.virtual_arm import VirtualArm
+from lockstep.robot_bridge.settings import BridgeSettings
+from lockstep.robot_bridge.stop.state_directory import default_place
+from lockstep.robot_bridge.yaml_file import SettingsPlace
+
+__all__ = ["Open", "arm_of"]
+
+SECRET_VARIABLE = "LOCKSTEP_LINK_SECRET"
+
+
+class Open(msgspec.Struct, forbid_unknown_fields=True, tag_field="do", tag="open"):
+    """Begin. The answer names the bridge's address."""
+
+    axes: dict[str, AxisSettings]  # each with its unit, minimum, maximum, slew and reach
+    start: dict[str, float] = {}  # where the arm is at first; others: 0, or the nearest place to it
+    name: str = "lerobot-teleoperator"
+    host: str = "127.0.0.1"
+    port: int = 5600
+    hold: float = 0.5
+
+
+class Action(msgspec.Struct, forbid_unknown_fields=True, tag_field="do", tag="action"):
+    """Return the applied goals."""
+
+
+def arm_of(request: Open) -> VirtualArm:
+    """Return the arm that is asked for.
+
+    Raises:
+        SettingsPlace: an axis lacks something.
+        ValueError: a start is out of an axis' range.
+    """
+    facts = DeviceFacts("lockstep", "", tuple(map(AxisFacts, request.axes)), (), has_torque=False)
+    settings = LeRobotSettings(name=request.name, label="LeRobot", axes=request.axes, hold=request.hold)
+    description = replace(describe(settings, facts), joints=())  # it has no bodies that joints would move
+    return VirtualArm(description, _places(description, request.start))
+
+
+def _places(description: RobotDescription, start: dict[str, float]) -> list[float]:
+    unknown = start.keys() - {axis.name for axis in description.axes}
+    if unknown:
+        raise ValueError(f"no axis {', '.join(sorted(unknown))}")
+    places = []
+    for axis in description.axes:
+        place = start.get(axis.name, min(max(0.0, axis.minimum), axis.maximum))
+        if not axis.minimum <= place <= axis.maximum:
+            raise ValueError(
+                f"{axis.name} cannot begin at {place:g}: it goes from {axis.minimum:g} to {axis.maximum:g}"
+            )
+        places.append(place)
+    return places
+
+
+async def serve(output: BinaryIO) -> None:
+    loop = asyncio.get_running_loop()
+    loop.add_signal_handler(signal.SIGINT, lambda: None)  # the pipe's end is the end
+    reader = asyncio.StreamReader()
+    await loop.connect_read_pipe(lambda: asyncio.StreamReaderProtocol(reader), sys.stdin)
+
+    def say(said: dict[str, Any]) -> None:
+        output.writelines(to_frame(said))  # a few hundred bytes, which the pipe always has room for
+        output.flush()
+
+    said = await read_request(reader)
+    if said is None:
+        return
+    try:
+        request = msgspec.convert(said, Open)
+        arm = arm_of(request)
+        text = os.environ.get(SECRET_VARIABLE, "")
+        settings = BridgeSettings(
+            host=request.host,
+            port=request.port,
+            secret=LinkSecret(text) if text else None,
+            state_dir=default_place(request.name),
+        )
+        async with Bridge(arm, settings) as bridge:
+            say({"robot": f"tcp://{bridge.address[0]}:{bridge.address[1]}"})
+            await _answer(reader, arm, bridge, say)
+    except SettingsPlace as place:
+        say({"error": "SettingsError", "text": f"{'.'.join(map(str, place.keys))}: {place.detail}"})
+    except (BridgeError, SecretError, OSError, ValueError, msgspec.ValidationError) as error:
+        say({"error": type(error).__name__, "text": str(error)})
+
+
+async def _answer(reader: asyncio.StreamReader, arm: VirtualArm, bridge: Bridge, say: Any) -> None:
+    ended = asyncio.Event()
+
+    async def read() -> None:
+        try:
+            while (said := await read_request(reader)) is not None:
+                msgspec.convert(said, Action)
+                say({"values": arm.action})
+        finally:
+            ended.set()
+
+    reading = asyncio.create_task(read(), name="requests")
+    try:
+        await bridge.wait(ended)
+    finally:
+        reading.cancel()
+        await asyncio.wait([reading])
+    if not reading.cancelled():
+        reading.result()
+
+
+def main() -> None:
+    logging.basicConfig(level=logging.WARNING, format="lockstep: %(levelname)s %(name)s: %(message)s")
+    output = os.fdopen(os.dup(1), "wb")
+    os.dup2(2, 1)  # a library that prints must not print into the frames
+    try:
+        asyncio.run(serve(output))
+    except BrokenPipeError:
+        pass  # the other side has gone
+    except BadFrame as error:
+        sys.exit(f"lockstep: {error}")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,96 @@
+"""Runs LeRobot's own commands, and says where its Python is."""
+
+import asyncio
+import os
+import sys
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+
+from lockstep.client import Console, NotArmed
+from lockstep.protocol.messages import Feedback
+from tests.support.stack import Stack
+
+__all__ = ["PATIENCE", "Arm", "environment", "lerobot_python", "reach", "run_lerobot"]
+
+ROOT = Path(__file__).parents[2]
+PATIENCE = 200.0  # s; PyTorch takes its time
+
+
+def lerobot_python() -> str:
+    """The interpreter that has LeRobot.
+
+    Raises:
+        RuntimeError: it was not installed.
+    """
+    python = ROOT / ".lerobot" / "bin" / "python"
+    if not python.exists():
+        raise RuntimeError("LeRobot is not installed for the tests: make test-long does it")
+    return str(python)
+
+
+def environment(directory: Path) -> dict[str, str]:
+    """What LeRobot's processes of a test get: no hub, a home of their own, and the parts of the tests."""
+    return {
+        "HF_HUB_OFFLINE": "1",
+        "HF_HOME": str(directory / "hub"),
+        "HF_LEROBOT_HOME": str(directory / "lerobot"),
+        "PYTHONPATH": str(ROOT),
+        "TINY_ARM": str(directory / "trouble"),
+    }
+
+
+@dataclass
+class Arm:
+    """The running console of the arm.
+
+    Attributes:
+        directory: where the file `trouble` makes some (parts/tiny_arm.py)
+    """
+
+    stack: Stack
+    directory: Path
+
+    def trouble(self, what: str) -> None:
+        (self.directory / "trouble").write_text(what)
+
+
+async def reach(console: Console, goals: dict[str, float]) -> Feedback:
+    """Arm and drive there; again if a busy machine has held the arm up meanwhile.
+
+    Raises:
+        NotArmed: each time.
+    """
+    for _ in range(4):
+        with suppress(NotArmed):
+            await console.arm()
+            return await console.move_to(goals)
+    await console.arm()
+    return await console.move_to(goals)
+
+
+async def run_lerobot(directory: Path, command: str, *flags: str, link: str = "") -> str:
+    """Run one of LeRobot's commands to its end; return all that it printed.
+
+    Raises:
+        AssertionError: it failed.
+    """
+    program, output = Path(lerobot_python()).with_name(command), directory / f"{command}.txt"
+    with output.open("wb") as file:
+        process = await asyncio.create_subprocess_exec(
+            str(program),
+            *flags,
+            stdin=asyncio.subprocess.DEVNULL,
+            stdout=file,
+            stderr=asyncio.subprocess.STDOUT,
+            env={**os.environ, **environment(directory), "LOCKSTEP_LINK": link, "LOCKSTEP_PYTHON": sys.executable},
+        )
+    try:
+        async with asyncio.timeout(PATIENCE):
+            await process.wait()
+    except TimeoutError:
+        process.kill()
+        await process.wait()
+    text = output.read_text(errors="replace")
+    assert process.returncode == 0, text[-4000:]
+    return text

@@ -1,0 +1,31 @@
+"""An arm of the tests behind LeRobot's classes, with its bridge in LeRobot's Python and a console beside it."""
+
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from pathlib import Path
+
+import pytest
+
+from tests.lerobot.commands import Arm, environment, lerobot_python
+from tests.support.stack import running_stack
+
+SETTINGS = """
+robot: tests.lerobot.parts.tiny_arm:TinyArm
+config: {id: desk, disable_torque_on_disconnect: true}
+"""
+
+
+@asynccontextmanager
+async def running_arm(directory: Path, settings: str = SETTINGS) -> AsyncIterator[Arm]:
+    """`lockstep up --lerobot`, as its user runs it."""
+    file = directory / "arm.yaml"
+    file.write_text(settings)
+    extra = ("--lerobot", str(file), "--robot-python", lerobot_python())
+    async with running_stack(directory, extra=extra, settings=environment(directory)) as stack:
+        yield Arm(stack, directory)
+
+
+@pytest.fixture
+async def arm(tmp_path: Path) -> AsyncIterator[Arm]:
+    async with running_arm(tmp_path) as found:
+        yield found

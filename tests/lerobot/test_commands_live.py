@@ -1,0 +1,181 @@
+"""LeRobot's own record, replay and teleoperate, with the plugins, on an arm behind a console."""
+
+import asyncio
+import json
+import math
+import sys
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+import av
+import numpy as np
+import pyarrow.parquet as parquet
+import pytest
+
+from lockstep.bench.harness.processes import running_process
+from lockstep.bench.harness.stack import LOCKSTEP
+from lockstep.client import CommandRefused, Console
+from tests.lerobot.commands import PATIENCE, Arm, environment, lerobot_python, reach, run_lerobot
+
+pytestmark = [pytest.mark.long, pytest.mark.timeout(400)]
+
+FPS = 10
+SECONDS = 3
+LEADER = ("--teleop.type=scripted", "--teleop.discover_packages_path=tests.lerobot.parts")
+GREY = 128  # of the picture at 0 degrees
+NEAR = 12.0  # degrees: the picture may be four events older, and JPEG and H.264 blur
+
+
+def dataset_flags(directory: Path, name: str, episodes: int) -> tuple[str, ...]:
+    return (
+        f"--dataset.repo_id=tests/{name}",
+        f"--dataset.root={directory / name}",
+        "--dataset.single_task=swing",
+        f"--dataset.fps={FPS}",
+        f"--dataset.episode_time_s={SECONDS}",
+        "--dataset.reset_time_s=1",
+        f"--dataset.num_episodes={episodes}",
+        "--dataset.push_to_hub=false",
+        "--dataset.vcodec=h264",
+        "--play_sounds=false",
+    )
+
+
+def rows(folder: Path) -> dict[str, list[Any]]:
+    (file,) = sorted(folder.glob("data/**/*.parquet"))
+    found: dict[str, list[Any]] = parquet.read_table(file).to_pydict()
+    return found
+
+
+def greys(folder: Path) -> list[float]:
+    (file,) = sorted(folder.glob("videos/**/*.mp4"))
+    with av.open(str(file)) as video:
+        return [float(frame.to_ndarray(format="rgb24").mean()) for frame in video.decode(video=0)]
+
+
+async def test_record_makes_a_dataset_whose_pictures_are_of_its_states_and_replay_moves_the_arm(
+    arm: Arm, tmp_path: Path
+) -> None:
+    link = arm.stack.operator
+    await run_lerobot(
+        *(tmp_path, "lerobot-record", "--robot.type=lockstep", "--robot.id=recorder", *LEADER),
+        *dataset_flags(tmp_path, "swing", 2),
+        link=link,
+    )
+    folder = tmp_path / "swing"
+    info = json.loads((folder / "meta/info.json").read_text())
+    assert info["robot_type"] == "lockstep"
+    assert info["total_episodes"] == 2
+    assert info["features"]["action"]["names"] == ["pan.pos", "lift.pos", "gripper.pos"]
+    assert info["features"]["observation.images.front"]["shape"] == [48, 64, 3]
+    table = rows(folder)
+    states, pictures = np.array(table["observation.state"])[:, 0], np.array(greys(folder))
+    assert len(states) == len(pictures)
+    assert len(states) > FPS
+    assert np.ptp(states) > 10.0  # it did swing
+    assert np.abs(pictures - GREY - states).max() < NEAR
+    events = await arm.stack.events("executed")
+    assert len(events) > FPS
+    arm.stack.skipped = len(await arm.stack.records())
+    await run_lerobot(
+        *(tmp_path, "lerobot-replay", "--robot.type=lockstep", "--dataset.repo_id=tests/swing"),
+        *(f"--dataset.root={folder}", "--dataset.episode=1", "--play_sounds=false"),
+        link=link,
+    )
+    assert len(await arm.stack.events("executed")) > FPS
+    async with Console(link, audio=False, video=False) as console:
+        assert console.seat.holder == ""  # given back
+        assert console.feedback is not None
+        assert console.feedback.at_rest
+
+
+async def test_teleoperate_drives_and_leaves_the_arm_at_rest(arm: Arm, tmp_path: Path) -> None:
+    async with Console(arm.stack.observer, audio=False, video=False) as watching:
+        places: list[float] = []
+
+        async def watch() -> None:
+            async for feedback in watching.feedbacks():
+                places.append(feedback.axes[0])
+
+        task = asyncio.create_task(watch())
+        try:
+            await run_lerobot(
+                *(tmp_path, "lerobot-teleoperate", "--robot.type=lockstep", *LEADER),
+                *("--fps=15", f"--teleop_time_s={SECONDS}"),
+                link=arm.stack.operator,
+            )
+        finally:
+            task.cancel()
+            await asyncio.wait([task])
+        assert max(places) - min(places) > 10.0
+        assert watching.feedback is not None
+        assert watching.feedback.at_rest
+
+
+async def test_record_watches_while_a_person_drives_from_the_page(arm: Arm, tmp_path: Path) -> None:
+    """The person is a headless client here; the actions of the dataset are the goals that the arm was given."""
+    async with Console(arm.stack.operator, audio=False, video=False, name="person") as person:
+        await person.take_seat()
+        loop = asyncio.get_running_loop()
+
+        async def drive() -> None:
+            began = loop.time()
+            while True:
+                with suppress(CommandRefused):  # a busy machine holds the arm up
+                    await person.arm()
+                    while True:
+                        await person.drive({"pan.pos": 10.0 + 15.0 * math.sin(loop.time() - began)})
+
+        task = asyncio.create_task(drive())
+        try:
+            await run_lerobot(
+                *(tmp_path, "lerobot-record", "--robot.type=lockstep", "--robot.drive=false", "--teleop.type=lockstep"),
+                *dataset_flags(tmp_path, "watched", 1),
+                link=arm.stack.observer,
+            )
+        finally:
+            task.cancel()
+            await asyncio.wait([task])
+    table = rows(tmp_path / "watched")
+    actions, states = np.array(table["action"])[:, 0], np.array(table["observation.state"])[:, 0]
+    assert np.ptp(actions) > 5.0
+    assert np.abs(actions - states).max() < NEAR
+
+
+async def test_a_stopped_robot_is_not_driven_and_the_command_says_why(arm: Arm, tmp_path: Path) -> None:
+    async with Console(arm.stack.operator, audio=False, video=False) as console:
+        await console.stop("a person is near")
+    with pytest.raises(AssertionError, match="stopped"):
+        await run_lerobot(
+            *(tmp_path, "lerobot-teleoperate", "--robot.type=lockstep", *LEADER, "--fps=15", "--teleop_time_s=2"),
+            link=arm.stack.operator,
+        )
+
+
+A_PAGE = """
+import json, sys
+from lerobot_teleoperator_lockstep import LockstepTeleoperator, LockstepTeleoperatorConfig
+leader = LockstepTeleoperator(LockstepTeleoperatorConfig(source="page", port=0, start={"gripper.pos": 40.0}))
+assert list(leader.action_features)[-1] == "gripper.pos", leader.action_features
+leader.connect()
+print(json.dumps({"robot": leader.address}), flush=True)
+for line in sys.stdin:
+    print(json.dumps(leader.get_action()), flush=True)
+leader.disconnect()
+"""
+
+
+async def test_a_page_leads_a_robot_of_lerobot(tmp_path: Path) -> None:
+    own = {**environment(tmp_path), "LOCKSTEP_PYTHON": sys.executable, "HOME": str(tmp_path)}
+    async with running_process(lerobot_python(), "-c", A_PAGE, environment=own) as (leader, ready):
+        serve = (str(LOCKSTEP), "serve", "--robot", str(ready["robot"]), "--port", "0", "--json")
+        async with (
+            running_process(*serve, "--state-dir", str(tmp_path / "state")) as (_, console_ready),
+            Console(console_ready["operator"], audio=False, video=False) as console,
+        ):
+            before = await leader.ask("", PATIENCE)
+            assert before["gripper.pos"] == 40.0
+            await console.take_seat()
+            await reach(console, {"shoulder_pan.pos": 20.0})
+            assert (await leader.ask("", PATIENCE))["shoulder_pan.pos"] == pytest.approx(20.0, abs=2.0)

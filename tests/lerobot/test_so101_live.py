@@ -1,0 +1,110 @@
+"""LeRobot's own SO-101 follower and motor driver, on servos of the tests at the other end of a serial line."""
+
+import asyncio
+import json
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from lockstep.client import Console
+from tests.lerobot.commands import PATIENCE, reach
+from tests.lerobot.conftest import running_arm
+from tests.lerobot.parts.feetech_bus import FeetechBus
+
+pytestmark = [pytest.mark.long, pytest.mark.timeout(400)]
+
+NAMES = ("shoulder_pan", "shoulder_lift", "elbow_flex", "wrist_flex", "wrist_roll", "gripper")
+LIMITS = dict.fromkeys(range(1, 6), (1024, 3072)) | {6: (2000, 3000)}
+STEPS_PER_DEGREE = 4095 / 360
+
+
+@pytest.fixture
+def bus() -> Iterator[FeetechBus]:
+    found = FeetechBus(dict.fromkeys(range(1, 6), 2048) | {6: 2500}, LIMITS)
+    yield found
+    found.close()
+
+
+def calibrated(directory: Path) -> None:
+    """Write the file that lerobot-calibrate would have written."""
+    folder = directory / "lerobot/calibration/robots/so_follower"
+    folder.mkdir(parents=True)
+    motors = {
+        name: {
+            "id": number,
+            "drive_mode": 0,
+            "homing_offset": 0,
+            "range_min": LIMITS[number][0],
+            "range_max": LIMITS[number][1],
+        }
+        for number, name in enumerate(NAMES, 1)
+    }
+    (folder / "desk.json").write_text(json.dumps(motors))
+
+
+def settings(bus: FeetechBus, more: str = "") -> str:
+    return f"robot: so101_follower\nconfig: {{port: {bus.port}, id: desk}}\n{more}"
+
+
+def has_torque(bus: FeetechBus) -> bool:
+    return bus.servos[2].has_torque
+
+
+async def test_its_joints_are_degrees_and_follow_goals_and_its_torque_stays_on(bus: FeetechBus, tmp_path: Path) -> None:
+    calibrated(tmp_path)
+    async with (
+        running_arm(tmp_path, settings(bus)) as arm,
+        Console(arm.stack.operator, audio=False, video=False) as console,
+    ):
+        axes = {axis.name: axis for axis in console.description.axes}
+        assert list(axes) == [f"{name}.pos" for name in NAMES]
+        assert [axis.unit for axis in axes.values()] == ["deg"] * 5 + ["%"]
+        assert axes["elbow_flex.pos"].maximum == pytest.approx(1024 / STEPS_PER_DEGREE)
+        assert console.feedback is not None
+        axes_now = console.feedback.axes
+        assert [*axes_now[:1], *axes_now[2:]] == pytest.approx([0.0] * 4 + [50.0], abs=0.2)
+        assert console.feedback.goals == pytest.approx(axes_now, abs=1.0)  # the lift stays where it sank to meanwhile
+        await console.take_seat()
+        await reach(console, {"shoulder_pan.pos": 45.0, "gripper.pos": 10.0})
+        assert bus.place(1) == pytest.approx(2048 + 45 * STEPS_PER_DEGREE, abs=30)
+        assert bus.place(6) == pytest.approx(2100, abs=60)
+        assert bus.place(3) == pytest.approx(2048, abs=5)
+    assert all(servo.has_torque for servo in bus.servos.values())
+
+
+async def test_motors_that_are_silent_make_the_state_unknown(bus: FeetechBus, tmp_path: Path) -> None:
+    calibrated(tmp_path)
+    async with (
+        running_arm(tmp_path, settings(bus)) as arm,
+        Console(arm.stack.operator, audio=False, video=False) as console,
+    ):
+        bus.unplug()
+        async with asyncio.timeout(PATIENCE):
+            async for feedback in console.feedbacks():
+                if any("no reading for" in fault or "has not answered" in fault for fault in feedback.faults):
+                    break
+
+
+async def test_a_stop_takes_the_torque_where_the_settings_say_so_and_a_reset_does_not_leap(
+    bus: FeetechBus, tmp_path: Path
+) -> None:
+    calibrated(tmp_path)
+    async with (
+        running_arm(tmp_path, settings(bus, "stop: torque_off\n")) as arm,
+        Console(arm.stack.operator, audio=False, video=False) as console,
+    ):
+        await console.take_seat()
+        await console.stop()
+        async with asyncio.timeout(PATIENCE):
+            while bus.place(2) > 1500:  # noqa: ASYNC110
+                await asyncio.sleep(0.05)
+        assert not has_torque(bus)
+        await asyncio.sleep(1.0)  # the bridge takes no reset within a second
+        await console.reset()
+        fallen = bus.place(2)
+        async with asyncio.timeout(PATIENCE):
+            while not has_torque(bus):  # noqa: ASYNC110
+                await asyncio.sleep(0.02)
+        await asyncio.sleep(0.5)
+        assert bus.place(2) <= fallen + 20  # not back to where it was told to be before
