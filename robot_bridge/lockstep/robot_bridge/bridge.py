@@ -15,6 +15,7 @@ from lockstep.robot_bridge.control.event_core import EventCore
 from lockstep.robot_bridge.control.feedback_issuer import FeedbackIssuer
 from lockstep.robot_bridge.control.limits.axis_shaper import AxisShaper
 from lockstep.robot_bridge.control.limits.motion_limits import MotionLimits
+from lockstep.robot_bridge.control.measured_axes import MeasuredAxes
 from lockstep.robot_bridge.control.tick_alarm import TickAlarm
 from lockstep.robot_bridge.control.tick_loop import TickLoop
 from lockstep.robot_bridge.counters import BridgeCounters
@@ -78,6 +79,8 @@ class Bridge:
             max_event_rate=description.max_event_rate,
             first_event=settings.first_event,
             start_warning=description.start_warning,
+            poses=description.poses,
+            measured=(measured := MeasuredAxes(robot, len(description.axes))),
         )
         self._log = EventLog(settings.event_log)
         self._keeper = StopKeeper(settings.state_dir, settings.older_state_dirs)
@@ -86,7 +89,9 @@ class Bridge:
         longest_tick = robot.tick_seconds * (2 if robot.ticks_on_command else 1)  # s from one tick to the next
         self._watchdogs = Watchdogs(robot, watchdog_seconds(description, longest_tick), now)
         limits = MotionLimits(description, robot, robot.tick_seconds, longest_tick=longest_tick)
-        shaper = AxisShaper(description.axes, hold=description.hold, limiter=limits)
+        shaper = self._shaper = AxisShaper(
+            description.axes, hold=description.hold, limiter=limits, poses=description.poses, pursued=robot.goals
+        )
         refusals, alarm = Refusals(counters, self._log), TickAlarm()
         self._stops = StopHandler(robot, self._core, shaper, self._keeper, self._lockout, refusals, self._log, now)
         self._feedback = FeedbackIssuer(robot, description, self._core, shaper, counters, self._log, now)
@@ -95,6 +100,7 @@ class Bridge:
             *(robot, description, self._core, shaper, limits, self._watchdogs, self._stops),
             feedback=self._feedback,
             actions=actions,
+            measured=measured,
             refusals=refusals,
             alarm=alarm,
             counters=counters,
@@ -174,6 +180,8 @@ class Bridge:
         stop = self._core.stop_state
         self._log.record("start", self._core.current, epoch=self.epoch, stopped=stop.stopped, number=stop.number)
         try:
+            if self._shaper.has_goals:
+                self._shaper.begin(self._robot.measured_axes())
             feedback = self._feedback.issue()
         except BaseException as error:  # an adapter may raise one that ends the loop or cancels the task
             self._stops.fail(error)

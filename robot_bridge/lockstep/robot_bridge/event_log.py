@@ -7,7 +7,7 @@ import logging
 import queue
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
 from typing import BinaryIO, Literal
@@ -35,7 +35,7 @@ EventKind = Literal[
     "stall",
     "action",
 ]
-Field = str | int | float | bool | list[float] | list[str]
+Field = str | int | float | bool | Sequence[float | None] | list[str]
 
 MAX_WAITING = 10_000  # lines
 

@@ -1,7 +1,6 @@
 """Runs the actions of a robot: takes requests from the link, calls the adapter, and tells how each action does."""
 
 import logging
-import math
 from collections.abc import Callable
 from functools import partial
 
@@ -138,10 +137,10 @@ class ActionRunner:
             return
         self._tell(self._core.progress(id, step.progress, step.text, self._robot_now()), final=False)
         if step.values is not None:
-            if id != self._core.moving or not all(map(math.isfinite, step.values)):
-                raise ValueError(
-                    "an action that is not declared to move, or has a value that is no number, drives axes"
-                )
+            if id != self._core.moving:
+                raise ValueError("an action that is not declared to move drives axes")
+            if (misfit := self._events.misfit(step.values)) is not None:
+                raise ValueError(f"an action drives axes with values that do not fit them: {' '.join(misfit)}")
             self._shaper.drive(step.values, self._core.renewed_at)
             self._drives = True
 

@@ -41,8 +41,7 @@ class ComingToRest:
             self._shaper.brake(self._robot.tick_seconds)
         else:
             self._shaper.cut()
-        values = self._shaper.values
-        taken = self._attempt("apply", lambda: self._robot.apply(values))
+        taken = self._apply()
         self._attempt("tick", self._robot.tick)
         self._ramps = taken
         self._taken = self._taken + 1 if taken and self._shaper.at_rest else 0
@@ -55,7 +54,7 @@ class ComingToRest:
         """Apply the rest values without a ramp and without waiting."""
         self._shaper.cut()
         for _ in range(REPEATS):
-            taken = self._attempt("apply", lambda: self._robot.apply(self._shaper.values))
+            taken = self._apply()
             self._attempt("tick", self._robot.tick)
             self._taken = self._taken + 1 if taken else 0
 
@@ -64,6 +63,10 @@ class ComingToRest:
         for _ in range(REPEATS):
             if self._attempt("stop", self._robot.stop):
                 return
+
+    def _apply(self) -> bool:
+        """Apply the values. Where a goal is not known, nothing was ever applied, and the robot's own stop suffices."""
+        return not self._shaper.is_known or self._attempt("apply", lambda: self._robot.apply(self._shaper.values))
 
     def _attempt(self, name: str, call: Callable[[], None]) -> bool:
         try:

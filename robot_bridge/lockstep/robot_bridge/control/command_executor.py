@@ -12,6 +12,7 @@ from lockstep.robot_bridge.control.event_core import Answered, EventCore, Execut
 from lockstep.robot_bridge.control.feedback_issuer import FeedbackIssuer
 from lockstep.robot_bridge.control.limits.axis_shaper import AxisShaper
 from lockstep.robot_bridge.control.limits.motion_limits import MotionLimits
+from lockstep.robot_bridge.control.measured_axes import MeasuredAxes
 from lockstep.robot_bridge.control.start_signal import StartSignal
 from lockstep.robot_bridge.control.tick_alarm import TickAlarm
 from lockstep.robot_bridge.counters import BridgeCounters
@@ -42,6 +43,7 @@ class CommandExecutor:
         stops: StopHandler,
         feedback: FeedbackIssuer,
         actions: ActionRunner,
+        measured: MeasuredAxes,
         refusals: Refusals,
         alarm: TickAlarm,
         counters: BridgeCounters,
@@ -57,6 +59,7 @@ class CommandExecutor:
         self._stops = stops
         self._feedback = feedback
         self._actions = actions
+        self._measured = measured
         self._refusals = refusals
         self._counters = counters
         self._log = log
@@ -115,7 +118,7 @@ class CommandExecutor:
         if isinstance(outcome, Executed):
             self._feedback.rested_why = ""
             if not self._actions.moving:  # else the action has the axes, and this command is neutral
-                self._shaper.drive(outcome.values, now)
+                self._shaper.drive(outcome.values, now, outcome.speed)
             self._alarm.ring()
             self._feedback.timing.executed(now)
             self._counters.executed += 1
@@ -139,6 +142,7 @@ class CommandExecutor:
             BaseException: the adapter raised.
         """
         self._stops.look(now)
+        self._measured.look()
         self._actions.look()
         moved = self._moves
         self._actions.step()
@@ -147,7 +151,8 @@ class CommandExecutor:
             self._held_up(held)
             values = self._shaper.values
         self._watchdogs.ticked(now, self._moves)
-        self._robot.apply(self._signal.on(values) if self._core.warns(now) else values)
+        if self._places_known():
+            self._robot.apply(self._signal.on(values) if self._core.warns(now) else values)
         self._robot.tick()
         if self._feedback.timing.waits_for_tick:
             self._feedback.timing.applied(now, self._now())
@@ -161,6 +166,20 @@ class CommandExecutor:
         feedback = self._feedback.issue(acts=self._actions.moving)
         self._actions.issued(feedback.nonce, now)
         return feedback
+
+    def _places_known(self) -> bool:
+        """Return whether every goal axis has a goal. Until then nothing is driven, and then a neutral command is due.
+
+        Raises:
+            BaseException: the adapter raised.
+        """
+        if self._shaper.is_known:
+            return True
+        self._shaper.begin(self._robot.measured_axes())
+        self._shaper.cut()
+        self._core.need_neutral()
+        self._feedback.rested_why = "" if self._shaper.is_known else "not driven: the place of a goal axis is not known"
+        return False
 
     @property
     def _moves(self) -> bool:

@@ -12,10 +12,11 @@ from typing import NamedTuple
 
 import msgspec
 
-from lockstep.protocol.description import Axis, StartWarning
+from lockstep.protocol.description import Axis, Pose, StartWarning
 from lockstep.protocol.messages import Command, Feedback, Refusal, RefusalReason, RobotFeedback, StopState
 from lockstep.protocol.serial import FIRST_EVENT, event_after, event_gap, is_event, is_newer
 from lockstep.protocol.trace import CommandSpans
+from lockstep.robot_bridge.control.command_values import CommandValues
 from lockstep.robot_bridge.control.restart_interlock import RestartInterlock
 from lockstep.robot_bridge.robots.base import Measurement
 from lockstep.robot_bridge.stop.stop_latch import ResetOutcome, ResetTaken, StopGiven, StopLatch, WriteOutcome
@@ -45,7 +46,8 @@ class Executed(NamedTuple):
     """The command executes: drive the axes with these values. The event is pending until the next `issue`."""
 
     event: int
-    values: list[float]
+    values: Sequence[float | None]
+    speed: float = 1.0  # of the goal axes, as a share of their largest
 
 
 class Answered(NamedTuple):
@@ -83,14 +85,19 @@ class EventCore:
         max_event_rate: float = math.inf,
         refresh_interval: float = REFRESH_INTERVAL,
         start_warning: StartWarning | None = None,
+        poses: Sequence[Pose] = (),
+        measured: Callable[[], Sequence[float]] | None = None,
         nonces: Callable[[], int] = draw_nonce,
     ) -> None:
-        """`max_event_rate`: Hz, of answered commands. `nonces`: draws the nonce of each issue."""
+        """`max_event_rate`: Hz, of answered commands. `nonces`: draws the nonce of each issue.
+
+        `measured`: returns the measured value of each axis now, for the reach of goals; called for a command with
+        goals. Without it every goal is a `jump`.
+        """
         if not is_event(first_event):
             raise ValueError(f"the first event must be a valid reference, not {first_event}")
-        self._rest_values = [axis.rest for axis in axes]
-        self._signal = "" if start_warning is None else start_warning.axis
-        self._drives = [axis.name != self._signal for axis in axes]  # all axes but a light or horn
+        signal = "" if start_warning is None else start_warning.axis
+        self._values = CommandValues(axes, poses=poses, signal=signal, measured=measured)
         self._max_event_age = max_event_age
         self._refresh_interval = refresh_interval
         self._interval = 1 / max_event_rate  # s between two answers
@@ -139,21 +146,18 @@ class EventCore:
         """Return the seconds for which the robot still warns before it may move; 0 if it does not warn."""
         return self._interlock.warns(now)
 
-    def moves(self, values: Sequence[float]) -> bool:
-        """Return whether these values are an intention to move; a light or horn alone is not."""
-        return any(
-            value != rest and drives
-            for value, rest, drives in zip(values, self._rest_values, self._drives, strict=True)
-        )
+    def moves(self, values: Sequence[float | None]) -> bool:
+        """Return whether these values, one per axis, are an intention to move; a light or horn alone is not."""
+        return self._values.moves(values)
+
+    def misfit(self, values: Sequence[float | None], speed: float = 1.0) -> tuple[RefusalReason, str] | None:
+        """Return the reason and detail why these values fit no state of this robot; None if they do."""
+        return self._values.misfit(values, speed)
 
     def command(self, command: Command, now: float) -> CommandOutcome:
         """Decide about a command that arrived now."""
-        if len(command.values) != len(self._rest_values):
-            return self._refuse(
-                command, "wrong_size", f"{len(command.values)} values for {len(self._rest_values)} axes"
-            )
-        if not all(map(math.isfinite, command.values)):
-            return self._refuse(command, "not_a_number")
+        if (misfit := self.misfit(command.values, command.speed)) is not None:
+            return self._refuse(command, *misfit)
         if self._latch.state.stopped:
             return self._refuse(command, "stopped", self._latch.state.reason)
         if command.event == self._current and self._feedback is not None:
@@ -177,12 +181,14 @@ class EventCore:
         self._look(now)
         if moving and (reason := self._interlock.refuses(now)) is not None:
             return self._refuse(command, reason)
+        if moving and (far := self._values.jump(command.values)):  # last: it measures the robot
+            return self._refuse(command, "jump", far)
         self._interlock.executed(moving=moving, spell=issued.spell, now=now)
         if not self._interlock.needed:
             self._latch.may_move()
         self._pending = command.event
         self._rested = None  # every event it could void is now behind; a stale mark must not survive the wrap
-        return Executed(command.event, command.values)
+        return Executed(command.event, command.values, command.speed)
 
     def refusal(self, event: int, reason: RefusalReason, detail: str = "", *, stop: int = 0) -> Refusal:
         """Return a refusal that names the current event. `stop`: the stop that a refused reset named."""
@@ -274,12 +280,14 @@ class EventCore:
         limits: Sequence[str] = (),
         unknown: Sequence[str] = (),
         *,
+        goals: Sequence[float | None] = (),
         time: float | None = None,
         spans: CommandSpans | msgspec.UnsetType = msgspec.UNSET,
     ) -> Feedback:
         """Return the feedback of the pending event, which thereby becomes current, or of the current event again.
 
-        `time`: the time of issue, on the clock of capture times; None: `now`. `spans`: of the pending command.
+        `goals`: where the goal axes are commanded to be now, None for a rate axis. `time`: the time of issue, on the
+        clock of capture times; None: `now`. `spans`: of the pending command.
         """
         if self._pending is not None:
             self._current, self._pending = self._pending, None
@@ -298,6 +306,7 @@ class EventCore:
             time=now if time is None else time,
             axes=measured.axes,
             joints=measured.joints,
+            goals=goals,
             wrench=measured.wrench,
             ranges=measured.ranges,
             at_rest=measured.at_rest,

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 
 from lockstep.protocol.description import RobotDescription
 from lockstep.protocol.messages import Feedback
+from lockstep.protocol.neutral import has_goals
 
 __all__ = ["misfit"]
 
@@ -26,6 +27,17 @@ def misfit(feedback: Feedback, description: RobotDescription) -> str:
             return f"a feedback with {len(found)} {name}"
         if not all(-MOST <= value <= MOST for value in found):
             return f"a feedback whose {name} are not numbers"
+    if wrong := _misfit_of_goals(feedback.goals, description):
+        return wrong
     if not (0 <= feedback.time <= LONGEST and 0 <= feedback.warning <= LONGEST):
         return "a feedback without a time"
+    return ""
+
+
+def _misfit_of_goals(goals: Sequence[float | None], description: RobotDescription) -> str:
+    if len(goals) != (len(description.axes) if has_goals(description.axes) else 0):
+        return f"a feedback with {len(goals)} goals"
+    for goal, axis in zip(goals, description.axes, strict=False):
+        if goal is not None and (axis.kind == "rate" or not -MOST <= goal <= MOST):
+            return f"a feedback with a goal of axis {axis.name} that cannot be"
     return ""

@@ -2,6 +2,7 @@
 
 import math
 import time
+from collections.abc import Sequence
 
 from lockstep.protocol.description import RobotDescription
 from lockstep.protocol.messages import MAX_FAULTS, Feedback
@@ -58,16 +59,19 @@ class FeedbackIssuer:
         """Measure and issue. `acts`: an action moves the robot."""
         taken, began = time.monotonic(), self._now()
         measured = self._robot.measure()
-        return self._issue(measured._replace(at_rest=measured.at_rest and not acts), taken, began)
+        return self._issue(measured._replace(at_rest=measured.at_rest and not acts), self._shaper.goals, taken, began)
 
     def issue_failed(self, failure: str) -> Feedback:
         """Issue that the robot failed, with the last measured values if it cannot be measured any more."""
+        goals: list[float | None] = []
         try:
+            goals = self._shaper.goals
             measured = self._robot.measure()
         except BaseException:  # the robot is not to be trusted any more
             axes, joints = ([math.nan] * len(each) for each in (self._description.axes, self._description.joints))
             measured = Measurement(axes=axes, joints=joints, wrench=[], ranges=[], at_rest=False, faults=[])
-        return self._issue(measured._replace(faults=[*measured.faults, failure]), time.monotonic(), self._now())
+        measured = measured._replace(faults=[*measured.faults, failure])
+        return self._issue(measured, goals, time.monotonic(), self._now())
 
     def limits_act(self, acting: frozenset[str]) -> None:
         """Note the limits that slow the robot in this tick; count each spell once, and record its begin and end."""
@@ -83,7 +87,7 @@ class FeedbackIssuer:
         self._source_faults.append(fault)
         self._core.want_issue()
 
-    def _issue(self, measured: Measurement, taken: float, began: float) -> Feedback:
+    def _issue(self, measured: Measurement, goals: Sequence[float | None], taken: float, began: float) -> Feedback:
         """`taken`: time of the measurement on the clock of capture times; `began`: its begin on the clock of motion."""
         measured, unknown = self._last_known.settle(measured)
         if self._source_faults or self.rested_why:
@@ -96,7 +100,7 @@ class FeedbackIssuer:
         limits = sorted(self._acted | self._acting)
         now = self._now()
         spans = self.timing.measured(began, now)
-        feedback = self._core.issue(measured, now, limits, unknown, time=taken, spans=spans)
+        feedback = self._core.issue(measured, now, limits, unknown, goals=goals, time=taken, spans=spans)
         measured_by = time.monotonic()  # a picture that was captured before may show less than this feedback has
         self.times.changed(feedback.event, measured_by)
         self._acted.clear()

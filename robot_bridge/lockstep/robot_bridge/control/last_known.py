@@ -3,7 +3,7 @@
 import math
 from collections.abc import Sequence
 
-from lockstep.protocol.description import RobotDescription
+from lockstep.protocol.description import Axis, RobotDescription
 from lockstep.robot_bridge.robots.base import Measurement
 
 __all__ = ["LastKnown"]
@@ -15,7 +15,7 @@ class LastKnown:
     def __init__(self, description: RobotDescription) -> None:
         self._axis_names = [axis.name for axis in description.axes]
         self._joint_names = [joint.name for joint in description.joints]
-        self._axes = [axis.rest for axis in description.axes]
+        self._axes = [_before(axis) for axis in description.axes]
         self._joints = [0.0] * len(description.joints)
 
     def settle(self, measured: Measurement) -> tuple[Measurement, list[str]]:
@@ -29,6 +29,11 @@ class LastKnown:
             wrench=_whole(measured.wrench),
             ranges=_whole(measured.ranges),
         ), unknown
+
+
+def _before(axis: Axis) -> float:
+    """Return the value that stands for an axis that was never measured."""
+    return axis.rest if axis.kind == "rate" else min(max(0.0, axis.minimum), axis.maximum)
 
 
 def _settled(names: Sequence[str], values: Sequence[float], before: Sequence[float], unknown: list[str]) -> list[float]:

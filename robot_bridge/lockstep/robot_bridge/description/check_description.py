@@ -7,13 +7,13 @@ from collections.abc import Iterable, Sequence
 import msgspec
 
 from lockstep.protocol.description import (
-    Axis,
     Body,
     Camera,
     ControlLayer,
     ForceFeeling,
     Geofence,
     Microphone,
+    Pose,
     PositionLimit,
     RangeRing,
     RobotDescription,
@@ -21,6 +21,7 @@ from lockstep.protocol.description import (
 )
 from lockstep.protocol.messages import MAX_AXES, MAX_RAYS
 from lockstep.robot_bridge.description.check_actions import action_texts, check_actions
+from lockstep.robot_bridge.description.check_axes import check_axes
 from lockstep.robot_bridge.description.check_limits import check_limits
 from lockstep.robot_bridge.errors import DescriptionError
 
@@ -61,8 +62,7 @@ def check_description(description: RobotDescription) -> None:
         raise DescriptionError(f"max_event_age must be in (0, 10] s, not {description.max_event_age}")
     if not 0 < description.max_event_rate <= 1000:
         raise DescriptionError(f"max_event_rate must be in (0, 1000] Hz, not {description.max_event_rate}")
-    for axis in description.axes:
-        _check_axis(axis, description.hold)
+    check_axes(description)
     _check_unique("axis", (axis.name for axis in description.axes))
     _check_unique("joint", (joint.name for joint in description.joints))
     _check_unique("body", (body.name for body in description.bodies))
@@ -99,22 +99,6 @@ def check_bounds(description: RobotDescription) -> None:
     _check_reach(description)
 
 
-def _check_axis(axis: Axis, hold: float) -> None:
-    numbers = (axis.minimum, axis.maximum, axis.slew, axis.brake, axis.rest)
-    if not all(map(math.isfinite, numbers)):
-        raise DescriptionError(f"axis {axis.name}: every number must be finite")
-    if not axis.minimum <= axis.rest <= axis.maximum:
-        raise DescriptionError(f"axis {axis.name}: rest must lie between minimum and maximum")
-    if axis.slew <= 0 or axis.brake <= 0:
-        raise DescriptionError(f"axis {axis.name}: slew and brake must be positive")
-    furthest = max(axis.maximum - axis.rest, axis.rest - axis.minimum)
-    if furthest > axis.brake * hold:
-        raise DescriptionError(
-            f"axis {axis.name}: braking from {furthest:g} {axis.unit} takes {furthest / axis.brake:.3f} s,"
-            f" longer than hold ({hold:g} s); raise brake or lower the limits"
-        )
-
-
 def _check_counts(description: RobotDescription) -> None:
     counts = (
         ("axes", len(description.axes), MAX_AXES),
@@ -131,6 +115,7 @@ def _check_counts(description: RobotDescription) -> None:
         ("joints of bodies", sum(len(body.joints) for body in description.bodies), MAX_GEOMS),
         ("rays", 0 if description.ranges is None else description.ranges.count, MAX_RAYS),
         ("body twists", len(description.body_twists), MAX_LIMITS),
+        ("poses", len(description.poses), MAX_LIMITS),
     )
     for kind, count, most in counts:
         if not 0 <= count <= most:
@@ -165,12 +150,13 @@ def _check_texts(description: RobotDescription) -> None:
     for axis in description.axes:
         texts += [axis.name, axis.label, axis.unit]
     texts += [joint.name for joint in description.joints] + [body.name for body in description.bodies]
-    labelled: list[Camera | Microphone | ControlLayer | PositionLimit | Geofence] = [
+    labelled: list[Camera | Microphone | ControlLayer | PositionLimit | Geofence | Pose] = [
         *description.cameras,
         *description.microphones,
         *description.layers,
         *description.position_limits,
         *description.geofences,
+        *description.poses,
     ]
     for each in labelled:
         texts += [each.name, each.label]

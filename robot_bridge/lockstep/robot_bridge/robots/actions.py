@@ -21,8 +21,9 @@ class ActionStep(NamedTuple):
     progress: float = 0.0  # from 0 to 1
     text: str = ""  # what it does now; its result when it is done
     # Values for the axes, as those of a command: the bridge clamps them, keeps slew, limits and geofences, and brings
-    # them to rest when the action ends. None: the robot moves in its own way, or not at all.
-    values: Sequence[float] | None = None
+    # them to rest when the action ends. None in place of a value: that goal axis stays where it is; `reach` does not
+    # bound an action. None in place of all: the robot moves in its own way, or not at all.
+    values: Sequence[float | None] | None = None
     done: bool = False
 
 

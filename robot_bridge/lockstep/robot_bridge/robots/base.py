@@ -87,7 +87,14 @@ class Robot(ABC):
 
     @abstractmethod
     def apply(self, values: Sequence[float]) -> None:
-        """Drive the axes with these values during the coming tick, in the description's order and units."""
+        """Drive the axes with these values during the coming tick, in the description's order and units.
+
+        The value of a goal axis is its applied goal: the place to be at. The first values after the start and after
+        `reset` are where the robot was measured then; they move nothing. From then on a value changes by no more than
+        a tick at `slew`, with one exception: of a pose and the axes that it stands in for, only those change that are
+        driven, and when one of these sets begins to be driven in place of the other, its values are first what `goals`
+        said. The bridge does not call this before every goal axis has been measured.
+        """
 
     def tick(self) -> None:
         """Let one `tick_seconds` pass. Only simulations need it."""
@@ -95,6 +102,23 @@ class Robot(ABC):
     @abstractmethod
     def measure(self) -> Measurement:
         """Measure the state now."""
+
+    def measured_axes(self) -> Sequence[float]:
+        """Return the measured value of each axis now, as in `measure`; NaN if unknown or too old to be trusted.
+
+        Called when the bridge starts, when a stop was reset, and for each command with goals, whose distance from here
+        is bounded by the axes' `reach`. So it should cost little. Needed only for goal axes.
+        """
+        return self.measure().axes
+
+    def goals(self) -> Sequence[float]:
+        """Return for each axis the goal that the robot pursues now, in the axis' unit; NaN if unknown.
+
+        Needed only for poses, whose axes move the same joints as others. While these are driven, the pose's goal is
+        where they bring it: the forward kinematics of the joints' goals; and the other way round. Without it the
+        measured values are taken: an arm that hangs below its goals then goes down by that much at each change.
+        """
+        return self.measured_axes()
 
     def positions(self) -> Sequence[float]:
         """Return the position of each joint now, for limits and geofences; NaN if unknown or too old to be trusted.
@@ -106,7 +130,7 @@ class Robot(ABC):
     def joint_rates(self, values: Sequence[float]) -> Sequence[float] | None:
         """Return the velocity of each joint that these axis values cause in the present posture; None if not known.
 
-        Needed only for position limits with a gain of None.
+        Needed only for position limits with a gain of None. The value of a goal axis is here the speed of its goal.
         """
         return None
 
@@ -137,7 +161,10 @@ class Robot(ABC):
         """
 
     def reset(self) -> None:
-        """Undo `stop`, because the stop was released. Must not move anything."""
+        """Undo `stop`, because the stop was released. Must not move anything.
+
+        The goal axes are measured afterwards, and their goals begin there: the arm may have fallen meanwhile.
+        """
 
     def locked_out(self) -> str:
         """Return why a person at the robot has locked it (key switch, teach pendant); "" while it is not locked.

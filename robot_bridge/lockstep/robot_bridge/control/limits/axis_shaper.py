@@ -1,90 +1,120 @@
 """Shapes commanded axis values into applied ones: clamp, slew, hold, brake. No I/O, no clock.
 
-Every value stays inside an envelope around its rest value that closes at the axis' `brake` rate and has closed `hold`
-seconds after the last execution. So a command never outlives `hold`. A tick changes a value by no more than the rate
-(`slew`, `brake`) times the period; where the envelope moves it, by no more than `brake` times the seconds since the
-tick before.
+It works on *rates*: the value of a rate axis, and the speed of the applied goal of a goal axis. Every rate stays inside
+an envelope around rest that closes at the axis' `brake` and has closed `hold` seconds after the last execution. So a
+command never outlives `hold`. A tick changes a rate by no more than its slope (`slew`, `brake`, `acceleration`) times
+the period; where the envelope moves it, by no more than `brake` times the seconds since the tick before.
 
-That bounds the rate over periods, not between any two moments: where a command may begin the tick of its period
+That bounds the slope over periods, not between any two moments: where a command may begin the tick of its period
 (`ticks_on_command`), two ticks, and so two steps of a ramp, may follow each other at once, and the next one come up to
-two periods later. A limiter (position limits, geofences) has the last word.
+two periods later. A limiter (position limits, geofences) has the last word on the rates.
 """
 
 from collections.abc import Callable, Sequence
 
-from lockstep.protocol.description import Axis
+from lockstep.protocol.description import Axis, Pose
+from lockstep.protocol.neutral import has_goals
+from lockstep.robot_bridge.control.limits.goal_axis import GoalAxis
+from lockstep.robot_bridge.control.limits.pose_turns import PoseTurns
+from lockstep.robot_bridge.control.limits.rate_axis import RateAxis
 
 __all__ = ["AxisShaper", "Limiter"]
 
-Limiter = Callable[[list[float], list[float]], list[float]]  # (values, values under braking) -> values nearer to rest
+Limiter = Callable[[list[float], list[float]], list[float]]  # (rates, rates under braking) -> rates nearer to rest
 
 
 class AxisShaper:
     """The applied values of all axes.
 
-    Call `drive` at execution, `rest` to come to rest early, and `step` or, after a failure, `brake` once a tick.
+    Call `begin` with the measured places if there are goal axes; then `drive` at execution, `rest` to come to rest
+    early, and `step` or, after a failure, `brake` once a tick.
+
+    Attributes:
+        has_goals: whether any axis is a goal axis
+        is_known: False while a goal axis was not measured: nothing can be applied then
     """
 
-    def __init__(self, axes: Sequence[Axis], *, hold: float, limiter: Limiter | None = None) -> None:
-        self._axes = tuple(axes)
+    def __init__(
+        self,
+        axes: Sequence[Axis],
+        *,
+        hold: float,
+        limiter: Limiter | None = None,
+        poses: Sequence[Pose] = (),
+        pursued: Callable[[], Sequence[float]] | None = None,
+    ) -> None:
+        """`pursued`: returns the goal of each axis that the robot pursues now; needed if there are `poses`."""
+        self.has_goals = has_goals(axes)
+        self.is_known = not self.has_goals
+        self._axes = tuple(GoalAxis(axis) if axis.kind == "goal" else RateAxis(axis) for axis in axes)
         self._hold = hold
         self._limiter = limiter
-        self._rest_values = [axis.rest for axis in axes]
-        self._values = list(self._rest_values)  # applied last, [0.4, 0.0, 0.0]
-        self._targets: list[float] | None = None  # None: coming to rest or there
-        self._deadline = float("-inf")  # s, when all values must be at rest
+        self._turns = None if pursued is None or not poses else PoseTurns(axes, poses, self._axes, pursued)
+        self._released = True  # coming to rest or there
+        self._deadline = float("-inf")  # s, when all axes must be at rest
 
     @property
     def values(self) -> list[float]:
         """The values applied last."""
-        return list(self._values)
+        return [axis.value for axis in self._axes]
+
+    @property
+    def goals(self) -> list[float | None]:
+        """Where each goal axis is commanded to be now, None for a rate axis and an unknown goal; empty without any."""
+        if not self.has_goals:
+            return []
+        goals = [axis.applied_goal for axis in self._axes]
+        return goals if self._turns is None else self._turns.as_brought(goals)
 
     @property
     def at_rest(self) -> bool:
-        """True if all applied values are at rest and none is to leave it."""
-        return self._values == self._rest_values and self._targets in (None, self._rest_values)
+        """True if all axes are at rest and none is to leave it."""
+        released = self._released
+        return all(axis.rate == axis.rest_rate and (released or not axis.is_driven) for axis in self._axes)
 
-    def drive(self, values: Sequence[float], now: float) -> None:
-        """Aim for `values` (finite, one per axis), clamped to the axes' limits."""
-        self._targets = [
-            min(max(value, axis.minimum), axis.maximum) for value, axis in zip(values, self._axes, strict=True)
-        ]
+    def begin(self, places: Sequence[float]) -> None:
+        """Begin to command the goal axes where they are measured, one place per axis; NaN: not known."""
+        self._released = True
+        for axis, place in zip(self._axes, places, strict=True):
+            axis.begin(place)
+        self.is_known = all(axis.is_known for axis in self._axes)
+        if self._turns is not None:
+            self._turns.begin()
+
+    def drive(self, values: Sequence[float | None], now: float, speed: float = 1.0) -> None:
+        """Aim for `values`, one per axis, clamped to the axes' limits. Numbers are finite; None: a goal axis stays.
+
+        `speed`: of the goal axes, as a share of their largest, 0 to 1.
+        """
+        for axis, value in zip(self._axes, values, strict=True):
+            axis.drive(value, speed)
+        self._released = False
         self._deadline = now + self._hold
 
     def rest(self) -> None:
         """Come to rest at the brake rate from the next step on."""
-        self._targets = None
+        self._released = True
 
     def brake(self, dt: float) -> list[float]:
         """Take one step towards rest at the brake rate, from any target, without asking the limiter."""
-        self._targets = None
-        self._values = self._braked(dt)
-        return list(self._values)
+        self._released = True
+        return [axis.take(axis.braked(dt), dt) for axis in self._axes]
 
     def cut(self) -> None:
-        """Set the values to rest without a ramp, because the robot's motion meanwhile is unknown."""
-        self._targets = None
-        self._values = list(self._rest_values)
+        """Be at rest without a ramp, because the robot's motion meanwhile is unknown. Goals stay where they are."""
+        self._released = True
+        for axis in self._axes:
+            axis.cut()
 
     def step(self, now: float, dt: float) -> list[float]:
         """Return the values for a tick of `dt` seconds that begins now."""
         left = self._deadline - now
         if left <= 0:
-            self._targets = None
-        values = [self._step_axis(index, axis, left, dt) for index, axis in enumerate(self._axes)]
-        self._values = values if self._limiter is None else self._limiter(values, self._braked(dt))
-        return list(self._values)
-
-    def _step_axis(self, index: int, axis: Axis, left: float, dt: float) -> float:
-        target, rate = (axis.rest, axis.brake) if self._targets is None else (self._targets[index], axis.slew)
-        change = target - self._values[index]
-        value = target if abs(change) <= rate * dt else self._values[index] + (rate * dt if change > 0 else -rate * dt)
-        reach = axis.brake * max(left, 0.0)
-        return min(max(value, axis.rest - reach), axis.rest + reach)
-
-    def _braked(self, dt: float) -> list[float]:
-        """Return the values after one step of braking from the last applied ones."""
-        return [
-            max(axis.rest, value - axis.brake * dt) if value > axis.rest else min(axis.rest, value + axis.brake * dt)
-            for value, axis in zip(self._values, self._axes, strict=True)
-        ]
+            self._released = True
+        released = self._released
+        if self._turns is not None and not released:
+            self._turns.take()
+        rates = [axis.next_rate(left, dt, released=released) for axis in self._axes]
+        if self._limiter is not None:
+            rates = self._limiter(rates, [axis.braked(dt) for axis in self._axes])
+        return [axis.take(rate, dt) for axis, rate in zip(self._axes, rates, strict=True)]

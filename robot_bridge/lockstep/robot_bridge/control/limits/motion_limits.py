@@ -1,4 +1,6 @@
-"""Limits the shaped values by all position limits and geofences before they reach the robot. No I/O, no clock.
+"""Limits the shaped rates by all position limits and geofences before they reach the robot. No I/O, no clock.
+
+The *value* of an axis is here what it is to the limits: the value of a rate axis, the speed of a goal axis' goal.
 
 In every tick each limit asks: with these values, and all axes braking from the next tick on, does the robot stay within
 bounds? If not, the axes that lead out of them are scaled down, towards rest only: no axis moves that was not told to.
@@ -13,6 +15,7 @@ from lockstep.protocol.description import PositionLimit, RobotDescription
 from lockstep.robot_bridge.control.limits.geofence import FenceGuard
 from lockstep.robot_bridge.control.limits.joint_limit_guard import JointLimitGuard, is_by_posture
 from lockstep.robot_bridge.control.limits.position_guard import PositionGuard
+from lockstep.robot_bridge.control.limits.rate_axis import rest_rate
 from lockstep.robot_bridge.control.limits.stopping_distance import Demand, share_of
 
 __all__ = ["MotionLimits", "PositionSense"]
@@ -50,7 +53,7 @@ class MotionLimits:
         self._linger = round(LINGER / tick_seconds)  # calls
         self._lingering: dict[str, int] = {}  # limit -> calls that it still counts as acting
         self._sense = sense
-        self._rest_values = [axis.rest for axis in description.axes]
+        self._rest_values = [rest_rate(axis) for axis in description.axes]
         self._positions = [
             PositionGuard(limit, description, reaction)
             for limit in description.position_limits

@@ -1,0 +1,150 @@
+"""Shapes one goal axis: the applied goal goes to the commanded one. No I/O, no clock.
+
+A goal axis is a rate axis on the speed of its applied goal, and an integrator behind it: hold, brake and the limits
+work on the speed. docs/robot-link.md, "Goal axes", has the rules.
+"""
+
+import math
+from typing import Final
+
+from lockstep.protocol.description import Axis
+
+__all__ = ["GoalAxis", "shorter_way", "stopping_speed"]
+
+ROUNDING: Final = 1e-6  # of a step or a speed: what is so close to another counts as it, whatever rounding added up
+
+
+class GoalAxis:
+    """The applied goal of an axis, and its speed. It has the methods of `RateAxis`.
+
+    Attributes:
+        goal: applied last, 1.2 rad; NaN until the axis was measured
+        waits: the axis must not be driven yet, because others that move the same joints still move
+    """
+
+    __slots__ = (
+        *("_acceleration", "_axis", "_brake", "_end", "_gap", "_planned", "_speed", "_steepest", "_target"),
+        *("_wrap", "goal", "is_driven", "rate", "waits"),
+    )
+
+    rest_rate: Final = 0.0
+
+    def __init__(self, axis: Axis) -> None:
+        self._axis = axis
+        self._wrap = axis.wrap
+        self._brake = axis.brake
+        self._acceleration = axis.acceleration or axis.brake
+        # From a speed that is planned with the lesser of the two, either brings the goal to a standstill in time.
+        self._planned = min(self._acceleration, axis.brake)
+        self._steepest = max(self._acceleration, axis.brake)
+        self._target = 0.0
+        self._speed = axis.slew  # unit/s, of the present command at most
+        self._gap = 0.0  # way from the goal to the target before this tick
+        self._end = 0.0  # the target, so that the goal plus the way is exactly there
+        self.goal = math.nan
+        self.rate = 0.0  # unit/s, of the goal in the tick that was applied last
+        self.is_driven = False
+        self.waits = False
+
+    @property
+    def is_known(self) -> bool:
+        """False until the axis was measured: it has no goal then."""
+        return self.goal == self.goal  # NaN differs from itself
+
+    @property
+    def applied_goal(self) -> float | None:
+        """The applied goal; None before the axis was measured."""
+        return self.goal if self.is_known else None
+
+    @property
+    def value(self) -> float:
+        """The value that the robot gets."""
+        return self.goal
+
+    def drive(self, value: float | None, speed: float) -> None:
+        """Aim for a goal, at a share `speed` of the axis' largest speed; None: brake, and stay."""
+        self.is_driven = value is not None
+        if value is not None:
+            self._target = value
+            self._speed = self._axis.slew * speed
+
+    def next_rate(self, left: float, dt: float, *, released: bool) -> float:
+        """Return the speed that is wanted for a tick of `dt` s, `left` s before the goal has to stand still.
+
+        `released`: it brakes.
+        """
+        if released or not self.is_driven or self.waits or not self.is_known:
+            self._gap = 0.0
+            rate = self.braked(dt)
+        else:
+            rate = self._towards_target(dt)
+        reach = self._brake * max(left, 0.0)
+        return min(max(rate, -reach), reach)
+
+    def braked(self, dt: float) -> float:
+        """Return the speed after one tick of braking."""
+        rate, step = self.rate, self._brake * dt
+        return max(0.0, rate - step) if rate > 0 else min(0.0, rate + step)
+
+    def take(self, rate: float, dt: float) -> float:
+        """Apply a speed for a tick of `dt` s; return the goal at its end."""
+        self.rate = rate
+        if rate:
+            way = rate * dt
+            if abs(way - self._gap) <= ROUNDING * abs(way):
+                self.goal = self._end
+            elif self._wrap is None:
+                low, high = self._bounds()  # the speed was planned to stay within: this takes away what rounding adds
+                self.goal = min(max(self.goal + way, low), high)
+            else:
+                self.goal += way
+        return self.goal
+
+    def cut(self) -> None:
+        """Stand still at once, where the goal is."""
+        self.rate = 0.0
+
+    def begin(self, place: float) -> None:
+        """Begin at a measured place; NaN: it is not known."""
+        self.goal = place if math.isfinite(place) else math.nan
+        self.rate = 0.0
+
+    def _bounds(self) -> tuple[float, float]:
+        """Return the range of the goal. A goal that is outside of the axis' limits may only move back."""
+        axis, goal = self._axis, self.goal
+        return min(axis.minimum, goal), max(axis.maximum, goal)
+
+    def _towards_target(self, dt: float) -> float:
+        if self._wrap is None:
+            low, high = self._bounds()
+            self._end = min(max(self._target, low), high)
+            self._gap = gap = self._end - self.goal
+        else:
+            self._gap = gap = shorter_way(self.goal, self._target, self._wrap)
+            self._end = self.goal + gap
+        wanted = min(self._speed, stopping_speed(abs(gap), self._planned, dt))
+        if gap < 0:
+            wanted = -wanted
+        faster, slower = self._acceleration * dt, self._steepest * dt
+        rate, stands_next = self.rate, slower * (1.0 + ROUNDING)
+        if rate >= 0:
+            lowest = rate - slower if rate > stands_next else min(0.0, rate - faster)
+            return min(max(wanted, lowest), rate + faster)
+        highest = rate + slower if -rate > stands_next else max(0.0, rate + faster)
+        return max(min(wanted, highest), rate - faster)
+
+
+def stopping_speed(distance: float, braking: float, dt: float) -> float:
+    """Return the largest speed from which a goal stands still within `distance`, in ticks of `dt` s.
+
+    The speed holds for one tick, and decreases by `braking * dt` in each tick after it.
+    """
+    step = braking * dt  # unit/s, by which the speed decreases in a tick
+    ticks = math.floor((math.sqrt(1.0 + 8.0 * distance / (step * dt)) - 1.0) / 2.0)  # of braking, after the first
+    return distance / (dt * (ticks + 1)) + step * ticks / 2.0
+
+
+def shorter_way(place: float, target: float, wrap: float) -> float:
+    """Return the way from a place to a target where values that differ by `wrap` are the same place."""
+    way = target - place
+    return math.remainder(way, wrap) if math.isfinite(way) else way

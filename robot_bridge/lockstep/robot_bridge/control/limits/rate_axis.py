@@ -1,0 +1,71 @@
+"""Shapes one rate axis: the value that is applied says how fast to move. No I/O, no clock."""
+
+from typing import Final
+
+from lockstep.protocol.description import Axis
+
+__all__ = ["RateAxis", "rest_rate"]
+
+
+def rest_rate(axis: Axis) -> float:
+    """Return the rate at which an axis does not move; that of a goal axis is the speed of its goal."""
+    return 0.0 if axis.kind == "goal" else axis.rest
+
+
+class RateAxis:
+    """The applied value of an axis that is driven by rates.
+
+    `AxisShaper` calls, for each tick, `next_rate`, then `take` with the rate that the limits have left of it.
+    """
+
+    __slots__ = ("_axis", "_target", "is_driven", "rate", "rest_rate")
+
+    is_known: Final = True  # a rate needs no measured place
+    applied_goal: Final = None
+
+    def __init__(self, axis: Axis) -> None:
+        self._axis = axis
+        self._target = axis.rest
+        self.rest_rate = axis.rest  # the rate at which the axis does not move
+        self.rate = axis.rest  # applied last, 0.4 m/s
+        self.is_driven = False  # a target holds, and leads away from rest
+
+    @property
+    def value(self) -> float:
+        """The value that the robot gets."""
+        return self.rate
+
+    def drive(self, value: float | None, speed: float) -> None:
+        """Aim for a value, clamped to the axis' limits; None: for rest. `speed` concerns goal axes only."""
+        axis = self._axis
+        self._target = axis.rest if value is None else min(max(value, axis.minimum), axis.maximum)
+        self.is_driven = self._target != axis.rest
+
+    def next_rate(self, left: float, dt: float, *, released: bool) -> float:
+        """Return the rate that is wanted for a tick of `dt` s, `left` s before the axis has to be at rest.
+
+        `released`: it comes to rest at its brake rate.
+        """
+        axis, rate = self._axis, self.rate
+        target, slope = (axis.rest, axis.brake) if released else (self._target, axis.slew)
+        change = target - rate
+        wanted = target if abs(change) <= slope * dt else rate + (slope * dt if change > 0 else -slope * dt)
+        reach = axis.brake * max(left, 0.0)
+        return min(max(wanted, axis.rest - reach), axis.rest + reach)
+
+    def braked(self, dt: float) -> float:
+        """Return the rate after one tick of braking."""
+        rate, rest, step = self.rate, self._axis.rest, self._axis.brake * dt
+        return max(rest, rate - step) if rate > rest else min(rest, rate + step)
+
+    def take(self, rate: float, dt: float) -> float:
+        """Apply a rate for a tick of `dt` s; return the value that the robot gets."""
+        self.rate = rate
+        return rate
+
+    def cut(self) -> None:
+        """Be at rest at once."""
+        self.rate = self._axis.rest
+
+    def begin(self, place: float) -> None:
+        """Begin at a measured place: nothing to do for a rate."""
