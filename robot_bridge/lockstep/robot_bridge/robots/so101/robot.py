@@ -69,7 +69,6 @@ class So101(Robot):
         self._values = None if self._stopped else values
 
     def goals(self) -> Sequence[float]:
-        """Return the goal of each axis that the arm pursues now."""
         *joints, x, y, z, rx, ry, rz = self._drive.pursued()
         return [*joints, self._grip, x, y, z, rx, ry, rz]
 
@@ -87,17 +86,19 @@ class So101(Robot):
         self._contact.update(simulation.data, seconds)
 
     def measure(self) -> Measurement:
-        joints = self.simulation.joints()
-        state = self._chain.at(joints[ARM])
-        axes = [*joints, *state.position.tolist(), *rotation_vector(state.rotation).tolist()]
         return Measurement(
-            axes=on_wire(axes),
-            joints=on_wire(joints),
+            axes=on_wire(self.measured_axes()),
+            joints=on_wire(self.simulation.joints()),
             wrench=on_wire(self._contact.wrench.tolist()),
             ranges=[],
             at_rest=bool(np.abs(self.simulation.rates()).max() < REST_SPEED),
             faults=self._faults(),
         )
+
+    def measured_axes(self) -> Sequence[float]:
+        joints = self.simulation.joints()
+        state = self._chain.at(joints[ARM])
+        return [*joints, *state.position.tolist(), *rotation_vector(state.rotation).tolist()]
 
     def positions(self) -> Sequence[float]:
         return self.simulation.joints()
