@@ -1,5 +1,6 @@
 """Distances between parts of a robot, as capsules around its links, and how the joints change them."""
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
@@ -46,21 +47,32 @@ class Clearance:
             (names.index(first), names.index(second), capsules[first].radius + capsules[second].radius)
             for first, second in pairs
         ]
+        self._columns = np.array([pair[:2] for pair in self._pairs], dtype=int).reshape(-1, 2).T
+        reaches = np.array([math.dist(each.start, each.end) / 2 + each.radius for each in capsules.values()])
+        self._reaches = reaches[self._columns].sum(axis=0)  # m, of both capsules around their middles
 
     def gaps(self, state: ChainState, within: float) -> list[Gap]:
         """Return the gaps of the pairs that are closer than `within` (m)."""
-        lines = [tuple(self._chain.place(state, end) for end in ends) for ends in self._ends]
-        found = []
-        for first, second, radii in self._pairs:
-            (a, b), (c, d) = lines[first], lines[second]
-            s, t = nearest_places(a, b, c, d)
-            here, there = a + s * (b - a), c + t * (d - c)
-            apart = here - there
-            length = float(np.sqrt(apart @ apart))
-            if TINY < length < radii + within:
-                motion = self._motion(state, self._ends[first], here) - self._motion(state, self._ends[second], there)
-                found.append(Gap(length - radii, apart @ motion / length))
-        return found
+        if not self._pairs:
+            return []
+        ends = np.array([[self._chain.place(state, end) for end in each] for each in self._ends])
+        middles = ends.mean(axis=1)
+        apart = middles[self._columns[0]] - middles[self._columns[1]]
+        near = np.flatnonzero((apart * apart).sum(axis=1) < (self._reaches + within) ** 2)
+        gaps = (self._gap(state, self._pairs[number], ends, within) for number in near.tolist())
+        return [gap for gap in gaps if gap is not None]
+
+    def _gap(self, state: ChainState, pair: tuple[int, int, float], ends: Array, within: float) -> Gap | None:
+        first, second, radii = pair
+        (a, b), (c, d) = ends[first], ends[second]
+        s, t = nearest_places(a, b, c, d)
+        here, there = a + s * (b - a), c + t * (d - c)
+        apart = here - there
+        length = math.sqrt(apart @ apart)
+        if not TINY < length < radii + within:
+            return None
+        motion = self._motion(state, self._ends[first], here) - self._motion(state, self._ends[second], there)
+        return Gap(length - radii, apart @ motion / length)
 
     def _motion(self, state: ChainState, ends: tuple[ChainPoint, ChainPoint], place: Array) -> Array:
         return self._chain.motion(state, ends[0].moving, place)

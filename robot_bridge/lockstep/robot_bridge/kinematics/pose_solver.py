@@ -30,6 +30,7 @@ class JointBounds(NamedTuple):
     lower: tuple[float, ...]  # rad or m
     upper: tuple[float, ...]
     rates: tuple[float, ...]  # rad/s or m/s, the fastest
+    ramp: float = 0.06  # s in which a joint changes from rest to its fastest rate, at least
 
 
 class Tuning(NamedTuple):
@@ -53,6 +54,7 @@ class Tuning(NamedTuple):
 
 class Solution(NamedTuple):
     joints: tuple[float, ...]  # rad or m, the next goals
+    rates: tuple[float, ...]  # rad/s or m/s, that bring them there
     limited: tuple[int, ...]  # joints that are at the end of their range and would go on
     near: bool  # parts of the robot are so close to each other that they slow it
     missing: float  # m, of the position before this step
@@ -75,6 +77,7 @@ class PoseSolver:
         self._chain = chain
         self._lower, self._upper = np.array(bounds.lower), np.array(bounds.upper)
         self._rates = np.array(bounds.rates)
+        self._accelerations = self._rates / bounds.ramp
         self._posture = None if posture is None else np.array(posture)
         self._clearance = clearance
         self._turns = turns
@@ -90,11 +93,13 @@ class PoseSolver:
         velocity: Array | None = None,
         spin: Array | None = None,
         share: float = 1.0,
+        before: Sequence[float] | None = None,
     ) -> Solution:
         """Return the joint goals after `seconds`.
 
         `joints`: the goals before. `position` (m) and `rotation` (3 x 3): of the tool. `velocity` (m/s) and `spin`
         (rad/s): of that pose, so that the tool follows it without lag. `share`: of the joints' rates, 0 to 1.
+        `before`: the rates of the step before; without them a rate may change at once.
         """
         here = np.array(joints)
         state = self._chain.at(joints)
@@ -116,9 +121,13 @@ class PoseSolver:
         rates, near = self._apart(state, rates)
         ratio = float(np.max(np.abs(rates) / self._rates)) if share > 0.0 else math.inf
         rates = rates * (min(1.0, share / ratio) if ratio > 0.0 else 1.0)
+        if before is not None:
+            last, most = np.array(before), self._accelerations * seconds
+            rates = np.clip(rates, last - most, last + most)
         after = here + np.clip(rates, slowest, fastest) * seconds
         after = np.clip(after, np.minimum(self._lower, here), np.maximum(self._upper, here))
-        return Solution(tuple(after.tolist()), limited, near, float(np.linalg.norm(error)))
+        made = tuple(((after - here) / seconds).tolist())
+        return Solution(tuple(after.tolist()), made, limited, near, float(np.linalg.norm(error)))
 
     def _speeds(self, here: Array, share: float) -> tuple[Array, Array]:
         """Return each joint's range of speeds: slower near the end of its range, and only inwards beyond it."""

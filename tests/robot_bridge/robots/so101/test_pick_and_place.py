@@ -1,4 +1,4 @@
-"""A scripted operator puts blocks into the bowl: contact, friction and gripping force of MuJoCo, nothing held by code."""
+"""A scripted operator puts blocks into the bowl: by contact, friction and gripping force of MuJoCo alone."""
 
 import math
 

@@ -48,6 +48,7 @@ class ArmDrive:
         self._joints: tuple[float, ...] | None = None  # goals of the joints while they are driven
         self._pose: tuple[float, ...] | None = None  # goals of the tool while it is driven
         self._motion = np.zeros(6)  # m/s and rad/s, of that goal in the present tick
+        self._solved = (0.0,) * self._count  # rad/s, in the last tick for the tool
         self._still = math.inf  # s since the pose's goal changed
         self._tool: _Tool | None = None  # of the present goals
         self.faults: list[str] = []
@@ -100,7 +101,9 @@ class ArmDrive:
             self._joints, self._pose = joints, None
             self.faults = []
         elif _differ(pose, before[self._count :]):
-            if self._pose is not None:  # in the first tick the goal was read anew, which is no motion
+            if self._pose is None:  # in the first tick the goal was read anew, which is no motion
+                self._solved = (0.0,) * self._count
+            else:
                 self._motion = _motion(self._pose, pose) / seconds
             self._joints, self._pose = None, pose
             self._still = 0.0
@@ -109,6 +112,7 @@ class ArmDrive:
         share = min(max((SETTLES - self._still) / SLOWS, 0.0), 1.0)
         self._still += seconds
         if share == 0.0:
+            self._solved = (0.0,) * self._count
             return
         solution = self._solver.step(
             self._goals,
@@ -118,8 +122,9 @@ class ArmDrive:
             velocity=self._motion[:3],
             spin=self._motion[3:],
             share=share,
+            before=self._solved,
         )
-        self._goals = solution.joints
+        self._goals, self._solved = solution.joints, solution.rates
         self.faults = [f"joint limit: {self._chain.joints[number]}" for number in solution.limited]
         if solution.near:
             self.faults.append("the arm is close to itself")
