@@ -117,7 +117,8 @@ def test_through_a_stretched_arm_and_back_the_joints_go_without_a_jump(speed: fl
     joints: tuple[float, ...] = (pan, 0.3, 0.3, 0.2, 0.0)
     begun = ARM.at(joints)
     out = np.array((math.cos(pan), math.sin(pan), 0.1)) * speed
-    solver, rates = PoseSolver(ARM, BOUNDS), [(0.0,) * 5]
+    solver = PoseSolver(ARM, BOUNDS)
+    rates: list[tuple[float, ...]] = [(0.0,) * 5]
     goal = begun.position
     for tick in range(round(2.0 / TICK)):
         velocity = out if tick < 250 else -out
@@ -145,7 +146,8 @@ def test_parts_of_the_arm_come_no_nearer_to_each_other_than_allowed(
 
 
 def test_a_tool_whose_goal_moves_follows_it_without_lag() -> None:
-    solver, joints = PoseSolver(ARM, BOUNDS), (0.0, -0.2, 0.6, 0.8, 0.0)
+    solver = PoseSolver(ARM, BOUNDS)
+    joints: tuple[float, ...] = (0.0, -0.2, 0.6, 0.8, 0.0)
     begun = ARM.at(joints)
     velocity = np.array((0.0, 0.1, -0.05))
     goal = begun.position

@@ -64,6 +64,6 @@ def rotation_vector(matrix: Array) -> Array:
         symmetric = (matrix + matrix.T) / 2.0 + np.eye(3)
         axis = symmetric[:, int(np.argmax(np.diag(symmetric)))]
         axis = axis / np.linalg.norm(axis)
-        return axis * (-angle if axis @ (x, y, z) < 0.0 else angle)  # type: ignore[no-any-return]
+        return axis * (-angle if axis @ (x, y, z) < 0.0 else angle)
     scale = angle / (2.0 * sine)
     return np.array((x * scale, y * scale, z * scale))

@@ -147,7 +147,7 @@ def _looking(direction: Vector) -> list[float]:
     right /= np.linalg.norm(right)
     quaternion = np.zeros(4)
     mujoco.mju_mat2Quat(quaternion, np.stack((right, np.cross(back, right), back), axis=1).ravel())
-    return quaternion.tolist()  # type: ignore[no-any-return]
+    return quaternion.tolist()
 
 
 def _add_bowl_walls(bowl: Any) -> None:

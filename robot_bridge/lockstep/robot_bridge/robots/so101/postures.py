@@ -7,8 +7,7 @@ from lockstep.robot_bridge.robots.actions import ActionFailed, ActionRun, Action
 
 __all__ = ["FOLDED", "GoTo"]
 
-FOLDED: Final[tuple[float, ...]] = (0.0, -1.70, 1.62, 0.9, 0.0, 0.0)  # rad, of each joint: low and near the foot
-AHEAD: Final = 0.5  # rad, that a goal is ahead of the arm: less than the axes' reach
+FOLDED: Final[tuple[float, ...]] = (0.0, -1.68, 1.48, 0.9, 0.0, 0.0)  # rad, of each joint: low and near the foot
 NEAR: Final = 0.03  # rad, of every joint
 NEARER: Final = 0.01  # rad, of all joints together, that count as nearer
 PATIENCE: Final = 2.0  # s without getting nearer
@@ -56,8 +55,4 @@ class GoTo(ActionRun):
         return [abs(goal - joints[number]) for number, goal in self._goals.items()]
 
     def _values(self) -> list[float | None]:
-        joints = self._joints()
-        values: list[float | None] = [None] * self._axes
-        for number, goal in self._goals.items():
-            values[number] = joints[number] + min(max(goal - joints[number], -AHEAD), AHEAD)
-        return values
+        return [self._goals.get(number) for number in range(self._axes)]

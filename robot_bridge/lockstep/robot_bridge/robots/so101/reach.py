@@ -6,21 +6,22 @@ from typing import Final
 from lockstep.protocol.description import RobotDescription
 from lockstep.robot_bridge.kinematics.chain import Chain
 from lockstep.robot_bridge.kinematics.clearance import Capsule, Clearance
-from lockstep.robot_bridge.kinematics.pose_solver import JointBounds, PoseSolver
+from lockstep.robot_bridge.kinematics.pose_solver import JointBounds, PoseSolver, Tuning
 from lockstep.robot_bridge.robots.so101.controls import JOINT_AXES, RATES
 from lockstep.robot_bridge.robots.so101.description import TOOL_BODY
 from lockstep.robot_bridge.robots.so101.model import ARM
 
 __all__ = ["CAPSULES", "PAIRS", "arm_chain", "arm_solver"]
 
-# Around the boxes that the links collide with; the hand's holds the moving jaw while it is not far open.
+# Through the boxes that the links collide with, whose corners stick out by up to 15 mm. The hand's does not hold the
+# moving jaw.
 CAPSULES: Final[Mapping[str, Capsule]] = {
-    "": Capsule((0.03, 0.0, -0.04), (0.02, 0.0, 0.035), 0.042),  # the foot
-    "arm.shoulder": Capsule((-0.030, 0.0, -0.040), (-0.030, 0.0, 0.0), 0.030),
-    "arm.upper_arm": Capsule((-0.095, -0.010, 0.018), (-0.020, 0.0, 0.018), 0.028),
-    "arm.lower_arm": Capsule((-0.115, 0.0, 0.018), (-0.020, 0.0, 0.018), 0.026),
-    "arm.wrist": Capsule((0.0, -0.045, 0.024), (0.0, -0.020, 0.018), 0.030),
-    "arm.gripper": Capsule((0.0, 0.0, -0.020), (-0.004, 0.0, -0.080), 0.028),
+    "": Capsule((0.012, 0.0, -0.02), (0.012, 0.0, 0.03), 0.048),  # the foot
+    "arm.shoulder": Capsule((-0.028, 0.0, -0.040), (-0.028, 0.0, 0.025), 0.036),
+    "arm.upper_arm": Capsule((-0.115, -0.008, 0.018), (-0.010, 0.0, 0.018), 0.034),
+    "arm.lower_arm": Capsule((-0.125, 0.003, 0.018), (-0.010, 0.0, 0.018), 0.034),
+    "arm.wrist": Capsule((0.0, -0.055, 0.0235), (0.0, -0.010, 0.0235), 0.040),
+    "arm.gripper": Capsule((-0.003, 0.0, -0.020), (-0.014, 0.0, -0.075), 0.034),
 }
 PAIRS: Final = (
     ("", "arm.lower_arm"),
@@ -43,4 +44,4 @@ def arm_solver(description: RobotDescription, chain: Chain) -> PoseSolver:
     bounds = JointBounds(
         lower=tuple(axis.minimum for axis in axes), upper=tuple(axis.maximum for axis in axes), rates=RATES[ARM]
     )
-    return PoseSolver(chain, bounds, clearance=Clearance(chain, CAPSULES, PAIRS))
+    return PoseSolver(chain, bounds, clearance=Clearance(chain, CAPSULES, PAIRS), tuning=Tuning(safe=0.02, close=0.004))

@@ -17,14 +17,8 @@ Array = npt.NDArray[np.float64]
 
 _logger = logging.getLogger(__name__)
 
-HOME: Final[tuple[float, ...]] = (
-    0.0,
-    -0.9,
-    0.75,
-    1.55,
-    0.0,
-    0.3,
-)  # rad, of each joint: over the table, the gripper down and half open
+# rad, of each joint: over the table, the gripper down and half open
+HOME: Final[tuple[float, ...]] = (0.0, -0.55, 0.30, 1.55, 0.0, 0.3)
 REST_SPEED: Final = 0.03  # rad/s
 BLOCKS: Final = ("red_block", "green_block", "blue_block")
 BOWL: Final = "bowl"
