@@ -1,10 +1,12 @@
 """The cases about goal axes pass on the bridge, and each finds the fault that it is about."""
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
+import msgspec
 import pytest
 
+from lockstep.protocol.description import RobotDescription
 from lockstep.robot_bridge.conformance import CASES, Outcome, Result, Subject, play
 from lockstep.robot_bridge.conformance.place import Place
 from lockstep.robot_bridge.control.command_values import CommandValues
@@ -22,19 +24,17 @@ ABOUT_GOALS = [case for case in CASES if case.name.startswith("goal")]
 class OnlyArm(HangingArm):
     """Has no base: also the cases about other things move a goal axis."""
 
-    def describe(self):  # type: ignore[no-untyped-def]
-        import msgspec
-
+    def describe(self) -> RobotDescription:
         found = super().describe()
         return msgspec.structs.replace(found, axes=found.axes[1:])
 
-    def apply(self, values):  # type: ignore[no-untyped-def]
+    def apply(self, values: Sequence[float]) -> None:
         super().apply([0.0, *values])
 
-    def goals(self):  # type: ignore[no-untyped-def]
+    def goals(self) -> Sequence[float]:
         return self.pursued[1:]
 
-    def measured_axes(self):  # type: ignore[no-untyped-def]
+    def measured_axes(self) -> Sequence[float]:
         return list(super().measured_axes())[1:]
 
 
@@ -97,8 +97,8 @@ def is_where_it_is(self: CommandValues, values: Sequence[float | None]) -> bool:
 
 drive, rest, step = GoalAxis.drive, AxisShaper.rest, AxisShaper.step
 
-FAULTS: dict[str, tuple[object, str, Callable[..., object]]] = {
-    "goals_in_feedback": (AxisShaper, "goals", property(lambda shaper: [None] * 6)),  # type: ignore[dict-item]
+FAULTS: dict[str, tuple[object, str, object]] = {
+    "goals_in_feedback": (AxisShaper, "goals", property(lambda shaper: [None] * 6)),
     "goal_neutral": (CommandValues, "moves", is_where_it_is),
     "goal_engage": (GoalAxis, "drive", creeps),
     "goal_engage after a rest": (AxisShaper, "rest", sags),

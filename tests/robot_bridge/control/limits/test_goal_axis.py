@@ -196,10 +196,10 @@ def test_an_axis_that_was_not_measured_has_no_goal_and_is_not_driven() -> None:
     assert player.shaper.goals == [None]
     player.shaper.drive([1.0], 0.0)
     assert math.isnan(player.shaper.step(0.0, DT)[0])
-    player.shaper.begin([0.5])
-    assert player.shaper.is_known
-    assert player.shaper.goals == [0.5]
-    assert player.shaper.at_rest
+    measured = Player(place=0.5)
+    assert measured.shaper.is_known
+    assert measured.shaper.goals == [0.5]
+    assert measured.shaper.at_rest
 
 
 @given(st.floats(0, 1e6), st.floats(0.01, 1e4), st.floats(1e-4, 0.1))
