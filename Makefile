@@ -142,7 +142,7 @@ $(ROS2)/.installed: requirements-ros2.lock | $(BIN)/python
 # A robot's model for its tests, where a user has it in a folder of their own.
 $(SO101)/.installed: robot_bridge/lockstep/robot_bridge/robots/so101/model_source.py | $(VENV)/.runtime
 	@echo "Fetching the model of the SO-101 for the tests"
-	@LOCKSTEP_SO101_MODEL=$(SO101) $(BIN)/lockstep robot fetch so101
+	@SO101_MODEL_FOLDER=$(SO101) $(BIN)/lockstep robot fetch so101
 	@touch $@
 
 # Apart from the rest, so that running and testing need none of it.

