@@ -48,6 +48,7 @@ class Tuning(NamedTuple):
     )
     posture: float = 1.0  # 1/s: the pull of the posture in what is left
     limit_gain: float = 8.0  # 1/s: a joint's speed towards its limit is at most this times the way to it
+    end: float = 0.02  # rad or m from the end of its range, from which on a joint is said to be there
     safe: float = 0.03  # m, from which on parts that come nearer to each other are slowed
     close: float = 0.008  # m, at which they come no nearer
 
@@ -162,7 +163,8 @@ class PoseSolver:
             held[worst] = fastest[worst] if rates[worst] > 0.0 else slowest[worst]
             free[worst] = False
             limited.append(worst)
-        return rates, tuple(limited)
+        ended = np.minimum(here - self._lower, self._upper - here) < self._tuning.end
+        return rates, tuple(number for number in limited if ended[number])
 
     def _solve(
         self,

@@ -20,8 +20,8 @@ __all__ = ["ArmDrive"]
 Array = npt.NDArray[np.float64]
 
 SAME: Final = 1e-9  # rad and m
-SETTLES: Final = 0.20  # s after its goal stood still, in which the tool may still come nearer to it
-SLOWS: Final = 0.10  # s, the last of these, in which it comes to a standstill
+SETTLES: Final = 0.12  # s after its goal stood still, in which the tool may still come nearer to it
+SLOWS: Final = 0.08  # s, the last of these, in which it comes to a standstill
 
 
 class _Tool(NamedTuple):
