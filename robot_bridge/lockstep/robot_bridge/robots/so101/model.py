@@ -33,7 +33,7 @@ GRIPPER: Final = 5
 TOOL: Final = "tool"  # site and body: x away from the gripper, z from the fixed jaw to the moving one
 TOOL_POINT: Final = (0.008, -0.0002, -0.0945)  # m in the gripper's frame: the middle of a block between the fingertips
 
-CELL: Final = 0.002  # m, of simplified meshes
+CELL: Final = 0.003  # m, of simplified meshes
 VISUAL, HULL = 2, 3  # groups of the arm's geoms
 DERIVATIVE: Final = 0.4  # N m s/rad, the derivative part of the servos' own controller
 GRIPPER_TORQUE: Final = 1.0  # N m: 13 N between the fingertips; these servos have a torque limit too
