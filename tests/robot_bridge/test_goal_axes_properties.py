@@ -38,7 +38,7 @@ class GoalLife(RuleBasedStateMachine):
         poses = self.robot.describe().poses
         self.core = EventCore(ARM_AXES, max_event_age=AGE, poses=poses, measured=self.robot.measured_axes)
         self.shaper = AxisShaper(ARM_AXES, hold=HOLD, poses=poses, pursued=self.robot.goals)
-        self.shaper.begin(self.robot.measured_axes())
+        self.shaper.begin(self.robot.measured_axes(), self.robot.measured_axes())
         self.applied: Sequence[float] = self.shaper.values
         self.robot.pursued = list(self.applied)
         self.rates = [0.0] * len(ARM_AXES)
@@ -162,14 +162,17 @@ class GoalLife(RuleBasedStateMachine):
             self.shaper.rest()
 
     @precondition(lambda self: self.core.stop_state.stopped and self.shaper.at_rest)
-    @rule(fallen=st.floats(0, 1.5))
-    def the_arm_falls_while_it_is_stopped_and_the_stop_is_reset(self, fallen: float) -> None:
+    @rule(fallen=st.floats(0, 1.5), holds=st.booleans())
+    def the_arm_falls_while_it_is_stopped_and_the_stop_is_reset(self, fallen: float, holds: bool) -> None:
         self.now += 1.1
         self.tick(DT)
         self.robot.sag += fallen
         if isinstance(self.core.reset(self.core.stop_state.number, self.now), ResetTaken):
-            self.shaper.begin(self.robot.measured_axes())
-            assert self.shaper.goals[1:] == list(self.robot.measured_axes())[1:]
+            measured = self.robot.measured_axes()
+            self.shaper.begin(measured, self.robot.goals() if holds else measured)
+            for axis, goal, place in zip(ARM_AXES[1:], self.shaper.goals[1:], measured[1:], strict=True):
+                assert goal is not None
+                assert abs(goal - place) <= axis.reach
             self.applied = self.shaper.values  # the only place where the goals are measured anew
             self.robot.pursued = list(self.applied)
         self.robot.sag -= fallen

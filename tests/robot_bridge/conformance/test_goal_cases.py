@@ -56,7 +56,19 @@ async def test_the_bridge_passes() -> None:
 
 
 async def test_cases_about_other_things_move_a_goal_axis_where_the_robot_has_no_other() -> None:
-    names = ("executes", "repeat", "copies", "moves", "hold", "rest", "lost_link", "new_link", "stop_latches", "late")
+    names = (
+        "reset_then_neutral",
+        "executes",
+        "repeat",
+        "copies",
+        "moves",
+        "hold",
+        "rest",
+        "lost_link",
+        "new_link",
+        "stop_latches",
+        "late",
+    )
     results = await results_of(OnlyArm(sag=0.05), *names, "goal_conflict")
     assert {name: (result.outcome, result.detail) for name, result in results.items()} == dict.fromkeys(
         (*names, "goal_conflict"), (Outcome.OK, "")

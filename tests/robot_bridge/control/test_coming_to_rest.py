@@ -122,7 +122,7 @@ def test_a_stop_that_raises_is_tried_again() -> None:
 def arm_in_motion() -> tuple[HangingArm, AxisShaper]:
     robot = HangingArm()
     shaper = AxisShaper(ARM_AXES, hold=0.3)
-    shaper.begin(robot.measured_axes())
+    shaper.begin(robot.measured_axes(), robot.goals())
     for tick in range(20):
         shaper.drive([0.0, 1.0, None, None, None, None], tick * DT)
         robot.apply(shaper.step(tick * DT, DT))

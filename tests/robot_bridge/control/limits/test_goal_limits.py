@@ -38,7 +38,7 @@ class Crane:
         check_description(CRANE)
         self.limits = MotionLimits(CRANE, self, DT)
         self.shaper = AxisShaper(CRANE.axes, hold=0.3, limiter=self.limits)
-        self.shaper.begin([0.0])
+        self.shaper.begin([0.0], [0.0])
         self.now = 0.0
         self.known = True
 

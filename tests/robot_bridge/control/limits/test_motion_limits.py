@@ -249,4 +249,4 @@ def test_a_pose_with_too_few_numbers_counts_as_unknown() -> None:
 def test_a_robot_without_limits_is_left_alone() -> None:
     description = msgspec.structs.replace(LIFT, position_limits=())
     values = [9.0, 9.0]
-    assert MotionLimits(description, ExactLift(0.0), DT)(values, [0.0, 0.0]) is values
+    assert MotionLimits(description, ExactLift(0.0), DT)(values, lambda: [0.0, 0.0]) is values

@@ -19,7 +19,7 @@ class Arm:
         self.shaper = AxisShaper(
             ARM_AXES, hold=0.3, poses=self.robot.describe().poses, pursued=lambda: self.robot.goals()
         )
-        self.shaper.begin(self.robot.pursued)
+        self.shaper.begin(self.robot.pursued, self.robot.pursued)
         self.now = 0.0
 
     def drive(self, seconds: float, **goals: float) -> list[float]:

@@ -28,7 +28,7 @@ Limiter = Callable[[list[float], Callable[[], list[float]]], list[float]]
 class AxisShaper:
     """The applied values of all axes.
 
-    Call `begin` with the measured places if there are goal axes; then `drive` at execution, `rest` to come to rest
+    Call `begin` if there are goal axes; then `drive` at execution, `rest` to come to rest
     early, and `step` or, after a failure, `brake` once a tick.
 
     Attributes:
@@ -74,10 +74,15 @@ class AxisShaper:
         released = self._released
         return all(axis.rate == axis.rest_rate and (released or not axis.is_driven) for axis in self._axes)
 
-    def begin(self, places: Sequence[float]) -> None:
-        """Begin to command the goal axes where they are measured, one place per axis; NaN: not known."""
+    def begin(self, places: Sequence[float], pursued: Sequence[float]) -> None:
+        """Begin to command the goal axes where they are held: at the goals that the robot pursues.
+
+        `places`: measured, one per axis; NaN: not known. If one of the goals is further than its axis' reach from its
+        place, the robot is not where it says, and the places count: all, since a pose and its joints belong together.
+        """
         self._released = True
-        for axis, place in zip(self._axes, places, strict=True):
+        holds = all(axis.reaches(place, goal) for axis, place, goal in zip(self._axes, places, pursued, strict=True))
+        for axis, place in zip(self._axes, pursued if holds else places, strict=True):
             axis.begin(place)
         self.is_known = all(axis.is_known for axis in self._axes)
         if self._turns is not None:

@@ -23,19 +23,8 @@ class GoalAxis:
     """
 
     __slots__ = (
-        *(
-            "_acceleration",
-            "_brake",
-            "_end",
-            "_gap",
-            "_maximum",
-            "_minimum",
-            "_planned",
-            "_slew",
-            "_speed",
-            "_steepest",
-        ),
-        *("_target", "_wrap", "goal", "is_driven", "rate", "waits"),
+        *("_acceleration", "_brake", "_end", "_gap", "_maximum", "_minimum", "_planned", "_reach", "_slew", "_speed"),
+        *("_steepest", "_target", "_wrap", "goal", "is_driven", "rate", "waits"),
     )
 
     rest_rate: Final = 0.0
@@ -43,7 +32,7 @@ class GoalAxis:
     def __init__(self, axis: Axis) -> None:
         self._minimum, self._maximum = axis.minimum, axis.maximum
         self._wrap = axis.wrap
-        self._slew, self._brake = axis.slew, axis.brake
+        self._slew, self._brake, self._reach = axis.slew, axis.brake, axis.reach
         self._acceleration = axis.acceleration or axis.brake
         # From a speed that is planned with the lesser of the two, either brings the goal to a standstill in time.
         self._planned = min(self._acceleration, axis.brake)
@@ -115,8 +104,13 @@ class GoalAxis:
         """Stand still at once, where the goal is."""
         self.rate = 0.0
 
+    def reaches(self, place: float, goal: float) -> bool:
+        """Return whether a goal is within reach of a place; False if one of them is not known."""
+        way = goal - place if self._wrap is None else shorter_way(place, goal, self._wrap)
+        return abs(way) <= self._reach
+
     def begin(self, place: float) -> None:
-        """Begin at a measured place; NaN: it is not known."""
+        """Begin to be commanded from a place; NaN: it is not known."""
         self.goal = place if math.isfinite(place) else math.nan
         self.rate = 0.0
 

@@ -70,5 +70,9 @@ class RateAxis:
         """Be at rest at once."""
         self.rate = self.rest_rate
 
+    def reaches(self, place: float, goal: float) -> bool:
+        """Return True: a rate has no reach."""
+        return True
+
     def begin(self, place: float) -> None:
-        """Begin at a measured place: nothing to do for a rate."""
+        """Begin at a place: nothing to do for a rate."""

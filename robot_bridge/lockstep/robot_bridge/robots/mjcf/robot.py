@@ -115,6 +115,9 @@ class MjcfRobot(Robot):
     def measured_axes(self) -> list[float]:
         return [short(drive.measured(self.data)) for drive in self._drives]
 
+    def goals(self) -> list[float]:
+        return list(self._values)  # also while it is stopped: the servos hold there
+
     def positions(self) -> Sequence[float]:
         qpos = self.data.qpos
         return [value for joint in self._joints for value in joint.values(qpos)]
