@@ -9,6 +9,7 @@ ROS2 := .ros2
 LEROBOT := .lerobot
 LEROBOT_PLUGINS := lerobot_plugins/lerobot_robot_lockstep lerobot_plugins/lerobot_teleoperator_lockstep
 DOCS := .docs
+SO101 := .so101
 RUN_PACKAGES := libegl1 libgl1-mesa-dri
 GSTREAMER_PACKAGES := python3-gi gir1.2-gst-plugins-bad-1.0 gstreamer1.0-plugins-good gstreamer1.0-plugins-bad gstreamer1.0-nice gstreamer1.0-x
 TEST_PACKAGES := $(RUN_PACKAGES) gcc libc6-dev chromium firefox-esr pulseaudio pulseaudio-utils caddy coturn prometheus docker-compose systemd janus redis-server $(GSTREAMER_PACKAGES)
@@ -57,10 +58,10 @@ test-fast: $(VENV)/.dev $(PAGE) ## Run the tests that take less than a minute to
 test-web: web/node_modules/.installed
 	cd web && npm test --silent
 
-test-unit: $(VENV)/.dev $(ROS2)/.installed
+test-unit: $(VENV)/.dev $(ROS2)/.installed $(SO101)/.installed
 	$(BIN)/python -m pytest -q -m "not browser and not long" -n $(WORKERS) $(PARALLEL)
 
-test-browser: $(VENV)/.dev $(ROS2)/.installed $(PAGE)
+test-browser: $(VENV)/.dev $(ROS2)/.installed $(SO101)/.installed $(PAGE)
 	$(BIN)/python -m pytest -q -m "browser and not long" -n $(BROWSERS) $(PARALLEL) \
 	  $$(grep -rlF mark.browser tests --include='test_*.py' | sort)
 
@@ -112,7 +113,7 @@ lock: ## Resolve the pinned, hashed dependencies again (needs uv)
 	$(LOCK) requirements-docs.in -c requirements-dev.lock --python-version 3.11 -o requirements-docs.lock
 
 clean: ## Remove what the commands above made
-	rm -rf $(VENV) $(ROS2) $(LEROBOT) $(DOCS) web/node_modules $(dir $(PAGE)) dist site
+	rm -rf $(VENV) $(ROS2) $(LEROBOT) $(SO101) $(DOCS) web/node_modules $(dir $(PAGE)) dist site
 
 $(BIN)/python:
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { echo "Lockstep needs Python 3.11 or newer"; exit 1; }
@@ -147,6 +148,12 @@ $(LEROBOT)/.installed: requirements-lerobot.lock $(LEROBOT_PLUGINS:=/pyproject.t
 	@$(PYTHON) -m venv $(LEROBOT)
 	@$(LEROBOT)/bin/python -m pip --disable-pip-version-check -q install --no-deps --require-hashes -r requirements-lerobot.lock
 	@$(LEROBOT)/bin/python -m pip --disable-pip-version-check -q install --no-build-isolation --no-deps $(addprefix -e ./,$(LEROBOT_PLUGINS))
+	@touch $@
+
+# A robot's model for its tests, where a user has it in a folder of their own.
+$(SO101)/.installed: robot_bridge/lockstep/robot_bridge/robots/so101/model_source.py | $(VENV)/.runtime
+	@echo "Fetching the model of the SO-101 for the tests"
+	@SO101_MODEL_FOLDER=$(SO101) $(BIN)/lockstep robot fetch so101
 	@touch $@
 
 # Apart from the rest, so that running and testing need none of it.

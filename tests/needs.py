@@ -38,6 +38,8 @@ REAL = (
     "lockstep.robot_bridge.robots.micromanipulator",
     "lockstep.robot_bridge.robots.mjcf",
     "lockstep.robot_bridge.robots.mobile_manipulator",
+    "lockstep.robot_bridge.robots.so101.model",
+    "lockstep.robot_bridge.robots.so101.robot",
     "lockstep.server.cli.main",
     "lockstep.server.media.sources.reader",
     "lockstep.server.http.transport.serve",

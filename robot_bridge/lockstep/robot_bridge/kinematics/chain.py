@@ -1,0 +1,143 @@
+"""A serial chain of joints: where its tool is, and how each joint moves it."""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from lockstep.protocol.description import Body
+from lockstep.robot_bridge.kinematics.rotations import about_axis, from_quaternion
+
+__all__ = ["Chain", "ChainPoint", "ChainState", "NoChain"]
+
+Array = npt.NDArray[np.float64]
+
+
+class NoChain(ValueError):
+    """The bodies hold no such chain. The text says why."""
+
+
+class ChainPoint(NamedTuple):
+    """A point of a body of the chain."""
+
+    moving: int  # number of joints, from the base on, that move it
+    position: Array  # m, in the frame that the last of them moves
+
+
+class ChainState(NamedTuple):
+    """The chain at some joint positions, in the frame of its base."""
+
+    position: Array  # m, of the tool
+    rotation: Array  # 3 x 3, of the tool
+    linear: Array  # m/s of the tool per rad/s (or m/s) of each joint, 3 x joints
+    angular: Array  # rad/s of the tool per rad/s (or m/s) of each joint, 3 x joints
+    places: Array  # m, of each joint's moving frame, after the base's own: (joints + 1) x 3
+    turns: list[Array]  # 3 x 3, of the same frames
+    axes: Array  # unit vectors of the joints, joints x 3
+
+
+class _Link(NamedTuple):
+    offset: Array  # m, from the frame before, in that frame
+    turn: Array  # 3 x 3, of this frame against the frame before, at joint position zero
+    axis: Array  # unit vector in its own frame
+    slides: bool
+
+
+class Chain:
+    """Computes forward kinematics and the geometric Jacobian from the bodies of a description.
+
+    Attributes:
+        joints: names of the joints, from the base to the tool
+    """
+
+    def __init__(
+        self, bodies: Sequence[Body], tool: str, base: str = "", point: Sequence[float] = (0.0, 0.0, 0.0)
+    ) -> None:
+        """`tool`: a body. `base`: the body in whose frame poses are; "": the world. `point`: m, in the tool's frame.
+
+        Raises:
+            NoChain: the tool does not hang on the base by joints.
+        """
+        path = _path(bodies, tool, base)
+        self.joints = tuple(joint.joint for body in path for joint in body.joints)
+        if not self.joints or len(set(self.joints)) < len(self.joints):
+            raise NoChain(f"between {base or 'the world'} and {tool} are no joints, or the same one twice")
+        self._links: list[_Link] = []
+        self._bodies: dict[str, tuple[int, Array, Array]] = {base: (0, np.zeros(3), np.eye(3))}
+        offset, turn = np.zeros(3), np.eye(3)  # since the last joint
+        for body in path:
+            offset = offset + turn @ np.array(body.position)
+            turn = turn @ from_quaternion(body.orientation)
+            for joint in body.joints:
+                axis = np.array(joint.axis) / np.linalg.norm(joint.axis)
+                self._links.append(_Link(offset, turn, axis, joint.kind == "prismatic"))
+                offset, turn = np.zeros(3), np.eye(3)
+            self._bodies[body.name] = (len(self._links), offset, turn)
+        self._end = offset + turn @ np.array(point)
+        self._end_turn = turn
+        self._slides = np.array([link.slides for link in self._links])
+
+    def point(self, body: str, position: Sequence[float]) -> ChainPoint:
+        """Return a point of a body of the chain; `position`: m, in the body's frame.
+
+        Raises:
+            NoChain: the body is not between the base and the tool.
+        """
+        if body not in self._bodies:
+            raise NoChain(f"{body} is not a part of the chain")
+        moving, offset, turn = self._bodies[body]
+        return ChainPoint(moving, offset + turn @ np.array(position))
+
+    def at(self, joints: Sequence[float]) -> ChainState:
+        """Return the state at these joint positions (rad or m), in the order of `joints`."""
+        place, turn = np.zeros(3), np.eye(3)
+        places, turns = np.zeros((len(self._links) + 1, 3)), [turn]
+        axes = np.empty((len(self._links), 3))
+        for number, (link, value) in enumerate(zip(self._links, joints, strict=True)):
+            place = place + turn @ link.offset
+            turn = turn @ link.turn
+            axes[number] = axis = turn @ link.axis
+            if link.slides:
+                place = place + axis * value
+            else:
+                turn = turn @ about_axis(link.axis.tolist(), value)
+            places[number + 1] = place
+            turns.append(turn)
+        position = place + turn @ self._end
+        linear, angular = _cross(axes, position - places[1:]), axes
+        if self._slides.any():
+            linear = np.where(self._slides[:, None], axes, linear)
+            angular = np.where(self._slides[:, None], 0.0, axes)
+        return ChainState(position, turn @ self._end_turn, linear.T, angular.T, places, turns, axes)
+
+    def place(self, state: ChainState, point: ChainPoint) -> Array:
+        """Return where a point is, m."""
+        return state.places[point.moving] + state.turns[point.moving] @ point.position  # type: ignore[no-any-return]
+
+    def motion(self, state: ChainState, moving: int, place: Array) -> Array:
+        """Return the velocity of a point per velocity of each joint, 3 x joints; `moving`: as of its `ChainPoint`."""
+        columns = np.zeros((len(self._links), 3))
+        linear = _cross(state.axes[:moving], place - state.places[1 : moving + 1])
+        columns[:moving] = np.where(self._slides[:moving, None], state.axes[:moving], linear)
+        return columns.T
+
+
+def _cross(one: Array, other: Array) -> Array:
+    """Return the cross products of rows: a third of the time that `numpy.cross` takes for so few."""
+    a, b, c = one.T
+    x, y, z = other.T
+    return np.stack((b * z - c * y, c * x - a * z, a * y - b * x), axis=1)
+
+
+def _path(bodies: Sequence[Body], tool: str, base: str) -> list[Body]:
+    """Return the bodies from below the base to the tool."""
+    known = {body.name: body for body in bodies}
+    path: list[Body] = []
+    name = tool
+    while name != base:
+        if name not in known or len(path) > len(known):
+            raise NoChain(f"{tool} does not hang on {base or 'the world'}")
+        path.insert(0, known[name])
+        name = known[name].parent
+    return path

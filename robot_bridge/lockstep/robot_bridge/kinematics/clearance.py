@@ -1,0 +1,103 @@
+"""Distances between parts of a robot, as capsules around its links, and how the joints change them."""
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from lockstep.robot_bridge.kinematics.chain import Chain, ChainPoint, ChainState
+
+__all__ = ["Capsule", "Clearance", "Gap", "nearest_places"]
+
+Array = npt.NDArray[np.float64]
+Vector = tuple[float, float, float]
+TINY = 1e-12  # m², of a line that is a point
+
+
+class Capsule(NamedTuple):
+    """All points within `radius` of a line, in the frame of a body."""
+
+    start: Vector  # m
+    end: Vector  # m
+    radius: float  # m
+
+
+class Gap(NamedTuple):
+    distance: float  # m, negative if they overlap
+    gradient: Array  # m per rad (or m) of each joint
+
+
+class Clearance:
+    """Computes the gaps between pairs of bodies of a chain. The capsules should hold the bodies' parts entirely."""
+
+    def __init__(self, chain: Chain, capsules: Mapping[str, Capsule], pairs: Sequence[tuple[str, str]]) -> None:
+        """`capsules`: by body. `pairs`: of bodies that must not touch.
+
+        Raises:
+            NoChain: a body is not a part of the chain.
+        """
+        self._chain = chain
+        names = list(capsules)
+        self._ends = [
+            (chain.point(name, capsule.start), chain.point(name, capsule.end)) for name, capsule in capsules.items()
+        ]
+        self._pairs = [
+            (names.index(first), names.index(second), capsules[first].radius + capsules[second].radius)
+            for first, second in pairs
+        ]
+        self._columns = np.array([pair[:2] for pair in self._pairs], dtype=int).reshape(-1, 2).T
+        reaches = np.array([math.dist(each.start, each.end) / 2 + each.radius for each in capsules.values()])
+        self._reaches = reaches[self._columns].sum(axis=0)  # m, of both capsules around their middles
+
+    def gaps(self, state: ChainState, within: float) -> list[Gap]:
+        """Return the gaps of the pairs that are closer than `within` (m)."""
+        if not self._pairs:
+            return []
+        ends = np.array([[self._chain.place(state, end) for end in each] for each in self._ends])
+        middles = ends.mean(axis=1)
+        apart = middles[self._columns[0]] - middles[self._columns[1]]
+        near = np.flatnonzero((apart * apart).sum(axis=1) < (self._reaches + within) ** 2)
+        gaps = (self._gap(state, self._pairs[number], ends, within) for number in near.tolist())
+        return [gap for gap in gaps if gap is not None]
+
+    def _gap(self, state: ChainState, pair: tuple[int, int, float], ends: Array, within: float) -> Gap | None:
+        first, second, radii = pair
+        (a, b), (c, d) = ends[first], ends[second]
+        s, t = nearest_places(a, b, c, d)
+        here, there = a + s * (b - a), c + t * (d - c)
+        apart = here - there
+        length = math.sqrt(apart @ apart)
+        if not TINY < length < radii + within:
+            return None
+        motion = self._motion(state, self._ends[first], here) - self._motion(state, self._ends[second], there)
+        return Gap(length - radii, apart @ motion / length)
+
+    def _motion(self, state: ChainState, ends: tuple[ChainPoint, ChainPoint], place: Array) -> Array:
+        return self._chain.motion(state, ends[0].moving, place)
+
+
+def nearest_places(a: Array, b: Array, c: Array, d: Array) -> tuple[float, float]:
+    """Return where the lines a-b and c-d are nearest to each other, as shares of their lengths.
+
+    Ericson, "Real-Time Collision Detection", 5.1.9.
+    """
+    u, v, w = b - a, d - c, a - c
+    uu, vv, uv, uw, vw = float(u @ u), float(v @ v), float(u @ v), float(u @ w), float(v @ w)
+    if uu <= TINY:
+        return 0.0, 0.0 if vv <= TINY else _share(vw / vv)
+    if vv <= TINY:
+        return _share(-uw / uu), 0.0
+    spread = uu * vv - uv * uv
+    s = _share((uv * vw - uw * vv) / spread) if spread > TINY * uu * vv else 0.0
+    t = (uv * s + vw) / vv
+    if t < 0.0:
+        return _share(-uw / uu), 0.0
+    if t > 1.0:
+        return _share((uv - uw) / uu), 1.0
+    return s, t
+
+
+def _share(value: float) -> float:
+    return min(max(value, 0.0), 1.0)

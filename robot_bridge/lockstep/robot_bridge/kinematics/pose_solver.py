@@ -1,0 +1,228 @@
+"""One step of the joints towards a pose of the tool, by damped least squares.
+
+What comes first when not all is possible: the joints' ranges and rates, the distance between the robot's own parts,
+the position, the rotation as far as the joints that are left can turn it, and last the posture.
+
+Sources: Nakamura and Hanafusa 1986 (damping near singularities), Sugihara 2011 (damping by the error), Chiaverini 1997
+(the later task in the null space of the earlier one, each damped by itself), Faverjon and Tournassoud 1987 (velocity
+dampers before limits), Flacco, De Luca and Khatib 2012 (a joint at its bound is taken out, and the others solve anew).
+"""
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from lockstep.robot_bridge.kinematics.chain import Chain, ChainState
+from lockstep.robot_bridge.kinematics.clearance import Clearance
+from lockstep.robot_bridge.kinematics.rotations import rotation_vector
+
+__all__ = ["JointBounds", "PoseSolver", "Solution", "Tuning"]
+
+Array = npt.NDArray[np.float64]
+
+
+class JointBounds(NamedTuple):
+    """Of each joint of the chain, in its order."""
+
+    lower: tuple[float, ...]  # rad or m
+    upper: tuple[float, ...]
+    rates: tuple[float, ...]  # rad/s or m/s, the fastest
+    ramp: float = 0.06  # s in which a joint changes from rest to its fastest rate, at least
+
+
+class Tuning(NamedTuple):
+    """How the solver moves. The defaults are for an arm of half a metre and ticks of a few milliseconds."""
+
+    gain: float = 20.0  # 1/s: the error decays by that rate
+    longest: float = 0.05  # m, of the position error that is worked on at once
+    widest: float = 0.4  # rad, of the rotation error that is worked on at once
+    small_linear: float = 0.03  # m, singular values of the position's Jacobian below this are damped
+    damping_linear: float = 0.02  # m, at a singular value of zero
+    small_angular: float = 0.15  # the same for the rotation's Jacobian in the null space of the position's
+    damping_angular: float = 0.1
+    bend: float = (
+        0.4  # m: the tool's way bends by at most 1 m for each 1/bend rad² of the joints; about the arm's length
+    )
+    posture: float = 1.0  # 1/s: the pull of the posture in what is left
+    limit_gain: float = 8.0  # 1/s: a joint's speed towards its limit is at most this times the way to it
+    end: float = 0.02  # rad or m from the end of its range, from which on a joint is said to be there
+    safe: float = 0.03  # m, from which on parts that come nearer to each other are slowed
+    close: float = 0.008  # m, at which they come no nearer
+
+
+class Solution(NamedTuple):
+    joints: tuple[float, ...]  # rad or m, the next goals
+    rates: tuple[float, ...]  # rad/s or m/s, that bring them there
+    limited: tuple[int, ...]  # joints that are at the end of their range and would go on
+    near: bool  # parts of the robot are so close to each other that they slow it
+    missing: float  # m, of the position before this step
+
+
+class PoseSolver:
+    """Steps from joint goals to joint goals. It remembers nothing: the caller keeps the goals."""
+
+    def __init__(
+        self,
+        chain: Chain,
+        bounds: JointBounds,
+        *,
+        posture: Sequence[float] | None = None,
+        clearance: Clearance | None = None,
+        turns: bool = True,
+        tuning: Tuning | None = None,
+    ) -> None:
+        """`posture`: joint positions that the joints tend to. `turns`: False if poses have no rotation."""
+        self._chain = chain
+        self._lower, self._upper = np.array(bounds.lower), np.array(bounds.upper)
+        self._rates = np.array(bounds.rates)
+        self._accelerations = self._rates / bounds.ramp
+        self._posture = None if posture is None else np.array(posture)
+        self._clearance = clearance
+        self._turns = turns
+        self._tuning = tuning or Tuning()
+
+    def step(
+        self,
+        joints: Sequence[float],
+        position: Array,
+        rotation: Array,
+        seconds: float,
+        *,
+        velocity: Array | None = None,
+        spin: Array | None = None,
+        share: float = 1.0,
+        before: Sequence[float] | None = None,
+    ) -> Solution:
+        """Return the joint goals after `seconds`.
+
+        `joints`: the goals before. `position` (m) and `rotation` (3 x 3): of the tool. `velocity` (m/s) and `spin`
+        (rad/s): of that pose, so that the tool follows it without lag. `share`: of the joints' rates, 0 to 1.
+        `before`: the rates of the step before; without them a rate may change at once.
+        """
+        here = np.array(joints)
+        state = self._chain.at(joints)
+        tuning = self._tuning
+        error = position - state.position
+        wanted = tuning.gain * _shortened(error, tuning.longest) + (0.0 if velocity is None else velocity)
+        turn, angle = np.zeros(3), 0.0
+        if self._turns:
+            askew = _shortened(rotation_vector(rotation @ state.rotation.T), tuning.widest)
+            angle = float(np.sqrt(askew @ askew))
+            turn = tuning.gain * askew + (0.0 if spin is None else spin)
+        # A goal that cannot be reached leaves an error, whose curvature a step of least squares does not know: the step
+        # would be too long, and the joints would swing. Damping by the error bounds it (Sugihara 2011), and vanishes as
+        # a goal that can be reached is approached.
+        part = tuning.gain * seconds
+        residual = (part * tuning.bend * min(float(np.sqrt(error @ error)), tuning.longest), part * angle)
+        slowest, fastest = self._speeds(here, share)
+        rates, limited = self._within(state, here, (wanted, turn), residual, slowest, fastest)
+        rates, near = self._apart(state, rates)
+        ratio = float(np.max(np.abs(rates) / self._rates)) if share > 0.0 else math.inf
+        rates = rates * (min(1.0, share / ratio) if ratio > 0.0 else 1.0)
+        if before is not None:
+            last, most = np.array(before), self._accelerations * seconds
+            rates = np.clip(rates, last - most, last + most)
+        after = here + np.clip(rates, slowest, fastest) * seconds
+        after = np.clip(after, np.minimum(self._lower, here), np.maximum(self._upper, here))
+        made = tuple(((after - here) / seconds).tolist())
+        return Solution(tuple(after.tolist()), made, limited, near, float(np.linalg.norm(error)))
+
+    def _speeds(self, here: Array, share: float) -> tuple[Array, Array]:
+        """Return each joint's range of speeds: slower near the end of its range, and only inwards beyond it."""
+        gain = self._tuning.limit_gain
+        slowest = np.clip(gain * (self._lower - here), -self._rates, 0.0)
+        fastest = np.clip(gain * (self._upper - here), 0.0, self._rates)
+        return slowest, fastest
+
+    def _within(
+        self,
+        state: ChainState,
+        here: Array,
+        wanted: tuple[Array, Array],
+        residual: tuple[float, float],
+        slowest: Array,
+        fastest: Array,
+    ) -> tuple[Array, tuple[int, ...]]:
+        """Solve; joints that would pass a bound set by their range keep to it, and the others solve anew."""
+        free = np.ones(len(here), dtype=bool)
+        held = np.zeros(len(here))
+        limited: list[int] = []
+        rates = held
+        for _ in range(len(here)):
+            rates = held + self._solve(state, here, wanted, residual, free, held)
+            beyond = free & (
+                ((rates > fastest) & (fastest < self._rates)) | ((rates < slowest) & (slowest > -self._rates))
+            )
+            if not beyond.any():
+                break
+            excess = np.where(beyond, np.maximum(rates - fastest, slowest - rates) / self._rates, 0.0)
+            worst = int(np.argmax(excess))
+            held[worst] = fastest[worst] if rates[worst] > 0.0 else slowest[worst]
+            free[worst] = False
+            limited.append(worst)
+        ended = np.minimum(here - self._lower, self._upper - here) < self._tuning.end
+        return rates, tuple(number for number in limited if ended[number])
+
+    def _solve(
+        self,
+        state: ChainState,
+        here: Array,
+        wanted: tuple[Array, Array],
+        residual: tuple[float, float],
+        free: Array,
+        held: Array,
+    ) -> Array:
+        """Return the rates of the free joints.
+
+        `wanted`: m/s and rad/s of the tool. `residual`: additional damping of position and rotation.
+        """
+        tuning = self._tuning
+        linear = state.linear * free
+        inverse, basis = _damped_inverse(linear, tuning.small_linear, tuning.damping_linear, residual[0])
+        rates = inverse @ (wanted[0] - state.linear @ held)
+        left = np.diag(free.astype(float)) - basis @ basis.T  # the null space of the position, of the free joints
+        if self._turns:
+            angular = state.angular @ left
+            inverse, basis = _damped_inverse(angular, tuning.small_angular, tuning.damping_angular, residual[1])
+            rates = rates + left @ inverse @ (wanted[1] - state.angular @ (rates + held))
+            left = left - basis @ basis.T
+        if self._posture is not None:
+            rates = rates + left @ (tuning.posture * (self._posture - here))
+        return rates * free
+
+    def _apart(self, state: ChainState, rates: Array) -> tuple[Array, bool]:
+        """Slow what brings parts of the robot nearer to each other than is safe."""
+        if self._clearance is None:
+            return rates, False
+        tuning = self._tuning
+        slowed = False
+        for gap in sorted(self._clearance.gaps(state, tuning.safe), key=lambda gap: -gap.distance):
+            most = max(0.0, tuning.limit_gain * (gap.distance - tuning.close))  # m/s, of coming nearer
+            coming = -float(gap.gradient @ rates)
+            steep = float(gap.gradient @ gap.gradient)
+            if coming > most and steep > 1e-9:
+                rates = rates + gap.gradient * ((coming - most) / steep)
+                slowed = True
+        return rates, slowed
+
+
+def _shortened(vector: Array, longest: float) -> Array:
+    length = float(np.sqrt(vector @ vector))
+    return vector if length <= longest else vector * (longest / length)
+
+
+def _damped_inverse(jacobian: Array, small: float, damping: float, residual: float) -> tuple[Array, Array]:
+    """Return the inverse, and a basis of the joints that it uses.
+
+    Directions that are nearly singular are damped, and all of them by `residual` besides. A direction whose singular
+    value is small counts for the basis by the share that the damping leaves of it, so that what is left for later tasks
+    changes without a jump.
+    """
+    left, values, right = np.linalg.svd(jacobian, full_matrices=False)
+    squares = values**2
+    near = damping**2 * np.clip(1.0 - squares / small**2, 0.0, 1.0) + 1e-12
+    shares = np.sqrt(squares / (squares + near))
+    return (right.T * (values / (squares + near + residual))) @ left.T, right.T * shares

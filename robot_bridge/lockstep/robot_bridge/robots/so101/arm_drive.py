@@ -1,0 +1,146 @@
+"""Turns the applied goals into joint goals: those of the joints as they are, a tool's pose by inverse kinematics.
+
+The bridge changes the goals of the set of axes that is driven and leaves the others as they were, so the values tell
+which set is driven. No I/O, no clock.
+"""
+
+import math
+from collections.abc import Sequence
+from typing import Final, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from lockstep.robot_bridge.kinematics.chain import Chain
+from lockstep.robot_bridge.kinematics.pose_solver import PoseSolver
+from lockstep.robot_bridge.kinematics.rotations import from_rotation_vector, rotation_vector
+
+__all__ = ["ArmDrive"]
+
+Array = npt.NDArray[np.float64]
+
+SAME: Final = 1e-9  # rad and m
+SETTLES: Final = 0.12  # s after its goal stood still, in which the tool may still come nearer to it
+SLOWS: Final = 0.08  # s, the last of these, in which it comes to a standstill
+
+
+class _Tool(NamedTuple):
+    position: Array
+    rotation: Array
+    vector: Array  # rad, the rotation as a vector
+
+
+class ArmDrive:
+    """Keeps the joint goals. They never move faster than `rates`, whatever is applied.
+
+    A joint that cannot keep up with the tool's goal leaves the tool behind it. When the goal stands still, because
+    nothing follows or a stop was pressed, the tool comes to rest within SETTLES, whether or not it has arrived.
+    """
+
+    def __init__(self, chain: Chain, solver: PoseSolver, rates: Sequence[float], posture: Sequence[float]) -> None:
+        """`rates`: rad/s of the arm's joints. `posture`: rad, where the arm is."""
+        self._chain = chain
+        self._solver = solver
+        self._rates = tuple(rates)
+        self._count = len(rates)
+        self._goals = tuple(posture)
+        self._before: tuple[float, ...] | None = None  # values of the tick before
+        self._joints: tuple[float, ...] | None = None  # goals of the joints while they are driven
+        self._pose: tuple[float, ...] | None = None  # goals of the tool while it is driven
+        self._motion = np.zeros(6)  # m/s and rad/s, of that goal in the present tick
+        self._solved = (0.0,) * self._count  # rad/s, in the last tick for the tool
+        self._still = math.inf  # s since the pose's goal changed
+        self._tool: _Tool | None = None  # of the present goals
+        self.faults: list[str] = []
+
+    @property
+    def goals(self) -> tuple[float, ...]:
+        """The joints' goals now, rad."""
+        return self._goals
+
+    def hold(self, posture: Sequence[float] | None = None) -> None:
+        """Stay where the goals are, or in a posture, until the values change."""
+        self._goals = self._goals if posture is None else tuple(posture)
+        self._joints = self._pose = self._tool = None
+        self._still = math.inf
+        self.faults = []
+
+    def restart(self) -> None:
+        """Stay where the goals are, whatever the next values are."""
+        self.hold()
+        self._before = None
+
+    def pursued(self) -> list[float]:
+        """Return what the joints' goals are, and the tool's pose at them."""
+        tool = self._at(self._goals)
+        return [*self._goals, *tool.position.tolist(), *tool.vector.tolist()]
+
+    def drive(self, values: Sequence[float], seconds: float) -> Array:
+        """Take the applied goals of joints and pose; return the joints' rates for the coming `seconds`, rad/s."""
+        self._choose(tuple(values), seconds)
+        before = self._goals
+        if self._pose is not None:
+            self._follow_pose(self._pose, seconds)
+        elif self._joints is not None:
+            self._goals = tuple(
+                place + min(max(goal - place, -rate * seconds), rate * seconds)
+                for place, goal, rate in zip(before, self._joints, self._rates, strict=True)
+            )
+        if self._goals is before:
+            return np.zeros(self._count)
+        self._tool = None
+        return (np.array(self._goals) - before) / seconds
+
+    def _choose(self, values: tuple[float, ...], seconds: float) -> None:
+        before, self._before = self._before, values
+        joints, pose = values[: self._count], values[self._count :]
+        self._motion[:] = 0.0
+        if before is None or not all(map(math.isfinite, values)):
+            return
+        if _differ(joints, before[: self._count]):
+            self._joints, self._pose = joints, None
+            self.faults = []
+        elif _differ(pose, before[self._count :]):
+            if self._pose is None:  # in the first tick the goal was read anew, which is no motion
+                self._solved = (0.0,) * self._count
+            else:
+                self._motion = _motion(self._pose, pose) / seconds
+            self._joints, self._pose = None, pose
+            self._still = 0.0
+
+    def _follow_pose(self, pose: tuple[float, ...], seconds: float) -> None:
+        share = min(max((SETTLES - self._still) / SLOWS, 0.0), 1.0)
+        self._still += seconds
+        if share == 0.0:
+            self._solved = (0.0,) * self._count
+            return
+        solution = self._solver.step(
+            self._goals,
+            np.array(pose[:3]),
+            from_rotation_vector(pose[3:]),
+            seconds,
+            velocity=self._motion[:3],
+            spin=self._motion[3:],
+            share=share,
+            before=self._solved,
+        )
+        self._goals, self._solved = solution.joints, solution.rates
+        self.faults = [f"joint limit: {self._chain.joints[number]}" for number in solution.limited]
+        if solution.near:
+            self.faults.append("the arm is close to itself")
+
+    def _at(self, goals: tuple[float, ...]) -> _Tool:
+        if self._tool is None:
+            state = self._chain.at(goals)
+            self._tool = _Tool(state.position, state.rotation, rotation_vector(state.rotation))
+        return self._tool
+
+
+def _differ(values: Sequence[float], others: Sequence[float]) -> bool:
+    return any(abs(value - other) > SAME for value, other in zip(values, others, strict=True))
+
+
+def _motion(before: Sequence[float], after: Sequence[float]) -> Array:
+    """Return the way between two poses, m, and the turn, rad as a rotation vector."""
+    turn = rotation_vector(from_rotation_vector(after[3:]) @ from_rotation_vector(before[3:]).T)
+    return np.concatenate((np.subtract(after[:3], before[:3]), turn))

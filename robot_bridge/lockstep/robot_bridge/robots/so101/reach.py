@@ -1,0 +1,47 @@
+"""What the arm can reach: its chain of joints, and the solver that keeps it within its ranges and off itself."""
+
+from collections.abc import Mapping
+from typing import Final
+
+from lockstep.protocol.description import RobotDescription
+from lockstep.robot_bridge.kinematics.chain import Chain
+from lockstep.robot_bridge.kinematics.clearance import Capsule, Clearance
+from lockstep.robot_bridge.kinematics.pose_solver import JointBounds, PoseSolver, Tuning
+from lockstep.robot_bridge.robots.so101.controls import JOINT_AXES, RATES
+from lockstep.robot_bridge.robots.so101.description import TOOL_BODY
+from lockstep.robot_bridge.robots.so101.model import ARM
+
+__all__ = ["CAPSULES", "PAIRS", "arm_chain", "arm_solver"]
+
+# Through the boxes that the links collide with, whose corners stick out by up to 15 mm. The hand's does not hold the
+# moving jaw.
+CAPSULES: Final[Mapping[str, Capsule]] = {
+    "": Capsule((0.012, 0.0, -0.02), (0.012, 0.0, 0.03), 0.048),  # the foot
+    "arm.shoulder": Capsule((-0.028, 0.0, -0.040), (-0.028, 0.0, 0.025), 0.036),
+    "arm.upper_arm": Capsule((-0.115, -0.008, 0.018), (-0.010, 0.0, 0.018), 0.034),
+    "arm.lower_arm": Capsule((-0.125, 0.003, 0.018), (-0.010, 0.0, 0.018), 0.034),
+    "arm.wrist": Capsule((0.0, -0.055, 0.0235), (0.0, -0.010, 0.0235), 0.040),
+    "arm.gripper": Capsule((-0.003, 0.0, -0.020), (-0.014, 0.0, -0.075), 0.034),
+}
+PAIRS: Final = (
+    ("", "arm.lower_arm"),
+    ("", "arm.wrist"),
+    ("", "arm.gripper"),
+    ("arm.shoulder", "arm.wrist"),
+    ("arm.shoulder", "arm.gripper"),
+    ("arm.upper_arm", "arm.gripper"),
+)
+
+
+def arm_chain(description: RobotDescription) -> Chain:
+    """Return the chain from the foot to the tool; the foot's frame is the world's."""
+    return Chain(description.bodies, TOOL_BODY)
+
+
+def arm_solver(description: RobotDescription, chain: Chain) -> PoseSolver:
+    """Return the solver for the tool's pose."""
+    axes = JOINT_AXES[ARM]
+    bounds = JointBounds(
+        lower=tuple(axis.minimum for axis in axes), upper=tuple(axis.maximum for axis in axes), rates=RATES[ARM]
+    )
+    return PoseSolver(chain, bounds, clearance=Clearance(chain, CAPSULES, PAIRS), tuning=Tuning(safe=0.02, close=0.004))

@@ -1,0 +1,123 @@
+"""The drive between the bridge's shaping of goals and the servos, with an arm of a few bodies in place of the model."""
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from lockstep.protocol.description import Pose
+from lockstep.robot_bridge.control.limits.axis_shaper import AxisShaper
+from lockstep.robot_bridge.kinematics.pose_solver import PoseSolver
+from lockstep.robot_bridge.robots.so101.arm_drive import SETTLES, ArmDrive
+from lockstep.robot_bridge.robots.so101.controls import JOINT_AXES, POSITION_AXES, RATES, ROTATION_AXES
+from tests.robot_bridge.kinematics.arms import BOUNDS, desk_arm
+
+TICK, EVENT, HOLD = 0.004, 0.04, 0.3  # s
+AXES = (*JOINT_AXES[:5], *POSITION_AXES, *ROTATION_AXES)
+POSE = Pose(
+    name="tool",
+    label="Tool",
+    body="hand",
+    position=("tool.x", "tool.y", "tool.z"),
+    rotation=("tool.rx", "tool.ry", "tool.rz"),
+    instead_of=tuple(axis.name for axis in JOINT_AXES[:5]),
+)
+START = (0.1, -0.3, 0.6, 0.7, 0.2)
+SLACK = 1e-9
+
+
+class Spell(NamedTuple):
+    """One goal for a while."""
+
+    drives: str  # "joints", "tool", "nothing"
+    ways: tuple[float, ...]  # rad or m from where the axes are
+    events: int
+
+
+class World:
+    """Arm and bridge in simulated time; the arm is where its goals are."""
+
+    def __init__(self) -> None:
+        self.drive = ArmDrive(desk_arm(), PoseSolver(desk_arm(), BOUNDS), RATES[:5], START)
+        self._shaper = AxisShaper(AXES, hold=HOLD, poses=(POSE,), pursued=self.drive.pursued)
+        self._shaper.begin(self.drive.pursued())
+        self._now = 0.0
+        self.way: list[tuple[float, ...]] = [START]
+
+    def play(self, spell: Spell) -> None:
+        here = self.drive.pursued()
+        numbers = {"joints": range(5), "tool": range(5, 11), "nothing": range(0)}[spell.drives]
+        goals = [here[number] + spell.ways[number] if number in numbers else None for number in range(len(AXES))]
+        for _ in range(spell.events):
+            if spell.drives != "nothing":
+                self._shaper.drive(goals, self._now)
+            self.wait(EVENT)
+
+    def wait(self, seconds: float) -> None:
+        for _ in range(round(seconds / TICK)):
+            before = self.drive.goals
+            rates = self.drive.drive(self._shaper.step(self._now, TICK), TICK)
+            assert self.drive.goals == pytest.approx(np.array(before) + np.array(rates) * TICK, abs=SLACK)
+            self.way.append(self.drive.goals)
+            self._now += TICK
+
+
+joint_ways = st.floats(-0.6, 0.6)
+spells = st.builds(
+    Spell,
+    st.sampled_from(("joints", "tool", "nothing")),
+    st.tuples(*[joint_ways] * 5, *[st.floats(-0.1, 0.1)] * 3, *[joint_ways] * 3),
+    st.integers(1, 12),
+)
+
+
+@pytest.mark.slow
+@settings(max_examples=30)
+@given(st.lists(spells, min_size=1, max_size=6))
+def test_whatever_is_driven_in_turn_no_joint_goal_jumps_or_leaves_its_range_and_all_rest_soon_after(
+    played: Sequence[Spell],
+) -> None:
+    world = World()
+    for spell in played:
+        world.play(spell)
+    world.wait(HOLD + SETTLES + 2 * TICK)
+    rest = world.drive.goals
+    world.wait(0.2)
+    assert world.drive.goals == rest
+    steps = np.abs(np.diff(np.array(world.way), axis=0))
+    assert (steps <= np.array(RATES[:5]) * TICK + SLACK).all()
+    for number, values in enumerate(zip(*world.way, strict=True)):
+        assert JOINT_AXES[number].minimum - SLACK <= min(values)
+        assert max(values) <= JOINT_AXES[number].maximum + SLACK
+
+
+def test_the_first_values_after_a_restart_move_nothing() -> None:
+    world = World()
+    world.play(Spell("joints", (0.3,) * 11, 10))
+    world.drive.restart()
+    held = world.drive.goals
+    for _ in range(10):
+        assert not world.drive.drive([0.0] * 11, TICK).any()
+    assert world.drive.goals == held
+
+
+def test_a_value_that_is_no_number_moves_nothing() -> None:
+    world = World()
+    world.wait(0.04)
+    assert not world.drive.drive([math.nan] * 11, TICK).any()
+
+
+def test_a_held_posture_is_kept_until_the_values_change() -> None:
+    world = World()
+    world.play(Spell("tool", (0.05,) * 11, 4))
+    world.drive.hold(START)
+    world.wait(HOLD + 0.2)
+    settled = world.drive.goals
+    world.wait(0.5)
+    assert world.drive.goals == settled
+    world.play(Spell("joints", (0.2,) * 11, 40))
+    assert world.drive.goals[0] == pytest.approx(settled[0] + 0.2, abs=1e-6)
