@@ -31,7 +31,7 @@ async def _seen(headset: Headset, place: tuple[float, float]) -> list[int]:
     return found
 
 
-def _far(one: list[float], other: list[float]) -> float:
+def _far(one: Sequence[float], other: Sequence[float]) -> float:
     return max(abs(left - right) for left, right in zip(one[:3], other[:3], strict=True))
 
 

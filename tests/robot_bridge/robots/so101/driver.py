@@ -33,7 +33,7 @@ class ArmDriver:
             poses=self.description.poses,
             pursued=robot.goals,
         )
-        self._shaper.begin(robot.measured_axes())
+        self._shaper.begin(robot.measured_axes(), robot.goals())
         self._now = 0.0
         self._event = 1
         self.reached = True
@@ -84,7 +84,7 @@ class ArmDriver:
     def reset(self) -> None:
         """What the bridge does when a stop is released."""
         self.robot.reset()
-        self._shaper.begin(self.robot.measured_axes())
+        self._shaper.begin(self.robot.measured_axes(), self.robot.goals())
 
     def value(self, name: str) -> float:
         """A measured value."""

@@ -44,7 +44,7 @@ class World:
     def __init__(self) -> None:
         self.drive = ArmDrive(desk_arm(), PoseSolver(desk_arm(), BOUNDS), RATES[:5], START)
         self._shaper = AxisShaper(AXES, hold=HOLD, poses=(POSE,), pursued=self.drive.pursued)
-        self._shaper.begin(self.drive.pursued())
+        self._shaper.begin(self.drive.pursued(), self.drive.pursued())
         self._now = 0.0
         self.way: list[tuple[float, ...]] = [START]
 

@@ -3,6 +3,7 @@ import math
 import numpy as np
 import pytest
 
+from lockstep.bench.pick_place import PickAndPlace
 from lockstep.robot_bridge.description.check_description import check_description
 from lockstep.robot_bridge.robots.actions import ActionFailed, ActionNotPossible, ActionRun
 from lockstep.robot_bridge.robots.so101.robot import So101
@@ -170,3 +171,16 @@ def test_a_simulation_that_diverged_begins_anew_and_says_so(arm: ArmDriver) -> N
     assert arm.robot.simulation.restarts == 1
     assert "diverged" in arm.feedback.faults[0]
     assert joints(arm) == pytest.approx(HOME, abs=0.02)
+
+
+def test_a_grip_outlives_a_stop_and_its_reset(arm: ArmDriver) -> None:
+    simulation = arm.robot.simulation
+    task = PickAndPlace(arm.description, "red")
+    feedback = arm.feedback
+    while simulation.place("red_block")[2] < 0.1:
+        feedback = arm.command(task.values(feedback))
+    arm.robot.stop()
+    arm.drive(1.0)
+    arm.reset()
+    arm.drive(1.0)
+    assert simulation.place("red_block")[2] > 0.09
