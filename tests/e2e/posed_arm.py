@@ -51,9 +51,10 @@ class PosedArm(PlanarRobot):
     def __init__(self) -> None:
         super().__init__()
         self._goals = list(START)
-        drawings = zip(EYES, (OverviewDrawing, FrontDrawing), strict=True)
-        self._eyes: tuple[MediaSource, ...] = tuple(
-            CameraSource(eye, kind(eye.width, eye.height).draw, lambda: self._state) for eye, kind in drawings
+        left, right = EYES
+        self._eyes: tuple[MediaSource, ...] = (
+            CameraSource(left, OverviewDrawing(left.width, left.height).draw, lambda: self._state),
+            CameraSource(right, FrontDrawing(right.width, right.height).draw, lambda: self._state),
         )
 
     def describe(self) -> RobotDescription:

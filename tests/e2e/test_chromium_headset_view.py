@@ -1,6 +1,6 @@
 """What both eyes see in an emulated headset: the gate's pictures and none else, veils, a stereo pair, AR."""
 
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Sequence
 
 import pytest
 import pytest_asyncio
