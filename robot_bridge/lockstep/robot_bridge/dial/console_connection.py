@@ -1,6 +1,7 @@
 """One WebSocket from the robot to its console: through TLS, and through the HTTP proxy that the environment names."""
 
 import asyncio
+import socket
 import ssl
 from collections.abc import Mapping
 from pathlib import Path
@@ -12,9 +13,12 @@ from websockets.client import ClientProtocol
 from websockets.exceptions import InvalidHandshake, InvalidStatus, WebSocketException
 from websockets.frames import Frame, Opcode
 from websockets.protocol import Event
+from websockets.proxy import get_proxy
+from websockets.uri import parse_uri
 
 from lockstep.protocol.dial_in import TRUSTED, certificate_pin
 from lockstep.protocol.errors import SecretError
+from lockstep.robot_bridge.dial.tcp_race import connect_first
 from lockstep.robot_bridge.errors import ConsoleRefused, ConsoleUnreachable, WrongConsole
 from lockstep.robot_bridge.link.paced_transport import PacedReader, PacedSocket
 from lockstep.robot_bridge.link.websocket_transport import WebSocketTransport
@@ -158,29 +162,42 @@ async def open_connection(
         made.append(ConsoleConnection(protocol, expected=expected, for_link=for_link, **options))
         return made[-1]
 
+    direct: socket.socket | None = None
     try:
-        opened = await connect(
-            url,
-            ssl=context,
-            additional_headers=dict(headers or {}),
-            compression=None,  # media are compressed already
-            open_timeout=seconds,
-            ping_interval=None,  # links have their own
-            close_timeout=1.0,
-            max_size=MAX_MESSAGE,
-            create_connection=cast(type[ClientConnection], create),
-        )
+        async with asyncio.timeout(seconds):
+            direct = await _direct(url)
+            opened = await connect(
+                url,
+                sock=direct,
+                ssl=context,
+                additional_headers=dict(headers or {}),
+                compression=None,  # media are compressed already
+                open_timeout=None,
+                ping_interval=None,  # links have their own
+                close_timeout=1.0,
+                max_size=MAX_MESSAGE,
+                create_connection=cast(type[ClientConnection], create),
+            )
     except InvalidStatus as error:
         raise _refusal(error) from error
     except ssl.SSLCertVerificationError as error:
         raise WrongConsole(f"the console's certificate is not trusted ({error.verify_message})") from error
-    except (OSError, TimeoutError, InvalidHandshake, WebSocketException, EOFError) as error:
+    except (OSError, TimeoutError, InvalidHandshake, WebSocketException, EOFError, ValueError) as error:
         if made and expected is not None and made[-1].pin not in ("", expected):
             raise WrongConsole(
                 f"another console answers at {url}: its key is {made[-1].pin}, the robot's console has {expected}"
             ) from error
-        raise ConsoleUnreachable(f"{url}: {error or 'no answer'}") from error
+        raise ConsoleUnreachable(f"{url}: {str(error) or 'no answer'}") from error
+    finally:
+        if direct is not None and not made:
+            direct.close()
     return cast(ConsoleConnection, opened)
+
+
+async def _direct(url: str) -> socket.socket | None:
+    """Return a TCP connection to the console; None if the environment names a proxy for it."""
+    where = parse_uri(url)
+    return None if get_proxy(where) is not None else await connect_first(where.host, where.port)
 
 
 def _refusal(error: InvalidStatus) -> ConsoleRefused:

@@ -7,9 +7,9 @@ __all__ = ["RedialTimes"]
 FIRST, SOON, LATE = 0.1, 0.5, 5.0  # s: the first wait, and the longest ones
 SOON_TRIES = 120  # about two minutes of tries; then the console is not coming back soon
 REFUSED = 10.0  # s, after a refusal that only a person can end
-# A SYN that is lost is repeated after 1 and 3 s: a new try finds a path that is back sooner. Every fourth try has time
-# for a path with a long delay.
-PATIENCE = (2.5, 2.5, 2.5, 10.0)  # s
+# A handshake that a cut has caught is given up. Every fourth try has time for a path with a long delay. Within a try,
+# TCP connections race (tcp_race.py).
+PATIENCE = (5.0, 5.0, 5.0, 10.0)  # s
 
 
 class RedialTimes:

@@ -1,0 +1,76 @@
+"""Opens a TCP connection as soon as a path is back.
+
+The kernel repeats a lost SYN after 1, 3 and 7 s. A new connection beside it finds the path sooner.
+"""
+
+import asyncio
+import contextlib
+import socket
+from collections.abc import Awaitable, Callable
+
+__all__ = ["INTERVAL", "MOST", "connect_first"]
+
+INTERVAL = 0.5  # s until the next connection is tried beside those that have no answer yet
+MOST = 4  # at once. The first has time for the longest path; of the others the oldest gives way to a new one
+
+Connect = Callable[[], Awaitable[socket.socket]]
+
+
+async def connect_first(
+    host: str, port: int, *, interval: float = INTERVAL, connect: Connect | None = None
+) -> socket.socket:
+    """Return the first of several connections to `host` that is open. Wait for ever; the caller bounds the time.
+
+    Args:
+        connect: opens one connection; None: by name and TCP
+
+    Raises:
+        OSError: a connection was refused, or there is no way or no such host.
+    """
+    opening: list[asyncio.Task[socket.socket]] = []
+
+    async def open_one() -> socket.socket:
+        return await (_connect(host, port) if connect is None else connect())
+
+    try:
+        while True:
+            if len(opening) == MOST:
+                await _drop([opening.pop(1)])
+            opening.append(asyncio.ensure_future(open_one()))
+            done, _ = await asyncio.wait(opening, timeout=interval, return_when=asyncio.FIRST_COMPLETED)
+            for task in opening:
+                if task in done:
+                    opening.remove(task)
+                    return task.result()
+    finally:
+        await _drop(opening)
+
+
+async def _drop(tasks: list[asyncio.Task[socket.socket]]) -> None:
+    """Cancel these, and close a socket that is open all the same."""
+    for task in tasks:
+        task.cancel()
+    for result in await asyncio.gather(*tasks, return_exceptions=True):
+        if isinstance(result, socket.socket):
+            result.close()
+
+
+async def _connect(host: str, port: int) -> socket.socket:
+    """Open a connection to the first of the host's addresses that takes it."""
+    loop = asyncio.get_running_loop()
+    error: OSError | None = None
+    for family, kind, protocol, _, address in await loop.getaddrinfo(host, port, type=socket.SOCK_STREAM):
+        made = socket.socket(family, kind, protocol)
+        try:
+            made.setblocking(False)
+            await loop.sock_connect(made, address)
+        except OSError as failed:
+            made.close()
+            error = failed
+        except BaseException:
+            with contextlib.suppress(OSError):
+                made.close()
+            raise
+        else:
+            return made
+    raise error or OSError(f"no address of {host}")
