@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from lockstep.protocol.description import Axis, Pose
-from lockstep.robot_bridge.control.command_values import CommandValues
+from lockstep.robot_bridge.control.goals.command_values import CommandValues
 from lockstep.robot_bridge.control.limits.goal_axis import shorter_way
 
 VECTORS = json.loads((Path(__file__).parents[1] / "vectors" / "goals.json").read_text())

@@ -13,9 +13,9 @@ from lockstep.robot_bridge.control import clock
 from lockstep.robot_bridge.control.command_executor import CommandExecutor
 from lockstep.robot_bridge.control.event_core import EventCore
 from lockstep.robot_bridge.control.feedback_issuer import FeedbackIssuer
+from lockstep.robot_bridge.control.goals.measured_axes import MeasuredAxes
 from lockstep.robot_bridge.control.limits.axis_shaper import AxisShaper
 from lockstep.robot_bridge.control.limits.motion_limits import MotionLimits
-from lockstep.robot_bridge.control.measured_axes import MeasuredAxes
 from lockstep.robot_bridge.control.tick_alarm import TickAlarm
 from lockstep.robot_bridge.control.tick_loop import TickLoop
 from lockstep.robot_bridge.counters import BridgeCounters

@@ -9,7 +9,7 @@ import pytest
 from lockstep.protocol.description import RobotDescription
 from lockstep.robot_bridge.conformance import CASES, Outcome, Result, Subject, play
 from lockstep.robot_bridge.conformance.place import Place
-from lockstep.robot_bridge.control.command_values import CommandValues
+from lockstep.robot_bridge.control.goals.command_values import CommandValues
 from lockstep.robot_bridge.control.limits import goal_axis
 from lockstep.robot_bridge.control.limits.axis_shaper import AxisShaper
 from lockstep.robot_bridge.control.limits.goal_axis import GoalAxis

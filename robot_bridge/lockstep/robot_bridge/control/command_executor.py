@@ -10,9 +10,9 @@ from lockstep.robot_bridge.actions.status_issuer import StatusIssuer
 from lockstep.robot_bridge.control.clock import Clock
 from lockstep.robot_bridge.control.event_core import Answered, EventCore, Executed, Refused
 from lockstep.robot_bridge.control.feedback_issuer import FeedbackIssuer
+from lockstep.robot_bridge.control.goals.measured_axes import MeasuredAxes
 from lockstep.robot_bridge.control.limits.axis_shaper import AxisShaper
 from lockstep.robot_bridge.control.limits.motion_limits import MotionLimits
-from lockstep.robot_bridge.control.measured_axes import MeasuredAxes
 from lockstep.robot_bridge.control.start_signal import StartSignal
 from lockstep.robot_bridge.control.tick_alarm import TickAlarm
 from lockstep.robot_bridge.counters import BridgeCounters
@@ -175,11 +175,10 @@ class CommandExecutor:
         """
         if self._shaper.is_known:
             return True
-        self._shaper.begin(self._robot.measured_axes(), self._robot.goals())
+        known = self._shaper.begin(self._robot.measured_axes(), self._robot.goals())
         self._shaper.cut()
-        self._feedback.rested_why = "not driven: the place of a goal axis is not known"
-        if self._shaper.is_known:
-            self._feedback.rested_why = ""
+        self._feedback.rested_why = "" if known else "not driven: the place of a goal axis is not known"
+        if known:
             self._core.need_neutral()
         return False
 

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from lockstep.protocol.description import AxisGain, Joint, Pose, PositionLimit, RobotDescription
-from lockstep.robot_bridge.control.command_values import CommandValues
+from lockstep.robot_bridge.control.goals.command_values import CommandValues
 from lockstep.robot_bridge.control.limits.axis_shaper import AxisShaper
 from lockstep.robot_bridge.control.limits.motion_limits import MotionLimits
 from lockstep.robot_bridge.description.check_description import check_description

@@ -15,8 +15,8 @@ from collections.abc import Callable, Sequence
 
 from lockstep.protocol.description import Axis, Pose
 from lockstep.protocol.neutral import has_goals
+from lockstep.robot_bridge.control.goals.pose_turns import PoseTurns
 from lockstep.robot_bridge.control.limits.goal_axis import GoalAxis
-from lockstep.robot_bridge.control.limits.pose_turns import PoseTurns
 from lockstep.robot_bridge.control.limits.rate_axis import RateAxis
 
 __all__ = ["AxisShaper", "Limiter"]
@@ -74,8 +74,8 @@ class AxisShaper:
         released = self._released
         return all(axis.rate == axis.rest_rate and (released or not axis.is_driven) for axis in self._axes)
 
-    def begin(self, places: Sequence[float], pursued: Sequence[float]) -> None:
-        """Begin to command the goal axes where they are held: at the goals that the robot pursues.
+    def begin(self, places: Sequence[float], pursued: Sequence[float]) -> bool:
+        """Command the goal axes from where they are held: from the goals that the robot pursues. True if all are known.
 
         `places`: measured, one per axis; NaN: not known. If one of the goals is further than its axis' reach from its
         place, the robot is not where it says, and the places count: all, since a pose and its joints belong together.
@@ -87,6 +87,7 @@ class AxisShaper:
         self.is_known = all(axis.is_known for axis in self._axes)
         if self._turns is not None:
             self._turns.begin()
+        return self.is_known
 
     def drive(self, values: Sequence[float | None], now: float, speed: float = 1.0) -> None:
         """Aim for `values`, one per axis, clamped to the axes' limits. Numbers are finite; None: a goal axis stays.

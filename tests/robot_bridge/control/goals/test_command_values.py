@@ -6,8 +6,8 @@ import pytest
 
 from lockstep.protocol.messages import Command
 from lockstep.protocol.serial import event_after
-from lockstep.robot_bridge.control.command_values import CommandValues
 from lockstep.robot_bridge.control.event_core import EventCore, Executed, Refused
+from lockstep.robot_bridge.control.goals.command_values import CommandValues
 from lockstep.robot_bridge.robots.base import Measurement
 from tests.robot_bridge.core_helpers import MAX_AGE, NONCE, reason
 from tests.robot_bridge.goal_helpers import ARM_AXES, HangingArm

@@ -6,8 +6,8 @@ from collections.abc import Callable, Sequence
 from lockstep.protocol.description import Axis, Pose
 from lockstep.protocol.messages import RefusalReason
 from lockstep.protocol.neutral import neutral_values
+from lockstep.robot_bridge.control.goals.shared_joints import SharedJoints
 from lockstep.robot_bridge.control.limits.goal_axis import shorter_way
-from lockstep.robot_bridge.control.limits.shared_joints import SharedJoints
 
 __all__ = ["CommandValues"]
 

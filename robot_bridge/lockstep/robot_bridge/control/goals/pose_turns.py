@@ -9,9 +9,9 @@ import math
 from collections.abc import Callable, Sequence
 
 from lockstep.protocol.description import Axis, Pose
+from lockstep.robot_bridge.control.goals.shared_joints import SharedJoints
 from lockstep.robot_bridge.control.limits.goal_axis import GoalAxis
 from lockstep.robot_bridge.control.limits.rate_axis import RateAxis
-from lockstep.robot_bridge.control.limits.shared_joints import SharedJoints
 
 __all__ = ["PoseTurns"]
 

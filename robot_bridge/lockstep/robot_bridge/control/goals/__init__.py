@@ -1,0 +1,1 @@
+"""What goals mean for a robot: which command carries them, where they begin, which exclude each other."""
