@@ -11,7 +11,7 @@ from lockstep.client import Console, NotArmed
 from lockstep.protocol.messages import Feedback
 from tests.support.stack import Stack
 
-__all__ = ["PATIENCE", "Arm", "environment", "lerobot_python", "reach", "run_lerobot"]
+__all__ = ["PATIENCE", "Arm", "environment", "lerobot_python", "newest", "reach", "run_lerobot"]
 
 ROOT = Path(__file__).parents[2]
 PATIENCE = 200.0  # s; PyTorch takes its time
@@ -53,6 +53,14 @@ class Arm:
 
     def trouble(self, what: str) -> None:
         (self.directory / "trouble").write_text(what)
+
+
+async def newest(console: Console) -> Feedback:
+    """Return the newest feedback; a console that has just connected may have none yet."""
+    if console.feedback is not None:
+        return console.feedback
+    async with asyncio.timeout(PATIENCE):
+        return await anext(console.feedbacks())
 
 
 async def reach(console: Console, goals: dict[str, float]) -> Feedback:

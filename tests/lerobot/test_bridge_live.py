@@ -12,7 +12,7 @@ import lockstep.protocol
 import lockstep.robot_bridge
 from lockstep.client import CommandRefused, Console, ConsoleLost
 from lockstep.protocol.messages import Feedback
-from tests.lerobot.commands import PATIENCE, Arm, environment, lerobot_python, reach
+from tests.lerobot.commands import PATIENCE, Arm, environment, lerobot_python, newest, reach
 from tests.lerobot.conftest import SETTINGS, running_arm
 
 pytestmark = [pytest.mark.long, pytest.mark.timeout(300)]
@@ -36,6 +36,7 @@ async def test_its_axes_are_what_lerobot_calls_them_and_goals_move_it(arm: Arm) 
         }
         assert axes["pan.pos"].maximum == pytest.approx(180.0)
         assert axes["lift.pos"].maximum == pytest.approx(90.0, abs=0.1)
+        await newest(console)
         assert console.feedback is not None
         assert console.feedback.axes == pytest.approx([10.0, -20.0, 50.0])  # nothing has moved it
         await console.take_seat()
@@ -83,8 +84,7 @@ async def test_an_arm_that_fails_or_hangs_ends_the_bridge_which_begins_anew_stop
                     pass
     async with Console(arm.stack.operator, audio=False, connect_seconds=PATIENCE) as console:
         assert console.epoch != epoch
-        assert console.feedback is not None
-        assert console.feedback.stop.stopped
+        assert (await newest(console)).stop.stopped
 
 
 async def test_the_bridge_leaves_the_torque_on_although_lerobot_would_switch_it_off(tmp_path: Path) -> None:
@@ -108,6 +108,7 @@ async def test_the_torque_goes_at_the_end_where_the_settings_say_so(tmp_path: Pa
             await console.reset()
             fallen = await console.arm()
             await asyncio.sleep(0.5)
+            await newest(console)
             assert console.feedback is not None
             assert console.feedback.axes[1] <= fallen.axes[1] + 1.0  # it does not leap back up
             assert (await reach(console, {"lift.pos": -20.0})).axes[1] == pytest.approx(-20.0, abs=2.0)

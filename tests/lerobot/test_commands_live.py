@@ -16,7 +16,7 @@ import pytest
 from lockstep.bench.harness.processes import running_process
 from lockstep.bench.harness.stack import LOCKSTEP
 from lockstep.client import CommandRefused, Console
-from tests.lerobot.commands import PATIENCE, Arm, environment, lerobot_python, reach, run_lerobot
+from tests.lerobot.commands import PATIENCE, Arm, environment, lerobot_python, newest, reach, run_lerobot
 
 pytestmark = [pytest.mark.long, pytest.mark.timeout(400)]
 
@@ -86,6 +86,7 @@ async def test_record_makes_a_dataset_whose_pictures_are_of_its_states_and_repla
     assert len(await arm.stack.events("executed")) > FPS
     async with Console(link, audio=False, video=False) as console:
         assert console.seat.holder == ""  # given back
+        await newest(console)
         assert console.feedback is not None
         assert console.feedback.at_rest
 
@@ -109,6 +110,7 @@ async def test_teleoperate_drives_and_leaves_the_arm_at_rest(arm: Arm, tmp_path:
             task.cancel()
             await asyncio.wait([task])
         assert max(places) - min(places) > 10.0
+        await newest(watching)
         assert watching.feedback is not None
         assert watching.feedback.at_rest
 

@@ -12,7 +12,7 @@ import pytest
 
 from lockstep.bench.harness.stack import LOCKSTEP
 from lockstep.client import Console
-from tests.lerobot.commands import PATIENCE, Arm, environment, lerobot_python
+from tests.lerobot.commands import PATIENCE, Arm, environment, lerobot_python, newest
 
 pytestmark = [pytest.mark.long, pytest.mark.timeout(300)]
 
@@ -91,6 +91,7 @@ async def test_the_leader_drives_only_while_the_key_is_held(arm: Arm, tmp_path: 
         driving(tmp_path, arm.stack.operator, *leader) as terminal,
     ):
         await terminal.says("hold the space bar")
+        await newest(watching)
         assert watching.feedback is not None
         start = list(watching.feedback.axes)
         goals: list[float] = []

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from lockstep.client import Console
-from tests.lerobot.commands import PATIENCE, reach
+from tests.lerobot.commands import PATIENCE, newest, reach
 from tests.lerobot.conftest import running_arm
 from tests.lerobot.parts.feetech_bus import FeetechBus
 
@@ -61,6 +61,7 @@ async def test_its_joints_are_degrees_and_follow_goals_and_its_torque_stays_on(b
         assert list(axes) == [f"{name}.pos" for name in NAMES]
         assert [axis.unit for axis in axes.values()] == ["deg"] * 5 + ["%"]
         assert axes["elbow_flex.pos"].maximum == pytest.approx(1024 / STEPS_PER_DEGREE)
+        await newest(console)
         assert console.feedback is not None
         axes_now = console.feedback.axes
         assert [*axes_now[:1], *axes_now[2:]] == pytest.approx([0.0] * 4 + [50.0], abs=0.2)
