@@ -51,9 +51,10 @@ class PosedArm(PlanarRobot):
     def __init__(self) -> None:
         super().__init__()
         self._goals = list(START)
-        drawings = zip(EYES, (OverviewDrawing, FrontDrawing), strict=True)
+        left, right = EYES
+        drawings = OverviewDrawing(left.width, left.height).draw, FrontDrawing(right.width, right.height).draw
         self._eyes: tuple[MediaSource, ...] = tuple(
-            CameraSource(eye, kind(eye.width, eye.height).draw, lambda: self._state) for eye, kind in drawings
+            CameraSource(eye, draw, lambda: self._state) for eye, draw in zip(EYES, drawings, strict=True)
         )
 
     def describe(self) -> RobotDescription:
