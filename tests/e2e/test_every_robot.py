@@ -58,6 +58,7 @@ ROBOTS = [
     pytest.param(registered("mobile-manipulator"), id="mobile-manipulator"),
     pytest.param(registered("micromanipulator"), id="micromanipulator"),
     pytest.param(own_model, id="mjcf"),
+    pytest.param(registered("tests.e2e.goal_arm:GoalArm"), id="goal-axes"),
     pytest.param(ros("base.yaml"), id="ros2-base", marks=needs_ros),
     pytest.param(ros("arm.yaml"), id="ros2-arm", marks=needs_ros),
     pytest.param(in_c, id="c"),

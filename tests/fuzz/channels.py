@@ -34,7 +34,7 @@ def message(channel: ChannelName, data: str | bytes) -> None:
 
 
 def _has_nan(found: ClientMessage) -> bool:
-    return isinstance(found, Command) and any(math.isnan(value) for value in found.values)
+    return isinstance(found, Command) and any(value is not None and math.isnan(value) for value in found.values)
 
 
 def label(text: str) -> None:

@@ -228,7 +228,9 @@ def hostile_operator(clock: Clock, data: bytes, code: int) -> None:
 
 
 def is_sound(command: Command) -> bool:
-    return len(command.values) == len(REST) and all(map(math.isfinite, command.values))
+    return len(command.values) == len(REST) and all(
+        value is not None and math.isfinite(value) for value in command.values
+    )
 
 
 def trickle(clock: Clock, data: bytes, code: int) -> None:

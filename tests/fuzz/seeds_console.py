@@ -98,6 +98,7 @@ def channel_seeds() -> dict[str, bytes]:
     )
     messages: dict[str, ClientMessage] = {
         "command": Command(event=2, issue=1, values=[0.1, -0.2, 0.0]),
+        "command-goals": Command(event=2, issue=1, values=[0.1, None, -1.5], speed=0.25),
         "rest": Rest(event=2),
         "ping": Ping(id=7),
         "report": report,

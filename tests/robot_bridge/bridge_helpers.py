@@ -21,10 +21,11 @@ from lockstep.protocol.messages import (
     decode_message,
     encode_message,
 )
+from lockstep.protocol.neutral import neutral_values
 from lockstep.protocol.serial import FIRST_EVENT, event_after
 from lockstep.robot_bridge.bridge import Bridge
 from lockstep.robot_bridge.link.link_client import RobotLink
-from lockstep.robot_bridge.robots.base import MediaSource
+from lockstep.robot_bridge.robots.base import MediaSource, Robot
 from lockstep.robot_bridge.robots.planar.robot import PlanarRobot, PlanarState
 from lockstep.robot_bridge.settings import BridgeSettings
 from tests.waiting import PATIENCE
@@ -101,7 +102,7 @@ class RecordingRobot(PlanarRobot):
 
 @asynccontextmanager
 async def running_bridge(
-    robot: PlanarRobot | None = None, *, event_log: Path | None = None, first_event: int = FIRST_EVENT
+    robot: Robot | None = None, *, event_log: Path | None = None, first_event: int = FIRST_EVENT
 ) -> AsyncIterator[Bridge]:
     """Runs a bridge; afterwards no connection and no task of it may be left."""
     settings = BridgeSettings(port=0, event_log=event_log, first_event=first_event)
@@ -139,7 +140,7 @@ class Operator:
                     return message
         raise AssertionError("the link was closed")
 
-    def command(self, values: list[float] = DRIVE) -> Command:
+    def command(self, values: Sequence[float | None] = DRIVE) -> Command:
         newest = self.feedback
         return Command(event=event_after(newest.event), issue=newest.issue, values=values, nonce=newest.nonce)
 
@@ -149,11 +150,11 @@ class Operator:
             await self.drive(list(self._neutral))
 
     @property
-    def _neutral(self) -> Sequence[float]:
+    def _neutral(self) -> Sequence[float | None]:
         description = self.link.hello.description
-        return [axis.rest for axis in description.axes] if description is not None else []
+        return neutral_values(description.axes) if description is not None else []
 
-    async def drive(self, values: list[float] = DRIVE) -> Feedback:
+    async def drive(self, values: Sequence[float | None] = DRIVE) -> Feedback:
         """Send the next command and wait for its feedback. A bridge that was held up gets its neutral command first."""
         command = self.command(values)
         self.link.send(command)

@@ -1,12 +1,13 @@
 """A robot with goal axes for tests: it hangs below its goals, and its tool is driven in place of its joints."""
 
 import asyncio
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import msgspec
 
 from lockstep.protocol.description import Axis, Body, Pose, RobotDescription
 from lockstep.robot_bridge.robots.base import Measurement, Robot
+from tests.waiting import PATIENCE
 
 __all__ = ["ARM_AXES", "BASE", "ELBOW", "SHOULDER", "TURN", "HangingArm", "X", "Z"]
 
@@ -38,8 +39,10 @@ class HangingArm(Robot):
     It is measured `sag` below its goals, which a servo without an integral part does under a load.
     """
 
-    def __init__(self, sag: float = 0.0) -> None:
+    def __init__(self, sag: float = 0.0, falls: float = 0.0) -> None:
+        """`falls`: how far the joints fall when the robot's own stop cuts their power; 0: it holds them."""
         self.sag = sag
+        self._falls = falls
         self.applied: list[list[float]] = []
         self.calls: list[str] = []
         self.pursued = [0.0, 0.2, 0.4, 0.0, 0.6, -0.2]
@@ -62,6 +65,7 @@ class HangingArm(Robot):
                 ),
             ),
             max_event_rate=200,
+            watchdog=0.28,  # the machine that runs the tests may hold up the ticks
         )
 
     def apply(self, values: Sequence[float]) -> None:
@@ -75,9 +79,15 @@ class HangingArm(Robot):
         self.pursued = [base, shoulder, elbow, turn, shoulder + elbow, shoulder - elbow]
         self._ticked.set()
 
-    async def tick_passes(self) -> None:
-        self._ticked.clear()
-        await self._ticked.wait()
+    async def until(self, condition: Callable[[], bool], what: str) -> None:
+        """Wait until the condition holds after a tick."""
+        try:
+            async with asyncio.timeout(PATIENCE):
+                while not condition():
+                    self._ticked.clear()
+                    await self._ticked.wait()
+        except TimeoutError:
+            raise AssertionError(f"never happened: {what}") from None
 
     def goals(self) -> Sequence[float]:
         return self.pursued
@@ -94,6 +104,10 @@ class HangingArm(Robot):
 
     def stop(self) -> None:
         self.calls.append("stop")
+        if self._falls:
+            self.sag = self._falls
 
     def reset(self) -> None:
         self.calls.append("reset")
+        if self._falls:
+            self.pursued, self.sag = list(self.measured_axes()), 0.0

@@ -181,7 +181,7 @@ class Bridge:
         self._log.record("start", self._core.current, epoch=self.epoch, stopped=stop.stopped, number=stop.number)
         try:
             if self._shaper.has_goals:
-                self._shaper.begin(self._robot.measured_axes())
+                self._shaper.begin(self._robot.measured_axes(), self._robot.goals())
             feedback = self._feedback.issue()
         except BaseException as error:  # an adapter may raise one that ends the loop or cancels the task
             self._stops.fail(error)

@@ -378,7 +378,7 @@ class Robot(RuleBasedStateMachine):
         super().__init__()
         self.now = 0.0
         self.event = MAX_EVENT - 3
-        self.executed: list[tuple[int, list[float]]] = []
+        self.executed: list[tuple[int, list[float | None]]] = []
         self.issue = 1
         self.sender = new_sender(self.event)
         self.network: list[Command] = []
@@ -414,7 +414,7 @@ class Robot(RuleBasedStateMachine):
         command = self.network[index] if keep else self.network.pop(index)
         if command.event == event_after(self.event):
             self.event, self.issue = command.event, 1
-            self.executed.append((command.event, command.values))
+            self.executed.append((command.event, list(command.values)))
         self.answers.append((self.event, self.issue))
 
     @rule()
@@ -442,3 +442,57 @@ class Robot(RuleBasedStateMachine):
 
 Robot.TestCase.settings = settings(max_examples=60, stateful_step_count=40, deadline=None)
 TestPilotAgainstARobot = Robot.TestCase
+
+
+class TestGoals:
+    """Of a rate axis and a goal axis."""
+
+    NEUTRAL = (0.5, None)
+
+    def sender(self) -> CommandSender:
+        sender = CommandSender(CommandGate("feedback", 4, 0.0), self.NEUTRAL)
+        sender.feedback(feedback(1), 0.0)
+        sender.ready = True
+        return sender
+
+    def test_a_command_and_its_repeats_carry_the_goals_and_the_speed(self) -> None:
+        sender = self.sender()
+        sender.intend([0.5, 1.0], 0.0, 0.25)
+        assert sender.due(0.0) == [Command(event=2, issue=1, values=[0.5, 1.0], speed=0.25)]
+        sender.intend([0.5, 1.5], 0.05, 0.75)
+        assert sender.due(INITIAL) == [Command(event=2, issue=1, values=[0.5, 1.5], speed=0.75)]
+
+    def test_a_goal_of_zero_moves_and_null_does_not(self) -> None:
+        sender = self.sender()
+        sender.intend([0.5, 0.0], 0.0)
+        [moving] = commands(sender.due(0.0))
+        assert not sender.moves_nothing(moving)
+        sender.feedback(feedback(2), 0.01)
+        [idle] = commands(sender.due(IDLE + TURN))
+        assert (idle.values, idle.speed) == (list(self.NEUTRAL), 1.0)
+        assert sender.moves_nothing(idle)
+
+    def test_arming_and_resting_let_goal_axes_stay(self) -> None:
+        sender = self.sender()
+        sender.arm()
+        [neutral] = commands(sender.due(0.0))
+        assert neutral.values == list(self.NEUTRAL)
+        sender.feedback(feedback(2), 0.01)
+        sender.intend([0.5, 1.0], 0.02, 0.5)
+        sender.due(0.02)
+        sender.feedback(feedback(3, at_rest=False), 0.03)
+        sender.rest(0.04)
+        messages = sender.due(0.04)
+        assert rests(messages)
+        assert [(each.values, each.speed) for each in commands(messages)] == [(list(self.NEUTRAL), 1.0)]
+
+    def test_a_jump_is_not_tried_again(self) -> None:
+        sender = self.sender()
+        sender.intend([0.5, 9.0], 0.0)
+        sender.due(0.0)
+        sender.refusal(refusal(2, "jump"))
+        [outcome] = sender.outcomes()
+        assert outcome.refusal is not None
+        assert outcome.refusal.reason == "jump"
+        assert sender.due(10.0) == []
+        assert not sender.ready

@@ -23,7 +23,7 @@ async def test_a_reader_gets_from_the_template_to_a_checked_bridge_in_two_langua
         reader.compare(await reader.run("lockstep check"))
     async with reader.running("cc -O2", "tcp://"):
         check, console = reader.take("lockstep check").splitlines()
-        assert "40 ok, 11 not applicable" in await reader.type(check)
+        assert "40 ok, 20 not applicable" in await reader.type(check)
         async with reader.process(f"{console} --port {reader.port('8000')}", "To drive"):
             assert '"robot_link":"up"' in await reader.type(f"curl -s http://127.0.0.1:{reader.port('8000')}/healthz")
     assert reader.left == []

@@ -189,7 +189,7 @@ class PlainBridge:
                 command = msgspec.structs.replace(command, event=event_after(self.event))
                 self.execute(command)
             elif self.fault is Fault.REPEATS_HOLD:
-                self.executed, self.values = time.monotonic(), list(command.values)
+                self.executed, self.values = time.monotonic(), numbers(command)
                 self.tell("operator", self.newest)
             else:
                 self.tell("operator", self.newest)
@@ -206,7 +206,7 @@ class PlainBridge:
     def is_proper(self, command: Command) -> RefusalReason | None:
         if len(command.values) != len(NEUTRAL):
             return "wrong_size"
-        if not all(map(math.isfinite, command.values)) and self.fault is not Fault.NAN_EXECUTES:
+        if not all(map(is_number, command.values)) and self.fault is not Fault.NAN_EXECUTES:
             return "not_a_number"
         return "stopped" if self.stop.stopped else None
 
@@ -226,7 +226,7 @@ class PlainBridge:
         return "not_neutral" if self.neutral_needed and self.fault is not Fault.NO_NEUTRAL else None
 
     def execute(self, command: Command) -> None:
-        self.executed, self.values = time.monotonic(), list(command.values)
+        self.executed, self.values = time.monotonic(), numbers(command)
         if command.values == NEUTRAL:
             self.neutral_needed = False
             self.presses.clear()
@@ -356,6 +356,15 @@ class PlainBridge:
             send(writer, Goodbye(error="framing"))
             return None
         return await reader.readexactly(length)
+
+
+def is_number(value: float | None) -> bool:
+    return value is not None and math.isfinite(value)
+
+
+def numbers(command: Command) -> list[float]:
+    """The values; this robot has no goal axes, for which null would be one."""
+    return [value for value in command.values if value is not None]
 
 
 def released(stop: StopState) -> StopState:

@@ -43,6 +43,7 @@ SAID = {  # of those that another fault could bring to the same end
 }
 
 
+GOALS = [case.name for case in CASES if case.name.startswith("goal")]
 MOTIONS = [case.name for case in CASES if case.name.startswith("action_") and case.name != "action_unknown"]
 
 
@@ -56,6 +57,7 @@ async def test_a_bridge_written_from_the_page_passes() -> None:
     assert {result.case.name: result.detail for result in results if result.outcome is not Outcome.OK} == {
         "secret": "no link secret was given",
         "warning": "the description has no start_warning",
+        **dict.fromkeys(GOALS, "the description has no goal axes"),
         "action_unknown": "the description has no actions",
         **dict.fromkeys(MOTIONS, "no action that moves the robot can be begun without a person"),
     }

@@ -8,6 +8,7 @@ from lockstep.robot_bridge.control.coming_to_rest import PATIENCE, REPEATS, Comi
 from lockstep.robot_bridge.control.limits.axis_shaper import AxisShaper
 from lockstep.robot_bridge.robots.planar.description import DESCRIPTION
 from lockstep.robot_bridge.robots.planar.robot import PlanarRobot
+from tests.robot_bridge.goal_helpers import ARM_AXES, HangingArm
 
 DT = PlanarRobot.tick_seconds
 BRAKE = DESCRIPTION.axes[0].brake
@@ -116,3 +117,41 @@ def test_a_stop_that_raises_is_tried_again() -> None:
     robot = Failing(stop=2)
     ComingToRest(robot, driving(), DESCRIPTION.hold, 0.0).stop()
     assert robot.stops == 1
+
+
+def arm_in_motion() -> tuple[HangingArm, AxisShaper]:
+    robot = HangingArm()
+    shaper = AxisShaper(ARM_AXES, hold=0.3)
+    shaper.begin(robot.measured_axes(), robot.goals())
+    for tick in range(20):
+        shaper.drive([0.0, 1.0, None, None, None, None], tick * DT)
+        robot.apply(shaper.step(tick * DT, DT))
+    return robot, shaper
+
+
+def test_a_goal_brakes_and_stays_where_it_has_come_to() -> None:
+    robot, shaper = arm_in_motion()
+    moving, driven = robot.pursued[1], len(robot.applied)
+    leaving = ComingToRest(robot, shaper, 0.3, 0.0)
+    steps_until_done(leaving)
+    assert leaving.rests
+    goals = [values[1] for values in robot.applied[driven:]]
+    assert goals == sorted(goals)
+    assert moving < goals[-1] < moving + ARM_AXES[1].slew ** 2 / (2 * ARM_AXES[1].brake) + ARM_AXES[1].slew * DT
+
+
+def test_after_an_apply_that_raised_a_goal_stands_still_at_once() -> None:
+    robot, shaper = arm_in_motion()
+    ComingToRest(robot, shaper, 0.3, 0.0).at_once()
+    assert [values[1] for values in robot.applied[-REPEATS:]] == [robot.applied[-REPEATS - 1][1]] * REPEATS
+
+
+def test_where_a_goal_was_never_known_nothing_is_applied_and_the_robots_own_stop_is_called() -> None:
+    robot = HangingArm()
+    shaper = AxisShaper(ARM_AXES, hold=0.3)
+    leaving = ComingToRest(robot, shaper, 0.3, 0.0)
+    steps_until_done(leaving)
+    leaving.stop()
+    assert leaving.rests
+    assert robot.applied == []
+    assert robot.calls == ["stop"]

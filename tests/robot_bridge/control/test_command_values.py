@@ -109,14 +109,17 @@ class Operator:
         self.outcome = self.core.command(command, now)
         return reason(self.outcome)
 
+    @property
+    def detail(self) -> str:
+        return self.outcome.refusal.detail if isinstance(self.outcome, Refused) else ""
+
 
 def test_a_jump_executes_nothing_and_its_event_is_not_used_up() -> None:
     operator = Operator()
     assert operator.send(STAY) == "executed"
     operator.issue()
     assert operator.send(values(shoulder=1.0)) == "jump"
-    assert isinstance(operator.outcome, Refused)
-    assert operator.outcome.refusal.detail == "shoulder: 0.8 rad from where it is; its reach is 0.5"
+    assert operator.detail == "shoulder: 0.8 rad from where it is; its reach is 0.5"
     assert operator.core.pending is None
     assert operator.send(values(shoulder=0.5)) == "executed"
     assert operator.outcome == Executed(3, values(shoulder=0.5), 1.0)

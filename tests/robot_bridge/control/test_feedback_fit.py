@@ -9,6 +9,7 @@ from lockstep.protocol.messages import MAX_FAULTS, Feedback, Goodbye, Hello, Sto
 from lockstep.robot_bridge.control.feedback_fit import misfit
 from lockstep.robot_bridge.link.link_session import BadInput, ClientSession
 from lockstep.robot_bridge.robots.planar.description import DESCRIPTION
+from tests.robot_bridge.goal_helpers import HangingArm
 
 FEEDBACK = Feedback(
     event=1, issue=1, time=0.0, axes=[0.0] * len(DESCRIPTION.axes), joints=[0.0] * len(DESCRIPTION.joints)
@@ -37,6 +38,26 @@ def changed(**changes: object) -> Feedback:
 )
 def test_a_feedback_has_what_the_description_says_and_numbers_only(feedback: Feedback, wrong: str) -> None:
     assert misfit(feedback, DESCRIPTION) == wrong
+
+
+@pytest.mark.parametrize(
+    ("goals", "wrong"),
+    [
+        ([None, 0.2, 0.4, 0.0, 0.6, -0.2], ""),
+        ([None, 0.2, None, 0.0, 0.6, -0.2], ""),
+        ([], "a feedback with 0 goals"),
+        ([0.0, 0.2, 0.4, 0.0, 0.6, -0.2], "a feedback with a goal of axis base that cannot be"),
+        ([None, math.nan, 0.4, 0.0, 0.6, -0.2], "a feedback with a goal of axis shoulder that cannot be"),
+        ([None, 0.2, 1e13, 0.0, 0.6, -0.2], "a feedback with a goal of axis elbow that cannot be"),
+    ],
+)
+def test_a_feedback_has_a_goal_for_goal_axes_only(goals: list[float | None], wrong: str) -> None:
+    feedback = Feedback(event=1, issue=1, time=0.0, axes=[0.0] * 6, goals=goals)
+    assert misfit(feedback, HangingArm().describe()) == wrong
+
+
+def test_a_robot_without_goal_axes_has_no_goals() -> None:
+    assert misfit(changed(goals=[None] * len(FEEDBACK.axes)), DESCRIPTION) == "a feedback with 3 goals"
 
 
 def test_a_console_takes_no_feedback_that_it_could_not_show_and_goes_on() -> None:

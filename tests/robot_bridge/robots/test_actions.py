@@ -24,7 +24,7 @@ def run(robot: Robot, name: str) -> ActionStep:
         if step.done:
             assert all(0 <= share <= 1 for share in shares)
             return step
-        robot.apply(rest if step.values is None else step.values)
+        robot.apply(rest if step.values is None else [value for value in step.values if value is not None])
         robot.tick()
     raise AssertionError(f"{name} does not end")
 

@@ -144,8 +144,8 @@ def test_a_recording_without_goal_axes_has_none_to_look_at(tmp_path: Path) -> No
     ("kind", "values", "words"),
     [
         (FeedbackRecord, {"goals": [None, 1.5]}, "the applied goal of j1 moved by"),
-        (FeedbackRecord, {"goals": []}, "one applied goal for each goal axis"),
-        (FeedbackRecord, {"goals": [0.0, 0.7]}, "one applied goal for each goal axis"),
+        (FeedbackRecord, {"goals": []}, "a feedback has no applied goals"),
+        (FeedbackRecord, {"goals": [0.0, 0.7]}, "a goal of base.vx"),
         (CommandRecord, {"values": [0.5, 1.9]}, "a goal of j1 was"),
         (CommandRecord, {"values": [None, 0.7]}, "a command has no value for base.vx"),
     ],

@@ -267,9 +267,6 @@ def test_a_goal_across_the_border_of_an_axis_that_turns_on_and_on_is_drawn_the_s
         axes=(_goal_axis("shoulder", wrap=2 * math.pi),),
         joints=ARM.joints[:1],
         bodies=(Body(name="arm", parent="", joints=(BodyJoint(joint="shoulder", kind="revolute", axis=Z),)),),
-        position_limits=(
-            PositionLimit(name="l", label="L", joint="shoulder", maximum=9, axes=(AxisGain(axis="shoulder"),)),
-        ),
     )
     path = CommandedPath(description)
     path.command(2, [-3.0])

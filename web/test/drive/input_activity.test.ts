@@ -73,6 +73,17 @@ describe("a deadman that is taped down", () => {
     expect(tapedAfter(moved, 2 * MINUTE_MS)).toBeNull();
   });
 
+  it("is not one whose slider is moved a little now and then", () => {
+    const dragged = (now: number): HeldInputs => ({
+      pad: null,
+      keys: new Set(),
+      touch: null,
+      sliders: { travels: { elbow: 0.001 * Math.floor(now / 20_000) }, pushes: {} },
+    });
+    expect(tapedAfter(dragged, 2 * MINUTE_MS)).toBeNull();
+    expect(tapedAfter(() => dragged(0), 2 * MINUTE_MS)).toBe(MINUTE_MS);
+  });
+
   it("is not one with another key from time to time", () => {
     const typed = (now: number): HeldInputs => ({
       pad: null,

@@ -36,8 +36,11 @@ LOOK = """(streams) => ({
 })"""
 
 
-def pad_axes(layer: ControlLayer, axes: Sequence[Axis], values: Sequence[float]) -> dict[int, float]:
-    """Return the sticks' positions for `values`: -1 to 1 by the number of the pad's axis. Buttons stay untouched."""
+def pad_axes(layer: ControlLayer, axes: Sequence[Axis], values: Sequence[float | None]) -> dict[int, float]:
+    """Return the sticks' positions for `values`: -1 to 1 by the number of the pad's axis. Buttons stay untouched.
+
+    A stick moves a goal axis for as long as it is held, by the share of `reach` that its value is; None: not at all.
+    """
     by_name = {axis.name: (axis, value) for axis, value in zip(axes, values, strict=True)}
     found: dict[int, float] = {}
     for binding in layer.bindings:
@@ -45,6 +48,10 @@ def pad_axes(layer: ControlLayer, axes: Sequence[Axis], values: Sequence[float])
         if number is None or binding.axis not in by_name:
             continue
         axis, value = by_name[binding.axis]
+        if axis.kind == "goal" or value is None:
+            share = 0.0 if value is None or not axis.reach else min(max(value / axis.reach, -1.0), 1.0)
+            found[number] = -share if binding.invert_pad else share
+            continue
         reach = (axis.maximum if value > axis.rest else 2 * axis.rest - axis.minimum) - axis.rest
         share = (value - axis.rest) / reach if reach else 0.0
         found[number] = -share if binding.invert_pad else share
@@ -122,9 +129,9 @@ class BrowserClient:
         """
         page, axes, layer = self._page.page, self.description.axes, self.description.layers[0]
         began = time.monotonic()
-        held = False
+        held, offsets = False, [0.0] * len(axes)  # a stick says how far, not where
         while (elapsed := time.monotonic() - began) < seconds:
-            move = script.at(elapsed)
+            move = script.at(elapsed, offsets)
             tilts = [[number, value] for number, value in pad_axes(layer, axes, move.values).items()]
             await page.evaluate("(tilts) => tilts.forEach(([axis, value]) => window.testPad.tilt(axis, value))", tilts)
             if held == move.pause:

@@ -14,7 +14,7 @@ from lockstep.bench.experiment.judge.age_gate import client_gate
 from lockstep.bench.experiment.judge.record import Arrival, ClientRecord, Gate, Rendered
 from lockstep.bench.experiment.observation import Look, Observation
 from lockstep.bench.experiment.operator_script import OperatorScript
-from lockstep.bench.harness.driving import drive_on
+from lockstep.bench.harness.driving import applied_goals, drive_on
 from lockstep.client import Console, ConsoleLost, Picture
 from lockstep.client.control.command_gate import Pacing
 from lockstep.robot_bridge.robots.event_strip import read_event_strip
@@ -85,7 +85,7 @@ class HeadlessClient:
         """Follow the script: one command at a time, each as the answer to the last feedback."""
         began = time.monotonic()
         while (elapsed := time.monotonic() - began) < seconds:
-            move = script.at(elapsed)
+            move = script.at(elapsed, applied_goals(self._console))
             try:
                 async with asyncio.timeout(began + seconds - time.monotonic()):
                     await drive_on(self._console, move.values)

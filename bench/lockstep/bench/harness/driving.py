@@ -8,12 +8,22 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
 
 from lockstep.client import Console, NotArmed
-from lockstep.protocol.description import RobotDescription
+from lockstep.protocol.description import Axis, RobotDescription
 from lockstep.protocol.messages import Command, Feedback, Refusal
+from lockstep.protocol.neutral import neutral_values
 from lockstep.protocol.serial import event_after
 from lockstep.robot_bridge.link.link_client import RobotLink
 
-__all__ = ["Pause", "Trip", "console_trips", "drive_on", "link_trips", "round_and_round"]
+__all__ = [
+    "Pause",
+    "Trip",
+    "applied_goals",
+    "axis_values",
+    "console_trips",
+    "drive_on",
+    "link_trips",
+    "round_and_round",
+]
 
 SPEEDS = {"base.vx": 0.15, "base.wz": 0.6, "tool.vz": 0.03}  # the base drives a circle of 0.25 m; the tool nods
 TICK = 0.004  # s, the robot's control tick
@@ -35,13 +45,34 @@ class Trip(NamedTuple):
         return self.answered - self.sent
 
 
-def round_and_round(description: RobotDescription) -> Callable[[float], list[float]]:
-    """Return a function from a time to the values of each axis; a robot that follows them stays where it is."""
+def applied_goals(console: Console) -> Sequence[float | None]:
+    """Return the applied goals of the newest feedback; empty before the first, and for a robot without goal axes."""
+    return () if console.feedback is None else console.feedback.goals
 
-    def values(now: float) -> list[float]:
+
+def axis_values(axes: Sequence[Axis], speeds: Mapping[int, float]) -> list[float | None]:
+    """Return `speeds` by the axes' numbers, -1 for the last. The others move nothing, nor do goal axes: a number there
+    would be a place."""
+    values = neutral_values(axes)
+    for number, speed in speeds.items():
+        if axes[number].kind == "rate":
+            values[number] = speed
+    return values
+
+
+def round_and_round(description: RobotDescription) -> Callable[[float], list[float | None]]:
+    """Return a function from a time to the values of each axis; a robot that follows them stays where it is.
+
+    Rate axes without a speed of their own get 0, goal axes stay.
+    """
+
+    def values(now: float) -> list[float | None]:
         nod = math.cos(now)
         found = {"base.vx": 1.0, "base.wz": 1.0, "tool.vz": nod}
-        return [SPEEDS.get(axis.name, 0.0) * found.get(axis.name, 0.0) for axis in description.axes]
+        return [
+            None if axis.kind == "goal" else SPEEDS.get(axis.name, 0.0) * found.get(axis.name, 0.0)
+            for axis in description.axes
+        ]
 
     return values
 
@@ -65,7 +96,7 @@ class Pause:
             pass
 
 
-async def drive_on(console: Console, values: Mapping[str, float] | Sequence[float]) -> Feedback:
+async def drive_on(console: Console, values: Mapping[str, float | None] | Sequence[float | None]) -> Feedback:
     """Drive, and arm first whenever the robot asks for it: a simulated robot endangers no person.
 
     A busy machine may hold the robot up again between the two.
@@ -112,7 +143,7 @@ async def link_trips(link: RobotLink, description: RobotDescription, count: int,
     A busy machine may hold the robot up for so long that it wants a neutral command first; that is not counted.
     """
     values, pause = round_and_round(description), Pause(description, seed)
-    rest = [axis.rest for axis in description.axes]
+    rest = neutral_values(description.axes)
     newest = await _feedback_of(link)
     trips: list[Trip] = []
     while len(trips) < count:

@@ -21,6 +21,7 @@ from lockstep.bench.harness.free_port import free_port
 from lockstep.bench.harness.processes import Running, running_process
 from lockstep.bench.harness.stack import Stack, running_stack
 from lockstep.client import Console
+from lockstep.protocol.neutral import neutral_values
 
 __all__ = ["FRONTS", "hostile", "memory_of"]
 
@@ -104,7 +105,7 @@ async def _entry(stack: Stack, front: str) -> AsyncIterator[str]:
 async def _drive(console: Console, seconds: float) -> list[float]:
     """Return the seconds from each command's first sending to its feedback."""
     end, taken = time.monotonic() + seconds, list[float]()
-    values, random = [0.0] * len(console.description.axes), Random(1)
+    values, random = neutral_values(console.description.axes), Random(1)
     while time.monotonic() < end:
         began = time.perf_counter()
         await console.drive(values)

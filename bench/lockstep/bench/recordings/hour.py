@@ -60,12 +60,12 @@ def _own(record: OwnRecord, at: int) -> Entry:
 def _events(description: RobotDescription, seconds: int) -> Iterator[Entry]:
     yield _own(RobotRecord(epoch=EPOCH, event=1, link="up", description=description), START)
     yield _own(SeatRecord(epoch=EPOCH, event=1, holder="p", name="Ada"), START)
-    values = [0.1] * len(description.axes)
+    axes = [0.1] * len(description.axes)
     for number in range(seconds * RATE):
         event, at = number + 1, START + number * SECOND // RATE
         if number:
             command = CommandRecord(
-                epoch=EPOCH, event=event, issue=1, values=values, peer="p", name="Ada", outcome="forwarded"
+                epoch=EPOCH, event=event, issue=1, values=[*axes], peer="p", name="Ada", outcome="forwarded"
             )
             yield _own(command, at - 10_000_000)
         feedback = FeedbackRecord(
@@ -73,7 +73,7 @@ def _events(description: RobotDescription, seconds: int) -> Iterator[Entry]:
             event=event,
             issue=1,
             time=number / RATE,
-            axes=values,
+            axes=axes,
             joints=[number / 1000] * len(description.joints),
         )
         yield _own(feedback, at)

@@ -5,6 +5,7 @@ import random
 from contextlib import suppress
 from functools import partial
 
+from lockstep.bench.harness.driving import axis_values
 from lockstep.client import Console
 from lockstep.client.errors import CommandRefused, ConsoleError
 
@@ -79,7 +80,7 @@ class Intruder:
             await asyncio.sleep(AGAIN_SECONDS)
 
     async def _intrude(self, console: Console) -> None:
-        values = [BACKWARDS, *(axis.rest for axis in console.description.axes[1:])]
+        values = axis_values(console.description.axes, {0: BACKWARDS})
         while True:
             self.tries += 1
             # A command that moves is not even sent while the robot asks for a neutral one first.

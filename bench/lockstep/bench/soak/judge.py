@@ -66,5 +66,5 @@ class Judge:
         issued = self._issued.get((event - 1, record["issue"]))  # a soak is too short for the counter to wrap
         if issued is None or record["time"] - issued > self._max_event_age + LOG_TOLERANCE:
             self.verdict["executed_late"] += 1
-        self.verdict["moved_without_seat"] += values[self._axis] < 0
+        self.verdict["moved_without_seat"] += (values[self._axis] or 0.0) < 0
         self.verdict["moved_while_stopped"] += self._stopped_at is not None

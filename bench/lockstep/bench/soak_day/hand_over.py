@@ -3,7 +3,7 @@
 import asyncio
 from contextlib import suppress
 
-from lockstep.bench.harness.driving import drive_on
+from lockstep.bench.harness.driving import axis_values, drive_on
 from lockstep.client import Console
 from lockstep.client.errors import CommandRefused, ConsoleError
 
@@ -20,7 +20,7 @@ async def take_over(link: str) -> bool:
     with suppress(ConsoleError, TimeoutError):
         async with asyncio.timeout(PATIENCE), Console(link, decode=False, name="relief") as console:
             await console.take_seat()
-            values = [0.3, *(axis.rest for axis in console.description.axes[1:])]
+            values = axis_values(console.description.axes, {0: 0.3})
             end = asyncio.get_running_loop().time() + SECONDS
             while asyncio.get_running_loop().time() < end:
                 with suppress(CommandRefused):

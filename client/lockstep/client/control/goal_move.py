@@ -15,7 +15,7 @@ __all__ = ["GoalMove"]
 TOLERANCE = 0.05  # of an axis' reach, unless it is given
 APPLIED = 0.1  # of the tolerance: nearer than this the applied goal has arrived
 STALLED = 2.0  # s without progress after which a move has failed
-PROGRESS = 0.5  # of the tolerance
+PROGRESS = 0.1  # of the tolerance
 
 
 @dataclass

@@ -5,15 +5,16 @@ import contextlib
 from collections.abc import Callable, Sequence
 from typing import Protocol
 
-from lockstep.protocol.description import RobotDescription
+from lockstep.protocol.description import Axis, RobotDescription
 from lockstep.protocol.messages import Command, Feedback, Goodbye, LinkMessage, Refusal, Reset, Stop, StopTaken
+from lockstep.protocol.neutral import neutral_values
 from lockstep.protocol.serial import event_after, is_newer
 from lockstep.robot_bridge.conformance.errors import NotApplicable, StoppedByOther, Violation, expect
 from lockstep.robot_bridge.conformance.peer import Peer
 from lockstep.robot_bridge.conformance.waiting import PATIENCE, within
 from lockstep.robot_bridge.control.feedback_fit import misfit
 
-__all__ = ["BY", "Driver", "Motion", "first_motion"]
+__all__ = ["BY", "Driver", "Motion", "first_motion", "near_goal"]
 
 BY = "lockstep check"  # name for stops and resets
 TRIES = 5  # attempts at a command that a bridge on a busy machine refuses because it was held up
@@ -26,8 +27,11 @@ class Motion(Protocol):
 
     presses: set[str]
 
-    def next_values(self, description: RobotDescription) -> list[float]:
-        """Return the values of a small motion; the next one goes the other way."""
+    def next_values(self, description: RobotDescription, goals: Sequence[float | None]) -> list[float | None]:
+        """Return the values of a small motion; the next one goes the other way. `goals`: the applied goals."""
+
+    def next_goal(self, axis: Axis, goal: float) -> float:
+        """Return a goal a small way from the applied one; the next one goes the other way."""
 
 
 class Driver:
@@ -42,18 +46,24 @@ class Driver:
         self._next_command = 0.0  # s of the loop's clock: not before that, to keep max_event_rate
 
     @property
-    def neutral(self) -> list[float]:
-        return [axis.rest for axis in self.description.axes]
+    def neutral(self) -> list[float | None]:
+        return neutral_values(self.description.axes)
 
-    def moving(self) -> list[float]:
+    def moving(self) -> list[float | None]:
         """Return the values of a small motion.
 
         Raises:
             NotApplicable: no axis of this robot moves.
         """
-        return self._motion.next_values(self.description)
+        return self._motion.next_values(self.description, self.feedback.goals)
 
-    def command(self, values: Sequence[float], *, nonce: int | None = None, issue: int | None = None) -> Command:
+    def next_goal(self, axis: Axis, goal: float) -> float:
+        """Return a goal a small way from the applied one."""
+        return self._motion.next_goal(axis, goal)
+
+    def command(
+        self, values: Sequence[float | None], *, nonce: int | None = None, issue: int | None = None, speed: float = 1.0
+    ) -> Command:
         """Return a command for the next event, as an answer to the newest feedback unless told otherwise."""
         newest = self.feedback
         return Command(
@@ -61,6 +71,7 @@ class Driver:
             issue=newest.issue if issue is None else issue,
             values=list(values),
             nonce=newest.nonce if nonce is None else nonce,
+            speed=speed,
         )
 
     async def next(self) -> LinkMessage:
@@ -96,7 +107,7 @@ class Driver:
         before = self.feedback
         return await self.heard(lambda feedback: feedback is not before, "the state, once more")
 
-    async def drive(self, values: Sequence[float]) -> Feedback:
+    async def drive(self, values: Sequence[float | None], speed: float = 1.0) -> Feedback:
         """Send a command and return its feedback. A bridge that was held up first gets the neutral command it needs.
 
         Raises:
@@ -104,7 +115,7 @@ class Driver:
         """
         for _ in range(TRIES):
             await self._pace()
-            refusal = await self._executed(self.command(values))
+            refusal = await self._executed(self.command(values, speed=speed))
             if refusal is None:
                 return self.feedback
             expect(
@@ -202,21 +213,35 @@ class Driver:
             self.began[feedback.event] = feedback.time
 
 
-def first_motion(description: RobotDescription, fraction: float, direction: int) -> list[float]:
-    """Return values with every axis at rest but one, which gets a fraction of its range.
+def first_motion(
+    description: RobotDescription, goals: Sequence[float | None], fraction: float, direction: int
+) -> list[float | None]:
+    """Return values with every axis at rest but one, which gets a fraction of its range, or of its reach.
 
     Raises:
         NotApplicable: no axis moves.
     """
-    values = [axis.rest for axis in description.axes]
+    values = neutral_values(description.axes)
     signal = "" if description.start_warning is None else description.start_warning.axis
     for index, axis in enumerate(description.axes):
         if axis.name == signal or axis.minimum == axis.maximum:
             continue
-        up, down = axis.maximum - axis.rest, axis.rest - axis.minimum
-        if direction > 0:
-            values[index] += fraction * up if up > 0 else -fraction * down
+        if axis.kind == "goal":
+            goal = goals[index] if index < len(goals) else None
+            if goal is None:
+                continue
+            values[index] = near_goal(axis, goal, fraction, direction)
         else:
-            values[index] -= fraction * down if down > 0 else -fraction * up
+            up, down = axis.maximum - axis.rest, axis.rest - axis.minimum
+            upwards = up > 0 if direction > 0 else down <= 0
+            values[index] = axis.rest + (fraction * up if upwards else -fraction * down)
         return values
     raise NotApplicable("no axis of this robot moves")
+
+
+def near_goal(axis: Axis, goal: float, fraction: float, direction: int) -> float:
+    """Return a goal that is a fraction of the axis' reach away, the other way if it has no room on this one."""
+    way = fraction * axis.reach * direction
+    if axis.wrap is None and not axis.minimum <= goal + way <= axis.maximum:
+        way = -way
+    return goal + way if axis.wrap is not None else min(max(goal + way, axis.minimum), axis.maximum)

@@ -9,6 +9,7 @@ from lockstep.robot_bridge.conformance.action_cases import ACTION_CASES
 from lockstep.robot_bridge.conformance.case import Case, Outcome, Result
 from lockstep.robot_bridge.conformance.errors import NotApplicable, StoppedByOther, Violation
 from lockstep.robot_bridge.conformance.event_cases import EVENT_CASES
+from lockstep.robot_bridge.conformance.goal_cases import GOAL_CASES
 from lockstep.robot_bridge.conformance.link_cases import LINK_CASES
 from lockstep.robot_bridge.conformance.media_cases import MEDIA_CASES
 from lockstep.robot_bridge.conformance.rest_cases import REST_CASES
@@ -17,7 +18,10 @@ from lockstep.robot_bridge.conformance.subject import Subject
 
 __all__ = ["CASES", "play", "play_all"]
 
-CASES: tuple[Case, ...] = (*LINK_CASES, *EVENT_CASES, *REST_CASES, *STOP_CASES, *ACTION_CASES, *MEDIA_CASES)
+CASES: tuple[Case, ...] = (
+    *(*LINK_CASES, *EVENT_CASES, *REST_CASES, *STOP_CASES),
+    *(*GOAL_CASES, *ACTION_CASES, *MEDIA_CASES),
+)
 CASE_SECONDS = 120.0  # a robot may warn for 30 s each time before it moves
 
 

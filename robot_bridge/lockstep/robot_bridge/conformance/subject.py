@@ -1,13 +1,13 @@
 """The bridge that is checked: opens links to it for the cases, and remembers the direction of the last motion."""
 
 import asyncio
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Sequence
 from contextlib import asynccontextmanager
 
-from lockstep.protocol.description import RobotDescription
+from lockstep.protocol.description import Axis, RobotDescription
 from lockstep.protocol.errors import LinkRefused
 from lockstep.protocol.messages import Feedback, Hello, LinkRole
-from lockstep.robot_bridge.conformance.driver import Driver, first_motion
+from lockstep.robot_bridge.conformance.driver import Driver, first_motion, near_goal
 from lockstep.robot_bridge.conformance.errors import NotApplicable, NotReady, Violation
 from lockstep.robot_bridge.conformance.peer import Peer, opened
 from lockstep.robot_bridge.conformance.place import Place
@@ -30,10 +30,15 @@ class Subject:
         self._fraction = fraction
         self._direction = -1  # of the last motion
 
-    def next_values(self, description: RobotDescription) -> list[float]:
+    def next_values(self, description: RobotDescription, goals: Sequence[float | None]) -> list[float | None]:
         """Return the values of a small motion, each opposite to the last, so that the robot stays where it is."""
         self._direction = -self._direction
-        return first_motion(description, self._fraction, self._direction)
+        return first_motion(description, goals, self._fraction, self._direction)
+
+    def next_goal(self, axis: Axis, goal: float) -> float:
+        """Return a goal a small way from the applied one, each opposite to the last."""
+        self._direction = -self._direction
+        return near_goal(axis, goal, self._fraction, self._direction)
 
     @asynccontextmanager
     async def stranger(self) -> AsyncIterator[Peer]:

@@ -175,10 +175,12 @@ class CommandExecutor:
         """
         if self._shaper.is_known:
             return True
-        self._shaper.begin(self._robot.measured_axes())
+        self._shaper.begin(self._robot.measured_axes(), self._robot.goals())
         self._shaper.cut()
-        self._core.need_neutral()
-        self._feedback.rested_why = "" if self._shaper.is_known else "not driven: the place of a goal axis is not known"
+        self._feedback.rested_why = "not driven: the place of a goal axis is not known"
+        if self._shaper.is_known:
+            self._feedback.rested_why = ""
+            self._core.need_neutral()
         return False
 
     @property

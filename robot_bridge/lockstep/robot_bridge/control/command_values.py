@@ -30,7 +30,7 @@ class CommandValues:
         self._axes = tuple(axes)
         self._neutral = neutral_values(axes)
         self._drives = [axis.name != signal for axis in axes]
-        self._goals = [number for number, axis in enumerate(axes) if axis.kind == "goal"]
+        self._goals = [(number, axis.reach, axis.wrap) for number, axis in enumerate(axes) if axis.kind == "goal"]
         self._shared = SharedJoints(axes, poses)
         self._measured = measured
 
@@ -57,15 +57,17 @@ class CommandValues:
 
     def jump(self, values: Sequence[float | None]) -> str:
         """Return which goal is beyond the reach of its axis, or where the axis is not known; "": none."""
-        driven = [(self._axes[number], number, goal) for number in self._goals if (goal := values[number]) is not None]
-        if not driven:
-            return ""
-        places = [math.nan] * len(values) if self._measured is None else self._measured()
-        for axis, number, goal in driven:
-            place = places[number]
-            way = goal - place if axis.wrap is None else shorter_way(place, goal, axis.wrap)
-            if math.isnan(place):
-                return f"{axis.name}: its place is not known"
-            if not abs(way) <= axis.reach:
-                return f"{axis.name}: {abs(way):.4g} {axis.unit} from where it is; its reach is {axis.reach:g}"
+        places: Sequence[float] | None = None
+        for number, reach, wrap in self._goals:
+            goal = values[number]
+            if goal is None:
+                continue
+            if places is None:
+                places = [math.nan] * len(values) if self._measured is None else self._measured()
+            way = goal - places[number] if wrap is None else shorter_way(places[number], goal, wrap)
+            if not abs(way) <= reach:  # also where the place is not a number
+                axis = self._axes[number]
+                if math.isnan(places[number]):
+                    return f"{axis.name}: its place is not known"
+                return f"{axis.name}: {abs(way):.4g} {axis.unit} from where it is; its reach is {reach:g}"
         return ""

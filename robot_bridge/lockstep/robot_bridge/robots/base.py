@@ -89,10 +89,11 @@ class Robot(ABC):
     def apply(self, values: Sequence[float]) -> None:
         """Drive the axes with these values during the coming tick, in the description's order and units.
 
-        The value of a goal axis is its applied goal: the place to be at. It is continuous but where it was read anew:
-        from `measured_axes` after `reset`, and from `goals` when a pose begins to be driven in place of other axes, or
-        they in its place. Of these two sets only the values of the one that is driven change. The bridge does not call
-        this before every goal axis has been measured.
+        The value of a goal axis is its applied goal: the place to be at. The first values after the start and after
+        `reset` are what `goals` said then; they move nothing. From then on a value changes by no more than
+        a tick at `slew`, with one exception: of a pose and the axes that it stands in for, only those change that are
+        driven, and when one of these sets begins to be driven in place of the other, its values are first what `goals`
+        said. The bridge does not call this before every goal axis has been measured.
         """
 
     def tick(self) -> None:
@@ -105,17 +106,23 @@ class Robot(ABC):
     def measured_axes(self) -> Sequence[float]:
         """Return the measured value of each axis now, as in `measure`; NaN if unknown or too old to be trusted.
 
-        Called when the bridge starts, when a stop was reset, and for each command with goals, whose distance from here
-        is bounded by the axes' `reach`. So it should cost little. Needed only for goal axes.
+        Called when the bridge starts, when a stop was reset, and for each command with goals: `reach` bounds their
+        distance from here. So it should cost little. Needed only for goal axes.
         """
         return self.measure().axes
 
     def goals(self) -> Sequence[float]:
-        """Return for each axis the goal that the robot pursues now, in the axis' unit; NaN if unknown.
+        """Return for each axis the goal that the robot pursues now, in the axis' unit; NaN or measured if it has none.
 
-        Needed only for poses, whose axes move the same joints as others. While these are driven, the pose's goal is
-        where they bring it: the forward kinematics of the joints' goals; and the other way round. Without it the
-        measured values are taken: an arm that hangs below its goals then goes down by that much at each change.
+        The bridge begins there when it starts and when a stop was reset; at `measured_axes` instead if one axis is
+        further than its `reach` from its goal. A robot that holds its place during a stop says here where. One whose
+        power was cut, or whose brakes have closed, takes the measured values for its goals in `reset`.
+
+        A robot with poses says here where their axes are told to be while others are driven in their place: the
+        forward kinematics of the joints' goals; and the other way round.
+
+        Without this method the measured values are taken: an arm that hangs below its goals under a load then goes
+        down by that much on each of these occasions.
         """
         return self.measured_axes()
 
@@ -162,7 +169,7 @@ class Robot(ABC):
     def reset(self) -> None:
         """Undo `stop`, because the stop was released. Must not move anything.
 
-        The goal axes are measured afterwards, and their goals begin there: the arm may have fallen meanwhile.
+        Afterwards the goal axes begin at `goals`, since the arm may have fallen meanwhile.
         """
 
     def locked_out(self) -> str:

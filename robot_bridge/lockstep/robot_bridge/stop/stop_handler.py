@@ -144,8 +144,8 @@ class StopHandler:
         if not self._stop_due:  # else the robot has not been told to stop yet
             try:
                 self._robot.reset()
-                if self._shaper.has_goals:  # the arm may have fallen; without the robot's own stop it was held
-                    self._shaper.begin(self._robot.measured_axes())
+                if self._shaper.has_goals:  # the arm may have fallen
+                    self._shaper.begin(self._robot.measured_axes(), self._robot.goals())
             except BaseException as error:  # ends the bridge at the next tick, and not the link of the reset
                 self._robot_error = error
         self._stop_due = False

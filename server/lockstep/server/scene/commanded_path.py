@@ -61,6 +61,7 @@ class CommandedPath:
         self._base = base if base is not None and {base.x, base.y, base.yaw} <= known else None
         bodies = {body.name for body in description.bodies}
         self._twists = [each for each in description.body_twists if {each.body, each.frame} <= bodies | {""}]
+        self._has_goal_joints = any(axis.kind == "goal" and axis.name in known for axis in description.axes)
         frames = bodies | {""}
         self._poses = [each for each in description.poses if each.body in bodies and each.frame in frames]
         self._commands: dict[int, tuple[float | None, ...]] = {}
@@ -69,7 +70,7 @@ class CommandedPath:
     @property
     def known(self) -> bool:
         """True if the description tells the effect of any axis."""
-        return bool(self._gains or self._base or self._twists or self._poses)
+        return bool(self._gains or self._base or self._twists or self._poses or self._has_goal_joints)
 
     def command(self, event: int, values: Sequence[float | None]) -> None:
         self._commands.pop(event, None)
@@ -83,8 +84,8 @@ class CommandedPath:
         if self._records and feedback.time < self._records[-1].time:
             self._records.clear()
         at_rest = feedback.at_rest or feedback.stop.stopped
-        joints, axes, goals = (tuple(each) for each in (feedback.joints, feedback.axes, feedback.goals))
-        self._records.append(_Record(feedback.event, feedback.time, joints, at_rest, axes, goals))
+        joints, axes = tuple(feedback.joints), tuple(feedback.axes)
+        self._records.append(_Record(feedback.event, feedback.time, joints, at_rest, axes, tuple(feedback.goals)))
         while len(self._records) > 1 and self._records[1].time <= feedback.time - self.seconds:
             self._records.popleft()
 

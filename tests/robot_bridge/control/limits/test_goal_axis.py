@@ -34,7 +34,7 @@ class Player:
 
     def __init__(self, axis: Axis = SHOULDER, place: float = 0.0, hold: float = HOLD) -> None:
         self.shaper = AxisShaper([axis], hold=hold)
-        self.shaper.begin([place])
+        self.shaper.begin([place], [place])
         self.now = 0.0
         self.goals = [place]
 
@@ -196,10 +196,10 @@ def test_an_axis_that_was_not_measured_has_no_goal_and_is_not_driven() -> None:
     assert player.shaper.goals == [None]
     player.shaper.drive([1.0], 0.0)
     assert math.isnan(player.shaper.step(0.0, DT)[0])
-    player.shaper.begin([0.5])
-    assert player.shaper.is_known
-    assert player.shaper.goals == [0.5]
-    assert player.shaper.at_rest
+    measured = Player(place=0.5)
+    assert measured.shaper.is_known
+    assert measured.shaper.goals == [0.5]
+    assert measured.shaper.at_rest
 
 
 @given(st.floats(0, 1e6), st.floats(0.01, 1e4), st.floats(1e-4, 0.1))
@@ -211,6 +211,23 @@ def test_from_the_stopping_speed_a_goal_stands_still_within_the_distance_and_not
     travelled = sum(max(0.0, rate - tick * braking * dt) * dt for tick in range(min(ticks, 20_000) + 1))
     if ticks <= 20_000:
         assert travelled == pytest.approx(distance, rel=1e-6, abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("place", "pursued", "goal"), [(0.3, 0.4, 0.4), (0.3, 1.4, 0.3), (0.3, math.nan, 0.3), (-0.5, 0.5, 0.5)]
+)
+def test_it_begins_at_the_goal_that_the_robot_pursues_or_where_it_is_if_that_is_out_of_reach(
+    place: float, pursued: float, goal: float
+) -> None:
+    shaper = AxisShaper([SHOULDER], hold=HOLD)
+    shaper.begin([place], [pursued])
+    assert shaper.goals == [goal]
+
+
+def test_where_the_axis_is_not_measured_a_pursued_goal_is_not_enough() -> None:
+    shaper = AxisShaper([SHOULDER], hold=HOLD)
+    shaper.begin([math.nan], [0.5])
+    assert shaper.goals == [None]
 
 
 axes = st.builds(
@@ -237,7 +254,7 @@ def test_whatever_happens_the_goal_is_continuous_stays_in_limits_and_stands_stil
 ) -> None:
     """Ticks come from nothing to two periods after each other, or long after where the bridge was held up."""
     shaper = AxisShaper([axis], hold=HOLD)
-    shaper.begin([place])
+    shaper.begin([place], [place])
     now, last, rate = 0.0, -math.inf, 0.0
     steepest = max(axis.acceleration, axis.brake)
     for what, goal, speed, gaps in life:
@@ -275,7 +292,7 @@ def test_whatever_happens_the_goal_is_continuous_stays_in_limits_and_stands_stil
 @given(axes, st.floats(-2, 2), st.floats(-2, 2))
 def test_from_anywhere_to_anywhere_it_arrives_exactly_without_going_back(axis: Axis, place: float, goal: float) -> None:
     shaper = AxisShaper([axis], hold=HOLD)
-    shaper.begin([place])
+    shaper.begin([place], [place])
     way = goal - place if axis.wrap is None else shorter_way(place, goal, axis.wrap)
     now, gone = 0.0, 0.0
     while now < 2 * (abs(way) / axis.slew + 2 * axis.slew / min(axis.acceleration or axis.brake, axis.brake)) + 1:

@@ -233,20 +233,20 @@ def test_a_base_that_does_not_know_where_it_is_does_not_move_but_may_turn(lost: 
 
 def test_a_base_that_does_not_know_its_heading_moves_only_far_from_every_fence() -> None:
     base = ExactBase(base_description(("keep_out", SQUARE)), [-3.0, 0.0, math.nan])
-    base.limits([0.5, 0.0, 0.0], [0.0, 0.0, 0.0])
+    base.limits([0.5, 0.0, 0.0], lambda: [0.0, 0.0, 0.0])
     assert base.limits.acting == frozenset()
     base.place[0] = -1.001
-    assert base.limits([0.5, 0.0, 0.0], [0.0, 0.0, 0.0])[0] < 0.2
-    assert base.limits([-0.5, 0.0, 0.0], [0.0, 0.0, 0.0])[0] > -0.2
+    assert base.limits([0.5, 0.0, 0.0], lambda: [0.0, 0.0, 0.0])[0] < 0.2
+    assert base.limits([-0.5, 0.0, 0.0], lambda: [0.0, 0.0, 0.0])[0] > -0.2
 
 
 def test_a_pose_with_too_few_numbers_counts_as_unknown() -> None:
     base = ExactBase(base_description(("keep_out", SQUARE)), [-3.0, 0.0, 0.0])
     base.place = []
-    assert base.limits([0.01, 0.0, 0.0], [0.0, 0.0, 0.0]) == [0.0, 0.0, 0.0]
+    assert base.limits([0.01, 0.0, 0.0], lambda: [0.0, 0.0, 0.0]) == [0.0, 0.0, 0.0]
 
 
 def test_a_robot_without_limits_is_left_alone() -> None:
     description = msgspec.structs.replace(LIFT, position_limits=())
     values = [9.0, 9.0]
-    assert MotionLimits(description, ExactLift(0.0), DT)(values, [0.0, 0.0]) is values
+    assert MotionLimits(description, ExactLift(0.0), DT)(values, lambda: [0.0, 0.0]) is values

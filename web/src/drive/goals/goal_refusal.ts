@@ -26,5 +26,5 @@ export function goalRefusalWords(refusal: GoalRefusal, description: RobotDescrip
     return "Refused: two controls move the same joints. Let go of one, or change the layer";
   const axis = refusedAxis(refusal, description);
   const who = axis === null ? "A joint" : axis.label;
-  return `Refused: ${who} is too far from its goal. Free it, then let go and begin again; else STOP and reset`;
+  return `Refused: ${who} is too far from its goal. Let go and begin again; if something holds it, STOP and reset`;
 }

@@ -1,8 +1,14 @@
 import type { Axis } from "../../protocol/wire";
 import { REACH_SHARE, wayTo, type AxisValue } from "./goal_range";
 
-/** How far ahead of the applied goal a jogged one is at most: what the axis goes in this time, and what it brakes in. */
-const LEAD_SECONDS = 0.4;
+/**
+ * How far ahead of the newest applied goal a jogged one is at most: what the axis goes in this time, and what it brakes
+ * in. On a long path the applied goal is old by the way back, and the command by the way there: a robot that arrives
+ * before the next command stops and goes.
+ */
+const LEAD_SECONDS = 0.8;
+/** Of the usable reach. */
+const LEAD_SHARE = 0.75;
 /** A page that was held up does not make up for it. */
 const LONGEST_STEP_MS = 50;
 
@@ -42,7 +48,7 @@ export function stepJog(jog: Jog, axis: Axis, rate: number, place: AxisPlace | n
 function longestLead(axis: Axis, rate: number): number {
   const acceleration = axis.acceleration > 0 ? axis.acceleration : axis.brake;
   const braking = acceleration > 0 ? (rate * rate) / (2 * acceleration) : 0;
-  return Math.min(Math.abs(rate) * LEAD_SECONDS + braking, (REACH_SHARE * axis.reach) / 2);
+  return Math.min(Math.abs(rate) * LEAD_SECONDS + braking, LEAD_SHARE * REACH_SHARE * axis.reach);
 }
 
 /** To the end of the axis, and to the share of reach from the measured value; what is beyond it may only come back. */

@@ -7,6 +7,7 @@ import type { Axis } from "../../protocol/wire";
 import { mayDrive } from "../../session/console_state";
 import { h, setData, setHidden, setText } from "../elements/dom";
 import type { AxisBar } from "./axis_bar";
+import { inputHint } from "./input_hint";
 
 /**
  * One goal axis: where it is measured, the goal that the robot applies, the one that is commanded now, its limits, and
@@ -20,6 +21,7 @@ export function createGoalBar(
 ): AxisBar {
   const value = h("span", "axis-value");
   const beside = h("span", "axis-beside");
+  const hint = h("span", "axis-hint", { "aria-hidden": "true" });
   const label = h("span", "axis-label", {}, axis.label);
   const reach = h("span", "goal-reach");
   const way = h("span", "goal-way");
@@ -36,7 +38,7 @@ export function createGoalBar(
     h("span", "", {}, least),
     h("span", "", {}, most),
   );
-  const line = h("span", "axis-line", {}, label, h("span", "axis-figures", {}, beside, value));
+  const line = h("span", "axis-line", {}, label, hint, h("span", "axis-figures", {}, beside, value));
   const element = h("div", "axis goal", { "data-axis": axis.name }, line, slider, ends);
   sliders.add(axis.name, slider);
   return {
@@ -61,11 +63,21 @@ export function createGoalBar(
       span(reach, axis, measured, axis.reach * REACH_SHARE);
       between(way, axis, measured, applied ?? undefined);
       const figure = measured === undefined ? null : figureOf(axis, measured);
+      setText(hint, hintOf(engine, axis));
       setText(value, figure?.main ?? "–");
       setText(beside, figure?.beside ?? "");
       describe(slider, engine, axis, measured, applied);
     },
   };
+}
+
+/** Which input moves the axis in the active layer. */
+function hintOf(engine: ConsoleEngine, axis: Axis): string {
+  if (!mayDrive(engine.state)) return "";
+  const layer = engine.state.robot?.description.layers[engine.layer];
+  const binding = layer?.bindings.find((each) => each.axis === axis.name);
+  const touches = document.documentElement.dataset["touch"] === "true";
+  return inputHint(binding, engine.controls.hasPad ? "pad" : touches ? "touch" : "keys");
 }
 
 function sliderAttributes(axis: Axis): Record<string, string> {

@@ -10,6 +10,7 @@ const ALWAYS: readonly Line[] = [
   [["Esc", "Backspace"], "STOP, for everyone; pad: B"],
   [["Enter"], "Arm; pad: START"],
   [["Space"], "Hold to move; pad: right bumper. Let go to bring the robot to rest"],
+  [["←", "→"], "With Space, push the axis whose bar has the focus, where the bar is a slider"],
   [["Shift"], "Slow while held; pad: left bumper"],
   [["Tab"], "Next control layer, while armed; pad: Y"],
   [["1", "9"], "The robot's first to ninth action; pad: A and X for the first two"],

@@ -29,8 +29,9 @@ describe("a jogged goal", () => {
     for (let now = 0; now <= 100; now += 10) stepJog(jog, axis, 0.5, at(0), now);
     expect(jog.goal).toBeCloseTo(0.05);
     for (let now = 110; now <= 5000; now += 10) stepJog(jog, axis, 0.5, at(0), now);
-    expect(jog.goal).toBeLessThanOrEqual((REACH_SHARE * axis.reach) / 2);
-    expect(jog.goal).toBeCloseTo(0.2);
+    expect(jog.goal).toBeCloseTo(0.75 * REACH_SHARE * axis.reach);
+    for (let now = 5000; now <= 9000; now += 10) stepJog(jog, axis, 0.1, at(0), now);
+    expect(jog.goal).toBeCloseTo(0.08, 2); // 0.8 s of a slow push
   });
 
   it("does not make up for a page that was held up", () => {
@@ -103,7 +104,7 @@ describe("a jogged goal", () => {
           const way = wayTo(some, place.applied, goal);
           if (began) expect(goal).toBe(place.applied);
           expect(Math.sign(rate) * way).toBeGreaterThanOrEqual(-1e-9);
-          expect(Math.abs(way)).toBeLessThanOrEqual((REACH_SHARE * some.reach) / 2 + 1e-9);
+          expect(Math.abs(way)).toBeLessThanOrEqual(0.75 * REACH_SHARE * some.reach + 1e-9);
           const off = Math.abs(wayTo(some, place.measured, goal));
           const was = Math.abs(wayTo(some, place.measured, place.applied));
           expect(off).toBeLessThanOrEqual(Math.max(REACH_SHARE * some.reach, was) + 1e-9);

@@ -68,7 +68,7 @@ class PageHands:
             await asyncio.sleep(PRESS_SECONDS)
             await self._press(START, False)
         else:
-            move = self._script.at(at)
+            move = self._script.at(at, [0.0] * len(self._description.axes))  # a stick says how far, not where
             await self._press(RB, not move.pause)
             tilts = pad_axes(self._description.layers[0], self._description.axes, move.values)
             await self._evaluate(f"{json.dumps(list(tilts.items()))}.forEach((each) => window.testPad.tilt(...each))")

@@ -14,7 +14,7 @@ from lockstep.bench.experiment.choices import Choices, media_of
 from lockstep.bench.experiment.endurance.endurance import Endurance
 from lockstep.bench.experiment.operator_script import OperatorScript
 from lockstep.bench.experiment.stage import Stage, running_stage
-from lockstep.bench.harness.driving import drive_on
+from lockstep.bench.harness.driving import applied_goals, drive_on
 from lockstep.bench.harness.stack import Metrics
 from lockstep.client import CommandRefused, Console, ConsoleError
 from lockstep.emulator.impairment.profile import Profile
@@ -159,7 +159,7 @@ class HeadlessHands:
             try:
                 await console.take_seat()
                 while True:
-                    move = script.at(clock())
+                    move = script.at(clock(), applied_goals(console))
                     await drive_on(console, move.values)
                     await asyncio.sleep(move.interval)
             except CommandRefused:

@@ -17,7 +17,7 @@ from lockstep.bench.experiment.judge.age_gate import count_by_age
 from lockstep.bench.experiment.judge.measures import event_rate
 from lockstep.bench.experiment.judge.record import ClientRecord, Gate
 from lockstep.bench.experiment.stage import Stage, running_stage
-from lockstep.bench.harness.driving import drive_on
+from lockstep.bench.harness.driving import axis_values, drive_on
 from lockstep.client import Console
 from lockstep.emulator.impairment.delay import Delay
 from lockstep.emulator.impairment.profile import Profile, TwoWay
@@ -134,7 +134,7 @@ async def run_growth(
 
 
 async def _drive(operator: Console, rate: float, seconds: float) -> None:
-    values = [0.2, *[0.0] * (len(operator.description.axes) - 2), 0.8]
+    values = axis_values(operator.description.axes, {0: 0.2, -1: 0.8})
     end = time.monotonic() + seconds
     while (now := time.monotonic()) < end:
         await drive_on(operator, values)

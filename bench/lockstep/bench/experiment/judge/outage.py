@@ -11,7 +11,7 @@ from typing import Any, Protocol
 from lockstep.bench.experiment.choices import Choices, media_of, round_trip_of
 from lockstep.bench.experiment.judge.outage_judge import Cut, Finding, judge_outage
 from lockstep.bench.experiment.stage import Stage, running_stage
-from lockstep.bench.harness.driving import drive_on
+from lockstep.bench.harness.driving import applied_goals, axis_values, drive_on
 from lockstep.bench.harness.event_log import records
 from lockstep.client import CommandRefused, Console, ConsoleError
 from lockstep.emulator.impairment.delay import Constant
@@ -170,13 +170,17 @@ class HeadlessStick:
 
     async def _hold(self, console: Console) -> None:
         await console.take_seat()
+        first, goals = console.description.axes[0], applied_goals(console)
+        base = 0.2 if first.kind == "rate" or not goals else goals[0] or 0.0  # a goal axis hardly moves from its place
         while True:
             formed = time.monotonic()
-            value = 0.2 + next(self._marks) * MARK
+            value = base + next(self._marks) * MARK
             self.intentions.append((formed, value))
             try:
                 async with asyncio.timeout(STEP):
-                    await drive_on(console, [value, *[0.0] * (len(console.description.axes) - 2), 0.8])
+                    values = axis_values(console.description.axes, {-1: 0.8})
+                    values[0] = value
+                    await drive_on(console, values)
             except TimeoutError:
                 continue  # in flight; the next intention takes its place
             except CommandRefused as refused:

@@ -66,7 +66,8 @@ def judge_outage(
     last = max((record["time"] for record in executed if record["time"] < cut.ended), default=None)
     rest = next((time for time in rested if last is not None and time > last), None)
     intended = {round(value, 6): time for time, value in intentions}
-    known = [(record, intended.get(round(record["values"][0], 6))) for record in back]
+    firsts = [(record, record["values"][0]) for record in back]  # None: a goal axis was to stay
+    known = [(record, intended.get(round(value, 6))) for record, value in firsts if value is not None]
     moved = next((record["time"] for record in back if any(record["values"])), None)
     return Finding(
         rest_seconds=None if rest is None or last is None else rest - last,

@@ -10,6 +10,7 @@ That bounds the slope over periods, not between any two moments: where a command
 two periods later. A limiter (position limits, geofences) has the last word on the rates.
 """
 
+import math
 from collections.abc import Callable, Sequence
 
 from lockstep.protocol.description import Axis, Pose
@@ -20,13 +21,14 @@ from lockstep.robot_bridge.control.limits.rate_axis import RateAxis
 
 __all__ = ["AxisShaper", "Limiter"]
 
-Limiter = Callable[[list[float], list[float]], list[float]]  # (rates, rates under braking) -> rates nearer to rest
+# (rates, what they would be under braking) -> rates nearer to rest
+Limiter = Callable[[list[float], Callable[[], list[float]]], list[float]]
 
 
 class AxisShaper:
     """The applied values of all axes.
 
-    Call `begin` with the measured places if there are goal axes; then `drive` at execution, `rest` to come to rest
+    Call `begin` if there are goal axes; then `drive` at execution, `rest` to come to rest
     early, and `step` or, after a failure, `brake` once a tick.
 
     Attributes:
@@ -51,7 +53,7 @@ class AxisShaper:
         self._limiter = limiter
         self._turns = None if pursued is None or not poses else PoseTurns(axes, poses, self._axes, pursued)
         self._released = True  # coming to rest or there
-        self._deadline = float("-inf")  # s, when all axes must be at rest
+        self._deadline = -math.inf  # s, when all axes must be at rest
 
     @property
     def values(self) -> list[float]:
@@ -72,10 +74,15 @@ class AxisShaper:
         released = self._released
         return all(axis.rate == axis.rest_rate and (released or not axis.is_driven) for axis in self._axes)
 
-    def begin(self, places: Sequence[float]) -> None:
-        """Begin to command the goal axes where they are measured, one place per axis; NaN: not known."""
+    def begin(self, places: Sequence[float], pursued: Sequence[float]) -> None:
+        """Begin to command the goal axes where they are held: at the goals that the robot pursues.
+
+        `places`: measured, one per axis; NaN: not known. If one of the goals is further than its axis' reach from its
+        place, the robot is not where it says, and the places count: all, since a pose and its joints belong together.
+        """
         self._released = True
-        for axis, place in zip(self._axes, places, strict=True):
+        holds = all(axis.reaches(place, goal) for axis, place, goal in zip(self._axes, places, pursued, strict=True))
+        for axis, place in zip(self._axes, pursued if holds else places, strict=True):
             axis.begin(place)
         self.is_known = all(axis.is_known for axis in self._axes)
         if self._turns is not None:
@@ -98,7 +105,7 @@ class AxisShaper:
     def brake(self, dt: float) -> list[float]:
         """Take one step towards rest at the brake rate, from any target, without asking the limiter."""
         self._released = True
-        return [axis.take(axis.braked(dt), dt) for axis in self._axes]
+        return [axis.take(axis.next_rate(math.inf, dt, True), dt) for axis in self._axes]
 
     def cut(self) -> None:
         """Be at rest without a ramp, because the robot's motion meanwhile is unknown. Goals stay where they are."""
@@ -114,7 +121,7 @@ class AxisShaper:
         released = self._released
         if self._turns is not None and not released:
             self._turns.take()
-        rates = [axis.next_rate(left, dt, released=released) for axis in self._axes]
+        rates = [axis.next_rate(left, dt, released) for axis in self._axes]
         if self._limiter is not None:
-            rates = self._limiter(rates, [axis.braked(dt) for axis in self._axes])
+            rates = self._limiter(rates, lambda: [axis.braked(dt) for axis in self._axes])
         return [axis.take(rate, dt) for axis, rate in zip(self._axes, rates, strict=True)]

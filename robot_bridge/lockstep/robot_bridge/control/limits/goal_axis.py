@@ -23,16 +23,16 @@ class GoalAxis:
     """
 
     __slots__ = (
-        *("_acceleration", "_axis", "_brake", "_end", "_gap", "_planned", "_speed", "_steepest", "_target"),
-        *("_wrap", "goal", "is_driven", "rate", "waits"),
+        *("_acceleration", "_brake", "_end", "_gap", "_maximum", "_minimum", "_planned", "_reach", "_slew", "_speed"),
+        *("_steepest", "_target", "_wrap", "goal", "is_driven", "rate", "waits"),
     )
 
     rest_rate: Final = 0.0
 
     def __init__(self, axis: Axis) -> None:
-        self._axis = axis
+        self._minimum, self._maximum = axis.minimum, axis.maximum
         self._wrap = axis.wrap
-        self._brake = axis.brake
+        self._slew, self._brake, self._reach = axis.slew, axis.brake, axis.reach
         self._acceleration = axis.acceleration or axis.brake
         # From a speed that is planned with the lesser of the two, either brings the goal to a standstill in time.
         self._planned = min(self._acceleration, axis.brake)
@@ -63,23 +63,25 @@ class GoalAxis:
 
     def drive(self, value: float | None, speed: float) -> None:
         """Aim for a goal, at a share `speed` of the axis' largest speed; None: brake, and stay."""
-        self.is_driven = value is not None
+        self.is_driven = value is not None and self.is_known
         if value is not None:
             self._target = value
-            self._speed = self._axis.slew * speed
+            self._speed = self._slew * speed
 
-    def next_rate(self, left: float, dt: float, *, released: bool) -> float:
+    def next_rate(self, left: float, dt: float, released: bool) -> float:
         """Return the speed that is wanted for a tick of `dt` s, `left` s before the goal has to stand still.
 
         `released`: it brakes.
         """
-        if released or not self.is_driven or self.waits or not self.is_known:
+        if released or not self.is_driven or self.waits:
             self._gap = 0.0
+            if not self.rate:
+                return 0.0
             rate = self.braked(dt)
         else:
             rate = self._towards_target(dt)
-        reach = self._brake * max(left, 0.0)
-        return min(max(rate, -reach), reach)
+        reach = self._brake * left if left > 0.0 else 0.0
+        return reach if rate > reach else -reach if rate < -reach else rate
 
     def braked(self, dt: float) -> float:
         """Return the speed after one tick of braking."""
@@ -93,41 +95,56 @@ class GoalAxis:
             way = rate * dt
             if abs(way - self._gap) <= ROUNDING * abs(way):
                 self.goal = self._end
-            elif self._wrap is None:
-                low, high = self._bounds()  # the speed was planned to stay within: this takes away what rounding adds
-                self.goal = min(max(self.goal + way, low), high)
             else:
-                self.goal += way
+                goal = self.goal + way
+                self.goal = goal if self._minimum <= goal <= self._maximum else self._within(goal)
         return self.goal
 
     def cut(self) -> None:
         """Stand still at once, where the goal is."""
         self.rate = 0.0
 
+    def reaches(self, place: float, goal: float) -> bool:
+        """Return whether a goal is within reach of a place; False if one of them is not known."""
+        way = goal - place if self._wrap is None else shorter_way(place, goal, self._wrap)
+        return abs(way) <= self._reach
+
     def begin(self, place: float) -> None:
-        """Begin at a measured place; NaN: it is not known."""
+        """Begin to be commanded from a place; NaN: it is not known."""
         self.goal = place if math.isfinite(place) else math.nan
         self.rate = 0.0
 
-    def _bounds(self) -> tuple[float, float]:
-        """Return the range of the goal. A goal that is outside of the axis' limits may only move back."""
-        axis, goal = self._axis, self.goal
-        return min(axis.minimum, goal), max(axis.maximum, goal)
+    def _within(self, goal: float) -> float:
+        """Return a goal within the axis' limits; one that is outside of them may only move back."""
+        if self._wrap is None:
+            if goal > self._maximum:
+                return min(goal, max(self._maximum, self.goal))
+            if goal < self._minimum:
+                return max(goal, min(self._minimum, self.goal))
+        return goal
 
     def _towards_target(self, dt: float) -> float:
         if self._wrap is None:
-            low, high = self._bounds()
-            self._end = min(max(self._target, low), high)
-            self._gap = gap = self._end - self.goal
+            end = self._target
+            if not self._minimum <= end <= self._maximum:
+                end = self._within(end)
+            self._end = end
+            self._gap = gap = end - self.goal
         else:
             self._gap = gap = shorter_way(self.goal, self._target, self._wrap)
             self._end = self.goal + gap
-        wanted = min(self._speed, stopping_speed(abs(gap), self._planned, dt))
-        if gap < 0:
+        distance, wanted = abs(gap), self._speed
+        # Further away than that, the full speed can be braked in any case (the ticks add less than one at full speed).
+        if distance < wanted * (wanted / (2.0 * self._planned) + dt):
+            wanted = min(wanted, stopping_speed(distance, self._planned, dt))
+        if gap < 0.0:
             wanted = -wanted
+        rate = self.rate
+        if rate == wanted:
+            return rate
         faster, slower = self._acceleration * dt, self._steepest * dt
-        rate, stands_next = self.rate, slower * (1.0 + ROUNDING)
-        if rate >= 0:
+        stands_next = slower * (1.0 + ROUNDING)
+        if rate >= 0.0:
             lowest = rate - slower if rate > stands_next else min(0.0, rate - faster)
             return min(max(wanted, lowest), rate + faster)
         highest = rate + slower if -rate > stands_next else max(0.0, rate + faster)

@@ -8,7 +8,7 @@ If even that would need a steeper ramp than the axes' brake, all limited axes br
 found to be good a tick before.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Protocol
 
 from lockstep.protocol.description import PositionLimit, RobotDescription
@@ -31,7 +31,7 @@ class PositionSense(Protocol):
 
 
 class MotionLimits:
-    """Limits the values of all axes. Call it once a tick, with the wanted values and the values under braking.
+    """Limits the values of all axes. Call it once a tick, with the wanted values.
 
     Attributes:
         acting: names of the limits that slow an axis now
@@ -67,8 +67,8 @@ class MotionLimits:
         guarded.update(() if self._fence is None else self._fence.axes)
         self._guarded = tuple(sorted(guarded))
 
-    def __call__(self, values: list[float], braked: Sequence[float]) -> list[float]:
-        """Return the values that may be applied instead of `values`."""
+    def __call__(self, values: list[float], braked: Callable[[], Sequence[float]]) -> list[float]:
+        """Return the values that may be applied instead of `values`. `braked`: returns them after a tick of braking."""
         rests = self._rest_values
         for number in self._guarded:
             if values[number] != rests[number]:
@@ -78,7 +78,7 @@ class MotionLimits:
             self.acting = self.blind = frozenset()
         return values
 
-    def _limit(self, values: list[float], braked: Sequence[float]) -> list[float]:
+    def _limit(self, values: list[float], braked: Callable[[], Sequence[float]]) -> list[float]:
         shares: dict[int, float] = {}
         excessive: list[Demand] = []
         for demand in self._demands(values):
@@ -89,7 +89,7 @@ class MotionLimits:
                     shares[number] = min(share, shares.get(number, 1.0))
         if excessive or self._lingering:
             self._note(excessive)
-        return self._scaled(values, braked, shares) if shares else values
+        return self._scaled(values, braked(), shares) if shares else values
 
     def _note(self, excessive: list[Demand]) -> None:
         self._lingering = {name: left - 1 for name, left in self._lingering.items() if left > 1}

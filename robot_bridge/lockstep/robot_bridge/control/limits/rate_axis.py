@@ -18,13 +18,14 @@ class RateAxis:
     `AxisShaper` calls, for each tick, `next_rate`, then `take` with the rate that the limits have left of it.
     """
 
-    __slots__ = ("_axis", "_target", "is_driven", "rate", "rest_rate")
+    __slots__ = ("_brake", "_maximum", "_minimum", "_slew", "_target", "is_driven", "rate", "rest_rate")
 
     is_known: Final = True  # a rate needs no measured place
     applied_goal: Final = None
 
     def __init__(self, axis: Axis) -> None:
-        self._axis = axis
+        self._minimum, self._maximum = axis.minimum, axis.maximum
+        self._slew, self._brake = axis.slew, axis.brake
         self._target = axis.rest
         self.rest_rate = axis.rest  # the rate at which the axis does not move
         self.rate = axis.rest  # applied last, 0.4 m/s
@@ -37,25 +38,27 @@ class RateAxis:
 
     def drive(self, value: float | None, speed: float) -> None:
         """Aim for a value, clamped to the axis' limits; None: for rest. `speed` concerns goal axes only."""
-        axis = self._axis
-        self._target = axis.rest if value is None else min(max(value, axis.minimum), axis.maximum)
-        self.is_driven = self._target != axis.rest
+        rest = self.rest_rate
+        self._target = rest if value is None else min(max(value, self._minimum), self._maximum)
+        self.is_driven = self._target != rest
 
-    def next_rate(self, left: float, dt: float, *, released: bool) -> float:
+    def next_rate(self, left: float, dt: float, released: bool) -> float:
         """Return the rate that is wanted for a tick of `dt` s, `left` s before the axis has to be at rest.
 
         `released`: it comes to rest at its brake rate.
         """
-        axis, rate = self._axis, self.rate
-        target, slope = (axis.rest, axis.brake) if released else (self._target, axis.slew)
+        rate, rest = self.rate, self.rest_rate
+        if released and rate == rest:
+            return rate
+        target, step = (rest, self._brake * dt) if released else (self._target, self._slew * dt)
         change = target - rate
-        wanted = target if abs(change) <= slope * dt else rate + (slope * dt if change > 0 else -slope * dt)
-        reach = axis.brake * max(left, 0.0)
-        return min(max(wanted, axis.rest - reach), axis.rest + reach)
+        wanted = rate + step if change > step else rate - step if change < -step else target
+        reach = self._brake * left if left > 0.0 else 0.0
+        return min(max(wanted, rest - reach), rest + reach)
 
     def braked(self, dt: float) -> float:
         """Return the rate after one tick of braking."""
-        rate, rest, step = self.rate, self._axis.rest, self._axis.brake * dt
+        rate, rest, step = self.rate, self.rest_rate, self._brake * dt
         return max(rest, rate - step) if rate > rest else min(rest, rate + step)
 
     def take(self, rate: float, dt: float) -> float:
@@ -65,7 +68,11 @@ class RateAxis:
 
     def cut(self) -> None:
         """Be at rest at once."""
-        self.rate = self._axis.rest
+        self.rate = self.rest_rate
+
+    def reaches(self, place: float, goal: float) -> bool:
+        """Return True: a rate has no reach."""
+        return True
 
     def begin(self, place: float) -> None:
-        """Begin at a measured place: nothing to do for a rate."""
+        """Begin at a place: nothing to do for a rate."""

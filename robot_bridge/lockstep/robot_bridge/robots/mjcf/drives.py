@@ -6,11 +6,13 @@ holds the place as far as its force allows.
 
 import math
 from abc import ABC, abstractmethod
+from collections.abc import Collection
 from typing import Any, Final
 
 import numpy as np
 
 from lockstep.protocol.description import Axis
+from lockstep.robot_bridge.errors import ModelError
 from lockstep.robot_bridge.robots.mjcf.actuators import Actuator, Kind
 from lockstep.robot_bridge.robots.mjcf.names import label_of
 
@@ -41,6 +43,10 @@ class Drive(ABC):
     @abstractmethod
     def measured(self, data: Any) -> float:
         """Return the measured value of the axis."""
+
+    def at_rest(self, value: float) -> float:
+        """Return the value that keeps the axis where the present value has brought it."""
+        return self.axis.rest
 
     def release(self, data: Any) -> None:
         """Forget the held places, because the state was put back to its beginning."""
@@ -88,6 +94,19 @@ class PositionDrive(_JointDrive):
             if abs(goal - self._position(data)) < max(self._lead, abs(self._goal - self._position(data))):
                 self._goal = goal
         data.ctrl[self.actuator.number] = self._goal * self.actuator.gear
+
+
+class GoalDrive(_JointDrive):
+    """Drives a position servo by its goal, which the bridge moves: the value is the place to be at."""
+
+    def measured(self, data: Any) -> float:
+        return self._position(data)
+
+    def at_rest(self, value: float) -> float:
+        return value
+
+    def drive(self, data: Any, value: float, seconds: float) -> None:
+        data.ctrl[self.actuator.number] = value * self.actuator.gear
 
 
 class VelocityDrive(_JointDrive):
@@ -146,14 +165,17 @@ class PlainDrive(Drive):
         return float(data.ctrl[self.actuator.number])
 
 
-def drives_of(model: Any, data: Any, actuators: list[Actuator]) -> list[Drive]:
-    """Return a drive for each actuator that gets an axis.
+def drives_of(model: Any, data: Any, actuators: list[Actuator], goals: Collection[int] = ()) -> list[Drive]:
+    """Return a drive for each actuator that gets an axis. `goals`: numbers of the servos that are goal axes.
 
     A velocity servo on a joint that also has a position servo only damps it, and gets none.
+
+    Raises:
+        ModelError: a goal axis would have no range.
     """
     servoed = {each.joint for each in actuators if each.kind is Kind.POSITION and each.joint is not None}
     return [
-        _drive(model, data, each)
+        GoalDrive(model, each, _goal_axis(model, each)) if each.number in goals else _drive(model, data, each)
         for each in actuators
         if not (each.kind is Kind.VELOCITY and each.joint is not None and each.joint in servoed)
     ]
@@ -169,6 +191,29 @@ def _drive(model: Any, data: Any, actuator: Actuator) -> Drive:
         return MotorDrive(model, actuator, _force_axis(model, actuator))
     low, high = (-1.0, 1.0) if math.isinf(actuator.low) else (actuator.low, actuator.high)
     return PlainDrive(actuator, _axis(actuator, "", low, high, min(max(0.0, low), high)))
+
+
+def _goal_axis(model: Any, actuator: Actuator) -> Axis:
+    low, high = _range(model, actuator)
+    wrap = None
+    if not (math.isfinite(low) and math.isfinite(high)):
+        if not actuator.is_rotary:
+            raise ModelError(f"actuator {actuator.name} cannot be a goal axis: neither its joint nor it has a range")
+        low, high, wrap = -math.pi, math.pi, math.tau
+    slew = _fastest(model, actuator)
+    return Axis(
+        name=actuator.name,
+        label=label_of(actuator.name),
+        unit="rad" if actuator.is_rotary else "m",
+        minimum=low,
+        maximum=high,
+        kind="goal",
+        slew=slew,
+        brake=slew / BRAKE_TIME,
+        acceleration=slew / SLEW_TIME,
+        reach=FURTHEST_LEAD * (high - low),
+        wrap=wrap,
+    )
 
 
 def _velocity_axis(model: Any, actuator: Actuator) -> Axis:

@@ -19,6 +19,7 @@ from lockstep.robot_bridge.robots.mjcf.bodies import DRAWN_GROUPS, bodies_of
 from lockstep.robot_bridge.robots.mjcf.cameras import cameras_of
 from lockstep.robot_bridge.robots.mjcf.controls import layers_of
 from lockstep.robot_bridge.robots.mjcf.drives import Drive, drives_of
+from lockstep.robot_bridge.robots.mjcf.goal_setting import goal_actuators
 from lockstep.robot_bridge.robots.mjcf.joints import joints_of
 from lockstep.robot_bridge.robots.mjcf.model_file import load_model
 from lockstep.robot_bridge.robots.mjcf.names import label_of
@@ -59,13 +60,12 @@ class MjcfRobot(Robot):
         self.restarts = 0
         self._begin()
         actuators = actuators_of(model)
-        self._drives = drives_of(model, data, actuators)
+        self._drives = drives_of(model, data, actuators, goal_actuators(model, actuators))
         self._joints = joints_of(model)
         self._wrench = wrench_sense(model)
         self._ranges = range_sense(model, data)
         cameras = cameras_of(model)
-        self._rest_values = [drive.axis.rest for drive in self._drives]
-        self._values = self._rest_values
+        self._values = [drive.at_rest(drive.measured(data)) for drive in self._drives]
         self._stopped = False  # every drive holds its place, at any applied value
         self._moving = self._moving_dofs()
         self._description = self._describe(path.stem, tuple(cameras))
@@ -89,7 +89,7 @@ class MjcfRobot(Robot):
         return self._description
 
     def apply(self, values: Sequence[float]) -> None:
-        self._values = self._rest_values if self._stopped else list(values)
+        self._values = self._at_rest() if self._stopped else list(values)
 
     def tick(self) -> None:
         before = self.data.time
@@ -104,24 +104,30 @@ class MjcfRobot(Robot):
         data = self.data
         is_still = not self._moving.size or bool((np.abs(data.qvel) * self._moving).max() < REST_SPEED)
         return Measurement(
-            axes=[short(drive.measured(data)) for drive in self._drives],
+            axes=self.measured_axes(),
             joints=[short(value) for value in self.positions()],
             wrench=[] if self._wrench is None else [short(value) for value in self._wrench.value.tolist()],
             ranges=[] if self._ranges is None else [short(value) for value in self._ranges.read(data)],
-            at_rest=is_still and self._values == self._rest_values,
+            at_rest=is_still and self._values == self._at_rest(),
             faults=self._faults(),
         )
+
+    def measured_axes(self) -> list[float]:
+        return [short(drive.measured(self.data)) for drive in self._drives]
+
+    def goals(self) -> list[float]:
+        return list(self._values)  # also while it is stopped: the servos hold there
 
     def positions(self) -> Sequence[float]:
         qpos = self.data.qpos
         return [value for joint in self._joints for value in joint.values(qpos)]
 
     def rest_from_thread(self) -> None:
-        self._values = self._rest_values
+        self._values = self._at_rest()
 
     def stop(self) -> None:
         self._stopped = True
-        self._values = self._rest_values
+        self._values = self._at_rest()
 
     def reset(self) -> None:
         self._stopped = False
@@ -153,6 +159,9 @@ class MjcfRobot(Robot):
             drive.release(self.data)
         if self._wrench is not None:
             self._wrench.clear()
+
+    def _at_rest(self) -> list[float]:
+        return [drive.at_rest(value) for drive, value in zip(self._drives, self._values, strict=True)]
 
     def _drive(self) -> None:
         for drive, value in zip(self._drives, self._values, strict=True):
@@ -190,6 +199,7 @@ class MjcfRobot(Robot):
 
     def _describe(self, name: str, cameras: tuple[Any, ...]) -> RobotDescription:
         axes = tuple(drive.axis for drive in self._drives)
+        by_stick = [drive for drive in self._drives if drive.axis.kind == "rate"]
         title = self.model.names[: self.model.names.index(b"\0")].decode(errors="replace")
         return RobotDescription(
             name=name,
@@ -198,7 +208,9 @@ class MjcfRobot(Robot):
             label=label_of(name if title in ("", "MuJoCo Model") else title),
             axes=axes,
             joints=tuple(part for joint in self._joints for part in joint.parts),
-            layers=layers_of(self.model, self.data, axes, [drive.actuator for drive in self._drives]),
+            layers=layers_of(
+                self.model, self.data, [drive.axis for drive in by_stick], [drive.actuator for drive in by_stick]
+            ),
             cameras=cameras,
             wrench=None if self._wrench is None else self._wrench.description,
             ranges=None if self._ranges is None else self._ranges.description,
@@ -214,7 +226,7 @@ class MjcfRobot(Robot):
 
     def _is_limited(self, drive: Drive) -> bool:
         joint = drive.actuator.joint
-        is_speed = drive.actuator.kind in (Kind.POSITION, Kind.VELOCITY)
+        is_speed = drive.axis.kind == "rate" and drive.actuator.kind in (Kind.POSITION, Kind.VELOCITY)
         return is_speed and joint is not None and bool(self.model.jnt_limited[joint])
 
     def _limit(self, drive: Drive) -> PositionLimit:

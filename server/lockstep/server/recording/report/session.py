@@ -107,11 +107,11 @@ def _take_row(session: Session, row: EventRow, at: float) -> None:
         session.force.add(at, math.hypot(*feedback.wrench[:3]))
     for axis, value in zip(session.description.axes, feedback.axes, strict=False):
         session.measured.setdefault(axis.name, Series()).add(at, value)
-    for axis, value in zip(session.description.axes, [] if command is None else command.values, strict=False):
-        session.commanded.setdefault(axis.name, Series()).add(at, math.nan if value is None else value)
-    for axis, value in zip(session.description.axes, feedback.goals, strict=False):
-        if value is not None:
-            session.applied.setdefault(axis.name, Series()).add(at, value)
+    for axis, asked in zip(session.description.axes, [] if command is None else command.values, strict=False):
+        session.commanded.setdefault(axis.name, Series()).add(at, math.nan if asked is None else asked)
+    for axis, goal in zip(session.description.axes, feedback.goals, strict=False):
+        if goal is not None:
+            session.applied.setdefault(axis.name, Series()).add(at, goal)
 
 
 def _take_report(session: Session, record: ReportRecord, at: float) -> None:

@@ -48,8 +48,11 @@ class GoalChecks:
         if not self._has_goals:
             return ""
         before, self._newest = self._newest, feedback
-        if [goal is None for goal in feedback.goals] != [axis.kind == "rate" for axis in self._axes]:
-            return "a feedback does not have one applied goal for each goal axis"
+        if len(feedback.goals) != len(self._axes):
+            return "a feedback has no applied goals"
+        for axis, goal in zip(self._axes, feedback.goals, strict=True):
+            if goal is not None and axis.kind == "rate":
+                return f"a feedback has a goal of {axis.name}, which is driven by its rate"
         if before is None or len(before.goals) != len(self._axes):
             return ""
         return self._too_fast(before, feedback) or ("" if executed is None else self._jump(before, feedback, executed))

@@ -1,0 +1,35 @@
+"""Reads which servos of a model are driven by goals: `<custom><text name="lockstep_goals" data="…"/></custom>`."""
+
+from collections.abc import Sequence
+from typing import Any, Final
+
+import mujoco
+
+from lockstep.robot_bridge.errors import ModelError
+from lockstep.robot_bridge.robots.mjcf.actuators import Actuator, Kind
+
+__all__ = ["goal_actuators"]
+
+TEXT: Final = "lockstep_goals"
+ALL: Final = "all"
+
+
+def goal_actuators(model: Any, actuators: Sequence[Actuator]) -> set[int]:
+    """Return the numbers of the position servos that are goal axes.
+
+    Raises:
+        ModelError: the text names an actuator that does not exist or cannot be one.
+    """
+    number = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_TEXT, TEXT)
+    if number < 0:
+        return set()
+    begin, size = int(model.text_adr[number]), int(model.text_size[number])
+    words = bytes(model.text_data)[begin : begin + size].rstrip(b"\0").decode(errors="replace").split()
+    servos = {each.name: each for each in actuators if each.kind is Kind.POSITION and each.joint is not None}
+    if words == [ALL]:
+        return {each.number for each in servos.values()}
+    for word in words:
+        if word not in servos:
+            known = ", ".join(servos) or "none"
+            raise ModelError(f"{TEXT} names {word!r}, which is no position actuator of a joint; there are: {known}")
+    return {servos[word].number for word in words}
