@@ -120,6 +120,20 @@ async def test_a_session_that_ends_brings_the_robot_to_rest(stack: Stack, chromi
         await console.until("document.querySelector('.arm-words').textContent.includes('headset view was closed')")
 
 
+async def test_a_view_that_cannot_be_drawn_any_more_ends_its_session_and_the_robot_rests(
+    stack: Stack, chromium: Browser
+) -> None:
+    async with open_headset(chromium, stack.operator) as headset:
+        console = headset.console
+        await headset.enter()
+        await headset.drive()
+        # Said, and not done: the emulator itself does not bear it.
+        await headset.do("void h.device.appCanvas.dispatchEvent(new Event('webglcontextlost'))")
+        await console.until("s.headset === null && !s.armed && s.at_rest === true")
+        await headset.page.evaluate("testHeadset.silence(false)")
+        await console.until("document.querySelector('.arm-words').textContent.includes('headset view was closed')")
+
+
 async def _press_stop(headset: Headset, how: str) -> None:
     if how == "button":
         await headset.press("left", "y-button")

@@ -26,8 +26,8 @@ MEAN = """(stream) => {
 }"""
 
 
-async def _seen(headset: Headset, place: tuple[float, float]) -> list[int]:
-    found: list[int] = await headset.page.evaluate("([x, y]) => testHeadset.area(x, y)", list(place))
+async def _seen(headset: Headset, place: tuple[float, float]) -> list[float]:
+    found: list[float] = await headset.page.evaluate("([x, y]) => testHeadset.area(x, y)", list(place))
     return found
 
 

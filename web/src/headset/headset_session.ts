@@ -53,6 +53,7 @@ export class HeadsetSession implements HeadsetControls {
   private viewer: RigidPose | null = null;
   private frames = 0;
   private poses: { readonly description: RobotDescription; readonly device: PoseDevice } | null = null;
+  private isEnded = false;
   private isPlaced = false;
   private resetting: { readonly side: Side; readonly sinceMs: number } | null = null;
   private status: ReturnType<typeof headsetStatus> | null = null;
@@ -148,6 +149,7 @@ export class HeadsetSession implements HeadsetControls {
   }
 
   private start(): void {
+    if (this.isEnded) throw new Error("the session ended while it was opened");
     const { engine } = this.page;
     const { session, renderer } = this;
     renderer.xr.setFoveation(0); // what is at the edge of the view is text
@@ -163,14 +165,21 @@ export class HeadsetSession implements HeadsetControls {
     engine.tracing?.show(true, performance.now(), "headset");
     session.addEventListener("visibilitychange", () => this.visibilityChanged());
     renderer.xr.getReferenceSpace()?.addEventListener("reset", () => this.spaceReset());
+    renderer.domElement.addEventListener("webglcontextlost", () => this.end());
     const loop = (_time: number, frame?: XRFrame): void => {
-      if (frame !== undefined) this.draw(frame);
+      try {
+        if (frame !== undefined) this.draw(frame);
+      } catch (error) {
+        reportError(error);
+        this.end();
+      }
     };
     renderer.setAnimationLoop(loop);
   }
 
   private ended(): void {
     const { engine } = this.page;
+    this.isEnded = true;
     engine.disarm("headset_left");
     this.renderer.setAnimationLoop(null);
     if (engine.headset === this) {
@@ -184,6 +193,12 @@ export class HeadsetSession implements HeadsetControls {
     this.view.close();
     this.renderer.dispose();
     this.renderer.forceContextLoss();
+  }
+
+  /** A view that is not drawn any more would go on showing its last picture as if it were the present one. */
+  private end(): void {
+    this.page.engine.disarm("headset_left");
+    this.session.end().catch(() => undefined); // it has ended
   }
 
   private visibilityChanged(): void {
@@ -265,7 +280,7 @@ export class HeadsetSession implements HeadsetControls {
     const button = this.view.buttonAt(side);
     if (button === "stop") this.page.engine.stop("headset button");
     else if (button === "recentre") this.recentre();
-    else if (button === "leave") void this.session.end();
+    else if (button === "leave") this.end();
     else if (button === "reset") this.resetting = { side, sinceMs: now };
   }
 
