@@ -18,7 +18,7 @@ from lockstep.server.recording.errors import RecordingDamaged
 from lockstep.server.recording.format.episodes import EpisodeBook, EpisodeEntry
 from lockstep.server.recording.format.info import RecordingInfo
 from lockstep.server.recording.format.payload import own_record_of
-from lockstep.server.recording.format.records import CommandRecord, EpisodeRecord, FeedbackRecord, SeatRecord
+from lockstep.server.recording.format.records import CommandRecord, Degraded, EpisodeRecord, FeedbackRecord, SeatRecord
 from lockstep.server.recording.format.topics import OWN_TOPICS
 from lockstep.server.recording.reading.event_rows import WRENCH
 from lockstep.server.recording.reading.reader import Record, RecordingReader
@@ -37,6 +37,7 @@ __all__ = [
     "stretches_of",
 ]
 
+DEGRADED = OWN_TOPICS[Degraded]
 READ = {OWN_TOPICS[kind] for kind in (FeedbackRecord, CommandRecord, SeatRecord)}
 
 
@@ -119,9 +120,16 @@ def rows_of(
 
 
 def picture_records(reader: RecordingReader, topic: str, stretch: Stretch) -> Iterator[Record]:
-    """Yield the pictures that are needed to decode those of the stretch, from a keyframe on."""
+    """Yield the pictures that are needed to decode those of the stretch, from a keyframe on.
+
+    Where the recorder has left something out, a picture may be missing that later ones build on: the next one that
+    counts is a keyframe.
+    """
     begun = False
-    for record in reader.records(stretch.first_event, stretch.last_event, {topic}, decodable=True):
+    for record in reader.records(stretch.first_event, stretch.last_event, {topic, DEGRADED}, decodable=True):
+        if record.topic == DEGRADED:
+            begun = False
+            continue
         picture = record.picture
         if picture is not None and (begun or picture.keyframe):
             begun = True
@@ -156,7 +164,8 @@ def state_of(feedback: FeedbackRecord) -> list[float]:
 
 
 def _is_within(event: int, stretch: Stretch) -> bool:
-    return not is_newer(stretch.first_event, event) and not is_newer(event, stretch.last_event)
+    """Return whether the event, and the one that answers it, are of the stretch."""
+    return not is_newer(stretch.first_event, event) and is_newer(stretch.last_event, event)
 
 
 def _fits(event: int, stamp: int | None, tolerance: int) -> bool:
