@@ -10,11 +10,14 @@ import pyarrow.parquet as pq
 import pytest
 
 from lockstep.protocol.serial import MAX_EVENT, event_after
+from lockstep.server.recording.episodes.edits import EpisodeEdit, EpisodeEditRefused, add_edit, edits_path
 from lockstep.server.recording.errors import RecordingDamaged
 from lockstep.server.recording.export import export_lerobot
-from lockstep.server.recording.export.lerobot_rows import aligned_stamps
+from lockstep.server.recording.export.lerobot_rows import aligned_stamps, episodes_of
+from lockstep.server.recording.format.episodes import EpisodeEntry
 from lockstep.server.recording.format.records import Degraded, EpisodeRecord
 from lockstep.server.recording.format.topics import CAMERA
+from lockstep.server.recording.reading.reader import RecordingReader
 from lockstep.server.recording.verify.verify_dataset import verify_dataset
 from lockstep.server.recording.writing.writer import Entry
 from tests.server.recording.makers import EPOCH, INTERVAL, START, Story, own_entry, rewritten
@@ -185,3 +188,53 @@ def test_pictures_are_aligned_across_the_wrap_of_the_event_reference() -> None:
     events = [MAX_EVENT - 1, MAX_EVENT, event_after(MAX_EVENT), event_after(event_after(MAX_EVENT))]
     stamps = [MAX_EVENT - 1, MAX_EVENT - 1, MAX_EVENT, 2]
     assert list(aligned_stamps(stamps, events)) == [(0, MAX_EVENT - 1), (2, MAX_EVENT), (2, MAX_EVENT), (3, 2)]
+
+
+def changed(path: Path, id: str, **change: object) -> list[EpisodeEntry]:
+    with RecordingReader(path) as reader:
+        return add_edit(path, episodes_of(reader), EpisodeEdit(episode=id, at=1.0, **change))  # type: ignore[arg-type]
+
+
+def test_an_episode_that_is_relabelled_trimmed_or_dropped_is_so_in_the_dataset_and_its_recording_unchanged(
+    tmp_path: Path,
+) -> None:
+    path = recording(tmp_path / "a.mcap", *KEPT_AND_NOT)
+    before = path.read_bytes()
+    changed(path, "a", task="pull", outcome="failure", first_event=12, last_event=18)
+    (root,) = export_lerobot.export(path, tmp_path / "one", "")
+    found = [row for row in rows(root) if row["episode_index"] == 0]
+    assert [row["lockstep.event"] for row in found] == [*range(12, 18)]
+    assert {row["lockstep.success"] for row in found} == {0}
+    assert pq.read_table(root / "meta/tasks.parquet").column("task").to_pylist() == ["pull", "wipe"]
+    changed(path, "a", dropped=True)
+    (root,) = export_lerobot.export(path, tmp_path / "two", "")
+    assert [row["lockstep.event"] for row in rows(root)] == [*range(45, 60)]
+    assert [each.state for each in changed(path, "a", dropped=False)][0] == "kept"
+    assert path.read_bytes() == before
+
+
+@pytest.mark.parametrize(
+    ("id", "change"),
+    [
+        ("b", {"dropped": False}),  # it was discarded
+        ("d", {"outcome": "success"}),  # it was cut
+        ("e", {"last_event": 90}),  # it has no end
+        ("x", {"task": "x"}),
+        ("a", {"first_event": 9}),
+        ("a", {"last_event": 21}),
+        ("a", {"first_event": 18, "last_event": 18}),
+    ],
+)
+def test_nothing_makes_more_count_than_was_kept(tmp_path: Path, id: str, change: dict[str, object]) -> None:
+    path = recording(tmp_path / "a.mcap", *KEPT_AND_NOT)
+    with pytest.raises(EpisodeEditRefused):
+        changed(path, id, **change)
+    assert not edits_path(path).exists()
+
+
+def test_a_file_of_changes_that_somebody_wrote_makes_no_discarded_episode_count(tmp_path: Path) -> None:
+    path = recording(tmp_path / "a.mcap", *KEPT_AND_NOT)
+    lines = ['{"episode":"b","at":1,"dropped":false}', '{"episode":"a","at":1,"last_event":99}', '{"epis', "[]", "\x00"]
+    edits_path(path).write_text("\n".join(lines))
+    (root,) = export_lerobot.export(path, tmp_path / "dataset", "")
+    assert [row["lockstep.event"] for row in rows(root)] == [*range(10, 20), *range(45, 60)]

@@ -55,11 +55,13 @@ def _access() -> typer.Typer:
 
 
 def _recordings() -> typer.Typer:
+    from lockstep.server.cli.episodes import add_episode_command
     from lockstep.server.cli.recordings import add_recording_commands
     from lockstep.server.cli.settings_from_flags import make_settings
 
     commands = typer.Typer()
     add_recording_commands(commands, make_settings)
+    add_episode_command(commands, make_settings)
     return commands
 
 

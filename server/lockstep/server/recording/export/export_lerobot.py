@@ -23,6 +23,7 @@ import pyarrow.parquet as pq
 
 from lockstep.protocol.description import RobotDescription
 from lockstep.protocol.serial import event_gap
+from lockstep.server.recording.episodes.edits import edited, read_edits
 from lockstep.server.recording.errors import RecordingDamaged
 from lockstep.server.recording.export.lerobot_meta import (
     DatasetEpisode,
@@ -113,7 +114,7 @@ def _read(paths: Sequence[Path], task: str, tolerance: int) -> tuple[RobotDescri
             check_same_robot(description, robot)
             if sorted(topics) != sorted(cameras):
                 raise RecordingDamaged(f"{path.name} has other cameras than {paths[0].name}")
-            stretches = stretches_of(reader, episodes_of(reader), task)
+            stretches = stretches_of(reader, edited(episodes_of(reader), read_edits(path)), task)
             episodes += rows_of(reader, robot, stretches, cameras, tolerance)
     episodes = [each for each in episodes if each.frames]
     if description is None or not episodes:
