@@ -2,6 +2,7 @@
 
 import json
 from pathlib import Path
+from typing import Any
 
 import av
 import msgspec
@@ -57,7 +58,7 @@ def shown(root: Path) -> list[float]:
         return [float(each.to_ndarray(format="gray")[100:140, 100:220].mean()) for each in video.decode(video=0)]
 
 
-def rows(root: Path) -> list[dict[str, object]]:
+def rows(root: Path) -> list[dict[str, Any]]:
     return pq.read_table(root / DATA).to_pylist()  # type: ignore[no-any-return]
 
 
@@ -144,7 +145,7 @@ def test_an_event_that_the_recorder_left_out_makes_no_row_with_the_wrong_action(
     (root,) = export_lerobot.export(path, tmp_path / "dataset", "")
     found = {row["lockstep.event"]: row["action"] for row in rows(root)}
     assert 14 not in found
-    assert found[16][0] == pytest.approx(16 / 30)  # type: ignore[index]
+    assert found[16][0] == pytest.approx(16 / 30)
 
 
 def test_pictures_that_build_on_one_that_was_left_out_are_in_no_row(tmp_path: Path) -> None:
@@ -174,7 +175,7 @@ def test_the_check_finds_a_row_that_was_changed(tmp_path: Path, column: str, cha
     pq.write_table(changed, root / DATA)
     verdict = verify_dataset(root)
     assert not verdict.ok
-    assert not verdict.checks[check].ok  # type: ignore[index]
+    assert not verdict.checks[check].ok
 
 
 def test_the_check_refuses_what_lockstep_has_not_exported(tmp_path: Path) -> None:

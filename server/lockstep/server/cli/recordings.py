@@ -5,6 +5,7 @@ import sys
 from collections.abc import Callable
 from datetime import datetime
 from enum import StrEnum
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -158,7 +159,7 @@ def add_recording_commands(app: typer.Typer, make_settings: MakeSettings) -> Non
         if to is ExportFormat.LEROBOT:
             written = _or_usage(lambda: exporter.export_all(paths, out, task, tolerance))
         else:
-            written = [each for path in paths for each in _or_usage(lambda path=path: exporter.export(path, out, task))]
+            written = [each for path in paths for each in _or_usage(partial(exporter.export, path, out, task))]
         for each in written:
             sys.stdout.write(f"{escaped(each)}\n")
 
