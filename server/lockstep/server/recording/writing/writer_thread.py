@@ -6,6 +6,7 @@ import time
 from collections import deque
 from collections.abc import Callable
 from pathlib import Path
+from typing import NamedTuple
 
 import msgspec
 import structlog
@@ -29,6 +30,12 @@ log = structlog.get_logger(__name__)
 MAX_WAITING = 4096  # items, 15 s and more
 DRAIN_SECONDS = 0.05  # between two looks at the queue: nobody is woken for each item
 REMEMBERED = (SeatRecord, ParticipantsRecord)  # every part begins with these, besides robot and feedback
+
+
+class Lost(NamedTuple):
+    """Stands in the queue where items were left out."""
+
+    count: int
 
 
 class RecordingThread:
@@ -70,7 +77,7 @@ class RecordingThread:
         self._is_keeping = False  # a record `kept` is written, and not known to be on the disk
         self.free_bytes = 0  # on the disk, when it was looked at last; 0: not yet
         self._head = ""  # of the previous part's signed chain
-        self._waiting: deque[Item] = deque()
+        self._waiting: deque[Item | Lost] = deque()
         self._lost = 0  # not in the file yet; the loop adds, the thread takes
         self._lost_ever = 0
         self._closing = threading.Event()
@@ -95,8 +102,11 @@ class RecordingThread:
         if len(self._waiting) >= MAX_WAITING and not is_episode:
             self._lost += 1
             self._lost_ever += 1
-        else:
-            self._waiting.append(item)
+            return
+        if self._lost:  # what was left out has its place in front of what follows
+            lost, self._lost = self._lost, 0
+            self._waiting.append(Lost(lost))
+        self._waiting.append(item)
 
     def close(self) -> None:
         """Write the waiting items, and end. Blocks; idempotent."""
@@ -148,13 +158,19 @@ class RecordingThread:
 
     def _drain(self) -> None:
         for _ in range(len(self._waiting)):
-            self._take(self._waiting.popleft())
+            item = self._waiting.popleft()
+            if isinstance(item, Lost):
+                if self._writer is not None:
+                    self._tell_lost(self._writer, item.count)
+            else:
+                self._take(item)
             time.sleep(0)  # the loop goes first
         writer = self._writer
         if writer is None:
             return
-        if self._lost:
-            self._tell_lost(writer)
+        if self._lost and not self._waiting:
+            lost, self._lost = self._lost, 0
+            self._tell_lost(writer, lost)
         if writer.flush_if_due(self._now()):
             self._look_at_disk()
 
@@ -255,8 +271,7 @@ class RecordingThread:
             self._bytes_before += writer.bytes_written
             self._head = writer.head
 
-    def _tell_lost(self, writer: RecordingWriter) -> None:
-        lost, self._lost = self._lost, 0
+    def _tell_lost(self, writer: RecordingWriter, lost: int) -> None:
         writer.count_lost(lost)
         if self._robot is not None:
             event = self._robot.record.event if self._feedback is None else self._feedback.feedback.event
