@@ -72,7 +72,7 @@ LOADERS: dict[Callable[[], typer.Typer], tuple[str, ...]] = {
     _ros2: ("ros2",),
     _check: ("check",),
     _access: ("invite", "invitations", "revoke", "audit"),
-    _recordings: ("record", "recordings", "replay", "verify", "export", "report"),
+    _recordings: ("record", "recordings", "replay", "episodes", "verify", "export", "report"),
 }
 
 
