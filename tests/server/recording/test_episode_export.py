@@ -175,7 +175,7 @@ def test_the_check_finds_a_row_that_was_changed(tmp_path: Path, column: str, cha
     pq.write_table(changed, root / DATA)
     verdict = verify_dataset(root)
     assert not verdict.ok
-    assert not verdict.checks[check].ok
+    assert check in {name for name, each in verdict.checks.items() if not each.ok}
 
 
 def test_the_check_refuses_what_lockstep_has_not_exported(tmp_path: Path) -> None:

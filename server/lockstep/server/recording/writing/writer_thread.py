@@ -35,7 +35,7 @@ REMEMBERED = (SeatRecord, ParticipantsRecord)  # every part begins with these, b
 class Lost(NamedTuple):
     """Stands in the queue where items were left out."""
 
-    count: int
+    items: int
 
 
 class RecordingThread:
@@ -161,7 +161,7 @@ class RecordingThread:
             item = self._waiting.popleft()
             if isinstance(item, Lost):
                 if self._writer is not None:
-                    self._tell_lost(self._writer, item.count)
+                    self._tell_lost(self._writer, item.items)
             else:
                 self._take(item)
             time.sleep(0)  # the loop goes first
