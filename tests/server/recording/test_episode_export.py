@@ -1,6 +1,8 @@
 """Episodes in datasets: exactly the kept ones, each row with the picture of its own event."""
 
 import json
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -94,6 +96,16 @@ def test_a_dataset_has_exactly_the_kept_episodes_and_their_rows_show_their_own_e
     assert [each["tasks"] for each in places] == [["push"], ["wipe"]]
     assert [(each["dataset_from_index"], each["dataset_to_index"]) for each in places] == [(0, 10), (10, 25)]
     assert verify_dataset(root).ok
+
+
+def test_a_checker_that_others_wrote_takes_a_dataset_of_several_episodes(tmp_path: Path) -> None:
+    path = recording(tmp_path / "a.mcap", *KEPT_AND_NOT)
+    (root,) = export_lerobot.export(path, tmp_path / "dataset", "")
+    command = [str(Path(sys.executable).with_name("lerobot-doctor")), "check", str(root), "--json"]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=50, check=False)
+    summary = json.loads(done.stdout)["summary"]
+    assert summary["FAIL"] == 0, done.stdout
+    assert summary["PASS"] >= 5, done.stdout
 
 
 def test_several_recordings_become_one_dataset(tmp_path: Path) -> None:

@@ -20,6 +20,7 @@ export type EpisodeTone = "off" | "wait" | "on" | "bad";
 export interface EpisodeLabels {
   readonly tone: EpisodeTone;
   readonly text: string; // what is going on
+  readonly time: string; // how long the episode has run; "" for none
   readonly count: string;
 }
 
@@ -34,23 +35,24 @@ export function episodeLabels(
   switch (state.phase) {
     case "countdown": {
       const left = Math.max(0, Math.ceil(state.seconds_left - ageSeconds));
-      return { tone: "wait", text: left > 0 ? `Begins in ${left}` : "Begins", count };
+      return { tone: "wait", text: left > 0 ? `Begins in ${left}` : "Begins", time: "", count };
     }
     case "resetting":
-      return { tone: "wait", text: `Reset: ${state.reset_action}`, count };
+      return { tone: "wait", text: `Reset: ${state.reset_action}`, time: "", count };
     case "keeping":
-      return { tone: "wait", text: "Being written", count };
+      return { tone: "wait", text: "Being written", time: "", count };
     case "open":
       return {
         tone: state.problems.length > 0 ? "bad" : "on",
-        text: `Take ${state.number} · ${elapsed(seconds)}`,
+        text: `Take ${state.number}`,
+        time: elapsed(seconds),
         count,
       };
     case "idle":
       if (recording?.state === "failed")
-        return { tone: "bad", text: `Not recording: ${recording.detail}`, count };
-      if (recording?.state !== "recording") return { tone: "off", text: "Record first", count };
-      return { tone: state.last.includes("lost") ? "bad" : "off", text: said(state.last), count };
+        return { tone: "bad", text: `Not recording: ${recording.detail}`, time: "", count };
+      if (recording?.state !== "recording") return { tone: "off", text: "Record first", time: "", count };
+      return { tone: state.last.includes("lost") ? "bad" : "off", text: said(state.last), time: "", count };
   }
 }
 

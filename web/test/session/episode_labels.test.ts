@@ -37,7 +37,7 @@ it("counts down, and says how long the open one runs", () => {
   const counting = episodeLabels({ ...IDLE, phase: "countdown", seconds_left: 3 }, RECORDING, 0.5, 0);
   expect(counting).toMatchObject({ tone: "wait", text: "Begins in 3" });
   const open = episodeLabels({ ...IDLE, phase: "open", number: 7 }, RECORDING, 0, 65);
-  expect(open).toMatchObject({ tone: "on", text: "Take 7 · 1:05" });
+  expect(open).toMatchObject({ tone: "on", text: "Take 7", time: "1:05" });
 });
 
 it("turns red as soon as something spoils the episode, and names it", () => {

@@ -40,6 +40,7 @@ export function createEpisodeBar(engine: ConsoleEngine): Panel {
   const isOpen = (each: EpisodeState): boolean => each.phase === "open";
   const lamp = h("span", "episode-lamp", { "aria-hidden": "true" });
   const words = h("strong", "episode-words", { role: "status" });
+  const time = h("span", "episode-time"); // apart from the words, which are read aloud when they change
   const count = h("span", "episode-count");
   const problems = h("span", "episode-problems", { role: "alert" });
   const task = h("input", "episode-task", {
@@ -60,7 +61,7 @@ export function createEpisodeBar(engine: ConsoleEngine): Panel {
   const group = h("div", "episode-buttons", { role: "group", "aria-label": "Episode" });
   group.append(...buttons.map((each) => each.element));
   const element = h("section", "episode-bar", { "aria-label": "Episodes" });
-  element.append(h("div", "episode-state", {}, lamp, words, problems, count), form, group);
+  element.append(h("div", "episode-state", {}, lamp, words, time, problems, count), form, group);
 
   function make(
     label: string,
@@ -135,6 +136,7 @@ export function createEpisodeBar(engine: ConsoleEngine): Panel {
       const isRefused = now - refusedMs < SHOWN_MS;
       setData(element, "tone", isRefused ? "bad" : labels.tone);
       setText(words, isRefused ? `Not done: ${refusal}` : labels.text);
+      setText(time, labels.time);
       setText(count, labels.count);
       setText(problems, problemWords(current.problems));
       setHidden(problems, current.problems.length === 0);

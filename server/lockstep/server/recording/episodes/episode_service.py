@@ -45,6 +45,7 @@ from lockstep.server.session_events import (
     SessionEvents,
     StopShown,
 )
+from lockstep.server.util.display_names import printable
 from lockstep.server.util.rate_limits import RateLimits
 
 __all__ = ["EpisodeRobot", "EpisodeService"]
@@ -208,7 +209,7 @@ class EpisodeService:
         core, place, now = self._core, self._place(), time.monotonic()
         match request.do:
             case "start":
-                return core.start(" ".join(request.task.split()), by.name, place, now)
+                return core.start(printable(request.task), by.name, place, now)
             case "keep":
                 return core.keep(request.episode, request.outcome, by.name, place)
             case "discard":
@@ -216,7 +217,7 @@ class EpisodeService:
             case "redo":
                 return core.redo(request.episode, by.name, place, now)
             case "mark":
-                return core.mark(request.episode, request.text, by.name, place)
+                return core.mark(request.episode, printable(request.text), by.name, place)
 
     # RecordingWatcher
 
