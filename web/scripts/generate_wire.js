@@ -71,25 +71,31 @@ function wayOf(name, spans) {
   return `export const ${constant} = [\n${entries.join("\n")}\n] as const;`;
 }
 
-function reachableFrom(name, found = new Set()) {
-  if (found.has(name)) return found;
+/** Messages that the operator's page reads only with code that it loads after its first picture. */
+const LATER = ["EpisodeAnswer", "EpisodeState"];
+
+function reachableFrom(name, found = new Set(), without = []) {
+  if (found.has(name) || without.includes(name)) return found;
   found.add(name);
   for (const [, reference] of JSON.stringify(definitions[name]).matchAll(/"#\/\$defs\/(\w+)"/g))
-    reachableFrom(reference, found);
+    reachableFrom(reference, found, without);
   return found;
 }
 
 const head = "// Generated from docs/schemas/console.schema.json by `npm run generate`. Do not edit.\n";
 const types = `${head}\n${Object.entries(definitions).map(declarationOf).join("\n\n")}\n`;
-const received = [...reachableFrom("ServerMessage")].sort();
-const checks = Object.fromEntries(received.map((name) => [name, shapeOf(definitions[name])]));
+const received = reachableFrom("ServerMessage", new Set(), LATER);
+const later = LATER.flatMap((name) => [...reachableFrom(name)]).filter((name) => !received.has(name));
+const checksOf = (names) =>
+  Object.fromEntries([...new Set(names)].sort().map((name) => [name, shapeOf(definitions[name])]));
 const ways = Object.entries(definitions).flatMap(([name, node]) =>
   node["x-way"] === undefined ? [] : [wayOf(name, node["x-way"])],
 );
 const generated = {
   "../src/protocol/ways.ts": `${head}\n${ways.join("\n\n")}\n`,
   "../src/protocol/wire.ts": types,
-  "../src/protocol/wire_schema.json": `${JSON.stringify(checks)}\n`,
+  "../src/protocol/wire_schema.json": `${JSON.stringify(checksOf(received))}\n`,
+  "../src/protocol/wire_schema_later.json": `${JSON.stringify(checksOf(later))}\n`,
 };
 
 for (const [path, text] of Object.entries(generated)) {

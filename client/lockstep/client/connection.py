@@ -8,6 +8,7 @@ from dataclasses import replace
 
 from lockstep.client.connection_options import ConnectionOptions
 from lockstep.client.control.driving import Driving
+from lockstep.client.episodes import Episodes
 from lockstep.client.errors import ConnectFailed, ConsoleLost
 from lockstep.client.heartbeat import Heartbeat
 from lockstep.client.media.media_receiver import MediaReceiver
@@ -52,6 +53,7 @@ class Connection:
         self._transport: Transport | None = None
         self._requests: SessionRequests | None = None
         self._actions: RobotActions | None = None
+        self._episodes: Episodes | None = None
         self._running: asyncio.Task[None] | None = None
 
     @property
@@ -71,6 +73,12 @@ class Connection:
         if self._actions is None:
             raise ConsoleLost("not connected yet")
         return self._actions
+
+    @property
+    def episodes(self) -> Episodes:
+        if self._episodes is None:
+            raise ConsoleLost("not connected")
+        return self._episodes
 
     @property
     def news(self) -> RobotNews:
@@ -109,6 +117,7 @@ class Connection:
         self._transport = transport
         self._requests = SessionRequests(transport, self.session, self.driving, self._messages.until)
         self._actions = RobotActions(transport, self.session, self.driving, self.news, self._messages.until)
+        self._episodes = Episodes(transport, self._messages.episodes, self._messages.until)
         if ticket is None and transport.packets is not None:
             self.media.prepare(transport.packets, sections, options.decode)
         await transport.connect(deadline - self._loop.time())

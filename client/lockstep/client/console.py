@@ -16,6 +16,7 @@ from lockstep.client.console_url import parse_link
 from lockstep.client.control.clutch import Clutch
 from lockstep.client.control.command_gate import GateState, Pacing
 from lockstep.client.control.goal_move import GoalMove
+from lockstep.client.episodes import Episodes
 from lockstep.client.errors import CommandError, CommandRefused, ConsoleError, ConsoleLost, NotArmed
 from lockstep.client.media.media_gate import GateMode
 from lockstep.client.media.newest_queue import NewestQueue, QueueClosed
@@ -203,6 +204,11 @@ class Console:
     def actions(self) -> list[ActionUpdate]:
         """The states of the robot's newest actions, oldest first, whoever asked for them."""
         return list(self._live().news.updates.values())
+
+    @property
+    def episodes(self) -> Episodes:
+        """The episodes of the console's recording: `await console.episodes.start("pick up the cube")`."""
+        return self._live().episodes
 
     @property
     def status(self) -> list[StatusItem]:

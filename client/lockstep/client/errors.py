@@ -15,6 +15,7 @@ ConsoleError
     ├── ActionRefused       … to an action
     ├── CommandRefused      … to a command
     │   └── NotArmed        … until `await console.arm()`: after a stop, a reset, a lost link, …
+    ├── EpisodeRefused      … to a request about an episode
     └── SeatRefused         … to the control seat
 """
 
@@ -27,6 +28,7 @@ __all__ = [
     "ConnectFailed",
     "ConsoleError",
     "ConsoleLost",
+    "EpisodeRefused",
     "GoalNotReached",
     "LinkFormatError",
     "NoSuchStream",
@@ -173,6 +175,14 @@ class ActionCancelled(ConsoleError):
 
 class ActionFailed(ConsoleError):
     """The robot began the action and failed at it; the detail says why."""
+
+
+class EpisodeRefused(Refused):
+    """A request about an episode was refused, or the episode did not come about.
+
+    Attributes:
+        reason: one of `lockstep.protocol.episodes.EpisodeReason`
+    """
 
 
 class SeatRefused(Refused):

@@ -4,6 +4,7 @@ import asyncio
 from collections.abc import Callable
 
 from lockstep.client.control.driving import Driving
+from lockstep.client.episodes import EpisodeNews
 from lockstep.client.errors import ConsoleLost
 from lockstep.client.heartbeat import Heartbeat
 from lockstep.client.media.media_receiver import MediaReceiver
@@ -19,6 +20,7 @@ from lockstep.protocol.console import (
     Welcome,
     decode_server_message,
 )
+from lockstep.protocol.episodes import EpisodeAnswer, EpisodeState
 from lockstep.protocol.errors import MessageError
 from lockstep.protocol.messages import Feedback, Pong, Refusal, StopTaken
 from lockstep.protocol.trace_messages import Traces
@@ -32,6 +34,7 @@ class MessageDispatcher:
     Attributes:
         lost: why no more messages come; None while they do
         news: of the robot's actions and status
+        episodes: what the console has said of episodes
         malformed: messages from the console that could not be read
     """
 
@@ -43,6 +46,7 @@ class MessageDispatcher:
         self._media = media
         self._heartbeat = heartbeat
         self.news = RobotNews()
+        self.episodes = EpisodeNews()
         self._changed = asyncio.Event()  # a message came, or the end
 
     async def until(self, condition: Callable[[], bool]) -> None:
@@ -94,6 +98,8 @@ class MessageDispatcher:
                 self._session.stop_taken(message)
             case ActionUpdate() | Status():
                 self.news.hear(message, asyncio.get_running_loop().time())
+            case EpisodeState() | EpisodeAnswer():
+                self.episodes.hear(message)
             case Welcome() | Seat() | Participants() | SharedNote() | Traces():
                 self._session.hear(message)
         self._wake_waiters()

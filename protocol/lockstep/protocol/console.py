@@ -8,9 +8,9 @@ import the other. JSON Schemas and the page's TypeScript types are generated fro
 | control | unordered, 0 retransmits | client | command, rest, report, ping, trace_report |
 | | | server | feedback, refusal, pong, traces |
 | session | reliable | client | seat_request, seat_grant, seat_decline, seat_take, seat_release, rename, note |
-| | | client | silence_stops, act, action_cancel, trace_request |
+| | | client | silence_stops, act, action_cancel, trace_request, episode_request |
 | | | server | welcome, robot, seat, participants, quality, speed_cap, sources, voice, recording, note_shared |
-| | | server | notice, refusal, action, status |
+| | | server | notice, refusal, action, status, episode, episode_answer |
 | stop | reliable | client | stop, reset |
 | | | server | stop_state, stop_taken, refusal |
 """
@@ -22,6 +22,7 @@ import msgspec
 from lockstep.protocol.actions import Act, ActionCancel, ActionUpdate, Status
 from lockstep.protocol.carriers import Carrier
 from lockstep.protocol.description import RobotDescription
+from lockstep.protocol.episodes import EpisodeAnswer, EpisodeRequest, EpisodeState
 from lockstep.protocol.errors import MessageError
 from lockstep.protocol.messages import (
     Command,
@@ -348,6 +349,7 @@ ClientMessage = (
     | Note
     | Act
     | ActionCancel
+    | EpisodeRequest
     | Stop
     | Reset
     | TraceRequest
@@ -371,6 +373,8 @@ ServerMessage = (
     | StopStateNotice
     | StopTaken
     | ActionUpdate
+    | EpisodeState
+    | EpisodeAnswer
     | Status
     | Traces
 )

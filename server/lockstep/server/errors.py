@@ -25,17 +25,23 @@ ConsoleError
 │   ├── BodyTooLarge
 │   ├── BodyTooSlow
 │   ├── CameraTaken         another client publishes it
+│   ├── EpisodeEmpty        no event was executed in it
+│   ├── EpisodeOpen         an episode is open, or about to begin
 │   ├── HostRefused         a host name that is not the console's
 │   ├── LockedOut           a reset while somebody at the robot keeps it from being driven
 │   ├── NotAcceptable       an offer without anything that the console accepts
 │   ├── NotConnected
 │   ├── NotRenewable        an action that moves the robot, asked for over HTTP
 │   ├── NotDialIn           the console connects to this robot; or its key is in the settings
+│   ├── NoEpisode           none is open
+│   ├── NoTask              an episode needs a task, in words
 │   ├── NotFound
 │   ├── NotPairing          no pairing code is open
+│   ├── OtherEpisode        the request names another one than the one that is open
 │   ├── PreconditionFailed
 │   ├── TooManyInvitations
 │   ├── PreconditionRequired
+│   ├── RecordingOff        nothing is recorded, so no episode can be
 │   ├── RecordingUnreadable  the recording is damaged for good
 │   ├── ResetTooSoon        a reset right after the stop that it names
 │   ├── PressUsed           the stop of this press has been reset
@@ -136,6 +142,12 @@ __all__ = [
     "WrongChannel",
     "WrongMediaType",
     "http_error",
+    "EpisodeEmpty",
+    "EpisodeOpen",
+    "NoEpisode",
+    "NoTask",
+    "OtherEpisode",
+    "RecordingOff",
 ]
 
 
@@ -319,6 +331,30 @@ class WrongMediaType(RequestError):
     pass
 
 
+class EpisodeEmpty(RequestError):
+    pass
+
+
+class EpisodeOpen(RequestError):
+    pass
+
+
+class NoEpisode(RequestError):
+    pass
+
+
+class NoTask(RequestError):
+    pass
+
+
+class OtherEpisode(RequestError):
+    pass
+
+
+class RecordingOff(RequestError):
+    pass
+
+
 class ChannelError(ConsoleError):
     """An error on a data channel; /metrics counts them by `name`."""
 
@@ -431,6 +467,12 @@ HTTP_ERRORS: dict[type[ConsoleError], HttpError] = {
     AlreadyPaired: HttpError(409, "already_paired"),
     AlreadyPublishing: HttpError(409, "already_publishing", {"Retry-After": "2"}),
     AlreadyRecording: HttpError(409, "already_recording"),
+    RecordingOff: HttpError(409, "recording_off"),
+    EpisodeOpen: HttpError(409, "episode_open"),
+    NoEpisode: HttpError(409, "no_episode"),
+    OtherEpisode: HttpError(409, "other_episode"),
+    EpisodeEmpty: HttpError(409, "empty"),
+    NoTask: HttpError(422, "no_task"),
     BadJson: HttpError(400, "bad_json"),
     BadParameter: HttpError(422, "bad_parameter"),
     BadSdp: HttpError(400, "bad_sdp"),

@@ -11,6 +11,7 @@ import msgspec
 from lockstep.protocol.actions import Act, ActionUpdate, Status
 from lockstep.protocol.console import Participants, Report, RobotState, Seat, SharedNote, SpeedCapState
 from lockstep.protocol.description import RobotDescription
+from lockstep.protocol.episodes import EpisodeRequest
 from lockstep.protocol.messages import Command, Feedback, Refusal, RefusalReason, Rest, StopState, StopTaken
 from lockstep.protocol.trace import CommandSpans
 from lockstep.protocol.trace_messages import EventTrace
@@ -26,6 +27,7 @@ __all__ = [
     "CommandForwarded",
     "CommandRefused",
     "CommandRepeated",
+    "EpisodeAsked",
     "EpochBegan",
     "EventsTraced",
     "FeedbackReceived",
@@ -205,6 +207,16 @@ class ActionUpdated(SessionEvent, frozen=True):
 
 class StatusReceived(SessionEvent, frozen=True):
     status: Status
+
+
+# episodes
+
+
+class EpisodeAsked(SessionEvent, frozen=True):
+    """A peer asks for something to be done with an episode."""
+
+    by: Actor
+    request: EpisodeRequest
 
 
 # stops and resets

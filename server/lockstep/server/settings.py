@@ -16,6 +16,7 @@ from lockstep.server.http.limit_settings import LimitSettings
 from lockstep.server.http.network_settings import NameList, NetworkSettings
 from lockstep.server.media.settings import MediaSettings
 from lockstep.server.media.sources.source_settings import SourceSettings
+from lockstep.server.recording.episodes.settings import EpisodeSettings
 from lockstep.server.recording.settings import RecordingSettings
 from lockstep.server.robot.credentials import link_access
 from lockstep.server.robot.dial_in import DIAL_IN
@@ -78,6 +79,7 @@ class Settings(NetworkSettings, LimitSettings, SourceSettings, RelaySettings, Fl
 
     media: MediaSettings = MediaSettings()
     recording: RecordingSettings = RecordingSettings()
+    episodes: EpisodeSettings = EpisodeSettings()
 
     @classmethod
     def settings_customise_sources(

@@ -96,6 +96,7 @@ export class Page {
       engine.actions = new parts.ActionClient((message) => engine.tell("session", message), parts.drawId);
       return (this.robot = parts.createRobotStrip(engine));
     });
+    const episodes = later.panel((parts) => parts.createEpisodeBar(engine));
     const event = createEventPanel(engine);
     grid.card = event.element;
     const force = later.panel((parts) => parts.createForceGauge(engine, false));
@@ -128,7 +129,7 @@ export class Page {
     const deck = h("footer", "deck", {}, arm.element, axes.element, left, right, stop.element);
     this.root.append(
       ...[bar.element, seat.element],
-      h("div", "strips", {}, alarm.element, banner.element),
+      h("div", "strips", {}, alarm.element, banner.element, episodes.element),
       ...[grid.element, rail],
       ...[charts.element, sheets.element, deck, announcer.element],
     );
@@ -140,6 +141,7 @@ export class Page {
       alarm,
       banner,
       robot,
+      episodes,
       event,
       force,
       contact,

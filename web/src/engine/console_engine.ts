@@ -103,6 +103,8 @@ export class ConsoleEngine {
   private readonly disposal = new Disposal();
   peer: Peer | null = null;
   measuredMs: number | null = null; // when the newest feedback came
+  episode: unknown = null; // the newest message of episodes, whose schema comes with the bar that shows it
+  takeEpisode = (message: unknown): void => void (this.episode = message); // the bar replaces it
   statusMs = 0; // when the robot's newest status came
   actionMs = -Infinity; // when the newest news of an action came
   private heardMs = 0;
@@ -330,6 +332,10 @@ export class ConsoleEngine {
   private received(channel: ChannelName, data: unknown, at: number): void {
     const parsed = parseServerMessage(data);
     if (parsed.kind !== "message") {
+      if (parsed.kind === "unknown" && parsed.type.startsWith("episode")) {
+        this.takeEpisode(parsed.value);
+        return;
+      }
       this.state.badMessages += 1;
       const detail = parsed.kind === "unknown" ? parsed.type : parsed.detail;
       note(this.state, "warning", `Unreadable message on ${channel}: ${detail}`, Date.now());

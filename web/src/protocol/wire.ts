@@ -121,7 +121,7 @@ export interface Camera {
   readonly metres_per_pixel: number | null;
 }
 
-export type ClientMessage = Command | Rest | Report | Ping | SeatRequest | SeatGrant | SeatDecline | SeatTake | SeatRelease | SilenceStops | Rename | Note | Act | ActionCancel | Stop | Reset | TraceRequest | TraceReport;
+export type ClientMessage = Command | Rest | Report | Ping | SeatRequest | SeatGrant | SeatDecline | SeatTake | SeatRelease | SilenceStops | Rename | Note | Act | ActionCancel | EpisodeRequest | Stop | Reset | TraceRequest | TraceReport;
 
 /** Event `event`, valid only as the answer to issue `issue` of feedback `event - 1`. */
 export interface Command {
@@ -159,6 +159,52 @@ export interface ControlLayer {
   readonly name: string;
   readonly label: string;
   readonly bindings: readonly (Binding)[];
+}
+
+/** The answer to a request, to its sender alone; that of `keep` comes when the episode is on the disk. */
+export interface EpisodeAnswer {
+  readonly type: "episode_answer";
+  readonly id: string;
+  readonly reason: "" | "empty" | "episode_open" | "link_down" | "no_episode" | "no_task" | "not_allowed" | "not_written" | "other_episode" | "recording_off" | "too_often";
+  readonly detail: string;
+  readonly episode: string;
+}
+
+/** Something that spoils the episode, or will. */
+export interface EpisodeProblem {
+  readonly kind: "camera_behind" | "camera_missing" | "camera_slow" | "disk_low" | "no_events" | "recorder_behind" | "records_lost";
+  readonly text: string;
+  readonly stream: string;
+}
+
+/** Ask for something to be done; the console answers with `episode_answer` of the same id. */
+export interface EpisodeRequest {
+  readonly type: "episode_request";
+  readonly id: string;
+  readonly do: "discard" | "keep" | "mark" | "redo" | "start";
+  readonly episode?: string;
+  readonly task?: string;
+  readonly outcome?: "" | "failure" | "success";
+  readonly text?: string;
+}
+
+/** How the episode does; sent to newcomers, when it changes, and every second while one is open. */
+export interface EpisodeState {
+  readonly type: "episode";
+  readonly phase: "countdown" | "idle" | "keeping" | "open" | "resetting";
+  readonly episode: string;
+  readonly number: number;
+  readonly task: string;
+  readonly by: string;
+  readonly seconds_left: number;
+  readonly since: number;
+  readonly first_event: number;
+  readonly kept: number;
+  readonly discarded: number;
+  readonly cut: number;
+  readonly last: string;
+  readonly reset_action: string;
+  readonly problems: readonly (EpisodeProblem)[];
 }
 
 /** One event as the operator's client has measured it, with what the console has told it. */
@@ -488,7 +534,7 @@ export interface SeatTake {
   readonly type: "seat_take";
 }
 
-export type ServerMessage = Feedback | Refusal | Pong | Welcome | RobotState | Seat | Participants | Quality | SpeedCapState | Sources | Voice | RecordingState | SharedNote | Notice | StopStateNotice | StopTaken | ActionUpdate | Status | Traces;
+export type ServerMessage = Feedback | Refusal | Pong | Welcome | RobotState | Seat | Participants | Quality | SpeedCapState | Sources | Voice | RecordingState | SharedNote | Notice | StopStateNotice | StopTaken | ActionUpdate | EpisodeState | EpisodeAnswer | Status | Traces;
 
 /** A participant's note, with the event it belongs to. Newcomers get the last ones. */
 export interface SharedNote {

@@ -5,7 +5,7 @@ import { isRecord, misfit, type Definitions, type Shape } from "./schema_check";
 /** A message of the console protocol, or why the text is none. */
 export type Parsed =
   | { readonly kind: "message"; readonly message: ServerMessage }
-  | { readonly kind: "unknown"; readonly type: string }
+  | { readonly kind: "unknown"; readonly type: string; readonly value: unknown }
   | { readonly kind: "malformed"; readonly detail: string };
 
 const definitions: Definitions = schema;
@@ -37,7 +37,7 @@ export function parseServerMessage(data: unknown): Parsed {
 function parseTyped(value: Record<string, unknown>, type: string): Parsed {
   const name = nameByType.get(type);
   const node = name === undefined ? undefined : definitions[name];
-  if (node === undefined) return { kind: "unknown", type };
+  if (node === undefined) return { kind: "unknown", type, value };
   const detail = misfit(definitions, node, value);
   if (detail !== null) return { kind: "malformed", detail };
   // The schema is generated together with the type, so what fits the one is the other.

@@ -14,7 +14,7 @@ export interface ReplayChunk {
 export type ReplayEntry = readonly [number, number, number];
 
 export type MarkKind =
-  "contact" | "refusal" | "stop" | "reset" | "seat" | "note" | "fault" | "link" | "action";
+  "contact" | "refusal" | "stop" | "reset" | "seat" | "note" | "fault" | "link" | "action" | "episode";
 
 export interface ReplayMark {
   readonly event: number;
@@ -48,6 +48,7 @@ const KINDS: readonly string[] = [
   "fault",
   "link",
   "action",
+  "episode",
 ];
 
 /** null: it is no index. */

@@ -2,15 +2,23 @@ import { REFUSAL_LABELS } from "../session/refusal_labels";
 import type { MarkKind, ReplayMark } from "./index_table";
 
 /** What marks are gathered under: what somebody looks for. */
-export type MarkGroup = "contacts" | "refusals" | "stops" | "seats" | "others";
+export type MarkGroup = "contacts" | "refusals" | "stops" | "seats" | "episodes" | "others";
 
-export const MARK_GROUPS: readonly MarkGroup[] = ["contacts", "refusals", "stops", "seats", "others"];
+export const MARK_GROUPS: readonly MarkGroup[] = [
+  "contacts",
+  "refusals",
+  "stops",
+  "seats",
+  "episodes",
+  "others",
+];
 
 export const GROUP_NAMES: Readonly<Record<MarkGroup, string>> = {
   contacts: "Contacts",
   refusals: "Refusals",
   stops: "Stops",
   seats: "Hand-overs",
+  episodes: "Episodes",
   others: "Other",
 };
 
@@ -24,6 +32,7 @@ const GROUPS: Readonly<Record<MarkKind, MarkGroup>> = {
   fault: "others",
   link: "others",
   action: "others",
+  episode: "episodes",
 };
 
 const NAMES: Readonly<Record<MarkKind, string>> = {
@@ -36,6 +45,7 @@ const NAMES: Readonly<Record<MarkKind, string>> = {
   fault: "Fault",
   link: "Robot link",
   action: "Action",
+  episode: "Episode",
 };
 
 export function groupOf(mark: ReplayMark): MarkGroup {
@@ -57,7 +67,7 @@ export function markLabel(mark: ReplayMark): string {
 
 /** How many there are of each group. */
 export function countMarks(marks: readonly ReplayMark[]): Record<MarkGroup, number> {
-  const counts = { contacts: 0, refusals: 0, stops: 0, seats: 0, others: 0 };
+  const counts = { contacts: 0, refusals: 0, stops: 0, seats: 0, episodes: 0, others: 0 };
   for (const mark of marks) counts[groupOf(mark)]++;
   return counts;
 }

@@ -15,6 +15,7 @@ export interface RecordingEntry {
   readonly lastEvent: number;
   readonly bytes: number;
   readonly marks: ReadonlyMap<string, number>; // how many of each kind
+  readonly episodes: ReadonlyMap<string, number>; // how many in each state: "kept", "discarded", "cut", "open"
   readonly lost: number;
   readonly running: boolean;
   readonly interrupted: boolean;
@@ -45,7 +46,10 @@ export function parseEntry(value: unknown): RecordingEntry | null {
   if (!isRecord(value) || typeof value["id"] !== "string" || value["id"] === "") return null;
   const text = (name: string): string => displayText(value[name]);
   const number = (name: string): number => (typeof value[name] === "number" ? value[name] : 0);
-  const marks = isRecord(value["marks"]) ? Object.entries(value["marks"]) : [];
+  const counts = (name: string): Map<string, number> => {
+    const found = isRecord(value[name]) ? Object.entries(value[name]) : [];
+    return new Map(found.flatMap(([kind, count]) => (typeof count === "number" ? [[kind, count]] : [])));
+  };
   return {
     id: value["id"],
     recording: text("recording"),
@@ -58,7 +62,8 @@ export function parseEntry(value: unknown): RecordingEntry | null {
     firstEvent: number("first_event"),
     lastEvent: number("last_event"),
     bytes: number("bytes"),
-    marks: new Map(marks.flatMap(([kind, count]) => (typeof count === "number" ? [[kind, count]] : []))),
+    marks: counts("marks"),
+    episodes: counts("episodes"),
     lost: number("lost"),
     running: value["running"] === true,
     interrupted: value["interrupted"] === true,

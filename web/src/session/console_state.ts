@@ -206,6 +206,8 @@ export function applyMessage(state: ConsoleState, message: ServerMessage, wallMs
       state.status = message;
       return;
     case "pong":
+    case "episode": // the episode bar's
+    case "episode_answer":
     case "stop_taken": // the stop sender's
     case "traces": // the engine's
       return;

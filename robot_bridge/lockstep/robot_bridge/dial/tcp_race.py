@@ -4,7 +4,6 @@ The kernel repeats a lost SYN after 1, 3 and 7 s. A new connection beside it fin
 """
 
 import asyncio
-import contextlib
 import socket
 from collections.abc import Awaitable, Callable
 
@@ -27,32 +26,32 @@ async def connect_first(
     Raises:
         OSError: a connection was refused, or there is no way or no such host.
     """
-    opening: list[asyncio.Task[socket.socket]] = []
+    outcomes: asyncio.Queue[socket.socket | OSError] = asyncio.Queue()
 
-    async def open_one() -> socket.socket:
-        return await (_connect(host, port) if connect is None else connect())
+    async def open_one() -> None:
+        try:
+            outcomes.put_nowait(await (_connect(host, port) if connect is None else connect()))
+        except OSError as error:
+            outcomes.put_nowait(error)
 
     try:
-        while True:
-            if len(opening) == MOST:
-                await _drop([opening.pop(1)])
-            opening.append(asyncio.ensure_future(open_one()))
-            done, _ = await asyncio.wait(opening, timeout=interval, return_when=asyncio.FIRST_COMPLETED)
+        async with asyncio.TaskGroup() as tasks:
+            opening: list[asyncio.Task[None]] = []
+            while outcomes.empty():
+                if len(opening) == MOST:
+                    opening.pop(1).cancel()
+                opening.append(tasks.create_task(open_one()))
+                await asyncio.wait(opening, timeout=interval, return_when=asyncio.FIRST_COMPLETED)
             for task in opening:
-                if task in done:
-                    opening.remove(task)
-                    return task.result()
+                task.cancel()
+        first = outcomes.get_nowait()
     finally:
-        await _drop(opening)
-
-
-async def _drop(tasks: list[asyncio.Task[socket.socket]]) -> None:
-    """Cancel these, and close a socket that is open all the same."""
-    for task in tasks:
-        task.cancel()
-    for result in await asyncio.gather(*tasks, return_exceptions=True):
-        if isinstance(result, socket.socket):
-            result.close()
+        while not outcomes.empty():  # others were open in the same moment, or nobody waits any more
+            if isinstance(other := outcomes.get_nowait(), socket.socket):
+                other.close()
+    if isinstance(first, OSError):
+        raise first
+    return first
 
 
 async def _connect(host: str, port: int) -> socket.socket:
@@ -68,8 +67,7 @@ async def _connect(host: str, port: int) -> socket.socket:
             made.close()
             error = failed
         except BaseException:
-            with contextlib.suppress(OSError):
-                made.close()
+            made.close()
             raise
         else:
             return made

@@ -182,6 +182,10 @@ class ActionService:
             raise ActionIdUsed("an earlier request with this id asked for something else, or on another way")
         return await _answered(asked.answer) if asked.newest is None else asked.newest
 
+    def act_by_console(self, act: Act) -> bool:
+        """Ask for an action that moves nothing, for the console itself. False: there is no link to the robot."""
+        return self._send(act, Actor(name=act.by))
+
     def cancel_by_peer(self, peer: Peer, cancel: ActionCancel) -> None:
         """Pass on what the seat's holder or a supervisor cancels. Others have STOP."""
         if peer.role == "supervisor" or self._holds_seat(peer):

@@ -65,11 +65,13 @@ def _pairing() -> typer.Typer:
 
 
 def _recordings() -> typer.Typer:
+    from lockstep.server.cli.episodes import add_episode_command
     from lockstep.server.cli.recordings import add_recording_commands
     from lockstep.server.cli.settings_from_flags import make_settings
 
     commands = typer.Typer()
     add_recording_commands(commands, make_settings)
+    add_episode_command(commands, make_settings)
     return commands
 
 
@@ -81,7 +83,7 @@ LOADERS: dict[Callable[[], typer.Typer], tuple[str, ...]] = {
     _check: ("check",),
     _access: ("invite", "invitations", "revoke", "audit"),
     _pairing: ("pair", "forget"),
-    _recordings: ("record", "recordings", "replay", "verify", "export", "report"),
+    _recordings: ("record", "recordings", "replay", "episodes", "verify", "export", "report"),
 }
 
 

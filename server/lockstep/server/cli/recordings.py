@@ -5,6 +5,7 @@ import sys
 from collections.abc import Callable
 from datetime import datetime
 from enum import StrEnum
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -32,6 +33,7 @@ __all__ = ["DirectoryOption", "File", "add_recording_commands", "recording_file"
 
 EXIT_BROKEN = 1  # a promise is not kept
 EXIT_USAGE = 2
+DATASET_TOLERANCE = 4  # events, as the page's own
 
 Json = Annotated[bool, typer.Option("--json", help="Print JSON.")]
 File = Annotated[Path, typer.Argument(help="A recording: its file, or its id in the recordings' directory.")]
@@ -116,7 +118,10 @@ def add_recording_commands(app: typer.Typer, make_settings: MakeSettings) -> Non
         state_dir: StateDirOption = None,
         as_json: Json = False,
     ) -> None:
-        """Check what is promised against a recording. Exit code 1: it is not kept; 2: it cannot be read."""
+        """Check what is promised against a recording or dataset. Exit code 1: it is not kept; 2: it cannot be read."""
+        if (file / "meta" / "info.json").is_file():
+            _verify_dataset(file, as_json)
+            return
         path = recording_file(file, make_settings(state_dir=state_dir), robot, directory)
         if key and not is_public_key(key):
             raise _usage("a public key has 64 hexadecimal digits")
@@ -131,21 +136,30 @@ def add_recording_commands(app: typer.Typer, make_settings: MakeSettings) -> Non
 
     @app.command()
     def export(
-        file: File,
+        files: Annotated[list[Path], typer.Argument(help="Recordings: their files, or their ids.")],
         to: Annotated[ExportFormat, typer.Option(help="mp4: pictures and sound; csv, parquet: tables; lerobot: v3.")],
         out: Annotated[
             Path | None, typer.Option(help="File or directory to write. Unset: beside the recording.")
         ] = None,
-        task: Annotated[str, typer.Option(help="lerobot: the task, in words.")] = "",
+        task: Annotated[str, typer.Option(help="lerobot: the task of recordings without episodes, in words.")] = "",
+        tolerance: Annotated[
+            int, typer.Option(min=0, help="lerobot: events by which a picture may be older than its row.")
+        ] = DATASET_TOLERANCE,
         directory: DirectoryOption = None,
         robot: RobotOption = "",
         state_dir: StateDirOption = None,
     ) -> None:
-        """Write a recording in another form."""
-        path = recording_file(file, make_settings(state_dir=state_dir), robot, directory)
+        """Write recordings in another form; lerobot: the kept episodes of all of them as one dataset."""
+        settings = make_settings(state_dir=state_dir)
+        paths = [recording_file(file, settings, robot, directory) for file in files]
+        if out is not None and len(paths) > 1 and to is not ExportFormat.LEROBOT:
+            raise _usage("--out takes one recording at a time, but for lerobot")
         # Loaded only here: parquet and lerobot need pyarrow, the extra "export".
         exporter: Any = load_extra(f"lockstep.server.recording.export.export_{to.value}", "export")
-        written = _or_usage(lambda: exporter.export(path, out, task))
+        if to is ExportFormat.LEROBOT:
+            written = _or_usage(lambda: exporter.export_all(paths, out, task, tolerance))
+        else:
+            written = [each for path in paths for each in _or_usage(partial(exporter.export, path, out, task))]
         for each in written:
             sys.stdout.write(f"{escaped(each)}\n")
 
@@ -162,6 +176,21 @@ def add_recording_commands(app: typer.Typer, make_settings: MakeSettings) -> Non
         reporter: Any = load_extra("lockstep.server.recording.report.report", "report")  # needs matplotlib
         written = _or_usage(lambda: reporter.write_report(path, out or path.with_suffix(".html")))
         sys.stdout.write(f"{escaped(written)}\n")
+
+
+def _verify_dataset(root: Path, as_json: bool) -> None:
+    verifier: Any = load_extra("lockstep.server.recording.verify.verify_dataset", "export")  # needs pyarrow
+    verdict = _or_usage(lambda: verifier.verify_dataset(root))
+    if as_json:
+        sys.stdout.write(msgspec.json.encode(verdict).decode() + "\n")
+    else:
+        lines = [f"{verdict.episodes} episodes, {verdict.rows} rows, tolerance {verdict.tolerance} events"]
+        for name, check in verdict.checks.items():
+            lines.append(f"{'ok  ' if check.ok else 'FAIL'}  {name} ({check.looked} looked at)")
+            lines += [f"        row {each.row}: {printable(each.text)}" for each in check.violations[:5]]
+        sys.stdout.write("\n".join(lines) + "\n")
+    if not verdict.ok:
+        raise typer.Exit(EXIT_BROKEN)
 
 
 def _say_state(state: dict[str, Any], as_json: bool) -> None:

@@ -17,6 +17,7 @@ from lockstep.server.routes import (
     access,
     actions,
     dial_in,
+    episodes,
     ice,
     observer_websocket,
     recordings,
@@ -81,6 +82,7 @@ def session_app(settings: Settings, lifespan: Lifespan[FastAPI] | None = None) -
     app.include_router(access.router)
     app.include_router(ice.router)
     app.include_router(recordings.router)
+    app.include_router(episodes.router)
     app.include_router(sfu.router)
     app.include_router(proxy.router)
     app.include_router(observer_websocket.router)

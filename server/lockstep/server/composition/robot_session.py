@@ -7,6 +7,7 @@ from contextlib import asynccontextmanager
 from lockstep.protocol.console import ServerMessage
 from lockstep.server.audit.audit_log import AuditLog, open_audit_log
 from lockstep.server.audit.audit_trail import AuditTrail
+from lockstep.server.audit.records import Actor
 from lockstep.server.control.console import Console
 from lockstep.server.control.notices import Notices
 from lockstep.server.control.seat import ControlSeat, SeatTimes
@@ -21,6 +22,8 @@ from lockstep.server.media.sources.source_manager import SourceManager
 from lockstep.server.peers.peer_registry import PeerRegistry
 from lockstep.server.peers.token_revocation import TokenRevocation
 from lockstep.server.publishing.publishers import Publishers
+from lockstep.server.recording.episodes.episode_service import EpisodeService
+from lockstep.server.recording.episodes.reset_action import ResetAction
 from lockstep.server.recording.format.signature import RecordingSigning
 from lockstep.server.recording.library import ConsoleLibrary
 from lockstep.server.recording.recording_store import RecordingStore
@@ -138,11 +141,14 @@ async def _session(
         dial_in=dial_in,
         further_news=notices.for_newcomers,
     )
+    episodes = _episodes(settings, clock, recorder, media, console, seat, peers, trail)
+    states.append(episodes.state)
     media.robot_encoding.ask_by(console.robot.ask_for_encoding)
     SessionMetrics(metrics).subscribe(events)
     SessionAudit(trail).subscribe(events)
     notices.subscribe(events)
     recorder.subscribe(events)
+    episodes.subscribe(events)
     if scene is not None:
         scene.subscribe(events)
     revocation = TokenRevocation(context.state.invitations, peers, trail, silence, robot)
@@ -166,6 +172,7 @@ async def _session(
         publishers=publishers,
         dial_in=dial_in,
         recordings=RecordingService(ConsoleLibrary(recorder), access, trail, console.seat.is_held_with),
+        episodes=episodes,
     )
     try:
         async with asyncio.TaskGroup() as tasks:
@@ -178,6 +185,7 @@ async def _session(
                         ("sources", sources.run),
                         ("voice", voice.run),
                         ("publishers", publishers.run),
+                        ("episodes", episodes.run),
                         ("recorder", recorder.run),
                         ("relays", relays.run),
                     )
@@ -196,3 +204,34 @@ async def _session(
 
 def _dial_in(settings: Settings, context: ConsoleContext, directory: StateDir) -> DialIn:
     return DialIn(directory, link_access(settings).secret, lambda: own_pin(settings, context.state.directory.path))
+
+
+def _episodes(
+    settings: Settings,
+    clock: EventClock,
+    recorder: Recorder,
+    media: MediaHub,
+    console: Console,
+    seat: ControlSeat,
+    peers: PeerRegistry,
+    trail: AuditTrail,
+) -> EpisodeService:
+    def may_ask(by: Actor) -> bool:
+        """Return True for supervisors and the operator who holds the seat; nobody else has a say, a policy neither."""
+        if by.role == "supervisor":
+            return True
+        return by.role == "operator" and (seat.holds(by.peer) if by.peer else console.seat.is_held_with(by.link))
+
+    reset = ResetAction(settings.episodes.reset_action, console.robot, clock, console.actions.act_by_console)
+    return EpisodeService(
+        settings.episodes,
+        settings.recording,
+        clock,
+        recorder,
+        media.recorded_codecs,
+        console.robot,
+        reset,
+        may_ask,
+        peers,
+        trail,
+    )

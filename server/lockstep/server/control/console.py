@@ -23,6 +23,7 @@ from lockstep.protocol.console import (
     encode_console_message,
 )
 from lockstep.protocol.description import RobotDescription
+from lockstep.protocol.episodes import EpisodeRequest
 from lockstep.protocol.messages import (
     Command,
     Feedback,
@@ -73,6 +74,7 @@ from lockstep.server.session_events import (
     CommandForwarded,
     CommandRefused,
     CommandRepeated,
+    EpisodeAsked,
     EpochBegan,
     EventsTraced,
     FeedbackReceived,
@@ -226,6 +228,8 @@ class Console:
                 self.actions.act_by_peer(peer, message)
             case ActionCancel():
                 self.actions.cancel_by_peer(peer, message)
+            case EpisodeRequest():
+                self._events.publish(EpisodeAsked(peer.actor, message))
             case SeatRelease():
                 self.seat.handle(peer, message)
             case Note():

@@ -19,6 +19,7 @@ from lockstep.protocol.console import (
     SilenceStops,
     decode_client_message,
 )
+from lockstep.protocol.episodes import EpisodeRequest
 from lockstep.protocol.errors import MessageError
 from lockstep.protocol.messages import Command, Ping, Reset, Rest, Stop
 from lockstep.protocol.trace_messages import TraceReport, TraceRequest
@@ -50,7 +51,7 @@ CHANNELS: dict[ChannelName, tuple[type[ClientMessage], ...]] = {
     "control": (Command, Rest, Report, Ping, TraceReport, Stop),  # a stop is accepted on every channel
     "session": (
         *(SeatRequest, SeatGrant, SeatDecline, SeatTake, SeatRelease, SilenceStops, Rename, Note),
-        *(Act, ActionCancel, TraceRequest, Stop),
+        *(Act, ActionCancel, EpisodeRequest, TraceRequest, Stop),
     ),
     "stop": (Stop, Reset),
 }

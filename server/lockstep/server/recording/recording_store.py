@@ -13,6 +13,7 @@ from typing import NamedTuple
 import msgspec
 import structlog
 
+from lockstep.server.recording.episodes.edits import edits_path
 from lockstep.server.recording.errors import RecordingError
 from lockstep.server.recording.format.event_index import EventIndex
 from lockstep.server.recording.format.info import RecordingInfo
@@ -46,6 +47,7 @@ class RecordingEntry(msgspec.Struct, frozen=True, kw_only=True):
     last_event: int
     bytes: int
     marks: dict[str, int]  # number of each kind
+    episodes: dict[str, int] = {}  # number in each state: "kept", "discarded", "cut", "open"; as they were recorded
     lost: int
     running: bool
     interrupted: bool
@@ -179,7 +181,7 @@ class RecordingStore:
             try:
                 if path in keep or _is_locked(path):
                     continue
-                path.unlink(missing_ok=True)
+                self.delete(path)
             except OSError as error:
                 log.error("a recording cannot be deleted", file=path.name, reason=error.strerror)
                 continue
@@ -189,12 +191,17 @@ class RecordingStore:
         return gone
 
     def delete(self, path: Path) -> None:
+        """Delete a recording, and the changes to its episodes. Raises OSError."""
         path.unlink(missing_ok=True)
+        edits_path(path).unlink(missing_ok=True)
 
 
 def entry_of(
     path: Path, info: RecordingInfo, index: EventIndex, *, running: bool = False, interrupted: bool = False
 ) -> RecordingEntry:
+    episodes: dict[str, int] = {}
+    for episode in index.episodes:
+        episodes[episode.state] = episodes.get(episode.state, 0) + 1
     marks: dict[str, int] = {}
     for mark in index.marks:
         marks[mark.kind] = marks.get(mark.kind, 0) + 1
@@ -212,6 +219,7 @@ def entry_of(
         last_event=index.last_event,
         bytes=path.stat().st_size,
         marks=marks,
+        episodes=episodes,
         lost=index.lost,
         running=running,
         interrupted=interrupted,

@@ -7,12 +7,13 @@ import json
 import re
 from collections.abc import Sequence
 from http import HTTPStatus
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, get_args
 
 import msgspec
 
 from lockstep.protocol.actions import ActionUpdate
 from lockstep.protocol.console import RecordingState
+from lockstep.protocol.episodes import EpisodeState, EpisodeVerb
 from lockstep.protocol.serial import MAX_EVENT
 from lockstep.server.errors import (
     HTTP_ERRORS,
@@ -28,6 +29,8 @@ from lockstep.server.errors import (
     BodyTooSlow,
     CameraTaken,
     ConsoleError,
+    EpisodeEmpty,
+    EpisodeOpen,
     HostRefused,
     HttpError,
     LinkDown,
@@ -35,18 +38,22 @@ from lockstep.server.errors import (
     LinkOtherRobot,
     LinkRevoked,
     LockedOut,
+    NoEpisode,
     NoSeat,
     NotAcceptable,
     NotAllowed,
+    NoTask,
     NotConnected,
     NotDialIn,
     NotFound,
     NotRenewable,
     OriginRefused,
+    OtherEpisode,
     PreconditionFailed,
     PreconditionRequired,
     PressUsed,
     RecordingFailed,
+    RecordingOff,
     RecordingUnreadable,
     ResetNotKept,
     ResetTooSoon,
@@ -69,6 +76,7 @@ from lockstep.server.http.problem import PROBLEM_JSON, Problem
 from lockstep.server.routes.access import MAX_RECORDS, AuditPage, InvitationList, InvitationRequest, NewInvitation
 from lockstep.server.routes.actions import ActionList, ActionRequest, RobotStatus
 from lockstep.server.routes.dial_in import NewPairingCode, RobotDialInfo
+from lockstep.server.routes.episodes import EpisodeBody
 from lockstep.server.routes.observer_websocket import WatchTicket
 from lockstep.server.routes.recordings import (
     MAX_LISTED,
@@ -144,6 +152,7 @@ TO = Parameter("to", "query", {"type": "integer", "minimum": 1, "maximum": MAX_E
 TOPIC = Parameter("topic", "query", {"type": "array", "items": {"type": "string"}, "maxItems": 50})
 DECODABLE = Parameter("decodable", "query", {"type": "boolean", "default": False})
 TICKET = Parameter("ticket", "query", {"type": "string"})
+EPISODE_VERB = Parameter("do", "path", {"enum": list(get_args(EpisodeVerb))}, required=True)
 ACTION = Parameter("name", "path", {"type": "string"}, required=True)
 INVITATION = Parameter("invitation_id", "path", {"type": "string"}, required=True)
 
@@ -242,6 +251,25 @@ OPERATIONS: tuple[Operation, ...] = (
         errors=(NotAllowed, NoSeat, NotFound, NotRenewable, ActionIdUsed, LinkDown, Unconfirmed, *WITH_JSON),
         body=ActionRequest,
         parameters=(ACTION,),
+    ),
+    Operation("get", "/api/episode", "How the episode does.", 200, EpisodeState),
+    Operation(
+        *("post", "/api/episode/{do}", "Begin, keep, discard, redo or mark an episode.", 200, EpisodeState),
+        errors=(
+            NotAllowed,
+            RecordingOff,
+            EpisodeOpen,
+            NoEpisode,
+            OtherEpisode,
+            EpisodeEmpty,
+            NoTask,
+            BadParameter,
+            LinkDown,
+            RecordingFailed,
+            *WITH_JSON,
+        ),
+        body=EpisodeBody,
+        parameters=(EPISODE_VERB,),
     ),
     Operation("get", "/api/status", "What the robot says of itself.", 200, RobotStatus),
     Operation("post", "/api/scene", "A ticket for the 3D scene.", 200, ScenePath, (SceneUnavailable,)),

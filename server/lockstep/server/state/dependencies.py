@@ -19,6 +19,7 @@ from lockstep.server.http.request_rate_limits import RequestRateLimits
 from lockstep.server.media.hub import MediaHub
 from lockstep.server.peers.token_revocation import TokenRevocation
 from lockstep.server.publishing.publishers import Publishers
+from lockstep.server.recording.episodes.episode_service import EpisodeService
 from lockstep.server.recording.service import RecordingService
 from lockstep.server.recording.writing.recorder import Recorder
 from lockstep.server.robot.dial_in import DialIn
@@ -65,6 +66,7 @@ class Dependencies:
     publishers: Publishers
     dial_in: DialIn | None  # None: the console connects to the robot
     recordings: RecordingService
+    episodes: EpisodeService
 
     @property
     def state(self) -> ConsoleState:

@@ -142,6 +142,32 @@ def test_nothing_waits_for_a_disk_that_is_too_slow_and_what_is_missing_is_told(
         assert b'"lost":21' in next(iter(reader.records(topics={"/lockstep/degraded"}))).data
 
 
+def test_what_is_missing_is_told_where_it_is_missing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The queue fills once more while the thread writes what it has found."""
+    monkeypatch.setattr(writer_thread, "MAX_WAITING", 10)
+    made = Made(tmp_path)
+    real = made.thread._take
+
+    def take(item: Any) -> None:
+        real(item)
+        if isinstance(item, RobotItem):
+            for event in range(1, 21):  # 10 of them find a place
+                made.feedback(event)
+        elif isinstance(item, FeedbackItem) and item.feedback.event == 10:
+            taken.set()
+
+    taken = threading.Event()
+    monkeypatch.setattr(made.thread, "_take", take)
+    made.robot()
+    made.thread.start()
+    assert taken.wait(PATIENCE)
+    made.feedback(21)
+    made.thread.close()
+    with RecordingReader(tmp_path / "r.mcap") as reader:
+        topics = [each.topic for each in reader.records(topics={"/lockstep/feedback", "/lockstep/degraded"})]
+    assert topics == ["/lockstep/feedback"] * 10 + ["/lockstep/degraded", "/lockstep/feedback"]
+
+
 def test_a_full_disk_ends_the_recording_with_its_reason_and_leaves_a_file_that_opens(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -229,9 +229,11 @@ function countWords(found: number, all: number): string {
 
 function marksOf(entry: RecordingEntry): string {
   const names = { contact: "contact", refusal: "refusal", stop: "stop", seat: "hand-over", note: "note" };
-  return Object.entries(names)
+  const kept = entry.episodes.get("kept") ?? 0;
+  const episodes = entry.episodes.size === 0 ? [] : [`${kept} kept episode${kept === 1 ? "" : "s"}`];
+  const found = Object.entries(names)
     .map(([kind, name]) => ({ count: entry.marks.get(kind) ?? 0, name }))
     .filter(({ count }) => count > 0)
-    .map(({ count, name }) => `${count} ${name}${count === 1 ? "" : "s"}`)
-    .join(" · ");
+    .map(({ count, name }) => `${count} ${name}${count === 1 ? "" : "s"}`);
+  return [...episodes, ...found].join(" · ");
 }

@@ -10,6 +10,7 @@ export const MARK_COLOURS: Readonly<Record<MarkGroup, string>> = {
   refusals: "#cc79a7",
   stops: "#ff7a70",
   seats: "#56b4e9",
+  episodes: "#3fbf9b",
   others: "#a3b2c0",
 };
 

@@ -1,182 +1,236 @@
-"""`lockstep export --to lerobot`: a LeRobot dataset, version 3, of one episode. Needs pyarrow.
+"""`lockstep export --to lerobot`: a LeRobot dataset, version 3. Needs pyarrow.
 
-One frame is one event `s`: the state is feedback `s`, the action command `s+1`, which answered it, and each picture the
-first one stamped `s`, or the newest older one. So a frame holds what belongs to the same state of the robot. Where
-command `s+1` lets a goal axis stay, the action is the goal at which it stayed, by feedback `s+1`. The rate is the
-median one of the events that were recorded.
+The kept episodes of one or several recordings are its episodes; a recording in which no episode was ever begun is one
+as a whole. `lerobot_rows` says what a row is. The rate is the median one of the events.
 """
 
 import json
+import os
 import re
-from collections.abc import Iterable, Iterator
+import shutil
+from collections.abc import Iterator, Sequence
 from fractions import Fraction
 from itertools import pairwise
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import av
+import msgspec
 import numpy as np
 import numpy.typing as npt
 import pyarrow as pa
 import pyarrow.parquet as pq
 
 from lockstep.protocol.description import RobotDescription
-from lockstep.protocol.serial import is_newer
+from lockstep.protocol.serial import event_gap
+from lockstep.server.recording.episodes.edits import edited, read_edits
 from lockstep.server.recording.errors import RecordingDamaged
 from lockstep.server.recording.export.lerobot_meta import (
-    episode_table,
+    DatasetEpisode,
+    DatasetNotes,
+    EpisodePlace,
+    episodes_table,
     info_of,
+    merged_statistics,
     picture_statistics,
     statistics_of,
     tasks_table,
 )
-from lockstep.server.recording.format.records import CommandRecord, FeedbackRecord
+from lockstep.server.recording.export.lerobot_rows import (
+    EpisodeRows,
+    Stretch,
+    aligned_stamps,
+    check_same_robot,
+    episodes_of,
+    picture_records,
+    rows_of,
+    state_names,
+    state_of,
+    stretches_of,
+)
 from lockstep.server.recording.format.topics import CAMERA
-from lockstep.server.recording.reading.event_rows import WRENCH, event_rows
 from lockstep.server.recording.reading.pictures import RecordedPictures
 from lockstep.server.recording.reading.reader import RecordingReader
 
-__all__ = ["aligned", "export"]
+__all__ = ["TOLERANCE", "export", "export_all"]
 
 FILE = "chunk-000/file-000"
-SAMPLES = 200  # pictures of a camera for its statistics
+SAMPLES = 200  # pictures of a camera and an episode for its statistics
 PIXEL_STEP = 4  # between the pixels that are used, in both directions
+TOLERANCE = 4  # events, as the page's own
 
 Array = npt.NDArray[Any]
-
-
-class Frame(NamedTuple):
-    """One event: the state of the robot, and the command that answered it."""
-
-    feedback: FeedbackRecord
-    action: list[float]
-
-
-class Picture(NamedTuple):
-    stamp: int
-    frame: av.VideoFrame
+SUCCESS = {"success": 1, "failure": 0, "": -1}
 
 
 class ExportedCamera(NamedTuple):
     key: str  # "observation.images.front"
     feature: dict[str, Any]
-    statistics: dict[str, Any]
+    pixels: list[Array]  # of each episode, N x 3
 
 
 def export(path: Path, out: Path | None, task: str) -> list[Path]:
     """Write and return a new directory: `out`, or one beside `path`. Raises RecordingError, OSError."""
-    root = out or path.with_suffix(".lerobot")
-    with RecordingReader(path) as reader:
-        description = reader.description()
-        cameras = [each.topic for each in reader.index.topics if reader.index.keyframes.get(each.topic)]
-        first_stamps = [reader.index.keyframes[topic][0].event for topic in cameras]
-        frames = [
-            frame
-            for frame in _frames(reader, description)
-            if not any(is_newer(stamp, frame.feedback.event) for stamp in first_stamps)
-        ]
-        task = task or reader.info.name or "teleoperation"
-    if not frames:
-        raise RecordingDamaged("no event has a feedback, a command that answers it, and a picture of every camera")
-    root.mkdir(parents=True)
-    fps = _rate([frame.feedback.time for frame in frames])
-    events = [frame.feedback.event for frame in frames]
-    exported = [_write_video(path, root, topic, events, fps) for topic in cameras]
-    _write_tables(root, description, frames, exported, fps, task)
+    return export_all([path], out, task)
+
+
+def export_all(paths: Sequence[Path], out: Path | None, task: str, tolerance: int = TOLERANCE) -> list[Path]:
+    """Write one dataset of the recordings, in their order. The directory appears when all of it is written.
+
+    Args:
+        out: a new directory; None: one beside the first recording
+        task: of recordings without episodes, in words
+        tolerance: events by which a picture may be older than its row
+
+    Raises:
+        RecordingError: a recording cannot be read, none has a row, or they are of different robots.
+        OSError: the directory is there already, or cannot be written.
+    """
+    root = out or paths[0].with_suffix(".lerobot")
+    if root.exists():
+        raise FileExistsError(17, "it is there already", str(root))
+    description, cameras, episodes = _read(paths, task, tolerance)
+    partial = root.with_name(f".{root.name}.partial-{os.getpid()}")
+    try:
+        _write_dataset(partial, description, cameras, episodes, tolerance)
+        partial.rename(root)
+    except BaseException:
+        shutil.rmtree(partial, ignore_errors=True)
+        raise
     return [root]
 
 
-def _rate(times: list[float]) -> int:
+def _read(paths: Sequence[Path], task: str, tolerance: int) -> tuple[RobotDescription, list[str], list[EpisodeRows]]:
+    """Return the robot, its cameras' topics, and the rows of all episodes that have some."""
+    description: RobotDescription | None = None
+    cameras: list[str] = []
+    episodes: list[EpisodeRows] = []
+    for path in paths:
+        with RecordingReader(path) as reader:
+            robot = reader.description()
+            topics = [each.topic for each in reader.index.topics if reader.index.keyframes.get(each.topic)]
+            if description is None:
+                description, cameras = robot, topics
+            check_same_robot(description, robot)
+            if sorted(topics) != sorted(cameras):
+                raise RecordingDamaged(f"{path.name} has other cameras than {paths[0].name}")
+            stretches = stretches_of(reader, edited(episodes_of(reader), read_edits(path)), task)
+            episodes += rows_of(reader, robot, stretches, cameras, tolerance)
+    episodes = [each for each in episodes if each.frames]
+    if description is None or not episodes:
+        raise RecordingDamaged("no kept event has a feedback, a command that answers it, and a picture of every camera")
+    return description, cameras, episodes
+
+
+def _write_dataset(
+    root: Path, description: RobotDescription, cameras: list[str], episodes: list[EpisodeRows], tolerance: int
+) -> None:
+    root.mkdir(parents=True)
+    fps = _rate(episodes)
+    exported = [_write_video(root, topic, episodes, fps) for topic in cameras]
+    tasks = list(dict.fromkeys(each.stretch.task for each in episodes))
+    drivers = sorted({frame.driver for each in episodes for frame in each.frames})
+    _write_tables(root, description, episodes, exported, fps, tasks, drivers)
+    notes = DatasetNotes(
+        tolerance=tolerance,
+        cameras=[camera.key for camera in exported],
+        drivers=drivers,
+        episodes=[_noted(each) for each in episodes],
+    )
+    (root / "meta" / "lockstep.json").write_bytes(msgspec.json.format(msgspec.json.encode(notes)) + b"\n")
+
+
+def _noted(rows: EpisodeRows) -> DatasetEpisode:
+    stretch = rows.stretch
+    return DatasetEpisode(
+        recording=stretch.info.recording,
+        part=stretch.info.part,
+        epoch=stretch.info.epoch,
+        episode=stretch.episode,
+        first_event=stretch.first_event,
+        last_event=stretch.last_event,
+        task=stretch.task,
+        outcome=stretch.outcome,
+        rows=len(rows.frames),
+        left_out=rows.left_out,
+    )
+
+
+def _rate(episodes: list[EpisodeRows]) -> int:
     """Return the events per second by the median interval, so that pauses do not count; at least 1 Hz.
 
     A dataset of this version has one rate for all its frames, in whole hertz.
     """
-    intervals = [later - earlier for earlier, later in pairwise(times) if later > earlier]
+    intervals = [
+        later.feedback.time - earlier.feedback.time
+        for each in episodes
+        for earlier, later in pairwise(each.frames)
+        if later.feedback.time > earlier.feedback.time
+    ]
     return max(1, round(1 / float(np.median(intervals)))) if intervals else 1
 
 
-def _frames(reader: RecordingReader, description: RobotDescription) -> Iterator[Frame]:
-    """Yield a frame for each event, but for those without an answer, as the last one, or with an incomplete state."""
-    length = len(_state_names(description))
-    for row, following in pairwise(event_rows(reader)):
-        command = following.command
-        action = None if command is None else _action(command, following.feedback)
-        if action is not None and len(_state(row.feedback)) == length:
-            yield Frame(row.feedback, action)
+def _pictures(stretch: Stretch, topic: str, events: list[int]) -> Iterator[av.VideoFrame]:
+    """Yield the decoded picture of each event."""
+    with RecordingReader(stretch.path) as reader:
+        stamps = [record.event for record in picture_records(reader, topic, stretch)]
+        wanted = [place for place, _ in aligned_stamps(stamps, events)]
+        decoded = _decoded(reader, topic, stretch)
+        number, frame = next(decoded, (-1, None))
+        for place in wanted:
+            while frame is not None and number < place:
+                number, frame = next(decoded, (-1, None))
+            if frame is None or number != place:
+                raise RecordingDamaged(f"{topic}: a picture cannot be decoded")
+            yield frame
 
 
-def _action(command: CommandRecord, answer: FeedbackRecord) -> list[float] | None:
-    """Return the values of a command, and for a goal axis that is to stay its goal then; None if that is not known."""
-    stays = answer.goals or [None] * len(command.values)
-    values = [goal if value is None else value for value, goal in zip(command.values, stays, strict=False)]
-    known = [value for value in values if value is not None]
-    return known if len(known) == len(command.values) else None
-
-
-def _state_names(description: RobotDescription) -> list[str]:
-    names = [f"axis.{axis.name}" for axis in description.axes]
-    names += [f"joint.{joint.name}" for joint in description.joints]
-    names += [f"wrench.{name}" for name in WRENCH if description.wrench is not None]
-    return names + [f"range.{number}" for number in range(description.ranges.count if description.ranges else 0)]
-
-
-def _state(feedback: FeedbackRecord) -> list[float]:
-    return [*feedback.axes, *feedback.joints, *feedback.wrench, *feedback.ranges]
-
-
-def aligned(pictures: Iterable[Picture], events: Iterable[int]) -> Iterator[av.VideoFrame]:
-    """Yield for each event the first picture with its stamp, or the newest older one. The first event must have one."""
-    source = iter(pictures)
-    current, upcoming = None, next(source, None)
-    for event in events:
-        while upcoming is not None and not is_newer(upcoming.stamp, event):
-            if current is not None and current.stamp == event:
-                break
-            current, upcoming = upcoming, next(source, None)
-        if current is None:
-            raise RecordingDamaged(f"there is no picture for event {event}")
-        yield current.frame
-
-
-def _pictures(path: Path, topic: str) -> Iterator[Picture]:
-    """Yield the decoded pictures, from the first keyframe on."""
+def _decoded(reader: RecordingReader, topic: str, stretch: Stretch) -> Iterator[tuple[int, av.VideoFrame]]:
+    """Yield the decoded pictures with their places among `picture_records`."""
     decoder = RecordedPictures()
-    stamps: dict[int, int] = {}
-    with RecordingReader(path) as reader:
-        for number, record in enumerate(reader.records(topics={topic})):
-            picture = record.picture
-            if picture is None or (not stamps and not picture.keyframe):
-                continue
-            stamps[number] = record.event
-            for frame in decoder.decode(picture, number):
-                yield Picture(stamps.get(frame.pts or number, record.event), frame)
-        for frame in decoder.flush():
-            yield Picture(stamps.get(frame.pts or 0, 0), frame)
+    for place, record in enumerate(picture_records(reader, topic, stretch)):
+        picture = record.picture
+        if picture is not None:
+            for frame in decoder.decode(picture, place):
+                yield frame.pts or 0, frame
+    for frame in decoder.flush():
+        yield frame.pts or 0, frame
 
 
-def _write_video(path: Path, root: Path, topic: str, events: list[int], fps: int) -> ExportedCamera:
+def _write_video(root: Path, topic: str, episodes: list[EpisodeRows], fps: int) -> ExportedCamera:
+    """Write the pictures of a camera, one for each row of the dataset, into one file."""
     key = "observation.images." + re.sub(r"[^\w. -]", "_", topic.removeprefix(CAMERA))
     target = root / "videos" / key / f"{FILE}.mp4"
     target.parent.mkdir(parents=True)
-    every = max(1, len(events) // SAMPLES)
-    samples: list[Array] = []
+    pixels: list[Array] = []
     size = 0, 0
+    number = 0
     with av.open(str(target), "w") as output:
         # A keyframe every second picture: training reads frames in any order.
         stream = output.add_stream("libx264", rate=fps, options={"crf": "23", "preset": "veryfast", "g": "2"})
         stream.pix_fmt = "yuv420p"
-        for number, picture in enumerate(aligned(_pictures(path, topic), events)):
-            if number == 0:
-                size = picture.width, picture.height
-                stream.width, stream.height = size
-            whole = picture.reformat(*size, format="yuv420p")
-            whole.pts, whole.time_base = number, Fraction(1, fps)
-            output.mux(stream.encode(whole))
-            if number % every == 0:
-                samples.append(picture.to_ndarray(format="rgb24")[::PIXEL_STEP, ::PIXEL_STEP].reshape(-1, 3) / 255.0)
+        for each in episodes:
+            events = [frame.feedback.event for frame in each.frames]
+            every = max(1, len(events) // SAMPLES)
+            samples: list[Array] = []
+            for place, picture in enumerate(_pictures(each.stretch, topic, events)):
+                if number == 0:
+                    size = picture.width, picture.height
+                    stream.width, stream.height = size
+                whole = picture.reformat(*size, format="yuv420p")
+                whole.pts, whole.time_base = number, Fraction(1, fps)
+                output.mux(stream.encode(whole))
+                number += 1
+                if place % every == 0:
+                    shown = picture.to_ndarray(format="rgb24")[::PIXEL_STEP, ::PIXEL_STEP]
+                    samples.append(shown.reshape(-1, 3) / 255.0)
+            pixels.append(np.concatenate(samples))
         output.mux(stream.encode(None))
-    width, height = size
-    feature = {
+    return ExportedCamera(key, _video_feature(*size, fps), pixels)
+
+
+def _video_feature(width: int, height: int, fps: int) -> dict[str, Any]:
+    return {
         "dtype": "video",
         "shape": [height, width, 3],
         "names": ["height", "width", "channels"],
@@ -191,38 +245,69 @@ def _write_video(path: Path, root: Path, topic: str, events: list[int], fps: int
             "has_audio": False,
         },
     }
-    statistics = picture_statistics(np.concatenate(samples))
-    statistics["count"] = [len(samples)]
-    return ExportedCamera(key, feature, statistics)
+
+
+def _columns(rows: EpisodeRows, number: int, begin: int, fps: int, tasks: list[str], drivers: list[str]) -> Any:
+    count = len(rows.frames)
+    events = [frame.feedback.event for frame in rows.frames]
+    columns: dict[str, Array] = {
+        "observation.state": np.array([state_of(frame.feedback) for frame in rows.frames], np.float32),
+        "action": np.array([frame.action for frame in rows.frames], np.float32),
+        "lockstep.event": np.array(events, np.int64),
+    }
+    if rows.stamps:
+        stamps = list(zip(*rows.stamps.values(), strict=True))
+        gaps = [max(event_gap(event, stamp) for stamp in each) for event, each in zip(events, stamps, strict=True)]
+        columns["lockstep.stamp"] = np.array(stamps, np.int64)
+        columns["lockstep.gap"] = np.array(gaps, np.int64)
+    columns |= {
+        "lockstep.driver": np.array([drivers.index(frame.driver) for frame in rows.frames], np.int64),
+        "lockstep.success": np.full(count, SUCCESS[rows.stretch.outcome], np.int64),
+        "timestamp": (np.arange(count) / fps).astype(np.float32),
+        "frame_index": np.arange(count, dtype=np.int64),
+        "episode_index": np.full(count, number, np.int64),
+        "index": np.arange(begin, begin + count, dtype=np.int64),
+        "task_index": np.full(count, tasks.index(rows.stretch.task), np.int64),
+    }
+    return columns
 
 
 def _write_tables(
-    root: Path, description: RobotDescription, frames: list[Frame], cameras: list[ExportedCamera], fps: int, task: str
+    root: Path,
+    description: RobotDescription,
+    episodes: list[EpisodeRows],
+    cameras: list[ExportedCamera],
+    fps: int,
+    tasks: list[str],
+    drivers: list[str],
 ) -> None:
-    count = len(frames)
-    columns: dict[str, Array] = {
-        "observation.state": np.array([_state(frame.feedback) for frame in frames], np.float32),
-        "action": np.array([frame.action for frame in frames], np.float32),
-        "lockstep.event": np.array([frame.feedback.event for frame in frames], np.int64),
-        "timestamp": (np.arange(count) / fps).astype(np.float32),
-        "frame_index": np.arange(count, dtype=np.int64),
-        "episode_index": np.zeros(count, np.int64),
-        "index": np.arange(count, dtype=np.int64),
-        "task_index": np.zeros(count, np.int64),
+    parts: list[dict[str, Array]] = []
+    places: list[EpisodePlace] = []
+    begin = 0
+    for number, each in enumerate(episodes):
+        columns = _columns(each, number, begin, fps, tasks, drivers)
+        statistics = {name: statistics_of(values) for name, values in columns.items()}
+        statistics |= {camera.key: picture_statistics(camera.pixels[number]) for camera in cameras}
+        parts.append(columns)
+        places.append(EpisodePlace(each.stretch.task, begin, begin + len(each.frames), statistics))
+        begin += len(each.frames)
+    whole = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+    names = {
+        "observation.state": state_names(description),
+        "action": [axis.name for axis in description.axes],
+        "lockstep.stamp": [camera.key for camera in cameras],
     }
-    names = {"observation.state": _state_names(description), "action": [axis.name for axis in description.axes]}
     features: dict[str, dict[str, Any]] = {camera.key: camera.feature for camera in cameras}
-    statistics = {camera.key: camera.statistics for camera in cameras}
-    for name, values in columns.items():
+    for name, values in whole.items():
         shape = list(values.shape[1:]) or [1]
         features[name] = {"dtype": str(values.dtype), "shape": shape, "names": names.get(name)}
-        statistics[name] = statistics_of(values)
-    data = pa.table({name: _arrow(values) for name, values in columns.items()})
     keys = [camera.key for camera in cameras]
-    _write(root / "data" / f"{FILE}.parquet", data)
-    _write(root / "meta" / "tasks.parquet", tasks_table(task))
-    _write(root / "meta" / "episodes" / f"{FILE}.parquet", episode_table(task, count, fps, keys, statistics))
-    info = info_of(description.name, features, count, fps)
+    _write(root / "data" / f"{FILE}.parquet", pa.table({name: _arrow(values) for name, values in whole.items()}))
+    _write(root / "meta" / "tasks.parquet", tasks_table(tasks))
+    _write(root / "meta" / "episodes" / f"{FILE}.parquet", episodes_table(places, fps, keys))
+    statistics = {name: statistics_of(values) for name, values in whole.items()}
+    statistics |= {camera.key: merged_statistics(camera.pixels) for camera in cameras}
+    info = info_of(description.name, features, begin, fps, len(episodes), len(tasks))
     for name, content in (("info.json", info), ("stats.json", statistics)):
         (root / "meta" / name).write_text(json.dumps(content, indent=2) + "\n")
 

@@ -7,7 +7,8 @@ import msgspec
 
 from lockstep.protocol.serial import event_gap, is_newer
 from lockstep.server.recording.errors import RecordingDamaged
-from lockstep.server.recording.format.records import Whole
+from lockstep.server.recording.format.episodes import EpisodeBook, EpisodeEntry
+from lockstep.server.recording.format.records import EpisodeRecord, Whole
 from lockstep.server.recording.reading.bookmarks import Mark
 
 __all__ = [
@@ -65,6 +66,7 @@ class EventIndex(msgspec.Struct, kw_only=True):
     events: list[EventEntry] = []
     keyframes: dict[str, list[EventEntry]] = {}
     marks: list[Mark] = []
+    episodes: list[EpisodeEntry] = []
     counts: dict[str, Whole] = {}
     lost: Whole = 0
 
@@ -87,6 +89,7 @@ class EventIndex(msgspec.Struct, kw_only=True):
                 topic: [each for each in entries if each.chunk >= chunk] for topic, entries in self.keyframes.items()
             },
             marks=[each for each in self.marks if each.time >= begin],
+            episodes=[each for each in self.episodes if each.ended >= begin],
         )
 
     def without_chunks_before(self, chunk: int) -> "EventIndex":
@@ -157,6 +160,7 @@ class IndexBuilder:
     def __init__(self, index: EventIndex) -> None:
         self.index = index
         self._chunk: ChunkEntry | None = None  # the chunk that is being filled
+        self._book = EpisodeBook()
 
     def add(self, topic: str, event: int, arrived: int, *, keyframe: bool, feedback: bool) -> None:
         """Add a record. `arrived`: µs; `keyframe`: it is a picture's keyframe; `feedback`: it is a feedback."""
@@ -191,6 +195,11 @@ class IndexBuilder:
         if len(self.index.marks) < MAX_MARKS:
             self.index.marks.append(mark)
 
+    def episode(self, record: EpisodeRecord, arrived: int) -> None:
+        """Add a record of an episode, which arrived at `arrived` (µs), besides `add`."""
+        self._book.take(record, arrived)
+        self.index.episodes = self._book.entries()
+
     def chunk_written(self, offset: int) -> None:
         """Called when all records added since the last call are in one chunk, at `offset`."""
         if self._chunk is not None:
@@ -213,5 +222,6 @@ class IndexBuilder:
                 for topic, entries in list(index.keyframes.items())
             },
             marks=[each for each in list(index.marks) if each.time <= ended],
+            episodes=[each for each in index.episodes if each.ended <= ended],
             counts=dict(index.counts),
         )

@@ -11,6 +11,7 @@ import msgspec
 from lockstep.protocol.actions import ActionReason, ActionState, ParameterValue, StatusItem
 from lockstep.protocol.console import Participant, Report
 from lockstep.protocol.description import RobotDescription
+from lockstep.protocol.episodes import EpisodeOutcome
 from lockstep.protocol.messages import EventReference, RefusalReason, StopState
 from lockstep.protocol.trace import CommandSpans, PictureSpans
 
@@ -20,6 +21,7 @@ __all__ = [
     "CommandOutcome",
     "CommandRecord",
     "Degraded",
+    "EpisodeRecord",
     "FeedbackRecord",
     "NoteRecord",
     "OwnRecord",
@@ -189,6 +191,23 @@ class NoteRecord(OwnRecord, frozen=True, kw_only=True):
     text: str
 
 
+class EpisodeRecord(OwnRecord, frozen=True, kw_only=True):
+    """What became of an episode (docs/episodes.md). One counts only if a file has its `start` and then its `kept`."""
+
+    episode: str  # id
+    number: Count  # counts the takes of a recording
+    kind: Literal["start", "mark", "kept", "discarded", "cut"]
+    task: str
+    outcome: EpisodeOutcome = ""  # of `kept`
+    first_event: EventReference  # that held at its start
+    last_event: EventReference  # that held at its end; of `start` and `mark` that of the record
+    by: str = ""  # who asked for it; "" for the console
+    why: str = ""  # of `cut`: "epoch", "link_down", "recording_ended", "console_ended"
+    text: str = ""  # of `mark`
+    drivers: list[str] = []  # names of all that held the seat in it, so far
+    problems: list[str] = []  # what the live checks have seen in it, so far: "camera_missing front"
+
+
 class Degraded(OwnRecord, frozen=True, kw_only=True):
     """The recorder was too slow and left records out before this one. Without it a recording has no gaps."""
 
@@ -238,6 +257,7 @@ OWN_RECORDS: dict[str, type[OwnRecord]] = {
     "lockstep.Report": ReportRecord,
     "lockstep.Trace": TraceRecord,
     "lockstep.Note": NoteRecord,
+    "lockstep.Episode": EpisodeRecord,
     "lockstep.Degraded": Degraded,
     "lockstep.Wrench": WrenchRecord,
     "lockstep.Signature": SignatureRecord,

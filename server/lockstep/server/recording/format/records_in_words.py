@@ -5,6 +5,7 @@ from typing import NamedTuple
 from lockstep.server.recording.format.records import (
     ActionRecord,
     Degraded,
+    EpisodeRecord,
     NoteRecord,
     OwnRecord,
     RefusalRecord,
@@ -50,6 +51,11 @@ def in_words(record: OwnRecord) -> Words | None:
             return Words(f"rest: {why}")
         case NoteRecord(name=name, text=text):
             return Words(f"{name}: {text}")
+        case EpisodeRecord(kind="mark", number=number, text=text):
+            return Words(f"episode {number}: {text}")
+        case EpisodeRecord(kind=kind, number=number, task=task, outcome=outcome, why=why):
+            said = ", ".join(filter(None, (outcome, why)))
+            return Words(f"episode {number} {kind}{': ' + said if said else ''} ({task})", kind == "cut")
         case Degraded(lost=lost):
             return Words(f"the recorder left out {lost} records", True)
     return None

@@ -8,6 +8,7 @@ import msgspec
 from lockstep.protocol.description import RobotDescription
 from lockstep.server.recording.format.records import (
     ActionRecord,
+    EpisodeRecord,
     FeedbackRecord,
     NoteRecord,
     OwnRecord,
@@ -19,7 +20,7 @@ from lockstep.server.recording.format.records import (
 
 __all__ = ["Mark", "BookmarkFinder", "MarkKind"]
 
-MarkKind = Literal["contact", "refusal", "stop", "reset", "seat", "note", "fault", "link", "action"]
+MarkKind = Literal["contact", "refusal", "stop", "reset", "seat", "note", "fault", "link", "action", "episode"]
 REFUSAL_SPACING = 1_000_000  # µs
 STOP_SPACING = 1_000_000  # µs between marks of further stops, while one holds
 RELEASE_SHARE = 0.6  # of the threshold: a contact ends below it, so that a trembling force is one contact
@@ -60,6 +61,9 @@ class BookmarkFinder:
             case ActionRecord(state=state) if state not in ("running", "cancel"):
                 words = f"{record.name} {state}{': ' + record.reason if record.reason else ''}"
                 return [Mark(record.event, arrived, "action", words)]
+            case EpisodeRecord():
+                what = record.text if record.kind == "mark" else " ".join(filter(None, (record.kind, record.outcome)))
+                return [Mark(record.event, arrived, "episode", f"{record.number} {what}: {record.task}"[:200])]
             case NoteRecord():
                 return [Mark(record.event, arrived, "note", f"{record.name}: {record.text}"[:200])]
             case RobotRecord():

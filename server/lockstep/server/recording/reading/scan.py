@@ -30,7 +30,7 @@ from lockstep.server.recording.errors import DiskTrouble, RecordingDamaged
 from lockstep.server.recording.format.event_index import INDEX_NAME, EventIndex, IndexBuilder, TopicEntry
 from lockstep.server.recording.format.info import METADATA_NAME, RecordingInfo
 from lockstep.server.recording.format.payload import VIDEO, own_record_of, picture_of
-from lockstep.server.recording.format.records import Degraded, FeedbackRecord
+from lockstep.server.recording.format.records import Degraded, EpisodeRecord, FeedbackRecord
 from lockstep.server.recording.reading.bookmarks import BookmarkFinder
 from lockstep.server.recording.reading.raw_records import BROKEN, HEAD, MAGIC, RawRecord, chunk_records, raw_records
 from lockstep.server.util.regular_file import open_regular
@@ -103,6 +103,8 @@ class Scan:
         self._builder.add(channel.topic, message.sequence, micros, keyframe=keyframe, feedback=feedback)
         if isinstance(record, Degraded):
             self.index.lost += record.lost
+        if isinstance(record, EpisodeRecord):
+            self._builder.episode(record, micros)
         if record is not None:
             for mark in self._marks.find(record, micros):
                 self._builder.mark(mark)

@@ -13,9 +13,12 @@ from lockstep.protocol.console import RecordingState
 from lockstep.server.audit.audit_trail import AuditTrail
 from lockstep.server.errors import AlreadyRecording, RecordingFailed
 from lockstep.server.event_clock import EventClock
+from lockstep.server.media.pipeline.frame import EncodedFrame
 from lockstep.server.media.pipeline.recorded_encoding import FrameTaker
 from lockstep.server.recording.format.info import RecordingInfo
+from lockstep.server.recording.format.records import EpisodeRecord
 from lockstep.server.recording.format.signature import RecordingSigning
+from lockstep.server.recording.format.topics import PICTURE_FORMATS
 from lockstep.server.recording.recording_store import RecordingStore
 from lockstep.server.recording.settings import RecordingSettings
 from lockstep.server.recording.times import RecordClock
@@ -23,7 +26,7 @@ from lockstep.server.recording.writing.session_records import SessionRecords
 from lockstep.server.recording.writing.writer_thread import RecordingThread
 from lockstep.server.session_events import SessionEvents
 
-__all__ = ["RecordedMedia", "Recorder"]
+__all__ = ["RecordedMedia", "Recorder", "RecordingWatcher"]
 
 log = structlog.get_logger(__name__)
 
@@ -38,6 +41,18 @@ class RecordedMedia(Protocol):
     def record(self, take: FrameTaker | None, keyframe_seconds: float) -> None: ...
     def record_keyframes(self) -> None: ...
     def recorded_codecs(self) -> Mapping[str, str]: ...
+
+
+class RecordingWatcher(Protocol):
+    """Is told of what concerns episodes. All methods are called on the loop and return at once."""
+
+    def recording_ends(self, failure: str) -> None:
+        """The recording ends; without a failure what is put into it now is still written."""
+
+    def episode_written(self, episode: str, kept: bool) -> None:
+        """The episode's record `kept` is on the disk; False: the episode cannot be kept any more."""
+
+    def picture_recorded(self, stream: str, stamp: int) -> None: ...
 
 
 class Recorder:
@@ -74,9 +89,17 @@ class Recorder:
         self._loop: asyncio.AbstractEventLoop | None = None
         self._stopping = asyncio.Lock()
         self._ended = asyncio.Event()  # the thread ended by itself
+        self._watcher: RecordingWatcher | None = None
 
     def subscribe(self, events: SessionEvents) -> None:
         self._records.subscribe(events)
+
+    def watched_by(self, watcher: RecordingWatcher) -> None:
+        self._watcher = watcher
+
+    def put_episode(self, record: EpisodeRecord) -> None:
+        """Put a record of an episode into the recording, if one is written."""
+        self._records.put_episode(record)
 
     async def run(self) -> None:
         """Run until cancelled; the file is closed then."""
@@ -191,11 +214,12 @@ class Recorder:
             lambda: self._call_soon(self._media.record_keyframes),
             lambda: self._call_soon(self._ended.set),
             self._signing,
+            lambda episode, kept: self._call_soon(lambda: self._episode_written(episode, kept)),
         )
         self._thread = thread
         self._records.begin(thread, times)
         thread.start()
-        self._media.record(self._records.take_frame, self._settings.keyframe_seconds)
+        self._media.record(self._take_frame, self._settings.keyframe_seconds)
         self._tell(self.state())
         log.info("recording", recording=thread.info.recording, by=by)
         return self.state()
@@ -217,6 +241,8 @@ class Recorder:
         async with self._stopping:
             thread = self._thread
             if thread is not None:
+                if self._watcher is not None:
+                    self._watcher.recording_ends(thread.failure)
                 self._media.record(None, self._settings.keyframe_seconds)
                 await asyncio.to_thread(thread.close)
                 self._thread = None
@@ -230,6 +256,15 @@ class Recorder:
             self._again_at = time.monotonic() + RETRY_SECONDS
             self._record_act("failed", self._failure)
             self._tell(self.state())
+
+    def _take_frame(self, stream: str, codec: str, frame: EncodedFrame, *, attached: bool) -> None:
+        self._records.take_frame(stream, codec, frame, attached=attached)
+        if self._watcher is not None and codec in PICTURE_FORMATS:
+            self._watcher.picture_recorded(stream, frame.stamp)
+
+    def _episode_written(self, episode: str, kept: bool) -> None:
+        if self._watcher is not None:
+            self._watcher.episode_written(episode, kept)
 
     def _call_soon(self, call: Callable[[], None]) -> None:
         if self._loop is not None and not self._loop.is_closed():

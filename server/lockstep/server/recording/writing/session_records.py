@@ -13,6 +13,7 @@ from lockstep.server.recording.format.records import (
     ActionRecord,
     CommandOutcome,
     CommandRecord,
+    EpisodeRecord,
     NoteRecord,
     OwnRecord,
     ParticipantsRecord,
@@ -284,6 +285,9 @@ class SessionRecords:
     def _status_received(self, event: StatusReceived) -> None:
         status = event.status
         self._put_own(StatusRecord(epoch=self._clock.epoch, event=status.event, items=status.items))
+
+    def put_episode(self, record: EpisodeRecord) -> None:
+        self._put_own(record)
 
     # handing over to the thread
 

@@ -14,7 +14,7 @@ from lockstep.protocol.description import RobotDescription
 from lockstep.server.recording.errors import DiskTrouble
 from lockstep.server.recording.format.event_index import INDEX_NAME, EventIndex, IndexBuilder, TopicEntry
 from lockstep.server.recording.format.info import METADATA_NAME, RecordingInfo
-from lockstep.server.recording.format.records import FeedbackRecord, OwnRecord
+from lockstep.server.recording.format.records import EpisodeRecord, FeedbackRecord, OwnRecord
 from lockstep.server.recording.format.signature import RecordingSigning, Signatures, TopicText
 from lockstep.server.recording.format.topics import SIGNATURE, Topic, topics_of
 from lockstep.server.recording.reading.bookmarks import BookmarkFinder
@@ -135,6 +135,8 @@ class RecordingWriter:
         self._waiting += len(entry.data)
         micros = entry.arrived // 1000
         self._builder.add(entry.topic, entry.event, micros, keyframe=entry.keyframe, feedback=feedback)
+        if isinstance(entry.record, EpisodeRecord):
+            self._builder.episode(entry.record, micros)
         if entry.record is not None:
             for mark in self._marks.find(entry.record, micros):
                 self._builder.mark(mark)

@@ -6,6 +6,7 @@ import time
 from collections import deque
 from collections.abc import Callable
 from pathlib import Path
+from typing import NamedTuple
 
 import msgspec
 import structlog
@@ -14,10 +15,11 @@ from lockstep.protocol.description import RobotDescription
 from lockstep.server.recording.errors import DiskTrouble, RecordingError
 from lockstep.server.recording.format.event_index import EventIndex
 from lockstep.server.recording.format.info import RecordingInfo
-from lockstep.server.recording.format.records import Degraded, OwnRecord, ParticipantsRecord, SeatRecord
+from lockstep.server.recording.format.records import Degraded, EpisodeRecord, OwnRecord, ParticipantsRecord, SeatRecord
 from lockstep.server.recording.format.signature import RecordingSigning
 from lockstep.server.recording.reading.scan import complete_file
 from lockstep.server.recording.settings import RecordingSettings
+from lockstep.server.recording.writing.episode_guard import EpisodeGuard
 from lockstep.server.recording.writing.queue_items import FeedbackItem, Item, MediaItem, OwnItem, RobotItem, entries_of
 from lockstep.server.recording.writing.writer import RecordingWriter
 
@@ -30,6 +32,12 @@ DRAIN_SECONDS = 0.05  # between two looks at the queue: nobody is woken for each
 REMEMBERED = (SeatRecord, ParticipantsRecord)  # every part begins with these, besides robot and feedback
 
 
+class Lost(NamedTuple):
+    """Stands in the queue where items were left out."""
+
+    items: int
+
+
 class RecordingThread:
     """Writes a recording. `put` from the loop at any rate; `close` from another thread, which waits for the end.
 
@@ -37,6 +45,8 @@ class RecordingThread:
         now: ns since 1970 on the recording's clock
         on_part: called from the thread when a file has begun
         on_end: called from the thread when it ends by itself
+        on_episode: called from the thread with an episode's id and True when its record `kept` is on the disk, and
+            with False when the episode cannot be kept any more because its file has ended
         signing: signs the files; None: they are not signed
 
     Attributes:
@@ -52,6 +62,7 @@ class RecordingThread:
         on_part: Callable[[], None],
         on_end: Callable[[], None],
         signing: RecordingSigning | None = None,
+        on_episode: Callable[[str, bool], None] = lambda episode, kept: None,
     ) -> None:
         self.info = info
         self.failure = ""
@@ -61,8 +72,12 @@ class RecordingThread:
         self._on_part = on_part
         self._on_end = on_end
         self._signing = signing
+        self._on_episode = on_episode
+        self._episodes = EpisodeGuard()
+        self._is_keeping = False  # a record `kept` is written, and not known to be on the disk
+        self.free_bytes = 0  # on the disk, when it was looked at last; 0: not yet
         self._head = ""  # of the previous part's signed chain
-        self._waiting: deque[Item] = deque()
+        self._waiting: deque[Item | Lost] = deque()
         self._lost = 0  # not in the file yet; the loop adds, the thread takes
         self._lost_ever = 0
         self._closing = threading.Event()
@@ -79,12 +94,19 @@ class RecordingThread:
         self._thread.start()
 
     def put(self, item: Item) -> None:
-        """Queue an item without blocking. When the disk is too slow, it is left out and counted."""
-        if len(self._waiting) >= MAX_WAITING:
+        """Queue an item without blocking. When the disk is too slow, it is left out and counted.
+
+        Records of episodes always find a place: a person has caused each of them, and the last one decides.
+        """
+        is_episode = isinstance(item, OwnItem) and isinstance(item.record, EpisodeRecord)
+        if len(self._waiting) >= MAX_WAITING and not is_episode:
             self._lost += 1
             self._lost_ever += 1
-        else:
-            self._waiting.append(item)
+            return
+        if self._lost:  # what was left out has its place in front of what follows
+            lost, self._lost = self._lost, 0
+            self._waiting.append(Lost(lost))
+        self._waiting.append(item)
 
     def close(self) -> None:
         """Write the waiting items, and end. Blocks; idempotent."""
@@ -100,6 +122,11 @@ class RecordingThread:
     def lost(self) -> int:
         """The number of records that were left out."""
         return self._lost_ever
+
+    @property
+    def waiting(self) -> float:
+        """The share of the queue that is taken, 0 to 1."""
+        return min(1.0, len(self._waiting) / MAX_WAITING)
 
     @property
     def bytes_written(self) -> int:
@@ -131,13 +158,19 @@ class RecordingThread:
 
     def _drain(self) -> None:
         for _ in range(len(self._waiting)):
-            self._take(self._waiting.popleft())
+            item = self._waiting.popleft()
+            if isinstance(item, Lost):
+                if self._writer is not None:
+                    self._tell_lost(self._writer, item.items)
+            else:
+                self._take(item)
             time.sleep(0)  # the loop goes first
         writer = self._writer
         if writer is None:
             return
-        if self._lost:
-            self._tell_lost(writer)
+        if self._lost and not self._waiting:
+            lost, self._lost = self._lost, 0
+            self._tell_lost(writer, lost)
         if writer.flush_if_due(self._now()):
             self._look_at_disk()
 
@@ -157,8 +190,23 @@ class RecordingThread:
                 epoch = record.epoch
                 if isinstance(record, REMEMBERED):
                     self._remembered[type(record)] = item
-        if self._writer is not None and self._robot is not None and epoch == self._robot.record.epoch:
+        is_open = self._writer is not None and self._robot is not None and epoch == self._robot.record.epoch
+        if isinstance(item, OwnItem) and isinstance(item.record, EpisodeRecord):
+            self._take_episode(item, item.record, is_open)
+        elif self._writer is not None and self._robot is not None and is_open:
             self._write(self._writer, item, self._robot.record.description)
+
+    def _take_episode(self, item: OwnItem, record: EpisodeRecord, is_open: bool) -> None:
+        """Write a record of an episode; say of `kept` that it is on the disk, only when it is."""
+        kept = False
+        if self._writer is not None and self._robot is not None and is_open and self._episodes.takes(record):
+            self._write(self._writer, item, self._robot.record.description)
+            if record.kind == "kept":
+                self._is_keeping = True
+                self._writer.flush()
+                self._is_keeping, kept = False, True
+        if record.kind == "kept":
+            self._on_episode(record.episode, kept)
 
     def _meet_robot(self, item: RobotItem) -> None:
         before, self._robot = self._robot, item
@@ -206,20 +254,24 @@ class RecordingThread:
     def _write(self, writer: RecordingWriter, item: Item, description: RobotDescription) -> None:
         for entry in entries_of(item, description):
             writer.write(entry)
-        if writer.bytes_written >= self._settings.file_bytes and self._robot is not None:
+        # A file is as long as two, rather than cut an episode.
+        most = self._settings.file_bytes * (2 if self._episodes.open else 1)
+        if writer.bytes_written >= most and self._robot is not None:
             self._end_part()
             self._begin_part(self._robot)
 
     def _end_part(self) -> None:
         writer = self._writer
+        cut = self._episodes.file_ends()
+        if cut:
+            self._on_episode(cut, False)
         if writer is not None:
             writer.close()
             self._writer = None  # not before: `_fail` cuts a file that fails here to its whole records
             self._bytes_before += writer.bytes_written
             self._head = writer.head
 
-    def _tell_lost(self, writer: RecordingWriter) -> None:
-        lost, self._lost = self._lost, 0
+    def _tell_lost(self, writer: RecordingWriter, lost: int) -> None:
         writer.count_lost(lost)
         if self._robot is not None:
             event = self._robot.record.event if self._feedback is None else self._feedback.feedback.event
@@ -228,6 +280,7 @@ class RecordingThread:
 
     def _look_at_disk(self) -> None:
         free = shutil.disk_usage(self._directory).free
+        self.free_bytes = free
         if free < self._settings.free_bytes:
             raise DiskTrouble(f"only {free / 1e6:.0f} MB are free on the disk")
 
@@ -239,6 +292,8 @@ class RecordingThread:
         if writer is not None:
             self._bytes_before += writer.bytes_written
             try:
+                if self._is_keeping:  # else a second try could keep an episode that everyone is told is lost
+                    raise DiskTrouble(reason)
                 writer.close()
             except RecordingError:
                 writer.abandon()

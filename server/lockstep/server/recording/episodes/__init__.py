@@ -1,0 +1,1 @@
+"""Episodes: stretches of a recording with a task and an outcome (docs/episodes.md)."""

@@ -1,0 +1,82 @@
+"""The bar of episodes on the operator's page."""
+
+import os
+from pathlib import Path
+
+import pytest
+from playwright.async_api import Browser, Page, expect
+
+from lockstep.bench.browsers.console_page import open_console
+from lockstep.bench.harness.driving import drive_on
+from lockstep.client import Console
+from lockstep.server.recording.reading.reader import RecordingReader
+from tests.support.stack import running_stack
+
+pytestmark = pytest.mark.browser
+
+SETTINGS = {"LOCKSTEP_EPISODES__COUNTDOWN_SECONDS": "1"}
+SHOTS = os.environ.get("EPISODE_SHOTS", "")  # directory for pictures of the page, for people to look at
+
+
+async def _shot(page: Page, name: str) -> None:
+    if SHOTS:
+        await page.screenshot(path=f"{SHOTS}/{name}.png")
+
+
+async def test_a_supervisor_begins_and_keeps_episodes_with_the_keyboard_while_an_operator_drives(
+    tmp_path: Path, chromium: Browser
+) -> None:
+    recordings = tmp_path / "recordings"
+    async with (
+        running_stack(tmp_path, settings=SETTINGS, extra=("--record", str(recordings))) as stack,
+        open_console(chromium, stack.supervisor) as page_console,
+        Console(stack.operator, video=False, audio=False) as driver,
+    ):
+        page = page_console.page
+        await page_console.until_live()
+        await driver.take_seat()
+        bar = page.locator(".episode-bar")
+        await expect(bar.locator(".episode-words")).to_have_text("No episode yet")
+        await expect(bar.get_by_role("button", name="Keep")).to_be_disabled()
+        await _shot(page, "idle")
+        await page.keyboard.press("b")
+        await expect(bar.locator(".episode-words")).to_have_text("Not done: say in words what is to be done")
+        await bar.locator(".episode-task").fill("push the box b k l")  # letters in the field are no keys
+        await bar.locator(".episode-task").press("Enter")
+        await expect(bar.locator(".episode-words")).to_contain_text("Take 1")
+        await _shot(page, "open")
+        for _ in range(5):
+            await drive_on(driver, [0.2, 0.0, 0.0])
+        await page.keyboard.press("y")
+        await expect(bar.locator(".episode-count")).to_have_text("1 kept")
+        await page.keyboard.press("b")
+        await expect(bar.locator(".episode-words")).to_contain_text("Take 2")
+        await bar.get_by_role("button", name="Redo").click()
+        await expect(bar.locator(".episode-words")).to_contain_text("Take 3")
+        await bar.get_by_role("button", name="Discard").click()
+        await expect(bar.locator(".episode-count")).to_have_text("1 kept · 2 discarded")
+        await expect(bar.locator(".episode-words")).to_have_text("Episode 3 is discarded")
+        await page.set_viewport_size({"width": 390, "height": 844})
+        await _shot(page, "phone-idle")
+        await page.keyboard.press("b")
+        await expect(bar.locator(".episode-words")).to_contain_text("Take 4")
+        await _shot(page, "phone-open")
+        assert await page.evaluate("document.documentElement.scrollWidth <= innerWidth")
+        assert (await page_console.stats())["bad_messages"] == 0
+    (path,) = recordings.glob("*.mcap")
+    with RecordingReader(path) as reader:
+        assert [(each.state, each.outcome, each.task) for each in reader.index.episodes] == [
+            ("kept", "success", "push the box b k l"),
+            ("discarded", "", "push the box b k l"),
+            ("discarded", "", "push the box b k l"),
+            ("cut", "", "push the box b k l"),
+        ]
+
+
+async def test_an_observer_sees_no_bar_and_without_a_recording_there_is_none(tmp_path: Path, chromium: Browser) -> None:
+    async with running_stack(tmp_path) as stack:
+        for link in (stack.supervisor, stack.observer):
+            async with open_console(chromium, link) as console:
+                await console.until_live()
+                await console.page.locator(".settings, .tabs").first.wait_for(state="attached")
+                await expect(console.page.locator(".episode-bar")).to_be_hidden()

@@ -1,0 +1,79 @@
+"""`lockstep episodes`, and `export` and `verify` of datasets, as their users call them."""
+
+import json
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner, Result
+
+from lockstep.server.cli.main import app
+from tests.server.recording.test_episode_export import KEPT_AND_NOT, recording
+
+
+@pytest.fixture
+def directory(tmp_path: Path) -> Path:
+    """Where recordings are; two are there, each with two kept episodes."""
+    found = tmp_path / "recordings"
+    found.mkdir()
+    for name in ("one", "two"):
+        recording(found / f"{name}.mcap", *KEPT_AND_NOT)
+    return found
+
+
+def _lockstep(directory: Path, *arguments: str) -> Result:
+    environment = {
+        "LOCKSTEP_STATE_DIR": str(directory.parent / "state"),
+        "LOCKSTEP_RECORDING__DIRECTORY": str(directory),
+    }
+    return CliRunner().invoke(app, arguments, env=environment)
+
+
+def test_the_episodes_of_a_recording_are_listed_and_one_is_relabelled(directory: Path) -> None:
+    words = _lockstep(directory, "episodes", "one")
+    assert words.exit_code == 0, words.output
+    assert [line.split()[2] for line in words.stdout.splitlines()] == ["kept", "discarded", "kept", "cut", "open"]
+    changed = json.loads(
+        _lockstep(directory, "episodes", "one", "--edit", "a", "--outcome", "failure", "--json").stdout
+    )
+    assert [(each["id"], each["outcome"]) for each in changed][:1] == [("a", "failure")]
+    assert json.loads(_lockstep(directory, "episodes", "one", "--json").stdout) == changed
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("--edit", "b", "--undrop"), "no kept episode"),
+        (("--edit", "a", "--last", "99"), "stays within"),
+        (("--edit", "a", "--outcome", "good"), "success, failure or none"),
+        (("--edit", "a", "--first", "-3"), ""),
+    ],
+)
+def test_what_cannot_be_changed_is_said_with_exit_code_2(
+    directory: Path, arguments: tuple[str, ...], words: str
+) -> None:
+    found = _lockstep(directory, "episodes", "one", *arguments)
+    assert found.exit_code == 2
+    assert words in found.stderr
+    assert sorted(each.name for each in directory.iterdir()) == ["one.mcap", "two.mcap"]
+
+
+def test_a_dataset_is_verified_and_never_written_over_another(directory: Path, tmp_path: Path) -> None:
+    command = ("export", "one", "--to", "lerobot", "--out", str(tmp_path / "dataset"))
+    done = _lockstep(directory, *command)
+    assert done.exit_code == 0, done.output
+    verdict = _lockstep(directory, "verify", str(tmp_path / "dataset"))
+    assert verdict.exit_code == 0, verdict.output
+    assert verdict.stdout.startswith("2 episodes, 25 rows, tolerance 4 events\n")
+    again = _lockstep(directory, *command)
+    assert (again.exit_code, "already" in again.stderr) == (2, True)
+
+
+def test_recordings_of_the_same_events_become_one_dataset_and_the_check_says_that_they_are(
+    directory: Path, tmp_path: Path
+) -> None:
+    """As when somebody exports a recording and a copy of it."""
+    done = _lockstep(directory, "export", "one", "two", "--to", "lerobot", "--out", str(tmp_path / "dataset"))
+    assert done.exit_code == 0, done.output
+    verdict = json.loads(_lockstep(directory, "verify", str(tmp_path / "dataset"), "--json").stdout)
+    assert (verdict["ok"], verdict["episodes"], verdict["rows"]) == (False, 4, 50)
+    assert {name for name, check in verdict["checks"].items() if check["count"]} == {"ordered"}

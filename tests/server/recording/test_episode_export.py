@@ -1,0 +1,253 @@
+"""Episodes in datasets: exactly the kept ones, each row with the picture of its own event."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import av
+import msgspec
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+
+from lockstep.protocol.serial import MAX_EVENT, event_after
+from lockstep.server.recording.episodes.edits import EpisodeEdit, EpisodeEditRefused, add_edit, edits_path
+from lockstep.server.recording.errors import RecordingDamaged
+from lockstep.server.recording.export import export_lerobot
+from lockstep.server.recording.export.lerobot_rows import aligned_stamps, episodes_of
+from lockstep.server.recording.format.episodes import EpisodeEntry
+from lockstep.server.recording.format.records import Degraded, EpisodeRecord
+from lockstep.server.recording.format.topics import CAMERA
+from lockstep.server.recording.reading.reader import RecordingReader
+from lockstep.server.recording.verify.verify_dataset import verify_dataset
+from lockstep.server.recording.writing.writer import Entry
+from tests.server.recording.makers import EPOCH, INTERVAL, START, Story, own_entry, rewritten
+
+DATA = Path("data/chunk-000/file-000.parquet")
+VIDEO = Path("videos/observation.images.front/chunk-000/file-000.mp4")
+
+
+def episode(id: str, kind: str, first: int, last: int, **more: object) -> Entry:
+    """A record at event `last`, behind everything of that event; events begin at 1."""
+    record = EpisodeRecord(
+        epoch=EPOCH,
+        event=last,
+        episode=id,
+        number=1,
+        kind=kind,  # type: ignore[arg-type]
+        task=str(more.pop("task", "push")),
+        first_event=first,
+        last_event=last,
+        **more,  # type: ignore[arg-type]
+    )
+    return own_entry(record, START + (last - 1) * INTERVAL + 30_000_000)
+
+
+def recording(path: Path, *records: Entry, events: int = 100, stamps: dict[int, int] | None = None) -> Path:
+    """`stamps`: of pictures, where it is not their own event."""
+    story = [
+        each._replace(event=(stamps or {}).get(each.event, each.event)) if each.topic.startswith(CAMERA) else each
+        for each in Story(events=events, real=True).entries()
+    ]
+    entries = [*story, *records]
+    return rewritten(path, sorted(entries, key=lambda entry: entry.arrived), lambda each: [each])
+
+
+def shown(root: Path) -> list[float]:
+    with av.open(str(root / VIDEO)) as video:
+        return [float(each.to_ndarray(format="gray")[100:140, 100:220].mean()) for each in video.decode(video=0)]
+
+
+def rows(root: Path) -> list[dict[str, Any]]:
+    return pq.read_table(root / DATA).to_pylist()  # type: ignore[no-any-return]
+
+
+KEPT_AND_NOT = (
+    episode("a", "start", 10, 10),
+    episode("a", "kept", 10, 20, outcome="success"),
+    episode("b", "start", 25, 25),
+    episode("b", "discarded", 25, 40),
+    episode("c", "start", 45, 45, task="wipe"),
+    episode("c", "kept", 45, 60, task="wipe", outcome="failure"),
+    episode("d", "start", 65, 65),
+    episode("d", "cut", 65, 70, why="link_down"),
+    episode("e", "start", 80, 80),
+)
+
+
+def test_a_dataset_has_exactly_the_kept_episodes_and_their_rows_show_their_own_events(tmp_path: Path) -> None:
+    path = recording(tmp_path / "a.mcap", *KEPT_AND_NOT)
+    (root,) = export_lerobot.export(path, tmp_path / "dataset", "not said")
+    found = rows(root)
+    events = [row["lockstep.event"] for row in found]
+    assert events == [*range(10, 20), *range(45, 60)]
+    assert [row["lockstep.stamp"] for row in found] == events
+    assert {row["lockstep.gap"] for row in found} == {0}
+    assert [row["episode_index"] for row in found] == [0] * 10 + [1] * 15
+    assert [row["frame_index"] for row in found] == [*range(10), *range(15)]
+    assert [row["lockstep.success"] for row in found] == [1] * 10 + [0] * 15
+    assert shown(root) == pytest.approx([2 * event for event in events], abs=6)
+    notes = json.loads((root / "meta" / "lockstep.json").read_text())
+    assert notes["drivers"] == ["Ada"]
+    assert [each["episode"] for each in notes["episodes"]] == ["a", "c"]
+    places = pq.read_table(root / "meta/episodes/chunk-000/file-000.parquet").to_pylist()
+    assert [each["tasks"] for each in places] == [["push"], ["wipe"]]
+    assert [(each["dataset_from_index"], each["dataset_to_index"]) for each in places] == [(0, 10), (10, 25)]
+    assert verify_dataset(root).ok
+
+
+def test_a_checker_that_others_wrote_takes_a_dataset_of_several_episodes(tmp_path: Path) -> None:
+    path = recording(tmp_path / "a.mcap", *KEPT_AND_NOT)
+    (root,) = export_lerobot.export(path, tmp_path / "dataset", "")
+    command = [str(Path(sys.executable).with_name("lerobot-doctor")), "check", str(root), "--json"]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=50, check=False)
+    summary = json.loads(done.stdout)["summary"]
+    assert summary["FAIL"] == 0, done.stdout
+    assert summary["PASS"] >= 5, done.stdout
+
+
+def test_several_recordings_become_one_dataset(tmp_path: Path) -> None:
+    kept = (episode("a", "start", 10, 10), episode("a", "kept", 10, 20))
+    paths = [recording(tmp_path / f"{name}.mcap", *kept, events=30) for name in "ab"]
+    (root,) = export_lerobot.export_all(paths, tmp_path / "dataset", "")
+    info = json.loads((root / "meta" / "info.json").read_text())
+    assert (info["total_episodes"], info["total_frames"], info["total_tasks"]) == (2, 20, 1)
+    assert [row["index"] for row in rows(root)] == list(range(20))
+    assert shown(root) == pytest.approx([2 * event for event in [*range(10, 20)] * 2], abs=6)
+
+
+def test_a_recording_whose_episodes_were_all_discarded_gives_no_dataset_and_leaves_nothing(tmp_path: Path) -> None:
+    path = recording(tmp_path / "a.mcap", *KEPT_AND_NOT[2:4])
+    with pytest.raises(RecordingDamaged):
+        export_lerobot.export(path, tmp_path / "dataset", "")
+    assert sorted(each.name for each in tmp_path.iterdir()) == ["a.mcap"]
+
+
+def test_an_episode_that_was_kept_in_another_file_than_it_began_in_is_in_no_dataset(tmp_path: Path) -> None:
+    path = recording(
+        tmp_path / "a.mcap",
+        episode("z", "kept", 10, 20),
+        episode("a", "start", 30, 30),
+        episode("a", "kept", 30, 40),
+    )
+    (root,) = export_lerobot.export(path, tmp_path / "dataset", "")
+    assert [row["lockstep.event"] for row in rows(root)] == [*range(30, 40)]
+
+
+def test_no_picture_from_before_the_episode_is_in_it_and_none_older_than_the_tolerance(tmp_path: Path) -> None:
+    """The camera hangs from event 8 to 12 and from event 30 to 40."""
+    hangs = dict.fromkeys(range(8, 13), 7) | dict.fromkeys(range(30, 41), 29)  # it gives the same picture again
+    path = recording(
+        tmp_path / "whole.mcap", episode("a", "start", 10, 10), episode("a", "kept", 10, 50), events=60, stamps=hangs
+    )
+    (root,) = export_lerobot.export_all([path], tmp_path / "dataset", "", tolerance=2)
+    found = rows(root)
+    assert [row["lockstep.event"] for row in found] == [*range(13, 32), *range(41, 50)]
+    assert [row["lockstep.gap"] for row in found][17:19] == [1, 2]
+    notes = json.loads((root / "meta" / "lockstep.json").read_text())
+    assert (notes["tolerance"], notes["episodes"][0]["left_out"]) == (2, 12)
+    assert verify_dataset(root).ok
+
+
+def test_an_event_that_the_recorder_left_out_makes_no_row_with_the_wrong_action(tmp_path: Path) -> None:
+    entries = [each for each in Story(events=30, real=True).entries() if each.event != 15]
+    path = rewritten(tmp_path / "a.mcap", entries, lambda each: [each])
+    (root,) = export_lerobot.export(path, tmp_path / "dataset", "")
+    found = {row["lockstep.event"]: row["action"] for row in rows(root)}
+    assert 14 not in found
+    assert found[16][0] == pytest.approx(16 / 30)
+
+
+def test_pictures_that_build_on_one_that_was_left_out_are_in_no_row(tmp_path: Path) -> None:
+    """Keyframes are those of events 2 and 52; the recorder says at event 40 that it left something out."""
+    lost = own_entry(Degraded(epoch=EPOCH, event=40, lost=3), START + 39 * INTERVAL + 4_000_000)
+    path = recording(tmp_path / "a.mcap", lost, episode("a", "start", 30, 30), episode("a", "kept", 30, 60))
+    (root,) = export_lerobot.export_all([path], tmp_path / "dataset", "", tolerance=0)
+    assert [row["lockstep.event"] for row in rows(root)] == [*range(30, 40), *range(52, 60)]
+
+
+@pytest.mark.parametrize(
+    ("column", "change", "check"),
+    [
+        ("lockstep.stamp", lambda value: value + 1, "aligned"),
+        ("lockstep.stamp", lambda value: value - 5, "aligned"),
+        ("lockstep.event", lambda value: 30, "within"),
+        ("episode_index", lambda value: 1, "counted"),
+    ],
+)
+def test_the_check_finds_a_row_that_was_changed(tmp_path: Path, column: str, change: object, check: str) -> None:
+    path = recording(tmp_path / "a.mcap", *KEPT_AND_NOT)
+    (root,) = export_lerobot.export(path, tmp_path / "dataset", "")
+    table = pq.read_table(root / DATA)
+    values = table.column(column).to_pylist()
+    values[7] = change(values[7])  # type: ignore[operator]
+    changed = table.set_column(table.schema.get_field_index(column), column, pa.array(values, pa.int64()))
+    pq.write_table(changed, root / DATA)
+    verdict = verify_dataset(root)
+    assert not verdict.ok
+    assert check in {name for name, each in verdict.checks.items() if not each.ok}
+
+
+def test_the_check_refuses_what_lockstep_has_not_exported(tmp_path: Path) -> None:
+    (tmp_path / "meta").mkdir()
+    (tmp_path / "meta" / "lockstep.json").write_bytes(msgspec.json.encode({"version": 7}))
+    with pytest.raises(RecordingDamaged):
+        verify_dataset(tmp_path)
+
+
+def test_pictures_are_aligned_across_the_wrap_of_the_event_reference() -> None:
+    events = [MAX_EVENT - 1, MAX_EVENT, event_after(MAX_EVENT), event_after(event_after(MAX_EVENT))]
+    stamps = [MAX_EVENT - 1, MAX_EVENT - 1, MAX_EVENT, 2]
+    assert list(aligned_stamps(stamps, events)) == [(0, MAX_EVENT - 1), (2, MAX_EVENT), (2, MAX_EVENT), (3, 2)]
+
+
+def changed(path: Path, id: str, **change: object) -> list[EpisodeEntry]:
+    with RecordingReader(path) as reader:
+        return add_edit(path, episodes_of(reader), EpisodeEdit(episode=id, at=1.0, **change))  # type: ignore[arg-type]
+
+
+def test_an_episode_that_is_relabelled_trimmed_or_dropped_is_so_in_the_dataset_and_its_recording_unchanged(
+    tmp_path: Path,
+) -> None:
+    path = recording(tmp_path / "a.mcap", *KEPT_AND_NOT)
+    before = path.read_bytes()
+    changed(path, "a", task="pull", outcome="failure", first_event=12, last_event=18)
+    (root,) = export_lerobot.export(path, tmp_path / "one", "")
+    found = [row for row in rows(root) if row["episode_index"] == 0]
+    assert [row["lockstep.event"] for row in found] == [*range(12, 18)]
+    assert {row["lockstep.success"] for row in found} == {0}
+    assert pq.read_table(root / "meta/tasks.parquet").column("task").to_pylist() == ["pull", "wipe"]
+    changed(path, "a", dropped=True)
+    (root,) = export_lerobot.export(path, tmp_path / "two", "")
+    assert [row["lockstep.event"] for row in rows(root)] == [*range(45, 60)]
+    assert [each.state for each in changed(path, "a", dropped=False)][0] == "kept"
+    assert path.read_bytes() == before
+
+
+@pytest.mark.parametrize(
+    ("id", "change"),
+    [
+        ("b", {"dropped": False}),  # it was discarded
+        ("d", {"outcome": "success"}),  # it was cut
+        ("e", {"last_event": 90}),  # it has no end
+        ("x", {"task": "x"}),
+        ("a", {"first_event": 9}),
+        ("a", {"last_event": 21}),
+        ("a", {"first_event": 18, "last_event": 18}),
+    ],
+)
+def test_nothing_makes_more_count_than_was_kept(tmp_path: Path, id: str, change: dict[str, object]) -> None:
+    path = recording(tmp_path / "a.mcap", *KEPT_AND_NOT)
+    with pytest.raises(EpisodeEditRefused):
+        changed(path, id, **change)
+    assert not edits_path(path).exists()
+
+
+def test_a_file_of_changes_that_somebody_wrote_makes_no_discarded_episode_count(tmp_path: Path) -> None:
+    path = recording(tmp_path / "a.mcap", *KEPT_AND_NOT)
+    lines = ['{"episode":"b","at":1,"dropped":false}', '{"episode":"a","at":1,"last_event":99}', '{"epis', "[]", "\x00"]
+    edits_path(path).write_text("\n".join(lines))
+    (root,) = export_lerobot.export(path, tmp_path / "dataset", "")
+    assert [row["lockstep.event"] for row in rows(root)] == [*range(10, 20), *range(45, 60)]

@@ -1,0 +1,151 @@
+import type { ConsoleEngine } from "../../engine/console_engine";
+import { drivingKeys } from "../../input/shortcuts";
+import { FIELDS } from "../../input/keyboard";
+import type { EpisodeRequest, EpisodeState } from "../../protocol/wire";
+import { drawId } from "../../robot/action_client";
+import { holdsSeat, note } from "../../session/console_state";
+import { EPISODE_REFUSALS, episodeLabels, problemWords } from "../../session/episode_labels";
+import { readEpisodeMessage } from "../../session/episode_reader";
+import { button, h, setData, setHidden, setText, type Panel } from "../elements/dom";
+
+type Request = Pick<EpisodeRequest, "do"> & Partial<EpisodeRequest>;
+
+/** How long a refusal stays in words. */
+const SHOWN_MS = 6000;
+const TASK_LIMIT = 300;
+
+/** What each key asks for; foot pedals are keys. */
+const KEYS: ReadonlyMap<string, Request> = new Map<string, Request>([
+  ["KeyB", { do: "start" }],
+  ["KeyK", { do: "keep" }],
+  ["KeyY", { do: "keep", outcome: "success" }],
+  ["KeyN", { do: "keep", outcome: "failure" }],
+  ["KeyL", { do: "discard" }],
+  ["KeyO", { do: "redo" }],
+  ["KeyM", { do: "mark" }],
+]);
+
+interface EpisodeButton {
+  readonly element: HTMLButtonElement;
+  readonly works: (state: EpisodeState) => boolean;
+}
+
+/** Begins, keeps and discards episodes, and says what would spoil the one that is open. */
+export function createEpisodeBar(engine: ConsoleEngine): Panel {
+  let state: EpisodeState | null = null;
+  let heardMs = 0;
+  let refusal = "";
+  let refusedMs = -Infinity;
+
+  const isOpen = (each: EpisodeState): boolean => each.phase === "open";
+  const lamp = h("span", "episode-lamp", { "aria-hidden": "true" });
+  const words = h("strong", "episode-words", { role: "status" });
+  const time = h("span", "episode-time"); // apart from the words, which are read aloud when they change
+  const count = h("span", "episode-count");
+  const problems = h("span", "episode-problems", { role: "alert" });
+  const task = h("input", "episode-task", {
+    "aria-label": "Task of the episode",
+    placeholder: "Task, in words",
+    maxlength: String(TASK_LIMIT),
+    enterkeyhint: "go",
+  });
+  const form = h("form", "episode-form", {}, task);
+  const buttons: readonly EpisodeButton[] = [
+    make("Begin", "B", { do: "start" }, (each) => each.phase === "idle" || each.phase === "resetting"),
+    make("Keep", "K", { do: "keep" }, isOpen),
+    make("Success", "Y", { do: "keep", outcome: "success" }, isOpen),
+    make("Failure", "N", { do: "keep", outcome: "failure" }, isOpen),
+    make("Discard", "L", { do: "discard" }, (each) => isOpen(each) || each.phase === "countdown"),
+    make("Redo", "O", { do: "redo" }, isOpen),
+  ];
+  const group = h("div", "episode-buttons", { role: "group", "aria-label": "Episode" });
+  group.append(...buttons.map((each) => each.element));
+  const element = h("section", "episode-bar", { "aria-label": "Episodes" });
+  element.append(h("div", "episode-state", {}, lamp, words, time, problems, count), form, group);
+
+  function make(
+    label: string,
+    key: string,
+    request: Request,
+    works: (state: EpisodeState) => boolean,
+  ): EpisodeButton {
+    const made = button("episode-button", label, () => ask(request));
+    made.title = `${label}: key ${key}`;
+    setData(made, "episode", `${request.do}${request.outcome === undefined ? "" : `-${request.outcome}`}`);
+    return { element: made, works };
+  }
+
+  /** Who may: as the console judges it, which has the last word. */
+  const may = (): boolean => holdsSeat(engine.state) || engine.state.welcome?.role === "supervisor";
+
+  /** Each request names the episode that stands on the page: one that comes late meets no later one. */
+  function ask(request: Request): void {
+    if (state === null || !may()) return;
+    const { do: verb } = request;
+    const message: EpisodeRequest = {
+      type: "episode_request",
+      id: drawId(),
+      episode: verb === "start" ? "" : state.episode,
+      task: verb === "start" ? task.value.trim() : "",
+      ...request,
+    };
+    engine.tell("session", message);
+  }
+
+  function take(value: unknown): void {
+    const message = readEpisodeMessage(value);
+    if (message?.type === "episode") {
+      if (state?.task !== message.task && document.activeElement !== task && message.task !== "")
+        task.value = message.task;
+      if (message.phase === "idle" && message.last !== state?.last && message.last.includes("lost"))
+        note(engine.state, "error", `Episode: ${message.last}`, Date.now());
+      [state, heardMs] = [message, performance.now()];
+    } else if (message?.type === "episode_answer" && message.reason !== "") {
+      [refusal, refusedMs] = [EPISODE_REFUSALS[message.reason], performance.now()];
+      note(engine.state, "warning", `Episode: ${refusal}`, Date.now());
+    }
+  }
+
+  if (engine.episode !== null) take(engine.episode);
+  engine.takeEpisode = take;
+  form.addEventListener("submit", (event) => {
+    event.preventDefault();
+    task.blur(); // keys drive again
+    ask({ do: "start" });
+  });
+  addEventListener("keydown", (event) => {
+    if (event.repeat || event.ctrlKey || event.metaKey || event.altKey || element.hidden) return;
+    if (event.target instanceof Element && event.target.matches(FIELDS)) return;
+    const request = KEYS.get(event.code);
+    if (request === undefined) return;
+    if (engine.isArmed() && drivingKeys(engine.state.robot?.description ?? null).has(event.code)) return;
+    ask(request);
+  });
+
+  return {
+    element,
+    update(now) {
+      const { recording, welcome } = engine.state;
+      if (welcome === null) state = null; // of a connection that ended
+      const records = recording?.state === "recording" || recording?.state === "failed";
+      setHidden(element, state === null || !may() || (!records && state.phase === "idle"));
+      if (state === null || element.hidden) return;
+      const current = state;
+      const seconds = Math.max(0, Date.now() / 1000 - current.since);
+      const labels = episodeLabels(current, recording, (now - heardMs) / 1000, seconds);
+      const isRefused = now - refusedMs < SHOWN_MS;
+      setData(element, "tone", isRefused ? "bad" : labels.tone);
+      setText(words, isRefused ? `Not done: ${refusal}` : labels.text);
+      setText(time, labels.time);
+      setText(count, labels.count);
+      setText(problems, problemWords(current.problems));
+      setHidden(problems, current.problems.length === 0);
+      setHidden(form, current.phase === "open" || current.phase === "keeping");
+      task.disabled = current.phase === "countdown";
+      for (const each of buttons) {
+        each.element.disabled =
+          !each.works(current) || (recording?.state !== "recording" && !isOpen(current));
+      }
+    },
+  };
+}

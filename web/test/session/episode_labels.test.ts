@@ -1,0 +1,84 @@
+import { expect, it } from "vitest";
+import type { EpisodeState, RecordingState } from "../../src/protocol/wire";
+import { episodeLabels, problemWords } from "../../src/session/episode_labels";
+import { readEpisodeMessage } from "../../src/session/episode_reader";
+
+const IDLE: EpisodeState = {
+  type: "episode",
+  phase: "idle",
+  episode: "",
+  number: 0,
+  task: "",
+  by: "",
+  seconds_left: 0,
+  since: 0,
+  first_event: 0,
+  kept: 0,
+  discarded: 0,
+  cut: 0,
+  last: "",
+  reset_action: "",
+  problems: [],
+};
+const RECORDING: RecordingState = {
+  type: "recording",
+  state: "recording",
+  id: "a",
+  recording: "a",
+  name: "",
+  by: "",
+  since: 0,
+  bytes: 0,
+  lost: 0,
+  detail: "",
+};
+
+it("counts down, and says how long the open one runs", () => {
+  const counting = episodeLabels({ ...IDLE, phase: "countdown", seconds_left: 3 }, RECORDING, 0.5, 0);
+  expect(counting).toMatchObject({ tone: "wait", text: "Begins in 3" });
+  const open = episodeLabels({ ...IDLE, phase: "open", number: 7 }, RECORDING, 0, 65);
+  expect(open).toMatchObject({ tone: "on", text: "Take 7", time: "1:05" });
+});
+
+it("turns red as soon as something spoils the episode, and names it", () => {
+  const problems = [
+    { kind: "camera_missing", stream: "front", text: "front: no picture for 2 s" },
+    { kind: "disk_low", stream: "", text: "the disk is almost full" },
+  ] as const;
+  expect(episodeLabels({ ...IDLE, phase: "open", problems }, RECORDING, 0, 1).tone).toBe("bad");
+  expect(problemWords(problems)).toBe("front: no picture for 2 s · the disk is almost full");
+});
+
+it("counts what was kept, discarded and lost", () => {
+  expect(episodeLabels({ ...IDLE, kept: 3 }, RECORDING, 0, 0).count).toBe("3 kept");
+  expect(episodeLabels({ ...IDLE, kept: 3, discarded: 2, cut: 1 }, RECORDING, 0, 0).count).toBe(
+    "3 kept · 2 discarded · 1 lost",
+  );
+});
+
+it("says why no episode can begin", () => {
+  expect(episodeLabels(IDLE, null, 0, 0).text).toBe("Record first");
+  const failed: RecordingState = { ...RECORDING, state: "failed", detail: "only 3 MB are free on the disk" };
+  expect(episodeLabels(IDLE, failed, 0, 0)).toMatchObject({
+    tone: "bad",
+    text: "Not recording: only 3 MB are free on the disk",
+  });
+});
+
+it("reads messages about episodes and nothing else", () => {
+  expect(readEpisodeMessage({ ...IDLE })).toEqual(IDLE);
+  expect(
+    readEpisodeMessage({ type: "episode_answer", id: "x", reason: "empty", detail: "", episode: "" }),
+  ).toMatchObject({
+    reason: "empty",
+  });
+  for (const wrong of [
+    null,
+    [],
+    { type: "episode" },
+    { ...IDLE, kept: "3" },
+    { type: "welcome" },
+    { ...IDLE, phase: "x" },
+  ])
+    expect(readEpisodeMessage(wrong)).toBeNull();
+});
