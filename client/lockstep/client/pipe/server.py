@@ -2,7 +2,7 @@
 
 import asyncio
 import logging
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Mapping
 from contextlib import AsyncExitStack
 from typing import Any
 
@@ -81,10 +81,14 @@ class PipeServer:
         self._console: Console | None = None
         self._observer: Observer | None = None
         self._cameras: dict[str, tuple[int, int]] = {}  # width and height by name
-        self._driving: asyncio.Task[Any] | None = None  # of the newest command that nobody waits for
+        self._tasks = asyncio.TaskGroup()
+        self._driving: asyncio.Task[None] | None = None  # of the newest command that nobody waits for
+        self._driving_error: Exception | None = None  # of such a command
         self._watching: asyncio.Task[None] | None = None
+        self._watching_error: Exception | None = None  # that ended it
 
     async def __aenter__(self) -> "PipeServer":
+        await self._stack.enter_async_context(self._tasks)
         return self
 
     async def __aexit__(self, *_: object) -> None:
@@ -101,17 +105,13 @@ class PipeServer:
             BadFrame: the other side does not speak in frames, or asks without waiting for answers.
         """
         requests: asyncio.Queue[dict[str, Any]] = asyncio.Queue(AHEAD)
-        answering = asyncio.create_task(self._answer_all(requests), name="answers")
-        reading = asyncio.create_task(self._read_all(requests), name="requests")
         try:
-            await asyncio.wait([answering, reading], return_when=asyncio.FIRST_COMPLETED)
-        finally:
-            for task in (answering, reading):
-                task.cancel()
-            await asyncio.wait([answering, reading])
-        for task in (answering, reading):
-            if not task.cancelled():
-                task.result()
+            async with asyncio.TaskGroup() as tasks:
+                answering = tasks.create_task(self._answer_all(requests), name="answers")
+                await self._read_all(requests)
+                answering.cancel()
+        except BaseExceptionGroup as errors:
+            raise errors.exceptions[0] from errors
 
     async def _read_all(self, requests: asyncio.Queue[dict[str, Any]]) -> None:
         while (said := await read_request(self._reader)) is not None:
@@ -162,8 +162,7 @@ class PipeServer:
         cameras = description.cameras if request.pictures else ()
         self._cameras = {camera.name: (camera.width, camera.height) for camera in cameras}
         self._observer = Observer(console, list(self._cameras), request.tolerance)
-        self._watching = asyncio.create_task(self._observer.run(), name="observer")
-        self._watching.add_done_callback(_read)
+        self._watching = self._tasks.create_task(self._watch(self._observer), name="observer")
         return {
             "robot": description.name,
             "axes": [
@@ -205,8 +204,7 @@ class PipeServer:
             return {"sent": values, "event": feedback.event}, []
         if self._driving is not None:
             self._driving.cancel()  # its values are overtaken; what was sent stays sent
-        self._driving = asyncio.create_task(console.drive(values), name="driving")
-        self._driving.add_done_callback(_read)
+        self._driving = self._tasks.create_task(self._drive_on(console, values), name="driving")
         await asyncio.sleep(0)  # the command is on its way, if the gate is open
         return {"sent": values, "event": None}, []
 
@@ -216,18 +214,31 @@ class PipeServer:
             await asyncio.wait([self._driving])
             self._driving = None
 
+    async def _drive_on(self, console: Console, values: Mapping[str, float | None]) -> None:
+        try:
+            await console.drive(values)
+        except Exception as error:  # of a task that nobody awaits: the next request raises it
+            _logger.info("driving ended: %s", error)
+            self._driving_error = error
+
+    async def _watch(self, observer: Observer) -> None:
+        try:
+            await observer.run()
+        except Exception as error:  # of a task that nobody awaits: the next request raises it
+            _logger.info("observing ended: %s", error)
+            self._watching_error = error
+
     def _raise_failed(self) -> None:
         """A command that nobody waited for may have been refused."""
-        task = self._driving
-        if task is not None and task.done() and not task.cancelled() and (error := task.exception()) is not None:
-            self._driving = None
+        error, self._driving_error = self._driving_error, None
+        if error is not None:
             raise error
 
     def _connected(self) -> Console:
         if self._console is None:
             raise NotOpen("open comes first")
         if self._watching is not None and self._watching.done() and not self._watching.cancelled():
-            error = self._watching.exception()
+            error: BaseException | None = self._watching_error
             while isinstance(error, BaseExceptionGroup):
                 error = error.exceptions[0]
             raise error if isinstance(error, ConsoleError) else ConsoleLost("the connection ended")
@@ -238,9 +249,3 @@ def _pixels(picture: Picture, width: int, height: int) -> bytes:
     """Return the pixels in the camera's own size: the console may have sent fewer for a narrow network."""
     frame = picture.frame.reformat(width=width, height=height, format="rgb24")
     return frame.to_ndarray().tobytes()
-
-
-def _read(task: asyncio.Task[Any]) -> None:
-    """Note that somebody looks at the task's end later."""
-    if not task.cancelled() and (error := task.exception()) is not None:
-        _logger.info("%s ended: %s", task.get_name(), error)
