@@ -81,7 +81,7 @@ class PipeServer:
         self._console: Console | None = None
         self._observer: Observer | None = None
         self._cameras: dict[str, tuple[int, int]] = {}  # width and height by name
-        self._tasks = asyncio.TaskGroup()
+        self._tasks: asyncio.TaskGroup = asyncio.TaskGroup()
         self._driving: asyncio.Task[None] | None = None  # of the newest command that nobody waits for
         self._driving_error: Exception | None = None  # of such a command
         self._watching: asyncio.Task[None] | None = None
