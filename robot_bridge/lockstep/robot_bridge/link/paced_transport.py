@@ -136,7 +136,11 @@ class PacedReader:
         if self._paused:
             return  # the budget was used up meanwhile; `resume_reading` goes on
         since, began = self._clock(), self._worked()
-        worked = self._hand_on(began)
+        try:
+            worked = self._hand_on(began)
+        except BaseException:
+            self._give_up()
+            raise
         ended = self._clock()
         wait = self._budget.spend(worked, ended)
         if self._source is None:
@@ -151,6 +155,13 @@ class PacedReader:
             self._source.pause_reading()
         else:
             self._source.resume_reading()
+
+    def _give_up(self) -> None:
+        """Abort the connection after a fault: in a turn of the loop's own, nobody else would, and it stays paused."""
+        source = cast(asyncio.Transport | None, self._source)
+        self.end()
+        if source is not None:
+            source.abort()
 
     def _hand_on(self, began: float) -> float:
         """Hand on pieces for a turn; return the seconds of the thread's time that it took."""
