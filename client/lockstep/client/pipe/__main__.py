@@ -10,6 +10,7 @@ from contextlib import suppress
 from typing import BinaryIO
 
 from lockstep.client.pipe.server import PipeServer
+from lockstep.protocol.parent_process import parent_ended
 from lockstep.protocol.pipe_frames import BadFrame
 
 
@@ -35,7 +36,12 @@ async def serve(output: BinaryIO) -> None:
     async with PipeServer(reader, write) as server:
         serving = asyncio.create_task(server.serve())
         loop.add_signal_handler(signal.SIGTERM, serving.cancel)
-        await asyncio.wait([serving])
+        # Processes that the other side has forked may keep the pipe open beyond its end.
+        ended = asyncio.create_task(parent_ended(), name="parent")
+        await asyncio.wait([serving, ended], return_when=asyncio.FIRST_COMPLETED)
+        for task in (ended, serving):
+            task.cancel()
+        await asyncio.wait([ended, serving])
     if not serving.cancelled():
         with suppress(BrokenPipeError):  # the other side has gone, and needs no answer
             serving.result()

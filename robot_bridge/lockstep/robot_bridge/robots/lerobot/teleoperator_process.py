@@ -17,6 +17,7 @@ from msgspec.structs import replace
 from lockstep.protocol.description import RobotDescription
 from lockstep.protocol.errors import SecretError
 from lockstep.protocol.link_secret import LinkSecret
+from lockstep.protocol.parent_process import parent_ended
 from lockstep.protocol.pipe_frames import BadFrame, read_request, to_frame
 from lockstep.robot_bridge.bridge import Bridge
 from lockstep.robot_bridge.errors import BridgeError
@@ -120,11 +121,15 @@ async def _answer(reader: asyncio.StreamReader, arm: VirtualArm, bridge: Bridge,
             ended.set()
 
     reading = asyncio.create_task(read(), name="requests")
+    # Processes that LeRobot has forked may keep the pipe open beyond its end.
+    parent = asyncio.create_task(parent_ended(), name="parent")
+    parent.add_done_callback(lambda _: ended.set())
     try:
         await bridge.wait(ended)
     finally:
-        reading.cancel()
-        await asyncio.wait([reading])
+        for task in (parent, reading):
+            task.cancel()
+        await asyncio.wait([parent, reading])
     if not reading.cancelled():
         reading.result()
 
