@@ -6,7 +6,6 @@ from pathlib import Path
 
 import pytest
 
-from lockstep.client.lead import hands
 from lockstep.client.lead.hands import EV_KEY, EV_SYN, EVENT, SYN_DROPPED, PedalHand
 
 PRESSED, RELEASED = 1, 0
