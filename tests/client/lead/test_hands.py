@@ -11,11 +11,9 @@ from lockstep.client.lead.hands import EV_KEY, EV_SYN, EVENT, SYN_DROPPED, Pedal
 PRESSED, RELEASED = 1, 0
 
 
-async def test_events_that_the_kernel_dropped_release_the_pedal(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+async def test_events_that_the_kernel_dropped_release_a_pedal(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A release may be among them."""
-    monkeypatch.setattr(hands.fcntl, "ioctl", lambda *_: 0)
+    monkeypatch.setattr("fcntl.ioctl", lambda *_: 0)
     path = tmp_path / "event0"
     os.mkfifo(path)
     hand = PedalHand(str(path))
