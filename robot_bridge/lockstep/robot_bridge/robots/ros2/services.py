@@ -62,7 +62,8 @@ class _Call(ActionRun):
             try:
                 answer = self._future.result()
             except Exception as error:  # an answer that cannot be read is no reason to end the bridge
-                raise ActionFailed(f"{self._settings.service} gave no answer that can be read: {words_of(error)}") from error
+                words = f"{self._settings.service} gave no answer that can be read: {words_of(error)}"
+                raise ActionFailed(words) from error
             return _outcome(answer, self._settings)
         if clock.now() > self._deadline:
             self.cancel()
