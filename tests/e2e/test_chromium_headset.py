@@ -110,6 +110,43 @@ async def test_what_leaves_a_doubt_brings_the_robot_to_rest_by_name(stack: Stack
             await _ends_by(headset, what, undo, words)
 
 
+async def test_pictures_are_judged_on_while_a_session_has_no_frames(stack: Stack, chromium: Browser) -> None:
+    """The window may be seen beside it: a picture that stood there would be too old, without its veil."""
+    async with open_headset(chromium, stack.operator) as headset:
+        console = headset.console
+        await headset.enter()
+        await headset.do("void h.standStill(true)")
+        shown = (await console.stats())["streams"]["overview"]["rendered"]
+        await console.until(f"s.streams.overview.rendered > {shown + 5}")
+        await headset.do("void h.standStill(false)")
+        await headset.drive()
+
+
+@pytest.mark.parametrize("where", ["getPose", "getViewerPose"])
+async def test_a_fault_in_a_frame_of_the_session_gives_the_page_back(
+    where: str, stack: Stack, chromium: Browser
+) -> None:
+    """No frame follows it, so that STOP would be out of reach. The viewer's pose is asked for by what draws, first."""
+    async with open_headset(chromium, stack.operator) as headset:
+        console = headset.console
+        await headset.enter()
+        await headset.drive()
+        await headset.page.evaluate(f"void (XRFrame.prototype.{where} = () => {{ throw new Error('a fault'); }})")
+        await headset.page.evaluate("testHeadset.silence(false)")
+        await console.until("s.headset === null && !s.armed && s.at_rest === true")
+        shown = (await console.stats())["streams"]["overview"]["rendered"]
+        await console.until(f"s.streams.overview.rendered > {shown + 5}")
+
+
+async def test_a_session_whose_view_does_not_load_ends(stack: Stack, chromium: Browser) -> None:
+    async with open_headset(chromium, stack.operator) as headset:
+        console = headset.console
+        await headset.page.route("**/headset_session*", lambda route: route.abort())
+        await headset.page.get_by_role("button", name="Enter VR").first.click()
+        await console.until("!window.testHeadset.device.activeSession && s.headset === null")
+        await console.arm()
+
+
 async def test_a_session_that_ends_brings_the_robot_to_rest(stack: Stack, chromium: Browser) -> None:
     async with open_headset(chromium, stack.operator) as headset:
         console = headset.console

@@ -17,10 +17,14 @@ __all__ = ["Pipe"]
 MARGIN = 5.0  # s that an answer may take on top of what was asked for
 LEAVE_SECONDS = 5.0  # for the robot to come to rest and the process to end
 CHUNK = 1 << 18
+MAX_MAP, MAX_BLOCK = 1 << 20, 64 << 20  # bytes of an answer's map, and of one picture behind it
 
 
 class Pipe:
-    """One process of Lockstep. One request at a time, from one thread."""
+    """One process of Lockstep. One request at a time, from one thread.
+
+    A request that has no whole answer is the last: its answer may still come, and would be taken for the next one's.
+    """
 
     def __init__(self, python: str, module: str, *arguments: str) -> None:
         """Start the process.
@@ -34,11 +38,12 @@ class Pipe:
             self._process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, bufsize=0)
         except OSError as error:
             raise LockstepLost(f"{python} cannot be run: {error.strerror}") from error
+        self._in_step = True
 
     @property
     def alive(self) -> bool:
-        """Whether the process runs."""
-        return self._process.poll() is None
+        """Whether the process runs, and every request so far had its answer."""
+        return self._in_step and self._process.poll() is None
 
     def ask(self, do: str, within: float = 0.0, **values: Any) -> tuple[dict[str, Any], list[bytearray]]:
         """Ask for something; return the answer and the bytes that follow it.
@@ -52,32 +57,58 @@ class Pipe:
             LockstepError: the console or the robot said no.
             LockstepLost: the connection or the process ended, or the process does not answer.
         """
+        if not self._in_step:
+            raise LockstepLost("an earlier request had no answer")
         deadline = time.monotonic() + within + MARGIN
         text = json.dumps({"do": do, **values}).encode()
         stdin = self._process.stdin
         assert stdin is not None
+        self._in_step = False  # also if Ctrl-C ends this call
         try:
             stdin.write(len(text).to_bytes(4, "big") + text)
         except (OSError, ValueError) as error:
             raise self._lost() from error
-        answer: dict[str, Any] = json.loads(self._read(int.from_bytes(self._read(4, deadline), "big"), deadline))
-        blocks = [self._read(size, deadline) for size in answer.pop("sizes", [])]
+        try:
+            answer, blocks = self._answer(deadline)
+        except LockstepLost:
+            self._hang_up()
+            raise
+        self._in_step = True
         if "error" in answer:
             raise error_of(answer)
         return answer, blocks
 
+    def _answer(self, deadline: float) -> tuple[dict[str, Any], list[bytearray]]:
+        """Read the answer's map and the bytes behind it."""
+        size = int.from_bytes(self._read(4, deadline), "big")
+        if size > MAX_MAP:
+            raise LockstepLost(f"Lockstep's process announced an answer of {size} bytes")
+        try:
+            answer: dict[str, Any] = json.loads(self._read(size, deadline))
+            sizes = [int(each) for each in answer.pop("sizes", [])]
+        except (ValueError, TypeError, AttributeError) as error:
+            raise LockstepLost("Lockstep's process said something else than an answer") from error
+        if any(not 0 <= each <= MAX_BLOCK for each in sizes):
+            raise LockstepLost(f"Lockstep's process announced a picture of {max(sizes)} bytes")
+        return answer, [self._read(each, deadline) for each in sizes]
+
     def close(self) -> None:
         """End the process in order: it brings the robot to rest and gives the seat back. May be called again."""
         process = self._process
-        for stream in (process.stdin, process.stdout):
-            if stream is not None:
-                with suppress(OSError):
-                    stream.close()
+        self._hang_up()
         try:
             process.wait(LEAVE_SECONDS)
         except subprocess.TimeoutExpired:
             process.kill()
             process.wait()
+
+    def _hang_up(self) -> None:
+        """Let the process end in its own time: nobody may be left to call `close`."""
+        self._in_step = False
+        for stream in (self._process.stdin, self._process.stdout):
+            if stream is not None:
+                with suppress(OSError):
+                    stream.close()
 
     def _read(self, size: int, deadline: float) -> bytearray:
         """Read exactly this many bytes."""

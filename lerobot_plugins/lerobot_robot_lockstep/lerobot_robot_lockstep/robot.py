@@ -76,9 +76,13 @@ class LockstepRobot(Robot):
             raise DeviceAlreadyConnectedError
         self._description()
         pipe = self._open()
-        if self.config.drive:
-            pipe.ask("take_seat", COMMAND_SECONDS)
-        self._observe(pipe, max(self.config.observation_timeout_s, self.config.connect_timeout_s))
+        try:
+            if self.config.drive:
+                pipe.ask("take_seat", COMMAND_SECONDS)
+            self._observe(pipe, max(self.config.observation_timeout_s, self.config.connect_timeout_s))
+        except BaseException:
+            self._let_go()  # who was refused holds no seat
+            raise
         self._connected = True
 
     def get_observation(self) -> dict[str, Any]:
@@ -108,9 +112,13 @@ class LockstepRobot(Robot):
         """Bring the robot to rest, give the seat back and end the connection."""
         if self._pipe is None:
             raise DeviceNotConnectedError
+        self._let_go()
+
+    def _let_go(self) -> None:
         self._connected = False
         pipe, self._pipe, self._known = self._pipe, None, None
-        pipe.close()
+        if pipe is not None:
+            pipe.close()
 
     def _live(self) -> Pipe:
         if not self.is_connected or self._pipe is None:
@@ -126,6 +134,7 @@ class LockstepRobot(Robot):
 
     def _open(self) -> Pipe:
         if self._pipe is None or not self._pipe.alive:
+            self._let_go()  # one that does not answer may hold the seat
             self._pipe, self._known = Pipe(python_of(self.config.python), "lockstep.client.pipe"), None
         return self._pipe
 

@@ -64,6 +64,8 @@ class LockstepTeleoperator(Teleoperator):
         if self.config.source == "session":
             self._session()
         else:
+            if self._pipe is not None:
+                self._pipe.close()  # it has ended, or does not answer
             self._listen()
         self._connected = True
 
@@ -100,6 +102,8 @@ class LockstepTeleoperator(Teleoperator):
         """Return what the console says of the robot."""
         config = self.config
         if self._pipe is None or not self._pipe.alive:
+            if self._pipe is not None:
+                self._pipe.close()
             self._pipe, self._known = Pipe(python_of(config.python), "lockstep.client.pipe"), None
         if self._known is None:
             self._known, _ = self._pipe.ask(

@@ -1,6 +1,8 @@
 """Reads a YAML file into typed settings, with errors that name the file, the line and the key."""
 
+import os
 import re
+import stat
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -14,6 +16,7 @@ Settings = TypeVar("Settings")
 Key = str | int
 MAX_BYTES = 1 << 20
 MAX_DEPTH = 32
+MAX_VALUES = 100_000  # with those that an alias repeats
 
 _PATH = re.compile(r" - at `\$(.*)`$", re.DOTALL)
 _STEP = re.compile(r"\.([A-Za-z0-9_]+)|\[(\d+)\]")
@@ -36,13 +39,16 @@ class YamlFile:
         """Read the file.
 
         Raises:
-            SettingsError: the file cannot be read, is not YAML, or is not one map.
+            SettingsError: the file cannot be read, is no regular file, is too long, is not YAML, or is not one map.
             RobotUnavailable: PyYAML is missing.
         """
         self._path = path
         self._lines: dict[tuple[Key, ...], int] = {}
         try:
-            text = path.read_bytes()[: MAX_BYTES + 1]
+            with open(path, "rb", opener=_without_waiting) as file:
+                if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
+                    raise SettingsError(f"{path}: not a regular file")
+                text = file.read(MAX_BYTES + 1)
         except OSError as error:
             raise SettingsError(f"{path}: {error.strerror}") from error
         if len(text) > MAX_BYTES:
@@ -102,11 +108,15 @@ class _Reader:
     def __init__(self, loader: Any, lines: dict[tuple[Key, ...], int]) -> None:
         self._loader = loader
         self._lines = lines
+        self._values = 0
 
     def plain(self, node: Any, keys: tuple[Key, ...], depth: int) -> Any:
         if node is None:
             return None
         self._lines.setdefault(keys, node.start_mark.line + 1)
+        self._values += 1
+        if self._values > MAX_VALUES:
+            raise SettingsPlace(keys, f"more than {MAX_VALUES} values")
         if depth > MAX_DEPTH:
             raise SettingsPlace(keys, "nested too deeply")
         if node.id == "mapping":
@@ -131,6 +141,11 @@ class _Reader:
                 raise SettingsPlace((*keys, key), "given twice")
             data[key] = self.plain(value_node, (*keys, key), depth + 1)
         return data
+
+
+def _without_waiting(path: str, flags: int) -> int:
+    """Open a file; a FIFO would wait for somebody to write to it."""
+    return os.open(path, flags | os.O_NONBLOCK)
 
 
 def _is_number(text: str) -> bool:

@@ -62,3 +62,15 @@ def test_a_pedal_that_is_unplugged_is_released() -> None:
     pedal.event(30, PRESSED)
     pedal.gone()
     assert not pedal.held(0)
+
+
+def test_a_pedal_whose_release_may_be_lost_counts_as_released() -> None:
+    pedal = HeldPedal()
+    pedal.event(30, PRESSED)
+    pedal.lost()
+    assert not pedal.held(0)
+    pedal.event(30, REPEATED)
+    assert not pedal.held(0), "it is down, and nobody has seen it up"
+    pedal.event(30, RELEASED)
+    pedal.event(30, PRESSED)
+    assert pedal.held(0)

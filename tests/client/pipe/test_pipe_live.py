@@ -2,6 +2,8 @@
 
 import asyncio
 import json
+import os
+import signal
 import sys
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
@@ -14,6 +16,15 @@ from lockstep.client import Console
 from tests.support.stack import Stack, running_stack
 
 SECONDS = 30.0
+ASK = """
+import json
+pan = {"unit": "deg", "minimum": -90, "maximum": 90, "slew": 60, "reach": 30}
+asked = {"do": "open", "axes": {"pan.pos": pan}, "port": 0, "name": "test"}
+text = json.dumps(asked).encode()
+helper.stdin.write(len(text).to_bytes(4, "big") + text)
+helper.stdin.flush()
+assert helper.stdout.read(4)
+"""  # the client's helper refuses it, the teleoperator's begins: both are ready then
 
 
 class Pipe:
@@ -109,3 +120,39 @@ async def test_what_is_no_frame_ends_it_with_a_reason(data: bytes) -> None:
         pipe.send(data)
         async with asyncio.timeout(SECONDS):
             assert await pipe.process.wait() == 1
+
+
+@pytest.mark.parametrize(
+    "module", ["lockstep.client.pipe", "lockstep.robot_bridge.robots.lerobot.teleoperator_process"]
+)
+async def test_it_ends_with_a_killed_process_though_a_forked_one_keeps_the_pipe_open(module: str) -> None:
+    """LeRobot forks processes that write pictures. A helper that lived on would keep the seat, or the port."""
+    end, told = os.pipe()  # the helper alone keeps `told` open
+    script = (
+        "import os, subprocess, sys, time\n"
+        f"helper = subprocess.Popen([sys.executable, '-I', '-m', {module!r}], stdin=-1, stdout=-1, stderr={told})\n"
+        f"os.close({told})\n"
+        f"{ASK}\n"
+        "forked = os.fork()\n"
+        "print(forked, flush=True) if forked else os.close(1)\n"
+        "time.sleep(600)\n"
+    )
+    process = await asyncio.create_subprocess_exec(
+        sys.executable, "-c", script, stdout=asyncio.subprocess.PIPE, pass_fds=[told]
+    )
+    os.close(told)
+    assert process.stdout is not None
+    async with asyncio.timeout(SECONDS):
+        forked = int(await process.stdout.readline())
+    try:
+        process.kill()
+        await process.wait()
+        reader = asyncio.StreamReader()
+        transport, _ = await asyncio.get_running_loop().connect_read_pipe(
+            lambda: asyncio.StreamReaderProtocol(reader), os.fdopen(end, "rb")
+        )
+        async with asyncio.timeout(SECONDS):
+            await reader.read()
+        transport.close()
+    finally:
+        os.kill(forked, signal.SIGKILL)

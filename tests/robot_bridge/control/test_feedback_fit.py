@@ -34,6 +34,7 @@ def changed(**changes: object) -> Feedback:
         (changed(time=1e300), "a feedback without a time"),
         (changed(time=-1.0), "a feedback without a time"),
         (changed(warning=math.inf), "a feedback without a time"),
+        (changed(limits=["l" * 500] * 512), "a feedback of more than 61440 bytes"),
     ],
 )
 def test_a_feedback_has_what_the_description_says_and_numbers_only(feedback: Feedback, wrong: str) -> None:

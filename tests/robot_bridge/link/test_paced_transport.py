@@ -157,6 +157,35 @@ async def test_whoever_takes_the_data_pauses_the_reader_and_loses_nothing() -> N
     assert frames.count == 10
 
 
+async def test_a_fault_of_whoever_takes_the_data_ends_the_connection_in_a_later_turn_too() -> None:
+    """Else it stays paused, with nobody to go on."""
+    aborted, faults = asyncio.Event(), 0
+
+    class Tcp(Socket):
+        def abort(self) -> None:
+            aborted.set()
+
+    def take(data: bytes) -> None:
+        raise ValueError
+
+    def told(loop: asyncio.AbstractEventLoop, context: dict[str, object]) -> None:
+        nonlocal faults
+        faults += isinstance(context["exception"], ValueError)
+
+    asyncio.get_running_loop().set_exception_handler(told)
+    reader = PacedReader(take)
+    socket = PacedSocket(Tcp(), reader)
+    socket.pause_reading()
+    reader.feed(b"data")
+    socket.resume_reading()
+    async with asyncio.timeout(10):
+        await aborted.wait()
+    assert faults == 1
+    reader.feed(b"data")
+    await asyncio.sleep(0)
+    assert faults == 1, "nothing is read after that"
+
+
 @pytest.mark.parametrize("end", ["close", "abort"])
 async def test_what_comes_after_this_sides_end_is_dropped(end: str) -> None:
     frames = Frames(READ_TURN)

@@ -58,13 +58,13 @@ export class HeadsetEntry {
     const { engine } = this.page;
     if (xr === undefined || this.isOpening || engine.display.isImmersive) return;
     this.isOpening = true;
+    engine.disarm("operator"); // the window may stand still from now on
+    const asked = xr.requestSession(mode, FEATURES);
     try {
-      const [session, { HeadsetSession }] = await Promise.all([
-        xr.requestSession(mode, FEATURES),
-        import("./headset_session"),
-      ]);
+      const [session, { HeadsetSession }] = await Promise.all([asked, import("./headset_session")]);
       await HeadsetSession.begin(session, this.page, mode, () => this.hand.settings);
     } catch (error) {
+      await asked.then((session) => session.end()).catch(() => undefined); // else it shows nothing, and does not end
       const why = error instanceof Error ? error.message : String(error);
       note(engine.state, "error", `The headset view did not open: ${why}`, Date.now());
     } finally {

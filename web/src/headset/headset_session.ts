@@ -33,6 +33,7 @@ export interface HeadsetPage {
 }
 
 const STATUS_MS = 100; // between two readings of what the panel says
+const DEAD_MS = 10_000; // a visible session without frames ends
 const HOLD_MS = 1000; // the reset is held this long
 const SMOOTH = 0.1; // share of the newest frame in the shown times
 
@@ -55,6 +56,7 @@ export class HeadsetSession implements HeadsetControls {
   private poses: { readonly description: RobotDescription; readonly device: PoseDevice } | null = null;
   private isEnded = false;
   private isPlaced = false;
+  private silentSinceMs: number | null = null; // a visible session without frames; null: it has some
   private resetting: { readonly side: Side; readonly sinceMs: number } | null = null;
   private status: ReturnType<typeof headsetStatus> | null = null;
   private statusMs = -Infinity;
@@ -119,9 +121,19 @@ export class HeadsetSession implements HeadsetControls {
     letGo(this.input);
   }
 
-  /** With every tick of the page, frames or not. */
+  /** With every tick of the page, frames or not. A window that is seen beside a silent headset is still judged. */
   step(now: number): void {
-    if (this.frames > 0 && isSilent(this.input, now)) this.page.engine.disarm("headset_silent");
+    if (!isSilent(this.input, now)) {
+      this.silentSinceMs = null;
+      return;
+    }
+    const { engine } = this.page;
+    if (engine.isArmed()) engine.disarm("headset_silent");
+    engine.display.frame(now);
+    this.silentSinceMs ??= now;
+    // A fault in what draws it: no frame follows, and what is shown there would stand.
+    if (this.session.visibilityState !== "visible") this.silentSinceMs = null;
+    else if (now - this.silentSinceMs > DEAD_MS) this.end();
   }
 
   statistics(): HeadsetStatistics {
@@ -167,9 +179,11 @@ export class HeadsetSession implements HeadsetControls {
     renderer.xr.getReferenceSpace()?.addEventListener("reset", () => this.spaceReset());
     renderer.domElement.addEventListener("webglcontextlost", () => this.end());
     const loop = (_time: number, frame?: XRFrame): void => {
+      if (frame === undefined) return;
       try {
-        if (frame !== undefined) this.draw(frame);
+        this.draw(frame);
       } catch (error) {
+        // No frame would follow: what the headset shows would stand, and STOP would be out of reach in it.
         reportError(error);
         this.end();
       }

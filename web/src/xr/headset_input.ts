@@ -102,7 +102,11 @@ function takeHand(input: HeadsetInput, sample: HandSample, elapsed: number, even
     pose,
   };
   input.hands.set(side, state);
-  if (before === undefined) return; // what it held when it came is no new press
+  if (before === undefined) {
+    // What it holds when it comes is no new press, but of STOP: it may have been pressed while the hand was lost.
+    if (state.stop) events.push({ kind: "stop" });
+    return;
+  }
   for (const kind of ["stop", "layer", "recentre"] as const)
     if (state[kind] && !before[kind]) events.push({ kind });
   if (state.pressed && !before.pressed) events.push({ kind: "press", side });

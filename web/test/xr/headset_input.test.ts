@@ -115,6 +115,16 @@ describe("a hand that holds the deadman is lost", () => {
   });
 });
 
+describe("a hand that comes", () => {
+  it("with STOP pressed says it, and once: it may have been lost when it was pressed", () => {
+    const session = new Session();
+    session.frame(hand());
+    session.frame();
+    expect(session.frame(hand({ stop: true, layer: true }))).toEqual([{ kind: "stop" }]);
+    expect(session.frame(hand({ stop: true, layer: true }))).toEqual([]);
+  });
+});
+
 describe("the session's frames", () => {
   it("are missed after a while", () => {
     const session = new Session().squeezed();
@@ -126,7 +136,7 @@ describe("the session's frames", () => {
 describe("buttons", () => {
   it("are told once when they are pressed, and not when they were held from the start", () => {
     const session = new Session();
-    expect(session.frame(hand({ stop: true, trigger: 1 }))).toEqual([]);
+    expect(session.frame(hand({ layer: true, recentre: true, trigger: 1 }))).toEqual([]);
     session.frame(hand());
     const pressed = session.frame(hand({ stop: true, layer: true, recentre: true, trigger: 1 }));
     expect(pressed.map(({ kind }) => kind)).toEqual(["stop", "layer", "recentre", "press"]);

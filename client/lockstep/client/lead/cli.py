@@ -86,15 +86,24 @@ async def _drive(options: argparse.Namespace, flags: Sequence[str]) -> None:
         newest = Newest(mapping.names)
         await console.take_seat()
         with hand.reading():
-            reading = asyncio.create_task(leader.read_into(newest), name="leader")
-            reading.add_done_callback(lambda _: hand.quit.set())
+            failed: list[LeaderFailed] = []
+
+            async def read() -> None:
+                try:
+                    await leader.read_into(newest)
+                except LeaderFailed as error:  # the robot comes to rest first
+                    failed.append(error)
+                hand.quit.set()
+
             try:
-                await lead(console, console.clutch(mapping.scales), newest, hand, _say)
-            finally:
-                reading.cancel()
-                await asyncio.wait([reading])
-        if not reading.cancelled():
-            reading.result()
+                async with asyncio.TaskGroup() as tasks:
+                    reading = tasks.create_task(read(), name="leader")
+                    await lead(console, console.clutch(mapping.scales), newest, hand, _say)
+                    reading.cancel()
+            except BaseExceptionGroup as errors:  # of `lead`
+                raise errors.exceptions[0] from None
+        for error in failed:
+            raise error
 
 
 def _say(text: str) -> None:

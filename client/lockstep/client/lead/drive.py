@@ -1,8 +1,9 @@
 """Drives a robot by a leader, for as long as the operator holds the key or the pedal."""
 
 import asyncio
-from collections.abc import Callable
+from collections.abc import Callable, Coroutine
 from contextlib import suppress
+from typing import Any
 
 from lockstep.client.console import Console
 from lockstep.client.control.clutch import Clutch
@@ -61,23 +62,32 @@ async def _drive_on(console: Console, clutch: Clutch, newest: Newest, hand: Hand
         if clutch.clipped != clipped:
             clipped = clutch.clipped
             say(f"out of reach: {', '.join(clipped)}" if clipped else "drives")
-        if await _answered(asyncio.create_task(console.drive(values)), hand, clock) is None:
+        if await _answered(console.drive(values), hand, clock) is None:
             break
     say("rests" if not hand.held(clock()) else "rests: the clutch was released; let go, and press again")
 
 
-async def _answered(command: "asyncio.Task[Feedback]", hand: Hand, clock: Callable[[], float]) -> Feedback | None:
+async def _answered(drive: Coroutine[Any, Any, Feedback], hand: Hand, clock: Callable[[], float]) -> Feedback | None:
     """Return the answer to a command; None if the operator has let go meanwhile, which waits for nothing."""
-    try:
-        while not command.done():
-            await asyncio.wait([command], timeout=LOOK)
+    failed: list[Exception] = []
+    answers: list[Feedback] = []
+
+    async def command() -> None:
+        try:
+            answers.append(await drive)
+        except Exception as error:  # raised below, as the only one
+            failed.append(error)
+
+    async with asyncio.TaskGroup() as tasks:
+        driving = tasks.create_task(command(), name="command")
+        while not driving.done():
+            await asyncio.wait([driving], timeout=LOOK)
             if not hand.held(clock()):
-                return None
-        return command.result()
-    finally:
-        if not command.done():
-            command.cancel()
-            await asyncio.wait([command])
+                driving.cancel()
+                break
+    for error in failed:
+        raise error
+    return answers[0] if answers and hand.held(clock()) else None
 
 
 async def _pressed(hand: Hand, clock: Callable[[], float]) -> bool:

@@ -18,7 +18,8 @@ __all__ = ["Hand", "KeyHand", "PedalHand"]
 KEY = " "
 QUIT = ("q", "\x03", "\x04")
 EVENT = struct.Struct("llHHi")  # struct input_event (input.h)
-EV_KEY = 1
+EV_SYN, EV_KEY = 0, 1
+SYN_DROPPED = 3  # the buffer was full
 EVIOCGRAB = 0x40044590  # the pedal's keys are not typed into a terminal as well
 
 
@@ -113,5 +114,7 @@ class PedalHand:
             self.quit.set()
             return
         for _, _, kind, code, value in EVENT.iter_unpack(data):
-            if kind == EV_KEY:
+            if kind == EV_SYN and code == SYN_DROPPED:
+                self._pedal.lost()
+            elif kind == EV_KEY:
                 self._pedal.event(code, value)

@@ -45,6 +45,11 @@ class HeldPedal:
             self._down.add(code)
             self._known = True
 
+    def lost(self) -> None:
+        """Take that the kernel has dropped events, a release perhaps: the next press counts, after a release."""
+        self._down.clear()
+        self._known = False
+
     def gone(self) -> None:
         """The device was unplugged."""
         self._down.clear()

@@ -10,6 +10,7 @@ from contextlib import suppress
 from typing import BinaryIO
 
 from lockstep.client.pipe.server import PipeServer
+from lockstep.protocol.parent_process import parent_ended
 from lockstep.protocol.pipe_frames import BadFrame
 
 
@@ -33,12 +34,22 @@ async def serve(output: BinaryIO) -> None:
         await asyncio.to_thread(write_now, parts)
 
     async with PipeServer(reader, write) as server:
-        serving = asyncio.create_task(server.serve())
-        loop.add_signal_handler(signal.SIGTERM, serving.cancel)
-        await asyncio.wait([serving])
-    if not serving.cancelled():
-        with suppress(BrokenPipeError):  # the other side has gone, and needs no answer
-            serving.result()
+        try:
+            async with asyncio.TaskGroup() as tasks:
+                serving = tasks.create_task(_until_gone(server), name="requests")
+                loop.add_signal_handler(signal.SIGTERM, serving.cancel)
+                # Processes that the other side has forked may keep the pipe open beyond its end.
+                ended = tasks.create_task(parent_ended(), name="parent")
+                await asyncio.wait([serving, ended], return_when=asyncio.FIRST_COMPLETED)
+                for task in (ended, serving):
+                    task.cancel()
+        except BaseExceptionGroup as errors:  # of `_until_gone`
+            raise errors.exceptions[0] from None
+
+
+async def _until_gone(server: PipeServer) -> None:
+    with suppress(BrokenPipeError):  # the other side has gone, and needs no answer
+        await server.serve()
 
 
 def main() -> None:

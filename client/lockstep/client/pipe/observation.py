@@ -9,7 +9,9 @@ from lockstep.client.media.media_gate import verdict
 from lockstep.client.media.stream import Picture
 from lockstep.protocol.messages import Feedback
 
-__all__ = ["NoFreshObservation", "Observation", "Observer", "unfit"]
+__all__ = ["NoFreshObservation", "Observation", "Observer", "unfit", "unfit_state"]
+
+REFRESH = 0.5  # s between two feedbacks of a robot that nobody drives
 
 
 class NoFreshObservation(Exception):
@@ -45,6 +47,22 @@ def unfit(feedback: Feedback | None, kept: Kept | None, tolerance: int, max_age:
     return "" if decided == "render" else f"its newest picture is {gap} events behind the state"
 
 
+def unfit_state(feedback: Feedback | None, arrived: float, max_age: float, now: float) -> str:
+    """Return why a state is no observation; "" if it is one. No I/O.
+
+    Args:
+        arrived: s, when the newest feedback came, on the clock of `now`
+        max_age: s that it may be old beyond `REFRESH`
+    """
+    if feedback is None:
+        return "no feedback has come"
+    if feedback.unknown:
+        return f"the robot does not know {', '.join(feedback.unknown)}"
+    if now - arrived > max_age + REFRESH:
+        return f"the newest feedback is {now - arrived:.2f} s old"
+    return ""
+
+
 class Observer:
     """Keeps the newest feedback and the newest picture of each camera. `run` runs until cancelled."""
 
@@ -53,6 +71,7 @@ class Observer:
         self._cameras = list(cameras)
         self._tolerance = tolerance
         self._kept: dict[str, Kept] = {}
+        self._arrived = float("-inf")  # s, when the newest feedback came
         self._news = asyncio.Event()
 
     async def run(self) -> None:
@@ -71,7 +90,7 @@ class Observer:
 
         Args:
             seconds: s to wait at most
-            max_age: s that a picture may be old
+            max_age: s that a picture may be old, and a state beyond the interval in which an idle robot measures
 
         Raises:
             NoFreshObservation: none came in time, or a part of the state is unknown.
@@ -88,17 +107,19 @@ class Observer:
                         for camera in self._cameras
                         if (reason := unfit(feedback, self._kept.get(camera), self._tolerance, max_age, now))
                     }
-                    if feedback is not None and not why and not feedback.unknown:
+                    if reason := unfit_state(feedback, self._arrived, max_age, now):
+                        why["state"] = reason
+                    if feedback is not None and not why:
                         return Observation(feedback, [self._kept[camera].picture for camera in self._cameras])
-                    if feedback is not None and feedback.unknown:
-                        why["state"] = f"the robot does not know {', '.join(feedback.unknown)}"
                     await self._news.wait()
         except TimeoutError as error:
             words = "; ".join(f"{name}: {reason}" for name, reason in why.items()) or "no feedback has come"
             raise NoFreshObservation(f"no fresh observation within {seconds:g} s: {words}") from error
 
     async def _feedbacks(self) -> None:
+        loop = asyncio.get_running_loop()
         async for _ in self._console.feedbacks():
+            self._arrived = loop.time()
             self._news.set()
 
     async def _pictures(self, camera: str) -> None:

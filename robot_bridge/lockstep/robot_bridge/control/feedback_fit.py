@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 
 from lockstep.protocol.description import RobotDescription
+from lockstep.protocol.feedback_size import MAX_FEEDBACK_BYTES, is_too_large
 from lockstep.protocol.messages import Feedback
 from lockstep.protocol.neutral import has_goals
 
@@ -31,6 +32,8 @@ def misfit(feedback: Feedback, description: RobotDescription) -> str:
         return wrong
     if not (0 <= feedback.time <= LONGEST and 0 <= feedback.warning <= LONGEST):
         return "a feedback without a time"
+    if is_too_large(feedback):
+        return f"a feedback of more than {MAX_FEEDBACK_BYTES} bytes"
     return ""
 
 

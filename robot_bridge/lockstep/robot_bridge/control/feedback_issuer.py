@@ -1,15 +1,17 @@
 """Issues feedback: measures the robot, and adds the faults and limits that came up since the last feedback."""
 
+import logging
 import math
 import time
 from collections.abc import Sequence
 
 from lockstep.protocol.description import RobotDescription
-from lockstep.protocol.messages import MAX_FAULTS, Feedback
+from lockstep.protocol.messages import Feedback
 from lockstep.robot_bridge.control.clock import Clock
 from lockstep.robot_bridge.control.command_timing import CommandTiming
 from lockstep.robot_bridge.control.event_core import EventCore
 from lockstep.robot_bridge.control.event_times import EventTimes
+from lockstep.robot_bridge.control.feedback_room import within_size
 from lockstep.robot_bridge.control.last_known import LastKnown
 from lockstep.robot_bridge.control.limits.axis_shaper import AxisShaper
 from lockstep.robot_bridge.counters import BridgeCounters
@@ -18,7 +20,7 @@ from lockstep.robot_bridge.robots.base import Measurement, Robot
 
 __all__ = ["FeedbackIssuer"]
 
-MAX_FAULT = 500  # characters in one fault
+_logger = logging.getLogger(__name__)
 
 
 class FeedbackIssuer:
@@ -54,6 +56,7 @@ class FeedbackIssuer:
         self._acting: frozenset[str] = frozenset()  # limits that slowed the robot in the last tick
         self._acted: set[str] = set()  # limits that slowed it since the last feedback
         self._source_faults: list[str] = []  # "media: OSError: no camera"
+        self._says_too_much = False  # a feedback without room for all its texts was logged
 
     def issue(self, *, acts: bool = False) -> Feedback:
         """Measure and issue. `acts`: an action moves the robot."""
@@ -93,14 +96,15 @@ class FeedbackIssuer:
         if self._source_faults or self.rested_why:
             rested = [self.rested_why] if self.rested_why else []
             measured = measured._replace(faults=[*measured.faults, *rested, *self._source_faults])
-        measured = measured._replace(
-            at_rest=measured.at_rest and self._shaper.at_rest,
-            faults=[fault[:MAX_FAULT] for fault in measured.faults[-MAX_FAULTS:]],
-        )
-        limits = sorted(self._acted | self._acting)
+        ranges, texts = within_size(measured, goals, unknown, sorted(self._acted | self._acting))
+        if texts.left_out and not self._says_too_much:
+            self._says_too_much = True
+            _logger.warning("a feedback has no room for %d of its faults, limits and unknown values", texts.left_out)
+        at_rest = measured.at_rest and self._shaper.at_rest
+        measured = measured._replace(at_rest=at_rest, ranges=ranges, faults=texts.faults)
         now = self._now()
         spans = self.timing.measured(began, now)
-        feedback = self._core.issue(measured, now, limits, unknown, goals=goals, time=taken, spans=spans)
+        feedback = self._core.issue(measured, now, texts.limits, texts.unknown, goals=goals, time=taken, spans=spans)
         measured_by = time.monotonic()  # a picture that was captured before may show less than this feedback has
         self.times.changed(feedback.event, measured_by)
         self._acted.clear()

@@ -9,7 +9,7 @@ import asyncio
 import time
 from collections import deque
 from collections.abc import Callable, Iterable
-from typing import Any, cast
+from typing import Any, Protocol, cast
 
 from lockstep.robot_bridge.link.link_session import LinkSession
 from lockstep.robot_bridge.link.link_transport import LinkTransport
@@ -23,6 +23,7 @@ __all__ = [
     "PacedSocket",
     "PacedTransport",
     "ReadBudget",
+    "Turns",
 ]
 
 READ_SHARE = 0.25  # of the thread's time
@@ -51,6 +52,25 @@ class ReadBudget:
         return max(0.0, -self._left / self._share)
 
 
+class Turns(Protocol):
+    """Bounds what several readers take of the thread's time together."""
+
+    @property
+    def is_free(self) -> bool:
+        """True if a reader may read at once."""
+        ...
+
+    def ask(self, read: Callable[[], None]) -> None:
+        """Call `read` in its turn, not before this returns."""
+        ...
+
+    def leave(self, read: Callable[[], None]) -> None: ...
+
+    def spend(self, worked: float) -> None:
+        """Account for the seconds of the thread's time that a reader has just taken."""
+        ...
+
+
 class PacedReader:
     """Hands received data on in pieces, within a budget of the thread's time.
 
@@ -65,6 +85,7 @@ class PacedReader:
         share: float = READ_SHARE,
         burst: float = READ_BURST,
         missing: Callable[[], int] = lambda: 0,
+        turns: Turns | None = None,
         clock: Callable[[], float] = time.monotonic,
         worked: Callable[[], float] = time.thread_time,
     ) -> None:
@@ -75,22 +96,30 @@ class PacedReader:
             share: of the thread's time
             burst: s of the thread's time at once
             missing: returns the bytes of a large message that are still to come; they may be one piece
+            turns: shared with other readers, beside the budget of this one
             worked: returns the time that this thread has worked so far, s
         """
         self._take = take
         self._share = share
         self._missing = missing
+        self._turns = turns
         self._clock = clock
         self._worked = worked
         self._budget = ReadBudget(share, burst, clock())
         self._unread: deque[memoryview] = deque()
         self._source: asyncio.ReadTransport | None = None  # None before the connection and after it
         self._later: asyncio.Handle | None = None  # the call that reads on; None while everything is read, or paused
+        self._waits = False  # for its turn
         self._paused = False  # by whoever takes the data
         self._reading = False
 
     def allow(self, share: float, burst: float) -> None:
-        """Take another budget from now on."""
+        """Take another budget from now on, of this reader alone."""
+        if self._turns is not None and self._waits:
+            self._turns.leave(self._read_in_turn)
+            self._waits = False
+            self._later = asyncio.get_running_loop().call_soon(self._go_on)
+        self._turns = None
         self._share = share
         self._budget = ReadBudget(share, burst, self._clock())
 
@@ -102,6 +131,9 @@ class PacedReader:
         if self._later is not None:
             self._later.cancel()
             self._later = None
+        if self._turns is not None and self._waits:
+            self._turns.leave(self._read_in_turn)
+        self._waits = False
         self._unread.clear()
         self._source = None
 
@@ -110,8 +142,8 @@ class PacedReader:
         if self._source is None:
             return
         self._unread.append(memoryview(data))
-        if self._later is None and not self._paused and not self._reading:
-            self._read()
+        if self._is_idle and not self._paused:
+            self._go_on()
         else:
             self._source.pause_reading()  # somebody else had resumed it
 
@@ -124,21 +156,44 @@ class PacedReader:
         if not self._paused:
             return
         self._paused = False
-        if self._source is None or self._later is not None or self._reading:
+        if self._source is None or not self._is_idle:
             return
         if self._unread:
-            self._later = asyncio.get_running_loop().call_soon(self._read)
+            self._later = asyncio.get_running_loop().call_soon(self._go_on)
         else:
             self._source.resume_reading()
 
-    def _read(self) -> None:
+    @property
+    def _is_idle(self) -> bool:
+        return self._later is None and not self._waits and not self._reading
+
+    def _go_on(self) -> None:
+        """Read as soon as the other readers let it."""
         self._later = None
+        if self._turns is None or self._turns.is_free or not self._unread:
+            self._read()
+        elif self._source is not None:
+            self._waits = True
+            self._source.pause_reading()
+            self._turns.ask(self._read_in_turn)
+
+    def _read_in_turn(self) -> None:
+        self._waits = False
+        self._read()
+
+    def _read(self) -> None:
         if self._paused:
             return  # the budget was used up meanwhile; `resume_reading` goes on
         since, began = self._clock(), self._worked()
-        worked = self._hand_on(began)
+        try:
+            worked = self._hand_on(began)
+        except BaseException:
+            self._give_up()
+            raise
         ended = self._clock()
         wait = self._budget.spend(worked, ended)
+        if self._turns is not None:
+            self._turns.spend(worked)
         if self._source is None:
             return
         if (
@@ -146,11 +201,18 @@ class PacedReader:
         ):  # a flood: others come first, even if the thread gets little of its processor
             wait = max(wait, min(ended - since, LONG_TURN) * (1 / self._share - 1))
         if wait > 0 or (self._unread and not self._paused):
-            self._later = asyncio.get_running_loop().call_later(wait, self._read)
+            self._later = asyncio.get_running_loop().call_later(wait, self._go_on)
         if self._later is not None or self._paused:
             self._source.pause_reading()
         else:
             self._source.resume_reading()
+
+    def _give_up(self) -> None:
+        """Abort the connection after a fault: in a turn of the loop's own, nobody else would, and it stays paused."""
+        source = cast(asyncio.Transport | None, self._source)
+        self.end()
+        if source is not None:
+            source.abort()
 
     def _hand_on(self, began: float) -> float:
         """Hand on pieces for a turn; return the seconds of the thread's time that it took."""

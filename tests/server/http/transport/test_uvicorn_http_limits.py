@@ -230,6 +230,46 @@ async def test_strangers_wait_for_their_pace_and_who_brings_a_good_token_does_no
             each.close()
 
 
+async def test_each_request_of_those_that_come_together_has_a_turn_and_the_strangers_pace_holds_for_all() -> None:
+    answered = 0
+
+    async def count(reader: asyncio.StreamReader) -> None:
+        nonlocal answered
+        while True:
+            await reader.readuntil(b"}")
+            answered += 1
+
+    async with guarded_console(max_stranger_burst=8, max_stranger_rate=0.001) as (rig, port):
+        head = HEAD + b"Authorization: " + rig.token("observer")["Authorization"].encode() + b"\r\n\r\n"
+        known, writer = await _open(port, head)
+        await _answer(known)
+        await known.readuntil(b"}")
+        stranger, other = await _open(port, (HEAD + b"\r\n") * 20)
+        counting = asyncio.create_task(count(stranger))
+        await eventually(lambda: answered > 0)
+        writer.write(head * 20)
+        for _ in range(20):
+            assert (await _answer(known)).startswith(b"HTTP/1.1 200"), "each is known by its own head"
+            await known.readuntil(b"}")
+        assert answered < 8, "it has used up what strangers have"
+        counting.cancel()
+        for each in (writer, other):
+            each.close()
+
+
+async def test_a_request_behind_another_comes_whole_though_its_end_comes_later() -> None:
+    async with guarded_console() as (_, port):
+        reader, writer = await _open(port, (HEAD + b"\r\n") * 2 + HEAD)
+        for _ in range(2):
+            assert (await _answer(reader)).startswith(b"HTTP/1.1 200")
+            await reader.readuntil(b"}")
+        writer.write(b"\r\n" + HEAD + b"\r\n")
+        for _ in range(2):
+            assert (await _answer(reader)).startswith(b"HTTP/1.1 200")
+            await reader.readuntil(b"}")
+        writer.close()
+
+
 async def test_a_link_that_floods_comes_first_no_more_but_its_stops_do(monkeypatch: pytest.MonkeyPatch) -> None:
     """Else strangers would get no answer while it does: a page that somebody opens, a health check."""
     came_first: list[bool] = []

@@ -17,6 +17,7 @@ from msgspec.structs import replace
 from lockstep.protocol.description import RobotDescription
 from lockstep.protocol.errors import SecretError
 from lockstep.protocol.link_secret import LinkSecret
+from lockstep.protocol.parent_process import parent_ended
 from lockstep.protocol.pipe_frames import BadFrame, read_request, to_frame
 from lockstep.robot_bridge.bridge import Bridge
 from lockstep.robot_bridge.errors import BridgeError
@@ -111,22 +112,31 @@ async def serve(output: BinaryIO) -> None:
 async def _answer(reader: asyncio.StreamReader, arm: VirtualArm, bridge: Bridge, say: Any) -> None:
     ended = asyncio.Event()
 
+    failed: list[Exception] = []
+
     async def read() -> None:
         try:
             while (said := await read_request(reader)) is not None:
                 msgspec.convert(said, Action)
                 say({"values": arm.action})
-        finally:
-            ended.set()
+        except Exception as error:  # the robot comes to rest first
+            failed.append(error)
+        ended.set()
 
-    reading = asyncio.create_task(read(), name="requests")
+    async def watch() -> None:  # processes that LeRobot has forked may keep the pipe open beyond its end
+        await parent_ended()
+        ended.set()
+
     try:
-        await bridge.wait(ended)
-    finally:
-        reading.cancel()
-        await asyncio.wait([reading])
-    if not reading.cancelled():
-        reading.result()
+        async with asyncio.TaskGroup() as tasks:
+            running = [tasks.create_task(read(), name="requests"), tasks.create_task(watch(), name="parent")]
+            await bridge.wait(ended)
+            for task in running:
+                task.cancel()
+    except BaseExceptionGroup as errors:  # of the bridge
+        raise errors.exceptions[0] from None
+    for error in failed:
+        raise error
 
 
 def main() -> None:

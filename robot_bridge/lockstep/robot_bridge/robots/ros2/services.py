@@ -59,7 +59,12 @@ class _Call(ActionRun):
 
     def step(self) -> ActionStep:
         if self._future.done():
-            return _outcome(self._future.result(), self._settings)
+            try:
+                answer = self._future.result()
+            except Exception as error:  # an answer that cannot be read is no reason to end the bridge
+                words = f"{self._settings.service} gave no answer that can be read: {words_of(error)}"
+                raise ActionFailed(words) from error
+            return _outcome(answer, self._settings)
         if clock.now() > self._deadline:
             self.cancel()
             raise ActionFailed(f"{self._settings.service} gave no answer within {self._settings.timeout:g} s")

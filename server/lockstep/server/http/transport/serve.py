@@ -14,14 +14,13 @@ from starlette.applications import Starlette
 
 from lockstep.server.http.transport.acceptor import PROXIES, Acceptor, PlacedProtocol
 from lockstep.server.http.transport.tls import Certificate
-from lockstep.server.http.transport.uvicorn_http_limits import GuardedConnections
-from lockstep.server.http.transport.uvicorn_websocket_limits import GuardedWebSocket
+from lockstep.server.http.transport.uvicorn_http_limits import MAX_HEAD, GuardedConnections
+from lockstep.server.http.transport.uvicorn_websocket_limits import guarded_websocket
 
 __all__ = ["PortTaken", "bind", "running", "wait_for_signal"]
 
 BACKLOG = 1024  # connections that wait to be accepted; a flood of them may come before a STOP
 SHUTDOWN_TIMEOUT = 3  # s for HTTP requests under way
-MAX_HEAD = 16 * 1024  # bytes of a request's head
 MAX_WEBSOCKET_MESSAGE = 64 * 1024  # bytes from a viewer of the scene, or from an observer
 
 
@@ -122,7 +121,7 @@ async def running(
         access_log=False,  # a path can hold a ticket
         log_level="error",  # uvicorn warns of every request that is not HTTP; the console counts them
         lifespan="on",
-        ws=GuardedWebSocket,
+        ws=guarded_websocket(),
         ws_max_size=MAX_WEBSOCKET_MESSAGE,
         forwarded_allow_ips=os.environ.get("FORWARDED_ALLOW_IPS") or sorted(PROXIES),
         timeout_graceful_shutdown=SHUTDOWN_TIMEOUT,

@@ -20,11 +20,12 @@ from lockstep.server.http.transport.connection_places import ConnectionPlaces, P
 from lockstep.server.util.fair_queue import FairQueue
 from lockstep.server.util.rate_limits import RateLimits
 
-__all__ = ["DEADLINE", "PLACE", "GuardedConnections", "guarded_by", "guarded_http"]
+__all__ = ["DEADLINE", "MAX_HEAD", "PLACE", "GuardedConnections", "guarded_by", "guarded_http"]
 
 DEADLINE, PLACE = "request_deadline", "place"  # keys of a request's `state`
 GRACE = 1.0  # s after the deadline, in which the answer that reports it may leave
 LEAST_READ = 16 * 1024  # bytes of an answer that a client reads within the time of a request
+MAX_HEAD = 16 * 1024  # bytes of a request's head
 LINK_RATE, LINK_BURST = 50.0, 300  # Hz, of one link's input that goes first; a page's load takes some 30
 STOP_RATE, STOP_BURST = 50.0, 100  # the same for its stops, counted apart
 STOP = re.compile(rb"POST [!-~]{0,500}/api/(?:fleet/)?stop[ ?]")
@@ -49,6 +50,7 @@ def guarded_http(
         place: Place
         _timer: asyncio.TimerHandle | None = None
         _asked = False  # for a turn
+        _in_turn = False
         _read = True  # whether the client has read something of its answer since the last look
         _unread = 0  # bytes, at the last look
         _upgraded = False
@@ -67,9 +69,21 @@ def guarded_http(
 
         def data_received(self, data: bytes) -> None:
             self._arrived += data
+            self._ask()
+
+        def handle_events(self) -> None:
+            """Handle what has come. Requests behind the one that was answered had come with it: each has a turn too."""
+            behind, _ = self.conn.trailing_data
+            if self._in_turn or self.conn.their_state is not h11.IDLE or not behind:
+                super().handle_events()
+            else:
+                self._ask()
+
+        def _ask(self) -> None:
+            """Have what has come handled in its turn."""
+            self.transport.pause_reading()
             if not self._asked:
                 self._asked = True
-                self.transport.pause_reading()
                 known = self._known()
                 first = bool(known) and budgets[self._is_stop].spend(known, self.loop.time())
                 turns.ask(known or self.place.address, self._take, first=first)
@@ -78,8 +92,10 @@ def guarded_http(
             """Return the good token, or the link, of what has come; "" if it is a stranger's."""
             if self.conn.their_state is not h11.IDLE:
                 return self.place.link
-            self._is_stop = STOP.match(self._arrived) is not None
-            found = BEARER.search(self._arrived)
+            behind, _ = self.conn.trailing_data
+            head = behind[:MAX_HEAD] + self._arrived[: max(0, MAX_HEAD - len(behind))]
+            self._is_stop = STOP.match(head) is not None
+            found = BEARER.search(head)
             token = "" if found is None else found[1].decode("ascii")
             return token if token in tokens else ""
 
@@ -91,11 +107,17 @@ def guarded_http(
             data, self._arrived = bytes(self._arrived), bytearray()
             if not self._awaited and self.conn.their_state is h11.IDLE:
                 self._begin()
+            self._in_turn = True
             try:
-                super().data_received(data)
+                if data:
+                    super().data_received(data)
+                else:  # which would be the end, to h11
+                    super().handle_events()
             except BaseException:
                 self.transport.abort()
                 raise
+            finally:
+                self._in_turn = False
             if self._upgraded or not self.flow.read_paused:
                 self.transport.resume_reading()
 

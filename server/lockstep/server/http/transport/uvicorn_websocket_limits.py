@@ -19,14 +19,16 @@ from lockstep.robot_bridge.link.paced_transport import READ_BURST, READ_SHARE, P
 from lockstep.robot_bridge.link.websocket_transport import WebSocketTransport
 from lockstep.rtc.token_bucket import TokenBucket
 from lockstep.server.http.robot_paths import below_robot
+from lockstep.server.util.read_turns import ReadTurns
 
-__all__ = ["CLOSED_FOR", "LINES", "SOCKET", "GuardedWebSocket"]
+__all__ = ["CLOSED_FOR", "LINES", "SOCKET", "GuardedWebSocket", "guarded_websocket"]
 
 SOCKET = "lockstep.socket"  # key of a dialled connection's `GuardedWebSocket` in the scope's extensions
 
 LINES = "/watch/"  # paths of observers' WebSockets (server/lockstep/server/routes/observer_websocket.py)
 LINE_BUFFER = 64 * 1024  # bytes that the kernel keeps for one that does not read; Linux doubles it
 SHARE, BURST = 0.05, 0.05  # of the thread's time, and s of it at once, for what one client sends to the app
+ALL_SHARE, ALL_BURST = 0.15, 0.01  # the same for what all clients send, but for robots that were admitted
 FRAME_RATE, FRAME_BURST = 200.0, 1000.0  # Hz, of messages and their fragments; empty ones count
 LINK_RATE, LINK_BURST = 20_000.0, 20_000.0  # the same for a robot: raw pictures of 5 Gbit/s
 CONTROL_RATE, CONTROL_BURST = 5.0, 50.0  # Hz, of pings and pongs
@@ -43,6 +45,7 @@ class GuardedWebSocket(WebSocketsSansIOProtocol):
     Nothing is parsed before the app has accepted the connection, while a message waits for the app, or after the end.
     """
 
+    turns: ReadTurns | None = None  # of all connections of a server; None: this one's share alone bounds it
     _goodbye: asyncio.TimerHandle | None = None
     _link: asyncio.Protocol | None = None  # the robot link that the connection carries, past the app
     _reader: PacedReader
@@ -53,7 +56,7 @@ class GuardedWebSocket(WebSocketsSansIOProtocol):
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         self._frames, self._control = TokenBucket(FRAME_RATE, FRAME_BURST), TokenBucket(CONTROL_RATE, CONTROL_BURST)
-        self._reader = PacedReader(self._parse, share=SHARE, burst=BURST)
+        self._reader = PacedReader(self._parse, share=SHARE, burst=BURST, turns=self.turns)
         super().connection_made(PacedSocket(cast(asyncio.Transport, transport), self._reader))
 
     def data_received(self, data: bytes) -> None:
@@ -229,6 +232,15 @@ class GuardedWebSocket(WebSocketsSansIOProtocol):
         """Abort the connection in `GOODBYE_SECONDS`, even if the client does not read."""
         if self._goodbye is None:
             self._goodbye = self.loop.call_later(GOODBYE_SECONDS, self.transport.abort)
+
+
+def guarded_websocket() -> type[GuardedWebSocket]:
+    """Return the class of one server's connections, which share a bound for all of them together."""
+
+    class Guarded(GuardedWebSocket):
+        turns = ReadTurns(ALL_SHARE, ALL_BURST)
+
+    return Guarded
 
 
 def _is_utf8(data: bytes) -> bool:
