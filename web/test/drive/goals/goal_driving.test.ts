@@ -163,7 +163,7 @@ describe("a pose that a device drives", () => {
     const arm = [goalAxisOf("elbow"), ...names.map((name) => goalAxisOf(name))];
     const pose = {
       ...{ name: "tool", label: "Tool", body: "hand", frame: "", point: [0, 0, 0] as const },
-      ...{ position: names, rotation: ["", "", ""] as const, instead_of: ["elbow"] },
+      ...{ position: names, rotation: ["", "", ""] as const, instead_of: ["elbow"], settling: 0 },
     };
     const robot = { ...descriptionOf(arm), poses: [pose] };
     const driving = new GoalDriving();

@@ -15,7 +15,7 @@ from lockstep.robot_bridge.kinematics.chain import Chain
 from lockstep.robot_bridge.kinematics.pose_solver import PoseSolver
 from lockstep.robot_bridge.kinematics.rotations import from_rotation_vector, rotation_vector
 
-__all__ = ["ArmDrive"]
+__all__ = ["SETTLES", "ArmDrive"]
 
 Array = npt.NDArray[np.float64]
 
@@ -111,8 +111,9 @@ class ArmDrive:
     def _follow_pose(self, pose: tuple[float, ...], seconds: float) -> None:
         share = min(max((SETTLES - self._still) / SLOWS, 0.0), 1.0)
         self._still += seconds
-        if share == 0.0:
+        if share == 0.0:  # the bridge reads its goals anew, from here
             self._solved = (0.0,) * self._count
+            self._pose = None
             return
         solution = self._solver.step(
             self._goals,
