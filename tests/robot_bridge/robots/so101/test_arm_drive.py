@@ -47,6 +47,7 @@ class World:
         self._shaper = AxisShaper(AXES, hold=HOLD, poses=(POSE,), pursued=self.drive.pursued)
         self._shaper.begin(self.drive.pursued(), self.drive.pursued())
         self._now = 0.0
+        self.values: list[float] = []
         self.way: list[tuple[float, ...]] = [START]
 
     def play(self, spell: Spell) -> None:
@@ -61,7 +62,8 @@ class World:
     def wait(self, seconds: float) -> None:
         for _ in range(round(seconds / TICK)):
             before = self.drive.goals
-            rates = self.drive.drive(self._shaper.step(self._now, TICK), TICK)
+            self.values = self._shaper.step(self._now, TICK)
+            rates = self.drive.drive(self.values, TICK)
             assert self.drive.goals == pytest.approx(np.array(before) + np.array(rates) * TICK, abs=SLACK)
             self.way.append(self.drive.goals)
             self._now += TICK
@@ -94,6 +96,16 @@ def test_whatever_is_driven_in_turn_no_joint_goal_jumps_or_leaves_its_range_and_
     for number, values in enumerate(zip(*world.way, strict=True)):
         assert JOINT_AXES[number].minimum - SLACK <= min(values)
         assert max(values) <= JOINT_AXES[number].maximum + SLACK
+
+
+def test_ticks_that_are_held_up_make_settling_no_longer() -> None:
+    world = World()
+    world.play(Spell("tool", (0.1,) * 11, 12))
+    world.drive.drive(world.values, TICK)
+    moved = 0
+    while world.drive.drive(world.values, TICK, since=10 * TICK).any():
+        moved += 1
+    assert 1 <= moved <= SETTLES / (10 * TICK)
 
 
 def test_the_first_values_after_a_restart_move_nothing() -> None:

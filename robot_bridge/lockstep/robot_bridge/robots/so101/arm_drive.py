@@ -75,8 +75,12 @@ class ArmDrive:
         tool = self._at(self._goals)
         return [*self._goals, *tool.position.tolist(), *tool.vector.tolist()]
 
-    def drive(self, values: Sequence[float], seconds: float) -> Array:
-        """Take the applied goals of joints and pose; return the joints' rates for the coming `seconds`, rad/s."""
+    def drive(self, values: Sequence[float], seconds: float, since: float = 0.0) -> Array:
+        """Take the applied goals of joints and pose; return the joints' rates for the coming `seconds`, rad/s.
+
+        `since`: s since the call before. Where it is more than `seconds`, calls were held up, and settling counts it.
+        """
+        self._still += max(since - seconds, 0.0)
         self._choose(tuple(values), seconds)
         before = self._goals
         if self._pose is not None:
