@@ -12,7 +12,8 @@ from hypothesis import strategies as st
 from lockstep.protocol.description import Pose
 from lockstep.robot_bridge.control.limits.axis_shaper import AxisShaper
 from lockstep.robot_bridge.kinematics.pose_solver import PoseSolver
-from lockstep.robot_bridge.robots.so101.arm_drive import SETTLES, ArmDrive
+from lockstep.robot_bridge.kinematics.rotations import from_rotation_vector, rotation_vector
+from lockstep.robot_bridge.robots.so101.arm_drive import AHEAD, SETTLES, ArmDrive
 from lockstep.robot_bridge.robots.so101.controls import JOINT_AXES, POSITION_AXES, RATES, ROTATION_AXES
 from tests.robot_bridge.kinematics.arms import BOUNDS, desk_arm
 
@@ -106,6 +107,34 @@ def test_ticks_that_are_held_up_make_settling_no_longer() -> None:
     while world.drive.drive(world.values, TICK, since=10 * TICK).any():
         moved += 1
     assert 1 <= moved <= SETTLES / (10 * TICK)
+
+
+def test_an_arm_that_is_blocked_gets_goals_no_further_ahead_than_a_joints_reach() -> None:
+    drive = ArmDrive(desk_arm(), PoseSolver(desk_arm(), BOUNDS), RATES[:5], START)
+    goal = drive.pursued()[5:]
+    for _ in range(1000):
+        goal[3] += 1.2 * TICK
+        rates = drive.drive([*START, *goal], TICK, measured=START)
+        assert np.abs(np.array(drive.goals) - START).max() <= AHEAD + SLACK
+    assert np.abs(rates).max() < 1e-6
+    assert np.abs(np.array(drive.goals) - START).max() == pytest.approx(AHEAD)
+
+
+def test_a_tool_whose_goal_is_turned_past_it_does_not_swing_round_the_other_way() -> None:
+    """The roll is near the end of its range, and its goal is turned on."""
+    drive = ArmDrive(desk_arm(), PoseSolver(desk_arm(), BOUNDS), RATES[:5], (0.0, -0.3, 0.6, -0.3, 2.6))
+    x, y, z = drive.pursued()[5:8]
+    rolled = 2.6
+    while rolled < 2.6 + 5.0:
+        rolled += 1.2 * TICK
+        drive.drive([*START, x, y, z, *rotation_vector(from_rotation_vector((rolled, 0.0, 0.0)))], TICK)
+        assert drive.goals[4] > 2.55
+    assert any("turned too far away" in fault for fault in drive.faults)
+    while rolled > 2.0:
+        rolled -= 1.2 * TICK
+        drive.drive([*START, x, y, z, *rotation_vector(from_rotation_vector((rolled, 0.0, 0.0)))], TICK)
+    assert drive.goals[4] == pytest.approx(2.0, abs=0.1)
+    assert not any("turned too far away" in fault for fault in drive.faults)
 
 
 def test_the_first_values_after_a_restart_move_nothing() -> None:

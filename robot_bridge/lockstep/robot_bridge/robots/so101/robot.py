@@ -82,7 +82,7 @@ class So101(Robot):
         if self._values is not None:
             values, self._values = list(self._values), None
             rates[GRIPPER] = self._drive_grip(values.pop(GRIPPER))
-            rates[ARM] = self._drive.drive(values, seconds, self._ticked_at - before)
+            rates[ARM] = self._drive.drive(values, seconds, self._ticked_at - before, simulation.joints()[ARM])
         simulation.aim((*self._drive.goals, self._grip), rates)
         if not simulation.step(STEPS_PER_TICK):
             self._drive.hold(HOME[ARM])
