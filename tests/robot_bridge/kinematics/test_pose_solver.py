@@ -161,7 +161,8 @@ def test_a_tool_whose_goal_moves_follows_it_without_lag() -> None:
 def test_a_tool_that_is_far_from_its_goal_goes_there_no_faster_than_it_may(
     way: tuple[float, float, float], turn: float
 ) -> None:
-    chain, joints = desk_arm(), (0.0, -0.3, 0.6, -0.3, 0.0)
+    chain = desk_arm()
+    joints: tuple[float, ...] = (0.0, -0.3, 0.6, -0.3, 0.0)
     solver = PoseSolver(chain, BOUNDS, tuning=Tuning(fastest=0.1, quickest=0.5))
     start = chain.at(joints)
     position = start.position + np.array(way)
