@@ -68,6 +68,8 @@ class PoseTurns:
     def settle(self, released: bool) -> None:
         """Note the poses that have settled. `released`: no axis is driven."""
         for number in list(self._driven):
+            if self._axes[number].is_driven and not released:
+                continue
             mates = self._shared.mates[number]
             if all((released or not self._axes[mate].is_driven) and self._axes[mate].stands for mate in mates):
                 self._driven -= mates
