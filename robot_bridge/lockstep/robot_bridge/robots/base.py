@@ -93,7 +93,8 @@ class Robot(ABC):
         `reset` are what `goals` said then; they move nothing. From then on a value changes by no more than
         a tick at `slew`, with one exception: of a pose and the axes that it stands in for, only those change that are
         driven, and when one of these sets begins to be driven in place of the other, or a pose with `settling` again
-        after it came to rest, its values are first what `goals` said. The bridge does not call this before every goal axis has been measured.
+        after it came to rest, its values are first what `goals` said. The bridge does not call this before every goal
+        axis has been measured.
         """
 
     def tick(self) -> None:
