@@ -2,6 +2,7 @@
 
 import asyncio
 import itertools
+import time
 from collections.abc import Mapping, Sequence
 
 import msgspec
@@ -10,9 +11,11 @@ import pytest
 from lockstep.protocol.actions import Act, ActionUpdate, ParameterValue
 from lockstep.protocol.description import Action, RobotDescription
 from lockstep.protocol.messages import Feedback, Refusal, Rest, Stop
+from lockstep.robot_bridge.bridge import Bridge
 from lockstep.robot_bridge.errors import RobotFailed
 from lockstep.robot_bridge.robots.actions import ActionRun, ActionStep
 from lockstep.robot_bridge.robots.base import Measurement, Robot
+from lockstep.robot_bridge.settings import BridgeSettings
 from tests.robot_bridge.bridge_helpers import Operator, operator, raw_link, running_bridge
 from tests.robot_bridge.goal_helpers import ARM_AXES, HangingArm
 
@@ -247,3 +250,27 @@ async def test_a_command_that_is_not_repeated_stands_still_after_hold() -> None:
         assert 0 < stood < 1.5 * HOLD
         await driver.next(Feedback)
         assert applied_goal(driver.feedback, "turn") == stood
+
+
+async def test_after_a_suspend_the_goals_are_where_they_were_before_it() -> None:
+    class Patient(HangingArm):
+        rests_from_thread = True
+        rested = 0
+
+        def describe(self) -> RobotDescription:
+            return msgspec.structs.replace(super().describe(), hold=5.0, watchdog=2.0)
+
+        def rest_from_thread(self) -> None:
+            self.rested += 1
+
+    suspended = 0.0
+    robot = Patient()
+    bridge = Bridge(robot, BridgeSettings(port=0), lambda: time.monotonic() + suspended)
+    async with bridge, operator(bridge) as driver:
+        for _ in range(5):
+            await driver.drive(goals(turn=0.9))
+        before = robot.applied[-1]
+        suspended = 2.5
+        await driver.heard(lambda feedback: feedback.neutral_needed)
+        assert robot.applied[-1] == before
+        assert robot.rested

@@ -48,6 +48,7 @@ def twice(**fields: Any) -> RobotDescription:
         with_turn(reach=math.pi),
         with_pose(instead_of=()),
         with_pose(frame="tool"),
+        with_pose(settling=0.2),
     ],
     ids=str,
 )
@@ -73,6 +74,10 @@ def test_it_makes_sense(description: RobotDescription) -> None:
         (with_pose(body="arm"), "pose tool names the body 'arm', which is not described"),
         (with_pose(body=""), "pose tool names the body ''"),
         (with_pose(frame="eye"), "pose tool names the frame 'eye', which is no body and no camera"),
+        (with_pose(settling=-0.1), "axis x: settling of its pose must be from 0 to less than hold"),
+        (with_pose(settling=math.nan), "axis x: settling of its pose must be from 0 to less than hold"),
+        (with_pose(settling=0.3), "axis x: settling of its pose must be from 0 to less than hold"),
+        (with_pose(settling=0.21), "axis x: braking takes 0.100 s and settling 0.21 s, together longer than hold"),
         (with_pose(point=(0.0, math.nan, 0.0)), "pose tool: its point must be finite"),
         (with_pose(position=("", "", "")), "pose tool has no axes"),
         (with_pose(position=("base", "", "")), "names the axis 'base', which is not a goal axis"),

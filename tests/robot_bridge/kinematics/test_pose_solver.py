@@ -8,7 +8,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from lockstep.robot_bridge.kinematics.chain import Chain
-from lockstep.robot_bridge.kinematics.pose_solver import JointBounds, PoseSolver
+from lockstep.robot_bridge.kinematics.pose_solver import JointBounds, PoseSolver, Tuning
 from lockstep.robot_bridge.kinematics.rotations import from_rotation_vector, rotation_vector
 from tests.robot_bridge.kinematics.arms import BOUNDS, LIFT, clearance, desk_arm
 
@@ -155,6 +155,28 @@ def test_a_tool_whose_goal_moves_follows_it_without_lag() -> None:
         goal = goal + velocity * TICK
         joints = solver.step(joints, goal, begun.rotation, TICK, velocity=velocity).joints
     assert ARM.at(joints).position == pytest.approx(goal, abs=1e-3)
+
+
+@pytest.mark.parametrize(("way", "turn"), [((-0.04, 0.0, 0.04), 0.0), ((0.0, 0.0, 0.0), 2.0)])
+def test_a_tool_that_is_far_from_its_goal_goes_there_no_faster_than_it_may(
+    way: tuple[float, float, float], turn: float
+) -> None:
+    chain = desk_arm()
+    joints: tuple[float, ...] = (0.0, -0.3, 0.6, -0.3, 0.0)
+    solver = PoseSolver(chain, BOUNDS, tuning=Tuning(fastest=0.1, quickest=0.5))
+    start = chain.at(joints)
+    position = start.position + np.array(way)
+    rotation = from_rotation_vector((turn, 0.0, 0.0)) @ start.rotation
+    for _ in range(round(5.0 / TICK)):
+        before = chain.at(joints)
+        joints = solver.step(joints, position, rotation, TICK).joints
+        after = chain.at(joints)
+        assert np.linalg.norm(after.position - before.position) <= 0.1 * TICK * 1.05
+        assert (
+            np.linalg.norm(rotation_vector(after.rotation @ before.rotation.T)) <= (0.5 if turn else 9.0) * TICK * 1.05
+        )
+    assert after.position == pytest.approx(position, abs=1e-3)
+    assert turn == 0.0 or joints[4] == pytest.approx(turn, abs=0.01)
 
 
 def test_joints_that_are_left_tend_to_the_posture() -> None:

@@ -10,6 +10,7 @@ interface Slider {
   pointer: number | null;
   fromX: number; // where it was taken, CSS pixels
   x: number;
+  width: number; // when it was taken: a page that is laid out anew moves nothing
 }
 
 const FORWARD = ["ArrowRight", "ArrowUp"];
@@ -56,13 +57,14 @@ export class GoalSliders {
 
   /** `track`: the element that is dragged, as wide as the axis' range. */
   add(axis: string, track: HTMLElement): void {
-    const slider: Slider = { track, pointer: null, fromX: 0, x: 0 };
+    const slider: Slider = { track, pointer: null, fromX: 0, x: 0, width: 0 };
     this.sliders.set(axis, slider);
     track.addEventListener("pointerdown", (event) => {
       if (slider.pointer !== null || event.button !== 0) return;
       event.preventDefault(); // no focus: the keyboard stays the robot's
       slider.pointer = event.pointerId;
       slider.fromX = slider.x = event.clientX;
+      slider.width = track.getBoundingClientRect().width;
       track.setPointerCapture(event.pointerId);
       track.classList.add("is-held");
       this.onchange(event.timeStamp);
@@ -88,8 +90,7 @@ export class GoalSliders {
   }
 }
 
-function travelOf({ track, fromX, x }: Slider): number {
-  const { width } = track.getBoundingClientRect();
+function travelOf({ fromX, x, width }: Slider): number {
   return width > 0 ? (x - fromX) / width : 0;
 }
 

@@ -367,6 +367,7 @@ export interface Pose {
   readonly position: readonly [string, string, string];
   readonly rotation: readonly [string, string, string];
   readonly instead_of: readonly (string)[];
+  readonly settling: number;
 }
 
 /** Keeps a measured joint between `minimum` and `maximum` by slowing the axes that move it; None: no bound. The bridge enforces it (docs/robot-link.md, "Limits"). Motion away from a bound is always free. */

@@ -12,7 +12,7 @@ const ROTATION = ["rx", "ry", "rz"] as const;
 const AXES = [axisOf("base"), ...[...POSITION, ...ROTATION].map((name) => goalAxisOf(name, { reach: 10 }))];
 const TOOL: Pose = {
   ...{ name: "tool", label: "Tool", body: "hand", frame: "", point: [0, 0, 0] },
-  ...{ position: POSITION, rotation: ROTATION, instead_of: [] },
+  ...{ position: POSITION, rotation: ROTATION, instead_of: [], settling: 0 },
 };
 
 class Hands implements DrivingHands {

@@ -148,7 +148,7 @@ class CommandExecutor:
         self._actions.step()
         values = self._shaper.step(now, self._robot.tick_seconds)  # asks for positions, which may hang too
         if (held := self._watchdogs.begin(now, moved)) is not None:
-            self._held_up(held)
+            self._held_up(held, moved)
             values = self._shaper.values
         self._watchdogs.ticked(now, self._moves)
         if self._places_known():
@@ -160,6 +160,8 @@ class CommandExecutor:
         self._note_blind(self._limits.blind)
         if self._shaper.at_rest:
             self._stops.rests()
+        if self._shaper.take_settled():  # so that the next hand engages where the pose is, and not where it was to be
+            self._core.want_issue()
         self.note_motion()
         if not self._core.issue_due(now):
             return None
@@ -204,10 +206,13 @@ class CommandExecutor:
             self._rested = not self._moves
             self._log.record("at_rest" if self._rested else "driven", self._core.current)
 
-    def _held_up(self, held: Held) -> None:
+    def _held_up(self, held: Held, moved: bool) -> None:
         """Make the operator begin anew after too long without a tick: the robot's motion meanwhile is unknown."""
         self._actions.interrupt("interrupted")
+        self._shaper.take_back()  # the values of this tick were shaped before it was known
         self._shaper.cut()
+        if moved and self._robot.rests_from_thread and not held.acted:  # a suspend holds up the thread too
+            self._robot.rest_from_thread()
         self._core.need_neutral()
         self._counters.stalls += 1
         self._counters.watchdog += held.acted

@@ -10,6 +10,7 @@ __all__ = ["check_axes"]
 
 POSITION_UNIT = "m"
 ROTATION_UNIT = "rad"
+ROUNDING = 1e-9  # s
 
 
 def check_axes(description: RobotDescription) -> None:
@@ -18,9 +19,10 @@ def check_axes(description: RobotDescription) -> None:
     Raises:
         DescriptionError: names the first contradiction found.
     """
+    settling = {name: pose.settling for pose in description.poses for name in (*pose.position, *pose.rotation)}
     for axis in description.axes:
         if axis.kind == "goal":
-            _check_goal_axis(axis, description.hold)
+            _check_goal_axis(axis, description.hold, settling.get(axis.name, 0.0))
         else:
             _check_rate_axis(axis, description.hold)
     goals = {axis.name: axis for axis in description.axes if axis.kind == "goal"}
@@ -43,7 +45,7 @@ def _check_rate_axis(axis: Axis, hold: float) -> None:
         )
 
 
-def _check_goal_axis(axis: Axis, hold: float) -> None:
+def _check_goal_axis(axis: Axis, hold: float, settling: float) -> None:
     _check_numbers(axis, (axis.minimum, axis.maximum, axis.slew, axis.brake, axis.acceleration, axis.reach))
     if not axis.minimum <= axis.maximum:
         raise DescriptionError(f"axis {axis.name}: minimum must not be above maximum")
@@ -51,10 +53,17 @@ def _check_goal_axis(axis: Axis, hold: float) -> None:
         raise DescriptionError(f"axis {axis.name}: acceleration must not be negative; 0 means as brake")
     if axis.reach <= 0:
         raise DescriptionError(f"axis {axis.name}: a goal axis needs a reach above 0, how far a goal may be away")
+    if not 0 <= settling < hold:
+        raise DescriptionError(f"axis {axis.name}: settling of its pose must be from 0 to less than hold ({hold:g} s)")
     if axis.slew > axis.brake * hold:
         raise DescriptionError(
             f"axis {axis.name}: braking from {axis.slew:g} {axis.unit}/s takes {axis.slew / axis.brake:.3f} s,"
             f" longer than hold ({hold:g} s); raise brake or lower slew"
+        )
+    if axis.slew / axis.brake + settling > hold + ROUNDING:
+        raise DescriptionError(
+            f"axis {axis.name}: braking takes {axis.slew / axis.brake:.3f} s and settling {settling:g} s, together"
+            f" longer than hold ({hold:g} s)"
         )
     if axis.wrap is None:
         return

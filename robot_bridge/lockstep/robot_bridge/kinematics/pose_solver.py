@@ -49,6 +49,8 @@ class Tuning(NamedTuple):
     posture: float = 1.0  # 1/s: the pull of the posture in what is left
     limit_gain: float = 8.0  # 1/s: a joint's speed towards its limit is at most this times the way to it
     end: float = 0.02  # rad or m from the end of its range, from which on a joint is said to be there
+    fastest: float = math.inf  # m/s, of the tool, also where it catches up
+    quickest: float = math.inf  # rad/s, the same for its turning
     safe: float = 0.03  # m, from which on parts that come nearer to each other are slowed
     close: float = 0.008  # m, at which they come no nearer
 
@@ -59,6 +61,7 @@ class Solution(NamedTuple):
     limited: tuple[int, ...]  # joints that are at the end of their range and would go on
     near: bool  # parts of the robot are so close to each other that they slow it
     missing: float  # m, of the position before this step
+    askew: float  # rad, of the rotation before this step, at most pi
 
 
 class PoseSolver:
@@ -95,23 +98,29 @@ class PoseSolver:
         spin: Array | None = None,
         share: float = 1.0,
         before: Sequence[float] | None = None,
+        turns: bool = True,
     ) -> Solution:
         """Return the joint goals after `seconds`.
 
         `joints`: the goals before. `position` (m) and `rotation` (3 x 3): of the tool. `velocity` (m/s) and `spin`
         (rad/s): of that pose, so that the tool follows it without lag. `share`: of the joints' rates, 0 to 1.
-        `before`: the rates of the step before; without them a rate may change at once.
+        `before`: the rates of the step before; without them a rate may change at once. `turns`: False to keep the
+        rotation that the tool has, as far as its way to the position allows.
         """
         here = np.array(joints)
         state = self._chain.at(joints)
         tuning = self._tuning
         error = position - state.position
         wanted = tuning.gain * _shortened(error, tuning.longest) + (0.0 if velocity is None else velocity)
-        turn, angle = np.zeros(3), 0.0
+        wanted = _shortened(wanted, tuning.fastest)
+        turn, angle, away = np.zeros(3), 0.0, 0.0
         if self._turns:
-            askew = _shortened(rotation_vector(rotation @ state.rotation.T), tuning.widest)
-            angle = float(np.sqrt(askew @ askew))
-            turn = tuning.gain * askew + (0.0 if spin is None else spin)
+            whole = rotation_vector(rotation @ state.rotation.T)
+            away = float(np.sqrt(whole @ whole))
+            if turns:
+                askew = _shortened(whole, tuning.widest)
+                angle = min(away, tuning.widest)
+                turn = _shortened(tuning.gain * askew + (0.0 if spin is None else spin), tuning.quickest)
         # A goal that cannot be reached leaves an error, whose curvature a step of least squares does not know: the step
         # would be too long, and the joints would swing. Damping by the error bounds it (Sugihara 2011), and vanishes as
         # a goal that can be reached is approached.
@@ -128,7 +137,7 @@ class PoseSolver:
         after = here + np.clip(rates, slowest, fastest) * seconds
         after = np.clip(after, np.minimum(self._lower, here), np.maximum(self._upper, here))
         made = tuple(((after - here) / seconds).tolist())
-        return Solution(tuple(after.tolist()), made, limited, near, float(np.linalg.norm(error)))
+        return Solution(tuple(after.tolist()), made, limited, near, float(np.linalg.norm(error)), away)
 
     def _speeds(self, here: Array, share: float) -> tuple[Array, Array]:
         """Return each joint's range of speeds: slower near the end of its range, and only inwards beyond it."""

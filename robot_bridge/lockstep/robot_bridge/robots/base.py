@@ -92,8 +92,9 @@ class Robot(ABC):
         The value of a goal axis is its applied goal: the place to be at. The first values after the start and after
         `reset` are what `goals` said then; they move nothing. From then on a value changes by no more than
         a tick at `slew`, with one exception: of a pose and the axes that it stands in for, only those change that are
-        driven, and when one of these sets begins to be driven in place of the other, its values are first what `goals`
-        said. The bridge does not call this before every goal axis has been measured.
+        driven, and when one of these sets begins to be driven in place of the other, or a pose with `settling` again
+        after it came to rest, its values are first what `goals` said. The bridge does not call this before every goal
+        axis has been measured.
         """
 
     def tick(self) -> None:
@@ -120,6 +121,8 @@ class Robot(ABC):
 
         A robot with poses says here where their axes are told to be while others are driven in their place: the
         forward kinematics of the joints' goals; and the other way round.
+
+        A pose with `settling` begins here each time it has come to rest.
 
         Without this method the measured values are taken: an arm that hangs below its goals under a load then goes
         down by that much on each of these occasions.

@@ -59,6 +59,7 @@ export class GoalDriving {
       const [goal, share] = this.goalOf(each, posed[each.index] ?? null, inputs, feedback, now);
       if (idle.has(each.axis.name)) {
         each.jog.goal = null;
+        each.clutch.release(); // a slider that is held meanwhile goes on from where the pose has led its axis
         taken[each.index] = null;
         continue;
       }
@@ -108,7 +109,7 @@ export class GoalDriving {
     const place = placeOf(feedback, index, axis);
     const travel = place === null ? undefined : held.sliders?.travels[axis.name];
     const dragged = travel === undefined ? null : drag(clutch, axis, travel, feedback);
-    if (travel === undefined) clutch.release();
+    if (travel === undefined || posed !== null) clutch.release();
     const led = posed ?? dragged;
     const push = held.sliders?.pushes[axis.name] ?? inputFor(axis, layer, held);
     const input = led === null ? push : 0;

@@ -163,7 +163,7 @@ describe("a pose that a device drives", () => {
     const arm = [goalAxisOf("elbow"), ...names.map((name) => goalAxisOf(name))];
     const pose = {
       ...{ name: "tool", label: "Tool", body: "hand", frame: "", point: [0, 0, 0] as const },
-      ...{ position: names, rotation: ["", "", ""] as const, instead_of: ["elbow"] },
+      ...{ position: names, rotation: ["", "", ""] as const, instead_of: ["elbow"], settling: 0 },
     };
     const robot = { ...descriptionOf(arm), poses: [pose] };
     const driving = new GoalDriving();
@@ -172,5 +172,30 @@ describe("a pose that a device drives", () => {
     expect(driving.take([null, null, null, null], inputs, 0)).toEqual([1, null, null, null]);
     driving.device = { goals: () => [null, 0.1, 0.2, 0.3], release: () => undefined };
     expect(driving.take([null, null, null, null], inputs, 10)).toEqual([null, 0.1, 0.2, 0.3]);
+  });
+
+  it("leaves nothing behind for a slider that was held meanwhile, of its own axes or of those it stands for", () => {
+    const names = ["x", "y", "z"] as const;
+    const arm = [goalAxisOf("elbow"), ...names.map((name) => goalAxisOf(name))];
+    const pose = {
+      ...{ name: "tool", label: "Tool", body: "hand", frame: "", point: [0, 0, 0] as const },
+      ...{ position: names, rotation: ["", "", ""] as const, instead_of: ["elbow"], settling: 0 },
+    };
+    const robot = { ...descriptionOf(arm), poses: [pose] };
+    const driving = new GoalDriving();
+    const rest = [null, null, null, null];
+    const at = (place: number, held: HeldInputs): GoalInputs => ({
+      ...inputsOf(held, { description: robot }),
+      feedback: feedbackOf(5, { axes: [place, place, 0, 0], goals: [place, place, 0, 0] }),
+    });
+    for (const name of ["elbow", "x"]) {
+      const held = heldOf([], { [name]: 0.1 });
+      driving.device = { goals: () => [null, 0.1, 0.2, 0.3], release: () => undefined };
+      driving.take(rest, at(0, held), 0);
+      driving.take(rest, at(0.3, held), 10);
+      driving.device = null;
+      expect(driving.take(rest, at(0.3, held), 20)[name === "x" ? 1 : 0]).toBe(0.3);
+      driving.release();
+    }
   });
 });

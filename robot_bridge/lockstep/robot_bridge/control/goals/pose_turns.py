@@ -3,6 +3,9 @@
 While one set is driven, the goals of the other are out of date: its axes have moved with the joints. When the other set
 begins to be driven, its goals are read from the robot; until then they do not change, so that an adapter can tell by
 the values which set is driven.
+
+The goals of a pose with `settling` are out of date also when it has settled: the robot may have come to rest before it
+got there.
 """
 
 import math
@@ -17,7 +20,11 @@ __all__ = ["PoseTurns"]
 
 
 class PoseTurns:
-    """Knows the goals that are out of date. Call `take` before each tick in which axes are driven."""
+    """Knows the goals that are out of date. Call `take` before each tick in which axes are driven, then `settle`.
+
+    Attributes:
+        settled: a pose has settled since this was set to False
+    """
 
     def __init__(
         self,
@@ -29,11 +36,15 @@ class PoseTurns:
         self._shared = SharedJoints(axes, poses)
         self._axes = {number: axis for number, axis in enumerate(shaped) if isinstance(axis, GoalAxis)}
         self._pursued = pursued
-        self._stale: set[int] = set()  # axes whose goals the other set's motion has made out of date
+        self._stale: set[int] = set()  # axes whose goals are out of date
+        self._settling = {number for number, axis in self._axes.items() if axis.settling > 0.0}
+        self._driven: set[int] = set()  # axes of `_settling` that were driven since their goals were read
+        self.settled = False
 
     def begin(self) -> None:
         """All goals are up to date."""
         self._stale.clear()
+        self._driven.clear()
 
     def take(self) -> None:
         """Let the axes that are driven begin, or wait until those that exclude them stand still and the robot knows
@@ -46,13 +57,24 @@ class PoseTurns:
             if not axis.is_driven:
                 continue
             if number in self._stale:
-                axis.waits = any(self._axes[rival].rate for rival in rivals)
+                axis.waits = not all(self._axes[rival].stands for rival in rivals)
                 if not axis.waits:
                     beginning.append(number)
             else:
-                self._stale |= rivals
+                self._note_driven(number)
         if beginning:
             self._begin(beginning)
+
+    def settle(self, released: bool) -> None:
+        """Note the poses that have settled. `released`: no axis is driven."""
+        for number in list(self._driven):
+            if self._axes[number].is_driven and not released:
+                continue
+            mates = self._shared.mates[number]
+            if all((released or not self._axes[mate].is_driven) and self._axes[mate].stands for mate in mates):
+                self._driven -= mates
+                self._stale |= mates
+                self.settled = True
 
     def as_brought(self, goals: list[float | None]) -> list[float | None]:
         """Return the goals with those that are out of date replaced by where the other set has brought the robot."""
@@ -73,4 +95,9 @@ class PoseTurns:
             for mate in mates:
                 self._axes[mate].begin(pursued[mate])
             self._stale -= mates
-            self._stale |= self._shared.rivals[number]
+            self._note_driven(number)
+
+    def _note_driven(self, number: int) -> None:
+        self._stale |= self._shared.rivals[number]
+        if number in self._settling:
+            self._driven.add(number)

@@ -48,7 +48,10 @@ class AxisShaper:
         """`pursued`: returns the goal of each axis that the robot pursues now; needed if there are `poses`."""
         self.has_goals = has_goals(axes)
         self.is_known = not self.has_goals
-        self._axes = tuple(GoalAxis(axis) if axis.kind == "goal" else RateAxis(axis) for axis in axes)
+        settling = {name: pose.settling for pose in poses for name in (*pose.position, *pose.rotation)}
+        self._axes = tuple(
+            GoalAxis(axis, settling.get(axis.name, 0.0)) if axis.kind == "goal" else RateAxis(axis) for axis in axes
+        )
         self._hold = hold
         self._limiter = limiter
         self._turns = None if pursued is None or not poses else PoseTurns(axes, poses, self._axes, pursued)
@@ -70,9 +73,16 @@ class AxisShaper:
 
     @property
     def at_rest(self) -> bool:
-        """True if all axes are at rest and none is to leave it."""
+        """True if all axes are at rest, none is to leave it, and the robot has had the time to settle."""
         released = self._released
-        return all(axis.rate == axis.rest_rate and (released or not axis.is_driven) for axis in self._axes)
+        return all(axis.stands and (released or not axis.is_driven) for axis in self._axes)
+
+    def take_settled(self) -> bool:
+        """Return whether a pose has settled since the last call: from then on `goals` says where."""
+        if self._turns is None or not self._turns.settled:
+            return False
+        self._turns.settled = False
+        return True
 
     def begin(self, places: Sequence[float], pursued: Sequence[float]) -> bool:
         """Command the goal axes from where they are held: from the goals that the robot pursues. True if all are known.
@@ -114,14 +124,21 @@ class AxisShaper:
         for axis in self._axes:
             axis.cut()
 
+    def take_back(self) -> None:
+        """Undo the goals' motion of the last `step`, whose values were not applied."""
+        for axis in self._axes:
+            axis.take_back()
+
     def step(self, now: float, dt: float) -> list[float]:
         """Return the values for a tick of `dt` seconds that begins now."""
         left = self._deadline - now
         if left <= 0:
             self._released = True
         released = self._released
-        if self._turns is not None and not released:
-            self._turns.take()
+        if self._turns is not None:
+            if not released:
+                self._turns.take()
+            self._turns.settle(released)
         rates = [axis.next_rate(left, dt, released) for axis in self._axes]
         if self._limiter is not None:
             rates = self._limiter(rates, lambda: [axis.braked(dt) for axis in self._axes])

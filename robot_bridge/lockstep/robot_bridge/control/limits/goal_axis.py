@@ -20,16 +20,18 @@ class GoalAxis:
     Attributes:
         goal: applied last, 1.2 rad; NaN until the axis was measured
         waits: the axis must not be driven yet, because others that move the same joints still move
+        settling: s in which the robot may still come nearer to the goal after it stood still
     """
 
     __slots__ = (
         *("_acceleration", "_brake", "_end", "_gap", "_maximum", "_minimum", "_planned", "_reach", "_slew", "_speed"),
-        *("_steepest", "_target", "_wrap", "goal", "is_driven", "rate", "waits"),
+        *("_before", "_settles", "_steepest", "_target", "_wrap"),
+        *("goal", "is_driven", "rate", "settling", "waits"),
     )
 
     rest_rate: Final = 0.0
 
-    def __init__(self, axis: Axis) -> None:
+    def __init__(self, axis: Axis, settling: float = 0.0) -> None:
         self._minimum, self._maximum = axis.minimum, axis.maximum
         self._wrap = axis.wrap
         self._slew, self._brake, self._reach = axis.slew, axis.brake, axis.reach
@@ -45,6 +47,14 @@ class GoalAxis:
         self.rate = 0.0  # unit/s, of the goal in the tick that was applied last
         self.is_driven = False
         self.waits = False
+        self.settling = settling
+        self._settles = 0.0  # s for which the robot may still come nearer to the goal
+        self._before = math.nan  # the goal before the last tick
+
+    @property
+    def stands(self) -> bool:
+        """True if the goal stands still, and the robot has had the time to settle."""
+        return not self.rate and self._settles <= 0.0
 
     @property
     def is_known(self) -> bool:
@@ -80,6 +90,7 @@ class GoalAxis:
             rate = self.braked(dt)
         else:
             rate = self._towards_target(dt)
+        left -= self.settling
         reach = self._brake * left if left > 0.0 else 0.0
         return reach if rate > reach else -reach if rate < -reach else rate
 
@@ -91,18 +102,28 @@ class GoalAxis:
     def take(self, rate: float, dt: float) -> float:
         """Apply a speed for a tick of `dt` s; return the goal at its end."""
         self.rate = rate
+        self._before = self.goal
         if rate:
+            self._settles = self.settling
             way = rate * dt
             if abs(way - self._gap) <= ROUNDING * abs(way):
                 self.goal = self._end
             else:
                 goal = self.goal + way
                 self.goal = goal if self._minimum <= goal <= self._maximum else self._within(goal)
+        elif self._settles > 0.0:
+            self._settles -= dt
+            if self._settles < ROUNDING * dt:
+                self._settles = 0.0
         return self.goal
+
+    def take_back(self) -> None:
+        """Undo the motion of the last `take`, whose goal was not applied."""
+        self.goal = self._before
 
     def cut(self) -> None:
         """Stand still at once, where the goal is."""
-        self.rate = 0.0
+        self.rate = self._settles = 0.0
 
     def reaches(self, place: float, goal: float) -> bool:
         """Return whether a goal is within reach of a place; False if one of them is not known."""
@@ -111,8 +132,8 @@ class GoalAxis:
 
     def begin(self, place: float) -> None:
         """Begin to be commanded from a place; NaN: it is not known."""
-        self.goal = place if math.isfinite(place) else math.nan
-        self.rate = 0.0
+        self.goal = self._before = place if math.isfinite(place) else math.nan
+        self.rate = self._settles = 0.0
 
     def _within(self, goal: float) -> float:
         """Return a goal within the axis' limits; one that is outside of them may only move back."""

@@ -36,6 +36,11 @@ class RateAxis:
         """The value that the robot gets."""
         return self.rate
 
+    @property
+    def stands(self) -> bool:
+        """True if the axis is at rest."""
+        return self.rate == self.rest_rate
+
     def drive(self, value: float | None, speed: float) -> None:
         """Aim for a value, clamped to the axis' limits; None: for rest. `speed` concerns goal axes only."""
         rest = self.rest_rate
@@ -69,6 +74,9 @@ class RateAxis:
     def cut(self) -> None:
         """Be at rest at once."""
         self.rate = self.rest_rate
+
+    def take_back(self) -> None:
+        """Undo the motion of the last `take`: a rate has none."""
 
     def reaches(self, place: float, goal: float) -> bool:
         """Return True: a rate has no reach."""

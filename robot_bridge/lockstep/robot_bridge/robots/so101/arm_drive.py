@@ -15,12 +15,15 @@ from lockstep.robot_bridge.kinematics.chain import Chain
 from lockstep.robot_bridge.kinematics.pose_solver import PoseSolver
 from lockstep.robot_bridge.kinematics.rotations import from_rotation_vector, rotation_vector
 
-__all__ = ["ArmDrive"]
+__all__ = ["SETTLES", "ArmDrive"]
 
 Array = npt.NDArray[np.float64]
 
 SAME: Final = 1e-9  # rad and m
 SETTLES: Final = 0.12  # s after its goal stood still, in which the tool may still come nearer to it
+AHEAD: Final = 0.7  # rad that a joint's goal is at most ahead of the joint while the tool is driven
+TURNED_AWAY: Final = 2.6  # rad between the tool and its goal, from which on it does not turn: either way is as short
+TURNED_BACK: Final = 0.5  # rad, from which on it turns again
 SLOWS: Final = 0.08  # s, the last of these, in which it comes to a standstill
 
 
@@ -50,6 +53,7 @@ class ArmDrive:
         self._motion = np.zeros(6)  # m/s and rad/s, of that goal in the present tick
         self._solved = (0.0,) * self._count  # rad/s, in the last tick for the tool
         self._still = math.inf  # s since the pose's goal changed
+        self._turns = True  # the tool follows the rotation of its goal
         self._tool: _Tool | None = None  # of the present goals
         self.faults: list[str] = []
 
@@ -75,12 +79,21 @@ class ArmDrive:
         tool = self._at(self._goals)
         return [*self._goals, *tool.position.tolist(), *tool.vector.tolist()]
 
-    def drive(self, values: Sequence[float], seconds: float) -> Array:
-        """Take the applied goals of joints and pose; return the joints' rates for the coming `seconds`, rad/s."""
+    def drive(
+        self, values: Sequence[float], seconds: float, since: float = 0.0, measured: Sequence[float] | None = None
+    ) -> Array:
+        """Take the applied goals of joints and pose; return the joints' rates for the coming `seconds`, rad/s.
+
+        `since`: s since the call before. Where it is more than `seconds`, calls were held up, and settling counts it.
+        `measured`: rad, where the joints are; None: where their goals are.
+        """
+        self._still += max(since - seconds, 0.0)
         self._choose(tuple(values), seconds)
         before = self._goals
         if self._pose is not None:
             self._follow_pose(self._pose, seconds)
+            if measured is not None:
+                self._keep_near(before, measured, seconds)
         elif self._joints is not None:
             self._goals = tuple(
                 place + min(max(goal - place, -rate * seconds), rate * seconds)
@@ -90,6 +103,16 @@ class ArmDrive:
             return np.zeros(self._count)
         self._tool = None
         return (np.array(self._goals) - before) / seconds
+
+    def _keep_near(self, before: tuple[float, ...], measured: Sequence[float], seconds: float) -> None:
+        """Let no goal get further than AHEAD from its joint: what blocks the arm must not store motion for later."""
+        kept = tuple(
+            min(max(goal, min(old, place - AHEAD)), max(old, place + AHEAD))
+            for goal, old, place in zip(self._goals, before, measured, strict=True)
+        )
+        if kept != self._goals:
+            self._goals = kept
+            self._solved = tuple((new - old) / seconds for new, old in zip(kept, before, strict=True))
 
     def _choose(self, values: tuple[float, ...], seconds: float) -> None:
         before, self._before = self._before, values
@@ -103,6 +126,7 @@ class ArmDrive:
         elif _differ(pose, before[self._count :]):
             if self._pose is None:  # in the first tick the goal was read anew, which is no motion
                 self._solved = (0.0,) * self._count
+                self._turns = True
             else:
                 self._motion = _motion(self._pose, pose) / seconds
             self._joints, self._pose = None, pose
@@ -111,8 +135,9 @@ class ArmDrive:
     def _follow_pose(self, pose: tuple[float, ...], seconds: float) -> None:
         share = min(max((SETTLES - self._still) / SLOWS, 0.0), 1.0)
         self._still += seconds
-        if share == 0.0:
+        if share == 0.0:  # the bridge reads its goals anew, from here
             self._solved = (0.0,) * self._count
+            self._pose = None
             return
         solution = self._solver.step(
             self._goals,
@@ -123,11 +148,15 @@ class ArmDrive:
             spin=self._motion[3:],
             share=share,
             before=self._solved,
+            turns=self._turns,
         )
+        self._turns = solution.askew < (TURNED_AWAY if self._turns else TURNED_BACK)
         self._goals, self._solved = solution.joints, solution.rates
         self.faults = [f"joint limit: {self._chain.joints[number]}" for number in solution.limited]
         if solution.near:
             self.faults.append("the arm is close to itself")
+        if not self._turns:
+            self.faults.append("the tool's goal is turned too far away from it: turn it back, or let go")
 
     def _at(self, goals: tuple[float, ...]) -> _Tool:
         if self._tool is None:

@@ -19,6 +19,7 @@ from lockstep.protocol.description import (
     RobotDescription,
     WrenchSensor,
 )
+from lockstep.robot_bridge.robots.so101.arm_drive import SETTLES
 from lockstep.robot_bridge.robots.so101.contact_force import HAND
 from lockstep.robot_bridge.robots.so101.controls import (
     AXES,
@@ -54,6 +55,7 @@ TOOL_POSE: Final = Pose(
     position=("tool.x", "tool.y", "tool.z"),
     rotation=("tool.rx", "tool.ry", "tool.rz"),
     instead_of=JOINT_NAMES[ARM],
+    settling=SETTLES,
 )
 ACTIONS: Final = (
     Action(name="home", label="Home"),

@@ -1,5 +1,6 @@
 """What the arm can reach: its chain of joints, and the solver that keeps it within its ranges and off itself."""
 
+import math
 from collections.abc import Mapping
 from typing import Final
 
@@ -7,7 +8,7 @@ from lockstep.protocol.description import RobotDescription
 from lockstep.robot_bridge.kinematics.chain import Chain
 from lockstep.robot_bridge.kinematics.clearance import Capsule, Clearance
 from lockstep.robot_bridge.kinematics.pose_solver import JointBounds, PoseSolver, Tuning
-from lockstep.robot_bridge.robots.so101.controls import JOINT_AXES, RATES
+from lockstep.robot_bridge.robots.so101.controls import JOINT_AXES, POSITION_AXES, RATES, ROTATION_AXES
 from lockstep.robot_bridge.robots.so101.description import TOOL_BODY
 from lockstep.robot_bridge.robots.so101.model import ARM
 
@@ -32,6 +33,14 @@ PAIRS: Final = (
     ("arm.upper_arm", "arm.gripper"),
 )
 
+# Faster than its goals together, so that a tool that lags arrives; far slower than its joints could throw it.
+TUNING: Final = Tuning(
+    safe=0.02,
+    close=0.004,
+    fastest=1.25 * math.hypot(*(axis.slew for axis in POSITION_AXES)),
+    quickest=1.25 * math.hypot(*(axis.slew for axis in ROTATION_AXES)),
+)
+
 
 def arm_chain(description: RobotDescription) -> Chain:
     """Return the chain from the foot to the tool; the foot's frame is the world's."""
@@ -44,4 +53,4 @@ def arm_solver(description: RobotDescription, chain: Chain) -> PoseSolver:
     bounds = JointBounds(
         lower=tuple(axis.minimum for axis in axes), upper=tuple(axis.maximum for axis in axes), rates=RATES[ARM]
     )
-    return PoseSolver(chain, bounds, clearance=Clearance(chain, CAPSULES, PAIRS), tuning=Tuning(safe=0.02, close=0.004))
+    return PoseSolver(chain, bounds, clearance=Clearance(chain, CAPSULES, PAIRS), tuning=TUNING)

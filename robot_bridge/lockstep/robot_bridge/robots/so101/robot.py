@@ -9,6 +9,7 @@ import numpy as np
 
 from lockstep.protocol.actions import ParameterValue, StatusItem
 from lockstep.protocol.description import RobotDescription
+from lockstep.robot_bridge.control import clock
 from lockstep.robot_bridge.kinematics.rotations import rotation_vector
 from lockstep.robot_bridge.robots.actions import ActionDone, ActionNotPossible, ActionRun
 from lockstep.robot_bridge.robots.base import Measurement, MediaSource, Robot
@@ -38,8 +39,8 @@ class So101(Robot):
     ticks_on_command = True
     rests_from_thread = True
 
-    def __init__(self, arm_file: Path) -> None:
-        """Start the simulation and the renderer.
+    def __init__(self, arm_file: Path, now: clock.Clock = clock.now) -> None:
+        """Start the simulation and the renderer. `now`: the clock that bounds motion.
 
         Raises:
             ModelError: the file is not the arm that this robot needs.
@@ -57,6 +58,8 @@ class So101(Robot):
         self._contact = ContactForce(model)
         self._stopped = False  # the arm holds its posture, at any applied value
         self._values: Sequence[float] | None = None
+        self._now = now
+        self._ticked_at = now()
         self._renderer = Renderer(model, CAMERAS[0].width, CAMERAS[0].height, Look())
         self._sources = tuple(
             CameraSource(each, self._renderer.drawing(each), self.simulation.snapshot) for each in CAMERAS
@@ -74,11 +77,12 @@ class So101(Robot):
 
     def tick(self) -> None:
         simulation, seconds = self.simulation, self.tick_seconds
+        before, self._ticked_at = self._ticked_at, self._now()
         rates = np.zeros(len(RATES))
         if self._values is not None:
             values, self._values = list(self._values), None
             rates[GRIPPER] = self._drive_grip(values.pop(GRIPPER))
-            rates[ARM] = self._drive.drive(values, seconds)
+            rates[ARM] = self._drive.drive(values, seconds, self._ticked_at - before, simulation.joints()[ARM])
         simulation.aim((*self._drive.goals, self._grip), rates)
         if not simulation.step(STEPS_PER_TICK):
             self._drive.hold(HOME[ARM])
