@@ -15,9 +15,9 @@ from lockstep.server.recording.verify.verify_file import verify_file
 
 __all__ = ["Judged", "judge"]
 
-# s of motion: a tick on either side of a feedback, and those that the bridge makes good at once when a busy machine has
-# held it up. Goals move per tick, the times are those of the machine's clock.
-ROOM: Final = (MAX_CATCH_UP + 2) * 0.004
+# s of motion beside the time between two feedbacks. Goals move per tick, times are the machine's clock: before
+# either feedback a busy machine may have held the bridge up, which then makes ticks good at once.
+ROOM: Final = 2 * (MAX_CATCH_UP + 2) * 0.004
 
 
 @dataclass

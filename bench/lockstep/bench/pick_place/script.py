@@ -96,13 +96,20 @@ class PickAndPlace:
         if not self._is_there(self._motion, feedback):
             self._there = None
             if feedback.time - self._begun > LONGEST:
-                here = {name: round(feedback.axes[self._index[name]], 3) for name in self._motion.goals}
-                self.failed = f"after {LONGEST:g} s the arm is at {here}, not at {self._motion.goals}"
+                self.failed = self._where(self._motion, feedback)
             return
         self._there = feedback.time if self._there is None else self._there
         if feedback.time - self._there >= PAUSE:
             self._motion = next(self._motions, None)
             self._begun = self._there = None
+
+    def _where(self, motion: Motion, feedback: Feedback) -> str:
+        places = [
+            f"{name} is {feedback.axes[self._index[name]]:.3f}, commanded {feedback.goals[self._index[name]]}, "
+            f"wanted {goal:.3f}"
+            for name, goal in motion.goals.items()
+        ]
+        return f"after {LONGEST:g} s {'; '.join([*places, *feedback.faults, *feedback.limits])}"
 
     def _is_there(self, motion: Motion, feedback: Feedback) -> bool:
         place = [feedback.axes[self._index[name]] - motion.goals[name] for name in POSITION if name in motion.goals]
