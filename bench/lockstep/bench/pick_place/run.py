@@ -13,13 +13,13 @@ import httpx
 
 from lockstep.bench.experiment.choices import media_of
 from lockstep.bench.experiment.stage import Stage, running_stage
-from lockstep.bench.harness.driving import drive_on
 from lockstep.bench.pick_place.hands import LEADER_SCALES, LeaderHand, PolicyHand
 from lockstep.bench.pick_place.judge import Judged, judge
 from lockstep.bench.pick_place.motions import BLOCKS, POSITION, ROTATION
 from lockstep.bench.pick_place.script import Hand, PickAndPlace, ToolHand
 from lockstep.client import CommandRefused, Console
 from lockstep.emulator.impairment.profile import load_profile
+from lockstep.protocol.messages import Feedback
 
 __all__ = ["Choices", "HandName", "pick_and_place"]
 
@@ -30,7 +30,8 @@ CONNECT_SECONDS: Final = 60.0  # through a bad network, with a busy machine
 SILENCE_SECONDS: Final = 15.0
 BLOCK_SECONDS: Final = 240.0
 LANDS_SECONDS: Final = 15.0  # until the robot says that the block lies in the bowl
-RESTED: Final = ("rested", "late", "out_of_order")  # refusals after which the next feedback is answered anew
+# Refusals after which the next feedback is answered anew: a bad network or a busy machine has held somebody up.
+PASSING: Final = ("late", "link_down", "not_neutral", "out_of_order", "rested")
 
 
 @dataclass(frozen=True)
@@ -103,11 +104,11 @@ class _Session:
         recording = await self._record(f"{self._choices.hand} {number + 1} {name}")
         task, began = PickAndPlace(self._console.description, name, self._hand()), time.monotonic()
         async with asyncio.timeout(BLOCK_SECONDS):
-            await self._drive(task)
+            armed = await self._drive(task)
         seconds = time.monotonic() - began
         placed = task.done and await self._in_bowl(before + 1)
         judged = await self._judged(recording)
-        self._say(_line(number, name, placed, judged, seconds) + (f": {task.failed}" if task.failed else ""))
+        self._say(_line(number, name, placed, judged, seconds, armed) + (f": {task.failed}" if task.failed else ""))
         return {
             "block": name,
             "placed": placed,
@@ -115,6 +116,7 @@ class _Session:
             "seconds": round(seconds, 1),
             "events": judged.events,
             "events_per_second": round(judged.events / judged.seconds, 1) if judged.seconds else 0.0,
+            "armed_anew": armed,
             "refusals": dict(judged.refusals),
             "largest_step": round(judged.step, 3),
             "largest_step_axis": judged.step_axis,
@@ -128,15 +130,27 @@ class _Session:
             return LeaderHand(console.description, console.clutch(LEADER_SCALES))
         return PolicyHand(console.description) if self._choices.hand == "policy" else ToolHand(console.description)
 
-    async def _drive(self, task: PickAndPlace) -> None:
-        feedback = await drive_on(self._console, [None] * len(self._console.description.axes))
+    async def _drive(self, task: PickAndPlace) -> int:
+        """Drive until it is done or failed; return how often the robot had to be armed anew."""
+        feedback, armed = await self._armed(), 0
         while not task.done and not task.failed:
             try:
-                feedback = await drive_on(self._console, task.values(feedback))
+                feedback = await self._console.drive(task.values(feedback))
             except CommandRefused as refused:
-                if refused.reason not in RESTED:
+                if refused.reason not in PASSING:
                     raise
-                feedback = await self._console.arm()
+                feedback, armed = await self._armed(), armed + 1
+        return armed
+
+    async def _armed(self) -> Feedback:
+        """Arm, again while the robot or its link is away: a simulated robot endangers no person."""
+        while True:
+            try:
+                return await self._console.arm()
+            except CommandRefused as refused:
+                if refused.reason not in PASSING:
+                    raise
+            await anext(aiter(self._console.feedbacks()))
 
     async def _in_bowl(self, count: int) -> bool:
         """Wait until the robot says that so many blocks lie in the bowl."""
@@ -175,11 +189,12 @@ async def _recorder(stage: Stage) -> AsyncIterator[httpx.AsyncClient]:
         yield http
 
 
-def _line(number: int, name: str, placed: bool, judged: Judged, seconds: float) -> str:
+def _line(number: int, name: str, placed: bool, judged: Judged, seconds: float, armed: int) -> str:
     verified = "verified" if judged.verdict.ok else "BROKEN"
     where = "in the bowl" if placed else "NOT in the bowl"
     refused = ", ".join(f"{count} {reason}" for reason, count in judged.refusals.items()) or "none"
     return (
         f"{number + 1}: {name} {where} after {seconds:.1f} s and {judged.events} events, refused {refused}, "
+        f"armed anew {armed} times, "
         f"largest step {judged.step:.2f} of {judged.step_axis}'s limit, {verified}"
     )

@@ -20,7 +20,7 @@ STEP: Final = 0.07  # m, of a goal ahead of the measured tool: less than its rea
 THERE: Final = 0.006  # m, of the measured tool
 APPLIED: Final = 0.02  # rad and m, of the applied goal
 PAUSE: Final = 0.25  # s of the robot's clock that a motion settles for
-LONGEST: Final = 15.0  # s for one motion
+LONGEST: Final = 30.0  # s for one motion
 
 Value = TypeVar("Value", float, float | None)
 
