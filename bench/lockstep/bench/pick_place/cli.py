@@ -36,7 +36,7 @@ def command(
     ] = "tool",
     seed: Annotated[int, typer.Option(help="Of the network.")] = 1,
     pictures: Annotated[bool, typer.Option(help="The client takes and shows the pictures of both cameras.")] = True,
-    keep: Annotated[Path | None, typer.Option(help="Keep the recordings in this folder.")] = None,
+    keep: Annotated[Path | None, typer.Option(help="Keep the recordings and the bridge's log in this folder.")] = None,
     json_to: Annotated[str, typer.Option("--json", help="Write the figures there; - is standard output.")] = "",
 ) -> None:
     """Put blocks into the bowl through a console, record and verify each; ends with 1 when a promise is not kept."""

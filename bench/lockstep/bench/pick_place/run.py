@@ -36,7 +36,11 @@ PASSING: Final = ("late", "link_down", "not_neutral", "out_of_order", "rested")
 
 @dataclass(frozen=True)
 class Choices:
-    """`network`: a profile; "" for none. `keep`: a folder for the recordings; None: they are deleted."""
+    """
+    Attributes:
+        network: a profile; "" for none
+        keep: a folder for the recordings and the bridge's event log; None: they are deleted
+    """
 
     network: str = ""
     times: int = 10
@@ -175,7 +179,8 @@ class _Session:
         judged = await asyncio.to_thread(judge, path, axes)
         if self._choices.keep is not None:
             self._choices.keep.mkdir(parents=True, exist_ok=True)
-            await asyncio.to_thread(shutil.copy, path, self._choices.keep)
+            for each in (path, self._stage.event_log):
+                await asyncio.to_thread(shutil.copy, each, self._choices.keep)
         return judged
 
 
