@@ -25,6 +25,8 @@ REAL = (
     "lockstep.bench.harness.caddy",
     "lockstep.bench.harness.lives",
     "lockstep.bench.harness.processes",
+    "lockstep.bench.pick_place.hands",
+    "lockstep.bench.pick_place.run",
     "lockstep.bench.quality.stage",
     "lockstep.bench.relay.stage",
     "lockstep.bench.harness.stack",

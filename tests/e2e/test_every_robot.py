@@ -9,6 +9,7 @@ import pytest
 from playwright.async_api import Browser
 
 from lockstep.bench.browsers.console_page import RB, STOP_BUTTON, ConsolePage, open_console
+from tests.e2e.so101 import SO101, needs_so101
 from tests.support.c_robot import running_c_robot
 from tests.support.ros2 import EXAMPLES, have_ros, ros_python, running_ros_robot
 from tests.support.stack import Stack, running_console, running_stack
@@ -30,6 +31,10 @@ def registered(name: str) -> Starting:
 
 def own_model(directory: Path) -> AbstractAsyncContextManager[Stack]:
     return running_stack(directory, extra=("--mjcf", str(EXAMPLES.parent / "mjcf" / "desk_arm.xml")))
+
+
+def so101(directory: Path) -> AbstractAsyncContextManager[Stack]:
+    return running_stack(directory, robot="so101", settings=SO101)
 
 
 def ros(example: str) -> Starting:
@@ -59,6 +64,7 @@ ROBOTS = [
     pytest.param(registered("micromanipulator"), id="micromanipulator"),
     pytest.param(own_model, id="mjcf"),
     pytest.param(registered("tests.e2e.goal_arm:GoalArm"), id="goal-axes"),
+    pytest.param(so101, id="so101", marks=needs_so101),
     pytest.param(ros("base.yaml"), id="ros2-base", marks=needs_ros),
     pytest.param(ros("arm.yaml"), id="ros2-arm", marks=needs_ros),
     pytest.param(in_c, id="c"),
@@ -99,10 +105,9 @@ async def _arm(console: ConsolePage) -> None:
 async def _drive(console: ConsolePage, robot: Any, binding: Any) -> None:
     """Hold the deadman and this one input until the axis is seen to move the way it was told to."""
     axis = next(axis for axis in robot["axes"] if axis["name"] == binding["axis"])
-    direction = -1 if binding["invert_pad"] else 1
+    sign, moved = await _moved(console, axis, binding["scale"])
+    direction = -sign if binding["invert_pad"] else sign
     rendered = await _rendered(console)
-    least = MOVED * binding["scale"] * (axis["maximum"] - axis["rest"])
-    moved = f"s.axes['{axis['name']}'] - {axis['rest']} > {least}"
     for _ in range(TRIES):
         await console.press(RB)
         if binding["pad"] in STICKS:
@@ -119,6 +124,20 @@ async def _drive(console: ConsolePage, robot: Any, binding: Any) -> None:
         await console.until(f"s.streams['{name}'].rendered > {count}")
     await _let_go(console, binding, direction)
     await console.until("!s.driving && s.at_rest === true", 30)
+
+
+async def _moved(console: ConsolePage, axis: Any, scale: float) -> tuple[int, str]:
+    """Return the direction to drive an axis in, and the condition that it has moved.
+
+    A goal axis goes to the wider side of its range; it is its applied goal that moves: five joints cannot turn a tool
+    every way.
+    """
+    name = axis["name"]
+    if axis["kind"] == "rate":
+        return 1, f"s.axes['{name}'] - {axis['rest']} > {MOVED * scale * (axis['maximum'] - axis['rest'])}"
+    start = (await console.stats())["goals"][name]
+    sign = 1 if start <= (axis["minimum"] + axis["maximum"]) / 2 else -1
+    return sign, f"{sign} * (s.goals['{name}'] - {start}) > {MOVED * scale * min(axis['reach'], axis['slew'])}"
 
 
 async def _let_go(console: ConsolePage, binding: Any, direction: int) -> None:

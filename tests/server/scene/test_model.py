@@ -1,5 +1,6 @@
 """A robot in viser, built from its description and posed from feedback."""
 
+import math
 from collections.abc import Iterator
 
 import pytest
@@ -167,3 +168,18 @@ def test_a_robot_that_describes_little_is_shown_as_far_as_it_goes(
     server: viser.ViserServer, robot: RobotDescription
 ) -> None:
     SceneModel(server, robot).pose(_feedback(wrench=[1.0] * 6, ranges=[0.5]))
+
+
+@pytest.mark.parametrize(("size", "nearest", "furthest"), [(0.25, 0.5, 1.5), (5.0, 5.0, 12.0)])
+def test_the_first_view_of_an_arm_on_a_table_is_from_near(
+    server: viser.ViserServer, size: float, nearest: float, furthest: float
+) -> None:
+    turning = BodyJoint(joint="turn", kind="revolute", axis=Z)
+    arm = (
+        Body(name="foot", parent=""),
+        Body(name="upper", parent="foot", position=(size, 0.0, 0.0), joints=(turning,)),
+    )
+    SceneModel(server, RobotDescription(name="r", label="R", axes=(), joints=ROBOT.joints, bodies=arm))
+    camera = server.initial_camera
+    away = math.dist(camera.position, camera.look_at)
+    assert nearest < away < furthest

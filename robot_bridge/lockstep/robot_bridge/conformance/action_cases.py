@@ -45,7 +45,7 @@ async def _told(driver: Driver, id: str, patience: float = PATIENCE) -> ActionUp
     """Return the next update of this request."""
     async with within(patience, f"no `action` message tells of request {id}"):
         while True:
-            said = await driver.next()
+            said = driver.passed_over.popleft() if driver.passed_over else await driver.next()
             if isinstance(said, ActionUpdate) and said.id == id:
                 return said
 

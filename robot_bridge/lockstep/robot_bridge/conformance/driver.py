@@ -2,9 +2,11 @@
 
 import asyncio
 import contextlib
+from collections import deque
 from collections.abc import Callable, Sequence
 from typing import Protocol
 
+from lockstep.protocol.actions import ActionUpdate
 from lockstep.protocol.description import Axis, RobotDescription
 from lockstep.protocol.messages import Command, Feedback, Goodbye, LinkMessage, Refusal, Reset, Stop, StopTaken
 from lockstep.protocol.neutral import neutral_values
@@ -17,6 +19,7 @@ from lockstep.robot_bridge.control.feedback_fit import misfit
 __all__ = ["BY", "Driver", "Motion", "first_motion", "near_goal"]
 
 BY = "lockstep check"  # name for stops and resets
+KEPT = 64  # updates of actions
 TRIES = 5  # attempts at a command that a bridge on a busy machine refuses because it was held up
 MOST_AHEAD = 3  # events by which a bridge may delay feedback, to keep max_event_rate
 RESET_AGAIN = 0.1  # s between two tries to reset a stop that is too new
@@ -42,6 +45,7 @@ class Driver:
         self.description = description
         self.feedback = Feedback(event=1, issue=1, time=0.0, axes=[])  # until the first has come
         self.began: dict[int, float] = {}  # event -> s of the bridge's clock, when it was first measured
+        self.passed_over: deque[ActionUpdate] = deque(maxlen=KEPT)  # heard while a stop was pressed, oldest first
         self._motion = motion
         self._next_command = 0.0  # s of the loop's clock: not before that, to keep max_event_rate
 
@@ -157,13 +161,14 @@ class Driver:
                     raise Violation(f"the reset released the stop; it had to be refused {reasons[0]!r}")
 
     async def stop(self, press: str, peer: Peer | None = None) -> int:
-        """Press STOP, on this link or another; return the number of the press."""
+        """Press STOP, on this link or another; return the number of the press. `passed_over` gets what actions say."""
         self._motion.presses.add(press)
         on = peer or self.peer
         on.send(Stop(by=BY, reason="a case of the conformance check", press=press))
         async with within(PATIENCE, "a stop was not answered with stop_taken"):
             while not isinstance(said := await self.next() if on is self.peer else await on.find(StopTaken), StopTaken):
-                pass
+                if isinstance(said, ActionUpdate):
+                    self.passed_over.append(said)
         expect(said.press == press, f"stop_taken names the press {said.press!r}, not {press!r}")
         return said.number
 

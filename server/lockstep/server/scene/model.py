@@ -30,7 +30,8 @@ RAY = (40, 92, 122)
 GHOST_APART = 0.008  # of the radius of the scene: nearer than this the ghost is not drawn
 ARROW_LEAST = 0.15  # m, so that a light contact shows
 ARROW_LENGTH = 0.6  # m at full scale
-MIN_VIEW, MAX_VIEW = 1.6, 6.0  # m, distance of the first view
+USUAL_VIEW = 1.6  # m, distance of the first view of a robot whose bodies have no places of their own
+MIN_VIEW, MAX_VIEW = 0.5, 6.0  # m, of the others: an arm on a table is seen from near
 
 Triple = tuple[float, float, float]
 
@@ -120,9 +121,9 @@ class SceneModel:
     def _radius(self) -> float:
         positions = world_positions(self._description, {})
         if not positions:
-            return MIN_VIEW
+            return USUAL_VIEW
         reach = float(np.max(np.linalg.norm(np.array(positions) - np.array(self._center()), axis=1)))
-        return min(max(reach, MIN_VIEW), MAX_VIEW)
+        return min(max(reach, MIN_VIEW), MAX_VIEW) if reach else USUAL_VIEW
 
     def _place_fixed_bodies(self) -> None:
         for body in self._description.bodies:

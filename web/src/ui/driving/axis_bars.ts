@@ -30,7 +30,7 @@ export function createAxisBars(engine: ConsoleEngine): Panel {
       const names = axesShown(description, engine.layer);
       const shown = bars.filter(({ axis }) => names.has(axis.name));
       setData(element, "goals", String(shown.some(({ axis }) => axis.kind === "goal")));
-      setData(element, "crowd", shown.length > 4 ? "many" : "");
+      setData(element, "crowd", shown.length > 6 ? "most" : shown.length > 4 ? "many" : "");
       setData(element, "rates", String(shown.some(({ axis }) => axis.kind === "rate")));
       for (const [index, bar] of bars.entries()) {
         setHidden(bar.element, !names.has(bar.axis.name));

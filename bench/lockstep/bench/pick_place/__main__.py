@@ -1,0 +1,3 @@
+from lockstep.bench.pick_place.cli import app
+
+app()

@@ -1,0 +1,136 @@
+"""A scripted operator of the SO-101: puts a block into the bowl by goals.
+
+It answers each feedback with one command, so that it runs over any link and any network: `Operator`-like test helpers,
+`RobotLink`, or the headless client (`feedback = await console.drive(task.values(feedback))`). No I/O, no clock.
+
+It knows where the blocks and the bowl begin, which the robot's action `reset_scene` restores; it sees nothing.
+"""
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Final, Protocol, TypeVar
+
+from lockstep.bench.pick_place.motions import POSITION, Motion, motions
+from lockstep.protocol.description import RobotDescription
+from lockstep.protocol.messages import Feedback
+
+__all__ = ["APPLIED", "Hand", "PickAndPlace", "ToolHand"]
+
+STEP: Final = 0.07  # m, of a goal ahead of the measured tool: less than its reach
+THERE: Final = 0.006  # m, of the measured tool
+NUDGE: Final = 0.004  # m, to and fro
+STANDS: Final = 0.0005  # m: a goal that moves by less stands still
+APPLIED: Final = 0.02  # rad and m, of the applied goal
+PAUSE: Final = 0.25  # s of the robot's clock that a motion settles for
+LONGEST: Final = 30.0  # s for one motion
+
+Value = TypeVar("Value", float, float | None)
+
+
+class Hand(Protocol):
+    """The way in which a motion becomes a command."""
+
+    def values(self, goals: Mapping[str, float], feedback: Feedback) -> Mapping[str, float | None]:
+        """Return values by axis that answer the feedback and lead to these goals of the tool or the gripper."""
+
+    def applied(self, goals: Mapping[str, float], feedback: Feedback) -> bool:
+        """Return whether what it commands for these goals is applied."""
+
+
+def by_name(description: RobotDescription, values: Sequence[Value]) -> dict[str, Value]:
+    """Return one value per axis of a feedback by the axes' names."""
+    return {axis.name: value for axis, value in zip(description.axes, values, strict=True)}
+
+
+class ToolHand:
+    """Drives the tool's pose; the robot solves the joints for it."""
+
+    def __init__(self, description: RobotDescription) -> None:
+        self._description = description
+        self._before: dict[str, float] = {}  # m, goals of the tool's place in the last command
+        self._nudge = NUDGE
+
+    def values(self, goals: Mapping[str, float], feedback: Feedback) -> Mapping[str, float | None]:
+        here = by_name(self._description, feedback.axes)
+        way = {name: goals[name] - here[name] for name in POSITION if name in goals}
+        distance = math.hypot(*way.values()) if way else 0.0
+        share = min(1.0, STEP / distance) if distance else 1.0
+        place = {name: here[name] + share * each if share < 1 else goals[name] for name, each in way.items()}
+        return dict(goals) | self._moved_on(place, distance)
+
+    def _moved_on(self, place: dict[str, float], distance: float) -> dict[str, float]:
+        """Move a goal that would stand still: then the arm rests before it is there (docs/so101.md).
+
+        Over a network with a long round trip, or when a busy machine interrupts the arm, it may be left behind.
+        """
+        before, self._before = self._before, place
+        stands = before.keys() == place.keys() and all(abs(place[name] - before[name]) < STANDS for name in place)
+        if not stands or distance < THERE / 2 or "tool.z" not in place:
+            return place
+        self._nudge = -self._nudge
+        return place | {"tool.z": place["tool.z"] + self._nudge}
+
+    def applied(self, goals: Mapping[str, float], feedback: Feedback) -> bool:
+        there = by_name(self._description, feedback.goals)
+        return all((goal := there[name]) is not None and abs(goal - goals[name]) < APPLIED for name in goals)
+
+
+class PickAndPlace:
+    """One block. `done` once it is in the bowl and the tool is above it.
+
+    Attributes:
+        done: the script is at its end
+        failed: what went wrong; "" as long as nothing did
+    """
+
+    def __init__(self, description: RobotDescription, block: str, hand: Hand | None = None) -> None:
+        """`block`: one of BLOCKS. `hand`: None: the tool's pose is driven."""
+        self._description = description
+        self._index = {axis.name: number for number, axis in enumerate(description.axes)}
+        self._hand = ToolHand(description) if hand is None else hand
+        self._motions = motions(block)
+        self._motion = next(self._motions, None)  # the present one
+        self._begun: float | None = None  # s, of the robot's clock
+        self._there: float | None = None
+        self.failed = ""
+
+    @property
+    def done(self) -> bool:
+        return self._motion is None
+
+    def values(self, feedback: Feedback) -> list[float | None]:
+        """Return the values of the command that answers this feedback; all None once it is done."""
+        self._go_on(feedback)
+        if self._motion is None or self.failed:
+            return [None] * len(self._index)
+        named = self._hand.values(self._motion.goals, feedback)
+        return [named.get(name) for name in self._index]
+
+    def _go_on(self, feedback: Feedback) -> None:
+        """Begin the next motion when the present one has settled."""
+        if self._motion is None:
+            return
+        self._begun = feedback.time if self._begun is None else self._begun
+        if not self._is_there(self._motion, feedback):
+            self._there = None
+            if feedback.time - self._begun > LONGEST:
+                self.failed = self._where(self._motion, feedback)
+            return
+        self._there = feedback.time if self._there is None else self._there
+        if feedback.time - self._there >= PAUSE:
+            self._motion = next(self._motions, None)
+            self._begun = self._there = None
+
+    def _where(self, motion: Motion, feedback: Feedback) -> str:
+        places = [
+            f"{name} is {feedback.axes[self._index[name]]:.3f}, commanded {feedback.goals[self._index[name]]}, "
+            f"wanted {goal:.3f}"
+            for name, goal in motion.goals.items()
+        ]
+        return f"after {LONGEST:g} s {'; '.join([*places, *feedback.faults, *feedback.limits])}"
+
+    def _is_there(self, motion: Motion, feedback: Feedback) -> bool:
+        place = [feedback.axes[self._index[name]] - motion.goals[name] for name in POSITION if name in motion.goals]
+        if motion.must_arrive and math.hypot(*place) >= THERE:
+            return False
+        return self._hand.applied(motion.goals, feedback)
