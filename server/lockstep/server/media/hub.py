@@ -150,6 +150,11 @@ class MediaHub:
             else:
                 stream.recording.record(take, keyframe_seconds)
 
+    @property
+    def is_recorded(self) -> bool:
+        """True while frames are handed to a recorder."""
+        return self._recorder is not None
+
     def record_keyframes(self) -> None:
         """Request a keyframe of every camera, because a new file begins."""
         for stream in self._streams.values():
