@@ -18,6 +18,10 @@ async def listening(rig: Rig) -> int:
     return service.port
 
 
+def is_recorded(rig: Rig) -> bool:
+    return rig.dependencies.media.is_recorded
+
+
 async def test_a_viewer_gets_the_state_that_holds_and_the_feedback_of_a_robot_that_idles() -> None:
     async with running_rig(foxglove={"port": 0}) as rig, viewing(await listening(rig)) as viewer:
         await viewer.subscribe("/lockstep/robot", "/lockstep/seat", "/lockstep/feedback", "/tf", "/tf_static")
@@ -38,10 +42,10 @@ async def test_pictures_come_from_a_keyframe_on_and_a_stamp_names_the_event_of_e
     async with running_rig(foxglove={"port": 0}) as rig, viewing(await listening(rig)) as viewer:
         await viewer.until(lambda: "/lockstep/stamp" in viewer.channels)
         camera = next(topic for topic in viewer.channels if topic.startswith("/camera/"))
-        assert not rig.dependencies.media.is_recorded
+        assert not is_recorded(rig)
         await viewer.subscribe(camera, "/lockstep/stamp")
         await viewer.until(lambda: len(viewer.of(camera)) >= 5 and len(viewer.of("/lockstep/stamp")) >= 5)
-        assert rig.dependencies.media.is_recorded
+        assert is_recorded(rig)
         pictures = [CompressedVideo.FromString(each.SerializeToString()) for each in viewer.of(camera)]
         stamps = {
             (each["timestamp"]["sec"], each["timestamp"]["nsec"]): each["event"]
@@ -50,7 +54,7 @@ async def test_pictures_come_from_a_keyframe_on_and_a_stamp_names_the_event_of_e
         }
         await viewer.unsubscribe_all()
         async with asyncio.timeout(PATIENCE):
-            while rig.dependencies.media.is_recorded:  # noqa: ASYNC110
+            while is_recorded(rig):  # noqa: ASYNC110
                 await asyncio.sleep(0.01)
     decoder = av.CodecContext.create("h264", "r")
     for picture in pictures[:4]:

@@ -207,9 +207,7 @@ async def _session(
 def _foxglove(settings: Settings, clock: EventClock, takers: FrameTakers, metrics: Metrics) -> FoxgloveService:
     dropped = metrics.dropped.labels("foxglove")
     keyframe_seconds = settings.recording.keyframe_seconds
-    return FoxgloveService(
-        settings.foxglove, clock, takers.add(), keyframe_seconds, dropped.inc, metrics.faults.caught
-    )
+    return FoxgloveService(settings.foxglove, clock, takers.add(), keyframe_seconds, dropped.inc, metrics.faults.caught)
 
 
 def _dial_in(settings: Settings, context: ConsoleContext, directory: StateDir) -> DialIn:

@@ -9,7 +9,7 @@ __all__ = ["FoxgloveSettings"]
 
 
 class FoxgloveSettings(BaseModel):
-    """The address of the Foxglove server. It asks nobody for a link, so it listens on loopback unless `public` is set."""
+    """The address of the Foxglove server. It asks for no link, so it listens on loopback unless `public` is set."""
 
     port: Annotated[int, Field(ge=0, le=65535)] | None = None  # None: there is no server; 0: any free port
     host: str = "127.0.0.1"  # address of this machine

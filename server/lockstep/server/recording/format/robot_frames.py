@@ -1,4 +1,4 @@
-"""Where the robot's bodies are and what they look like, in Foxglove's schemas. No I/O, no clock; times in ns since 1970.
+"""Poses and shapes of the robot's bodies in Foxglove's schemas. No I/O, no clock; times in ns since 1970.
 
 Each body is a frame with the body's name in its parent's, as in the robot description; bodies without a parent are in
 the frame WORLD. The frames of bodies on joints come with each feedback, the others, and the shapes, once.
