@@ -93,7 +93,7 @@ async def test_a_port_that_is_taken_takes_nothing_but_the_viewers_from_the_conso
         assert not rig.dependencies.foxglove.listening.is_set()
 
 
-async def test_a_viewer_that_does_not_read_delays_no_other_and_is_no_load() -> None:
+async def test_a_viewer_that_does_not_read_delays_no_other() -> None:
     async with running_rig(foxglove={"port": 0}) as rig:
         port = await listening(rig)
         async with viewing(port) as slow, viewing(port) as viewer:
