@@ -2,7 +2,6 @@
 
 import asyncio
 import time
-from collections import Counter
 from collections.abc import Callable
 from contextlib import suppress
 
@@ -11,8 +10,8 @@ import structlog
 from lockstep.server.event_clock import EventClock
 from lockstep.server.foxglove.publishing_thread import PublishingThread
 from lockstep.server.foxglove.settings import FoxgloveSettings
+from lockstep.server.foxglove.subscriptions import Subscribers, Subscriptions
 from lockstep.server.media.frame_takers import TakenMedia
-from lockstep.server.recording.format.topics import stream_of
 from lockstep.server.recording.times import RecordClock
 from lockstep.server.recording.writing.session_records import SessionRecords
 from lockstep.server.session_events import SessionEvents
@@ -60,11 +59,9 @@ class FoxgloveService:
         self._on_dropped = on_dropped
         self._on_fault = on_fault
         self._records = SessionRecords(clock, media)
-        self._subscriptions: Counter[str] = Counter()  # by topic
-        self._changed = asyncio.Event()
-        self._newcomer = False  # somebody subscribed who has nothing yet
-        self._media_newcomer = False
+        self._changed = asyncio.Event()  # of subscriptions
         self._takes_media = False
+        self._keyframe_wanted = False  # somebody waits for one
         self._keyframe_at = 0.0  # s, monotonic: of the last one that was asked for
 
     def subscribe(self, events: SessionEvents) -> None:
@@ -76,18 +73,19 @@ class FoxgloveService:
 
         loop = asyncio.get_running_loop()
 
-        def subscribed(topic: str, change: int) -> None:
+        def wake() -> None:
             with suppress(RuntimeError):  # the loop has ended meanwhile
-                loop.call_soon_threadsafe(self._subscribed, topic, change)
+                loop.call_soon_threadsafe(self._changed.set)
 
         def failed(error: Exception) -> None:
             with suppress(RuntimeError):
                 loop.call_soon_threadsafe(self._on_fault, "foxglove", error)
 
+        subscriptions = Subscriptions(wake)
         while True:
             try:
                 # Listening is a bind, and no name is looked up: nothing that blocks the loop.
-                server = SdkServer(self._settings.host, self._settings.port or 0, subscribed)
+                server = SdkServer(self._settings.host, self._settings.port or 0, subscriptions.change)
                 break
             except (RuntimeError, OSError) as error:
                 log.error("the Foxglove server cannot listen", host=self._settings.host, reason=str(error))
@@ -98,19 +96,16 @@ class FoxgloveService:
             self.port = server.port
             self.listening.set()
             log.info("Foxglove server", address=f"ws://{self._settings.host}:{server.port}")
-            await self._serve(thread)
+            await self._serve(thread, subscriptions)
         finally:
             self._records.end()
             self._media.record(None, self._keyframe_seconds)
             self._takes_media = False
             self.listening.clear()
             self.port = 0
-            try:
-                await asyncio.shield(asyncio.to_thread(_close, thread, server.stop))
-            finally:
-                self._subscriptions.clear()  # the server's end ends them one by one
+            await asyncio.shield(asyncio.to_thread(_close, thread, server.stop))
 
-    async def _serve(self, thread: PublishingThread) -> None:
+    async def _serve(self, thread: PublishingThread, subscriptions: Subscriptions) -> None:
         times = RecordClock(time.time_ns(), time.monotonic_ns())
         self._records.begin(thread, times)  # the topics are offered before anybody comes
         told = 0
@@ -119,30 +114,23 @@ class FoxgloveService:
                 async with asyncio.timeout(KEYFRAME_SECONDS):
                     await self._changed.wait()
             self._changed.clear()
-            thread.watched = self._subscriptions.total() > 0
-            if self._newcomer:
-                self._newcomer = False
+            wanted = subscriptions.look()
+            thread.watched = wanted.any
+            if wanted.newcomer:
                 self._records.begin(thread, times)
-            self._take_media()
+            self._take_media(wanted)
             self._on_dropped(thread.dropped - told)
             told = thread.dropped
             await asyncio.sleep(SETTLE_SECONDS)
 
-    def _subscribed(self, topic: str, change: int) -> None:
-        self._subscriptions[topic] += change
-        if change > 0:
-            self._newcomer = True
-            self._media_newcomer |= bool(stream_of(topic))
-        self._changed.set()
-
-    def _take_media(self) -> None:
-        wanted = any(count > 0 and stream_of(topic) for topic, count in self._subscriptions.items())
+    def _take_media(self, wanted: Subscribers) -> None:
         now = time.monotonic()
-        if wanted != self._takes_media:
-            self._takes_media, self._keyframe_at, self._media_newcomer = wanted, now, False
-            self._media.record(self._records.take_frame if wanted else None, self._keyframe_seconds)
-        elif wanted and self._media_newcomer and now - self._keyframe_at >= KEYFRAME_SECONDS:
-            self._keyframe_at, self._media_newcomer = now, False
+        self._keyframe_wanted |= wanted.media_newcomer
+        if wanted.media != self._takes_media:
+            self._takes_media, self._keyframe_at, self._keyframe_wanted = wanted.media, now, False
+            self._media.record(self._records.take_frame if wanted.media else None, self._keyframe_seconds)
+        elif wanted.media and self._keyframe_wanted and now - self._keyframe_at >= KEYFRAME_SECONDS:
+            self._keyframe_at, self._keyframe_wanted = now, False
             self._media.record_keyframes()
 
 
