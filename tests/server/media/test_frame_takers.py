@@ -12,13 +12,15 @@ class Hub:
         self.take: FrameTaker | None = None
         self.begun = 0
         self.keyframes = 0
+        self.afresh: bool | None = None
 
     def record(self, take: FrameTaker | None, keyframe_seconds: float = 4.0) -> None:
         self.take = take
         self.begun += take is not None
 
-    def record_keyframes(self) -> None:
+    def record_keyframes(self, *, afresh: bool = True) -> None:
         self.keyframes += 1
+        self.afresh = afresh
 
     def recorded_codecs(self) -> Mapping[str, str]:
         return {"front": "H264"}
@@ -50,7 +52,11 @@ def test_a_second_taker_leaves_the_first_ones_stream_alone_and_begins_with_a_key
     hub.give(3, keyframe=True)
     hub.give(4)
     assert (first, second) == ([1, 2, 3, 4], [3, 4])
-    assert (hub.begun, hub.keyframes) == (1, 1)
+    assert (hub.begun, hub.keyframes, hub.afresh) == (1, 1, False)
+    viewer.request_keyframes()
+    assert (hub.keyframes, hub.afresh) == (2, False)
+    recorder.record_keyframes()  # of a new file
+    assert (hub.keyframes, hub.afresh) == (3, True)
 
 
 def test_streams_are_taken_until_the_last_taker_has_ended() -> None:

@@ -131,7 +131,7 @@ class FoxgloveService:
             self._media.record(self._records.take_frame if wanted.media else None, self._keyframe_seconds)
         elif wanted.media and self._keyframe_wanted and now - self._keyframe_at >= KEYFRAME_SECONDS:
             self._keyframe_at, self._keyframe_wanted = now, False
-            self._media.record_keyframes()
+            self._media.request_keyframes()
 
 
 def _close(thread: PublishingThread, stop: Callable[[], None]) -> None:

@@ -13,7 +13,7 @@ class RecordingHub(Protocol):
     """The part of the media hub that is needed here."""
 
     def record(self, take: FrameTaker | None, keyframe_seconds: float = ...) -> None: ...
-    def record_keyframes(self) -> None: ...
+    def record_keyframes(self, *, afresh: bool = ...) -> None: ...
     def recorded_codecs(self) -> Mapping[str, str]: ...
 
 
@@ -35,7 +35,7 @@ class FrameTakers:
         if first:
             self._hub.record(self._take, keyframe_seconds)
         else:
-            self._hub.record_keyframes()
+            self._hub.record_keyframes(afresh=False)
 
     def end(self, who: "TakenMedia", keyframe_seconds: float) -> None:
         """Hand no more frames to `who`. Idempotent."""
@@ -68,7 +68,12 @@ class TakenMedia:
         else:
             self._takers.begin(self, self._taken, keyframe_seconds)
 
+    def request_keyframes(self) -> None:
+        """Request keyframes, and change nothing for other takers. A camera that takes no requests gives one later."""
+        self._hub.record_keyframes(afresh=False)
+
     def record_keyframes(self) -> None:
+        """Request keyframes, because a new file begins."""
         self._hub.record_keyframes()
 
     def recorded_codecs(self) -> Mapping[str, str]:
