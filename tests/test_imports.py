@@ -28,7 +28,8 @@ FROM_THE_BRIDGE = {
 LAYERS = (
     "errors", "event_clock", "util", "telemetry", "evidence", "audit", "stop", "session_events", "webrtc", "media",
     "talkback", "auth", "http", "peers", "sfu", "robot", "actions", "federation", "publishing", "scene",
-    "settings_file", "settings", "control", "recording", "state", "routes", "composition", "fleet", "cli",
+    "settings_file", "settings", "control", "recording",
+    "foxglove", "state", "routes", "composition", "fleet", "cli",
 )  # fmt: skip
 
 

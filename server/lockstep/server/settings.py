@@ -12,6 +12,7 @@ from lockstep.protocol.console import SpeedCapMode
 from lockstep.protocol.errors import SecretError
 from lockstep.server.federation.settings import BoardSettings
 from lockstep.server.fleet.settings import FleetSettings
+from lockstep.server.foxglove.settings import FoxgloveSettings
 from lockstep.server.http.limit_settings import LimitSettings
 from lockstep.server.http.network_settings import NameList, NetworkSettings
 from lockstep.server.media.settings import MediaSettings
@@ -80,6 +81,7 @@ class Settings(NetworkSettings, LimitSettings, SourceSettings, RelaySettings, Fl
     media: MediaSettings = MediaSettings()
     recording: RecordingSettings = RecordingSettings()
     episodes: EpisodeSettings = EpisodeSettings()
+    foxglove: FoxgloveSettings = FoxgloveSettings()
 
     @classmethod
     def settings_customise_sources(

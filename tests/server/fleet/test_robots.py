@@ -73,6 +73,20 @@ def test_a_robot_that_sets_something_of_its_recordings_keeps_a_directory_of_its_
         assert all(each.recording.automatic for each in found.values())
 
 
+def test_robots_of_a_fleet_serve_foxglove_at_ports_of_their_own(tmp_path: Path) -> None:
+    tables = """
+        [robots.left]
+        robot = "tcp://h:1"
+        foxglove = { port = 8765 }
+        [robots.right]
+        robot = "tcp://h:2"
+        """
+    found = robot_settings(Settings(fleet_file=fleet_file(tmp_path, tables)))
+    assert {name: each.foxglove.port for name, each in found.items()} == {"left": 8765, "right": None}
+    with pytest.raises(BadFleet, match="left and right have the same port 8765"):
+        robot_settings(Settings(robots=TWO, foxglove={"port": 8765}))  # type: ignore[arg-type]
+
+
 @pytest.mark.parametrize(
     ("text", "name"),
     [

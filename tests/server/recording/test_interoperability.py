@@ -5,16 +5,23 @@ from pathlib import Path
 import av
 import pytest
 from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey
-from foxglove.messages import CompressedVideo
+from foxglove.messages import CompressedVideo, FrameTransforms, Odometry, SceneUpdate
 from foxglove.messages import JointStates as SdkJointStates
 from foxglove_schemas_protobuf.CompressedAudio_pb2 import CompressedAudio
 from foxglove_schemas_protobuf.CompressedVideo_pb2 import CompressedVideo as Message
 from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
+from google.protobuf.descriptor_pb2 import FileDescriptorSet
 from mcap.reader import make_reader
 
+from lockstep.protocol.messages import Feedback
+from lockstep.robot_bridge.robots.registry import create_robot
 from lockstep.server.evidence.signer import Signer
+from lockstep.server.recording.format.records import RobotRecord
 from lockstep.server.recording.format.signature import RecordingSigning
-from tests.server.recording.makers import Story
+from lockstep.server.recording.format.topics import topics_of
+from lockstep.server.recording.writing.queue_items import FeedbackItem, RobotItem, entries_of
+from lockstep.server.recording.writing.writer import RecordingWriter
+from tests.server.recording.makers import EPOCH, INFO, SECOND, START, Story
 
 EVENTS = 60
 
@@ -60,19 +67,65 @@ def test_schemas_are_those_of_the_foxglove_sdk(file: Path) -> None:
     assert [joint.name for joint in JointStates.FromString(message.data).joints] == ["x", "y", "yaw"]
 
 
+@pytest.mark.parametrize("kind", [FrameTransforms, Odometry, SceneUpdate])
+def test_the_fields_of_frames_shapes_and_odometry_are_those_of_the_foxglove_sdk(
+    kind: type[FrameTransforms] | type[Odometry] | type[SceneUpdate],
+) -> None:
+    theirs = kind.get_schema()
+    topics = topics_of(create_robot("mobile-manipulator").describe(), {})
+    ours = next(topic for topic in topics if topic.schema == theirs.name)
+    assert _fields(ours.schema_data) == _fields(theirs.data)
+
+
+def _fields(schema: bytes) -> set[tuple[str, str, int, int, str]]:
+    """Message, name, number, type and message type of every field in a schema."""
+    return {
+        (message.name, field.name, field.number, field.type, field.type_name)
+        for file in FileDescriptorSet.FromString(schema).file
+        for message in file.message_type
+        for field in message.field
+    }
+
+
+def test_rerun_loads_frames_shapes_and_odometry(tmp_path: Path) -> None:
+    description = create_robot("mobile-manipulator").describe()
+    file = tmp_path / "a.mcap"
+    writer = RecordingWriter(file, INFO, description, {})
+    robot = RobotItem(START, RobotRecord(epoch=EPOCH, event=1, link="up", description=description), {})
+    joints = [0.1] * len(description.joints)
+    for number in range(1, 10):
+        feedback = Feedback(
+            event=number, issue=1, time=float(number), axes=[0.0] * len(description.axes), joints=joints
+        )
+        at = START + number * SECOND // 25
+        for entry in (
+            *(entries_of(robot, description) if number == 1 else ()),
+            *entries_of(FeedbackItem(at, at, EPOCH, feedback), description),
+        ):
+            writer.write(entry)
+    assert writer.close().lost == 0
+    loaded = _loaded_by_rerun(file, tmp_path)
+    for topic in ("/tf", "/tf_static", "/robot_shapes", "/odom"):
+        assert topic.encode() in loaded
+
+
 @pytest.mark.parametrize(("codec", "sounds"), [("H264", ("opus",)), ("VP8", ("opus", "PCMU"))])
 def test_rerun_loads_it(codec: str, sounds: tuple[str, ...], tmp_path: Path) -> None:
     """With pictures in VP8, or sound in G.711, all the rest: it knows neither."""
     file = tmp_path / "a.mcap"
     signing = RecordingSigning(Signer(Ed25519PrivateKey.generate()), lambda: "")
     Story(events=EVENTS, real=True, codecs=(codec,), sounds=sounds).write(file, signing=signing)
+    loaded = _loaded_by_rerun(file, tmp_path)
+    assert b"/camera/front" in loaded
+    assert b"/lockstep/feedback" in loaded
+
+
+def _loaded_by_rerun(file: Path, folder: Path) -> bytes:
     rerun = pytest.importorskip("rerun")
-    target = tmp_path / "a.rrd"
+    target = folder / "a.rrd"
     recording = rerun.RecordingStream("lockstep-test")
     recording.save(str(target))
     recording.log_file_from_path(str(file))
     recording.flush()
     recording.disconnect()
-    loaded = target.read_bytes()
-    assert b"/camera/front" in loaded
-    assert b"/lockstep/feedback" in loaded
+    return target.read_bytes()

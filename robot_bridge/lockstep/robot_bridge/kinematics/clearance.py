@@ -69,8 +69,10 @@ class Clearance:
         here, there = a + s * (b - a), c + t * (d - c)
         apart = here - there
         length = math.sqrt(apart @ apart)
-        if not TINY < length < radii + within:
+        if length >= radii + within:
             return None
+        if length <= TINY:  # the lines cross: no direction leads apart more than another
+            return Gap(length - radii, np.zeros(state.linear.shape[1]))
         motion = self._motion(state, self._ends[first], here) - self._motion(state, self._ends[second], there)
         return Gap(length - radii, apart @ motion / length)
 

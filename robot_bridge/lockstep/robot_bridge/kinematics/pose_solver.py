@@ -81,6 +81,7 @@ class PoseSolver:
         self._chain = chain
         self._lower, self._upper = np.array(bounds.lower), np.array(bounds.upper)
         self._rates = np.array(bounds.rates)
+        self._ramp = bounds.ramp
         self._accelerations = self._rates / bounds.ramp
         self._posture = None if posture is None else np.array(posture)
         self._clearance = clearance
@@ -124,7 +125,7 @@ class PoseSolver:
         # A goal that cannot be reached leaves an error, whose curvature a step of least squares does not know: the step
         # would be too long, and the joints would swing. Damping by the error bounds it (Sugihara 2011), and vanishes as
         # a goal that can be reached is approached.
-        part = tuning.gain * seconds
+        part = tuning.gain * (seconds + self._ramp / 2)  # the time in which a rate follows what is solved here
         residual = (part * tuning.bend * min(float(np.sqrt(error @ error)), tuning.longest), part * angle)
         slowest, fastest = self._speeds(here, share)
         rates, limited = self._within(state, here, (wanted, turn), residual, slowest, fastest)

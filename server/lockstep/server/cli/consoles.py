@@ -17,11 +17,13 @@ from pydantic import SecretStr
 from lockstep.protocol.link_secret import LinkSecret
 from lockstep.robot_bridge.encoding.encoder_choice import ENCODERS
 from lockstep.robot_bridge.robots.registry import is_robot, robot_names, simulated_names
+from lockstep.server.cli.extras import load_extra
 from lockstep.server.cli.options import (
     AllowedHosts,
     Board,
     Cameras,
     Config,
+    Foxglove,
     Microphones,
     ObserversDirect,
     PublicUrl,
@@ -159,6 +161,7 @@ def up(
     quality: Quality = None,
     speed_cap: SpeedCap = None,
     record: Record = None,
+    foxglove: Foxglove = None,
     relay: Relay = None,
     observers_direct: ObserversDirect = None,
     public_url: PublicUrl = None,
@@ -192,6 +195,7 @@ def up(
         speaker=speaker,
         speed_cap=speed_cap,
         recording=_recording(record),
+        foxglove=None if foxglove is None else {"port": foxglove},
         relay=relay,
         observers_direct=observers_direct,
         log_format=log_format,
@@ -269,6 +273,7 @@ def serve(
     quality: Quality = None,
     speed_cap: SpeedCap = None,
     record: Record = None,
+    foxglove: Foxglove = None,
     relay: Relay = None,
     observers_direct: ObserversDirect = None,
     public_url: PublicUrl = None,
@@ -308,6 +313,7 @@ def serve(
         speaker=speaker,
         speed_cap=speed_cap,
         recording=_recording(record),
+        foxglove=None if foxglove is None else {"port": foxglove},
         relay=relay,
         observers_direct=observers_direct,
         log_format=log_format,
@@ -390,10 +396,13 @@ def _run(
         _check_files(settings)
         check_media_addresses(settings)
         check_board(settings, settings.public_url)
+        each_robot = [settings]
         if settings.is_fleet:
-            robot_settings(settings)
+            each_robot = list(robot_settings(settings).values())
         elif settings.has_board:
             raise BoardUnusable(NO_NAMES)
+        if any(each.foxglove.port is not None for each in each_robot):
+            load_extra("foxglove", "foxglove")
         listener = bind(settings.host, settings.port)
         state = open_state(settings, fall_back=True)
         uvloop.run(run_console(settings, state, listener, bridges, as_json))

@@ -11,6 +11,7 @@ __all__ = [
     "Board",
     "Cameras",
     "Config",
+    "Foxglove",
     "Microphones",
     "ObserversDirect",
     "PublicUrl",
@@ -112,6 +113,17 @@ ObserversDirect = Annotated[
 ]
 Record = Annotated[
     Path | None, typer.Option("--record", help="Record from the start, into this directory.", metavar="DIR")
+]
+Foxglove = Annotated[
+    int | None,
+    typer.Option(
+        "--foxglove",
+        min=0,
+        max=65535,
+        help="Serve the session live to Foxglove and Lichtblick, on this port of 127.0.0.1 (8765 is what they try "
+        "first). Whoever reaches the port sees everything. docs/foxglove.md",
+        metavar="PORT",
+    ),
 ]
 Speaker = Annotated[
     str | None,

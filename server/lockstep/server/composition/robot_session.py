@@ -16,7 +16,9 @@ from lockstep.server.control.session_metrics import SessionMetrics
 from lockstep.server.control.stop_silence import StopSilence
 from lockstep.server.event_clock import EventClock
 from lockstep.server.evidence.anchors import anchor_text
+from lockstep.server.foxglove.service import FoxgloveService
 from lockstep.server.http.transport.tls import own_pin
+from lockstep.server.media.frame_takers import FrameTakers
 from lockstep.server.media.hub import MediaHub
 from lockstep.server.media.sources.source_manager import SourceManager
 from lockstep.server.peers.peer_registry import PeerRegistry
@@ -114,7 +116,9 @@ async def _session(
     scene = SceneView(settings.scene_hz, settings.max_scene_viewers, metrics) if settings.scene else None
     shelf = RecordingStore(recordings_directory(settings.recording, directory.path), settings.recording)
     signing = RecordingSigning(context.state.signer, lambda: anchor_text(audit.newest_anchor()))
-    recorder = Recorder(settings.recording, shelf, clock, media, peers.announce, trail, signing)
+    takers = FrameTakers(media)
+    recorder = Recorder(settings.recording, shelf, clock, takers.add(), peers.announce, trail, signing)
+    foxglove = _foxglove(settings, clock, takers, metrics) if settings.foxglove.port is not None else None
     engine = JanusEngine(settings, context.endpoint, media, context.state.signing_key(settings) + robot)
     relays = SfuCoordinator(settings, engine, peers, context.state.invitations.has_ended)
     sources = SourceManager(settings.sources, clock, media, metrics.registry, peers.announce)
@@ -149,6 +153,8 @@ async def _session(
     notices.subscribe(events)
     recorder.subscribe(events)
     episodes.subscribe(events)
+    if foxglove is not None:
+        foxglove.subscribe(events)
     if scene is not None:
         scene.subscribe(events)
     revocation = TokenRevocation(context.state.invitations, peers, trail, silence, robot)
@@ -167,6 +173,7 @@ async def _session(
         revocation=revocation,
         scene=scene,
         recorder=recorder,
+        foxglove=foxglove,
         relays=relays,
         voice=voice,
         publishers=publishers,
@@ -193,6 +200,9 @@ async def _session(
             ]
             if scene is not None:
                 running.append(tasks.create_task(keep_running("scene", scene.run, metrics.faults), name="scene"))
+            if foxglove is not None:
+                serving = keep_running("foxglove", foxglove.run, metrics.faults)
+                running.append(tasks.create_task(serving, name="foxglove"))
             yield made
             for task in running:
                 task.cancel()
@@ -200,6 +210,12 @@ async def _session(
         made.recordings.close()
         if scene is not None:
             await scene.close()
+
+
+def _foxglove(settings: Settings, clock: EventClock, takers: FrameTakers, metrics: Metrics) -> FoxgloveService:
+    dropped = metrics.dropped.labels("foxglove")
+    keyframe_seconds = settings.recording.keyframe_seconds
+    return FoxgloveService(settings.foxglove, clock, takers.add(), keyframe_seconds, dropped.inc, metrics.faults.caught)
 
 
 def _dial_in(settings: Settings, context: ConsoleContext, directory: StateDir) -> DialIn:

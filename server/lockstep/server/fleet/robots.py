@@ -18,6 +18,7 @@ OWN = frozenset(
         *("cameras", "microphones", "whip", "speaker", "relay", "relay_public", "relay_codec", "observers_direct"),
         *("speed_cap", "seat_timeout", "seat_idle_seconds", "seat_claim_seconds", "observer_feedback_hz"),
         *("max_peers", "max_relayed", "max_thumbnails", "reserved_places", "scene", "scene_hz", "media", "recording"),
+        "foxglove",
     }
 )
 # A camera belongs to one robot: given to the whole console, it would show the same at every robot.
@@ -39,7 +40,21 @@ def robot_settings(settings: Settings) -> dict[str, Settings]:
     if not tables:
         raise BadFleet("no_robots", f"{settings.fleet_file}: the file has no table [robots.NAME]")
     common = {name: getattr(settings, name) for name in settings.model_fields_set - {"robots", "fleet_file", "config"}}
-    return {name: _settings(name, common, table) for name, table in tables}
+    made = {name: _settings(name, common, table) for name, table in tables}
+    _check_foxglove_ports(made)
+    return made
+
+
+def _check_foxglove_ports(robots: Mapping[str, Settings]) -> None:
+    """Raise BadFleet if two robots would serve Foxglove at the same port: a viewer would see one of them alone."""
+    taken: dict[int, str] = {}
+    for name, each in robots.items():
+        port = each.foxglove.port
+        if port and port in taken:
+            detail = f"robots {taken[port]} and {name} have the same port {port}; give each its own in the fleet file"
+            raise BadFleet("foxglove_port", detail)
+        if port:
+            taken[port] = name
 
 
 def _settings(name: str, common: Mapping[str, Any], table: Mapping[str, Any]) -> Settings:

@@ -150,10 +150,15 @@ class MediaHub:
             else:
                 stream.recording.record(take, keyframe_seconds)
 
-    def record_keyframes(self) -> None:
-        """Request a keyframe of every camera, because a new file begins."""
+    @property
+    def is_recorded(self) -> bool:
+        """True while frames are handed to a recorder."""
+        return self._recorder is not None
+
+    def record_keyframes(self, *, afresh: bool = True) -> None:
+        """Request a keyframe of every recorded stream; `afresh`: see `RecordedEncoding.request_keyframe`."""
         for stream in self._streams.values():
-            stream.recording.request_keyframe()
+            stream.recording.request_keyframe(afresh=afresh)
 
     def recorded_codecs(self) -> dict[str, str]:
         """Return each stream's recording codec while nobody takes another, by stream name: "H264", "opus" or "PCMU"."""

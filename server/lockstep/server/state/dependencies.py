@@ -15,6 +15,7 @@ from lockstep.server.auth.tokens import Access, Right
 from lockstep.server.control.console import Console
 from lockstep.server.control.stop_service import StopAnswer
 from lockstep.server.errors import RobotFailed, SceneUnavailable
+from lockstep.server.foxglove.service import FoxgloveService
 from lockstep.server.http.request_rate_limits import RequestRateLimits
 from lockstep.server.media.hub import MediaHub
 from lockstep.server.peers.token_revocation import TokenRevocation
@@ -67,6 +68,7 @@ class Dependencies:
     dial_in: DialIn | None  # None: the console connects to the robot
     recordings: RecordingService
     episodes: EpisodeService
+    foxglove: FoxgloveService | None = None  # None: no port was named
 
     @property
     def state(self) -> ConsoleState:

@@ -210,6 +210,19 @@ async def test_a_new_file_begins_with_a_keyframe_though_the_cameras_own_is_far()
         assert decoded(taken.frames) == 6
 
 
+async def test_whoever_asks_for_keyframes_without_a_new_file_waits_for_a_cameras_own() -> None:
+    taken, pictures = Taken(), camera_pictures(8, first=2, gop=6)
+    async with running_plane(description(microphones=0)) as hub:
+        hub.feed(camera_pictures(1)[0], 0.0)
+        hub.record(taken)
+        await taken.feed(hub, pictures[:3])
+        before = encoded(hub, "H264")
+        hub.record_keyframes(afresh=False)
+        await taken.feed(hub, pictures[3:])
+        assert [frame.data for frame in taken.frames] == [medium.payload for medium in pictures]
+        assert encoded(hub, "H264") == before
+
+
 async def test_a_camera_that_gives_other_pictures_is_recorded_on() -> None:
     taken = Taken()
     async with running_plane(description(microphones=0)) as hub:

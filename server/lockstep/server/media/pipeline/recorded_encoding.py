@@ -147,13 +147,17 @@ class RecordedEncoding(FrameStage):
             return False
         return 0 < self._last[1] + HALF_A_PACKET - frame.time < CLOCK_JUMPED
 
-    def request_keyframe(self) -> None:
-        """Request a keyframe for a new file."""
+    def request_keyframe(self, *, afresh: bool = True) -> None:
+        """Request a keyframe.
+
+        `afresh`: for a new file, which cannot wait for a camera that takes no requests: the console's encoding is
+        recorded until that camera's next keyframe. Else the one who asks waits, and what is recorded stays as it is.
+        """
         if self._current is None:
             return
         if self._current.codec != PASSED or self._encodings.follows:
             self._current.request_keyframe("record")
-        else:  # a camera's own: the encoding is chosen afresh, and the console's comes first
+        elif afresh:  # a camera's own: the encoding is chosen afresh, and the console's comes first
             for encoding in (self._current, self._next):
                 self._drop(encoding)
             self._current = self._next = None

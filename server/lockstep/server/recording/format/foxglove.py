@@ -18,12 +18,27 @@ from google.protobuf.timestamp_pb2 import Timestamp
 
 from lockstep.protocol.description import RobotDescription
 from lockstep.server.recording.format.records import FeedbackRecord, Vector, WrenchRecord
-from lockstep.server.recording.format.topics import JOINTS, OWN_TOPICS, POSE, SCAN
+from lockstep.server.recording.format.robot_frames import (
+    WORLD,
+    fixed_transforms,
+    moving_transforms,
+    odometry,
+    robot_shapes,
+)
+from lockstep.server.recording.format.topics import (
+    FIXED_TRANSFORMS,
+    JOINTS,
+    ODOMETRY,
+    OWN_TOPICS,
+    POSE,
+    SCAN,
+    SHAPES,
+    TRANSFORMS,
+)
 from lockstep.server.recording.writing.writer import Entry
 
-__all__ = ["WORLD", "camera_message", "feedback_messages", "log_message", "sound_message"]
+__all__ = ["camera_message", "feedback_messages", "log_message", "robot_messages", "sound_message"]
 
-WORLD = "world"  # frame of the base's pose
 SECOND = 1_000_000_000
 
 
@@ -45,6 +60,13 @@ def sound_message(sound_format: str, captured: int, packet: bytes) -> bytes:
 def log_message(arrived: int, text: str, *, warning: bool = False) -> bytes:
     level = Log.WARNING if warning else Log.INFO
     return Log(timestamp=_stamp(arrived), level=level, message=text, name="lockstep").SerializeToString()
+
+
+def robot_messages(description: RobotDescription, event: int, arrived: int) -> Iterator[Entry]:
+    """Yield what is fixed of a robot in Foxglove's schemas: frames of bodies without joints, and shapes."""
+    if description.bodies:
+        yield Entry(FIXED_TRANSFORMS, event, arrived, arrived, fixed_transforms(description, arrived))
+        yield Entry(SHAPES, event, arrived, arrived, robot_shapes(description, arrived))
 
 
 def feedback_messages(
@@ -73,9 +95,14 @@ def feedback_messages(
             ranges=feedback.ranges,
         )
         yield entry(SCAN, scan.SerializeToString())
-    pose = _base_pose(description, feedback.joints)
-    if pose is not None:
+    joints = dict(zip((joint.name for joint in description.joints), feedback.joints, strict=False))
+    if description.bodies:
+        yield entry(TRANSFORMS, moving_transforms(description, joints, captured))
+    base = description.planar_base
+    if base is not None and {base.x, base.y, base.yaw} <= joints.keys():
+        pose = _pose(joints[base.x], joints[base.y], joints[base.yaw])
         yield entry(POSE, PoseInFrame(timestamp=stamp, frame_id=WORLD, pose=pose).SerializeToString())
+        yield entry(ODOMETRY, odometry(description, base, pose, feedback.axes, captured))
     if description.wrench is not None and len(feedback.wrench) == 6:
         wrench = WrenchRecord(
             epoch=feedback.epoch,
@@ -85,14 +112,6 @@ def feedback_messages(
             torque=Vector(*feedback.wrench[3:]),
         )
         yield entry(OWN_TOPICS[WrenchRecord], msgspec.json.encode(wrench))
-
-
-def _base_pose(description: RobotDescription, joints: list[float]) -> Pose | None:
-    base = description.planar_base
-    positions = dict(zip((joint.name for joint in description.joints), joints, strict=False))
-    if base is None or not {base.x, base.y, base.yaw} <= positions.keys():
-        return None
-    return _pose(positions[base.x], positions[base.y], positions[base.yaw])
 
 
 def _pose(x: float, y: float, yaw: float) -> Pose:

@@ -8,10 +8,13 @@ from typing import Any, NamedTuple
 import msgspec
 from foxglove_schemas_protobuf.CompressedAudio_pb2 import CompressedAudio
 from foxglove_schemas_protobuf.CompressedVideo_pb2 import CompressedVideo
+from foxglove_schemas_protobuf.FrameTransforms_pb2 import FrameTransforms
 from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 from foxglove_schemas_protobuf.LaserScan_pb2 import LaserScan
 from foxglove_schemas_protobuf.Log_pb2 import Log
+from foxglove_schemas_protobuf.Odometry_pb2 import Odometry
 from foxglove_schemas_protobuf.PoseInFrame_pb2 import PoseInFrame
+from foxglove_schemas_protobuf.SceneUpdate_pb2 import SceneUpdate
 from google.protobuf.descriptor_pb2 import FileDescriptorSet
 from google.protobuf.message import Message
 
@@ -40,15 +43,19 @@ from lockstep.server.recording.format.records import (
 
 __all__ = [
     "CAMERA",
+    "FIXED_TRANSFORMS",
     "JOINTS",
     "LOG",
     "MICROPHONE",
+    "ODOMETRY",
     "OWN_TOPICS",
     "PICTURE_FORMATS",
     "POSE",
     "SCAN",
+    "SHAPES",
     "SIGNATURE",
     "SOUND_FORMATS",
+    "TRANSFORMS",
     "Topic",
     "media_topic",
     "own_schema",
@@ -58,6 +65,7 @@ __all__ = [
 
 CAMERA, MICROPHONE = "/camera/", "/microphone/"  # and the stream's name
 JOINTS, SCAN, POSE, LOG = "/joint_states", "/scan", "/pose", "/log"
+TRANSFORMS, FIXED_TRANSFORMS, ODOMETRY, SHAPES = "/tf", "/tf_static", "/odom", "/robot_shapes"
 
 # The names of formats in messages, by codec. One topic can have several.
 PICTURE_FORMATS = {"H264": "h264", "VP8": "vp8"}  # in CompressedVideo
@@ -110,6 +118,10 @@ def topics_of(description: RobotDescription, codecs: Mapping[str, str], *, signe
         found.append(_foxglove(SCAN, LaserScan))
     if description.planar_base is not None:
         found.append(_foxglove(POSE, PoseInFrame))
+        found.append(_foxglove(ODOMETRY, Odometry))
+    if description.bodies:
+        found.extend(_foxglove(topic, FrameTransforms) for topic in (TRANSFORMS, FIXED_TRANSFORMS))
+        found.append(_foxglove(SHAPES, SceneUpdate))
     found.append(_foxglove(LOG, Log))
     return found
 

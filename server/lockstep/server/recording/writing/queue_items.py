@@ -7,7 +7,13 @@ import msgspec
 
 from lockstep.protocol.description import RobotDescription
 from lockstep.protocol.messages import Feedback
-from lockstep.server.recording.format.foxglove import camera_message, feedback_messages, log_message, sound_message
+from lockstep.server.recording.format.foxglove import (
+    camera_message,
+    feedback_messages,
+    log_message,
+    robot_messages,
+    sound_message,
+)
 from lockstep.server.recording.format.records import FeedbackRecord, OwnRecord, RobotRecord
 from lockstep.server.recording.format.records_in_words import in_words
 from lockstep.server.recording.format.topics import LOG, OWN_TOPICS, PICTURE_FORMATS, SOUND_FORMATS, media_topic
@@ -65,6 +71,8 @@ def entries_of(item: Item, description: RobotDescription) -> Iterator[Entry]:
             if words:
                 data = log_message(arrived, words.text, warning=words.warning)
                 yield Entry(LOG, record.event, arrived, arrived, data)
+            if isinstance(item, RobotItem):
+                yield from robot_messages(description, record.event, arrived)
 
 
 def _own(record: OwnRecord, arrived: int, captured: int) -> Entry:

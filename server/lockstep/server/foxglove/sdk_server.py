@@ -1,0 +1,79 @@
+"""The Foxglove SDK's WebSocket server with the topics of one robot. The SDK is an optional extra of the console."""
+
+from collections.abc import Callable, Iterable
+
+import foxglove
+from foxglove import Channel, Context, Schema
+from foxglove.websocket import ChannelView, Client, ServerListener
+
+from lockstep.server.recording.format.topics import Topic
+
+__all__ = ["SdkServer"]
+
+NAME = "Lockstep"
+BACKLOG = 256  # messages kept for each client, about 1 s; then the SDK drops the oldest
+Subscribed = Callable[[str, int], None]
+
+
+class SdkServer:
+    """The server. `advertise` and `log` are called from one thread. It takes nothing from clients: no capability is on.
+
+    Attributes:
+        port: that it listens on
+    """
+
+    def __init__(self, host: str, port: int, subscribed: Subscribed) -> None:
+        """Start to listen. `subscribed` gets a topic, and +1 or -1, from threads of the SDK.
+
+        Raises:
+            RuntimeError: the address cannot be listened on.
+        """
+        self._context = Context()
+        self._channels: dict[str, tuple[Topic, Channel]] = {}
+        self._server = foxglove.start_server(
+            name=NAME,
+            host=host,
+            port=port,
+            capabilities=[],
+            server_listener=_Listener(subscribed),
+            context=self._context,
+            message_backlog_size=BACKLOG,
+        )
+        self.port = self._server.port
+
+    def advertise(self, topics: Iterable[Topic]) -> None:
+        """Offer exactly these topics. Channels of topics that stay are kept, with their subscriptions."""
+        wanted = {topic.name: topic for topic in topics}
+        for name, (topic, channel) in list(self._channels.items()):
+            if wanted.get(name) != topic:
+                channel.close()
+                del self._channels[name]
+        for name, topic in wanted.items():
+            if name not in self._channels:
+                schema = Schema(name=topic.schema, encoding=topic.schema_encoding, data=topic.schema_data)
+                channel = Channel(name, schema=schema, message_encoding=topic.encoding, context=self._context)
+                self._channels[name] = (topic, channel)
+
+    def log(self, topic: str, data: bytes, arrived: int) -> None:
+        """Send a message to whoever subscribed to `topic`; waits for nobody. `arrived`: ns since 1970."""
+        found = self._channels.get(topic)
+        if found is not None:
+            found[1].log(data, log_time=arrived)
+
+    def stop(self) -> None:
+        """Close the connections and the socket. Blocks for a moment; idempotent."""
+        self._server.stop()
+        for _, channel in self._channels.values():
+            channel.close()
+        self._channels.clear()
+
+
+class _Listener(ServerListener):
+    def __init__(self, subscribed: Subscribed) -> None:
+        self._subscribed = subscribed
+
+    def on_subscribe(self, client: Client, channel: ChannelView) -> None:
+        self._subscribed(channel.topic, 1)
+
+    def on_unsubscribe(self, client: Client, channel: ChannelView) -> None:
+        self._subscribed(channel.topic, -1)

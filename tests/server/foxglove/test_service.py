@@ -1,0 +1,109 @@
+"""The Foxglove server on a real console with the planar robot, looked at by a viewer that knows only the protocol."""
+
+import asyncio
+import json
+
+import av
+from foxglove_schemas_protobuf.CompressedVideo_pb2 import CompressedVideo
+
+from tests.server.foxglove.viewer import viewing
+from tests.server.rig import PATIENCE, Rig, running_rig
+
+
+async def listening(rig: Rig) -> int:
+    service = rig.dependencies.foxglove
+    assert service is not None
+    async with asyncio.timeout(PATIENCE):
+        await service.listening.wait()
+    return service.port
+
+
+def is_recorded(rig: Rig) -> bool:
+    return rig.dependencies.media.is_recorded
+
+
+async def test_a_viewer_gets_the_state_that_holds_and_the_feedback_of_a_robot_that_idles() -> None:
+    async with running_rig(foxglove={"port": 0}) as rig, viewing(await listening(rig)) as viewer:
+        await viewer.subscribe("/lockstep/robot", "/lockstep/seat", "/lockstep/feedback", "/tf", "/tf_static")
+        robot = await viewer.next_of("/lockstep/robot")
+        await viewer.next_of("/lockstep/seat")
+        feedback = await viewer.next_of("/lockstep/feedback")
+        moving = await viewer.next_of("/tf")
+        fixed = await viewer.next_of("/tf_static")
+        assert viewer.info["capabilities"] == []
+    bodies = {each["name"] for each in robot.message["description"]["bodies"]}
+    frames = {each.child_frame_id for each in (*moving.message.transforms, *fixed.message.transforms)}
+    assert frames == bodies
+    assert robot.message["epoch"] == feedback.message["epoch"]
+    assert feedback.message["event"] >= 1
+
+
+async def test_pictures_come_from_a_keyframe_on_and_a_stamp_names_the_event_of_each() -> None:
+    async with running_rig(foxglove={"port": 0}) as rig, viewing(await listening(rig)) as viewer:
+        await viewer.until(lambda: "/lockstep/stamp" in viewer.channels)
+        camera = next(topic for topic in viewer.channels if topic.startswith("/camera/"))
+        assert not is_recorded(rig)
+        await viewer.subscribe(camera, "/lockstep/stamp")
+        await viewer.until(lambda: len(viewer.of(camera)) >= 5 and len(viewer.of("/lockstep/stamp")) >= 5)
+        assert is_recorded(rig)
+        pictures = [CompressedVideo.FromString(each.SerializeToString()) for each in viewer.of(camera)]
+        stamps = {
+            (each["timestamp"]["sec"], each["timestamp"]["nsec"]): each["event"]
+            for each in viewer.of("/lockstep/stamp")
+            if each["stream"] == camera.removeprefix("/camera/")
+        }
+        await viewer.unsubscribe_all()
+        async with asyncio.timeout(PATIENCE):
+            while is_recorded(rig):  # noqa: ASYNC110
+                await asyncio.sleep(0.01)
+    decoder = av.CodecContext.create("h264", "r")
+    for picture in pictures[:4]:
+        assert picture.format == "h264"
+        (frame,) = decoder.decode(av.Packet(picture.data))
+        assert frame.width > 0
+        assert stamps[picture.timestamp.seconds, picture.timestamp.nanos] >= 1
+
+
+async def test_what_happens_is_told_and_no_message_of_a_viewer_does_anything() -> None:
+    async with (
+        running_rig(foxglove={"port": 0}) as rig,
+        viewing(await listening(rig)) as viewer,
+        rig.peer("operator") as operator,
+    ):
+        await viewer.subscribe("/lockstep/stop", "/lockstep/participants", "/log", "/lockstep/feedback")
+        await viewer.next_of("/lockstep/participants", lambda each: bool(each["participants"]))
+        channel = {"id": 1, "topic": "/lockstep/command", "encoding": "json", "schemaName": ""}
+        await viewer.socket.send(json.dumps({"op": "advertise", "channels": [channel]}))
+        await viewer.socket.send(b"\x01\x01\0\0\0{}")
+        await viewer.socket.send("this is no JSON")
+        await rig.http.post("/api/stop", headers=rig.token("operator"))
+        stop = await viewer.next_of("/lockstep/stop", lambda each: each["kind"] == "stop")
+        await viewer.next_of("/lockstep/feedback", lambda each: each["stop"]["stopped"])
+        await viewer.next_of("/log")
+        assert stop.message["where"] == "http"
+        assert not operator.closed.is_set()
+
+
+async def test_a_port_that_is_taken_takes_nothing_but_the_viewers_from_the_console() -> None:
+    taken = await asyncio.start_server(lambda *_: None, "127.0.0.1", 0)
+    port = taken.sockets[0].getsockname()[1]
+    async with taken, running_rig(foxglove={"port": port}) as rig, rig.peer("operator") as operator:
+        await operator.feedback()
+        assert rig.dependencies.foxglove is not None
+        assert not rig.dependencies.foxglove.listening.is_set()
+
+
+async def test_a_viewer_that_does_not_read_delays_no_other() -> None:
+    async with running_rig(foxglove={"port": 0}) as rig:
+        port = await listening(rig)
+        async with viewing(port) as slow, viewing(port) as viewer:
+            await slow.subscribe("/lockstep/feedback")
+            slow.socket.transport.pause_reading()
+            await viewer.subscribe("/lockstep/feedback")
+            await viewer.until(lambda: len(viewer.of("/lockstep/feedback")) > 3)
+            slow.socket.transport.resume_reading()
+
+
+async def test_without_a_port_there_is_no_server() -> None:
+    async with running_rig() as rig:
+        assert rig.dependencies.foxglove is None
