@@ -183,3 +183,17 @@ def test_the_first_view_of_an_arm_on_a_table_is_from_near(
     camera = server.initial_camera
     away = math.dist(camera.position, camera.look_at)
     assert nearest < away < furthest
+
+
+def test_the_event_stands_above_a_body_whose_own_frame_is_turned_over(server: viser.ViserServer) -> None:
+    turned = Body(
+        name="arm",
+        parent="",
+        position=(0.1, 0.0, 0.2),
+        orientation=(0.0, 1.0, 0.0, 0.0),  # half a turn about x
+        joints=(BodyJoint(joint="turn", kind="revolute", axis=Z),),
+    )
+    robot = RobotDescription(name="r", label="R", axes=(), joints=ROBOT.joints, bodies=(turned,))
+    x, y, z = SceneModel(server, robot).label.position
+    assert (x, y) == pytest.approx((0.0, 0.0))
+    assert z < 0  # down in the body's frame is up

@@ -10,7 +10,15 @@ from lockstep.protocol.description import Body, RobotDescription
 from lockstep.protocol.messages import Feedback
 from lockstep.server.scene.commanded_pose import SceneGhost
 from lockstep.server.scene.geofences import SceneFences
-from lockstep.server.scene.kinematics import Pose, body_pose, scene_paths, world_poses, world_positions
+from lockstep.server.scene.kinematics import (
+    Pose,
+    body_pose,
+    inverse,
+    joined,
+    scene_paths,
+    world_poses,
+    world_positions,
+)
 from lockstep.server.scene.path_trace import SceneTrails
 from lockstep.server.scene.shapes import add_geom
 
@@ -32,6 +40,7 @@ ARROW_LEAST = 0.15  # m, so that a light contact shows
 ARROW_LENGTH = 0.6  # m at full scale
 USUAL_VIEW = 1.6  # m, distance of the first view of a robot whose bodies have no places of their own
 MIN_VIEW, MAX_VIEW = 0.5, 6.0  # m, of the others: an arm on a table is seen from near
+UPRIGHT = (1.0, 0.0, 0.0, 0.0)  # quaternion, w first
 
 Triple = tuple[float, float, float]
 
@@ -133,11 +142,16 @@ class SceneModel:
 
     def _add_label(self) -> viser.LabelHandle:
         """Add the event reference above the first moving body; it moves with the body."""
-        positions = world_positions(self._description, {})
-        top = max((z for _, _, z in positions), default=0.0) + LABEL_LIFT
-        root = next((self._paths[body.name] for body in self._moving), "/robot")
+        poses = world_poses(self._description, {})
+        top = max((pose.position[2] for pose in poses.values()), default=0.0) + LABEL_LIFT
+        name = next((body.name for body in self._moving), None)
+        root, place = "/robot", (0.0, 0.0, top)
+        if name is not None:  # its frame may be turned: up is up in the world's
+            x, y, _ = poses[name].position
+            root = self._paths[name]
+            place = joined(inverse(poses[name]), Pose((x, y, top), UPRIGHT)).position
         return self._server.scene.add_label(
-            f"{root}/event", "", position=(0.0, 0.0, top), anchor="bottom-center", font_screen_scale=1.4
+            f"{root}/event", "", position=place, anchor="bottom-center", font_screen_scale=1.4
         )
 
     def _add_arrow(self) -> viser.ArrowsHandle | None:
