@@ -7,6 +7,7 @@ from typing import Final
 
 from lockstep.protocol.description import Axis
 from lockstep.robot_bridge.control.tick_loop import MAX_CATCH_UP
+from lockstep.robot_bridge.robots.so101.controls import JOINT_AXES, RATES
 from lockstep.server.recording.format.payload import own_record_of
 from lockstep.server.recording.format.records import FeedbackRecord, RefusalRecord, RobotRecord
 from lockstep.server.recording.reading.reader import RecordingReader
@@ -26,8 +27,8 @@ class Judged:
     Attributes:
         verdict: of `lockstep verify`
         refusals: how often each reason
-        step: the largest motion of a commanded axis' applied goal between two feedbacks, as a share of what the axis'
-            speed allows in that time; at most 1
+        step: the largest motion of a joint's goal between two feedbacks, as a share of what the joint's rate allows in
+            that time; at most 1. The tool's own goals are read anew where the arm came to rest, which moves nothing.
         step_axis: whose that was
         events: number of commands that were executed
         seconds: of the robot's clock
@@ -41,8 +42,8 @@ class Judged:
     seconds: float = 0.0
 
 
-def judge(path: Path, commanded: tuple[str, ...]) -> Judged:
-    """Judge a recording. `commanded`: the axes that were driven; of a pose's other axes the goals only follow.
+def judge(path: Path) -> Judged:
+    """Judge a recording of an SO-101.
 
     Raises:
         RecordingError: it is no recording.
@@ -60,7 +61,8 @@ def judge(path: Path, commanded: tuple[str, ...]) -> Judged:
                     found.refusals[own.reason] += 1
                 elif isinstance(own, FeedbackRecord):
                     feedbacks.append(own)
-    chosen = [(index, axis) for index, axis in enumerate(axes) if axis.name in commanded]
+    rates = {axis.name: rate for axis, rate in zip(JOINT_AXES, RATES, strict=True)}
+    chosen = [(index, axis.name, rates[axis.name]) for index, axis in enumerate(axes) if axis.name in rates]
     for before, after in zip(feedbacks, feedbacks[1:], strict=False):
         found.events += after.event != before.event
         _compare(found, chosen, before, after)
@@ -69,9 +71,12 @@ def judge(path: Path, commanded: tuple[str, ...]) -> Judged:
     return found
 
 
-def _compare(found: Judged, axes: list[tuple[int, Axis]], before: FeedbackRecord, after: FeedbackRecord) -> None:
+def _compare(
+    found: Judged, joints: list[tuple[int, str, float]], before: FeedbackRecord, after: FeedbackRecord
+) -> None:
+    """`joints`: the number, name and rate (rad/s) of each."""
     seconds = after.time - before.time + ROOM
-    for index, axis in axes:
+    for index, name, rate in joints:
         was, goal = before.goals[index], after.goals[index]
-        if was is not None and goal is not None and abs(goal - was) / (axis.slew * seconds) > found.step:
-            found.step, found.step_axis = abs(goal - was) / (axis.slew * seconds), axis.name
+        if was is not None and goal is not None and abs(goal - was) / (rate * seconds) > found.step:
+            found.step, found.step_axis = abs(goal - was) / (rate * seconds), name

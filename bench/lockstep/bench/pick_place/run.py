@@ -15,7 +15,7 @@ from lockstep.bench.experiment.choices import media_of
 from lockstep.bench.experiment.stage import Stage, running_stage
 from lockstep.bench.pick_place.hands import LEADER_SCALES, LeaderHand, PolicyHand
 from lockstep.bench.pick_place.judge import Judged, judge
-from lockstep.bench.pick_place.motions import BLOCKS, POSITION, ROTATION
+from lockstep.bench.pick_place.motions import BLOCKS
 from lockstep.bench.pick_place.script import Hand, PickAndPlace, ToolHand
 from lockstep.client import CommandRefused, Console
 from lockstep.emulator.impairment.profile import load_profile
@@ -175,8 +175,7 @@ class _Session:
     async def _judged(self, recording: str) -> Judged:
         (await self._recorder.post("/api/recordings/stop")).raise_for_status()
         [path] = self._stage.event_log.parent.rglob(f"*{recording}*.mcap")
-        axes = ("gripper", *POSITION, *ROTATION) if self._choices.hand == "tool" else tuple(LEADER_SCALES)
-        judged = await asyncio.to_thread(judge, path, axes)
+        judged = await asyncio.to_thread(judge, path)
         if self._choices.keep is not None:
             self._choices.keep.mkdir(parents=True, exist_ok=True)
             for each in (path, self._stage.event_log):
