@@ -142,4 +142,4 @@ async def test_a_tracked_hand_that_closes_leads_the_tool_and_lets_go_when_it_ope
             raise AssertionError("the hand does not lead the tool")
         await headset.do("void (h.device.hands.right.poseId = 'default')")
         await console.until("!s.armed && s.commanded['tool.y'] === null")
-        assert "Squeeze" in (await console.stats())["headset"]["text"]
+        await console.until("s.headset.text.includes('Squeeze')")

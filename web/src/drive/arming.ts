@@ -29,7 +29,10 @@ export type DisarmReason =
   | "locked_out"
   | "neutral_needed"
   | "taped_down"
-  // in a headset's session:
+  | HeadsetDisarmReason;
+
+/** Reasons that only a headset's session has. */
+export type HeadsetDisarmReason =
   | "squeeze_released"
   | "tracking_lost"
   | "headset_off"

@@ -1,4 +1,4 @@
-import type { ArmRefusal, DisarmReason } from "./arming";
+import type { ArmRefusal, DisarmReason, HeadsetDisarmReason } from "./arming";
 import type { GateState } from "./command_gate";
 import type { GateReason } from "./gate_reason";
 
@@ -34,7 +34,7 @@ export const ARM_REFUSAL_LABELS: Readonly<Record<ArmRefusal, string>> = {
   deadman_held: "Let go of the hold-to-run control first",
 };
 
-export const DISARM_LABELS: Readonly<Record<DisarmReason, string>> = {
+const DISARM_LABELS: Readonly<Record<Exclude<DisarmReason, HeadsetDisarmReason>, string>> = {
   start: "Arm to drive",
   operator: "Disarmed by you",
   blur: "Disarmed: the window lost focus",
@@ -50,11 +50,16 @@ export const DISARM_LABELS: Readonly<Record<DisarmReason, string>> = {
   locked_out: "Disarmed: somebody at the robot locked it",
   neutral_needed: "Disarmed: the robot interrupted the motion. Arm to go on",
   taped_down: "Disarmed: hold-to-run was held a minute without change",
-  squeeze_released: "Squeeze the grip to drive",
-  tracking_lost: "Disarmed: the headset lost sight of the hand",
-  headset_off: "Disarmed: the headset was taken off",
-  headset_blurred: "Disarmed: the headset showed something else",
-  headset_silent: "Disarmed: the headset stood still",
-  headset_left: "Disarmed: the headset view was closed",
-  battery_low: "Disarmed: the battery is almost empty",
 };
+
+let headsetLabels: Readonly<Partial<Record<DisarmReason, string>>> = {};
+
+/** The headset's view brings its labels with it, so that the page's first files stay small. */
+export function addDisarmLabels(labels: Readonly<Record<HeadsetDisarmReason, string>>): void {
+  headsetLabels = labels;
+}
+
+export function disarmLabel(reason: DisarmReason): string {
+  const labels: Readonly<Partial<Record<DisarmReason, string>>> = DISARM_LABELS;
+  return labels[reason] ?? headsetLabels[reason] ?? "Disarmed";
+}

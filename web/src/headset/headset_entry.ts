@@ -1,5 +1,7 @@
+import { addDisarmLabels } from "../drive/labels";
 import { note } from "../session/console_state";
 import { button, setHidden, type Panel } from "../ui/elements/dom";
+import { HEADSET_DISARM_LABELS } from "./disarm_labels";
 import { createHeadsetSettings, HandSettingsStorage } from "./headset_settings";
 import type { HeadsetMode, HeadsetPage } from "./headset_session";
 
@@ -18,6 +20,7 @@ export class HeadsetEntry {
   private readonly hand = new HandSettingsStorage();
 
   constructor(private readonly page: HeadsetPage) {
+    addDisarmLabels(HEADSET_DISARM_LABELS);
     const { xr } = navigator as { xr?: XRSystem }; // absent where the page has no TLS
     if (xr === undefined) return;
     void this.look(xr);

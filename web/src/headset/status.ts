@@ -1,7 +1,8 @@
 import { pictureSummary } from "../charts/way_summary";
 import { armRefusal } from "../drive/arming";
 import { ageLabel, feedbackAge } from "../drive/feedback_age";
-import { ARM_REFUSAL_LABELS, DISARM_LABELS } from "../drive/labels";
+import { ARM_REFUSAL_LABELS, disarmLabel } from "../drive/labels";
+import { HEADSET_DISARM_LABELS } from "./disarm_labels";
 import { warningSeconds } from "../drive/start_warning";
 import type { ConsoleEngine } from "../engine/console_engine";
 import { forceOf } from "../haptics/contact_force";
@@ -86,9 +87,9 @@ function stateWords(engine: ConsoleEngine, now: number): Pick<HeadsetStatus, "te
 }
 
 function calmWords({ arming: { reason } }: ConsoleEngine): string {
-  const squeeze = DISARM_LABELS.squeeze_released;
+  const squeeze = HEADSET_DISARM_LABELS.squeeze_released;
   if (reason === "start" || reason === "operator" || reason === "squeeze_released") return squeeze;
-  const why = DISARM_LABELS[reason].replace(/^Disarmed: (.)/, (_all, first: string) => first.toUpperCase());
+  const why = disarmLabel(reason).replace(/^Disarmed: (.)/, (_all, first: string) => first.toUpperCase());
   return `${why.replace(". Arm to go on", "")}. ${squeeze}`;
 }
 

@@ -1,4 +1,5 @@
 import type {
+  Action,
   ActionUpdate,
   Feedback,
   Participant,
@@ -23,7 +24,6 @@ import type { GateMode } from "../gate/media_gate";
 import { isNewer } from "../gate/serial";
 import { resetRefusalLabel } from "../stop/reset_labels";
 import { actionNamed, isRunning, takeUpdate } from "../robot/actions";
-import { actionWords } from "../robot/action_labels";
 import { sourceLabel } from "./source_labels";
 import { REFUSAL_LABELS } from "./refusal_labels";
 
@@ -62,6 +62,7 @@ export interface ConsoleState {
   recording: RecordingState | null; // null before the console has said so
   notes: SharedNote[]; // oldest first
   actions: readonly ActionUpdate[]; // of the robot, oldest request first
+  actionWords: (action: Pick<Action, "label">, update: ActionUpdate) => string; // of the page's later files, when they are there
   status: Status | null; // what the robot says of itself; null before it has
   feedback: Feedback | null; // newest
   stop: StopState;
@@ -107,6 +108,7 @@ export function createConsoleState(): ConsoleState {
     recording: null,
     notes: [],
     actions: [],
+    actionWords: (action, update) => `${action.label}: ${update.state} ${update.text}`.trim(),
     status: null,
     feedback: null,
     stop: NOT_STOPPED,
@@ -252,7 +254,7 @@ function takeAction(state: ConsoleState, update: ActionUpdate, wallMs: number): 
   if (isRunning(update) || known?.state === update.state) return;
   if (update.state === "done" && update.text === "") return;
   const label = actionNamed(state.robot?.description ?? null, update.name)?.label ?? update.name;
-  note(state, update.state === "done" ? "info" : "warning", actionWords({ label }, update), wallMs);
+  note(state, update.state === "done" ? "info" : "warning", state.actionWords({ label }, update), wallMs);
 }
 
 /** A failure is said once, in the log too. */

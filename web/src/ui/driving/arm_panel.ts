@@ -4,7 +4,7 @@ import type { PadAction } from "../../gamepad/layout";
 import { actionName } from "../../gamepad/source_names";
 import { isStandard } from "../../gamepad/standard_mapping";
 import { warningSeconds } from "../../drive/start_warning";
-import { ARM_REFUSAL_LABELS, DISARM_LABELS } from "../../drive/labels";
+import { ARM_REFUSAL_LABELS, disarmLabel } from "../../drive/labels";
 import type { ConsoleEngine } from "../../engine/console_engine";
 import { focusedControl } from "../../input/pointer_focus";
 import { button, h, setData, setHidden, setText, type Panel } from "../elements/dom";
@@ -50,7 +50,7 @@ function armWords(engine: ConsoleEngine, now: number): string {
   if (refusal === null && focused !== null && focused !== "Arm")
     return `Enter and Space work “${focused}” now. Tab to Arm, or click the picture`;
   return refusal === null || refusal === "deadman_held"
-    ? DISARM_LABELS[engine.arming.reason]
+    ? disarmLabel(engine.arming.reason)
     : ARM_REFUSAL_LABELS[refusal];
 }
 

@@ -1,5 +1,5 @@
 import { robotName } from "../../fleet/robot_links";
-import { DISARM_LABELS } from "../../drive/labels";
+import { disarmLabel } from "../../drive/labels";
 import type { ConsoleEngine } from "../../engine/console_engine";
 import { h, setText, type Panel } from "../elements/dom";
 import { overlayLabels } from "../views/overlay";
@@ -14,7 +14,7 @@ export function createAnnouncer(engine: ConsoleEngine): Panel {
     update(now) {
       const overlay = overlayLabels(engine, now);
       const { state, reason } = engine.arming;
-      const armed = state === "disarmed" ? DISARM_LABELS[reason] : state === "armed" ? "Armed" : "Driving";
+      const armed = state === "disarmed" ? disarmLabel(reason) : state === "armed" ? "Armed" : "Driving";
       setText(polite, overlay?.tone === "stopped" ? "" : (overlay?.title ?? armed));
       setText(urgent, overlay?.tone === "stopped" ? `${overlay.title}. ${overlay.text}` : "");
       const title = overlay === null ? (engine.isArmed() ? "Armed" : "") : overlay.title;
