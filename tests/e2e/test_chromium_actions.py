@@ -1,5 +1,7 @@
 """Actions and status on the page: what moves the robot ends with everything that ends driving."""
 
+import re
+
 import pytest
 from playwright.async_api import Browser, Locator, expect
 
@@ -10,6 +12,9 @@ from tests.support.stack import Stack
 A, X = 0, 2  # the pad's buttons
 
 pytestmark = pytest.mark.browser
+
+
+TRIES = 3  # a busy machine may hold the page up, which disarms it and so cancels the action
 
 
 def _action(console: ConsolePage, name: str) -> Locator:
@@ -33,12 +38,17 @@ async def test_home_shows_its_progress_and_leaves_the_keyboard_with_the_robot(st
         open_console(chromium, stack.operator) as console,
         open_console(chromium, stack.observer, pad=False) as observer,
     ):
-        await _away(console)
-        await _action(console, "home").get_by_role("button").click()
-        await expect(_action(console, "home")).to_have_attribute("data-state", "running")
-        await expect(_words(observer)).to_contain_text("Home")
-        assert await console.page.evaluate("document.activeElement === document.body")
-        await expect(_words(console)).to_contain_text("done · at home")
+        for _ in range(TRIES):
+            await _away(console)
+            await _action(console, "home").get_by_role("button").click()
+            await expect(_action(console, "home")).to_have_attribute("data-state", "running")
+            await expect(_words(observer)).to_contain_text("Home")
+            assert await console.page.evaluate("document.activeElement === document.body")
+            await expect(_words(console)).to_contain_text(re.compile("done · at home|cancelled|Arm first"))
+            if "done · at home" in await _words(console).inner_text():
+                break
+        else:
+            raise AssertionError("the robot does not come home")
         await expect(_action(observer, "home")).to_be_hidden()
     done = await until_logged(stack, "action", lambda record: record["state"] == "done")
     assert done["name"] == "home"
