@@ -29,8 +29,8 @@ KEYFRAME_SECONDS = 2.0  # between two keyframes for those who subscribe: they co
 class FoxgloveService:
     """The Foxglove server of one robot. Run `run` as a task; everything else is called on the loop.
 
-    Streams are taken, and encoded if nobody else takes them, only while somebody subscribed to one. The state that holds
-    is put once more when a topic is newly subscribed to, and at intervals, since the protocol repeats nothing.
+    Streams are taken, and encoded if nobody else takes them, only while somebody subscribed to one. The state that
+    holds is put once more when a topic is newly subscribed to, and at intervals: the protocol repeats nothing.
 
     Attributes:
         port: that it listens on; 0 while it does not
