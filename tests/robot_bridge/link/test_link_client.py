@@ -1,5 +1,6 @@
 import asyncio
 import contextlib
+import socket
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 
@@ -28,6 +29,9 @@ HELLO = Hello(role="robot", epoch="e1", description=DESCRIPTION)
 
 def wire(*messages: LinkMessage) -> bytes:
     return b"".join(frame(encode_message(message)) for message in messages)
+
+
+NOTICE = wire(EventNotice(event=1, time=1.0))
 
 
 class FakeBridge:
@@ -288,3 +292,29 @@ def test_a_link_that_is_cancelled_as_it_opens_ends_as_cancelled(
 ) -> None:
     with asyncio.Runner(loop_factory=loop) as runner:
         runner.run(cancelled_as_it_opens())
+
+
+async def test_closing_with_data_unread_does_not_reset_the_connection_and_the_bridge_gets_the_goodbye() -> None:
+    # A reset makes the bridge's next write fail, and what it has not read is lost: it would keep the client's robot.
+    loop = asyncio.get_running_loop()
+    with socket.create_server(("127.0.0.1", 0)) as listener:
+        listener.setblocking(False)
+        link = RobotLink(*listener.getsockname(), "operator")
+        async with asyncio.timeout(20), asyncio.TaskGroup() as tasks:
+            connecting = tasks.create_task(link.connect())
+            bridge, _ = await loop.sock_accept(listener)
+            with bridge:
+                bridge.setblocking(False)
+                await loop.sock_sendall(bridge, wire(HELLO))
+                await connecting
+                with contextlib.suppress(BlockingIOError):
+                    while True:  # into the client's buffer, before its loop turns
+                        bridge.send(NOTICE)
+                closing = tasks.create_task(link.close())
+                received = b""
+                while data := await loop.sock_recv(bridge, 1 << 16):  # a reset raises
+                    received += data
+                for _ in range(3):  # a bridge that was busy writes on
+                    await loop.sock_sendall(bridge, NOTICE)
+            await closing
+    assert received.endswith(wire(Goodbye(error="closing", detail="")))

@@ -4,6 +4,7 @@ import socket
 
 import pytest
 
+from lockstep.bench.harness.free_port import free_port
 from lockstep.server.settings import Settings
 from lockstep.server.webrtc.media_addresses import MediaPortTaken, NoSuchAddress, check_media_addresses
 
@@ -22,7 +23,7 @@ def test_an_outer_address_is_refused_and_the_words_say_where_it_belongs(address:
 @pytest.mark.parametrize(("transport", "kind"), [("UDP", socket.SOCK_DGRAM), ("TCP", socket.SOCK_STREAM)])
 def test_a_port_that_somebody_has_is_refused_by_name(transport: str, kind: socket.SocketKind) -> None:
     with socket.socket(socket.AF_INET, kind) as other:
-        other.bind(("127.0.0.1", 0))
+        other.bind(("127.0.0.1", free_port()))
         if kind == socket.SOCK_STREAM:
             other.listen()
         port = other.getsockname()[1]

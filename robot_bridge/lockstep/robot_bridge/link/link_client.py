@@ -183,7 +183,7 @@ class RobotLink:
         if self._ticker is not None:
             self._ticker.cancel()
             self._ticker = None
-        self._transport.end("closing")
+        self._transport.say_goodbye()
         try:
             async with asyncio.timeout(1.0):
                 await self._transport.gone.wait()
@@ -252,6 +252,27 @@ class _ClientTransport(PacedTransport):
         self._link = link
         self.gone = asyncio.Event()
         self.gone.set()
+        self._waits_for_end = False  # of the bridge's side, after the goodbye
+
+    def say_goodbye(self) -> None:
+        """Say goodbye, and close when the bridge has closed.
+
+        To close with received data unread resets the connection, and the bridge would lose the goodbye that it has not
+        read yet: it would keep the robot for this client, as after a broken link.
+        """
+        self._waits_for_end = self._transport is not None and self._transport.can_write_eof()
+        self.end("closing")
+
+    def _leave(self, transport: asyncio.Transport) -> None:
+        if self._waits_for_end:
+            transport.write_eof()
+            transport.resume_reading()
+        else:
+            super()._leave(transport)
+
+    def data_received(self, data: bytes) -> None:
+        if self.session.ended is None:
+            super().data_received(data)
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         self.gone.clear()

@@ -189,8 +189,12 @@ class LinkTransport(asyncio.Protocol):
         self._send_outgoing()
         if self.session.ended is not None and self._transport is not None and self._closing_since is None:
             self._closing_since = now
-            self._transport.close()
+            self._leave(self._transport)
             self._report_lost()
+
+    def _leave(self, transport: asyncio.Transport) -> None:
+        """Close when what was written has left."""
+        transport.close()
 
     def _send_outgoing(self) -> None:
         for message in self.session.take_outgoing():
