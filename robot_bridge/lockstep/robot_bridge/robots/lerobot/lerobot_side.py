@@ -112,8 +112,10 @@ class LeRobotDevice:
 
     def disconnect(self, *, torque_off: bool) -> None:
         if torque_off:
-            with suppress(Exception):
+            try:
                 self.torque(False)
+            except Exception as error:  # what follows lets go of the bus all the same
+                _logger.error("the torque of %s could not be switched off: %s", self._robot, error)
         if self._all_cameras is not None:
             self._robot.cameras = self._all_cameras
         self._robot.disconnect()
