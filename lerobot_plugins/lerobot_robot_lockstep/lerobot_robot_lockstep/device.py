@@ -1,4 +1,4 @@
-"""What a robot and a teleoperator of LeRobot have in common when they are a process of Lockstep."""
+"""The common part of the robot and the teleoperator: each has a process of Lockstep."""
 
 from typing import Any
 

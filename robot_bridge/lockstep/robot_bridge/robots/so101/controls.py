@@ -10,7 +10,7 @@ __all__ = ["AXES", "JOINT_AXES", "LAYERS", "POSITION_AXES", "RATES", "ROTATION_A
 
 STOPS_IN: Final = 0.15  # s from an axis' full speed to a standstill, when it brakes
 SPEEDS_UP_IN: Final = 0.25  # s to its full speed
-JOINT_REACH: Final = 0.7  # rad: some more than a leader arm can be ahead
+JOINT_REACH: Final = 0.7  # rad: a little more than a leader arm gets ahead
 TOOL_REACH: Final = 0.10  # m
 HALF_A_TURN: Final = round(math.pi, 5)
 RATES: Final[tuple[float, ...]] = (2.0, 1.6, 2.0, 2.5, 3.0, 3.0)  # rad/s, of each joint, always; the servos make 5

@@ -1,4 +1,4 @@
-"""The rules of episodes: what begins one, what ends it, and what is written of it. No I/O; the caller hands in `now`.
+"""The rules of episodes: how they begin, how they end, and their records. No I/O; the caller hands in `now`.
 
 | phase | what holds | ends by |
 |---|---|---|
@@ -8,8 +8,7 @@
 | open | an episode is recorded | keep, discard, redo, a cut |
 | keeping | the record `kept` is on its way to the disk | its arrival there, a cut |
 
-Only the record `kept` makes an episode count. Whatever ends one in another way, the end of the process included, needs
-no record for that.
+Only the record `kept` makes an episode count. Any other end, such as the end of the process, needs no record.
 """
 
 from collections.abc import Callable

@@ -11,7 +11,7 @@ MAX_DRIVERS = 20  # names in the record of an episode
 
 
 class Place(NamedTuple):
-    """What holds at the console now."""
+    """The state of the console at one moment."""
 
     epoch: str
     event: int
