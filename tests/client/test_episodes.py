@@ -272,6 +272,26 @@ async def test_the_reset_action_runs_between_episodes_and_the_next_one_waits_for
 
 
 @pytest.mark.asyncio
+async def test_a_revoked_link_begins_no_episode_that_it_asked_for_before(tmp_path: Path) -> None:
+    recordings = tmp_path / "recordings"
+    settings = {"LOCKSTEP_EPISODES__COUNTDOWN_SECONDS": "4"}
+    async with (
+        running_stack(tmp_path, extra=("--record", str(recordings)), settings=settings) as stack,
+        _console(stack.observer, "Grace") as observer,
+    ):
+        headers = {"Authorization": f"Bearer {parse_link(stack.supervisor).token}"}
+        async with httpx.AsyncClient(base_url=stack.console, headers=headers, trust_env=False) as http:
+            made = (await http.post("/api/invitations", json={"role": "supervisor", "name": "Eve"})).json()
+            assert (await _ask(stack, made["link"], "start", task="push")).json()["phase"] == "countdown"
+            await _until_state(observer, "countdown")
+            assert (await http.delete(f"/api/invitations/{made['id']}")).is_success
+        state = await _until_state(observer, "idle")
+        assert (state.number, state.last) == (0, "cancelled before it began: the link that asked for it has ended")
+    (path,) = recordings.glob("*.mcap")
+    assert _episodes(path) == []
+
+
+@pytest.mark.asyncio
 async def test_a_reset_that_moves_nothing_is_run_by_the_console(tmp_path: Path) -> None:
     settings = NO_COUNTDOWN | {"LOCKSTEP_EPISODES__RESET_ACTION": "light"}
     async with _in_an_episode(tmp_path, tmp_path / "recordings", settings) as (_, console):

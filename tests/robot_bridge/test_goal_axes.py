@@ -187,6 +187,34 @@ async def test_an_adapter_that_raises_while_it_is_measured_for_a_command_ends_th
     assert robot.applied[-1][1] == 0.2
 
 
+async def test_commands_that_are_refused_for_a_jump_measure_the_robot_once_a_tick_at_most() -> None:
+    class Counting(HangingArm):
+        asked = 0
+        most = 0  # between two ticks
+
+        def measured_axes(self) -> Sequence[float]:
+            self.asked += 1
+            self.most = max(self.most, self.asked)
+            return super().measured_axes()
+
+        def measure(self) -> Measurement:
+            axes = list(HangingArm.measured_axes(self))
+            return Measurement(axes=axes, joints=[], wrench=[], ranges=[], at_rest=True, faults=[])
+
+        def tick(self) -> None:
+            self.asked = 0
+
+    robot = Counting()
+    async with running_bridge(robot) as bridge, operator(bridge) as driver:
+        jump = driver.command(goals(shoulder=1.9))
+        for _ in range(40):  # fewer than are read at once
+            driver.link.send(jump)
+        for _ in range(40):
+            assert (await driver.next(Refusal)).reason == "jump"
+        assert robot.most == 1
+        await drive_to(driver, "shoulder", 0.3)
+
+
 class Folding(ActionRun):
     """Folds the arm by goals far beyond its reach."""
 

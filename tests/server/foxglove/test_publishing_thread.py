@@ -96,6 +96,22 @@ def test_topics_are_offered_once_and_nothing_is_published_while_nobody_watches()
     assert len(server.of(NOTE)) == 1
 
 
+def test_what_is_repeated_is_no_news_and_has_no_line_in_the_log() -> None:
+    server = Server()
+    thread = PublishingThread(server, fail)
+    thread.start()
+    thread.watched = True
+    thread.repeats = True
+    thread.put(robot())
+    thread.put(note("known"))
+    thread.repeats = False
+    thread.put(note("the last"))
+    assert server.done.wait(PATIENCE)
+    thread.close()
+    assert len(server.of(NOTE)) == 2
+    assert all(b"known" not in line for line in server.of("/log"))
+
+
 def test_an_item_that_cannot_be_encoded_is_told_and_the_next_goes_on() -> None:
     server, faults = Server(), list[Exception]()
     thread = PublishingThread(server, faults.append)

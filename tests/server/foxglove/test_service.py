@@ -2,8 +2,12 @@
 
 import asyncio
 import json
+from typing import Any
 
 import av
+import foxglove
+import pytest
+from foxglove.websocket import WebSocketServer
 from foxglove_schemas_protobuf.CompressedVideo_pb2 import CompressedVideo
 
 from tests.server.foxglove.viewer import viewing
@@ -82,6 +86,38 @@ async def test_what_happens_is_told_and_no_message_of_a_viewer_does_anything() -
         await viewer.next_of("/log")
         assert stop.message["where"] == "http"
         assert not operator.closed.is_set()
+
+
+async def test_who_subscribes_without_end_calls_nothing_in_the_console(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A call from the SDK's threads for each subscription would keep the interpreter from the operator's commands."""
+    started: list[dict[str, Any]] = []
+
+    def start_server(**wanted: Any) -> WebSocketServer:
+        started.append(wanted)
+        return original(**wanted)
+
+    original = foxglove.start_server
+    monkeypatch.setattr(foxglove, "start_server", start_server)
+    async with running_rig(foxglove={"port": 0}) as rig, viewing(await listening(rig)) as viewer:
+        for _ in range(50):
+            await viewer.subscribe("/lockstep/seat")
+            await viewer.unsubscribe_all()
+        await viewer.subscribe("/lockstep/seat")
+        await viewer.next_of("/lockstep/seat")
+    (wanted,) = started
+    assert wanted.keys().isdisjoint({"server_listener", "services", "asset_handler", "channel_filter"})
+    assert wanted["capabilities"] == []
+
+
+async def test_who_subscribes_to_what_another_watches_gets_the_state_too(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("lockstep.server.foxglove.service.REPEAT_SECONDS", 0.5)
+    async with running_rig(foxglove={"port": 0}) as rig:
+        port = await listening(rig)
+        async with viewing(port) as one, viewing(port) as other:
+            await one.subscribe("/lockstep/seat")
+            await one.next_of("/lockstep/seat")
+            await other.subscribe("/lockstep/seat")
+            await other.next_of("/lockstep/seat")
 
 
 async def test_a_port_that_is_taken_takes_nothing_but_the_viewers_from_the_console() -> None:

@@ -107,8 +107,8 @@ class Robot(ABC):
     def measured_axes(self) -> Sequence[float]:
         """Return the measured value of each axis now, as in `measure`; NaN if unknown or too old to be trusted.
 
-        Called when the bridge starts, when a stop was reset, and for each command with goals: `reach` bounds their
-        distance from here. So it should cost little. Needed only for goal axes.
+        Called when the bridge starts, when a stop was reset, and for commands with goals, once between two ticks at
+        most: `reach` bounds their distance from here. So it should cost little. Needed only for goal axes.
         """
         return self.measure().axes
 

@@ -145,7 +145,8 @@ async def _session(
         dial_in=dial_in,
         further_news=notices.for_newcomers,
     )
-    episodes = _episodes(settings, clock, recorder, media, console, seat, peers, trail)
+    has_ended = context.state.invitations.has_ended
+    episodes = _episodes(settings, clock, recorder, media, console, seat, has_ended, peers, trail)
     states.append(episodes.state)
     media.robot_encoding.ask_by(console.robot.ask_for_encoding)
     SessionMetrics(metrics).subscribe(events)
@@ -229,6 +230,7 @@ def _episodes(
     media: MediaHub,
     console: Console,
     seat: ControlSeat,
+    has_ended: Callable[[str, float], bool],
     peers: PeerRegistry,
     trail: AuditTrail,
 ) -> EpisodeService:
@@ -248,6 +250,7 @@ def _episodes(
         console.robot,
         reset,
         may_ask,
+        has_ended,
         peers,
         trail,
     )

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable
 from typing import Protocol
 
 from lockstep.server.foxglove.stamp import STAMP_TOPIC, stamp_message
-from lockstep.server.recording.format.topics import Topic, topics_of
+from lockstep.server.recording.format.topics import LOG, Topic, topics_of
 from lockstep.server.recording.writing.queue_items import FeedbackItem, Item, MediaItem, RobotItem, entries_of
 
 __all__ = ["PublishingThread", "TopicServer"]
@@ -32,15 +32,17 @@ class PublishingThread:
     Attributes:
         watched: whether anybody subscribed; if not, the topics are offered, and nothing is encoded
         dropped: number of dropped items
+        repeats: whether the items that are put now are no news: then /log has no line of them
     """
 
     def __init__(self, server: TopicServer, on_fault: Callable[[Exception], None]) -> None:
         """`on_fault` is called from the thread."""
         self.watched = False
         self.dropped = 0
+        self.repeats = False
         self._server = server
         self._on_fault = on_fault
-        self._waiting: deque[Item] = deque(maxlen=MAX_WAITING)
+        self._waiting: deque[tuple[Item, bool]] = deque(maxlen=MAX_WAITING)
         self._robot: RobotItem | None = None  # the newest, which no full queue drops
         self._offered: RobotItem | None = None  # the one whose topics are offered
         self._news = threading.Event()
@@ -58,7 +60,7 @@ class PublishingThread:
             return
         if len(self._waiting) == MAX_WAITING:
             self.dropped += 1
-        self._waiting.append(item)
+        self._waiting.append((item, self.repeats))
         self._news.set()
 
     def close(self) -> None:
@@ -74,13 +76,13 @@ class PublishingThread:
             self._news.clear()
             for _ in range(len(self._waiting)):
                 try:
-                    self._publish(self._waiting.popleft())
+                    self._publish(*self._waiting.popleft())
                 except Exception as error:
                     self._on_fault(error)
                 time.sleep(0)  # the loop goes first
             self._closing.wait(DRAIN_SECONDS)
 
-    def _publish(self, item: Item) -> None:
+    def _publish(self, item: Item, repeated: bool) -> None:
         robot = self._robot
         if robot is None:
             return
@@ -90,7 +92,8 @@ class PublishingThread:
         if not self.watched or _epoch(item) != robot.record.epoch:
             return  # joints and axes of another epoch may be those of another description
         for entry in entries_of(item, robot.record.description):
-            self._server.log(entry.topic, entry.data, entry.arrived)
+            if not (repeated and entry.topic == LOG):
+                self._server.log(entry.topic, entry.data, entry.arrived)
             if isinstance(item, MediaItem):
                 self._server.log(STAMP_TOPIC.name, stamp_message(entry, item.epoch), entry.arrived)
 

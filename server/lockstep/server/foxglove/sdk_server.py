@@ -1,10 +1,9 @@
 """The Foxglove SDK's WebSocket server with the topics of one robot. The SDK is an optional extra of the console."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 
 import foxglove
 from foxglove import Channel, Context, Schema
-from foxglove.websocket import ChannelView, Client, ServerListener
 
 from lockstep.server.recording.format.topics import Topic
 
@@ -12,18 +11,20 @@ __all__ = ["SdkServer"]
 
 NAME = "Lockstep"
 BACKLOG = 256  # messages kept for each client, about 1 s; then the SDK drops the oldest
-Subscribed = Callable[[str, int], None]
 
 
 class SdkServer:
     """The server. `advertise` and `log` are called from one thread. It takes nothing from clients: no capability is on.
 
+    Nothing of a client calls into Python, so the SDK has no listener: whoever subscribed and unsubscribed without end
+    would keep the interpreter from the operator's commands.
+
     Attributes:
         port: that it listens on
     """
 
-    def __init__(self, host: str, port: int, subscribed: Subscribed) -> None:
-        """Start to listen. `subscribed` gets a topic, and +1 or -1, from threads of the SDK.
+    def __init__(self, host: str, port: int) -> None:
+        """Start to listen.
 
         Raises:
             RuntimeError: the address cannot be listened on.
@@ -35,7 +36,6 @@ class SdkServer:
             host=host,
             port=port,
             capabilities=[],
-            server_listener=_Listener(subscribed),
             context=self._context,
             message_backlog_size=BACKLOG,
         )
@@ -60,20 +60,13 @@ class SdkServer:
         if found is not None:
             found[1].log(data, log_time=arrived)
 
+    def subscribed(self) -> frozenset[str]:
+        """Return the topics that somebody is subscribed to. May be called from any thread."""
+        return frozenset(name for name, (_, channel) in list(self._channels.items()) if channel.has_sinks())
+
     def stop(self) -> None:
         """Close the connections and the socket. Blocks for a moment; idempotent."""
         self._server.stop()
         for _, channel in self._channels.values():
             channel.close()
         self._channels.clear()
-
-
-class _Listener(ServerListener):
-    def __init__(self, subscribed: Subscribed) -> None:
-        self._subscribed = subscribed
-
-    def on_subscribe(self, client: Client, channel: ChannelView) -> None:
-        self._subscribed(channel.topic, 1)
-
-    def on_unsubscribe(self, client: Client, channel: ChannelView) -> None:
-        self._subscribed(channel.topic, -1)

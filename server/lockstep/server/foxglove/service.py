@@ -21,15 +21,16 @@ __all__ = ["FoxgloveService"]
 log = structlog.get_logger(__name__)
 
 RETRY_SECONDS = 5.0  # until an address that could not be listened on is tried again
-SETTLE_SECONDS = 0.2  # in which new subscriptions are answered together
+LOOK_SECONDS = 0.25  # between two looks at who subscribed
+REPEAT_SECONDS = 5.0  # between two repetitions of the state, for those who subscribe to what others watch already
 KEYFRAME_SECONDS = 2.0  # between two keyframes for those who subscribe: they cost the operator's path
 
 
 class FoxgloveService:
     """The Foxglove server of one robot. Run `run` as a task; everything else is called on the loop.
 
-    Streams are taken, and encoded if nobody else takes them, only while somebody subscribed to one. Whoever subscribes
-    gets the state that holds once more, since the protocol repeats nothing.
+    Streams are taken, and encoded if nobody else takes them, only while somebody subscribed to one. The state that
+    holds is put once more when a topic is newly subscribed to, and at intervals: the protocol repeats nothing.
 
     Attributes:
         port: that it listens on; 0 while it does not
@@ -59,7 +60,6 @@ class FoxgloveService:
         self._on_dropped = on_dropped
         self._on_fault = on_fault
         self._records = SessionRecords(clock, media)
-        self._changed = asyncio.Event()  # of subscriptions
         self._takes_media = False
         self._keyframe_wanted = False  # somebody waits for one
         self._keyframe_at = 0.0  # s, monotonic: of the last one that was asked for
@@ -73,19 +73,14 @@ class FoxgloveService:
 
         loop = asyncio.get_running_loop()
 
-        def wake() -> None:
-            with suppress(RuntimeError):  # the loop has ended meanwhile
-                loop.call_soon_threadsafe(self._changed.set)
-
         def failed(error: Exception) -> None:
-            with suppress(RuntimeError):
+            with suppress(RuntimeError):  # the loop has ended meanwhile
                 loop.call_soon_threadsafe(self._on_fault, "foxglove", error)
 
-        subscriptions = Subscriptions(wake)
         while True:
             try:
                 # Listening is a bind, and no name is looked up: nothing that blocks the loop.
-                server = SdkServer(self._settings.host, self._settings.port or 0, subscriptions.change)
+                server = SdkServer(self._settings.host, self._settings.port or 0)
                 break
             except (RuntimeError, OSError) as error:
                 log.error("the Foxglove server cannot listen", host=self._settings.host, reason=str(error))
@@ -96,7 +91,7 @@ class FoxgloveService:
             self.port = server.port
             self.listening.set()
             log.info("Foxglove server", address=f"ws://{self._settings.host}:{server.port}")
-            await self._serve(thread, subscriptions)
+            await self._serve(thread, server.subscribed)
         finally:
             self._records.end()
             self._media.record(None, self._keyframe_seconds)
@@ -105,23 +100,27 @@ class FoxgloveService:
             self.port = 0
             await asyncio.shield(asyncio.to_thread(_close, thread, server.stop))
 
-    async def _serve(self, thread: PublishingThread, subscriptions: Subscriptions) -> None:
+    async def _serve(self, thread: PublishingThread, subscribed: Callable[[], frozenset[str]]) -> None:
         times = RecordClock(time.time_ns(), time.monotonic_ns())
-        self._records.begin(thread, times)  # the topics are offered before anybody comes
-        told = 0
+        subscriptions = Subscriptions()
+        self._repeat(thread, times)  # the topics are offered before anybody comes
+        repeated_at, told = time.monotonic(), 0
         while True:
-            with suppress(TimeoutError):
-                async with asyncio.timeout(KEYFRAME_SECONDS):
-                    await self._changed.wait()
-            self._changed.clear()
-            wanted = subscriptions.look()
+            await asyncio.sleep(LOOK_SECONDS)
+            wanted, now = subscriptions.look(subscribed()), time.monotonic()
             thread.watched = wanted.any
-            if wanted.newcomer:
-                self._records.begin(thread, times)
+            if wanted.newcomer or (wanted.any and now - repeated_at >= REPEAT_SECONDS):
+                repeated_at = now
+                self._repeat(thread, times)
             self._take_media(wanted)
             self._on_dropped(thread.dropped - told)
             told = thread.dropped
-            await asyncio.sleep(SETTLE_SECONDS)
+
+    def _repeat(self, thread: PublishingThread, times: RecordClock) -> None:
+        """Put the state that holds."""
+        thread.repeats = True
+        self._records.begin(thread, times)
+        thread.repeats = False
 
     def _take_media(self, wanted: Subscribers) -> None:
         now = time.monotonic()

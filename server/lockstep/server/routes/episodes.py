@@ -68,6 +68,7 @@ async def ask(request: Request, caller: Caller, do: EpisodeVerb) -> Response:
         id=secrets.token_hex(8), do=do, episode=body.episode, task=body.task, outcome=body.outcome, text=body.text
     )
     try:
-        return json_answer(await dependencies(request).episodes.ask_by_http(caller.actor, wanted))
+        asked = dependencies(request).episodes.ask_by_http(caller.actor, caller.identity.expires, wanted)
+        return json_answer(await asked)
     except EpisodeRefused as refused:
         raise ERRORS[refused.reason](refused.detail) from refused

@@ -75,6 +75,20 @@ def test_discarding_in_the_count_down_cancels_it_and_leaves_no_record() -> None:
     assert (it.phase, it.discarded) == ("idle", 0)
 
 
+@pytest.mark.parametrize("resets", [False, True])
+def test_an_episode_that_was_cancelled_before_its_begin_never_begins(resets: bool) -> None:
+    it = core(countdown=3.0, resets=resets)
+    it.start("wipe", "Ada", HERE, 0.0)
+    it.tick(HERE, 3.0)
+    it.redo("", "Ada", LATER, 4.0)
+    it.cancel("her link has ended")
+    assert it.last == "cancelled before it began: her link has ended"
+    assert it.phase == ("resetting" if resets else "idle")
+    it.reset_ended("", LATER, 5.0)
+    assert it.tick(LATER, 100.0) == []
+    assert (it.phase, it.number) == ("idle", 1)
+
+
 def test_the_reset_runs_after_each_episode_and_the_next_one_waits_for_it() -> None:
     it = core(resets=True)
     it.start("wipe", "Ada", HERE, 0.0)

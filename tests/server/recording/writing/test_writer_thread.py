@@ -7,6 +7,7 @@ import threading
 from pathlib import Path
 from typing import Any
 
+import msgspec
 import pytest
 from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey
 
@@ -14,7 +15,7 @@ from lockstep.protocol.messages import Feedback
 from lockstep.server.evidence.signer import Signer
 from lockstep.server.recording.format.info import RecordingInfo
 from lockstep.server.recording.format.payload import own_record
-from lockstep.server.recording.format.records import RobotRecord, SeatRecord, SignatureRecord
+from lockstep.server.recording.format.records import EpisodeRecord, RobotRecord, SeatRecord, SignatureRecord
 from lockstep.server.recording.format.signature import RecordingSigning
 from lockstep.server.recording.format.topics import SIGNATURE
 from lockstep.server.recording.reading.reader import RecordingReader
@@ -140,6 +141,29 @@ def test_nothing_waits_for_a_disk_that_is_too_slow_and_what_is_missing_is_told(
     with RecordingReader(tmp_path / "r.mcap") as reader:
         assert reader.index.lost == 21
         assert b'"lost":21' in next(iter(reader.records(topics={"/lockstep/degraded"}))).data
+
+
+def test_a_disk_that_is_too_slow_loses_marks_and_neither_begin_nor_end_of_an_episode(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(writer_thread, "MAX_WAITING", 10)
+    made = Made(tmp_path)
+    made.robot()
+    for event in range(1, 31):
+        made.feedback(event)
+    begun = EpisodeRecord(
+        epoch=EPOCH, event=30, episode="a", number=1, kind="start", task="push", first_event=30, last_event=30
+    )
+    made.thread.put(OwnItem(START, begun))
+    for number in range(1000):
+        made.thread.put(OwnItem(START, msgspec.structs.replace(begun, kind="mark", text=f"{number}")))
+    made.thread.put(OwnItem(START, msgspec.structs.replace(begun, kind="kept", event=31, last_event=31)))
+    assert made.thread.lost == 21 + 1000
+    made.thread.start()
+    made.thread.close()
+    with RecordingReader(tmp_path / "r.mcap") as reader:
+        (found,) = reader.index.episodes
+    assert (found.state, found.marks) == ("kept", [])
 
 
 def test_what_is_missing_is_told_where_it_is_missing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

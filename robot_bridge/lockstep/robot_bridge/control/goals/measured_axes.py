@@ -11,15 +11,22 @@ __all__ = ["MeasuredAxes"]
 class MeasuredAxes:
     """Returns the measured value of each axis when it is called; NaN for all if the adapter raised.
 
-    Call `look` in every tick.
+    Call `look` in every tick. It asks the adapter once between two ticks at most: a link may send thousands of commands
+    a second whose goals are refused, and a slow adapter that was asked for each would hold up the ticks.
     """
 
     def __init__(self, robot: Robot, axes: int) -> None:
         self._robot = robot
         self._axes = axes
         self._error: BaseException | None = None
+        self._places: Sequence[float] | None = None  # measured since the last tick
 
     def __call__(self) -> Sequence[float]:
+        if self._places is None:
+            self._places = self._measure()
+        return self._places
+
+    def _measure(self) -> Sequence[float]:
         try:
             places = self._robot.measured_axes()
             if len(places) != self._axes:
@@ -30,10 +37,11 @@ class MeasuredAxes:
         return places
 
     def look(self) -> None:
-        """Raise what the adapter raised.
+        """Let the adapter be asked anew. Raise what it raised.
 
         Raises:
             BaseException: the adapter's.
         """
+        self._places = None
         if self._error is not None:
             raise self._error

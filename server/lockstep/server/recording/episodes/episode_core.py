@@ -96,6 +96,11 @@ class EpisodeCore:
         """The event that held when the open episode began; 0: none is open."""
         return 0 if self._current is None else self._current.first_event
 
+    @property
+    def is_about_to_begin(self) -> bool:
+        """True from the request for an episode to its begin."""
+        return self.phase == "countdown" or self._next is not None
+
     def seconds_left(self, now: float) -> float:
         """Return the rest of the count-down."""
         return max(0.0, self._deadline - now) if self.phase == "countdown" else 0.0
@@ -104,7 +109,7 @@ class EpisodeCore:
 
     def start(self, task: str, by: str, place: Place, now: float) -> list[Effect]:
         task = task or self.task
-        if self.phase in ("open", "keeping", "countdown") or self._next is not None:
+        if self.phase in ("open", "keeping") or self.is_about_to_begin:
             raise EpisodeRefused("episode_open", "keep or discard it first")
         self._check_place(place)
         if not task:
@@ -124,7 +129,7 @@ class EpisodeCore:
 
     def discard(self, episode: str, by: str, place: Place, now: float) -> list[Effect]:
         """Discard the open episode, or cancel the one that is about to begin."""
-        if self.phase == "countdown" or self._next is not None:
+        if self.is_about_to_begin:
             if episode:
                 raise EpisodeRefused("other_episode")
             self._next = None
@@ -192,10 +197,8 @@ class EpisodeCore:
     def cut(self, why: CutReason, place: Place) -> list[Effect]:
         """End the open episode, which is in no dataset then. An epoch's end leaves one that is being kept alone."""
         if self.phase in ("countdown", "resetting"):
-            if self.phase == "countdown" or self._next is not None:
-                self.last = f"cancelled before it began: {CUT_WORDS[why]}"
-            self._next = None
-            if self.phase == "countdown" or why in ("epoch", "link_down"):
+            self.cancel(CUT_WORDS[why])
+            if why in ("epoch", "link_down"):
                 self.phase = "idle"
             return []
         current = self._current
@@ -206,6 +209,15 @@ class EpisodeCore:
         self.cuts += 1
         self.last = f"episode {current.number} is lost: {CUT_WORDS[why]}"
         return [] if kept else [Write(current.record("cut", place, "", why=why))]
+
+    def cancel(self, why: str) -> None:
+        """Cancel the episode that is about to begin, if there is one. `why`: in words."""
+        if not self.is_about_to_begin:
+            return
+        self._next = None
+        if self.phase == "countdown":
+            self.phase = "idle"
+        self.last = f"cancelled before it began: {why}"
 
     # steps
 

@@ -1,6 +1,7 @@
 """Runs the episodes of a robot's session: takes requests, writes records, tells everyone, and lets time pass."""
 
 import asyncio
+import math
 import secrets
 import time
 from collections.abc import Callable, Mapping
@@ -76,15 +77,24 @@ class EpisodeService:
         robot: EpisodeRobot,
         reset: ResetAction,
         may_ask: Callable[[Actor], bool],
+        has_ended: Callable[[str, float], bool],
         peers: PeerRegistry,
         audit: AuditTrail,
     ) -> None:
-        """`recorded`: codec by stream of what is recorded; `may_ask`: whether a person may begin and end episodes."""
+        """Create the service.
+
+        Args:
+            recorded: returns codec by stream of what is recorded
+            may_ask: returns whether a person may begin and end episodes
+            has_ended: returns whether the link with this id and expiry is no longer good
+        """
         self._clock = clock
         self._recorder = recorder
         self._robot = robot
         self._reset = reset
         self._may_ask = may_ask
+        self._has_ended = has_ended
+        self._begins_for = "", 0.0  # id and expiry of the link that asked for the episode that is about to begin
         self._peers = peers
         self._audit = audit
         self._core = EpisodeCore(
@@ -120,6 +130,9 @@ class EpisodeService:
                 await asyncio.sleep(TICK_SECONDS)
                 ticks += 1
                 phase = self._core.phase
+                if self._core.is_about_to_begin and self._has_ended(*self._begins_for):
+                    self._core.cancel("the link that asked for it has ended")
+                    self._tell()
                 if phase in ("countdown", "resetting"):
                     self._act(self._core.tick(self._place(), time.monotonic()), before=phase)
                 if self._core.phase == "resetting" and (ended := self._reset.ended()) is not None:
@@ -160,10 +173,14 @@ class EpisodeService:
             if peer is not None:
                 peer.send("session", EpisodeAnswer(id=request.id, reason=reason, detail=detail, episode=episode))
 
-        self._ask(event.by, request, answer)
+        self._ask(event.by, math.inf if peer is None else peer.identity.expires, request, answer)
 
-    async def ask_by_http(self, by: Actor, request: EpisodeRequest) -> EpisodeState:
-        """Do what is asked for; return the state when it is done. Raises EpisodeRefused."""
+    async def ask_by_http(self, by: Actor, expires: float, request: EpisodeRequest) -> EpisodeState:
+        """Do what is asked for by a link that `expires` (s since 1970); return the state when it is done.
+
+        Raises:
+            EpisodeRefused: it is not done.
+        """
         done: asyncio.Future[None] = asyncio.get_running_loop().create_future()
 
         def answer(reason: EpisodeReason, detail: str, episode: str) -> None:
@@ -174,11 +191,11 @@ class EpisodeService:
             else:
                 done.set_result(None)
 
-        self._ask(by, request, answer)
+        self._ask(by, expires, request, answer)
         await done
         return self.state()
 
-    def _ask(self, by: Actor, request: EpisodeRequest, answer: Answer) -> None:
+    def _ask(self, by: Actor, expires: float, request: EpisodeRequest, answer: Answer) -> None:
         episode = self._core.episode
         try:
             if not self._may_ask(by):
@@ -191,6 +208,8 @@ class EpisodeService:
             return
         if request.do == "keep":
             self._waiting.append((episode, answer))
+        if request.do in ("start", "redo"):
+            self._begins_for = by.link, expires
         self._act(effects)
         if request.do != "mark":
             what = f"episode: {request.do} {request.outcome}".strip()

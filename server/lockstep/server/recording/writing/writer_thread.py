@@ -96,10 +96,11 @@ class RecordingThread:
     def put(self, item: Item) -> None:
         """Queue an item without blocking. When the disk is too slow, it is left out and counted.
 
-        Records of episodes always find a place: a person has caused each of them, and the last one decides.
+        The begin and the end of an episode always find a place: a person has caused each of them, and the end decides.
+        They come a few times a second at most. Marks do not: stops and changes of the seat cause them too.
         """
-        is_episode = isinstance(item, OwnItem) and isinstance(item.record, EpisodeRecord)
-        if len(self._waiting) >= MAX_WAITING and not is_episode:
+        decides = isinstance(item, OwnItem) and isinstance(item.record, EpisodeRecord) and item.record.kind != "mark"
+        if len(self._waiting) >= MAX_WAITING and not decides:
             self._lost += 1
             self._lost_ever += 1
             return
