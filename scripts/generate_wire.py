@@ -16,7 +16,7 @@ import msgspec
 
 from lockstep.protocol.console import ClientMessage, ServerMessage
 from lockstep.protocol.messages import LinkMessageOnWire
-from lockstep.protocol.trace import COMMAND_WAY, PICTURE_WAY, Span
+from lockstep.protocol.traces.trace import COMMAND_WAY, PICTURE_WAY, Span
 from lockstep.server.fleet.openapi import fleet_openapi
 from lockstep.server.recording.format.records import OWN_RECORDS
 from lockstep.server.routes.openapi import openapi_document

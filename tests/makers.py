@@ -2,9 +2,10 @@
 
 from collections.abc import Sequence
 
+from lockstep.protocol.description import Axis
 from lockstep.protocol.messages import Feedback, Refusal, RefusalReason, StopState
 
-__all__ = ["feedback", "refusal"]
+__all__ = ["feedback", "goal_axis", "refusal"]
 
 
 def feedback(
@@ -34,3 +35,19 @@ def feedback(
 
 def refusal(event: int, reason: RefusalReason, current: int = 1) -> Refusal:
     return Refusal(event=event, reason=reason, current=current)
+
+
+def goal_axis(name: str, *, most: float, reach: float, wrap: float | None = None) -> Axis:
+    """An axis from `-most` to `most` rad that is told where to be, at 1 rad/s."""
+    return Axis(
+        name=name,
+        label=name,
+        unit="rad",
+        minimum=-most,
+        maximum=most,
+        slew=1,
+        brake=4,
+        kind="goal",
+        reach=reach,
+        wrap=wrap,
+    )

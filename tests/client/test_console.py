@@ -17,8 +17,8 @@ from lockstep.client import (
     SignallingRefused,
 )
 from lockstep.protocol.carriers import Carrier
-from lockstep.protocol.trace import known_spans
-from lockstep.protocol.trace_messages import Traces
+from lockstep.protocol.traces.trace import known_spans
+from lockstep.protocol.traces.trace_messages import Traces
 from tests.client.truth import collecting, drawn_event, executed_after, logged_stamps, until_logged
 from tests.support.stack import Stack
 

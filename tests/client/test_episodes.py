@@ -4,6 +4,8 @@ import asyncio
 import json
 import os
 import signal
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
 from pathlib import Path
 
 import av
@@ -43,6 +45,21 @@ async def _reset(console: Console) -> bool:
     except CommandRefused as refused:
         return refused.reason != "stale_reset"
     return True
+
+
+@asynccontextmanager
+async def _in_an_episode(
+    directory: Path, recordings: Path, settings: dict[str, str] = NO_COUNTDOWN
+) -> AsyncIterator[tuple[Stack, Console]]:
+    """A recorded session, and its operator, who has begun an episode and drives."""
+    async with (
+        running_stack(directory, extra=("--record", str(recordings)), settings=settings) as stack,
+        _console(stack.operator) as console,
+    ):
+        await console.take_seat()
+        await console.episodes.start("push")
+        await _drive(console)
+        yield stack, console
 
 
 async def _ask(stack: Stack, link: str, do: str, **body: str) -> httpx.Response:
@@ -135,13 +152,7 @@ async def test_without_a_recording_no_episode_begins_and_its_end_cuts_the_open_o
 @pytest.mark.asyncio
 async def test_a_stop_in_an_episode_is_marked_and_does_not_end_it(tmp_path: Path) -> None:
     recordings = tmp_path / "recordings"
-    async with (
-        running_stack(tmp_path, extra=("--record", str(recordings)), settings=NO_COUNTDOWN) as stack,
-        _console(stack.operator) as console,
-    ):
-        await console.take_seat()
-        await console.episodes.start("push")
-        await _drive(console)
+    async with _in_an_episode(tmp_path, recordings) as (_, console):
         await console.stop("a look")
         async with asyncio.timeout(PATIENCE):
             while not await _reset(console):  # noqa: ASYNC110 until the robot's answer to the press has come
@@ -159,13 +170,7 @@ async def test_a_stop_in_an_episode_is_marked_and_does_not_end_it(tmp_path: Path
 @pytest.mark.asyncio
 async def test_a_robot_that_is_lost_or_restarted_cuts_the_episode(tmp_path: Path) -> None:
     recordings = tmp_path / "recordings"
-    async with (
-        running_stack(tmp_path, extra=("--record", str(recordings)), settings=NO_COUNTDOWN) as stack,
-        _console(stack.operator) as console,
-    ):
-        await console.take_seat()
-        await console.episodes.start("push")
-        await _drive(console)
+    async with _in_an_episode(tmp_path, recordings) as (stack, console):
         os.kill(stack.bridge_pid(), signal.SIGKILL)
         state = await _until_state(console, "idle")
         assert "the robot link was lost" in state.last
@@ -251,13 +256,7 @@ async def test_the_reset_action_runs_between_episodes_and_the_next_one_waits_for
     """`light` moves nothing, so the console asks for it; `home` moves the robot, so whoever drives has to."""
     recordings = tmp_path / "recordings"
     settings = NO_COUNTDOWN | {"LOCKSTEP_EPISODES__RESET_ACTION": "home"}
-    async with (
-        running_stack(tmp_path, extra=("--record", str(recordings)), settings=settings) as stack,
-        _console(stack.operator) as console,
-    ):
-        await console.take_seat()
-        await console.episodes.start("push")
-        await _drive(console, 10)
+    async with _in_an_episode(tmp_path, recordings, settings) as (_, console):
         redone = asyncio.ensure_future(console.episodes.redo())
         state = await _until_state(console, "resetting")
         assert (state.reset_action, state.discarded) == ("home", 1)
@@ -295,13 +294,7 @@ async def test_a_revoked_link_begins_no_episode_that_it_asked_for_before(tmp_pat
 @pytest.mark.asyncio
 async def test_a_reset_that_moves_nothing_is_run_by_the_console(tmp_path: Path) -> None:
     settings = NO_COUNTDOWN | {"LOCKSTEP_EPISODES__RESET_ACTION": "light"}
-    async with (
-        running_stack(tmp_path, extra=("--record", str(tmp_path / "recordings")), settings=settings) as stack,
-        _console(stack.operator) as console,
-    ):
-        await console.take_seat()
-        await console.episodes.start("push")
-        await _drive(console)
+    async with _in_an_episode(tmp_path, tmp_path / "recordings", settings) as (_, console):
         await console.episodes.keep()
         await _until_state(console, "idle")
         assert "failed" not in console.episodes.state.last

@@ -12,9 +12,9 @@ import pytest
 from lockstep.bench.harness.driving import drive_on
 from lockstep.client import Console
 from lockstep.emulator import Network, load_profile
-from lockstep.protocol.trace import known_spans
+from lockstep.protocol.traces.trace import known_spans
 from lockstep.robot_bridge.robots.event_strip import read_event_strip
-from lockstep.server.cli.audit import verify_audit
+from lockstep.server.cli.access.audit import verify_audit
 from lockstep.server.evidence.anchors import parse_anchor
 from lockstep.server.evidence.signer import evidence_signer
 from lockstep.server.recording.format.payload import own_record_of

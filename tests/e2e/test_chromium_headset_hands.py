@@ -112,7 +112,7 @@ async def test_sticks_drive_the_base_and_the_trigger_the_gripper_while_a_hand_le
 async def test_the_scale_and_what_is_held_still_are_chosen_on_the_page(posed: Stack, chromium: Browser) -> None:
     async with open_headset(chromium, posed.operator) as headset:
         hands = headset.page.get_by_role("region", name="Hands in the headset")
-        await hands.get_by_label("Tool's way by the hand's").select_option("0.5")
+        await hands.get_by_label("Tool motion per hand motion").select_option("0.5")
         await hands.get_by_label("The camera looks").select_option("180")
         await hands.get_by_label("Hold still: up and down").press("Space")
         await headset.enter()

@@ -3,7 +3,7 @@
 import msgspec
 
 from lockstep.protocol.messages import Media, decode_message
-from lockstep.protocol.trace import PictureSpans
+from lockstep.protocol.traces.trace import PictureSpans
 from lockstep.robot_bridge.link.link_server import encode_waited
 from lockstep.robot_bridge.media_sources import with_spans
 

@@ -30,7 +30,7 @@ from lockstep.protocol.console import Participant, Role, Seat, SharedNote
 from lockstep.protocol.description import RobotDescription
 from lockstep.protocol.messages import Feedback, StopState
 from lockstep.protocol.neutral import neutral_value, neutral_values
-from lockstep.protocol.trace_messages import Traces
+from lockstep.protocol.traces.trace_messages import Traces
 
 __all__ = ["Console"]
 

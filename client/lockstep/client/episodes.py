@@ -17,7 +17,7 @@ DISK_SECONDS = 30.0  # for an episode to be on the disk
 
 
 class EpisodeNews:
-    """What the console has said of episodes. No I/O.
+    """The console's messages about episodes. No I/O.
 
     Attributes:
         state: the newest; None before the first
@@ -55,7 +55,7 @@ class Episodes:
 
     @property
     def state(self) -> EpisodeState:
-        """How the episode does, as the console told it last."""
+        """The newest state that the console has sent."""
         return self._news.state or EpisodeState()
 
     async def start(self, task: str = "") -> str:

@@ -23,7 +23,7 @@ from lockstep.protocol.console import (
 from lockstep.protocol.episodes import EpisodeAnswer, EpisodeState
 from lockstep.protocol.errors import MessageError
 from lockstep.protocol.messages import Feedback, Pong, Refusal, StopTaken
-from lockstep.protocol.trace_messages import Traces
+from lockstep.protocol.traces.trace_messages import Traces
 
 __all__ = ["MessageDispatcher"]
 

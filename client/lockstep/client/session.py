@@ -5,7 +5,7 @@ from collections.abc import Callable
 
 from lockstep.protocol.console import Participants, Role, Seat, SharedNote, Welcome
 from lockstep.protocol.messages import Refusal, StopState, StopTaken
-from lockstep.protocol.trace_messages import CommandTrace, PictureTrace, Traces
+from lockstep.protocol.traces.trace_messages import CommandTrace, PictureTrace, Traces
 
 __all__ = ["Session"]
 

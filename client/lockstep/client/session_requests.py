@@ -21,7 +21,7 @@ from lockstep.protocol.console import (
     SharedNote,
 )
 from lockstep.protocol.messages import Refusal, Reset, Stop, StopState
-from lockstep.protocol.trace_messages import TraceRequest
+from lockstep.protocol.traces.trace_messages import TraceRequest
 
 __all__ = ["SessionRequests"]
 

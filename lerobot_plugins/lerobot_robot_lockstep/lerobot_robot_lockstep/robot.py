@@ -7,7 +7,8 @@ import numpy as np
 from lerobot.robots import Robot
 from lerobot.utils.errors import DeviceAlreadyConnectedError, DeviceNotConnectedError
 
-from lerobot_robot_lockstep.config import LockstepRobotConfig, link_of, python_of
+from lerobot_robot_lockstep.config import LockstepRobotConfig
+from lerobot_robot_lockstep.device import LockstepDevice
 from lerobot_robot_lockstep.pipe import Pipe
 
 __all__ = ["LockstepRobot"]
@@ -15,7 +16,7 @@ __all__ = ["LockstepRobot"]
 COMMAND_SECONDS = 10.0  # for one command and its feedback on a bad network
 
 
-class LockstepRobot(Robot):
+class LockstepRobot(LockstepDevice, Robot):
     """Drives the robot as one more client of its console, with the seat, one event each; or only watches it.
 
     A picture that the console's gate would refuse never becomes part of an observation.
@@ -24,14 +25,7 @@ class LockstepRobot(Robot):
     config_class = LockstepRobotConfig
     name = "lockstep"
 
-    def __init__(self, config: LockstepRobotConfig) -> None:
-        super().__init__(config)
-        self.config = config
-        self._pipe: Pipe | None = None
-        self._known: dict[str, Any] | None = None
-        self._connected = False
-
-    # What the robot is; the console is asked as soon as somebody wants to know
+    # The robot's features; the first one that is read asks the console
 
     @cached_property
     def observation_features(self) -> dict[str, Any]:
@@ -49,20 +43,6 @@ class LockstepRobot(Robot):
         """The cameras by name: LeRobot counts them for its image writers."""
         return {camera["name"]: camera for camera in self._description()["cameras"]}
 
-    @property
-    def is_connected(self) -> bool:
-        return self._connected and self._pipe is not None and self._pipe.alive
-
-    @property
-    def is_calibrated(self) -> bool:
-        return True
-
-    def calibrate(self) -> None:
-        """The robot's own side calibrates it."""
-
-    def configure(self) -> None:
-        """The robot's own side configures it."""
-
     # Driving
 
     def connect(self, calibrate: bool = True) -> None:
@@ -75,13 +55,13 @@ class LockstepRobot(Robot):
         if self.is_connected:
             raise DeviceAlreadyConnectedError
         self._description()
-        pipe = self._open()
+        pipe = self._console()
         try:
             if self.config.drive:
                 pipe.ask("take_seat", COMMAND_SECONDS)
             self._observe(pipe, max(self.config.observation_timeout_s, self.config.connect_timeout_s))
         except BaseException:
-            self._let_go()  # who was refused holds no seat
+            self._let_go()  # after a refusal the seat is free
             raise
         self._connected = True
 
@@ -114,17 +94,6 @@ class LockstepRobot(Robot):
             raise DeviceNotConnectedError
         self._let_go()
 
-    def _let_go(self) -> None:
-        self._connected = False
-        pipe, self._pipe, self._known = self._pipe, None, None
-        if pipe is not None:
-            pipe.close()
-
-    def _live(self) -> Pipe:
-        if not self.is_connected or self._pipe is None:
-            raise DeviceNotConnectedError
-        return self._pipe
-
     def _observe(self, pipe: Pipe, seconds: float) -> dict[str, Any]:
         answer, blocks = pipe.ask("observe", seconds, seconds=seconds, max_age=self.config.picture_age_s)
         observed: dict[str, Any] = dict(answer["values"])
@@ -132,25 +101,7 @@ class LockstepRobot(Robot):
             observed[camera["name"]] = np.frombuffer(block, np.uint8).reshape(camera["height"], camera["width"], 3)
         return observed
 
-    def _open(self) -> Pipe:
-        if self._pipe is None or not self._pipe.alive:
-            self._let_go()  # one that does not answer may hold the seat
-            self._pipe, self._known = Pipe(python_of(self.config.python), "lockstep.client.pipe"), None
-        return self._pipe
-
     def _description(self) -> dict[str, Any]:
         """Return what the console says of the robot."""
-        pipe = self._open()
-        if self._known is None:
-            config = self.config
-            self._known, _ = pipe.ask(
-                "open",
-                config.connect_timeout_s,
-                link=link_of(config.link),
-                name=config.id or "lerobot",
-                tolerance=config.tolerance,
-                tls_ca=config.tls_ca,
-                pictures=config.pictures,
-                connect_seconds=config.connect_timeout_s,
-            )
-        return self._known
+        config = self.config
+        return self._ask_console(config.id or "lerobot", tolerance=config.tolerance, pictures=config.pictures)

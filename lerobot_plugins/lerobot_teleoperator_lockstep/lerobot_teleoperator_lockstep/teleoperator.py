@@ -5,7 +5,8 @@ from typing import Any
 
 from lerobot.teleoperators.teleoperator import Teleoperator
 from lerobot.utils.errors import DeviceAlreadyConnectedError, DeviceNotConnectedError
-from lerobot_robot_lockstep.config import link_of, python_of
+from lerobot_robot_lockstep.config import python_of
+from lerobot_robot_lockstep.device import LockstepDevice
 from lerobot_robot_lockstep.pipe import Pipe
 
 from lerobot_teleoperator_lockstep.config import LockstepTeleoperatorConfig
@@ -15,7 +16,7 @@ __all__ = ["LockstepTeleoperator"]
 ANSWER_SECONDS = 5.0
 
 
-class LockstepTeleoperator(Teleoperator):
+class LockstepTeleoperator(LockstepDevice, Teleoperator):
     """Returns the applied goals: what the robot is told, after every limit. When nobody drives, they stand still."""
 
     config_class = LockstepTeleoperatorConfig
@@ -23,10 +24,6 @@ class LockstepTeleoperator(Teleoperator):
 
     def __init__(self, config: LockstepTeleoperatorConfig) -> None:
         super().__init__(config)
-        self.config = config
-        self._pipe: Pipe | None = None
-        self._known: dict[str, Any] | None = None
-        self._connected = False
         self.address = ""  # of the bridge, with "page"
 
     @cached_property
@@ -39,20 +36,6 @@ class LockstepTeleoperator(Teleoperator):
     def feedback_features(self) -> dict[str, Any]:
         return {}
 
-    @property
-    def is_connected(self) -> bool:
-        return self._connected and self._pipe is not None and self._pipe.alive
-
-    @property
-    def is_calibrated(self) -> bool:
-        return True
-
-    def calibrate(self) -> None:
-        """There is nothing to calibrate."""
-
-    def configure(self) -> None:
-        """There is nothing to configure."""
-
     def connect(self, calibrate: bool = True) -> None:
         """Connect to the session, or begin to listen for a console.
 
@@ -64,8 +47,7 @@ class LockstepTeleoperator(Teleoperator):
         if self.config.source == "session":
             self._session()
         else:
-            if self._pipe is not None:
-                self._pipe.close()  # it has ended, or does not answer
+            self._let_go()  # a process that has ended, or does not answer
             self._listen()
         self._connected = True
 
@@ -76,13 +58,12 @@ class LockstepTeleoperator(Teleoperator):
             LockstepError: the robot's state is not known.
             DeviceNotConnectedError: the connection ended.
         """
-        if not self.is_connected or self._pipe is None:
-            raise DeviceNotConnectedError
+        pipe = self._live()
         if self.config.source == "page":
-            answer, _ = self._pipe.ask("action", ANSWER_SECONDS)
+            answer, _ = pipe.ask("action", ANSWER_SECONDS)
             return {name: float(value) for name, value in answer["values"].items()}
         seconds = self.config.observation_timeout_s
-        answer, _ = self._pipe.ask("observe", seconds, seconds=seconds)
+        answer, _ = pipe.ask("observe", seconds, seconds=seconds)
         measured, goals = answer["values"], answer["goals"]
         return {name: float(measured[name] if goals[name] is None else goals[name]) for name in measured}
 
@@ -94,28 +75,11 @@ class LockstepTeleoperator(Teleoperator):
         """End the connection, or the bridge."""
         if self._pipe is None:
             raise DeviceNotConnectedError
-        self._connected = False
-        pipe, self._pipe, self._known = self._pipe, None, None
-        pipe.close()
+        self._let_go()
 
     def _session(self) -> dict[str, Any]:
         """Return what the console says of the robot."""
-        config = self.config
-        if self._pipe is None or not self._pipe.alive:
-            if self._pipe is not None:
-                self._pipe.close()
-            self._pipe, self._known = Pipe(python_of(config.python), "lockstep.client.pipe"), None
-        if self._known is None:
-            self._known, _ = self._pipe.ask(
-                "open",
-                config.connect_timeout_s,
-                link=link_of(config.link),
-                name=f"{config.id or 'lerobot'} (actions)",
-                tls_ca=config.tls_ca,
-                pictures=False,
-                connect_seconds=config.connect_timeout_s,
-            )
-        return self._known
+        return self._ask_console(f"{self.config.id or 'lerobot'} (actions)", pictures=False)
 
     def _listen(self) -> None:
         config = self.config

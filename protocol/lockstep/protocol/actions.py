@@ -64,7 +64,6 @@ ActionReason = Literal[
     "not_possible",  # the robot says no; the text says why
     "no_seat",  # the sender does not hold the control seat
     "not_allowed",  # the sender's role does not permit it
-    "not_renewable",  # it moves the robot, and a request over HTTP cannot renew it by armed events
     "too_often",  # more requests than the console or the bridge takes
     "link_down",  # refused: the console has no robot link; cancelled: the link was lost
     # refused or cancelled

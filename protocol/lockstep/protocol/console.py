@@ -37,7 +37,7 @@ from lockstep.protocol.messages import (
     StopState,
     StopTaken,
 )
-from lockstep.protocol.trace_messages import TraceReport, TraceRequest, Traces
+from lockstep.protocol.traces.trace_messages import TraceReport, TraceRequest, Traces
 
 __all__ = [
     "ClientMessage",

@@ -81,7 +81,7 @@ class EpisodeProblem(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class EpisodeState(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", tag="episode"):
-    """How the episode does; sent to newcomers, when it changes, and every second while one is open."""
+    """The state of episodes; sent to newcomers, when it changes, and every second while an episode is open."""
 
     phase: EpisodePhase = "idle"
     episode: str = ""  # id of the one that is open or kept now; "" for none

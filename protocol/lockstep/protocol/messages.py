@@ -12,7 +12,7 @@ from lockstep.protocol.actions import Act, ActionCancel, ActionUpdate, RenewedAc
 from lockstep.protocol.description import RobotDescription
 from lockstep.protocol.errors import MessageError
 from lockstep.protocol.serial import MAX_EVENT
-from lockstep.protocol.trace import CommandSpans, PictureSpans
+from lockstep.protocol.traces.trace import CommandSpans, PictureSpans
 
 __all__ = [
     "MAX_AXES",

@@ -1,4 +1,4 @@
-"""What a command's values mean without regard to a robot's state: which of them move nothing."""
+"""Tells which values of a command move nothing, without regard to a robot's state."""
 
 from collections.abc import Sequence
 

@@ -8,7 +8,7 @@ from collections.abc import Callable
 import msgspec
 
 from lockstep.protocol.messages import Media
-from lockstep.protocol.trace import PictureSpans, span_ms
+from lockstep.protocol.traces.trace import PictureSpans, span_ms
 from lockstep.robot_bridge.control.event_core import EventCore
 from lockstep.robot_bridge.control.event_times import EventTimes
 from lockstep.robot_bridge.control.feedback_issuer import FeedbackIssuer

@@ -13,8 +13,8 @@ from lockstep.protocol.console import Participants, Report, RobotState, Seat, Sh
 from lockstep.protocol.description import RobotDescription
 from lockstep.protocol.episodes import EpisodeRequest
 from lockstep.protocol.messages import Command, Feedback, Refusal, RefusalReason, Rest, StopState, StopTaken
-from lockstep.protocol.trace import CommandSpans
-from lockstep.protocol.trace_messages import EventTrace
+from lockstep.protocol.traces.trace import CommandSpans
+from lockstep.protocol.traces.trace_messages import EventTrace
 from lockstep.server.audit.records import Actor
 from lockstep.server.stop.stop_presses import Press
 from lockstep.server.telemetry.faults import Faults

@@ -1,5 +1,5 @@
 from lockstep.bench.figures.way_results import sum_of_spans, way_results
-from lockstep.protocol.trace import PICTURE_WAY
+from lockstep.protocol.traces.trace import PICTURE_WAY
 
 
 def test_the_rows_add_up_to_a_usual_way() -> None:

@@ -9,28 +9,16 @@ from lockstep.client.control.clutch import REACH_SHARE, Clutch
 from lockstep.protocol.description import Axis, RobotDescription
 from lockstep.protocol.messages import Feedback, StopState
 from tests.client.vectors import load_vectors
+from tests.makers import goal_axis
 
 VECTORS = load_vectors("clutch.json")
 CASES: list[dict[str, Any]] = VECTORS["cases"]
 
 
-def goal_axis(name: str, reach: float, wrap: float | None = None) -> Axis:
-    return Axis(
-        name=name,
-        label=name,
-        unit="rad",
-        minimum=-1e4,
-        maximum=1e4,
-        slew=1,
-        brake=4,
-        kind="goal",
-        reach=reach,
-        wrap=wrap,
-    )
-
-
 def clutch_of(case: dict[str, Any]) -> Clutch:
-    axes = tuple(goal_axis(str(i), axis["reach"], axis["wrap"]) for i, axis in enumerate(case["axes"]))
+    axes = tuple(
+        goal_axis(str(i), most=1e4, reach=axis["reach"], wrap=axis["wrap"]) for i, axis in enumerate(case["axes"])
+    )
     scales = {str(i): axis["scale"] for i, axis in enumerate(case["axes"])}
     return Clutch(RobotDescription(name="arm", label="Arm", axes=axes), scales)
 
@@ -78,8 +66,8 @@ ARM = RobotDescription(
     label="Arm",
     axes=(
         Axis(name="base", label="Base", unit="m/s", minimum=-1, maximum=1, slew=1, brake=4),
-        goal_axis("j1", 0.5),
-        goal_axis("j2", 0.5),
+        goal_axis("j1", most=1e4, reach=0.5),
+        goal_axis("j2", most=1e4, reach=0.5),
     ),
 )
 
@@ -140,7 +128,7 @@ steps = st.lists(
 def test_the_first_goal_is_the_applied_goal_and_no_goal_is_beyond_both_its_share_of_reach_and_the_applied_goal(
     steps: list[tuple[str, float, float]], scale: float, wrap: float | None
 ) -> None:
-    axis = goal_axis("j", 0.5, wrap)
+    axis = goal_axis("j", most=1e4, reach=0.5, wrap=wrap)
     clutch = Clutch(RobotDescription(name="arm", label="Arm", axes=(axis,)), {"j": scale})
     applied, position, first = 0.0, 0.0, False
     for kind, one, other in steps:

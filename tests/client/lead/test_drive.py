@@ -22,9 +22,18 @@ class Hand:
     def __init__(self) -> None:
         self.quit = asyncio.Event()
         self.is_held = False
+        self._looked = asyncio.Event()
 
     def held(self, now: float) -> bool:
+        self._looked.set()
         return self.is_held and not self.quit.is_set()
+
+    async def until_looked_at(self, times: int = 2) -> None:
+        """Wait until the hand was looked at several times more."""
+        async with asyncio.timeout(10):
+            for _ in range(times):
+                self._looked.clear()
+                await self._looked.wait()
 
 
 class FakeConsole:
@@ -99,7 +108,7 @@ async def stage() -> Stage:
 async def test_nothing_is_sent_while_nobody_holds(stage: Stage) -> None:
     driving = stage.start()
     stage.move(20.0)
-    await asyncio.sleep(0.05)  # several looks
+    await stage.hand.until_looked_at(5)
     assert stage.console.said == []
     await stage.end(driving)
 
@@ -107,7 +116,7 @@ async def test_nothing_is_sent_while_nobody_holds(stage: Stage) -> None:
 async def test_a_press_moves_nothing_and_then_the_robot_follows_the_leaders_own_motion(stage: Stage) -> None:
     stage.move(-70.0)
     driving = stage.start()
-    await asyncio.sleep(0.03)
+    await stage.hand.until_looked_at()
     stage.hand.is_held = True
     await stage.console.until(lambda said: len(said) > 2)
     assert stage.console.said[:2] == ["arm", 40.0]
@@ -119,7 +128,7 @@ async def test_a_press_moves_nothing_and_then_the_robot_follows_the_leaders_own_
 
 async def test_letting_go_rests_at_once_though_a_command_is_not_answered(stage: Stage) -> None:
     driving = stage.start()
-    await asyncio.sleep(0.03)
+    await stage.hand.until_looked_at()
     stage.console.go.clear()
     stage.hand.is_held = True
     await stage.console.until(lambda said: 40.0 in said)
@@ -131,7 +140,7 @@ async def test_letting_go_rests_at_once_though_a_command_is_not_answered(stage: 
 async def test_a_key_that_was_held_all_along_drives_only_after_a_new_press(stage: Stage) -> None:
     stage.hand.is_held = True
     driving = stage.start()
-    await asyncio.sleep(0.05)
+    await stage.hand.until_looked_at(5)
     assert stage.console.said == []
     await stage.end(driving)
 
@@ -139,10 +148,10 @@ async def test_a_key_that_was_held_all_along_drives_only_after_a_new_press(stage
 async def test_after_a_refusal_it_takes_a_new_press(stage: Stage) -> None:
     stage.console.refusal = CommandRefused("stopped", "someone pressed STOP")
     driving = stage.start()
-    await asyncio.sleep(0.03)
+    await stage.hand.until_looked_at()
     stage.hand.is_held = True
     await stage.console.until(lambda said: said[-1:] == ["rest"])
-    await asyncio.sleep(0.05)
+    await stage.hand.until_looked_at(5)
     assert stage.console.said == ["arm", 40.0, "rest"]
     assert "press again" in stage.words[-1]
     await stage.end(driving)
@@ -150,12 +159,12 @@ async def test_after_a_refusal_it_takes_a_new_press(stage: Stage) -> None:
 
 async def test_a_leader_that_is_not_known_any_more_rests_the_robot(stage: Stage) -> None:
     driving = stage.start()
-    await asyncio.sleep(0.03)
+    await stage.hand.until_looked_at()
     stage.hand.is_held = True
     await stage.console.until(lambda said: 40.0 in said)
     stage.newest.put({}, float("inf"))
     await stage.console.until(lambda said: said[-1] == "rest")
     stage.move(0.0)
-    await asyncio.sleep(0.05)
+    await stage.hand.until_looked_at(5)
     assert stage.console.said[-1] == "rest"
     await stage.end(driving)

@@ -2,7 +2,7 @@
 
 import msgspec
 
-from lockstep.protocol.trace import CommandSpans
+from lockstep.protocol.traces.trace import CommandSpans
 from lockstep.robot_bridge.control.command_timing import CommandTiming
 
 

@@ -12,7 +12,7 @@ import pytest
 
 from lockstep.protocol.framing import MAX_MEDIA_FRAME, FrameReader, frame
 from lockstep.protocol.messages import EncodeRequest, Hello, Media, Ping, StreamRequest, decode_message, encode_message
-from lockstep.protocol.trace import known_spans
+from lockstep.protocol.traces.trace import known_spans
 from lockstep.robot_bridge.bridge import Bridge
 from lockstep.robot_bridge.conformance import CASES, Outcome, Subject, play_all
 from lockstep.robot_bridge.conformance.place import Place

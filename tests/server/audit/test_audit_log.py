@@ -10,7 +10,7 @@ from lockstep.server.audit import audit_writer
 from lockstep.server.audit.audit_file import stored_records
 from lockstep.server.audit.audit_log import open_audit_log
 from lockstep.server.audit.records import AuditRecord, AuditTrouble
-from lockstep.server.cli.audit import verify_audit
+from lockstep.server.cli.access.audit import verify_audit
 from lockstep.server.evidence.signer import evidence_signer
 from lockstep.server.settings import Settings
 from lockstep.server.util.state_dir import StateDir

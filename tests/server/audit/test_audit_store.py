@@ -12,7 +12,7 @@ from lockstep.server.audit import audit_store
 from lockstep.server.audit.audit_file import chatter_path, rotated, stored_records
 from lockstep.server.audit.audit_store import AuditStore
 from lockstep.server.audit.records import AuditKind, AuditRecord
-from lockstep.server.cli.audit import AuditVerdict, verify_audit
+from lockstep.server.cli.access.audit import AuditVerdict, verify_audit
 from lockstep.server.evidence.anchors import Anchor, AnchorFile, anchor_text, parse_anchor, sign_anchor
 from lockstep.server.evidence.signer import Signer
 

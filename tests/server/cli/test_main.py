@@ -227,9 +227,10 @@ def test_each_robot_of_up_has_its_latch_by_its_name_whatever_the_port(
 ) -> None:
     given: list[list[str]] = []
     monkeypatch.setattr(
-        "lockstep.server.cli.consoles.BridgeProcess", lambda kind, host, port, options, *more: given.append(options)
+        "lockstep.server.cli.console.consoles.BridgeProcess",
+        lambda kind, host, port, options, *more: given.append(options),
     )
-    monkeypatch.setattr("lockstep.server.cli.consoles._run", lambda *more: None)
+    monkeypatch.setattr("lockstep.server.cli.console.consoles._run", lambda *more: None)
     for port in ("8000", "9000"):
         asked = CliRunner().invoke(app, ["up", *robots, "--port", port, "--state-dir", str(tmp_path)])
         assert asked.exit_code == 0, asked.output

@@ -7,8 +7,8 @@ from contextlib import asynccontextmanager
 import pytest
 
 from lockstep.protocol.console import decode_server_message
-from lockstep.protocol.trace import CommandSpans, PictureSpans, known_spans
-from lockstep.protocol.trace_messages import MAX_TRACED_COMMANDS, EventTrace, PictureTrace, TraceReport, Traces
+from lockstep.protocol.traces.trace import CommandSpans, PictureSpans, known_spans
+from lockstep.protocol.traces.trace_messages import MAX_TRACED_COMMANDS, EventTrace, PictureTrace, TraceReport, Traces
 from lockstep.server.control import trace_service
 from lockstep.server.control.trace_service import TraceService, command_spans
 

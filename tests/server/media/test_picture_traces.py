@@ -3,7 +3,7 @@
 import msgspec
 
 from lockstep.protocol.carriers import EVENT_REFERENCE_URI
-from lockstep.protocol.trace import PictureSpans, known_spans
+from lockstep.protocol.traces.trace import PictureSpans, known_spans
 from lockstep.server.media.picture_traces import NEWEST, PictureTraces, SentPictures
 from lockstep.server.media.pipeline.frame import EncodedFrame
 from lockstep.server.media.pipeline.picture_timing import PictureTiming

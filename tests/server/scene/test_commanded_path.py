@@ -18,6 +18,7 @@ from lockstep.protocol.description import (
 )
 from lockstep.protocol.messages import Feedback, StopState
 from lockstep.server.scene.commanded_path import CommandedPath
+from tests.makers import goal_axis
 
 X, Y, Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
 
@@ -180,18 +181,7 @@ def test_what_it_is_now_stays_so_for_another_thread() -> None:
 
 
 def _goal_axis(name: str, wrap: float | None = None) -> Axis:
-    return Axis(
-        name=name,
-        label=name,
-        unit="rad",
-        minimum=-1,
-        maximum=1,
-        slew=1,
-        brake=4,
-        kind="goal",
-        reach=0.5,
-        wrap=wrap,
-    )
+    return goal_axis(name, most=1, reach=0.5, wrap=wrap)
 
 
 ARM = RobotDescription(

@@ -101,7 +101,7 @@ async def test_a_scene_that_does_not_start_is_said_to_be_unavailable_and_tried_a
 
 def test_a_console_that_nobody_asks_for_the_scene_does_not_load_viser() -> None:
     look = (
-        "import sys, lockstep.server.cli.main, lockstep.server.cli.run_console; "
+        "import sys, lockstep.server.cli.main, lockstep.server.cli.console.run_console; "
         "print(sorted({'viser', 'trimesh', 'PIL'} & set(sys.modules)))"
     )
     done = subprocess.run([sys.executable, "-c", look], capture_output=True, text=True, timeout=60, check=True)

@@ -3,9 +3,10 @@ from collections.abc import Callable
 
 import pytest
 
-from lockstep.robot_bridge.link.paced_transport import PacedReader, PacedSocket
+from lockstep.robot_bridge.link.pacing.paced_reader import PacedReader
+from lockstep.robot_bridge.link.pacing.paced_socket import PacedSocket
 from lockstep.server.util.read_turns import ReadTurns
-from tests.robot_bridge.link.test_paced_transport import Socket
+from tests.robot_bridge.link.pacing.tcp_socket import Socket
 
 
 class Time:

@@ -8,7 +8,7 @@ import { lengthOf, NO_FORCE, ramped, sourceDegrees, type StickForce } from "./st
 /** Effect block indices that the device gave; no entry where it has no such effect. */
 export type EffectBlocks = Readonly<Partial<Record<EffectKind, number>>> & { readonly constant: number };
 
-/** What the hand may feel now. */
+/** The force that the hand may feel now. */
 export interface Wanted {
   readonly force: StickForce; // share of the strongest that the settings allow
   readonly holdSeconds: number; // of the robot: no effect lasts longer
@@ -31,7 +31,7 @@ interface Playing {
 
 /**
  * Decides which reports a device is sent: the constant force on its way to the one that is wanted, a spring and a
- * damper. Every effect ends by itself and is renewed, so that nothing pushes for whoever has gone.
+ * damper. Every effect ends by itself and is renewed, so that nothing pushes for a page that has gone.
  *
  * Call `step` at least every 100 ms with what is wanted, null for nothing, and send what it returns, in order. After a
  * report that could not be sent call `stop`, or use a new manager.

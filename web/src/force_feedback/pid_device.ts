@@ -31,7 +31,7 @@ export type PidDescription =
 const SHORTEST_SECONDS = 0.02;
 const NEEDED = ["setEffect", "setConstantForce", "effectOperation", "deviceControl"] as const;
 
-/** What a device's descriptor offers of PID 1.0, or why it cannot be used. */
+/** The parts of PID 1.0 that a device's descriptor offers, or the reason why it cannot be used. */
 export function describePid(collections: readonly HidCollection[]): PidDescription {
   const find = (name: keyof typeof REPORTS, kind: ReportKind): ReportLayout | null =>
     findReport(collections, kind, REPORTS[name]);

@@ -14,7 +14,7 @@ import {
 } from "./report_values";
 import * as usages from "./pid_usages";
 
-/** What an effect is told before it plays. */
+/** The parameters of an effect. */
 export interface EffectParameters {
   readonly kind: usages.EffectKind;
   readonly block: number; // its effect block index
@@ -129,7 +129,7 @@ function withoutId(layout: ReportLayout, data: Uint8Array): Uint8Array {
   return layout.id !== 0 && data.length > layout.bytes && data[0] === layout.id ? data.subarray(1) : data;
 }
 
-/** PID 1.0: a value outside of the field's range is none, and the effect plays without a button. */
+/** PID 1.0: a value outside of the field's range is no button, and the effect plays without a button. */
 function noButton({ item }: Field): number {
   return item.logicalMinimum > 0 ? 0 : 2 ** item.reportSize - 1;
 }

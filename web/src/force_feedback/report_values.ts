@@ -45,7 +45,7 @@ export function indexOf({ usages, item }: Field, usage: number): number {
   return item.logicalMinimum + usages.indexOf(usage);
 }
 
-/** The usage that an array field names; null when it is none of its own. */
+/** The usage that an array field names; null when the field has no such usage. */
 export function usageNamed({ usages, item }: Field, value: number): number | null {
   return usages[value - item.logicalMinimum] ?? null;
 }

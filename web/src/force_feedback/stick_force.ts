@@ -7,7 +7,7 @@ export interface StickForce {
 export const NO_FORCE: StickForce = { right: 0, ahead: 0 };
 
 /**
- * What of a measured wrench (N, N m) the hand feels: x pushes ahead, y to the left (REP 103). `strength`: 0 to 1, how
+ * The part of a measured wrench (N, N m) that the hand feels: x pushes ahead, y to the left (REP 103). `strength`: 0 to 1, how
  * strongly a contact of this size is felt. Of a force from above or below the hand feels nothing.
  */
 export function stickForce(wrench: readonly number[], strength: number): StickForce {

@@ -50,7 +50,7 @@ export interface ForceContext {
 
 /** One stick that pushes back with the contact force: chosen, remembered, opened, and told what the hand may feel. */
 export class ForceFeedback {
-  /** What its owner should know; "" when nothing. */
+  /** A message for the stick's owner; "" for none. */
   words = "";
   stick: ForceStick | null = null;
   private kept: KeptStick = readKeptStick(load());

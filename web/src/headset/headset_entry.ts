@@ -37,7 +37,7 @@ export class HeadsetEntry {
     });
   }
 
-  /** How hands drive, where a headset is there and the robot has a pose to drive. */
+  /** The settings of the hands, where a headset is present and the robot has a pose to drive. */
   createSettings(): Panel {
     const { state } = this.page.engine;
     return createHeadsetSettings(

@@ -16,7 +16,7 @@ const LOCKS: readonly (readonly [keyof HandSettings["locked"], string])[] = [
   ["rotation", "Hold still: turning"],
 ];
 
-/** How hands move the robot's tool; kept in this browser. */
+/** The settings of how hands move the robot's tool; kept in this browser. */
 export class HandSettingsStorage {
   settings: HandSettings = readHandSettings(load());
 
@@ -34,7 +34,7 @@ export class HandSettingsStorage {
 export function createHeadsetSettings(storage: HandSettingsStorage, shown: () => boolean): Panel {
   const { settings } = storage;
   const scale = choice(
-    "Tool's way by the hand's",
+    "Tool motion per hand motion",
     SCALES.map((each) => [String(each), `${each} ×`]),
     String(settings.scale),
     (value) => storage.change({ scale: Number(value) }),

@@ -12,7 +12,7 @@ import type { HandReading } from "./xr_hands";
 
 export type ButtonName = "leave" | "recentre" | "reset" | "stop";
 
-/** What the view shows at one frame. */
+/** The content of the view at one frame. */
 export interface ViewState {
   readonly cameras: readonly ViewCamera[]; // in their order
   readonly main: string | null; // stream of the large picture

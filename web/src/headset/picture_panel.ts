@@ -17,7 +17,7 @@ export interface PanelPicture {
   readonly drawnMs: number | null; // when it last did
 }
 
-/** What is known of a panel's picture at one frame. */
+/** The state of a panel's picture at one frame. */
 export interface PanelState {
   readonly left: PanelPicture;
   readonly right: PanelPicture;
@@ -82,7 +82,7 @@ export class PicturePanel {
   }
 }
 
-/** What one eye sees of a panel, or both. */
+/** The part of a panel for one eye, or for both. */
 class EyePicture {
   readonly mesh: Mesh<PlaneGeometry, MeshBasicMaterial>;
   private texture: CanvasTexture | null = null;

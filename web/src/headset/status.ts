@@ -22,7 +22,7 @@ export interface Figure {
   readonly tone: "bad" | "good" | "off";
 }
 
-/** What the panel below the pictures says. */
+/** The content of the panel below the pictures. */
 export interface HeadsetStatus {
   readonly tone: "armed" | "bad" | "calm" | "driving" | "stopped";
   readonly title: string;
@@ -33,7 +33,7 @@ export interface HeadsetStatus {
   readonly frame: string; // "Frame 13.9 ms, of which 2.1 ms work"
 }
 
-/** What the session itself measures. */
+/** The times that the session itself measures. */
 export interface FrameFigures {
   readonly intervalMs: number | null; // between the newest frames
   readonly workMs: number | null; // of the page in one
@@ -56,7 +56,7 @@ export function headsetStatus(
   };
 }
 
-/** What the button that resets a stop says; null where there is nothing to reset, or it is not this person's. */
+/** The text of the button that resets a stop; null where there is nothing to reset, or it is not this person's. */
 export function resetWords(engine: ConsoleEngine, now: number): { text: string; ready: boolean } | null {
   const { stop } = engine.state;
   const isShown = overlayLabels(engine, now)?.tone === "stopped";

@@ -19,7 +19,7 @@ const UPPER = 5; // B, Y
 const STICK_X = 2; // axes
 const STICK_Y = 3;
 
-/** What the session's input sources say in this frame; of two on one side the controller counts. */
+/** The readings of the session's input sources in this frame; of two on one side the controller counts. */
 export function readHands(
   frame: XRFrame,
   space: XRReferenceSpace,

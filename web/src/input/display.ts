@@ -1,4 +1,4 @@
-/** What the person looks at instead of the window, while an immersive session lasts. */
+/** The display that the person looks at instead of the window, while an immersive session lasts. */
 export interface ImmersiveDisplay {
   readonly visible: boolean; // the session is, and not blurred
 }

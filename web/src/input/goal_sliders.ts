@@ -1,6 +1,6 @@
 import type { SliderInputs } from "../drive/axis_mapping";
 
-/** What is held of the sliders, and the keys that are not theirs. */
+/** The slider that is held, and the keys that are not the sliders'. */
 export interface SliderSample extends SliderInputs {
   readonly otherKeys: ReadonlySet<string>;
 }

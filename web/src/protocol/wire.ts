@@ -43,7 +43,7 @@ export interface ActionUpdate {
   readonly id: string;
   readonly name: string;
   readonly state: "cancelled" | "done" | "failed" | "refused" | "running";
-  readonly reason: "" | "bad_parameter" | "busy" | "cancelled" | "driving" | "interrupted" | "late" | "link_down" | "locked_out" | "no_seat" | "not_allowed" | "not_neutral" | "not_possible" | "not_renewable" | "not_renewed" | "rested" | "stopped" | "too_often" | "unknown_action" | "warning";
+  readonly reason: "" | "bad_parameter" | "busy" | "cancelled" | "driving" | "interrupted" | "late" | "link_down" | "locked_out" | "no_seat" | "not_allowed" | "not_neutral" | "not_possible" | "not_renewed" | "rested" | "stopped" | "too_often" | "unknown_action" | "warning";
   readonly progress: number;
   readonly text: string;
   readonly moves: boolean;

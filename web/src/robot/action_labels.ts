@@ -15,7 +15,6 @@ export const ACTION_REASON_LABELS: Readonly<Record<ActionUpdate["reason"], strin
   not_possible: "not possible now",
   no_seat: "you do not hold the control seat",
   not_allowed: "your link does not permit it",
-  not_renewable: "it needs a page or a program that stays",
   too_often: "too many requests at once",
   link_down: "the link to the robot was lost",
   stopped: "the robot was stopped",

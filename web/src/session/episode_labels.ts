@@ -24,7 +24,7 @@ export interface EpisodeLabels {
   readonly count: string;
 }
 
-/** What the page says of episodes. `ageSeconds`: since the state came, `seconds`: since the episode began. */
+/** The page's words about episodes. `ageSeconds`: since the state came, `seconds`: since the episode began. */
 export function episodeLabels(
   state: EpisodeState,
   recording: RecordingState | null,
@@ -56,7 +56,7 @@ export function episodeLabels(
   }
 }
 
-/** What spoils the open episode, the worst first, in one line. */
+/** The problems of the open episode, the worst first, in one line. */
 export function problemWords(problems: readonly EpisodeProblem[]): string {
   return problems.map((each) => each.text).join(" · ");
 }

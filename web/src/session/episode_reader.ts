@@ -4,7 +4,7 @@ import schema from "../protocol/wire_schema_later.json";
 
 const definitions: Definitions = schema;
 
-/** A message about episodes; null: it is none. */
+/** Reads a message about episodes; null for any other message. */
 export function readEpisodeMessage(value: unknown): EpisodeState | EpisodeAnswer | null {
   if (!isRecord(value)) return null;
   const name = { episode: "EpisodeState", episode_answer: "EpisodeAnswer" }[String(value["type"])];

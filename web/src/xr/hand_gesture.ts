@@ -3,7 +3,7 @@ import { distance, type Vector } from "./rigid";
 /** Places of a tracked hand's joints by their WebXR names; null: not tracked. */
 export type JointPlaces = (name: string) => Vector | null;
 
-/** What a hand without a controller says. */
+/** The gesture of a hand without a controller. */
 export interface HandGesture {
   readonly squeeze: number; // 0 open, 1: middle, ring and little finger closed
   readonly pinch: number; // 0 apart, 1: the tips of thumb and index finger touch

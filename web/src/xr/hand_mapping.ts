@@ -15,9 +15,9 @@ import {
 /** WebXR has x to the right, y up and -z ahead; a robot's base has x ahead, y to the left and z up (REP 103). */
 const TO_REP_103: Quaternion = [0.5, -0.5, -0.5, 0.5];
 
-/** What the operator has chosen for the motion of the hands. */
+/** The operator's settings for the motion of the hands. */
 export interface HandSettings {
-  readonly scale: number; // the tool's way by the hand's: 0.5 halves it
+  readonly scale: number; // tool motion per hand motion: 0.5 halves it
   readonly view: number; // heading of the camera's look in the base's frame, rad; 0 ahead, to the left positive
   readonly locked: {
     readonly x: boolean;

@@ -16,7 +16,7 @@ export interface HandSample {
   readonly recentre: boolean; // the stick is pressed
 }
 
-/** What the shell has to do, in this order. */
+/** The actions for the shell, in this order. */
 export type HeadsetEvent =
   | { readonly kind: "arm"; readonly side: Side } // and `grab` if that succeeded
   | { readonly kind: "lost"; readonly why: "squeeze_released" | "tracking_lost" }
@@ -32,7 +32,7 @@ interface HandState {
   pose: RigidPose | null;
 }
 
-/** What is held in the headset's session. */
+/** The state of the inputs in the headset's session. */
 export interface HeadsetInput {
   readonly hands: Map<Side, HandState>;
   readonly held: Set<Side>; // hands whose squeeze lets the robot move; empty: it may not

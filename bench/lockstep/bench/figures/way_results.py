@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from lockstep.bench.figures.results import Result
-from lockstep.protocol.trace import Span
+from lockstep.protocol.traces.trace import Span
 
 __all__ = ["sum_of_spans", "way_results"]
 

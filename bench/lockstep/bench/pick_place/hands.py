@@ -73,7 +73,7 @@ def policy(joints: Array, wanted: Array) -> Array:
 
 
 class PolicyHand:
-    """What a trained policy does each time it is asked: joint positions out of an observation, absolute."""
+    """Returns absolute joint positions for each observation, as a trained policy does."""
 
     def __init__(self, description: RobotDescription) -> None:
         self._postures = Postures(description)

@@ -1,4 +1,4 @@
-"""What a recording of a run says: refusals, and how far the goals moved from one feedback to the next."""
+"""Reads the recording of a run: its refusals, and how far the goals moved from one feedback to the next."""
 
 from collections import Counter
 from dataclasses import dataclass, field

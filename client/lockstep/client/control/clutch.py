@@ -161,7 +161,10 @@ class Clutch:
         self._clipped = ()
 
     def lost_feedback(self) -> None:
-        """Release, and do not engage before another feedback: the newest one may be of another state, or run."""
+        """Release, and do not engage before another feedback.
+
+        The newest one may be of another state, or of another run of the robot bridge.
+        """
         self.release()
         self._newest = None
 

@@ -39,7 +39,7 @@ class ForceSettings:
 
 
 class Effect(NamedTuple):
-    """What one effect is told before it plays. It ends by itself after `seconds`."""
+    """The parameters of one effect. It ends after `seconds` without an order."""
 
     kind: EffectKind
     share: float  # 0 to 1 of the device's strongest

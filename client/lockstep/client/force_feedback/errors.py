@@ -4,4 +4,4 @@ __all__ = ["ForceFeedbackError"]
 
 
 class ForceFeedbackError(Exception):
-    """A device cannot push, or does no longer. The text says why."""
+    """A device cannot push, or no longer pushes. The text says why."""

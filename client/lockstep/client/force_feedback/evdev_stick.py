@@ -25,7 +25,7 @@ __all__ = ["EvdevStick", "SystemCalls"]
 
 
 class SystemCalls(Protocol):
-    """What is asked of the kernel; each raises OSError."""
+    """The calls to the kernel; each raises OSError."""
 
     def open(self, path: str, flags: int) -> int: ...
 

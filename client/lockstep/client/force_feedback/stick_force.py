@@ -1,4 +1,4 @@
-"""What the hand feels of a measured force. Without I/O."""
+"""Turns a measured force into the force on the operator's hand. No I/O."""
 
 import math
 from collections.abc import Sequence
@@ -21,7 +21,7 @@ class StickForce(NamedTuple):
 
     @property
     def source_degrees(self) -> float:
-        """Where it comes from, clockwise from ahead, 0 to 360: Linux and USB PID name a force by its source."""
+        """The direction that it comes from, clockwise from ahead, 0 to 360, as Linux and USB PID have it."""
         return math.degrees(math.atan2(-self.right, -self.ahead)) % 360
 
     def scaled(self, factor: float) -> "StickForce":

@@ -91,7 +91,7 @@ async def _answered(drive: Coroutine[Any, Any, Feedback], hand: Hand, clock: Cal
 
 
 async def _pressed(hand: Hand, clock: Callable[[], float]) -> bool:
-    """Wait for a new press; return False when the operator quits. One that was held all along is none."""
+    """Wait for a new press; return False when the operator quits. A key that was held all along is not a new press."""
     for wanted in (False, True):
         while hand.held(clock()) != wanted and not hand.quit.is_set():
             with suppress(TimeoutError):

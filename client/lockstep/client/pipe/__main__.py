@@ -10,8 +10,8 @@ from contextlib import suppress
 from typing import BinaryIO
 
 from lockstep.client.pipe.server import PipeServer
-from lockstep.protocol.parent_process import parent_ended
-from lockstep.protocol.pipe_frames import BadFrame
+from lockstep.protocol.pipe.parent_process import parent_ended
+from lockstep.protocol.pipe.pipe_frames import BadFrame
 
 
 async def serve(output: BinaryIO) -> None:

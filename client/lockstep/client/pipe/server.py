@@ -13,7 +13,7 @@ from lockstep.client.errors import ConsoleError, ConsoleLost, Refused
 from lockstep.client.media.stream import Picture
 from lockstep.client.pipe.observation import NoFreshObservation, Observer
 from lockstep.client.pipe.reach import within_reach
-from lockstep.protocol.pipe_frames import BadFrame, read_request, to_frame
+from lockstep.protocol.pipe.pipe_frames import BadFrame, read_request, to_frame
 
 __all__ = ["PipeServer"]
 

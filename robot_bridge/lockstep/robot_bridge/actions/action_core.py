@@ -82,11 +82,6 @@ class ActionCore:
         """The time (s) at which the moving action began or was renewed last."""
         return self._renewed_at
 
-    @property
-    def running(self) -> list[str]:
-        """The ids of all actions that run."""
-        return list(self._running)
-
     def newest(self) -> list[ActionUpdate]:
         """Return the updates that a newcomer is told: all that run, and the newest others, oldest first."""
         known = [update for _, update in self._updates.values()]

@@ -5,7 +5,7 @@ Call order: `executed` when a command executes, `applied` after the next tick, `
 
 import msgspec
 
-from lockstep.protocol.trace import CommandSpans, span_ms
+from lockstep.protocol.traces.trace import CommandSpans, span_ms
 
 __all__ = ["CommandTiming"]
 

@@ -15,7 +15,7 @@ import msgspec
 from lockstep.protocol.description import Axis, Pose, StartWarning
 from lockstep.protocol.messages import Command, Feedback, Refusal, RefusalReason, RobotFeedback, StopState
 from lockstep.protocol.serial import FIRST_EVENT, event_after, event_gap, is_event, is_newer
-from lockstep.protocol.trace import CommandSpans
+from lockstep.protocol.traces.trace import CommandSpans
 from lockstep.robot_bridge.control.goals.command_values import CommandValues
 from lockstep.robot_bridge.control.restart_interlock import RestartInterlock
 from lockstep.robot_bridge.robots.base import Measurement

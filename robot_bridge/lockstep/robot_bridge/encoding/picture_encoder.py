@@ -40,15 +40,12 @@ _logger = logging.getLogger(__name__)
 class H264Encoder:
     """Constrained baseline; parameter sets in front of every keyframe; no reordering, no delay.
 
-    What `encode` returns is the picture that it was given: an encoder that returns another one is opened again.
-
-    Attributes:
-        fell_back: why the software encoder took the place of the one that was asked for; "" while it did not
+    What `encode` returns is the picture that it was given: an encoder that returns another one is opened again. Where
+    the named encoder cannot be used, the software encoder takes its place, and the log says why.
     """
 
     def __init__(self, encoder: str = SOFTWARE, frame_rate: float = ASSUMED_RATE) -> None:
         """`frame_rate`: the camera's, in Hz."""
-        self.fell_back = ""
         self._name = encoder
         self._frame_rate = frame_rate
         self._context: VideoCodecContext | None = None
@@ -97,7 +94,6 @@ class H264Encoder:
         raise EncodingFailed(f"no picture of the encoder: {why}")
 
     def _fall_back(self, why: str) -> None:
-        self.fell_back = why
         _logger.warning("encoder_fallback: %s; %s takes its place", why, SOFTWARE)
         self._name, self._wrong = SOFTWARE, 0
 

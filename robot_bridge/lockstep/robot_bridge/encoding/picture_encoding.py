@@ -11,7 +11,7 @@ from typing import NamedTuple, Protocol
 import msgspec
 
 from lockstep.protocol.messages import Media
-from lockstep.protocol.trace import PictureSpans, join_spans, span_ms
+from lockstep.protocol.traces.trace import PictureSpans, join_spans, span_ms
 from lockstep.robot_bridge.encoding.encoding_requests import EncodingGoal, FrameRateGate, KeyframeSpacing
 from lockstep.robot_bridge.errors import EncodingFailed
 from lockstep.robot_bridge.thread_name import name_thread

@@ -1,7 +1,7 @@
 """One step of the joints towards a pose of the tool, by damped least squares.
 
-What comes first when not all is possible: the joints' ranges and rates, the distance between the robot's own parts,
-the position, the rotation as far as the joints that are left can turn it, and last the posture.
+The order of priority where not everything is possible: the joints' ranges and rates, the distance between the robot's
+own parts, the position, the rotation as far as the joints that are left can turn it, and last the posture.
 
 Sources: Nakamura and Hanafusa 1986 (damping near singularities), Sugihara 2011 (damping by the error), Chiaverini 1997
 (the later task in the null space of the earlier one, each damped by itself), Faverjon and Tournassoud 1987 (velocity
@@ -34,7 +34,7 @@ class JointBounds(NamedTuple):
 
 
 class Tuning(NamedTuple):
-    """How the solver moves. The defaults are for an arm of half a metre and ticks of a few milliseconds."""
+    """The solver's bounds. The defaults are for an arm of half a metre and ticks of a few milliseconds."""
 
     gain: float = 20.0  # 1/s: the error decays by that rate
     longest: float = 0.05  # m, of the position error that is worked on at once

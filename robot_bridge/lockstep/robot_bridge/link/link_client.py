@@ -14,7 +14,7 @@ from lockstep.protocol.messages import Goodbye, Hello, LinkMessage, LinkRole, Me
 from lockstep.robot_bridge.link.link_session import BadInput, ClientSession, kind_of
 from lockstep.robot_bridge.link.link_transport import TICK_INTERVAL
 from lockstep.robot_bridge.link.outgoing_queues import MediaOutbox
-from lockstep.robot_bridge.link.paced_transport import PacedTransport
+from lockstep.robot_bridge.link.pacing.paced_transport import PacedTransport
 
 __all__ = ["RobotLink"]
 

@@ -29,7 +29,7 @@ from lockstep.protocol.messages import (
     Stop,
     encode_message,
 )
-from lockstep.protocol.trace import PictureSpans, span_ms
+from lockstep.protocol.traces.trace import PictureSpans, span_ms
 from lockstep.robot_bridge.counters import BridgeCounters
 from lockstep.robot_bridge.errors import ListenError
 from lockstep.robot_bridge.link.applicants import Strangers

@@ -17,7 +17,7 @@ __all__ = ["LOADERS", "app", "main"]
 
 
 def _console() -> typer.Typer:
-    from lockstep.server.cli.consoles import commands
+    from lockstep.server.cli.console.consoles import commands
 
     return commands
 
@@ -47,7 +47,7 @@ def _check() -> typer.Typer:
 
 
 def _access() -> typer.Typer:
-    from lockstep.server.cli.access import add_access_commands
+    from lockstep.server.cli.access.access import add_access_commands
     from lockstep.server.cli.settings_from_flags import make_settings
 
     commands = typer.Typer()
@@ -56,7 +56,7 @@ def _access() -> typer.Typer:
 
 
 def _pairing() -> typer.Typer:
-    from lockstep.server.cli.pairing import add_pairing_commands
+    from lockstep.server.cli.access.pairing import add_pairing_commands
     from lockstep.server.cli.settings_from_flags import make_settings
 
     commands = typer.Typer()
@@ -65,8 +65,8 @@ def _pairing() -> typer.Typer:
 
 
 def _recordings() -> typer.Typer:
-    from lockstep.server.cli.episodes import add_episode_command
-    from lockstep.server.cli.recordings import add_recording_commands
+    from lockstep.server.cli.recordings.episodes import add_episode_command
+    from lockstep.server.cli.recordings.recordings import add_recording_commands
     from lockstep.server.cli.settings_from_flags import make_settings
 
     commands = typer.Typer()
@@ -89,7 +89,7 @@ LOADERS: dict[Callable[[], typer.Typer], tuple[str, ...]] = {
 
 @cache
 def _group(load: Callable[[], typer.Typer]) -> TyperGroup:
-    gc.disable()  # as in server/lockstep/server/cli/entry.py
+    gc.disable()  # as in robot_bridge/lockstep/robot_bridge/entry.py
     try:
         return typer.main.get_group(load())
     finally:

@@ -40,7 +40,7 @@ from lockstep.protocol.messages import (
     plain_feedback,
     spans_of,
 )
-from lockstep.protocol.trace_messages import TraceReport, TraceRequest
+from lockstep.protocol.traces.trace_messages import TraceReport, TraceRequest
 from lockstep.server.actions.action_service import ActionService
 from lockstep.server.actions.status_service import StatusService
 from lockstep.server.audit.audit_trail import AuditTrail

@@ -10,7 +10,7 @@ from collections.abc import Callable, Collection, Sequence
 from typing import NamedTuple, Protocol
 
 from lockstep.protocol.console import encode_console_message
-from lockstep.protocol.trace import (
+from lockstep.protocol.traces.trace import (
     CommandSpans,
     PictureSpans,
     join_spans,
@@ -19,7 +19,7 @@ from lockstep.protocol.trace import (
     spans_at_bridge,
     sum_of_spans,
 )
-from lockstep.protocol.trace_messages import (
+from lockstep.protocol.traces.trace_messages import (
     MAX_TRACED_COMMANDS,
     CommandTrace,
     EventTrace,

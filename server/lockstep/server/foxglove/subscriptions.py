@@ -9,7 +9,7 @@ __all__ = ["Subscribers", "Subscriptions"]
 
 
 class Subscribers(NamedTuple):
-    """What viewers want now."""
+    """The topics that viewers have subscribed to now."""
 
     any: bool  # somebody subscribed to something
     media: bool  # somebody subscribed to a camera or a microphone

@@ -3,7 +3,7 @@
 from collections import deque
 from collections.abc import Sequence
 
-from lockstep.protocol.trace_messages import MAX_TRACED_PICTURES, PictureTrace
+from lockstep.protocol.traces.trace_messages import MAX_TRACED_PICTURES, PictureTrace
 from lockstep.server.media.pipeline.frame import EncodedFrame
 
 __all__ = ["PictureTraces", "SentPictures"]

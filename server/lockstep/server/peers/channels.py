@@ -22,7 +22,7 @@ from lockstep.protocol.console import (
 from lockstep.protocol.episodes import EpisodeRequest
 from lockstep.protocol.errors import MessageError
 from lockstep.protocol.messages import Command, Ping, Reset, Rest, Stop
-from lockstep.protocol.trace_messages import TraceReport, TraceRequest
+from lockstep.protocol.traces.trace_messages import TraceReport, TraceRequest
 from lockstep.rtc.token_bucket import TokenBucket
 from lockstep.server.errors import BinaryMessage, Flood, MalformedMessage, MessageTooLarge, UnknownChannel, WrongChannel
 from lockstep.server.stop.stop_presses import MAX_REASON, stop_text

@@ -21,7 +21,7 @@ from lockstep.protocol.console import (
     encode_console_message,
 )
 from lockstep.protocol.messages import Stop
-from lockstep.protocol.trace_messages import PictureTrace
+from lockstep.protocol.traces.trace_messages import PictureTrace
 from lockstep.rtc.token_bucket import TokenBucket
 from lockstep.server.audit.records import Actor
 from lockstep.server.auth.tokens import Identity

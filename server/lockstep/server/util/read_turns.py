@@ -4,7 +4,7 @@ import asyncio
 import time
 from collections.abc import Callable
 
-from lockstep.robot_bridge.link.paced_transport import ReadBudget
+from lockstep.robot_bridge.link.pacing.paced_reader import ReadBudget
 
 __all__ = ["ReadTurns"]
 

@@ -10,22 +10,12 @@ from hypothesis import strategies as st
 from lockstep.protocol.description import Axis
 from lockstep.robot_bridge.control.limits.axis_shaper import AxisShaper
 from lockstep.robot_bridge.control.limits.goal_axis import shorter_way, stopping_speed
+from tests.robot_bridge import goal_helpers
 
 HOLD = 0.3
 DT = 0.004
 ROUNDING = 1e-9
-SHOULDER = Axis(
-    name="shoulder",
-    label="Shoulder",
-    unit="rad",
-    minimum=-2,
-    maximum=2,
-    slew=1.5,
-    brake=8,
-    acceleration=3,
-    kind="goal",
-    reach=1.0,
-)
+SHOULDER = msgspec.structs.replace(goal_helpers.SHOULDER, brake=8, acceleration=3, reach=1.0)
 WHEEL = msgspec.structs.replace(SHOULDER, minimum=-math.pi, maximum=math.pi, wrap=2 * math.pi)
 
 

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import pytest
 
 from lockstep.robot_bridge.errors import RobotUnavailable, SettingsError
-from lockstep.robot_bridge.robots.base import Robot
+from lockstep.robot_bridge.robots.base import Measurement, Robot
 from lockstep.robot_bridge.robots.lerobot import drive
 from lockstep.robot_bridge.robots.lerobot import robot as robot_module
 from lockstep.robot_bridge.robots.lerobot.settings import AxisSettings, LeRobotSettings
@@ -28,6 +28,16 @@ def robots() -> Iterator[list[Robot]]:
 def make(robots: list[Robot], device: FakeDevice, settings: LeRobotSettings = FAST) -> Robot:
     robots.append(drive(device, settings))
     return robots[-1]
+
+
+def until_unknown(robot: Robot) -> Measurement:
+    """Wait until the newest reading is too old; it grows old by itself."""
+    for _ in range(5000):
+        measured = robot.measure()
+        if all(map(math.isnan, measured.axes)):
+            break
+        time.sleep(0.001)
+    return measured
 
 
 def tick_on(robot: Robot) -> None:
@@ -128,14 +138,13 @@ def test_a_device_that_hangs_makes_the_state_unknown_and_then_ends_the_tick(
     robot.apply([1.0, 1.0])
     assert arrived.wait(10)
     try:
-        time.sleep(0.1)  # the state grows old by itself
-        measured = robot.measure()
+        measured = until_unknown(robot)
         assert all(map(math.isnan, measured.axes))
         assert any("no reading for" in fault for fault in measured.faults)
         assert not measured.at_rest
         monkeypatch.setattr(robot_module, "HUNG_SECONDS", 0.05)
         with pytest.raises(TimeoutError, match="has not answered"):
-            robot.tick()
+            tick_on(robot)
     finally:
         go.set()
 

@@ -12,10 +12,10 @@ from lockstep.server.recording.episodes.episode_core import (
     Effect,
     EpisodeCore,
     EpisodeRefused,
-    Place,
     RunReset,
     Write,
 )
+from lockstep.server.recording.episodes.open_episode import Place
 from lockstep.server.recording.format.episodes import EpisodeBook
 from lockstep.server.recording.format.records import EpisodeRecord
 

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from lockstep.protocol.console import Report, StreamReport
-from lockstep.protocol.trace import CommandSpans, PictureSpans
+from lockstep.protocol.traces.trace import CommandSpans, PictureSpans
 from lockstep.server.recording.format.records import ReportRecord, TraceRecord
 from lockstep.server.recording.report.report import write_report
 from lockstep.server.recording.report.session import read_session

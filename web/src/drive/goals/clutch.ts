@@ -8,7 +8,7 @@ export interface ClutchAxis {
   readonly scale: number; // goal for the device's motion, in units of the axis; negative: mirrored
 }
 
-/** What is bound of one axis. Places of an axis with `wrap` are counted on past its period: a turn keeps its direction. */
+/** The bound places of one axis. Places of an axis with `wrap` are counted on past its period: a turn keeps its direction. */
 interface Binding extends ClutchAxis {
   origin: number; // the applied goal at which it was engaged
   device: number; // newest reading

@@ -13,7 +13,7 @@ export interface GoalDevice {
   release(): void;
 }
 
-/** What goal axes are driven with at one moment. */
+/** The inputs that drive goal axes at one moment. */
 export interface GoalInputs {
   readonly description: RobotDescription;
   readonly layer: ControlLayer | undefined;

@@ -2,7 +2,7 @@ import type { Axis } from "../../protocol/wire";
 import { quantity, scaleFor } from "../../util/units";
 import { wayTo } from "./goal_range";
 
-/** How near to an end of its range an axis counts as at its end; of the range. */
+/** An axis that is nearer to an end of its range than this share of the range counts as at its end. */
 const AT_END = 0.004;
 const DEGREES = 180 / Math.PI;
 

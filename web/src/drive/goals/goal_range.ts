@@ -3,7 +3,7 @@ import type { Axis } from "../../protocol/wire";
 /** Of an axis' reach that goals use: the robot moves on while a command travels. The Python client has the same share. */
 export const REACH_SHARE = 0.8;
 
-/** What an axis value may be: null where a goal axis is to stay. */
+/** A value of an axis; null where a goal axis is to stay. */
 export type AxisValue = number | null;
 
 type Wrapping = Pick<Axis, "wrap">;

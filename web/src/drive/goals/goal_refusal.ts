@@ -20,7 +20,7 @@ export function refusedAxis(refusal: GoalRefusal, description: RobotDescription 
   return description?.axes.find((axis) => refusal.detail.startsWith(`${axis.name}:`)) ?? null;
 }
 
-/** What was refused, and what to do next. */
+/** Says what was refused and what to do next. */
 export function goalRefusalWords(refusal: GoalRefusal, description: RobotDescription | null): string {
   if (refusal.reason === "conflict")
     return "Refused: two controls move the same joints. Let go of one, or change the layer";

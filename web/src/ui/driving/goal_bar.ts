@@ -90,7 +90,7 @@ function sliderAttributes(axis: Axis): Record<string, string> {
   };
 }
 
-/** What a screen reader is told: where the axis is, where it is told to be, and whether the slider moves it now. */
+/** The text for a screen reader: where the axis is, where it is told to be, and whether the slider moves it now. */
 function describe(
   slider: HTMLElement,
   engine: ConsoleEngine,

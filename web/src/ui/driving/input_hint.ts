@@ -1,7 +1,7 @@
 import { keyName } from "../../input/shortcuts";
 import type { Binding } from "../../protocol/wire";
 
-/** What the operator has in hand. */
+/** The input device that the operator uses. */
 export type InputDevice = "keys" | "pad" | "touch";
 
 const PAD: Readonly<Record<NonNullable<Binding["pad"]>, string>> = {

@@ -10,11 +10,11 @@ import { button, h, setData, setHidden, setText, type Panel } from "../elements/
 
 type Request = Pick<EpisodeRequest, "do"> & Partial<EpisodeRequest>;
 
-/** How long a refusal stays in words. */
+/** The time for which a refusal stays readable, in ms. */
 const SHOWN_MS = 6000;
 const TASK_LIMIT = 300;
 
-/** What each key asks for; foot pedals are keys. */
+/** The request of each key; foot pedals are keys. */
 const KEYS: ReadonlyMap<string, Request> = new Map<string, Request>([
   ["KeyB", { do: "start" }],
   ["KeyK", { do: "keep" }],
@@ -75,10 +75,10 @@ export function createEpisodeBar(engine: ConsoleEngine): Panel {
     return { element: made, works };
   }
 
-  /** Who may: as the console judges it, which has the last word. */
+  /** Whether this person may ask, by the rule of the console, which decides in the end. */
   const may = (): boolean => holdsSeat(engine.state) || engine.state.welcome?.role === "supervisor";
 
-  /** Each request names the episode that stands on the page: one that comes late meets no later one. */
+  /** Each request names the episode that the page shows, so that a late request never ends a later episode. */
   function ask(request: Request): void {
     if (state === null || !may()) return;
     const { do: verb } = request;

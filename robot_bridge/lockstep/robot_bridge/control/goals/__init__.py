@@ -1,1 +1,1 @@
-"""What goals mean for a robot: which command carries them, where they begin, which exclude each other."""
+"""Goals of a robot's axes: which command carries them, where they begin, which of them exclude each other."""

@@ -1,4 +1,4 @@
-"""What the values of a command mean for a robot's axes. No I/O but the caller's measurement, no clock."""
+"""Judges the values of a command by the robot's axes. No I/O but the caller's measurement, no clock."""
 
 import math
 from collections.abc import Callable, Sequence

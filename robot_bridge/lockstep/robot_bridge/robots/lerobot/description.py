@@ -20,7 +20,7 @@ MAX_FRAME_RATE = 240.0
 
 
 class _Unit(NamedTuple):
-    """What an axis of a unit may do unless the settings say otherwise."""
+    """The limits of an axis with a certain unit, unless the settings say otherwise."""
 
     unit: str
     minimum: float | None

@@ -1,4 +1,4 @@
-"""What the adapter needs of a robot of LeRobot, so that its rules can be tried without LeRobot."""
+"""The interface between the adapter and a robot of LeRobot, so that the rules can be tested without LeRobot."""
 
 from collections.abc import Mapping
 from typing import Any, Literal, NamedTuple, Protocol
@@ -10,7 +10,7 @@ Norm = Literal["degrees", "range_m100_100", "range_0_100"]
 
 
 class AxisFacts(NamedTuple):
-    """What the robot says of one entry of its action."""
+    """The robot's facts about one entry of its action."""
 
     name: str  # "shoulder_pan.pos"
     norm: Norm | None = None  # None: the robot does not say it
@@ -28,7 +28,7 @@ class CameraFacts(NamedTuple):
 
 
 class DeviceFacts(NamedTuple):
-    """What the robot says of itself once it is connected."""
+    """The robot's facts about itself, known once it is connected."""
 
     kind: str  # "so101_follower"
     id: str  # "" without one
@@ -38,7 +38,7 @@ class DeviceFacts(NamedTuple):
 
 
 class Shots(Protocol):
-    """A camera that is read by itself."""
+    """A camera that is read apart from the robot's state."""
 
     def read(self) -> Any:
         """Wait for a picture that was not read before; return it, height x width x 3, uint8, RGB.

@@ -33,7 +33,7 @@ def connect(kind: str, config: Mapping[str, Any], flags: Sequence[str]) -> "LeRo
     Raises:
         RobotUnavailable: LeRobot is missing, the robot does not answer, or is not calibrated.
         UnknownRobot: there is no such type or class.
-        BadRobot: the class is none of a robot.
+        BadRobot: the class is not one of a robot.
         SettingsError: the configuration does not fit.
     """
     try:
@@ -112,8 +112,10 @@ class LeRobotDevice:
 
     def disconnect(self, *, torque_off: bool) -> None:
         if torque_off:
-            with suppress(Exception):
+            try:
                 self.torque(False)
+            except Exception as error:  # the disconnect below lets go of the bus all the same
+                _logger.error("the torque of %s could not be switched off: %s", self._robot, error)
         if self._all_cameras is not None:
             self._robot.cameras = self._all_cameras
         self._robot.disconnect()

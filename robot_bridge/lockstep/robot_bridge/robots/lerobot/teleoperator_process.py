@@ -17,8 +17,8 @@ from msgspec.structs import replace
 from lockstep.protocol.description import RobotDescription
 from lockstep.protocol.errors import SecretError
 from lockstep.protocol.link_secret import LinkSecret
-from lockstep.protocol.parent_process import parent_ended
-from lockstep.protocol.pipe_frames import BadFrame, read_request, to_frame
+from lockstep.protocol.pipe.parent_process import parent_ended
+from lockstep.protocol.pipe.pipe_frames import BadFrame, read_request, to_frame
 from lockstep.robot_bridge.bridge import Bridge
 from lockstep.robot_bridge.errors import BridgeError
 from lockstep.robot_bridge.robots.lerobot.description import describe

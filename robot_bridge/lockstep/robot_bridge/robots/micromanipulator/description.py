@@ -16,13 +16,12 @@ from lockstep.protocol.description import (
     Geom,
     Joint,
     Microphone,
-    PadInput,
     PositionLimit,
     RobotDescription,
-    TouchPad,
     WrenchSensor,
 )
 from lockstep.robot_bridge.robots.micromanipulator.samples import MICRO, SAMPLES
+from lockstep.robot_bridge.robots.stick_bindings import leftwards, upwards
 
 __all__ = [
     "DESCRIPTION",
@@ -72,33 +71,12 @@ def _axis(name: str, label: str, fastest: float, unit: str = "m/s") -> Axis:
     )
 
 
-def _up(axis: str, stick: PadInput, touch: TouchPad | None, keys: tuple[str, str], scale: float) -> Binding:
-    """Bind an axis so that stick up is positive; pads give that as a negative number, touch sticks as a positive."""
-    return Binding(
-        axis=axis, pad=stick, touch=touch, invert_pad=True, key_positive=keys[0], key_negative=keys[1], scale=scale
-    )
-
-
-def _left(axis: str, stick: PadInput, touch: TouchPad | None, keys: tuple[str, str], scale: float) -> Binding:
-    """Bind an axis so that stick left is positive, which both kinds of stick give as a negative number."""
-    return Binding(
-        axis=axis,
-        pad=stick,
-        touch=touch,
-        invert_pad=True,
-        invert_touch=True,
-        key_positive=keys[0],
-        key_negative=keys[1],
-        scale=scale,
-    )
-
-
 def _probe(scale: float) -> tuple[Binding, ...]:
     return (
-        _up("probe.vx", "left_y", "left_y", ("KeyW", "KeyS"), scale),
-        _left("probe.vy", "left_x", "left_x", ("KeyA", "KeyD"), scale),
-        _up("probe.vz", "right_y", "right_y", ("KeyR", "KeyF"), scale),
-        _up("focus.vz", "dpad_y", None, ("ArrowUp", "ArrowDown"), 1.0),
+        upwards("probe.vx", "left_y", "left_y", ("KeyW", "KeyS"), scale=scale),
+        leftwards("probe.vy", "left_x", "left_x", ("KeyA", "KeyD"), scale=scale),
+        upwards("probe.vz", "right_y", "right_y", ("KeyR", "KeyF"), scale=scale),
+        upwards("focus.vz", "dpad_y", None, ("ArrowUp", "ArrowDown")),
     )
 
 
@@ -109,9 +87,9 @@ LAYERS: Final = (
         name="microscope",
         label="Microscope",
         bindings=(
-            _up("focus.vz", "left_y", "left_y", ("KeyW", "KeyS"), 1.0),
+            upwards("focus.vz", "left_y", "left_y", ("KeyW", "KeyS")),
             Binding(axis="light.rate", pad="left_x", touch="left_x", key_positive="KeyD", key_negative="KeyA"),
-            _up("probe.vz", "right_y", "right_y", ("KeyR", "KeyF"), FINE),
+            upwards("probe.vz", "right_y", "right_y", ("KeyR", "KeyF"), scale=FINE),
         ),
     ),
 )

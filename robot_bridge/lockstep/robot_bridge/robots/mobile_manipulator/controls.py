@@ -2,7 +2,8 @@
 
 from typing import Final
 
-from lockstep.protocol.description import Axis, Binding, ControlLayer, PadInput, TouchPad
+from lockstep.protocol.description import Axis, Binding, ControlLayer
+from lockstep.robot_bridge.robots.stick_bindings import leftwards, upwards
 
 __all__ = ["AXES", "LAYERS"]
 
@@ -35,35 +36,15 @@ AXES: Final = (
 )
 
 
-def forward(name: str, stick: PadInput, touch: TouchPad, keys: tuple[str, str]) -> Binding:
-    """Bind an axis so that stick up is positive; pads give that as a negative number, touch sticks as a positive."""
-    return Binding(
-        axis=name, pad=stick, touch=touch, invert_pad=True, key_positive=f"Key{keys[0]}", key_negative=f"Key{keys[1]}"
-    )
-
-
-def leftward(name: str, stick: PadInput, touch: TouchPad, keys: tuple[str, str]) -> Binding:
-    """Bind an axis so that stick left is positive, which both kinds of stick give as a negative number."""
-    return Binding(
-        axis=name,
-        pad=stick,
-        touch=touch,
-        invert_pad=True,
-        invert_touch=True,
-        key_positive=f"Key{keys[0]}",
-        key_negative=f"Key{keys[1]}",
-    )
-
-
 LAYERS: Final = (
     ControlLayer(
         name="drive",
         label="Drive",
         bindings=(
-            forward("base.vx", "left_y", "left_y", ("W", "S")),
-            leftward("base.vy", "left_x", "left_x", ("A", "D")),
-            leftward("base.wz", "right_x", "right_x", ("Q", "E")),
-            forward("tool.vz", "right_y", "right_y", ("R", "F")),
+            upwards("base.vx", "left_y", "left_y", ("KeyW", "KeyS")),
+            leftwards("base.vy", "left_x", "left_x", ("KeyA", "KeyD")),
+            leftwards("base.wz", "right_x", "right_x", ("KeyQ", "KeyE")),
+            upwards("tool.vz", "right_y", "right_y", ("KeyR", "KeyF")),
             Binding(axis="tool.vx", pad="triggers", key_positive="ArrowUp", key_negative="ArrowDown"),
             Binding(axis="tool.vy", pad="dpad_x", invert_pad=True, key_positive="ArrowLeft", key_negative="ArrowRight"),
         ),
@@ -72,10 +53,10 @@ LAYERS: Final = (
         name="arm",
         label="Tool",
         bindings=(
-            forward("tool.vx", "left_y", "left_y", ("W", "S")),
-            leftward("tool.vy", "left_x", "left_x", ("A", "D")),
-            leftward("tool.wz", "right_x", "right_x", ("Q", "E")),
-            forward("tool.vz", "right_y", "right_y", ("R", "F")),
+            upwards("tool.vx", "left_y", "left_y", ("KeyW", "KeyS")),
+            leftwards("tool.vy", "left_x", "left_x", ("KeyA", "KeyD")),
+            leftwards("tool.wz", "right_x", "right_x", ("KeyQ", "KeyE")),
+            upwards("tool.vz", "right_y", "right_y", ("KeyR", "KeyF")),
             # Up lifts the tool's nose, which is negative pitch; right turns it clockwise seen from behind.
             Binding(axis="tool.wy", pad="dpad_y", key_positive="ArrowDown", key_negative="ArrowUp"),
             Binding(axis="tool.wx", pad="dpad_x", key_positive="ArrowRight", key_negative="ArrowLeft"),

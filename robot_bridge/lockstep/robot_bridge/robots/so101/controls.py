@@ -1,26 +1,19 @@
 """The arm's axes, and their bindings to gamepad, touch sticks and keys, in two layers."""
 
 import math
-from collections.abc import Sequence
 from typing import Final
 
-from lockstep.protocol.description import Axis, Binding, ControlLayer, PadInput, TouchPad
+from lockstep.protocol.description import Axis, Binding, ControlLayer
+from lockstep.robot_bridge.robots.stick_bindings import leftwards, upwards
 
 __all__ = ["AXES", "JOINT_AXES", "LAYERS", "POSITION_AXES", "RATES", "ROTATION_AXES"]
 
 STOPS_IN: Final = 0.15  # s from an axis' full speed to a standstill, when it brakes
 SPEEDS_UP_IN: Final = 0.25  # s to its full speed
-JOINT_REACH: Final = 0.7  # rad: some more than a leader arm can be ahead
+JOINT_REACH: Final = 0.7  # rad: a little more than a leader arm gets ahead
 TOOL_REACH: Final = 0.10  # m
 HALF_A_TURN: Final = round(math.pi, 5)
-RATES: Final[tuple[float, ...]] = (
-    2.0,
-    1.6,
-    2.0,
-    2.5,
-    3.0,
-    3.0,
-)  # rad/s, of each joint, whatever drives it; the servos make 5
+RATES: Final[tuple[float, ...]] = (2.0, 1.6, 2.0, 2.5, 3.0, 3.0)  # rad/s, of each joint, always; the servos make 5
 
 
 def goal(name: str, label: str, unit: str, bounds: tuple[float, float], speed: float, reach: float) -> Axis:
@@ -61,32 +54,6 @@ ROTATION_AXES: Final = (
     goal("tool.rz", "Tool turn left", "rad", (-HALF_A_TURN, HALF_A_TURN), 1.2, 2 * HALF_A_TURN),
 )
 AXES: Final = (*JOINT_AXES, *POSITION_AXES, *ROTATION_AXES)
-
-
-def upwards(name: str, stick: PadInput, touch: TouchPad, keys: Sequence[str], *, reverse: bool = False) -> Binding:
-    """Bind an axis so that stick up is positive; pads give that as a negative number, touch sticks as a positive."""
-    return Binding(
-        axis=name,
-        pad=stick,
-        touch=touch,
-        invert_pad=not reverse,
-        invert_touch=reverse,
-        key_positive=keys[0],
-        key_negative=keys[1],
-    )
-
-
-def leftwards(name: str, stick: PadInput, touch: TouchPad, keys: Sequence[str], *, reverse: bool = False) -> Binding:
-    """Bind an axis so that stick left is positive, which both kinds of stick give as a negative number."""
-    return Binding(
-        axis=name,
-        pad=stick,
-        touch=touch,
-        invert_pad=not reverse,
-        invert_touch=not reverse,
-        key_positive=keys[0],
-        key_negative=keys[1],
-    )
 
 
 GRIPPER: Final = Binding(axis="gripper", pad="triggers", key_positive="KeyT", key_negative="KeyG")

@@ -1,30 +1,24 @@
 """The arm's description for a console."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from typing import Any, Final
-
-import mujoco
 
 from lockstep.protocol.description import (
     Action,
     AxisGain,
     Body,
-    BodyJoint,
     Camera,
     ForceFeeling,
-    Geom,
     Joint,
     Pose,
     PositionLimit,
     RobotDescription,
     WrenchSensor,
 )
+from lockstep.robot_bridge.robots.mujoco_bodies import describe_body, rounded
 from lockstep.robot_bridge.robots.so101.arm_drive import SETTLES
 from lockstep.robot_bridge.robots.so101.contact_force import HAND
-from lockstep.robot_bridge.robots.so101.controls import (
-    AXES,
-    LAYERS,
-)
+from lockstep.robot_bridge.robots.so101.controls import AXES, LAYERS
 from lockstep.robot_bridge.robots.so101.model import ARM, JOINT_NAMES, LINKS, PREFIX, TOOL, TOOL_POINT
 
 __all__ = ["CAMERAS", "TOOL_BODY", "describe", "describe_bodies"]
@@ -35,10 +29,6 @@ CAMERAS: Final = (  # names are those of the model's cameras
 )
 TOOL_BODY: Final = "arm.tool"
 TOOL_TURN: Final = (0.70711, 0.0, 0.70711, 0.0)  # from the hand's frame: x away from the gripper
-SHAPES: Final = {
-    int(mujoco.mjtGeom.mjGEOM_BOX): "box",
-    int(mujoco.mjtGeom.mjGEOM_CYLINDER): "cylinder",
-}
 TABLE_GROUPS: Final = (1,)
 ARM_GROUPS: Final = (3, 4)  # hulls: the meshes are not sent, and a hull is what the arm touches things with
 YELLOW, DARK = (1.0, 0.82, 0.12, 1.0), (0.2, 0.2, 0.22, 1.0)
@@ -104,7 +94,7 @@ def limits(joints: Sequence[Joint]) -> tuple[PositionLimit, ...]:
 
 
 def describe_joint(model: Any, name: str) -> Joint:
-    lower, upper = rounded(model.jnt_range[model.joint(PREFIX + name).id])
+    lower, upper = rounded(model.jnt_range[model.joint(PREFIX + name).id], DIGITS)
     return Joint(name=name, unit="rad", minimum=lower, maximum=upper)
 
 
@@ -113,54 +103,15 @@ def describe_bodies(model: Any) -> tuple[Body, ...]:
 
     Blocks and bowl are left out: feedback does not say where they are.
     """
-    table = describe_body(model, "table", TABLE_GROUPS)
-    links = (describe_body(model, PREFIX + name, ARM_GROUPS) for name in LINKS)
+    table = describe_body(model, model.body("table").id, TABLE_GROUPS, DIGITS)
+    links = (
+        describe_body(model, model.body(PREFIX + name).id, ARM_GROUPS, DIGITS, prefix=PREFIX, colour=hull_colour)
+        for name in LINKS
+    )
     tool = Body(name=TOOL_BODY, parent=HAND, position=TOOL_POINT, orientation=TOOL_TURN)
     return (table, *links, tool)
-
-
-def describe_body(model: Any, name: str, groups: Sequence[int]) -> Body:
-    number = model.body(name).id
-    parent = model.body(model.body_parentid[number]).name
-    first, count = model.body_jntadr[number], model.body_jntnum[number]
-    return Body(
-        name=name,
-        parent="" if parent == "world" else parent,
-        position=rounded(model.body_pos[number]),
-        orientation=rounded(model.body_quat[number]),
-        joints=tuple(
-            BodyJoint(
-                joint=model.joint(joint).name.removeprefix(PREFIX),
-                kind="revolute",
-                axis=rounded(model.jnt_axis[joint]),
-            )
-            for joint in range(first, first + count)
-        ),
-        geoms=tuple(describe_geoms(model, number, groups)),
-    )
-
-
-def describe_geoms(model: Any, body: int, groups: Sequence[int]) -> Iterator[Geom]:
-    first = model.body_geomadr[body]
-    for number in range(first, first + model.body_geomnum[body]):
-        shape = SHAPES.get(int(model.geom_type[number]))
-        if shape is None or model.geom_group[number] not in groups:
-            continue
-        material = model.geom_matid[number]
-        yield Geom(
-            shape=shape,  # type: ignore[arg-type]
-            size=rounded(model.geom_size[number]),
-            position=rounded(model.geom_pos[number]),
-            orientation=rounded(model.geom_quat[number]),
-            rgba=rounded(model.mat_rgba[material]) if material >= 0 else hull_colour(model, number),
-        )
 
 
 def hull_colour(model: Any, geom: int) -> Any:
     """Return the colour of a hull: fingertips have their own."""
     return DARK if model.geom_group[geom] == 4 else YELLOW
-
-
-def rounded(values: Any) -> Any:
-    """Return the values as a tuple of floats, short on the wire; never -0."""
-    return tuple(round(float(value), DIGITS) + 0.0 for value in values)

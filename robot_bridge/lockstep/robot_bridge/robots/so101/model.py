@@ -1,6 +1,6 @@
 """Builds the compiled model: the arm from its own files, on the table of scene.xml, with the parts that it lacks.
 
-What is added to the arm: simple hulls for contacts, soft fingertips, the point that a tool's pose is about, a camera,
+Additions to the arm: simple hulls for contacts, soft fingertips, the point that a tool's pose is about, a camera,
 and a part of the servo's damping.
 """
 

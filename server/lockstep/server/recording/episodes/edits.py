@@ -21,7 +21,7 @@ MAX_BYTES = 16 * 1024 * 1024
 
 
 class EpisodeEditRefused(RecordingError):
-    """The episode cannot be changed so."""
+    """This change of an episode is not allowed."""
 
 
 class EpisodeEdit(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):

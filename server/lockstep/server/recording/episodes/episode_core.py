@@ -1,4 +1,4 @@
-"""The rules of episodes: what begins one, what ends it, and what is written of it. No I/O; the caller hands in `now`.
+"""The rules of episodes: how they begin, how they end, and their records. No I/O; the caller hands in `now`.
 
 | phase | what holds | ends by |
 |---|---|---|
@@ -8,8 +8,7 @@
 | open | an episode is recorded | keep, discard, redo, a cut |
 | keeping | the record `kept` is on its way to the disk | its arrival there, a cut |
 
-Only the record `kept` makes an episode count. Whatever ends one in another way, the end of the process included, needs
-no record for that.
+Only the record `kept` makes an episode count. Any other end, such as the end of the process, needs no record.
 """
 
 from collections.abc import Callable
@@ -17,11 +16,10 @@ from typing import Literal, NamedTuple
 
 from lockstep.protocol.episodes import EpisodeOutcome, EpisodePhase, EpisodeReason
 from lockstep.protocol.serial import event_gap
+from lockstep.server.recording.episodes.open_episode import OpenEpisode, Place
 from lockstep.server.recording.format.records import EpisodeRecord
 
-__all__ = ["Effect", "EpisodeCore", "EpisodeRefused", "Place", "RunReset", "Write"]
-
-MAX_DRIVERS = 20  # names in the record of an episode
+__all__ = ["Effect", "EpisodeCore", "EpisodeRefused", "RunReset", "Write"]
 
 CUT_WORDS = {
     "epoch": "the robot bridge was restarted",
@@ -48,16 +46,6 @@ class EpisodeRefused(Exception):
         self.detail = detail
 
 
-class Place(NamedTuple):
-    """What holds at the console now."""
-
-    epoch: str
-    event: int
-    recording: str  # that is written now; "" for none
-    link: bool  # the robot link is up
-    driver: str  # name of the seat's holder; "" for nobody
-
-
 class Write(NamedTuple):
     """The caller puts this record into the recording."""
 
@@ -69,21 +57,6 @@ class RunReset(NamedTuple):
 
 
 Effect = Write | RunReset
-
-
-class _Take:
-    """An episode that is open."""
-
-    def __init__(self, id: str, number: int, task: str, by: str, place: Place) -> None:
-        self.id = id
-        self.number = number
-        self.task = task
-        self.by = by
-        self.epoch = place.epoch
-        self.first_event = place.event
-        self.last_event = place.event
-        self.drivers = [place.driver] if place.driver else []
-        self.problems: list[str] = []  # kinds that were seen, with the camera
 
 
 class EpisodeCore:
@@ -108,7 +81,7 @@ class EpisodeCore:
         self._draw_id = draw_id
         self._countdown = countdown
         self._reset_seconds = reset_seconds
-        self._take: _Take | None = None  # open, or being kept
+        self._current: OpenEpisode | None = None  # open, or being kept
         self._recording = ""  # that the counts are of
         self._deadline = 0.0  # of the count-down or the reset
         self._next: tuple[str, str] | None = None  # task and person of the episode that begins after the reset
@@ -116,12 +89,12 @@ class EpisodeCore:
     @property
     def episode(self) -> str:
         """The id of the episode that is open or being kept; "" for none."""
-        return "" if self._take is None else self._take.id
+        return "" if self._current is None else self._current.id
 
     @property
     def first_event(self) -> int:
         """The event that held when the open episode began; 0: none is open."""
-        return 0 if self._take is None else self._take.first_event
+        return 0 if self._current is None else self._current.first_event
 
     @property
     def is_about_to_begin(self) -> bool:
@@ -147,12 +120,12 @@ class EpisodeCore:
         return self._count_down(task, by, place, now)
 
     def keep(self, episode: str, outcome: EpisodeOutcome, by: str, place: Place) -> list[Effect]:
-        take = self._open(episode)
-        if event_gap(place.event, take.first_event) <= 0:
+        current = self._open(episode)
+        if event_gap(place.event, current.first_event) <= 0:
             raise EpisodeRefused("empty", "no event was executed since it began")
-        take.last_event = place.event
+        current.last_event = place.event
         self.phase = "keeping"
-        return [Write(self._record(take, "kept", place, by, outcome=outcome))]
+        return [Write(current.record("kept", place, by, outcome=outcome))]
 
     def discard(self, episode: str, by: str, place: Place, now: float) -> list[Effect]:
         """Discard the open episode, or cancel the one that is about to begin."""
@@ -168,14 +141,14 @@ class EpisodeCore:
 
     def redo(self, episode: str, by: str, place: Place, now: float) -> list[Effect]:
         """Discard the open episode, and begin the next one with the same task."""
-        take = self._open(episode)
+        current = self._open(episode)
         self._check_place(place)
-        self._next = take.task, by
+        self._next = current.task, by
         return self._discard(episode, by, place, now)
 
     def mark(self, episode: str, text: str, by: str, place: Place) -> list[Effect]:
-        take = self._open(episode)
-        return [Write(self._record(take, "mark", place, by, text=text or "mark"))]
+        current = self._open(episode)
+        return [Write(current.record("mark", place, by, text=text or "mark"))]
 
     # what happens
 
@@ -201,26 +174,25 @@ class EpisodeCore:
 
     def on_disk(self, episode: str, now: float) -> list[Effect]:
         """The record `kept` of that episode is on the disk."""
-        take = self._take
-        if take is None or self.phase != "keeping" or take.id != episode:
+        current = self._current
+        if current is None or self.phase != "keeping" or current.id != episode:
             return []
         self.kept += 1
-        self.last = f"episode {take.number} is kept"
+        self.last = f"episode {current.number} is kept"
         return self._end(now)
 
     def noted(self, text: str, place: Place) -> list[Effect]:
         """Note a STOP, a reset or a change of the seat in the open episode. None of them ends it."""
-        take = self._take
-        if take is None or self.phase != "open":
+        current = self._current
+        if current is None or self.phase != "open":
             return []
-        if place.driver and place.driver not in take.drivers and len(take.drivers) < MAX_DRIVERS:
-            take.drivers.append(place.driver)
-        return [Write(self._record(take, "mark", place, "", text=text))]
+        current.driven_by(place.driver)
+        return [Write(current.record("mark", place, "", text=text))]
 
     def spoiled(self, problem: str) -> None:
         """Remember a problem of the open episode for its record."""
-        if self._take is not None and self.phase == "open" and problem not in self._take.problems:
-            self._take.problems.append(problem)
+        if self._current is not None and self.phase == "open" and problem not in self._current.problems:
+            self._current.problems.append(problem)
 
     def cut(self, why: CutReason, place: Place) -> list[Effect]:
         """End the open episode, which is in no dataset then. An epoch's end leaves one that is being kept alone."""
@@ -229,14 +201,14 @@ class EpisodeCore:
             if why in ("epoch", "link_down"):
                 self.phase = "idle"
             return []
-        take = self._take
-        if take is None or (self.phase == "keeping" and why not in ("recording_failed", "new_part")):
+        current = self._current
+        if current is None or (self.phase == "keeping" and why not in ("recording_failed", "new_part")):
             return []
-        place = place._replace(epoch=take.epoch)
-        kept, self.phase, self._take = self.phase == "keeping", "idle", None
+        place = place._replace(epoch=current.epoch)
+        kept, self.phase, self._current = self.phase == "keeping", "idle", None
         self.cuts += 1
-        self.last = f"episode {take.number} is lost: {CUT_WORDS[why]}"
-        return [] if kept else [Write(self._record(take, "cut", place, "", why=why))]
+        self.last = f"episode {current.number} is lost: {CUT_WORDS[why]}"
+        return [] if kept else [Write(current.record("cut", place, "", why=why))]
 
     def cancel(self, why: str) -> None:
         """Cancel the episode that is about to begin, if there is one. `why`: in words."""
@@ -255,13 +227,13 @@ class EpisodeCore:
         if not place.recording:
             raise EpisodeRefused("recording_off", "start the recording first")
 
-    def _open(self, episode: str) -> _Take:
-        take = self._take
-        if take is None or self.phase != "open":
+    def _open(self, episode: str) -> OpenEpisode:
+        current = self._current
+        if current is None or self.phase != "open":
             raise EpisodeRefused("no_episode", "no episode is open")
-        if episode and episode != take.id:
+        if episode and episode != current.id:
             raise EpisodeRefused("other_episode", "another episode is open by now")
-        return take
+        return current
 
     def _count_down(self, task: str, by: str, place: Place, now: float) -> list[Effect]:
         self.task, self.by = task, by
@@ -278,50 +250,22 @@ class EpisodeCore:
             self._recording = place.recording
             self.kept = self.discarded = self.cuts = self.number = 0
         self.number += 1
-        take = self._take = _Take(self._draw_id(), self.number, self.task, self.by, place)
+        current = self._current = OpenEpisode(self._draw_id(), self.number, self.task, self.by, place)
         self.phase = "open"
-        return [Write(self._record(take, "start", place, self.by))]
+        return [Write(current.record("start", place, self.by))]
 
     def _discard(self, episode: str, by: str, place: Place, now: float) -> list[Effect]:
-        take = self._open(episode)
-        take.last_event = place.event
+        current = self._open(episode)
+        current.last_event = place.event
         self.discarded += 1
-        self.last = f"episode {take.number} is discarded"
-        return [Write(self._record(take, "discarded", place, by)), *self._end(now, place)]
+        self.last = f"episode {current.number} is discarded"
+        return [Write(current.record("discarded", place, by)), *self._end(now, place)]
 
     def _end(self, now: float, place: Place | None = None) -> list[Effect]:
         """After an episode: the reset, then the next one if it is wanted."""
-        self._take = None
+        self._current = None
         if self.resets:
             self.phase, self._deadline = "resetting", now + self._reset_seconds
             return [RunReset()]
         wanted, self._next, self.phase = self._next, None, "idle"
         return [] if wanted is None or place is None else self._count_down(*wanted, place, now)
-
-    def _record(
-        self,
-        take: _Take,
-        kind: Literal["start", "kept", "discarded", "cut", "mark"],
-        place: Place,
-        by: str,
-        *,
-        outcome: EpisodeOutcome = "",
-        why: str = "",
-        text: str = "",
-    ) -> EpisodeRecord:
-        return EpisodeRecord(
-            epoch=place.epoch,
-            event=place.event,
-            episode=take.id,
-            number=take.number,
-            kind=kind,
-            task=take.task,
-            outcome=outcome,
-            first_event=take.first_event,
-            last_event=place.event if kind != "cut" else take.last_event,
-            by=by,
-            why=why,
-            text=text,
-            drivers=list(take.drivers),
-            problems=list(take.problems),
-        )

@@ -8,10 +8,8 @@ from collections.abc import Callable, Mapping
 from typing import Protocol
 
 from lockstep.protocol.console import Seat
-from lockstep.protocol.description import RobotDescription
 from lockstep.protocol.episodes import (
     EpisodeAnswer,
-    EpisodeProblem,
     EpisodeReason,
     EpisodeRequest,
     EpisodeState,
@@ -25,12 +23,12 @@ from lockstep.server.recording.episodes.episode_core import (
     Effect,
     EpisodeCore,
     EpisodeRefused,
-    Place,
     RunReset,
     Write,
 )
-from lockstep.server.recording.episodes.live_checks import LiveChecks, RecorderFigures
+from lockstep.server.recording.episodes.open_episode import Place
 from lockstep.server.recording.episodes.reset_action import ResetAction
+from lockstep.server.recording.episodes.session_checks import CheckedRobot, SessionChecks
 from lockstep.server.recording.episodes.settings import EpisodeSettings
 from lockstep.server.recording.format.records import EpisodeRecord
 from lockstep.server.recording.settings import RecordingSettings
@@ -59,13 +57,11 @@ ASKS, ASK_RATE = 20, 4.0  # Hz, of one link
 Answer = Callable[[EpisodeReason, str, str], None]  # reason, detail, episode
 
 
-class EpisodeRobot(Protocol):
+class EpisodeRobot(CheckedRobot, Protocol):
     """The part of the connection to the robot that is needed here."""
 
     @property
     def up(self) -> bool: ...
-    @property
-    def description(self) -> RobotDescription | None: ...
 
 
 class EpisodeService:
@@ -92,10 +88,8 @@ class EpisodeService:
             may_ask: returns whether a person may begin and end episodes
             has_ended: returns whether the link with this id and expiry is no longer good
         """
-        self._recording = recording
         self._clock = clock
         self._recorder = recorder
-        self._recorded = recorded
         self._robot = robot
         self._reset = reset
         self._may_ask = may_ask
@@ -109,8 +103,7 @@ class EpisodeService:
             resets=reset.is_wanted,
             reset_seconds=settings.reset_seconds,
         )
-        self._checks = LiveChecks()
-        self._problems: list[EpisodeProblem] = []
+        self._checks = SessionChecks(robot, recorder, recorded, recording.free_bytes)
         self._seat = Seat()
         self._stop_number, self._is_stopped = 0, False
         self._since = 0.0  # s since 1970
@@ -145,7 +138,7 @@ class EpisodeService:
                 if self._core.phase == "resetting" and (ended := self._reset.ended()) is not None:
                     self._act(self._core.reset_ended(ended, self._place(), time.monotonic()), before="resetting")
                 if self._core.phase == "open" and ticks % CHECK_TICKS == 0:
-                    changed = self._check(time.monotonic())
+                    changed = self._check()
                     if changed or ticks % NEWS_TICKS == 0:
                         self._tell()
         finally:
@@ -168,7 +161,7 @@ class EpisodeService:
             cut=core.cuts,
             last=core.last,
             reset_action=self._reset.name,
-            problems=self._problems if core.phase == "open" else [],
+            problems=self._checks.problems if core.phase == "open" else [],
         )
 
     # requests
@@ -254,7 +247,7 @@ class EpisodeService:
             self._cut("new_part")
 
     def picture_recorded(self, stream: str, stamp: int) -> None:
-        self._checks.picture(stream, stamp, time.monotonic())
+        self._checks.picture(stream, stamp)
 
     # events of the session
 
@@ -301,27 +294,15 @@ class EpisodeService:
         self._recorder.put_episode(record)
         if record.kind != "start":
             return
-        self._since, self._problems = round(time.time(), 3), []
-        described = () if self._robot.description is None else self._robot.description.cameras
-        rates = {camera.name: camera.frame_rate for camera in described}
-        cameras = {
-            stream: rates.get(stream, 0.0) for stream, codec in self._recorded().items() if codec in ("H264", "VP8")
-        }
-        self._checks.begin(cameras, record.event, self._figures().lost, time.monotonic())
+        self._since = round(time.time(), 3)
+        self._checks.begin(record.event)
 
-    def _check(self, now: float) -> bool:
+    def _check(self) -> bool:
         """Return True if something else spoils the episode than before."""
-        before = {(each.kind, each.stream) for each in self._problems}
-        self._problems = self._checks.problems(self._clock.event, self._figures(), now)
-        for each in self._problems:
+        changed = self._checks.look(self._clock.event)
+        for each in self._checks.problems:
             self._core.spoiled(f"{each.kind} {each.stream}".strip())
-        return before != {(each.kind, each.stream) for each in self._problems}
-
-    def _figures(self) -> RecorderFigures:
-        thread = self._recorder.running
-        if thread is None:
-            return RecorderFigures(0, 0.0, 0, 0)
-        return RecorderFigures(thread.lost, thread.waiting, thread.free_bytes, self._recording.free_bytes)
+        return changed
 
     def _answer_waiting(self, episode: str, reason: EpisodeReason, detail: str) -> None:
         mine = [answer for each, answer in self._waiting if each == episode]

@@ -1,4 +1,4 @@
-"""Checks while an episode is recorded: what spoils it is said at once. No I/O; the caller hands in `now`, in s."""
+"""Finds at once what spoils an episode while it is recorded. No I/O; the caller hands in `now`, in s."""
 
 from collections import deque
 from collections.abc import Mapping
@@ -21,7 +21,7 @@ DISK_MARGIN = 1.25  # of the room that is to stay free
 
 
 class RecorderFigures(NamedTuple):
-    """How the recorder does."""
+    """The recorder's figures."""
 
     lost: int  # records that were left out, ever
     waiting: float  # share of its queue that is taken, 0 to 1

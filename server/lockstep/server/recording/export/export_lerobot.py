@@ -6,15 +6,12 @@ as a whole. `lerobot_rows` says what a row is. The rate is the median one of the
 
 import json
 import os
-import re
 import shutil
-from collections.abc import Iterator, Sequence
-from fractions import Fraction
+from collections.abc import Sequence
 from itertools import pairwise
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
-import av
 import msgspec
 import numpy as np
 import numpy.typing as npt
@@ -26,6 +23,7 @@ from lockstep.protocol.serial import event_gap
 from lockstep.server.recording.episodes.edits import edited, read_edits
 from lockstep.server.recording.errors import RecordingDamaged
 from lockstep.server.recording.export.lerobot_meta import (
+    FILE,
     DatasetEpisode,
     DatasetNotes,
     EpisodePlace,
@@ -38,35 +36,22 @@ from lockstep.server.recording.export.lerobot_meta import (
 )
 from lockstep.server.recording.export.lerobot_rows import (
     EpisodeRows,
-    Stretch,
-    aligned_stamps,
     check_same_robot,
     episodes_of,
-    picture_records,
     rows_of,
     state_names,
     state_of,
     stretches_of,
 )
-from lockstep.server.recording.format.topics import CAMERA
-from lockstep.server.recording.reading.pictures import RecordedPictures
+from lockstep.server.recording.export.lerobot_video import ExportedCamera, write_video
 from lockstep.server.recording.reading.reader import RecordingReader
 
 __all__ = ["TOLERANCE", "export", "export_all"]
 
-FILE = "chunk-000/file-000"
-SAMPLES = 200  # pictures of a camera and an episode for its statistics
-PIXEL_STEP = 4  # between the pixels that are used, in both directions
 TOLERANCE = 4  # events, as the page's own
 
 Array = npt.NDArray[Any]
 SUCCESS = {"success": 1, "failure": 0, "": -1}
-
-
-class ExportedCamera(NamedTuple):
-    key: str  # "observation.images.front"
-    feature: dict[str, Any]
-    pixels: list[Array]  # of each episode, N x 3
 
 
 def export(path: Path, out: Path | None, task: str) -> list[Path]:
@@ -127,7 +112,7 @@ def _write_dataset(
 ) -> None:
     root.mkdir(parents=True)
     fps = _rate(episodes)
-    exported = [_write_video(root, topic, episodes, fps) for topic in cameras]
+    exported = [write_video(root, topic, episodes, fps) for topic in cameras]
     tasks = list(dict.fromkeys(each.stretch.task for each in episodes))
     drivers = sorted({frame.driver for each in episodes for frame in each.frames})
     _write_tables(root, description, episodes, exported, fps, tasks, drivers)
@@ -168,83 +153,6 @@ def _rate(episodes: list[EpisodeRows]) -> int:
         if later.feedback.time > earlier.feedback.time
     ]
     return max(1, round(1 / float(np.median(intervals)))) if intervals else 1
-
-
-def _pictures(stretch: Stretch, topic: str, events: list[int]) -> Iterator[av.VideoFrame]:
-    """Yield the decoded picture of each event."""
-    with RecordingReader(stretch.path) as reader:
-        stamps = [record.event for record in picture_records(reader, topic, stretch)]
-        wanted = [place for place, _ in aligned_stamps(stamps, events)]
-        decoded = _decoded(reader, topic, stretch)
-        number, frame = next(decoded, (-1, None))
-        for place in wanted:
-            while frame is not None and number < place:
-                number, frame = next(decoded, (-1, None))
-            if frame is None or number != place:
-                raise RecordingDamaged(f"{topic}: a picture cannot be decoded")
-            yield frame
-
-
-def _decoded(reader: RecordingReader, topic: str, stretch: Stretch) -> Iterator[tuple[int, av.VideoFrame]]:
-    """Yield the decoded pictures with their places among `picture_records`."""
-    decoder = RecordedPictures()
-    for place, record in enumerate(picture_records(reader, topic, stretch)):
-        picture = record.picture
-        if picture is not None:
-            for frame in decoder.decode(picture, place):
-                yield frame.pts or 0, frame
-    for frame in decoder.flush():
-        yield frame.pts or 0, frame
-
-
-def _write_video(root: Path, topic: str, episodes: list[EpisodeRows], fps: int) -> ExportedCamera:
-    """Write the pictures of a camera, one for each row of the dataset, into one file."""
-    key = "observation.images." + re.sub(r"[^\w. -]", "_", topic.removeprefix(CAMERA))
-    target = root / "videos" / key / f"{FILE}.mp4"
-    target.parent.mkdir(parents=True)
-    pixels: list[Array] = []
-    size = 0, 0
-    number = 0
-    with av.open(str(target), "w") as output:
-        # A keyframe every second picture: training reads frames in any order.
-        stream = output.add_stream("libx264", rate=fps, options={"crf": "23", "preset": "veryfast", "g": "2"})
-        stream.pix_fmt = "yuv420p"
-        for each in episodes:
-            events = [frame.feedback.event for frame in each.frames]
-            every = max(1, len(events) // SAMPLES)
-            samples: list[Array] = []
-            for place, picture in enumerate(_pictures(each.stretch, topic, events)):
-                if number == 0:
-                    size = picture.width, picture.height
-                    stream.width, stream.height = size
-                whole = picture.reformat(*size, format="yuv420p")
-                whole.pts, whole.time_base = number, Fraction(1, fps)
-                output.mux(stream.encode(whole))
-                number += 1
-                if place % every == 0:
-                    shown = picture.to_ndarray(format="rgb24")[::PIXEL_STEP, ::PIXEL_STEP]
-                    samples.append(shown.reshape(-1, 3) / 255.0)
-            pixels.append(np.concatenate(samples))
-        output.mux(stream.encode(None))
-    return ExportedCamera(key, _video_feature(*size, fps), pixels)
-
-
-def _video_feature(width: int, height: int, fps: int) -> dict[str, Any]:
-    return {
-        "dtype": "video",
-        "shape": [height, width, 3],
-        "names": ["height", "width", "channels"],
-        "info": {
-            "video.height": height,
-            "video.width": width,
-            "video.codec": "h264",
-            "video.pix_fmt": "yuv420p",
-            "video.is_depth_map": False,
-            "video.fps": fps,
-            "video.channels": 3,
-            "has_audio": False,
-        },
-    }
 
 
 def _columns(rows: EpisodeRows, number: int, begin: int, fps: int, tasks: list[str], drivers: list[str]) -> Any:

@@ -10,6 +10,7 @@ import numpy.typing as npt
 import pyarrow as pa
 
 __all__ = [
+    "FILE",
     "DatasetEpisode",
     "DatasetNotes",
     "EpisodePlace",
@@ -26,6 +27,7 @@ Array = npt.NDArray[Any]
 Statistics = dict[str, Any]
 Features = dict[str, dict[str, Any]]
 
+FILE = "chunk-000/file-000"  # the only one of each kind
 CHUNKS = 1000  # files of a folder
 DATA_MB, VIDEO_MB = 100, 200  # of a file, for programs that append
 QUANTILES = (1, 10, 50, 90, 99)

@@ -76,7 +76,7 @@ class EpisodeRows(NamedTuple):
 
 
 def episodes_of(reader: RecordingReader) -> list[EpisodeEntry]:
-    """Return the episodes of a recording from its records: an index may say anything. Raises RecordingError."""
+    """Return the episodes of a recording from its records, since nothing checks an index. Raises RecordingError."""
     book = EpisodeBook()
     for record in reader.records(topics={OWN_TOPICS[EpisodeRecord]}):
         own = own_record_of(record.schema, record.data)

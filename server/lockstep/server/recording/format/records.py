@@ -13,7 +13,7 @@ from lockstep.protocol.console import Participant, Report
 from lockstep.protocol.description import RobotDescription
 from lockstep.protocol.episodes import EpisodeOutcome
 from lockstep.protocol.messages import EventReference, RefusalReason, StopState
-from lockstep.protocol.trace import CommandSpans, PictureSpans
+from lockstep.protocol.traces.trace import CommandSpans, PictureSpans
 
 __all__ = [
     "OWN_RECORDS",

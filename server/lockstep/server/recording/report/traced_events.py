@@ -5,7 +5,7 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from lockstep.protocol.trace import (
+from lockstep.protocol.traces.trace import (
     COMMAND_WAY,
     PICTURE_WAY,
     CommandSpans,

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 import matplotlib as mpl
 from matplotlib.axes import Axes
 
-from lockstep.protocol.trace import Span
+from lockstep.protocol.traces.trace import Span
 from lockstep.server.recording.report.drawing import STYLE, new_figure, svg_text
 from lockstep.server.recording.report.traced_events import TracedEvent, TracedEvents, slowest, slowest_by_time, way_of
 

@@ -62,7 +62,7 @@ def verify_dataset(root: Path) -> DatasetVerdict:
     """Check a dataset.
 
     Raises:
-        RecordingDamaged: it is none that Lockstep has exported, or it cannot be read.
+        RecordingDamaged: Lockstep has not exported it, or it cannot be read.
         OSError: a file is missing.
     """
     try:

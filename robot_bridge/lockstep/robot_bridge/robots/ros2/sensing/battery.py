@@ -17,7 +17,7 @@ MOST_VOLTS = 1e5
 
 
 class Charge(NamedTuple):
-    """What a message says. A quantity that it leaves out is None."""
+    """The content of a message. A quantity that it leaves out is None."""
 
     share: float | None  # 0 to 1
     volts: float | None

@@ -17,6 +17,8 @@ from pydantic import SecretStr
 from lockstep.protocol.link_secret import LinkSecret
 from lockstep.robot_bridge.encoding.encoder_choice import ENCODERS
 from lockstep.robot_bridge.robots.registry import is_robot, robot_names, simulated_names
+from lockstep.server.cli.console.run_console import ConsoleFailed, run_console, say
+from lockstep.server.cli.console.unknown_settings import unknown_settings
 from lockstep.server.cli.extras import load_extra
 from lockstep.server.cli.options import (
     AllowedHosts,
@@ -40,9 +42,7 @@ from lockstep.server.cli.options import (
     TurnSecret,
     Whip,
 )
-from lockstep.server.cli.run_console import ConsoleFailed, run_console, say
 from lockstep.server.cli.settings_from_flags import make_settings
-from lockstep.server.cli.unknown_settings import unknown_settings
 from lockstep.server.federation import check_board
 from lockstep.server.federation.errors import BoardUnusable
 from lockstep.server.fleet.robots import robot_settings

@@ -19,9 +19,9 @@ from lockstep.server.audit.audit_file import last_records, stored_records
 from lockstep.server.audit.audit_log import anchors_path
 from lockstep.server.audit.records import AuditRecord
 from lockstep.server.auth.invitations import Invitation
-from lockstep.server.cli.audit import verify_audit
+from lockstep.server.cli.access.audit import verify_audit
+from lockstep.server.cli.access.durations import duration_words, parse_duration
 from lockstep.server.cli.console_address import read_address
-from lockstep.server.cli.durations import duration_words, parse_duration
 from lockstep.server.cli.options import RobotOption, StateDirOption
 from lockstep.server.errors import ConsoleError
 from lockstep.server.evidence.anchors import ANCHORS_NAME

@@ -8,7 +8,7 @@ from typing import Annotated, Final
 import msgspec
 
 from lockstep.protocol.messages import EventReference
-from lockstep.protocol.trace import CommandSpans, PictureSpans
+from lockstep.protocol.traces.trace import CommandSpans, PictureSpans
 
 __all__ = [
     "MAX_TRACED_COMMANDS",

@@ -1,6 +1,6 @@
 import pytest
 
-from lockstep.server.cli.unknown_settings import unknown_settings
+from lockstep.server.cli.console.unknown_settings import unknown_settings
 from lockstep.server.settings import Settings
 
 

@@ -8,11 +8,8 @@ on a WebSocket the frames too, in which the link's messages come.
 import asyncio
 import time
 from collections import deque
-from collections.abc import Callable, Iterable
-from typing import Any, Protocol, cast
-
-from lockstep.robot_bridge.link.link_session import LinkSession
-from lockstep.robot_bridge.link.link_transport import LinkTransport
+from collections.abc import Callable
+from typing import Protocol, cast
 
 __all__ = [
     "PIECE",
@@ -20,8 +17,6 @@ __all__ = [
     "READ_SHARE",
     "READ_TURN",
     "PacedReader",
-    "PacedSocket",
-    "PacedTransport",
     "ReadBudget",
     "Turns",
 ]
@@ -196,9 +191,8 @@ class PacedReader:
             self._turns.spend(worked)
         if self._source is None:
             return
-        if (
-            self._unread and not self._paused
-        ):  # a flood: others come first, even if the thread gets little of its processor
+        if self._unread and not self._paused:
+            # A flood: others come first, even if the thread gets little of its processor.
             wait = max(wait, min(ended - since, LONG_TURN) * (1 / self._share - 1))
         if wait > 0 or (self._unread and not self._paused):
             self._later = asyncio.get_running_loop().call_later(wait, self._go_on)
@@ -233,80 +227,3 @@ class PacedReader:
         if len(first) > end:
             self._unread.appendleft(first[end:])
         return bytes(first[:end])
-
-
-class PacedSocket(asyncio.Transport):
-    """The transport of a protocol whose data come by a `PacedReader`: who pauses it pauses the reader.
-
-    Once it is closed on this side, the reader drops what has come.
-    """
-
-    def __init__(self, below: asyncio.Transport, reader: PacedReader) -> None:
-        super().__init__()
-        self._below = below
-        self._reader = reader
-        reader.begin(below)
-
-    def get_extra_info(self, name: str, default: Any = None) -> Any:
-        return self._below.get_extra_info(name, default)
-
-    def is_closing(self) -> bool:
-        return self._below.is_closing()
-
-    def close(self) -> None:
-        self._reader.end()
-        self._below.close()
-
-    def abort(self) -> None:
-        self._reader.end()
-        self._below.abort()
-
-    def pause_reading(self) -> None:
-        self._reader.pause_reading()
-
-    def resume_reading(self) -> None:
-        self._reader.resume_reading()
-
-    def write(self, data: bytes | bytearray | memoryview) -> None:
-        self._below.write(data)
-
-    def writelines(self, list_of_data: Iterable[bytes | bytearray | memoryview]) -> None:
-        self._below.writelines(list_of_data)
-
-    def can_write_eof(self) -> bool:
-        return self._below.can_write_eof()
-
-    def write_eof(self) -> None:
-        self._below.write_eof()
-
-    def set_write_buffer_limits(self, high: int | None = None, low: int | None = None) -> None:
-        self._below.set_write_buffer_limits(high, low)
-
-    def get_write_buffer_size(self) -> int:
-        return self._below.get_write_buffer_size()
-
-
-class PacedTransport(LinkTransport):
-    """`worked`: returns the time that this thread has worked so far, s."""
-
-    def __init__(
-        self,
-        session: LinkSession,
-        clock: Callable[[], float] = time.monotonic,
-        worked: Callable[[], float] = time.thread_time,
-    ) -> None:
-        super().__init__(session, clock)
-        self._reader = PacedReader(
-            super().data_received, missing=lambda: self.session.missing, clock=clock, worked=worked
-        )
-
-    def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        self._reader.begin(cast(asyncio.ReadTransport, transport))
-        super().connection_made(transport)
-
-    def data_received(self, data: bytes) -> None:
-        self._reader.feed(data)
-
-    def connection_lost(self, error: Exception | None) -> None:
-        self._reader.end()
-        super().connection_lost(error)

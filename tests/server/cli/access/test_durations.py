@@ -1,6 +1,6 @@
 import pytest
 
-from lockstep.server.cli.durations import duration_words, parse_duration
+from lockstep.server.cli.access.durations import duration_words, parse_duration
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,7 @@ from typing import Annotated, Any
 
 import typer
 
-from lockstep.server.cli.access import MakeSettings
+from lockstep.server.cli.access.access import MakeSettings
 from lockstep.server.cli.console_request import ask_by_link, ask_console
 from lockstep.server.cli.options import RobotOption, StateDirOption
 from lockstep.server.util.display_names import escaped, printable

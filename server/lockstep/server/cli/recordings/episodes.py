@@ -10,9 +10,9 @@ import typer
 
 from lockstep.protocol.episodes import EpisodeOutcome
 from lockstep.protocol.serial import event_gap
-from lockstep.server.cli.access import MakeSettings
+from lockstep.server.cli.access.access import MakeSettings
 from lockstep.server.cli.options import RobotOption, StateDirOption
-from lockstep.server.cli.recordings import DirectoryOption, File, recording_file
+from lockstep.server.cli.recordings.recordings import DirectoryOption, File, recording_file
 from lockstep.server.recording.episodes.edits import EpisodeEdit, add_edit, edited, read_edits
 from lockstep.server.recording.errors import RecordingError
 from lockstep.server.recording.export.lerobot_rows import episodes_of

@@ -31,7 +31,7 @@ async def read_request(reader: asyncio.StreamReader) -> dict[str, Any] | None:
     """Return the next request, which no bytes follow; None at the end of the pipe.
 
     Raises:
-        BadFrame: it is none.
+        BadFrame: the bytes are not a request.
     """
     try:
         size = int.from_bytes(await reader.readexactly(4), "big")

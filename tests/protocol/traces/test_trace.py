@@ -15,7 +15,7 @@ from lockstep.protocol.messages import (
     plain_feedback,
     spans_of,
 )
-from lockstep.protocol.trace import (
+from lockstep.protocol.traces.trace import (
     COMMAND_WAY,
     MAX_SPAN_MS,
     PICTURE_WAY,

@@ -12,7 +12,7 @@ from typing import Annotated, Any
 import msgspec
 import typer
 
-from lockstep.server.cli.access import MakeSettings
+from lockstep.server.cli.access.access import MakeSettings
 from lockstep.server.cli.console_request import ask_console
 from lockstep.server.cli.extras import load_extra
 from lockstep.server.cli.options import RobotOption, StateDirOption
@@ -102,7 +102,7 @@ def add_recording_commands(app: typer.Typer, make_settings: MakeSettings) -> Non
         as_json: Json = False,
     ) -> None:
         """Serve the player for one recording, without a robot, and print its link."""
-        from lockstep.server.cli.replay import serve_replay
+        from lockstep.server.cli.recordings.replay import serve_replay
 
         serve_replay(recording_file(file, make_settings(state_dir=state_dir), robot, directory), host, port, as_json)
 

@@ -1,0 +1,1 @@
+"""Frames between a process and the helper process that it started."""

@@ -1,0 +1,1 @@
+"""Traces: the spans of the two ways, and the messages that carry them (docs/traces.md)."""

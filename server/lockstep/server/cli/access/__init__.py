@@ -1,0 +1,1 @@
+"""The commands about links, invitations, the audit, and robots that dial in."""
