@@ -188,7 +188,7 @@ export interface EpisodeRequest {
   readonly text?: string;
 }
 
-/** How the episode does; sent to newcomers, when it changes, and every second while one is open. */
+/** The state of episodes; sent to newcomers, when it changes, and every second while an episode is open. */
 export interface EpisodeState {
   readonly type: "episode";
   readonly phase: "countdown" | "idle" | "keeping" | "open" | "resetting";
