@@ -20,9 +20,10 @@ PIP := $(BIN)/python -m pip --disable-pip-version-check -q
 INSTALL_LOCK := $(PIP) install --no-deps --require-hashes -r
 ARGS ?=
 # A file's tests share what they start. Many wait more than they compute, so that there are more workers than cores; not
-# many more, or their robots and consoles are late. Browsers take what there is: their tests run after the others, alone.
+# many more, or their robots and consoles are late. Browsers take what there is: their tests run after the others, two at
+# a time, since each waits half of its time; those that judge pictures or sound have the machine to themselves.
 WORKERS ?= 3
-BROWSERS ?= 1
+BROWSERS ?= 2
 PARALLEL := --dist loadfile --no-loadscope-reorder
 # Every process that a test starts would compile all of Lockstep again.
 unexport PYTHONDONTWRITEBYTECODE
@@ -62,8 +63,9 @@ test-unit: $(VENV)/.dev $(ROS2)/.installed $(SO101)/.installed
 	$(BIN)/python -m pytest -q -m "not browser and not long" -n $(WORKERS) $(PARALLEL)
 
 test-browser: $(VENV)/.dev $(ROS2)/.installed $(SO101)/.installed $(PAGE)
-	$(BIN)/python -m pytest -q -m "browser and not long" -n $(BROWSERS) $(PARALLEL) \
-	  $$(grep -rlF mark.browser tests --include='test_*.py' | sort)
+	@files=$$(grep -rlF mark.browser tests --include='test_*.py' | sort); \
+	$(BIN)/python -m pytest -q -m "browser and not alone and not long" -n $(BROWSERS) $(PARALLEL) $$files; several=$$?; \
+	$(BIN)/python -m pytest -q -m "browser and alone and not long" -n 1 $(PARALLEL) $$files && exit $$several
 
 test-long: $(VENV)/.dev $(LEROBOT)/.installed setup ## Run the tests that take minutes by their nature
 	@scripts/system-packages $(TEST_PACKAGES)

@@ -29,6 +29,7 @@ REAL = (
     "lockstep.bench.pick_place.run",
     "lockstep.bench.quality.stage",
     "lockstep.bench.relay.stage",
+    "lockstep.bench.robot_cuts.run",
     "lockstep.bench.harness.stack",
     "lockstep.bench.harness.tcp_path",
     "lockstep.client.console",

@@ -24,7 +24,7 @@ async def _run(link: str) -> tuple[int | None, str, str]:
         cwd=EXAMPLE.parents[2],
     )
     try:
-        async with asyncio.timeout(40):
+        async with asyncio.timeout(100):
             output, trouble = await process.communicate()
     finally:
         if process.returncode is None:

@@ -9,6 +9,7 @@ import pytest
 from lockstep.bench.harness.driving import drive_on
 from lockstep.client import Console
 from lockstep.client.errors import ConnectFailed, SignallingRefused
+from lockstep.client.transport.webrtc_peer import Peer
 from lockstep.client.transport.whep import Whep
 from lockstep.rtc.ice.settings import IceSettings
 from lockstep.rtc.peer import PeerSettings
@@ -113,7 +114,14 @@ async def test_after_the_path_is_cut_a_restart_brings_commands_and_pictures_back
             paths.close()
 
 
-async def test_a_restart_that_finds_no_path_leaves_the_old_one_as_it_was() -> None:
+async def test_a_restart_that_finds_no_path_leaves_the_old_one_as_it_was(monkeypatch: pytest.MonkeyPatch) -> None:
+    restart_ice = Peer.restart_ice
+
+    async def hasty(peer: Peer, seconds: float) -> None:
+        await restart_ice(peer, 2.0)
+
+    monkeypatch.setattr(Peer, "restart_ice", hasty)
+
     class Nowhere(Paths):
         def answer(self, sdp: str) -> str:
             sent = super().answer(sdp)
@@ -122,9 +130,9 @@ async def test_a_restart_that_finds_no_path_leaves_the_old_one_as_it_was() -> No
             return sent
 
     paths = Nowhere()
-    async with running_rig(ice_hosts="127.0.0.1", peer_connect_timeout=2.0) as rig:
+    async with running_rig(ice_hosts="127.0.0.1") as rig:
         try:
-            async with Console(_link(rig), route=paths, connect_seconds=3.0) as console:
+            async with Console(_link(rig), route=paths) as console:
                 await console.take_seat()
                 with pytest.raises(ConnectFailed):
                     await console.restart_ice()
@@ -170,7 +178,7 @@ async def test_an_old_path_without_answers_ends_nothing_while_a_restart_is_under
 @pytest.mark.usefixtures("hasty_consent")
 async def test_a_restart_that_finds_no_path_ends_a_session_whose_old_path_gives_no_answers() -> None:
     paths = Paths()
-    async with running_rig(ice_hosts="127.0.0.1", peer_connect_timeout=3.0) as rig:
+    async with running_rig(ice_hosts="127.0.0.1") as rig:
         try:
             async with Console(_link(rig), route=paths, video=False, audio=False):
                 await _lapse(rig, paths)

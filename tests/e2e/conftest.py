@@ -30,8 +30,16 @@ expect.set_options(timeout=30_000)  # ms; a page shows what it hears when a busy
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     on_one_loop = pytest.mark.asyncio(loop_scope="session")
     for item in items:
-        if HERE in item.path.parents and pytest_asyncio.is_async_test(item):
+        if HERE not in item.path.parents:
+            continue
+        if pytest_asyncio.is_async_test(item):
             item.add_marker(on_one_loop, append=False)
+        if item.get_closest_marker("full_rate") or _listens(item):
+            item.add_marker(pytest.mark.alone)
+
+
+def _listens(item: pytest.Item) -> bool:
+    return isinstance(item, pytest.Function) and "sound_card" in item.fixturenames
 
 
 @pytest.fixture(autouse=True)

@@ -126,9 +126,10 @@ async def test_a_dead_path_is_left_by_an_ice_restart_and_the_same_connection_goe
         await console.arm()
         await console.drive_forward()
         before = await console.stats()
-        path.cut()
-        await console.until("!s.armed")
-        last = (await console.stats())["event"]  # nothing passes any more: what is newer came by the new path
+        with path.restarts_wait():
+            path.cut()
+            await console.until("!s.armed")
+            last = (await console.stats())["event"]  # nothing passes: what is newer comes by the new path
         await console.until(f"s.connected && s.streams.overview.stamp > {last}")
         assert path.restarts == [200]
         after = await console.stats()

@@ -15,7 +15,7 @@ from lockstep.bench.browsers.console_page import ConsolePage, open_console
 from lockstep.bench.browsers.sound_card import SoundCard, running_sound_card, tone_level
 from tests.support.stack import Stack, running_stack
 
-pytestmark = pytest.mark.browser
+pytestmark = [pytest.mark.browser, pytest.mark.alone]
 
 VOICE = 700.0  # Hz; the robot's own tone is another
 HEARD, SILENT = 0.02, 0.001

@@ -1,5 +1,6 @@
 """Random lives of a bridge and its network: the invariants hold after every step."""
 
+import pytest
 from hypothesis import settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, precondition, rule
@@ -8,6 +9,8 @@ from lockstep.protocol.messages import Command, Feedback
 from lockstep.protocol.serial import MAX_EVENT, event_after, event_gap
 from lockstep.robot_bridge.control.event_core import Answered, EventCore, Executed
 from tests.robot_bridge.core_helpers import AXES, MAX_AGE, MEASURED, NEUTRAL, reason
+
+pytestmark = pytest.mark.slow
 
 values = st.sampled_from([[0.5, 0.2], [-1.0, 0.3], NEUTRAL])
 

@@ -20,6 +20,8 @@ from lockstep.robot_bridge.control.limits.axis_shaper import AxisShaper
 from lockstep.robot_bridge.stop.stop_latch import ResetTaken
 from tests.robot_bridge.goal_helpers import ARM_AXES, HangingArm
 
+pytestmark = pytest.mark.slow
+
 HOLD = 0.3
 AGE = 2.0
 DT = 0.004

@@ -3,6 +3,7 @@ stop, then a neutral command, then another."""
 
 from collections.abc import Callable
 
+import pytest
 from hypothesis import settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, precondition, rule
@@ -11,6 +12,8 @@ from lockstep.protocol.messages import Command, Feedback, LinkMessage, Reset, Re
 from lockstep.protocol.serial import MAX_EVENT, event_after
 from tests.robot_bridge.bridge_model import BridgeModel
 from tests.robot_bridge.core_helpers import NEUTRAL
+
+pytestmark = pytest.mark.slow
 
 MOVES = [[0.5, 0.2], [-1.0, 0.3]]
 PRESSES = ["", "a" * 32, "b" * 32, "c" * 32]

@@ -16,6 +16,8 @@ from lockstep.protocol.serial import MAX_EVENT, event_after
 from tests.robot_bridge.core_helpers import NEUTRAL
 from tests.safety.stop_world import LINKS, MOVE, PEOPLE, Link, World
 
+pytestmark = pytest.mark.slow
+
 people = st.sampled_from(list(PEOPLE))
 links = st.sampled_from(LINKS)
 few = st.integers(0, 3)

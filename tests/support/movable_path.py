@@ -3,8 +3,8 @@
 import asyncio
 import re
 import time
-from collections.abc import AsyncIterator
-from contextlib import asynccontextmanager
+from collections.abc import AsyncIterator, Iterator
+from contextlib import asynccontextmanager, contextmanager
 
 from playwright.async_api import Page, Route
 
@@ -30,10 +30,21 @@ class MovablePath:
         self._relay = relay
         self._outages = outages
         self._offered = False
+        self._may_restart = asyncio.Event()
+        self._may_restart.set()
 
     def cut(self) -> None:
         """From now on nothing passes."""
         self._outages.demand(time.monotonic(), FOR_GOOD)
+
+    @contextmanager
+    def restarts_wait(self) -> Iterator[None]:
+        """No ICE restart reaches the console inside the block: one that the page asks for waits for its end."""
+        self._may_restart.clear()
+        try:
+            yield
+        finally:
+            self._may_restart.set()
 
     async def connect(self, route: Route) -> None:
         """Stands between the page and `POST /whep`."""
@@ -52,6 +63,7 @@ class MovablePath:
             self.restarts.append(422)
             await route.fulfill(status=422, json={"error": "ice_restart_unsupported", "detail": ""})
         else:
+            await self._may_restart.wait()
             response = await route.fetch()
             self.restarts.append(response.status)
             await route.fulfill(response=response)

@@ -1,5 +1,6 @@
 """Clutch, sender and arbiter against a model of a robot: engaging moves nothing, whatever happened before."""
 
+import pytest
 from hypothesis import settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, precondition, rule
@@ -15,6 +16,8 @@ from lockstep.protocol.serial import event_after
 from lockstep.server.control.command_arbiter import Answer, CommandArbiter, Forward, ForwardRest, Refuse
 from lockstep.server.control.seat import ControlSeat, SeatTimes
 from lockstep.server.event_clock import EventClock
+
+pytestmark = pytest.mark.slow
 
 ARM = RobotDescription(
     name="arm",

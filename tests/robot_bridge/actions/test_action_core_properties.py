@@ -1,5 +1,6 @@
 """Random lives of actions: requests, copies of them, commands, losses, stops, other holders of the seat, and time."""
 
+import pytest
 from hypothesis import settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, precondition, rule
@@ -8,6 +9,8 @@ from lockstep.protocol.actions import Act, ActionUpdate
 from lockstep.protocol.description import Action
 from lockstep.protocol.messages import StopState
 from lockstep.robot_bridge.actions.action_core import ActionCore, Begun, RobotNow
+
+pytestmark = pytest.mark.slow
 
 HOLD, AGE = 0.3, 2.0
 ACTIONS = (Action(name="home", label=""), Action(name="dock", label=""), Action(name="light", label="", moves=False))

@@ -6,6 +6,8 @@ from lockstep.rtc.ice.agent import Agent
 from lockstep.rtc.ice.events import Ended, PathChanged, RestartFailed
 from tests.rtc.ice.network import Conditions, Network, agent_at, candidates_of, connect
 
+pytestmark = pytest.mark.slow
+
 BAD = {
     "loss of 30 %": Conditions(loss=0.3, delay=(0.02, 0.05)),
     "600 ms round trip": Conditions(delay=(0.3, 0.3)),

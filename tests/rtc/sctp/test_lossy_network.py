@@ -7,6 +7,8 @@ import pytest
 from lockstep.rtc.sctp import Association, Closed, MessageReceived, SctpSettings, State
 from tests.rtc.sctp.network import Link, World, associated, seeded
 
+pytestmark = pytest.mark.slow
+
 ORDERED, UNORDERED, NEWEST, TIMED, BULK = range(5)
 
 NETWORKS = {

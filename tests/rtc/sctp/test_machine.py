@@ -5,6 +5,7 @@ from collections.abc import Callable
 from itertools import count
 
 import hypothesis.strategies as st
+import pytest
 from hypothesis import HealthCheck, settings
 from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, rule
 
@@ -42,6 +43,8 @@ from lockstep.rtc.sctp.wire.chunks import (
 )
 from tests.rtc.sctp.hostile import Victim
 from tests.rtc.sctp.network import Link, World, seeded
+
+pytestmark = pytest.mark.slow
 
 
 def near_the_wrap(seed: int) -> Callable[[int], bytes]:

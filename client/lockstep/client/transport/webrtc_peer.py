@@ -174,7 +174,7 @@ class Peer:
                     self._stepped.clear()
                     await self._stepped.wait()
         except TimeoutError:
-            detail = f"no data channel after {seconds:g} s: is UDP to the console blocked?"
+            detail = "no data channel was open in time: is UDP to the console blocked?"
             raise ConnectFailed(detail) from None
         if self.ended.is_set():
             raise ConnectFailed(self.why)
