@@ -18,8 +18,6 @@ __all__ = ["APPLIED", "Hand", "PickAndPlace", "ToolHand"]
 
 STEP: Final = 0.07  # m, of a goal ahead of the measured tool: less than its reach
 THERE: Final = 0.006  # m, of the measured tool
-NUDGE: Final = 0.004  # m, to and fro
-STANDS: Final = 0.0005  # m: a goal that moves by less stands still
 APPLIED: Final = 0.02  # rad and m, of the applied goal
 PAUSE: Final = 0.25  # s of the robot's clock that a motion settles for
 LONGEST: Final = 30.0  # s for one motion
@@ -47,8 +45,6 @@ class ToolHand:
 
     def __init__(self, description: RobotDescription) -> None:
         self._description = description
-        self._before: dict[str, float] = {}  # m, goals of the tool's place in the last command
-        self._nudge = NUDGE
 
     def values(self, goals: Mapping[str, float], feedback: Feedback) -> Mapping[str, float | None]:
         here = by_name(self._description, feedback.axes)
@@ -56,19 +52,7 @@ class ToolHand:
         distance = math.hypot(*way.values()) if way else 0.0
         share = min(1.0, STEP / distance) if distance else 1.0
         place = {name: here[name] + share * each if share < 1 else goals[name] for name, each in way.items()}
-        return dict(goals) | self._moved_on(place, distance)
-
-    def _moved_on(self, place: dict[str, float], distance: float) -> dict[str, float]:
-        """Move a goal that would stand still: then the arm rests before it is there (docs/so101.md).
-
-        Over a network with a long round trip, or when a busy machine interrupts the arm, it may be left behind.
-        """
-        before, self._before = self._before, place
-        stands = before.keys() == place.keys() and all(abs(place[name] - before[name]) < STANDS for name in place)
-        if not stands or distance < THERE / 2 or "tool.z" not in place:
-            return place
-        self._nudge = -self._nudge
-        return place | {"tool.z": place["tool.z"] + self._nudge}
+        return dict(goals) | place
 
     def applied(self, goals: Mapping[str, float], feedback: Feedback) -> bool:
         there = by_name(self._description, feedback.goals)
