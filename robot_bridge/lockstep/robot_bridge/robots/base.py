@@ -97,7 +97,7 @@ class Robot(ABC):
         axis has been measured.
         """
 
-    def pursue_poses(self, names: Sequence[str]) -> None:  # noqa: B027 - most robots need not know it
+    def pursue_poses(self, names: Sequence[str]) -> None:
         """Take the names of the poses with `settling` that commands drive in the coming tick. Precedes every `apply`.
 
         The robot pursues the goals of these, also while they stand still. Towards those of any other pose it comes to

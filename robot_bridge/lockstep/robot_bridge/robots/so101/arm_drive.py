@@ -20,7 +20,7 @@ __all__ = ["SETTLES", "ArmDrive"]
 Array = npt.NDArray[np.float64]
 
 SAME: Final = 1e-9  # rad and m
-SETTLES: Final = 0.12  # s in which the tool may still come nearer to a goal that stands still and is not pursued any more
+SETTLES: Final = 0.12  # s in which the tool may come nearer to a goal that stands still and is pursued no more
 AHEAD: Final = 0.7  # rad that a joint's goal is at most ahead of the joint while the tool is driven
 TURNED_AWAY: Final = 2.6  # rad between the tool and its goal, from which on it does not turn: either way is as short
 TURNED_BACK: Final = 0.5  # rad, from which on it turns again
