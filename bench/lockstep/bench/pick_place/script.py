@@ -10,7 +10,7 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Final, Protocol, TypeVar
 
-from lockstep.bench.pick_place.motions import POSITION, Motion, motions
+from lockstep.bench.pick_place.motions import POSITION, ROTATION, Motion, motions
 from lockstep.protocol.description import RobotDescription
 from lockstep.protocol.messages import Feedback
 
@@ -19,6 +19,7 @@ __all__ = ["APPLIED", "Hand", "PickAndPlace", "ToolHand"]
 STEP: Final = 0.07  # m, of a goal ahead of the measured tool: less than its reach
 THERE: Final = 0.006  # m, of the measured tool
 APPLIED: Final = 0.02  # rad and m, of the applied goal
+STANDS: Final = 0.01  # rad, from one feedback to the next: the tool does not turn
 PAUSE: Final = 0.25  # s of the robot's clock that a motion settles for
 LONGEST: Final = 30.0  # s for one motion
 
@@ -45,6 +46,7 @@ class ToolHand:
 
     def __init__(self, description: RobotDescription) -> None:
         self._description = description
+        self._turned: dict[str, float] = {}  # rad, how the tool was measured to be turned before
 
     def values(self, goals: Mapping[str, float], feedback: Feedback) -> Mapping[str, float | None]:
         here = by_name(self._description, feedback.axes)
@@ -55,8 +57,12 @@ class ToolHand:
         return dict(goals) | place
 
     def applied(self, goals: Mapping[str, float], feedback: Feedback) -> bool:
-        there = by_name(self._description, feedback.goals)
-        return all((goal := there[name]) is not None and abs(goal - goals[name]) < APPLIED for name in goals)
+        """A tool that the joints cannot turn so far is turned as far as they can when it does not turn any more."""
+        there, here = by_name(self._description, feedback.goals), by_name(self._description, feedback.axes)
+        before, self._turned = self._turned, {name: here[name] for name in ROTATION if name in goals}
+        stands = all(abs(each - before.get(name, math.inf)) < STANDS for name, each in self._turned.items())
+        judged = goals.keys() - self._turned.keys() if stands else goals.keys()
+        return all((goal := there[name]) is not None and abs(goal - goals[name]) < APPLIED for name in judged)
 
 
 class PickAndPlace:
