@@ -11,6 +11,8 @@ from pathlib import Path
 from typing import Any
 
 ROOT = Path(__file__).resolve().parent.parent
+# The first has what requirements.lock has too. Every environment of the Makefile is made from one of them.
+LOCKS = ("requirements-dev.lock", "requirements-ros2.lock", "requirements-lerobot.lock", "requirements-docs.lock")
 SECONDS = 300
 
 
@@ -19,14 +21,14 @@ def _run(*command: str) -> str:
     return finished.stdout
 
 
-def _python() -> tuple[list[str], str]:
-    """Vulnerabilities, and what was not looked up."""
-    lock = ("--disable-pip", "--require-hashes", "-r", "requirements-dev.lock")
-    answer: dict[str, Any] = json.loads(_run(sys.executable, "-m", "pip_audit", "-f", "json", *lock) or "{}")
+def _python(lock: str) -> tuple[list[str], str]:
+    """Return the vulnerabilities of a lock file's packages, and what was not looked up."""
+    flags = ("--disable-pip", "--require-hashes", "-r", lock)
+    answer: dict[str, Any] = json.loads(_run(sys.executable, "-m", "pip_audit", "-f", "json", *flags) or "{}")
     packages = answer.get("dependencies", [])
-    found = [f"{each['name']} {vuln['id']}" for each in packages for vuln in each.get("vulns", [])]
+    found = [f"{each['name']} {vuln['id']} ({lock})" for each in packages for vuln in each.get("vulns", [])]
     skipped = sum("skip_reason" in each for each in packages)
-    missed = "" if packages and not skipped else f"{skipped or 'all'} of the Python packages"
+    missed = "" if packages and not skipped else f"{skipped or 'all'} of the Python packages in {lock}"
     return found, missed
 
 
@@ -39,7 +41,7 @@ def _page() -> tuple[list[str], str]:
 
 def main(arguments: list[str]) -> int:
     found: list[str] = []
-    for vulnerabilities, missed in (_python(), _page()):
+    for vulnerabilities, missed in (*map(_python, LOCKS), _page()):
         found += vulnerabilities
         if missed:
             print(f"audit: no advisories could be had for {missed}", file=sys.stderr)

@@ -1,4 +1,7 @@
-"""Build a wheel of every part, with licence and notices inside: `python -m scripts.build_wheels FOLDER`."""
+"""Build a wheel of every part and of LeRobot's plugins: `python -m scripts.build_wheels FOLDER`.
+
+Licence and notices are inside of each.
+"""
 
 import shutil
 import subprocess
@@ -8,6 +11,8 @@ from tempfile import TemporaryDirectory
 
 ROOT = Path(__file__).resolve().parent.parent
 PARTS = ("protocol", "rtc", "robot_bridge", "client", "server", ".")
+PLUGINS = ("lerobot_plugins/lerobot_robot_lockstep", "lerobot_plugins/lerobot_teleoperator_lockstep")
+WHEELS = ("lockstep_*.whl", "lerobot_*_lockstep-*.whl")
 PAGE = ROOT / "server" / "lockstep" / "server" / "web_dist" / "index.html"
 
 
@@ -28,6 +33,10 @@ def build(part: str, into: Path) -> None:
         subprocess.run([*pip, "wheel", "--no-deps", "--no-build-isolation", "-w", str(into), str(copy)], check=True)
 
 
+def _wheels(folder: Path) -> list[Path]:
+    return sorted(wheel for pattern in WHEELS for wheel in folder.glob(pattern))
+
+
 def main(arguments: list[str]) -> int:
     if len(arguments) != 1:
         print("usage: python -m scripts.build_wheels FOLDER", file=sys.stderr)
@@ -37,11 +46,11 @@ def main(arguments: list[str]) -> int:
         return 1
     into = Path(arguments[0]).resolve()
     into.mkdir(parents=True, exist_ok=True)
-    for old in into.glob("lockstep_*.whl"):
+    for old in _wheels(into):
         old.unlink()
-    for part in PARTS:
+    for part in (*PARTS, *PLUGINS):
         build(part, into)
-    for wheel in sorted(into.glob("lockstep_*.whl")):
+    for wheel in _wheels(into):
         print(wheel.name)
     return 0
 

@@ -14,7 +14,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from lockstep.bench.harness.driving import drive_on
-from lockstep.client import CommandRefused, Console, EpisodeRefused
+from lockstep.client import Console, EpisodeRefused
 from lockstep.client.console_url import parse_link
 from lockstep.protocol.episodes import EpisodeState
 from lockstep.robot_bridge.robots.event_strip import read_event_strip
@@ -37,14 +37,6 @@ def _console(link: str, name: str = "Ada") -> Console:
 async def _drive(console: Console, events: int = 5) -> None:
     for _ in range(events):
         await drive_on(console, AWAY)
-
-
-async def _reset(console: Console) -> bool:
-    try:
-        await console.reset()
-    except CommandRefused as refused:
-        return refused.reason != "stale_reset"
-    return True
 
 
 @asynccontextmanager
@@ -154,9 +146,7 @@ async def test_a_stop_in_an_episode_is_marked_and_does_not_end_it(tmp_path: Path
     recordings = tmp_path / "recordings"
     async with _in_an_episode(tmp_path, recordings) as (_, console):
         await console.stop("a look")
-        async with asyncio.timeout(PATIENCE):
-            while not await _reset(console):  # noqa: ASYNC110 until the robot's answer to the press has come
-                await asyncio.sleep(0.05)
+        await console.reset()
         await console.arm()
         await _drive(console)
         await console.episodes.keep()

@@ -7,6 +7,7 @@ import pytest
 
 from lockstep.server.http.limit_settings import LimitSettings
 from lockstep.server.settings import Settings
+from scripts.audit import LOCKS
 
 ROOT = Path(__file__).parents[2]
 TEXT = (ROOT / "docs" / "security.md").read_text()
@@ -40,8 +41,16 @@ def test_the_check_looks_up_every_locked_package() -> None:
     recipe = re.search(r"^check:.*\n((?:\t.*\n)+)", (ROOT / "Makefile").read_text(), re.MULTILINE)
     assert recipe is not None
     assert "scripts.audit" in recipe[1]
-    assert "requirements-dev.lock" in (ROOT / "scripts" / "audit.py").read_text()
-    assert all("--hash=" in part for part in _packages(ROOT / "requirements-dev.lock"))
+    packages = {path.name: set(_packages(path)) for path in ROOT.glob("requirements*.lock")}
+    assert set(LOCKS) <= packages.keys()
+    looked_up = set().union(*(_pins(packages[lock]) for lock in LOCKS))
+    for name, parts in packages.items():
+        assert all("--hash=" in part for part in parts), name
+        assert _pins(parts) <= looked_up, name
+
+
+def _pins(parts: set[str]) -> set[str]:
+    return {part.split(" ")[0] for part in parts}
 
 
 def _packages(lock: Path) -> list[str]:

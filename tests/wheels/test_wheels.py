@@ -16,6 +16,7 @@ from tests.support.stack import running_stack
 
 ROOT = Path(__file__).parents[2]
 PARTS = ("protocol", "rtc", "robot_bridge", "client", "server", ".")
+PLUGINS = ("lerobot_robot_lockstep", "lerobot_teleoperator_lockstep")
 BRIDGE = ("lockstep_protocol", "lockstep_bridge")
 WITH_PAGE = "lockstep/server/web_dist/"
 
@@ -87,13 +88,20 @@ def test_all_parts_have_one_version_and_need_each_other_in_it() -> None:
 
 
 def test_every_wheel_has_its_licence_and_the_consoles_has_the_page_with_its_notices(wheels: dict[str, Path]) -> None:
-    assert len(wheels) == len(PARTS)
-    for wheel in wheels.values():
+    assert len(wheels) == len(PARTS) + len(PLUGINS)
+    for name, wheel in wheels.items():
         names = zipfile.ZipFile(wheel).namelist()
-        assert {Path(name).name for name in names if ".dist-info/licenses/" in name} == {"LICENSE", "NOTICE"}
-        assert not [name for name in names if not name.startswith("lockstep") or "__pycache__" in name]
+        assert {Path(each).name for each in names if ".dist-info/licenses/" in each} == {"LICENSE", "NOTICE"}
+        own = name if name in PLUGINS else "lockstep"
+        assert not [each for each in names if not each.startswith(own) or "__pycache__" in each]
     page = {name for name in zipfile.ZipFile(wheels["lockstep_console"]).namelist() if name.startswith(WITH_PAGE)}
     assert {f"{WITH_PAGE}{name}" for name in ("index.html", "licenses.md", "licenses-inter.txt")} <= page
+
+
+def test_the_plugins_that_lerobot_finds_by_their_names_are_built_too(wheels: dict[str, Path]) -> None:
+    for plugin in PLUGINS:
+        names = zipfile.ZipFile(wheels[plugin]).namelist()
+        assert {f"{plugin}/__init__.py", f"{plugin}/py.typed"} <= set(names)
 
 
 def test_no_file_is_in_two_wheels(wheels: dict[str, Path]) -> None:

@@ -25,7 +25,7 @@ from lockstep.protocol.traces.trace_messages import TraceRequest
 
 __all__ = ["SessionRequests"]
 
-RESET_AGAIN = 0.5  # s between two tries while the stop is too new
+RESET_AGAIN = 0.5  # s between two tries while the stop is too new, or the robot's answer to a press is on its way
 ANSWER_SECONDS = 5.0  # time for the console to answer a request
 STOP_SECONDS = 0.3  # time for a channel to confirm a stop, before HTTP is tried as well or after HTTP has failed
 
@@ -88,7 +88,11 @@ class SessionRequests:
         return note
 
     async def reset(self, by: str, number: int) -> StopState:
-        """Release stop `number`, and no later one; wait while it is too soon. Raises CommandRefused."""
+        """Release stop `number`, and no later one. Raises CommandRefused.
+
+        Waits while it is too soon, and while the console waits for the robot's answer to a press: feedback may have
+        shown the stop already.
+        """
         reset = Reset(by=by, number=number)
         loop = asyncio.get_running_loop()
         until = loop.time() + ANSWER_SECONDS
@@ -96,7 +100,10 @@ class SessionRequests:
             refusal = await self._ask(lambda: self._is_released(number), "stop", reset, ANSWER_SECONDS)
             if refusal is None:
                 return self._session.stop_state
-            if refusal.reason != "too_soon" or loop.time() > until:
+            passes = refusal.reason == "too_soon" or (
+                refusal.reason == "stale_reset" and self._session.newest_stop <= number
+            )
+            if not passes or loop.time() > until:
                 raise CommandRefused(refusal.reason, refusal.detail)
             await asyncio.sleep(RESET_AGAIN)
 

@@ -230,7 +230,7 @@ class Pose(msgspec.Struct, frozen=True, kw_only=True):
     position: tuple[str, str, str]  # axes, m; "" without such an axis
     rotation: tuple[str, str, str] = ("", "", "")  # axes, rad
     instead_of: tuple[str, ...] = ()  # goal axes
-    settling: float = 0.0  # s in which the robot may still come nearer to its goals after they stood still
+    settling: float = 0.0  # s in which the robot may come nearer to goals that stand still and are pursued no more
 
 
 class Binding(msgspec.Struct, frozen=True, kw_only=True):

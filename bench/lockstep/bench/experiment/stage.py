@@ -1,7 +1,7 @@
 """Starts, connects and ends the robot, console and network of one run."""
 
 import secrets
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Mapping
 from contextlib import asynccontextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -31,9 +31,17 @@ class Stage:
 
 @asynccontextmanager
 async def running_stage(
-    robot: str, profile: Profile, media: MediaChoice, seed: int, *, robot_link: bool = True
+    robot: str,
+    profile: Profile,
+    media: MediaChoice,
+    seed: int,
+    *,
+    robot_link: bool = True,
+    settings: Mapping[str, str] | None = None,
 ) -> AsyncIterator[Stage]:
-    """Start the stage. `robot_link`: whether the robot's link passes the network too.
+    """Start the stage.
+
+    `robot_link`: whether the robot's link passes the network too. `settings`: more of the console, LOCKSTEP_…
 
     Raises:
         ProcessFailed: a process did not start.
@@ -44,6 +52,7 @@ async def running_stage(
             "LOCKSTEP_STATE_DIR": str(bridge.event_log.parent),
             "LOCKSTEP_SECRET": secrets.token_urlsafe(32),
             "LOCKSTEP_SCENE": "false",
+            **(settings or {}),
         }
         through = ("127.0.0.1", bridge.port) if robot_link else None
         async with NetworkProcess(profile, robot=through, seed=seed) as network:

@@ -16,12 +16,12 @@ from lockstep.bench.experiment.stage import Stage, running_stage
 from lockstep.bench.pick_place.hands import LEADER_SCALES, LeaderHand, PolicyHand
 from lockstep.bench.pick_place.judge import Judged, judge
 from lockstep.bench.pick_place.motions import BLOCKS
+from lockstep.bench.pick_place.operate import operate
 from lockstep.bench.pick_place.script import Hand, PickAndPlace, ToolHand
-from lockstep.client import CommandRefused, Console
+from lockstep.client import Console
 from lockstep.emulator.impairment.profile import load_profile
-from lockstep.protocol.messages import Feedback
 
-__all__ = ["Choices", "HandName", "pick_and_place"]
+__all__ = ["Choices", "HandName", "pick_and_place", "recorder_of"]
 
 HandName = Literal["tool", "leader", "policy"]
 ROBOT: Final = "so101"
@@ -30,8 +30,6 @@ CONNECT_SECONDS: Final = 60.0  # through a bad network, with a busy machine
 SILENCE_SECONDS: Final = 15.0
 BLOCK_SECONDS: Final = 240.0
 LANDS_SECONDS: Final = 15.0  # until the robot says that the block lies in the bowl
-# Refusals after which the next feedback is answered anew: a bad network or a busy machine has held somebody up.
-PASSING: Final = ("late", "link_down", "not_neutral", "out_of_order", "rested")
 
 
 @dataclass(frozen=True)
@@ -62,7 +60,7 @@ async def pick_and_place(choices: Choices, say: Callable[[str], None]) -> dict[s
     ) as stage:
         link = stage.link if choices.network else stage.near_link
         async with (
-            _recorder(stage) as recorder,
+            recorder_of(stage.near_link) as recorder,
             Console(
                 link,
                 video=2 if choices.pictures else False,
@@ -108,7 +106,7 @@ class _Session:
         recording = await self._record(f"{self._choices.hand} {number + 1} {name}")
         task, began = PickAndPlace(self._console.description, name, self._hand()), time.monotonic()
         async with asyncio.timeout(BLOCK_SECONDS):
-            armed = await self._drive(task)
+            armed = await operate(self._console, task)
         seconds = time.monotonic() - began
         placed = task.done and await self._in_bowl(before + 1)
         judged = await self._judged(recording)
@@ -133,28 +131,6 @@ class _Session:
         if self._choices.hand == "leader":
             return LeaderHand(console.description, console.clutch(LEADER_SCALES))
         return PolicyHand(console.description) if self._choices.hand == "policy" else ToolHand(console.description)
-
-    async def _drive(self, task: PickAndPlace) -> int:
-        """Drive until it is done or failed; return how often the robot had to be armed anew."""
-        feedback, armed = await self._armed(), 0
-        while not task.done and not task.failed:
-            try:
-                feedback = await self._console.drive(task.values(feedback))
-            except CommandRefused as refused:
-                if refused.reason not in PASSING:
-                    raise
-                feedback, armed = await self._armed(), armed + 1
-        return armed
-
-    async def _armed(self) -> Feedback:
-        """Arm, again while the robot or its link is away: a simulated robot endangers no person."""
-        while True:
-            try:
-                return await self._console.arm()
-            except CommandRefused as refused:
-                if refused.reason not in PASSING:
-                    raise
-            await anext(aiter(self._console.feedbacks()))
 
     async def _in_bowl(self, count: int) -> bool:
         """Wait until the robot says that so many blocks lie in the bowl."""
@@ -184,9 +160,9 @@ class _Session:
 
 
 @asynccontextmanager
-async def _recorder(stage: Stage) -> AsyncIterator[httpx.AsyncClient]:
-    """Speak to the console about recordings, past the network."""
-    url, _, fragment = stage.near_link.partition("/#")
+async def recorder_of(link: str) -> AsyncIterator[httpx.AsyncClient]:
+    """Speak to the console about recordings. `link`: an operator's, past the network."""
+    url, _, fragment = link.partition("/#")
     token = fragment.partition("token=")[2].partition("&")[0]
     async with httpx.AsyncClient(base_url=url, trust_env=False, timeout=60.0) as http:
         http.headers["Authorization"] = f"Bearer {token}"

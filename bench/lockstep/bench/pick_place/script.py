@@ -10,7 +10,7 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Final, Protocol, TypeVar
 
-from lockstep.bench.pick_place.motions import POSITION, Motion, motions
+from lockstep.bench.pick_place.motions import POSITION, ROTATION, Motion, motions
 from lockstep.protocol.description import RobotDescription
 from lockstep.protocol.messages import Feedback
 
@@ -18,9 +18,8 @@ __all__ = ["APPLIED", "Hand", "PickAndPlace", "ToolHand"]
 
 STEP: Final = 0.07  # m, of a goal ahead of the measured tool: less than its reach
 THERE: Final = 0.006  # m, of the measured tool
-NUDGE: Final = 0.004  # m, to and fro
-STANDS: Final = 0.0005  # m: a goal that moves by less stands still
 APPLIED: Final = 0.02  # rad and m, of the applied goal
+STANDS: Final = 0.01  # rad, from one feedback to the next: the tool does not turn
 PAUSE: Final = 0.25  # s of the robot's clock that a motion settles for
 LONGEST: Final = 30.0  # s for one motion
 
@@ -47,8 +46,7 @@ class ToolHand:
 
     def __init__(self, description: RobotDescription) -> None:
         self._description = description
-        self._before: dict[str, float] = {}  # m, goals of the tool's place in the last command
-        self._nudge = NUDGE
+        self._turned: dict[str, float] = {}  # rad, how the tool was measured to be turned before
 
     def values(self, goals: Mapping[str, float], feedback: Feedback) -> Mapping[str, float | None]:
         here = by_name(self._description, feedback.axes)
@@ -56,23 +54,15 @@ class ToolHand:
         distance = math.hypot(*way.values()) if way else 0.0
         share = min(1.0, STEP / distance) if distance else 1.0
         place = {name: here[name] + share * each if share < 1 else goals[name] for name, each in way.items()}
-        return dict(goals) | self._moved_on(place, distance)
-
-    def _moved_on(self, place: dict[str, float], distance: float) -> dict[str, float]:
-        """Move a goal that would stand still: then the arm rests before it is there (docs/so101.md).
-
-        Over a network with a long round trip, or when a busy machine interrupts the arm, it may be left behind.
-        """
-        before, self._before = self._before, place
-        stands = before.keys() == place.keys() and all(abs(place[name] - before[name]) < STANDS for name in place)
-        if not stands or distance < THERE / 2 or "tool.z" not in place:
-            return place
-        self._nudge = -self._nudge
-        return place | {"tool.z": place["tool.z"] + self._nudge}
+        return dict(goals) | place
 
     def applied(self, goals: Mapping[str, float], feedback: Feedback) -> bool:
-        there = by_name(self._description, feedback.goals)
-        return all((goal := there[name]) is not None and abs(goal - goals[name]) < APPLIED for name in goals)
+        """A tool that the joints cannot turn so far is turned as far as they can when it does not turn any more."""
+        there, here = by_name(self._description, feedback.goals), by_name(self._description, feedback.axes)
+        before, self._turned = self._turned, {name: here[name] for name in ROTATION if name in goals}
+        stands = all(abs(each - before.get(name, math.inf)) < STANDS for name, each in self._turned.items())
+        judged = goals.keys() - self._turned.keys() if stands else goals.keys()
+        return all((goal := there[name]) is not None and abs(goal - goals[name]) < APPLIED for name in judged)
 
 
 class PickAndPlace:

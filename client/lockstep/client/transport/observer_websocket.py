@@ -11,6 +11,7 @@ from websockets.exceptions import ConnectionClosed, WebSocketException
 
 from lockstep.client.console_url import ConsoleLink
 from lockstep.client.errors import ConnectFailed, ConsoleError, SignallingRefused
+from lockstep.client.transport.message_turns import MAX_UNREAD, in_turns
 from lockstep.client.transport.packets import Packets
 from lockstep.client.transport.sdp import Section
 from lockstep.client.transport.transport import ChannelName
@@ -80,6 +81,7 @@ class ObserverWebSocket:
                 open_timeout=OPEN_SECONDS,
                 close_timeout=1.0,
                 max_size=MAX_MESSAGE,
+                max_queue=MAX_UNREAD,
                 ping_interval=None,  # the reports serve as pings, and the console pings too
                 compression=None,
                 proxy=None if self._link.loopback else True,
@@ -144,8 +146,7 @@ class ObserverWebSocket:
         if self._socket is None:
             return
         try:
-            while True:
-                data = await self._socket.recv()
+            async for data in in_turns(self._socket.recv):
                 self._heard()
                 self._on_message(data)
         except ConnectionClosed:

@@ -14,6 +14,7 @@ from websockets.typing import Subprotocol
 from lockstep.client.errors import ConnectFailed
 from lockstep.client.transport.endpoints import open_endpoint
 from lockstep.client.transport.media_sections import receiving
+from lockstep.client.transport.message_turns import MAX_UNREAD, in_turns
 from lockstep.client.transport.packets import Packets
 from lockstep.client.transport.sdp import Section, read_sections
 from lockstep.protocol.console import StreamInfo
@@ -83,6 +84,7 @@ class RelayMedia:
                 subprotocols=[Subprotocol(JANUS_PROTOCOL)],
                 open_timeout=ANSWER_SECONDS,
                 max_size=MAX_MESSAGE,
+                max_queue=MAX_UNREAD,
                 ping_interval=None,
                 proxy=None,
             )
@@ -203,7 +205,7 @@ class RelayMedia:
         if self._socket is None:
             return
         try:
-            async for text in self._socket:
+            async for text in in_turns(self._socket.recv):
                 if _ends(text):
                     self._lose("the relay ended the subscription")
         except WebSocketException:

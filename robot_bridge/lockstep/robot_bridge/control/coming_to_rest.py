@@ -66,7 +66,10 @@ class ComingToRest:
 
     def _apply(self) -> bool:
         """Apply the values. Where a goal is not known, nothing was ever applied, and the robot's own stop suffices."""
-        return not self._shaper.is_known or self._attempt("apply", lambda: self._robot.apply(self._shaper.values))
+        if not self._shaper.is_known:
+            return True
+        told = self._attempt("pursue_poses", lambda: self._robot.pursue_poses(()))
+        return self._attempt("apply", lambda: self._robot.apply(self._shaper.values)) and told
 
     def _attempt(self, name: str, call: Callable[[], None]) -> bool:
         try:

@@ -152,6 +152,7 @@ class CommandExecutor:
             values = self._shaper.values
         self._watchdogs.ticked(now, self._moves)
         if self._places_known():
+            self._robot.pursue_poses(self._shaper.pursued_poses)
             self._robot.apply(self._signal.on(values) if self._core.warns(now) else values)
         self._robot.tick()
         if self._feedback.timing.waits_for_tick:

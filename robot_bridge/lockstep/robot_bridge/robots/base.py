@@ -97,6 +97,20 @@ class Robot(ABC):
         axis has been measured.
         """
 
+    def pursue_poses(self, names: Sequence[str]) -> None:
+        """Take the names of the poses with `settling` that commands drive in the coming tick. Precedes every `apply`.
+
+        The robot pursues the goals of these, also while they stand still. Towards those of any other pose it comes to
+        rest within `settling`, counted from the last tick in which the pose was named or its goals changed. After a
+        rest, a stop, a lost link or a failure only a new command names a pose again. From `settling` before `hold` has
+        passed since the last command, no pose is named. So the robot is at rest within `hold`.
+
+        A pose is not named while a limit slows one of its axes. Otherwise limits see the motion of the goals alone: the
+        robot itself keeps its joints within their ranges while it pursues goals that stand still. A robot that does not
+        override this comes to rest `settling` after its goals stood still, and gets no nearer by a command that repeats
+        them.
+        """
+
     def tick(self) -> None:
         """Let one `tick_seconds` pass. Only simulations need it."""
 

@@ -1,6 +1,5 @@
 """Requests of the command line to a running console: that of the state directory, or of a supervisor's link."""
 
-import json
 import ssl
 from pathlib import Path
 from typing import Any
@@ -85,7 +84,7 @@ def _ask(
         raise _usage(f"the console at {base} does not answer: {error}") from error
     try:
         found = answer.json()
-    except (json.JSONDecodeError, UnicodeDecodeError) as error:
+    except (ValueError, RecursionError) as error:  # also of numbers that are too long, and of JSON that is too deep
         raise _usage(f"{base} is no console: it answers {answer.status_code}") from error
     if not isinstance(found, dict):
         raise _usage(f"{base} is no console: it answers {answer.status_code}")

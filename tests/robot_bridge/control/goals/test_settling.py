@@ -1,5 +1,7 @@
 """A pose with `settling`: the robot may come nearer to its goals for that long after they stood still, within hold."""
 
+from collections.abc import Callable
+
 import msgspec
 import pytest
 
@@ -17,8 +19,9 @@ class Arm:
     def __init__(self, settling: float = SETTLING, short: float = 0.0) -> None:
         self.robot = HangingArm()
         self.short = short
+        self.limited: set[int] = set()  # axes that a limit keeps where they are
         poses = [msgspec.structs.replace(pose, settling=settling) for pose in self.robot.describe().poses]
-        self.shaper = AxisShaper(ARM_AXES, hold=HOLD, poses=poses, pursued=self.pursued)
+        self.shaper = AxisShaper(ARM_AXES, hold=HOLD, limiter=self.limit, poses=poses, pursued=self.pursued)
         self.shaper.begin(self.robot.pursued, self.robot.pursued)
         self.now = 0.0
         self.driven_at = 0.0
@@ -26,6 +29,9 @@ class Arm:
     def pursued(self) -> list[float]:
         *others, x, z = self.robot.goals()
         return [*others, x - self.short, z]
+
+    def limit(self, rates: list[float], _: Callable[[], list[float]]) -> list[float]:
+        return [0.0 if number in self.limited else rate for number, rate in enumerate(rates)]
 
     def drive(self, seconds: float, values: list[float | None]) -> None:
         for _ in range(round(seconds / DT)):
@@ -41,6 +47,7 @@ class Arm:
 
 
 X_FORWARD: list[float | None] = [0.0, None, None, None, 2.0, None]
+NEAR: list[float | None] = [0.0, None, None, None, 0.7, None]  # the goal gets there within a second
 
 
 def test_its_goals_stand_still_that_much_before_hold_has_passed_and_the_joints_goals_at_hold() -> None:
@@ -100,13 +107,94 @@ def test_a_tool_that_stopped_short_of_its_goal_says_where_and_engaging_there_mov
 
 def test_a_tool_that_is_still_commanded_keeps_its_goal_though_it_has_settled() -> None:
     arm = Arm(short=0.05)
-    near: list[float | None] = [0.0, None, None, None, 0.7, None]
-    arm.drive(2.0, near)
+    arm.drive(2.0, NEAR)
     assert arm.shaper.goals[4] == 0.7
     assert not arm.shaper.at_rest
 
 
-def test_a_cut_leaves_nothing_to_settle() -> None:
+def test_a_pose_is_pursued_while_a_command_drives_it_until_it_must_settle_within_hold() -> None:
+    arm = Arm()
+    assert not arm.shaper.pursued_poses
+    arm.drive(DT, [0.0, None, None, None, 0.6, None])  # where it is
+    assert arm.shaper.pursued_poses == ["tool"]
+    pursued_at = arm.driven_at
+    while arm.now < arm.driven_at + 2 * HOLD:
+        began = arm.now
+        arm.tick()
+        if arm.shaper.pursued_poses:
+            pursued_at = began
+    assert HOLD - SETTLING - 2 * DT < pursued_at - arm.driven_at <= HOLD - SETTLING
+
+
+def test_a_pose_without_settling_and_one_that_is_not_driven_are_not_pursued() -> None:
+    arm = Arm(settling=0.0)
+    arm.drive(DT, X_FORWARD)
+    assert not arm.shaper.pursued_poses
+    arm = Arm()
+    undriven: list[list[float | None]] = [
+        REST,
+        [0.0, 2.0, None, None, None, None],
+        [0.5, None, None, 1.0, None, None],
+    ]
+    for values in undriven:
+        arm.drive(DT, values)
+        assert not arm.shaper.pursued_poses
+    arm.shaper.drive(X_FORWARD, arm.now, 0.0)
+    arm.tick()
+    assert not arm.shaper.pursued_poses
+
+
+def neutral(arm: Arm) -> None:
+    arm.drive(DT, REST)
+
+
+def rest(arm: Arm) -> None:
+    arm.shaper.rest()
+    arm.tick()
+
+
+def fail(arm: Arm) -> None:
+    arm.shaper.brake(DT)
+
+
+@pytest.mark.parametrize("end", [neutral, rest, fail])
+def test_whatever_ends_the_driving_the_pursuit_ends_at_once_and_the_pose_settles_from_then_on(
+    end: Callable[[Arm], None],
+) -> None:
+    arm = Arm()
+    arm.drive(1.0, NEAR)
+    assert arm.shaper.pursued_poses
+    end(arm)
+    assert not arm.shaper.pursued_poses
+    ticks = 1
+    while not arm.shaper.at_rest:
+        end(arm)
+        ticks += 1
+    assert ticks * DT == pytest.approx(SETTLING, abs=2 * DT)
+
+
+def test_the_joints_wait_for_a_tool_that_was_pursued_until_now() -> None:
+    arm = Arm()
+    arm.drive(1.0, NEAR)
+    joints: list[float | None] = [0.0, 1.5, None, None, None, None]
+    before = arm.robot.applied[-1][1]
+    arm.drive(SETTLING - 2 * DT, joints)
+    assert arm.robot.applied[-1][1] == before
+    arm.drive(4 * DT, joints)
+    assert arm.robot.applied[-1][1] != before
+
+
+def test_a_pose_that_a_limit_keeps_from_its_goal_is_not_pursued() -> None:
+    arm = Arm()
+    arm.limited = {4}
+    arm.drive(DT, X_FORWARD)
+    assert not arm.shaper.pursued_poses
+    arm.limited = {0, 1}  # others
+    arm.drive(DT, X_FORWARD)
+    assert arm.shaper.pursued_poses
+
+
+def test_a_cut_leaves_nothing_to_settle_and_pursues_nothing() -> None:
     arm = Arm()
     arm.drive(0.4, X_FORWARD)
     before = arm.robot.applied[-1]
@@ -115,3 +203,4 @@ def test_a_cut_leaves_nothing_to_settle() -> None:
     arm.shaper.cut()
     assert arm.shaper.values == before
     assert arm.shaper.at_rest
+    assert not arm.shaper.pursued_poses

@@ -77,7 +77,9 @@ class ArmDriver:
 
     def ticks(self, seconds: float) -> None:
         for _ in range(round(seconds / self.robot.tick_seconds)):
-            self.robot.apply(self._shaper.step(self._now, self.robot.tick_seconds))
+            values = self._shaper.step(self._now, self.robot.tick_seconds)
+            self.robot.pursue_poses(self._shaper.pursued_poses)
+            self.robot.apply(values)
             self.robot.tick()
             self._now += self.robot.tick_seconds
 

@@ -2,73 +2,18 @@
 
 import math
 from collections.abc import Sequence
-from typing import NamedTuple
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from lockstep.protocol.description import Pose
-from lockstep.robot_bridge.control.limits.axis_shaper import AxisShaper
 from lockstep.robot_bridge.kinematics.pose_solver import PoseSolver
 from lockstep.robot_bridge.kinematics.rotations import from_rotation_vector, rotation_vector
 from lockstep.robot_bridge.robots.so101.arm_drive import AHEAD, SETTLES, ArmDrive
-from lockstep.robot_bridge.robots.so101.controls import JOINT_AXES, POSITION_AXES, RATES, ROTATION_AXES
+from lockstep.robot_bridge.robots.so101.controls import JOINT_AXES, RATES
 from tests.robot_bridge.kinematics.arms import BOUNDS, desk_arm
-
-TICK, EVENT, HOLD = 0.004, 0.04, 0.3  # s
-AXES = (*JOINT_AXES[:5], *POSITION_AXES, *ROTATION_AXES)
-POSE = Pose(
-    name="tool",
-    label="Tool",
-    body="hand",
-    position=("tool.x", "tool.y", "tool.z"),
-    rotation=("tool.rx", "tool.ry", "tool.rz"),
-    instead_of=tuple(axis.name for axis in JOINT_AXES[:5]),
-    settling=SETTLES,
-)
-START = (0.1, -0.3, 0.6, 0.7, 0.2)
-SLACK = 1e-9
-
-
-class Spell(NamedTuple):
-    """One goal for a while."""
-
-    drives: str  # "joints", "tool", "nothing"
-    ways: tuple[float, ...]  # rad or m from where the axes are
-    events: int
-
-
-class World:
-    """Arm and bridge in simulated time; the arm is where its goals are."""
-
-    def __init__(self) -> None:
-        self.drive = ArmDrive(desk_arm(), PoseSolver(desk_arm(), BOUNDS), RATES[:5], START)
-        self._shaper = AxisShaper(AXES, hold=HOLD, poses=(POSE,), pursued=self.drive.pursued)
-        self._shaper.begin(self.drive.pursued(), self.drive.pursued())
-        self._now = 0.0
-        self.values: list[float] = []
-        self.way: list[tuple[float, ...]] = [START]
-
-    def play(self, spell: Spell) -> None:
-        here = self.drive.pursued()
-        numbers = {"joints": range(5), "tool": range(5, 11), "nothing": range(0)}[spell.drives]
-        goals = [here[number] + spell.ways[number] if number in numbers else None for number in range(len(AXES))]
-        for _ in range(spell.events):
-            if spell.drives != "nothing":
-                self._shaper.drive(goals, self._now)
-            self.wait(EVENT)
-
-    def wait(self, seconds: float) -> None:
-        for _ in range(round(seconds / TICK)):
-            before = self.drive.goals
-            self.values = self._shaper.step(self._now, TICK)
-            rates = self.drive.drive(self.values, TICK)
-            assert self.drive.goals == pytest.approx(np.array(before) + np.array(rates) * TICK, abs=SLACK)
-            self.way.append(self.drive.goals)
-            self._now += TICK
-
+from tests.robot_bridge.robots.so101.arm_world import HOLD, SLACK, START, TICK, Spell, World
 
 joint_ways = st.floats(-0.6, 0.6)
 spells = st.builds(

@@ -99,3 +99,38 @@ async def test_a_console_that_is_away_is_said_to_be(tmp_path: Path) -> None:
     assert (code, "does not answer" in errors) == (2, True)
     code, _, errors = await run("forget", "--link", "http://127.0.0.1:1/#token=x", "--tls-ca", str(tmp_path / "none"))
     assert (code, "is no certificate" in errors) == (2, True)
+
+
+ODD = [
+    '{"command": "lockstep robot"}',
+    '{"command": 3, "seconds": 60, "tries": 5}',
+    '{"command": "lockstep robot", "seconds": "soon", "tries": 5}',
+    "[]",
+    "nothing",
+    '{"seconds": ' + "9" * 5000 + "}",
+    "[" * 100_000,
+]
+CODE = '{"command": "lockstep robot NAME", "seconds": 60, "tries": 5}'
+ODD_STATES = [
+    '{"key": ""}',
+    '{"key": "", "pairing": null}',
+    '{"key": "", "pairing": {"state": 1, "refused": ""}}',
+    "{}",
+]
+
+
+@pytest.mark.parametrize(("code", "state"), [*((odd, "{}") for odd in ODD), *((CODE, odd) for odd in ODD_STATES)])
+async def test_an_answer_that_is_none_of_a_console_is_said_to_be_and_is_no_fault(code: str, state: str) -> None:
+    async def answer(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        asked = await reader.readuntil(b"\r\n\r\n")
+        body = (code if asked.startswith(b"POST") else state).encode()
+        writer.write(b"HTTP/1.1 200 OK\r\nContent-Length: %d\r\nConnection: close\r\n\r\n" % len(body) + body)
+        writer.close()
+        await writer.wait_closed()
+
+    async with await asyncio.start_server(answer, "127.0.0.1", 0) as server:
+        port = server.sockets[0].getsockname()[1]
+        status, _, errors = await run("pair", "--wait", "--link", f"http://127.0.0.1:{port}/#token=x")
+    assert status == 2, errors
+    assert "Traceback" not in errors
+    assert "console" in errors

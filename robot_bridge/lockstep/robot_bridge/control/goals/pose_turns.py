@@ -5,11 +5,12 @@ begins to be driven, its goals are read from the robot; until then they do not c
 the values which set is driven.
 
 The goals of a pose with `settling` are out of date also when it has settled: the robot may have come to rest before it
-got there.
+got there. While a command drives it, the robot pursues goals that stand still, as long as there is time to settle
+before `hold` has passed; the pose has not settled then.
 """
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 
 from lockstep.protocol.description import Axis, Pose
 from lockstep.robot_bridge.control.goals.shared_joints import SharedJoints
@@ -20,10 +21,12 @@ __all__ = ["PoseTurns"]
 
 
 class PoseTurns:
-    """Knows the goals that are out of date. Call `take` before each tick in which axes are driven, then `settle`.
+    """Knows the goals that are out of date. Call `take` before each tick in which axes are driven, then `settle`, and
+    `pursue` when the limits of the tick are known.
 
     Attributes:
         settled: a pose has settled since this was set to False
+        pursued_poses: names of the poses with `settling` whose goals the robot pursues while they stand still
     """
 
     def __init__(
@@ -38,8 +41,15 @@ class PoseTurns:
         self._pursued = pursued
         self._stale: set[int] = set()  # axes whose goals are out of date
         self._settling = {number for number, axis in self._axes.items() if axis.settling > 0.0}
+        index = {axis.name: number for number, axis in enumerate(axes)}
+        self._poses = [
+            (pose.name, [self._axes[index[name]] for name in (*pose.position, *pose.rotation) if name])
+            for pose in poses
+            if pose.settling > 0.0
+        ]
         self._driven: set[int] = set()  # axes of `_settling` that were driven since their goals were read
         self.settled = False
+        self.pursued_poses: list[str] = []
 
     def begin(self) -> None:
         """All goals are up to date."""
@@ -64,6 +74,21 @@ class PoseTurns:
                 self._note_driven(number)
         if beginning:
             self._begin(beginning)
+
+    def pursue(self, left: float, slowed: Collection[GoalAxis | RateAxis] = ()) -> None:
+        """Note which poses the robot pursues in this tick.
+
+        `left`: s before all motion has to have ended; 0: released. `slowed`: the axes that a limit slows in this tick.
+        """
+        self.pursued_poses = []
+        for name, axes in self._poses:
+            pursued = any(axis.may_move and left > axis.settling for axis in axes) and not any(
+                axis in slowed for axis in axes
+            )
+            if pursued:
+                self.pursued_poses.append(name)
+            for axis in axes:
+                axis.is_pursued = pursued
 
     def settle(self, released: bool) -> None:
         """Note the poses that have settled. `released`: no axis is driven."""

@@ -77,6 +77,11 @@ class AxisShaper:
         released = self._released
         return all(axis.stands and (released or not axis.is_driven) for axis in self._axes)
 
+    @property
+    def pursued_poses(self) -> Sequence[str]:
+        """The poses with `settling` that the robot pursues in the tick of the last step, see `Robot.pursue_poses`."""
+        return () if self._turns is None or self._released else self._turns.pursued_poses
+
     def take_settled(self) -> bool:
         """Return whether a pose has settled since the last call: from then on `goals` says where."""
         if self._turns is None or not self._turns.settled:
@@ -116,6 +121,8 @@ class AxisShaper:
     def brake(self, dt: float) -> list[float]:
         """Take one step towards rest at the brake rate, from any target, without asking the limiter."""
         self._released = True
+        if self._turns is not None:
+            self._turns.pursue(0.0)
         return [axis.take(axis.next_rate(math.inf, dt, True), dt) for axis in self._axes]
 
     def cut(self) -> None:
@@ -139,7 +146,10 @@ class AxisShaper:
             if not released:
                 self._turns.take()
             self._turns.settle(released)
-        rates = [axis.next_rate(left, dt, released) for axis in self._axes]
+        wanted = rates = [axis.next_rate(left, dt, released) for axis in self._axes]
         if self._limiter is not None:
             rates = self._limiter(rates, lambda: [axis.braked(dt) for axis in self._axes])
+        if self._turns is not None:
+            slowed = [axis for axis, rate, most in zip(self._axes, rates, wanted, strict=True) if rate != most]
+            self._turns.pursue(0.0 if released else left, slowed)
         return [axis.take(rate, dt) for axis, rate in zip(self._axes, rates, strict=True)]

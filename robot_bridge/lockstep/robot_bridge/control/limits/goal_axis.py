@@ -21,12 +21,13 @@ class GoalAxis:
         goal: applied last, 1.2 rad; NaN until the axis was measured
         waits: the axis must not be driven yet, because others that move the same joints still move
         settling: s in which the robot may still come nearer to the goal after it stood still
+        is_pursued: the robot may go on towards the goal in this tick, though it stands still; settling begins after it
     """
 
     __slots__ = (
         *("_acceleration", "_brake", "_end", "_gap", "_maximum", "_minimum", "_planned", "_reach", "_slew", "_speed"),
         *("_before", "_settles", "_steepest", "_target", "_wrap"),
-        *("goal", "is_driven", "rate", "settling", "waits"),
+        *("goal", "is_driven", "is_pursued", "rate", "settling", "waits"),
     )
 
     rest_rate: Final = 0.0
@@ -46,6 +47,7 @@ class GoalAxis:
         self.goal = math.nan
         self.rate = 0.0  # unit/s, of the goal in the tick that was applied last
         self.is_driven = False
+        self.is_pursued = False
         self.waits = False
         self.settling = settling
         self._settles = 0.0  # s for which the robot may still come nearer to the goal
@@ -55,6 +57,11 @@ class GoalAxis:
     def stands(self) -> bool:
         """True if the goal stands still, and the robot has had the time to settle."""
         return not self.rate and self._settles <= 0.0
+
+    @property
+    def may_move(self) -> bool:
+        """True if a command drives the axis now and gives it a speed."""
+        return self.is_driven and not self.waits and self._speed > 0.0
 
     @property
     def is_known(self) -> bool:
@@ -103,18 +110,19 @@ class GoalAxis:
         """Apply a speed for a tick of `dt` s; return the goal at its end."""
         self.rate = rate
         self._before = self.goal
-        if rate:
+        if rate or self.is_pursued:
             self._settles = self.settling
+        elif self._settles > 0.0:
+            self._settles -= dt
+            if self._settles < ROUNDING * dt:
+                self._settles = 0.0
+        if rate:
             way = rate * dt
             if abs(way - self._gap) <= ROUNDING * abs(way):
                 self.goal = self._end
             else:
                 goal = self.goal + way
                 self.goal = goal if self._minimum <= goal <= self._maximum else self._within(goal)
-        elif self._settles > 0.0:
-            self._settles -= dt
-            if self._settles < ROUNDING * dt:
-                self._settles = 0.0
         return self.goal
 
     def take_back(self) -> None:
@@ -124,6 +132,7 @@ class GoalAxis:
     def cut(self) -> None:
         """Stand still at once, where the goal is."""
         self.rate = self._settles = 0.0
+        self.is_pursued = False
 
     def reaches(self, place: float, goal: float) -> bool:
         """Return whether a goal is within reach of a place; False if one of them is not known."""
@@ -133,7 +142,7 @@ class GoalAxis:
     def begin(self, place: float) -> None:
         """Begin to be commanded from a place; NaN: it is not known."""
         self.goal = self._before = place if math.isfinite(place) else math.nan
-        self.rate = self._settles = 0.0
+        self.cut()
 
     def _within(self, goal: float) -> float:
         """Return a goal within the axis' limits; one that is outside of them may only move back."""

@@ -1,7 +1,7 @@
 """Turns the applied goals into joint goals: those of the joints as they are, a tool's pose by inverse kinematics.
 
 The bridge changes the goals of the set of axes that is driven and leaves the others as they were, so the values tell
-which set is driven. No I/O, no clock.
+which set is driven. The bridge says besides whether to pursue the tool's goal while it stands still. No I/O, no clock.
 """
 
 import math
@@ -20,7 +20,7 @@ __all__ = ["SETTLES", "ArmDrive"]
 Array = npt.NDArray[np.float64]
 
 SAME: Final = 1e-9  # rad and m
-SETTLES: Final = 0.12  # s after its goal stood still, in which the tool may still come nearer to it
+SETTLES: Final = 0.12  # s in which the tool may come nearer to a goal that stands still and is pursued no more
 AHEAD: Final = 0.7  # rad that a joint's goal is at most ahead of the joint while the tool is driven
 TURNED_AWAY: Final = 2.6  # rad between the tool and its goal, from which on it does not turn: either way is as short
 TURNED_BACK: Final = 0.5  # rad, from which on it turns again
@@ -36,8 +36,9 @@ class _Tool(NamedTuple):
 class ArmDrive:
     """Keeps the joint goals. They never move faster than `rates`, whatever is applied.
 
-    A joint that cannot keep up with the tool's goal leaves the tool behind it. When the goal stands still, because
-    nothing follows or a stop was pressed, the tool comes to rest within SETTLES, whether or not it has arrived.
+    A joint that cannot keep up with the tool's goal leaves the tool behind it. While the goal is pursued, the tool goes
+    on until it has arrived. When that ends, because nothing follows or a stop was pressed, it comes to rest within
+    SETTLES, whether or not it has arrived.
     """
 
     def __init__(self, chain: Chain, solver: PoseSolver, rates: Sequence[float], posture: Sequence[float]) -> None:
@@ -52,7 +53,8 @@ class ArmDrive:
         self._pose: tuple[float, ...] | None = None  # goals of the tool while it is driven
         self._motion = np.zeros(6)  # m/s and rad/s, of that goal in the present tick
         self._solved = (0.0,) * self._count  # rad/s, in the last tick for the tool
-        self._still = math.inf  # s since the pose's goal changed
+        self._still = math.inf  # s since the pose's goal changed or was pursued
+        self._pursued = False  # the tool's goal was pursued in the last tick
         self._turns = True  # the tool follows the rotation of its goal
         self._tool: _Tool | None = None  # of the present goals
         self.faults: list[str] = []
@@ -80,15 +82,22 @@ class ArmDrive:
         return [*self._goals, *tool.position.tolist(), *tool.vector.tolist()]
 
     def drive(
-        self, values: Sequence[float], seconds: float, since: float = 0.0, measured: Sequence[float] | None = None
+        self,
+        values: Sequence[float],
+        seconds: float,
+        since: float = 0.0,
+        measured: Sequence[float] | None = None,
+        *,
+        pursues: bool = False,
     ) -> Array:
         """Take the applied goals of joints and pose; return the joints' rates for the coming `seconds`, rad/s.
 
         `since`: s since the call before. Where it is more than `seconds`, calls were held up, and settling counts it.
-        `measured`: rad, where the joints are; None: where their goals are.
+        `measured`: rad, where the joints are; None: where their goals are. `pursues`: go on to the tool's
+        goal while it stands still.
         """
         self._still += max(since - seconds, 0.0)
-        self._choose(tuple(values), seconds)
+        self._choose(tuple(values), seconds, pursues)
         before = self._goals
         if self._pose is not None:
             self._follow_pose(self._pose, seconds)
@@ -114,16 +123,21 @@ class ArmDrive:
             self._goals = kept
             self._solved = tuple((new - old) / seconds for new, old in zip(kept, before, strict=True))
 
-    def _choose(self, values: tuple[float, ...], seconds: float) -> None:
+    def _choose(self, values: tuple[float, ...], seconds: float, pursues: bool) -> None:
+        """Choose the set that is driven. The tool may begin with the goal that it stopped short of."""
         before, self._before = self._before, values
         joints, pose = values[: self._count], values[self._count :]
         self._motion[:] = 0.0
         if before is None or not all(map(math.isfinite, values)):
+            self._pursued = False
             return
+        begins, self._pursued = pursues and not self._pursued, pursues
+        if pursues:
+            self._still = 0.0
         if _differ(joints, before[: self._count]):
             self._joints, self._pose = joints, None
             self.faults = []
-        elif _differ(pose, before[self._count :]):
+        elif begins or _differ(pose, before[self._count :]):
             if self._pose is None:  # in the first tick the goal was read anew, which is no motion
                 self._solved = (0.0,) * self._count
                 self._turns = True

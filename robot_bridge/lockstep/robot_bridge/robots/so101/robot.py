@@ -58,6 +58,7 @@ class So101(Robot):
         self._contact = ContactForce(model)
         self._stopped = False  # the arm holds its posture, at any applied value
         self._values: Sequence[float] | None = None
+        self._pursues = False  # the tool goes on to a goal that stands still
         self._now = now
         self._ticked_at = now()
         self._renderer = Renderer(model, CAMERAS[0].width, CAMERAS[0].height, Look())
@@ -67,6 +68,9 @@ class So101(Robot):
 
     def describe(self) -> RobotDescription:
         return self._description
+
+    def pursue_poses(self, names: Sequence[str]) -> None:
+        self._pursues = bool(names)
 
     def apply(self, values: Sequence[float]) -> None:
         self._values = None if self._stopped else values
@@ -82,7 +86,8 @@ class So101(Robot):
         if self._values is not None:
             values, self._values = list(self._values), None
             rates[GRIPPER] = self._drive_grip(values.pop(GRIPPER))
-            rates[ARM] = self._drive.drive(values, seconds, self._ticked_at - before, simulation.joints()[ARM])
+            since, joints = self._ticked_at - before, simulation.joints()[ARM]
+            rates[ARM] = self._drive.drive(values, seconds, since, joints, pursues=self._pursues)
         simulation.aim((*self._drive.goals, self._grip), rates)
         if not simulation.step(STEPS_PER_TICK):
             self._drive.hold(HOME[ARM])

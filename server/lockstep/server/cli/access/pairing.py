@@ -5,8 +5,9 @@ import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, TypeVar
 
+import msgspec
 import typer
 
 from lockstep.server.cli.access.access import MakeSettings
@@ -17,9 +18,11 @@ from lockstep.server.util.display_names import escaped, printable
 __all__ = ["add_pairing_commands"]
 
 EXIT_UNPAIRED = 1
+EXIT_USAGE = 2
 LOOK_SECONDS = 1.0
 
 Ask = Callable[[str, str], dict[str, Any]]
+Answer = TypeVar("Answer", bound=msgspec.Struct)
 Link = Annotated[
     str,
     typer.Option(
@@ -32,6 +35,27 @@ TlsCa = Annotated[
     Path | None, typer.Option(help="A certificate to trust for the link, such as a console's own tls-cert.pem.")
 ]
 Json = Annotated[bool, typer.Option("--json", help="Print JSON.")]
+
+
+class _Code(msgspec.Struct):
+    """The answer of POST /api/dial-in/code."""
+
+    command: str
+    seconds: float
+    tries: int
+
+
+class _Pairing(msgspec.Struct):
+    state: str
+    refused: str = ""
+
+
+class _DialIn(msgspec.Struct):
+    """The answer of GET /api/dial-in."""
+
+    key: str
+    pairing: _Pairing
+    robot: str = ""
 
 
 def add_pairing_commands(app: typer.Typer, make_settings: MakeSettings) -> None:
@@ -60,9 +84,10 @@ def add_pairing_commands(app: typer.Typer, make_settings: MakeSettings) -> None:
         if withdraw:
             _print(ask("DELETE", "/api/dial-in/code"), as_json, "the code is withdrawn")
             return
-        made = ask("POST", "/api/dial-in/code")
-        _print(made, as_json, printable(str(made["command"])))
-        typer.echo(f"lockstep: the code is good once, for {made['seconds']:.0f} s and {made['tries']} tries", err=True)
+        answer = ask("POST", "/api/dial-in/code")
+        made = _as(_Code, answer)
+        _print(answer, as_json, printable(made.command))
+        typer.echo(f"lockstep: the code is good once, for {made.seconds:.0f} s and {made.tries} tries", err=True)
         if wait and not _is_paired(ask):
             raise typer.Exit(EXIT_UNPAIRED)
 
@@ -83,18 +108,26 @@ def _is_paired(ask: Ask) -> bool:
     """Wait until a robot has used the code, or the code has ended. Says of robots that are refused meanwhile."""
     said = ""
     while True:
-        found = ask("GET", "/api/dial-in")
-        pairing = found["pairing"]
-        if found["key"] == "paired":
-            typer.echo(f"lockstep: {escaped(str(found['robot']))} is paired", err=True)
+        found = _as(_DialIn, ask("GET", "/api/dial-in"))
+        if found.key == "paired":
+            typer.echo(f"lockstep: {escaped(found.robot)} is paired", err=True)
             return True
-        if pairing["refused"] and pairing["refused"] != said:
-            said = pairing["refused"]
-            typer.echo(f"lockstep: a robot was refused: {escaped(str(said))}", err=True)
-        if pairing["state"] != "waiting":
+        if found.pairing.refused and found.pairing.refused != said:
+            said = found.pairing.refused
+            typer.echo(f"lockstep: a robot was refused: {escaped(said)}", err=True)
+        if found.pairing.state != "waiting":
             typer.echo("lockstep: no robot was paired: the code has ended", err=True)
             return False
         time.sleep(LOOK_SECONDS)
+
+
+def _as(kind: type[Answer], answer: dict[str, Any]) -> Answer:
+    """Return the answer's fields. Raises typer.Exit: it is not one of a console."""
+    try:
+        return msgspec.convert(answer, kind)
+    except msgspec.ValidationError as error:
+        typer.echo(f"lockstep: the answer is not one of a console: {escaped(str(error))}", err=True)
+        raise typer.Exit(EXIT_USAGE) from error
 
 
 def _print(answer: dict[str, Any], as_json: bool, words: str) -> None:

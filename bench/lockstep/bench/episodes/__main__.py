@@ -1,0 +1,3 @@
+from lockstep.bench.episodes.cli import app
+
+app()

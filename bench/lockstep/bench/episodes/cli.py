@@ -1,0 +1,108 @@
+"""`python -m lockstep.bench.episodes`: episodes of the SO-101 by two drivers, and a look at their dataset's pixels.
+
+Needs the arm's model: lockstep robot fetch so101.
+"""
+
+import json
+import sys
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+import uvloop
+
+from lockstep.bench.episodes.faults import FAULTS, FaultName, run_fault
+from lockstep.bench.episodes.run import Choices, record_episodes
+from lockstep.bench.harness.processes import ProcessFailed
+from lockstep.client.errors import ConsoleError
+from lockstep.emulator.errors import ProfileError
+
+__all__ = ["app"]
+
+EXIT_FAILED = 3
+
+app = typer.Typer(add_completion=False, pretty_exceptions_enable=False)
+
+
+@app.command()
+def command(
+    network: Annotated[str, typer.Option(help="A profile of lockstep network, such as hong-kong; unset: none.")] = "",
+    times: Annotated[int, typer.Option(min=1, max=1000, help="How many episodes.")] = 30,
+    discard: Annotated[int, typer.Option(min=0, help="How many of them are discarded.")] = 6,
+    redo: Annotated[int, typer.Option(min=0, help="How many of them are done again.")] = 4,
+    fault: Annotated[
+        list[str] | None,
+        typer.Option(
+            help=f"Try this fault instead, without a network; all, or one of {', '.join(FAULTS)}. May repeat."
+        ),
+    ] = None,
+    seed: Annotated[int, typer.Option(help="Of the network, and of what becomes of which episode.")] = 1,
+    pictures: Annotated[bool, typer.Option(help="The drivers receive the pictures of both cameras.")] = True,
+    keep: Annotated[Path | None, typer.Option(help="Keep the recordings and the dataset in this folder.")] = None,
+    json_to: Annotated[str, typer.Option("--json", help="Write the figures there; - is standard output.")] = "",
+) -> None:
+    """Record episodes, export them, and look at each picture of the dataset; ends with 1 when something is wrong."""
+    faults = _faults(fault or [])
+    if discard + redo > times:
+        raise typer.BadParameter("more episodes are discarded and redone than there are")
+    try:
+        if faults:
+            tried = [uvloop.run(run_fault(each, _say)) for each in faults]
+            figures: dict[str, Any] = {"faults": tried, "ok": all(each["ok"] for each in tried)}
+        else:
+            figures = uvloop.run(record_episodes(Choices(network, times, discard, redo, seed, pictures, keep), _say))
+    except ProfileError as error:
+        raise typer.BadParameter(str(error)) from error
+    except (ProcessFailed, ConsoleError, TimeoutError) as error:
+        _say(str(error) or "an episode took too long")
+        raise typer.Exit(EXIT_FAILED) from error
+    _say(_faults_table(figures) if faults else _table(figures))
+    if json_to == "-":
+        sys.stdout.write(json.dumps(figures) + "\n")
+    elif json_to:
+        Path(json_to).write_text(json.dumps(figures, indent=1) + "\n")
+    raise typer.Exit(0 if figures["ok"] else 1)
+
+
+def _faults(names: list[str]) -> list[FaultName]:
+    unknown = set(names) - {"all", *FAULTS}
+    if unknown:
+        raise typer.BadParameter(f"no fault {', '.join(sorted(unknown))}; there are {', '.join(FAULTS)}")
+    return [each for each in FAULTS if each in names or "all" in names]
+
+
+def _table(figures: dict[str, Any]) -> str:
+    lines = [
+        "",
+        "| no. | driver | became | s | rows | left out | problems |",
+        "|--:|---|---|--:|--:|--:|---|",
+    ]
+    for each in figures["runs"]:
+        lines.append(
+            f"| {each['number']} | {', '.join(each['drivers'])} | {each['fate']} | {each['seconds']} | "
+            f"{each['rows']} | {each['left_out']} | {'; '.join(each['problems'])} |"
+        )
+    dataset = figures["dataset"]
+    lines.append(
+        f"{figures['network'] or 'no network'}: {figures['episodes']} episodes, {figures['discarded']} discarded, "
+        f"{figures['redone']} redone, {figures['kept']} kept; dataset: {len(dataset.get('rows', []))} episodes, "
+        f"{sum(dataset.get('rows', []))} rows, {dataset.get('pictures', 0)} pictures, "
+        f"{dataset.get('unreadable', 0)} unreadable, {dataset.get('outside', 0)} outside of the tolerance of "
+        f"{dataset.get('tolerance', 0)} events, pictures by gap {dataset.get('gaps', {})}"
+    )
+    lines += [f"WRONG: {each}" for each in dataset["wrong"]]
+    return "\n".join(lines)
+
+
+def _faults_table(figures: dict[str, Any]) -> str:
+    lines = ["", "| fault | the console said | kept | in the dataset | |", "|---|---|--:|--:|---|"]
+    for each in figures["faults"]:
+        right = "right" if each["ok"] else f"WRONG: {'; '.join(each['wrong'])}"
+        lines.append(
+            f"| {each['fault']} | {'; '.join(each['said'])} | {each['kept']} | {each['in_dataset']} | {right} |"
+        )
+    return "\n".join(lines)
+
+
+def _say(text: str) -> None:
+    typer.echo(f"episodes: {text}", err=True)

@@ -1,0 +1,116 @@
+"""Checks a dataset from its pixels: `python -m lockstep.bench.episodes.pixels DIR`.
+
+It reads the dataset's own files, and shares no code with the export or with `lockstep verify`: rows from the table, the
+tolerance from the notes, and the event of each picture from the strip that the robot's bridge has drawn into it.
+"""
+
+import json
+import sys
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any, Final
+
+import av
+import pyarrow.parquet as pq
+
+from lockstep.robot_bridge.robots.event_strip import read_event_strip
+
+__all__ = ["Pixels", "look"]
+
+LISTED: Final = 20  # of what is wrong
+MODULUS: Final = 1 << 31  # event references are serial numbers of 31 bits
+
+
+@dataclass
+class Pixels:
+    """What the pictures of a dataset show.
+
+    Attributes:
+        tolerance: events, as the dataset states
+        pictures: that were decoded, of all cameras
+        unreadable: pictures whose strip cannot be read
+        outside: pictures that show no event of the row's own last `tolerance` ones
+        mislabelled: pictures whose strip differs from the stamp in the row
+        gaps: pictures by their distance from the row's event
+        rows: by episode of the dataset
+        events: of the rows, by episode
+        drivers: names, by episode
+        wrong: what is wrong, in words; the first ones
+    """
+
+    tolerance: int = 0
+    pictures: int = 0
+    unreadable: int = 0
+    outside: int = 0
+    mislabelled: int = 0
+    gaps: dict[int, int] = field(default_factory=dict)
+    rows: list[int] = field(default_factory=list)
+    events: list[tuple[int, int]] = field(default_factory=list)
+    drivers: list[list[str]] = field(default_factory=list)
+    wrong: list[str] = field(default_factory=list)
+
+    @property
+    def ok(self) -> bool:
+        """All pictures were read, and each is its row's."""
+        return self.pictures > 0 and not (self.unreadable or self.outside or self.mislabelled or self.wrong)
+
+
+def look(root: Path) -> Pixels:
+    """Look at every picture of every row. Raises OSError, KeyError: it is no such dataset."""
+    notes: dict[str, Any] = json.loads((root / "meta" / "lockstep.json").read_text())
+    rows: list[dict[str, Any]] = pq.read_table(sorted((root / "data").rglob("*.parquet"))).to_pylist()
+    found = Pixels(tolerance=notes["tolerance"])
+    gaps: Counter[int] = Counter()
+    for number, camera in enumerate(notes["cameras"]):
+        drawn = list(_drawn(root, camera))
+        if len(drawn) != len(rows):
+            found.wrong.append(f"{camera}: {len(drawn)} pictures for {len(rows)} rows")
+        for row, event in zip(rows, drawn, strict=False):
+            found.pictures += 1
+            _judge(found, gaps, camera, row, event, _stamp(row, number))
+    found.gaps = dict(sorted(gaps.items()))
+    for index in range(len(notes["episodes"])):
+        mine = [row for row in rows if row["episode_index"] == index]
+        events = [row["lockstep.event"] for row in mine]
+        found.rows.append(len(mine))
+        found.events.append((min(events), max(events)) if events else (0, 0))
+        found.drivers.append(sorted({notes["drivers"][row["lockstep.driver"]] for row in mine}))
+    del found.wrong[LISTED:]
+    return found
+
+
+def _judge(found: Pixels, gaps: Counter[int], camera: str, row: dict[str, Any], event: int | None, stamp: int) -> None:
+    where = f"row {row['index']}, event {row['lockstep.event']}, {camera}"
+    if event is None:
+        found.unreadable += 1
+        found.wrong.append(f"{where}: the strip cannot be read")
+        return
+    gap = (row["lockstep.event"] - event) % MODULUS
+    gaps[gap] += 1
+    if gap > found.tolerance:
+        found.outside += 1
+        found.wrong.append(f"{where}: shows event {event}")
+    if event != stamp:
+        found.mislabelled += 1
+        found.wrong.append(f"{where}: shows event {event}, is stamped {stamp}")
+
+
+def _drawn(root: Path, camera: str) -> Iterator[int | None]:
+    """Yield the event in each picture of a camera, in the order of the rows."""
+    for path in sorted((root / "videos" / camera).rglob("*.mp4")):
+        with av.open(str(path)) as video:
+            for picture in video.decode(video=0):
+                yield read_event_strip(picture.to_ndarray(format="gray"))
+
+
+def _stamp(row: dict[str, Any], camera: int) -> int:
+    stamps = row["lockstep.stamp"]
+    return int(stamps if isinstance(stamps, int) else stamps[camera])
+
+
+if __name__ == "__main__":
+    seen = look(Path(sys.argv[1]))
+    sys.stdout.write(json.dumps(asdict(seen) | {"ok": seen.ok}, indent=1) + "\n")
+    sys.exit(0 if seen.ok else 1)

@@ -1,0 +1,92 @@
+"""Runs it through everything real: the arm in MuJoCo, a bridge, a console that records, a network, two drivers."""
+
+import asyncio
+import shutil
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any, Final
+
+from lockstep.bench.episodes.dataset import export, judged
+from lockstep.bench.episodes.plan import plan
+from lockstep.bench.episodes.session import Done, Session, drivers
+from lockstep.bench.experiment.choices import media_of
+from lockstep.bench.experiment.stage import running_stage
+from lockstep.bench.pick_place.run import recorder_of
+from lockstep.emulator.impairment.profile import load_profile
+
+__all__ = ["ROBOT", "Choices", "record_episodes"]
+
+ROBOT: Final = "so101"
+NO_NETWORK: Final = "perfect"
+COUNTDOWN: Final = "0.5"  # s
+
+
+@dataclass(frozen=True)
+class Choices:
+    """
+    Attributes:
+        network: a profile; "" for none
+        keep: a folder for the recordings and the dataset; None: they are deleted
+    """
+
+    network: str = ""
+    times: int = 30
+    discard: int = 6
+    redo: int = 4
+    seed: int = 1
+    pictures: bool = True
+    keep: Path | None = None
+
+
+async def record_episodes(choices: Choices, say: Callable[[str], None]) -> dict[str, Any]:
+    """Record episodes, make the dataset, and return the figures of both.
+
+    Raises:
+        ProcessFailed, ConsoleError, TimeoutError: a part did not start, or was lost.
+    """
+    planned = plan(choices.times, choices.discard, choices.redo, choices.seed)
+    profile = load_profile(choices.network or NO_NETWORK)
+    settings = {"LOCKSTEP_EPISODES__COUNTDOWN_SECONDS": COUNTDOWN}
+    media, through = media_of(profile), bool(choices.network)
+    async with running_stage(ROBOT, profile, media, choices.seed, robot_link=through, settings=settings) as stage:
+        link = stage.link if through else stage.near_link
+        async with recorder_of(stage.near_link) as recorder, drivers(link, pictures=choices.pictures) as consoles:
+            (await recorder.post("/api/recordings", json={"name": "episodes"})).raise_for_status()
+            stage.network.begin()
+            session = Session(consoles, say)
+            done = [await session.run(each) for each in planned]
+            (await recorder.post("/api/recordings/stop")).raise_for_status()
+        state = stage.event_log.parent
+        recordings = sorted((state / "recordings").glob("*.mcap"))
+        root = state / "dataset"
+        said = await export(recordings, root)
+        kept = [each.kept for each in done if each.kept is not None]
+        dataset = {"wrong": [f"export: {said}"]} if said else await judged(root, kept)
+        if choices.keep is not None:
+            choices.keep.mkdir(parents=True, exist_ok=True)
+            for path in recordings:
+                await asyncio.to_thread(shutil.copy, path, choices.keep)
+            if root.exists():
+                await asyncio.to_thread(shutil.copytree, root, choices.keep / "dataset", dirs_exist_ok=True)
+    return _figures(choices, done, dataset)
+
+
+def _figures(choices: Choices, done: Sequence[Done], dataset: dict[str, Any]) -> dict[str, Any]:
+    rows = iter(zip(dataset.get("rows", []), dataset.get("left_out", []), strict=False))
+    episodes = []
+    for each in done:
+        of_dataset = next(rows, (0, 0)) if each.kept is not None else (0, 0)
+        figures = asdict(each) | {"kept": each.kept is not None, "rows": of_dataset[0], "left_out": of_dataset[1]}
+        episodes.append(figures)
+    return {
+        "network": choices.network,
+        "episodes": len(done),
+        "kept": sum(each.kept is not None for each in done),
+        "discarded": sum(each.fate == "discard" for each in done),
+        "redone": sum(each.fate == "redo" for each in done),
+        "shared": sum(len(each.drivers) > 1 for each in done),
+        "runs": episodes,
+        "dataset": dataset,
+        "ok": not dataset["wrong"],
+    }

@@ -1,0 +1,70 @@
+"""A few short episodes through everything real: MuJoCo, bridge, console, two drivers, recording, dataset, pixels."""
+
+import json
+from pathlib import Path
+
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+from typer.testing import CliRunner
+
+from lockstep.bench.episodes.cli import app
+from lockstep.bench.episodes.pixels import look
+from lockstep.robot_bridge.robots.so101.model_source import FOLDER_VARIABLE
+from tests.robot_bridge.robots.so101.driver import MODEL_FOLDER
+
+FEW = ["--times", "3", "--discard", "1", "--redo", "1", "--no-pictures"]
+
+
+@pytest.fixture
+def arm(monkeypatch: pytest.MonkeyPatch) -> None:
+    if not (MODEL_FOLDER / ".installed").is_file():
+        pytest.skip("the model of the SO-101 is not here; `make test` fetches it")
+    monkeypatch.setenv(FOLDER_VARIABLE, str(MODEL_FOLDER))
+
+
+@pytest.mark.timeout(300)
+@pytest.mark.usefixtures("arm")
+def test_a_dataset_of_two_drivers_has_the_kept_episodes_alone_and_each_picture_shows_its_rows_event(
+    tmp_path: Path,
+) -> None:
+    done = CliRunner().invoke(app, [*FEW, "--keep", str(tmp_path), "--json", "-"])
+    assert done.exit_code == 0, done.output
+    figures = json.loads(done.stdout)
+    assert (figures["episodes"], figures["kept"], figures["discarded"], figures["redone"]) == (3, 2, 1, 1)
+    dataset = figures["dataset"]
+    assert len(dataset["rows"]) == 2
+    assert min(dataset["rows"]) > 5
+    assert dataset["pictures"] == 2 * sum(dataset["rows"])
+    assert (dataset["unreadable"], dataset["outside"], dataset["mislabelled"]) == (0, 0, 0)
+    root = tmp_path / "dataset"
+    assert look(root).ok
+    _shift_events(root)
+    seen = look(root)
+    assert not seen.ok
+    assert seen.outside == seen.pictures
+
+
+def _shift_events(root: Path) -> None:
+    """Say of each row that it is of an event ten later."""
+    [path] = (root / "data").rglob("*.parquet")
+    table = pq.read_table(path)
+    place = table.schema.get_field_index("lockstep.event")
+    events = pa.array([event + 10 for event in table.column(place).to_pylist()], pa.int64())
+    pq.write_table(table.set_column(place, "lockstep.event", events), path)
+
+
+@pytest.mark.timeout(300)
+@pytest.mark.usefixtures("arm")
+def test_a_console_that_is_killed_while_it_keeps_an_episode_leaves_a_dataset_of_whole_episodes() -> None:
+    done = CliRunner().invoke(app, ["--fault", "kill-keeping", "--json", "-"])
+    assert done.exit_code == 0, done.output
+    [fault] = json.loads(done.stdout)["faults"]
+    assert fault["ok"]
+    assert 1 <= fault["kept"] <= fault["in_dataset"] <= 2
+
+
+def test_more_discarded_and_redone_episodes_than_there_are_is_an_error() -> None:
+    done = CliRunner().invoke(app, ["--times", "3", "--discard", "2", "--redo", "2"])
+    assert done.exit_code == 2
+    assert "more episodes" in done.output
