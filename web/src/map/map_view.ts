@@ -216,6 +216,7 @@ export class MapView {
     );
     setData(this.words, "tone", isShown ? actionTone(update) : "off");
     setHidden(this.cancel, running === null || !(holdsSeat(state) || state.welcome?.role === "supervisor"));
+    setData(this.element, "aims", String(this.aim !== null));
     setData(this.element, "goals", String(action !== null && mayDrive(state)));
   }
 

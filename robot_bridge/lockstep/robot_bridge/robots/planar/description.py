@@ -100,6 +100,12 @@ DESCRIPTION = RobotDescription(
     actions=(
         Action(name="home", label="Home"),
         Action(
+            name="light",
+            label="Light",
+            moves=False,
+            parameters=(ActionParameter(name="on", label="On", kind="switch", default=True),),
+        ),
+        Action(
             name="go_to",
             label="Go to",
             parameters=(
@@ -111,12 +117,6 @@ DESCRIPTION = RobotDescription(
                     name="yaw", label="Heading", kind="number", unit="rad", minimum=-4, maximum=4, default=0.0
                 ),
             ),
-        ),
-        Action(
-            name="light",
-            label="Light",
-            moves=False,
-            parameters=(ActionParameter(name="on", label="On", kind="switch", default=True),),
         ),
     ),
     map=MapView(x="base.x", y="base.y", yaw="base.yaw", radius=RADIUS, goal="go_to"),
