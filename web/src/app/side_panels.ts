@@ -83,7 +83,10 @@ export class SidePanels {
       keys: () => this.act("keys"),
       pads: () => this.act("pads"),
       scene: () => this.toggleScene(),
-      map: () => this.map.toggle(),
+      map: () => {
+        root.classList.remove("shows-details"); // they would cover it on a small screen
+        this.map.toggle();
+      },
       headset: (className) => this.headset.createButtons(className),
     });
     this.tools = {
