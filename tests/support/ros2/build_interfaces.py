@@ -22,7 +22,14 @@ from rosidl_typesupport_fastrtps_c import generate_typesupport_fastrtps_c
 SOURCES = Path(__file__).with_name("interfaces")
 PREFIX = Path(sys.prefix)
 SHARE, LIB, INCLUDE = PREFIX / "share", PREFIX / "lib", PREFIX / "include"
-DEPENDENCIES = ("builtin_interfaces", "std_msgs", "geometry_msgs", "action_msgs", "unique_identifier_msgs", "service_msgs")
+DEPENDENCIES = (
+    "builtin_interfaces",
+    "std_msgs",
+    "geometry_msgs",
+    "action_msgs",
+    "unique_identifier_msgs",
+    "service_msgs",
+)
 SUPPORTS = ["rosidl_typesupport_fastrtps_c"]
 
 
@@ -94,10 +101,16 @@ def compile_all(package: str, work: Path, out: dict[str, Path], target: Path) ->
     includes += [Path(numpy.get_include()), *(path for path in INCLUDE.iterdir() if path.is_dir())]
     includes += sorted((target / "build").glob("*/c"))  # of packages that were built before
     flags = ["-O0", "-w", "-fPIC", "-shared", *(f"-I{path}" for path in includes), f"-L{LIB}", f"-L{target}"]
-    wheels = [f"-l:{path.name}" for path in LIB.glob("lib*__rosidl_*_c.so") if path.name[3:].split("__")[0] in DEPENDENCIES]
+    wheels = [
+        f"-l:{path.name}" for path in LIB.glob("lib*__rosidl_*_c.so") if path.name[3:].split("__")[0] in DEPENDENCIES
+    ]
     wheels += [f"-l{name}" for name in ("rosidl_runtime_c", "rosidl_typesupport_c", "rosidl_typesupport_fastrtps_c",
                                         "rosidl_typesupport_fastrtps_cpp", "fastcdr")]  # fmt: skip
-    pythons = [f"-l:{path.name}" for path in LIB.glob("lib*__rosidl_generator_py.so") if path.name[3:].split("__")[0] in DEPENDENCIES]
+    pythons = [
+        f"-l:{path.name}"
+        for path in LIB.glob("lib*__rosidl_generator_py.so")
+        if path.name[3:].split("__")[0] in DEPENDENCIES
+    ]
 
     def link(name: str, sources: list[Path], *more: str, compiler: str = "gcc", folder: Path = target) -> None:
         subprocess.run([compiler, *flags, "-o", str(folder / name), *map(str, sources), *more, *wheels], check=True)

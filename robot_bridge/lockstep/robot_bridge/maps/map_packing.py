@@ -10,6 +10,8 @@ from lockstep.robot_bridge.robots.navigation import GridMap
 
 __all__ = ["pack_map"]
 
+FULL = 100  # the value of a cell that is surely occupied
+
 Cells = npt.NDArray[np.uint8]
 
 
@@ -25,6 +27,8 @@ def pack_map(grid: GridMap) -> OccupancyMap:
     if grid.width < 1 or grid.height < 1 or len(grid.cells) != grid.width * grid.height:
         raise ValueError(f"a map of {grid.width} by {grid.height} cells with {len(grid.cells)} of them")
     cells = np.frombuffer(grid.cells, np.uint8).reshape(grid.height, grid.width)
+    if ((cells > FULL) & (cells != UNKNOWN)).any():
+        cells = np.where(cells > FULL, UNKNOWN, cells).astype(np.uint8)
     resolution = grid.resolution
     while True:
         height, width = cells.shape

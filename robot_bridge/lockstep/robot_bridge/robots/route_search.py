@@ -23,7 +23,7 @@ class RouteSearch:
     def __init__(
         self, start: Point, goal: Point, has_room: Callable[[float, float], bool], *, cell: float, most: int
     ) -> None:
-        """`has_room`: whether the robot fits at a place. `cell`: side of a cell, m. `most`: cells that are looked at."""
+        """`has_room`: whether the robot fits at a place. `cell`: side of a cell, m. `most`: cells to look at."""
         self._start = start
         self._goal = goal
         self._has_room = has_room

@@ -79,7 +79,9 @@ def test_the_map_shows_walls_and_pillars_and_nothing_behind_them() -> None:
     cells = np.frombuffer(grid.cells, np.uint8).reshape(grid.height, grid.width)
 
     def at(x: float, y: float) -> int:
-        column, row = (int((place - start) / grid.resolution) for place, start in zip((x, y), grid.origin, strict=False))
+        column, row = (
+            int((place - start) / grid.resolution) for place, start in zip((x, y), grid.origin, strict=False)
+        )
         return int(cells[row, column])
 
     assert at(0.0, 0.0) == 0
