@@ -30,6 +30,13 @@ DEPENDENCIES = (
     "unique_identifier_msgs",
     "service_msgs",
 )
+RUNTIME = (
+    "rosidl_runtime_c",
+    "rosidl_typesupport_c",
+    "rosidl_typesupport_fastrtps_c",
+    "rosidl_typesupport_fastrtps_cpp",
+    "fastcdr",
+)
 SUPPORTS = ["rosidl_typesupport_fastrtps_c"]
 
 
@@ -96,21 +103,19 @@ def visibility(package: str, work: Path) -> None:
         file.write_text(text)
 
 
+def libraries(ending: str) -> list[str]:
+    """Return the wheels' libraries of the packages that are depended on."""
+    return [path.name for package in DEPENDENCIES for path in sorted(LIB.glob(f"lib{package}{ending}"))]
+
+
 def compile_all(package: str, work: Path, out: dict[str, Path], target: Path) -> None:
     includes = [work / "c", work / "fastrtps", work / "dispatch", INCLUDE, Path(sysconfig.get_path("include"))]
     includes += [Path(numpy.get_include()), *(path for path in INCLUDE.iterdir() if path.is_dir())]
     includes += sorted((target / "build").glob("*/c"))  # of packages that were built before
     flags = ["-O0", "-w", "-fPIC", "-shared", *(f"-I{path}" for path in includes), f"-L{LIB}", f"-L{target}"]
-    wheels = [
-        f"-l:{path.name}" for path in LIB.glob("lib*__rosidl_*_c.so") if path.name[3:].split("__")[0] in DEPENDENCIES
-    ]
-    wheels += [f"-l{name}" for name in ("rosidl_runtime_c", "rosidl_typesupport_c", "rosidl_typesupport_fastrtps_c",
-                                        "rosidl_typesupport_fastrtps_cpp", "fastcdr")]  # fmt: skip
-    pythons = [
-        f"-l:{path.name}"
-        for path in LIB.glob("lib*__rosidl_generator_py.so")
-        if path.name[3:].split("__")[0] in DEPENDENCIES
-    ]
+    wheels = [f"-l:{name}" for name in libraries("__rosidl_*_c.so")]
+    wheels += [f"-l{name}" for name in RUNTIME]
+    pythons = [f"-l:{name}" for name in libraries("__rosidl_generator_py.so")]
 
     def link(name: str, sources: list[Path], *more: str, compiler: str = "gcc", folder: Path = target) -> None:
         subprocess.run([compiler, *flags, "-o", str(folder / name), *map(str, sources), *more, *wheels], check=True)

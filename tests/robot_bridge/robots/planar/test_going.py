@@ -36,7 +36,8 @@ def test_it_goes_around_a_pillar_and_arrives_with_the_heading_that_was_asked_for
     check_description(robot.describe())
     states = drive(robot, go(robot, -2.9, -1.4, 2.0))  # a pillar stands in the straight way
     x, y, yaw = robot.state[:3]
-    assert math.hypot(x + 2.9, y + 1.4) < 0.03 and abs(yaw - 2.0) < 0.05
+    assert math.hypot(x + 2.9, y + 1.4) < 0.03
+    assert abs(yaw - 2.0) < 0.05
     for px, py, radius in PILLARS.tolist():
         assert min(math.hypot(each.x - px, each.y - py) for each in states) > radius + RADIUS + CLEARANCE - 0.05
 
@@ -60,7 +61,8 @@ def test_goal_and_path_are_told_while_it_goes_and_not_afterwards() -> None:
     while not robot.navigation().path:
         run.step()
     told = robot.navigation()
-    assert told.goal == (1.0, 0.5, 1.0) and told.path[0] == (0.0, 0.0) and told.path[-1] == (1.0, 0.5)
+    assert told.goal == (1.0, 0.5, 1.0)
+    assert (told.path[0], told.path[-1]) == ((0.0, 0.0), (1.0, 0.5))
     run.cancel()
     assert robot.navigation().goal is None
 
@@ -68,9 +70,13 @@ def test_goal_and_path_are_told_while_it_goes_and_not_afterwards() -> None:
 def test_it_gives_up_when_it_is_held() -> None:
     robot = PlanarRobot()
     run = go(robot, 1.0, 0.5)
-    with pytest.raises(ActionFailed, match="in the way"):
+
+    def wait() -> None:
         for _ in range(10_000):
             run.step()
+
+    with pytest.raises(ActionFailed, match="in the way"):
+        wait()
     assert robot.navigation().goal is None
 
 
@@ -85,5 +91,5 @@ def test_the_map_shows_walls_and_pillars_and_nothing_behind_them() -> None:
         return int(cells[row, column])
 
     assert at(0.0, 0.0) == 0
-    assert at(4.05, 0.0) >= OCCUPIED and at(2.0, 1.2 + 0.33) >= OCCUPIED
-    assert at(4.17, 0.0) == UNKNOWN and at(2.0, 1.2) == UNKNOWN
+    assert min(at(4.05, 0.0), at(2.0, 1.2 + 0.33)) >= OCCUPIED
+    assert (at(4.17, 0.0), at(2.0, 1.2)) == (UNKNOWN, UNKNOWN)
