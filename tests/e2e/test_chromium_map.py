@@ -15,7 +15,7 @@ from tests.support.stack import Stack
 pytestmark = pytest.mark.browser
 
 TRIES = 3  # a busy machine may hold the page up, which disarms it and so cancels the goal
-NOTES = 64  # pixels at the lower edge that words cover
+COVERED, COVERED_ON_A_PHONE = (0, 64), (104, 44)  # pixels at the upper and the lower edge
 WIDTH, HEIGHT = 8.4, 6.4  # m, of the planar robot's map
 
 
@@ -36,9 +36,10 @@ async def _place(canvas: Locator, x: float, y: float) -> tuple[float, float]:
     """Return where a place on the map is on the page, while the whole map is seen."""
     box = await canvas.bounding_box()
     assert box is not None
-    height = box["height"] - (NOTES if box["height"] > 240 else 0)
+    above, below = COVERED_ON_A_PHONE if box["width"] < 600 else COVERED
+    height = box["height"] - above - below
     scale = 0.94 * min(box["width"] / WIDTH, height / HEIGHT)
-    return box["x"] + box["width"] / 2 + x * scale, box["y"] + height / 2 - y * scale
+    return box["x"] + box["width"] / 2 + x * scale, box["y"] + above + height / 2 - y * scale
 
 
 def _words(console: ConsolePage) -> Locator:
@@ -138,8 +139,9 @@ async def test_a_finger_that_rests_sets_a_goal_and_one_that_moves_moves_the_map(
     stack: Stack, chromium: Browser
 ) -> None:
     async with open_console(chromium, stack.operator, width=390, height=844, touch=True) as console:
+        await console.until_live()
+        canvas = await _open_map(console)  # in the details, which disarm
         await _armed(console)
-        canvas = await _open_map(console)
         await _picture(console, "map-phone")
         client = await console.page.context.new_cdp_session(console.page)
 

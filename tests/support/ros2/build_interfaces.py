@@ -37,7 +37,7 @@ RUNTIME = (
     "rosidl_typesupport_fastrtps_cpp",
     "fastcdr",
 )
-SUPPORTS = ["rosidl_typesupport_fastrtps_c"]
+SUPPORTS = ["rosidl_typesupport_fastrtps_c", "rosidl_typesupport_introspection_c"]  # the second is never asked for
 
 
 def build(package: str, target: Path) -> None:

@@ -49,15 +49,16 @@ export function toMap(view: Viewport, size: Size, [x, y]: Point): Point {
   return [view.x + (x - size.width / 2) / view.scale, view.y - (y - size.height / 2) / view.scale];
 }
 
-/** The view in which the whole extent is seen. `inset`: pixels at the lower edge that are covered. */
-export function fitted(extent: Extent, size: Size, inset = 0): Viewport {
+/** The view in which the whole extent is seen. `above`, `below`: pixels at its edges that are covered. */
+export function fitted(extent: Extent, size: Size, above = 0, below = 0): Viewport {
   const [width, height] = [extent.right - extent.left, extent.high - extent.low];
   const scale =
-    FILLED * Math.min(size.width / Math.max(width, 1e-6), (size.height - inset) / Math.max(height, 1e-6));
+    FILLED *
+    Math.min(size.width / Math.max(width, 1e-6), (size.height - above - below) / Math.max(height, 1e-6));
   const shown = bounded(scale);
   return {
     x: (extent.left + extent.right) / 2,
-    y: (extent.low + extent.high) / 2 - inset / 2 / shown,
+    y: (extent.low + extent.high) / 2 + (above - below) / 2 / shown,
     scale: shown,
   };
 }

@@ -40,8 +40,6 @@ import {
 const STEP = 1.4; // of a press on a zoom button
 const WHEEL = 0.0015; // per pixel of a wheel
 const SHOWN_MS = 8000; // how long the end of a goal stays in words
-const NOTES = 64; // pixels that the words at the lower edge cover
-const NOTES_FROM = 240; // pixels of height
 const AROUND = 5; // m, what is seen around the robot without a map
 
 /** The map: where the robot is on it, where it is going, and by a hand on it where it is to go. */
@@ -170,7 +168,7 @@ export class MapView {
               high: around[1] + AROUND,
             }
           : gridExtent(map.origin, map.width * map.resolution, map.height * map.resolution);
-      this.view = fitted(extent, size, size.height > NOTES_FROM ? NOTES : 0);
+      this.view = fitted(extent, size, ...coveredOf(size));
       this.fittedTo = key;
     }
     const { navigation, aim } = this;
@@ -315,4 +313,10 @@ function tool(sign: string, label: string, onclick: () => void): HTMLButtonEleme
   made.setAttribute("aria-label", label);
   made.title = label;
   return made;
+}
+
+/** Pixels at the upper and the lower edge that words cover, on a phone the robot's actions too. */
+function coveredOf({ width, height }: Size): [number, number] {
+  if (height < 200) return [0, 0];
+  return width < 600 ? [104, 44] : [0, 64];
 }

@@ -75,9 +75,9 @@ from lockstep.server.errors import (
 from lockstep.server.http.problem import PROBLEM_JSON, Problem
 from lockstep.server.routes.access import MAX_RECORDS, AuditPage, InvitationList, InvitationRequest, NewInvitation
 from lockstep.server.routes.actions import ActionList, ActionRequest, RobotStatus
-from lockstep.server.routes.maps import NewestMap
 from lockstep.server.routes.dial_in import NewPairingCode, RobotDialInfo
 from lockstep.server.routes.episodes import EpisodeBody
+from lockstep.server.routes.maps import NewestMap
 from lockstep.server.routes.observer_websocket import WatchTicket
 from lockstep.server.routes.recordings import (
     MAX_LISTED,

@@ -36,6 +36,8 @@ Name = Annotated[str, Meta(min_length=1, max_length=100)]
 Topic = Annotated[str, Meta(pattern=r"^[~/A-Za-z_][A-Za-z0-9_/]*$", max_length=200)]
 InterfaceType = Annotated[str, Meta(pattern=r"^[a-z][a-z0-9_]*/(action/)?[A-Z][A-Za-z0-9]*$", max_length=200)]
 FieldPath = Annotated[str, Meta(pattern=r"^[a-z][a-z0-9_]*(\.[a-z][a-z0-9_]*)*$", max_length=200)]
+MaybeFieldPath = Annotated[str, Meta(pattern=r"^([a-z][a-z0-9_]*(\.[a-z][a-z0-9_]*)*)?$", max_length=200)]
+MaybeTopic = Annotated[str, Meta(pattern=r"^([~/A-Za-z_][A-Za-z0-9_/]*)?$", max_length=200)]
 Positive = Annotated[float, Meta(gt=0, le=1e6)]
 NotNegative = Annotated[float, Meta(ge=0, le=1e6)]
 Timeout = Annotated[float, Meta(gt=0, le=10)]
@@ -226,10 +228,10 @@ class RosAction(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     confirm: str = ""
     goal: dict[FieldPath, bool | float | str] = {}  # fields of the goal that are always the same
     parameters: Annotated[tuple[ActionField, ...], Meta(max_length=8)] = ()
-    left: FieldPath | Literal[""] = ""  # number in the feedback that goes to 0 until the goal is reached
-    progress: FieldPath | Literal[""] = ""  # number in the feedback that goes from 0 to 1
-    text: FieldPath | Literal[""] = ""  # field of the feedback that is shown while it runs
-    result: FieldPath | Literal[""] = ""  # field of the result that is shown at the end
+    left: MaybeFieldPath = ""  # number in the feedback that goes to 0 until the goal is reached
+    progress: MaybeFieldPath = ""  # number in the feedback that goes from 0 to 1
+    text: MaybeFieldPath = ""  # field of the feedback that is shown while it runs
+    result: MaybeFieldPath = ""  # field of the result that is shown at the end
     timeout: Annotated[float, Meta(gt=0, le=60)] = 5.0  # s for the server to accept a goal, or to end a cancelled one
 
 
@@ -262,8 +264,8 @@ class MapGoal(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     action: Topic = "/navigate_to_pose"
     type: InterfaceType = "nav2_msgs/NavigateToPose"
     pose: FieldPath = "pose"  # field of the goal, a geometry_msgs/PoseStamped
-    left: FieldPath | Literal[""] = "distance_remaining"  # m, in the feedback
-    result: FieldPath | Literal[""] = ""
+    left: MaybeFieldPath = "distance_remaining"  # m, in the feedback
+    result: MaybeFieldPath = ""
     label: str = "Go to"
     timeout: Annotated[float, Meta(gt=0, le=60)] = 5.0
 
@@ -275,7 +277,7 @@ class MapTopics(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     durable: bool = True  # its publisher keeps the newest for subscribers that come later
     frame: Name = "map"
     place: MapPlace = field(default_factory=MapPlace)
-    path: Topic | Literal[""] = "/plan"  # nav_msgs/Path
+    path: MaybeTopic = "/plan"  # nav_msgs/Path
     goal: MapGoal | None = None
 
 
