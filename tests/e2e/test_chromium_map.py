@@ -86,7 +86,8 @@ async def test_a_click_is_a_goal_with_the_heading_of_the_drag_and_the_robot_arri
         else:
             raise AssertionError("the robot does not arrive")
         joints = await console.page.evaluate("lockstep.stats().joints")
-        assert math.hypot(joints[0] - 1.2, joints[1] + 0.8) < 0.1 and abs(joints[2] - math.pi / 2) < 0.1
+        assert math.hypot(joints[0] - 1.2, joints[1] + 0.8) < 0.1
+        assert abs(joints[2] - math.pi / 2) < 0.1
         await _open_map(observer)
         await expect(observer.page.locator(".map-hint")).to_be_hidden()
     done = await until_logged(stack, "action", lambda record: record["state"] == "done")
