@@ -73,6 +73,7 @@ export function descriptionOf(axes: readonly Axis[]): RobotDescription {
     body_twists: [],
     poses: [],
     actions: [],
+    map: null,
     hold: 0.3,
     max_event_age: 2,
     max_event_rate: 25,

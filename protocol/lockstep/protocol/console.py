@@ -24,6 +24,7 @@ from lockstep.protocol.carriers import Carrier
 from lockstep.protocol.description import RobotDescription
 from lockstep.protocol.episodes import EpisodeAnswer, EpisodeRequest, EpisodeState
 from lockstep.protocol.errors import MessageError
+from lockstep.protocol.maps import Navigation
 from lockstep.protocol.messages import (
     Command,
     EventReference,
@@ -376,6 +377,7 @@ ServerMessage = (
     | EpisodeState
     | EpisodeAnswer
     | Status
+    | Navigation
     | Traces
 )
 

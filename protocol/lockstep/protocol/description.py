@@ -22,6 +22,7 @@ __all__ = [
     "Geofence",
     "Geom",
     "Joint",
+    "MapView",
     "Microphone",
     "PadInput",
     "PlanarBase",
@@ -162,6 +163,9 @@ class Camera(msgspec.Struct, frozen=True, kw_only=True):
     height: int
     frame_rate: float  # Hz
     metres_per_pixel: float | None = None  # m, of a camera that looks at one plane: a scale bar; None: it has no scale
+    # Action that a click on the picture asks for. Its number parameters are "x" and "y", shares of the picture from the
+    # left and from the top, and "event", the stamp of the picture that was clicked on. "": none.
+    click: str = ""
 
 
 class Microphone(msgspec.Struct, frozen=True, kw_only=True):
@@ -285,6 +289,21 @@ class Action(msgspec.Struct, frozen=True, kw_only=True):
     confirm: str = ""  # question that a console asks the person first; "": it asks none
 
 
+class MapView(msgspec.Struct, frozen=True, kw_only=True):
+    """The map on which the robot is shown (docs/robot-link.md, "Maps").
+
+    The joints give the measured pose, in a frame whose place on the map `Navigation.frame` says.
+    """
+
+    x: str  # "base.x", m
+    y: str  # "base.y", m
+    yaw: str  # "base.yaw", rad
+    radius: float = 0.3  # m, of the circle that stands for the robot
+    # Action that drives to a place. Its number parameters "x" and "y" (m) and "yaw" (rad) are the pose in the map's
+    # frame; without "yaw" the robot arrives as it likes. "": none.
+    goal: str = ""
+
+
 class RobotDescription(msgspec.Struct, frozen=True, kw_only=True):
     name: str  # "mobile-manipulator"
     label: str  # "Mobile manipulator"
@@ -304,6 +323,7 @@ class RobotDescription(msgspec.Struct, frozen=True, kw_only=True):
     poses: tuple[Pose, ...] = ()
     start_warning: StartWarning | None = None
     actions: tuple[Action, ...] = ()
+    map: MapView | None = None
     hold: float = 0.3  # s a command is held before the robot comes to rest without another
     watchdog: float | None = (
         None  # s without a tick after which the robot is brought to rest; None: see docs/robot-link.md

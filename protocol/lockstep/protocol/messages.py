@@ -11,6 +11,7 @@ import msgspec
 from lockstep.protocol.actions import Act, ActionCancel, ActionUpdate, RenewedAction, Status
 from lockstep.protocol.description import RobotDescription
 from lockstep.protocol.errors import MessageError
+from lockstep.protocol.maps import Navigation, OccupancyMap
 from lockstep.protocol.serial import MAX_EVENT
 from lockstep.protocol.traces.trace import CommandSpans, PictureSpans
 
@@ -285,6 +286,8 @@ _WithoutFeedback = (
     | ActionCancel
     | ActionUpdate
     | Status
+    | Navigation
+    | OccupancyMap
     | Ping
     | Pong
     | Goodbye

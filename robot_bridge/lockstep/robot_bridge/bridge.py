@@ -27,6 +27,7 @@ from lockstep.robot_bridge.event_log import EventLog
 from lockstep.robot_bridge.link.check_link import check_link
 from lockstep.robot_bridge.link.link_server import LinkServer
 from lockstep.robot_bridge.link.refusals import Refusals
+from lockstep.robot_bridge.maps.map_sender import MapSender
 from lockstep.robot_bridge.media_sources import MediaSources
 from lockstep.robot_bridge.robots.base import Robot
 from lockstep.robot_bridge.settings import BridgeSettings
@@ -134,6 +135,7 @@ class Bridge:
             event_strip=settings.event_strip,
             encoding=encoding,
         )
+        self._maps = MapSender(robot, description, self._core, self._links, now)
         self._running: asyncio.Task[None] | None = None
         self._closed = False
 
@@ -261,6 +263,7 @@ class Bridge:
                 group.create_task(self._links.run())
                 group.create_task(self._run_reports())
                 group.create_task(self._sources.run())
+                group.create_task(self._maps.run())
                 if self._dialer is not None:
                     group.create_task(self._dialer.run())
         except (asyncio.CancelledError, GeneratorExit):

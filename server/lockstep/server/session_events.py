@@ -12,6 +12,7 @@ from lockstep.protocol.actions import Act, ActionUpdate, Status
 from lockstep.protocol.console import Participants, Report, RobotState, Seat, SharedNote, SpeedCapState
 from lockstep.protocol.description import RobotDescription
 from lockstep.protocol.episodes import EpisodeRequest
+from lockstep.protocol.maps import Navigation
 from lockstep.protocol.messages import Command, Feedback, Refusal, RefusalReason, Rest, StopState, StopTaken
 from lockstep.protocol.traces.trace import CommandSpans
 from lockstep.protocol.traces.trace_messages import EventTrace
@@ -34,6 +35,7 @@ __all__ = [
     "InputRefused",
     "LinkDown",
     "LinkUp",
+    "NavigationReceived",
     "NoteWritten",
     "ParticipantsChanged",
     "PeerJoined",
@@ -207,6 +209,12 @@ class ActionUpdated(SessionEvent, frozen=True):
 
 class StatusReceived(SessionEvent, frozen=True):
     status: Status
+
+
+class NavigationReceived(SessionEvent, frozen=True):
+    """The robot has said where it is on its map, and where it is going."""
+
+    navigation: Navigation
 
 
 # episodes

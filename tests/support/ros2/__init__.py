@@ -3,10 +3,13 @@
 import asyncio
 import atexit
 import fcntl
+import hashlib
 import os
 import platform
 import random
+import shutil
 import socket
+import subprocess
 import sys
 import tempfile
 from collections import deque
@@ -20,6 +23,7 @@ from lockstep.bench.harness.processes import Running, running_process
 from tests.support.event_logs import whole_lines, written
 
 __all__ = [
+    "ACTIONS",
     "EXAMPLES",
     "PATIENCE",
     "STAY",
@@ -27,6 +31,8 @@ __all__ = [
     "RosBridge",
     "RosRobot",
     "SERVICES",
+    "built_interfaces",
+    "have_compiler",
     "have_ros",
     "ros_environment",
     "ros_python",
@@ -37,6 +43,9 @@ __all__ = [
 ROOT = Path(__file__).parents[3]
 EXAMPLES = ROOT / "docs" / "examples" / "ros2"
 NODE = Path(__file__).with_name("robot_node.py")
+ACTIONS = Path(__file__).with_name("actions_node.py")
+BUILD = Path(__file__).with_name("build_interfaces.py")
+INTERFACES = Path(__file__).with_name("interfaces")
 SERVICES = Path(__file__).with_name("services_node.py")
 TWO_BASES = Path(__file__).with_name("two_bases_node.py")
 # RTPS well-known ports (DDSI-RTPS 9.6.1.1): 7400 + 250 x domain is where a domain's participants find each other.
@@ -50,6 +59,11 @@ STAY = [0.0, 0.0]
 def have_ros() -> bool:
     """Whether there are wheels of ROS 2 for this machine."""
     return (platform.system(), platform.machine()) == ("Linux", "x86_64") and sys.version_info < (3, 14)
+
+
+def have_compiler() -> bool:
+    """Whether interfaces can be built on this machine."""
+    return shutil.which("g++") is not None and shutil.which("gcc") is not None
 
 
 def ros_python() -> str:
@@ -71,6 +85,26 @@ _kept: deque[IO[bytes]] = deque()  # the locks of its newest domains
 def _let_go() -> None:
     while _kept:
         _kept.popleft().close()
+
+
+def built_interfaces() -> Path:
+    """Return the directory with the interfaces that the wheels do not have, built when that was not done before.
+
+    It belongs on PYTHONPATH and LD_LIBRARY_PATH. It needs a C++ compiler.
+    """
+    sources = [BUILD, *sorted(path for path in INTERFACES.rglob("*") if path.is_file())]
+    digest = hashlib.sha256(b"".join(path.read_bytes() for path in sources)).hexdigest()[:16]
+    target = ROOT / ".ros2-interfaces" / digest
+    target.parent.mkdir(exist_ok=True)
+    with (target.parent / "lock").open("wb") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        if not target.exists():
+            with tempfile.TemporaryDirectory(dir=target.parent) as work:
+                made = Path(work) / "made"
+                subprocess.run([ros_python(), str(BUILD), str(made)], check=True, capture_output=True)
+                shutil.rmtree(made / "build")
+                made.rename(target)
+    return target
 
 
 def ros_environment() -> dict[str, str]:
@@ -157,9 +191,15 @@ def _zeros(twists: list[dict[str, Any]]) -> int:
 
 
 @asynccontextmanager
-async def running_ros_robot(directory: Path, node: Path = NODE) -> AsyncIterator[RosRobot]:
+async def running_ros_robot(
+    directory: Path, node: Path = NODE, *, interfaces: Path | None = None
+) -> AsyncIterator[RosRobot]:
+    """`interfaces`: a directory of `built_interfaces`, for the node and for a bridge beside it."""
     log = directory / "robot_node.jsonl"
     environment = ros_environment()
+    if interfaces is not None:
+        environment["PYTHONPATH"] += f"{os.pathsep}{interfaces}"
+        environment["LD_LIBRARY_PATH"] = str(interfaces)
     async with running_process(ros_python(), str(node), str(log), environment=environment) as (process, _):
         yield RosRobot(process, environment, log)
 

@@ -21,7 +21,7 @@ import PIL.Image
 import rclpy
 from geometry_msgs.msg import Twist, TwistStamped, WrenchStamped
 from nav_msgs.msg import Odometry
-from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+from rclpy.executors import Executor, ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, qos_profile_sensor_data
 from sensor_msgs.msg import CompressedImage, Image, JointState, LaserScan
@@ -242,10 +242,10 @@ def listen(node: RobotNode) -> None:
         print(json.dumps({"done": line.strip()}), flush=True)
 
 
-def main(kind: type[RobotNode] = RobotNode) -> None:
+def main(kind: type[RobotNode] = RobotNode, make_executor: type[Executor] = SingleThreadedExecutor) -> None:
     rclpy.init()
     node = kind(Path(sys.argv[1]))
-    executor = SingleThreadedExecutor()
+    executor = make_executor()
     executor.add_node(node)
     threading.Thread(target=listen, args=(node,), daemon=True).start()
     print(json.dumps({"ready": True}), flush=True)

@@ -58,6 +58,7 @@ export class Page {
     this.engine = new ConsoleEngine(api, options, name, new TouchSticks(left, right), events, first);
     this.panels = this.build(left, right, api);
     this.later.use(({ installHook }) => installHook(this));
+    this.later.use(({ watchPictureClicks }) => watchPictureClicks(this.engine, this.grid.element));
     this.later.use(({ Rumble, ContactTone, SceneSwitch, SoundStream, createScene }) => {
       this.engine.streams.sound = SoundStream;
       this.grid.takeScene(createScene(this.engine, this.grid, api), new SceneSwitch());

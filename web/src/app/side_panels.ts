@@ -3,6 +3,7 @@ import { ChartsDrawer } from "../charts/charts_drawer";
 import type { WaySource } from "../charts/way_figures";
 import type { ConsoleEngine } from "../engine/console_engine";
 import { Tracing } from "../engine/tracing";
+import { MapSwitch } from "../map/map_switch";
 import { HeadsetEntry } from "../headset/headset_entry";
 import { PictureTrace } from "../media/picture_trace";
 import { readFragment } from "../util/url_fragment";
@@ -48,6 +49,7 @@ export class SidePanels {
   private readonly unread = createUnread();
   private readonly headset: HeadsetEntry;
   private readonly pageTools: PageTools;
+  private readonly map: MapSwitch;
   private readonly session: SessionApi;
   private readonly keys = once(() => createKeysSheet(this.engine));
   private readonly pads: () => SheetContent;
@@ -75,16 +77,24 @@ export class SidePanels {
     this.sheets = new Sheets(() => root.querySelectorAll<HTMLElement>(BEHIND_SHEETS));
     this.record = createRecordButton(engine, this.session);
     this.headset = new HeadsetEntry({ engine, grid });
+    this.map = new MapSwitch(engine, grid, api, redraw);
     this.pageTools = createPageTools({
       charts: () => this.act("charts"),
       keys: () => this.act("keys"),
       pads: () => this.act("pads"),
       scene: () => this.toggleScene(),
+      map: () => {
+        root.classList.remove("shows-details"); // they would cover it on a small screen
+        this.map.toggle();
+      },
       headset: (className) => this.headset.createButtons(className),
     });
     this.tools = {
       element: this.pageTools.bar,
-      update: () => this.pageTools.update(engine, grid.sceneSwitch?.isOn === true),
+      update: (now) => {
+        this.map.update(now);
+        this.pageTools.update(engine, grid.sceneSwitch?.isOn === true, this.map.isOn);
+      },
     };
     this.tabs = this.createTabs();
     const sampler = new ChartSampler(engine);

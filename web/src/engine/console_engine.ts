@@ -104,6 +104,7 @@ export class ConsoleEngine {
   peer: Peer | null = null;
   measuredMs: number | null = null; // when the newest feedback came
   episode: unknown = null; // the newest message of episodes, whose schema comes with the bar that shows it
+  navigation: { readonly value: unknown; readonly atMs: number } | null = null; // the newest, whose schema comes with the map
   takeEpisode = (message: unknown): void => void (this.episode = message); // the bar replaces it
   statusMs = 0; // when the robot's newest status came
   actionMs = -Infinity; // when the newest news of an action came
@@ -326,6 +327,7 @@ export class ConsoleEngine {
     this.streams.close();
     this.heartbeat.end();
     forgetConnection(this.state);
+    this.navigation = null;
     this.measuredMs = null;
   }
 
@@ -334,6 +336,10 @@ export class ConsoleEngine {
     if (parsed.kind !== "message") {
       if (parsed.kind === "unknown" && parsed.type.startsWith("episode")) {
         this.takeEpisode(parsed.value);
+        return;
+      }
+      if (parsed.kind === "unknown" && parsed.type === "navigation") {
+        this.navigation = { value: parsed.value, atMs: at };
         return;
       }
       this.state.badMessages += 1;

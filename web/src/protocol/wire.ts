@@ -119,6 +119,7 @@ export interface Camera {
   readonly height: number;
   readonly frame_rate: number;
   readonly metres_per_pixel: number | null;
+  readonly click: string;
 }
 
 export type ClientMessage = Command | Rest | Report | Ping | SeatRequest | SeatGrant | SeatDecline | SeatTake | SeatRelease | SilenceStops | Rename | Note | Act | ActionCancel | EpisodeRequest | Stop | Reset | TraceRequest | TraceReport;
@@ -268,11 +269,33 @@ export interface Joint {
   readonly maximum: number | null;
 }
 
+/** The map on which the robot is shown (docs/robot-link.md, "Maps"). The joints give the measured pose, in a frame whose place on the map `Navigation.frame` says. */
+export interface MapView {
+  readonly x: string;
+  readonly y: string;
+  readonly yaw: string;
+  readonly radius: number;
+  readonly goal: string;
+}
+
 export interface Microphone {
   readonly name: string;
   readonly label: string;
   readonly sample_rate: number;
   readonly channels: number;
+}
+
+/** Where the robot is on its map, and where it is going. Each message replaces the one before it. */
+export interface Navigation {
+  readonly type: "navigation";
+  readonly event: number;
+  readonly map: string;
+  readonly map_age: number;
+  readonly located: boolean;
+  readonly frame: readonly [number, number, number];
+  readonly goal: readonly (number)[];
+  readonly path: readonly (number)[];
+  readonly path_age: number;
 }
 
 /** Text to everyone. */
@@ -475,6 +498,7 @@ export interface RobotDescription {
   readonly poses: readonly (Pose)[];
   readonly start_warning: StartWarning | null;
   readonly actions: readonly (Action)[];
+  readonly map: MapView | null;
   readonly hold: number;
   readonly watchdog: number | null;
   readonly max_event_age: number;
@@ -535,7 +559,7 @@ export interface SeatTake {
   readonly type: "seat_take";
 }
 
-export type ServerMessage = Feedback | Refusal | Pong | Welcome | RobotState | Seat | Participants | Quality | SpeedCapState | Sources | Voice | RecordingState | SharedNote | Notice | StopStateNotice | StopTaken | ActionUpdate | EpisodeState | EpisodeAnswer | Status | Traces;
+export type ServerMessage = Feedback | Refusal | Pong | Welcome | RobotState | Seat | Participants | Quality | SpeedCapState | Sources | Voice | RecordingState | SharedNote | Notice | StopStateNotice | StopTaken | ActionUpdate | EpisodeState | EpisodeAnswer | Status | Navigation | Traces;
 
 /** A participant's note, with the event it belongs to. Newcomers get the last ones. */
 export interface SharedNote {

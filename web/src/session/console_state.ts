@@ -212,6 +212,7 @@ export function applyMessage(state: ConsoleState, message: ServerMessage, wallMs
     case "episode_answer":
     case "stop_taken": // the stop sender's
     case "traces": // the engine's
+    case "navigation": // the map's
       return;
     default:
       message satisfies never;

@@ -23,6 +23,7 @@ from lockstep.protocol.messages import MAX_AXES, MAX_RAYS
 from lockstep.robot_bridge.description.check_actions import action_texts, check_actions
 from lockstep.robot_bridge.description.check_axes import check_axes
 from lockstep.robot_bridge.description.check_limits import check_limits
+from lockstep.robot_bridge.description.check_maps import check_clicks, check_map
 from lockstep.robot_bridge.errors import DescriptionError
 
 __all__ = ["check_bounds", "check_description"]
@@ -82,6 +83,8 @@ def check_description(description: RobotDescription) -> None:
     if description.start_warning is not None:
         _check_warning(description, description.start_warning)
     check_actions(description.actions)
+    check_clicks(description)
+    check_map(description)
     check_limits(description)
 
 

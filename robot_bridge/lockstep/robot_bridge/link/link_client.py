@@ -265,7 +265,11 @@ class _ClientTransport(PacedTransport):
 
     def _leave(self, transport: asyncio.Transport) -> None:
         if self._waits_for_end:
-            transport.write_eof()
+            try:
+                transport.write_eof()
+            except OSError:  # the bridge has reset the connection: nothing that was sent can still arrive
+                transport.close()
+                return
             transport.resume_reading()
         else:
             super()._leave(transport)

@@ -15,6 +15,7 @@ from lockstep.protocol.actions import Act, ActionCancel, Status
 from lockstep.protocol.description import RobotDescription
 from lockstep.protocol.framing import frame
 from lockstep.protocol.link_secret import LinkSecret
+from lockstep.protocol.maps import Navigation, OccupancyMap
 from lockstep.protocol.messages import (
     Command,
     EncodeRequest,
@@ -171,6 +172,7 @@ class LinkServer:
         self._connections: set[LinkPeer] = set()  # all sockets, those that are closing included
         self._strangers: Strangers[LinkPeer] = Strangers(max_strangers)
         self._admitted: LinkAdmission[LinkPeer] = LinkAdmission(max_links=max_links, operator_grace=operator_grace)
+        self._map: Callable[[], bytes] | None = None  # the frame of the newest map; None before the first
         self._acceptor: LinkAcceptor | None = None  # None while it does not listen
         self._closed = False
         self._all_gone = asyncio.Event()
@@ -247,6 +249,17 @@ class LinkServer:
         if self._admitted.operator is not None:
             self._admitted.operator.send(status)
 
+    def publish_navigation(self, navigation: Navigation) -> None:
+        """Send where the robot is on its map to the operator link."""
+        if self._admitted.operator is not None:
+            self._admitted.operator.send(navigation)
+
+    def publish_map(self, map: OccupancyMap) -> None:
+        """Send a map to every media link, and to those that open later."""
+        self._map = encode_once(map)
+        for peer in self._admitted.media:
+            peer.send_encoded("map", self._map)
+
     def publish_media(self, media: Media) -> None:
         """Send a medium to every media link, newest wins per stream."""
         encoded = encode_once(media) if media.spans is msgspec.UNSET else encode_waited(media, time.monotonic)
@@ -303,6 +316,8 @@ class LinkServer:
                     self._handler.link_bad_input(peer, event)
             case Hello():
                 self._handler.link_opened(peer)
+                if self._map is not None and peer in self._admitted.media:
+                    peer.send_encoded("map", self._map)
             case EncodeRequest():
                 if self._encoding is not None:
                     self._encoding.asked(peer, event)

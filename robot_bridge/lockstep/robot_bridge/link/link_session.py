@@ -24,6 +24,7 @@ from lockstep.protocol.actions import (
 from lockstep.protocol.errors import FramingError, MessageError
 from lockstep.protocol.framing import MAX_CONTROL_FRAME, MAX_HELLO_FRAME, MAX_MEDIA_FRAME, FrameReader
 from lockstep.protocol.link_secret import NONCE_BYTES, LinkSecret, draw_nonce
+from lockstep.protocol.maps import MAX_CELLS, Navigation, OccupancyMap
 from lockstep.protocol.messages import (
     PROTOCOL_VERSION,
     Challenge,
@@ -66,9 +67,9 @@ FROM_CLIENT: dict[LinkRole, tuple[type[LinkMessage], ...]] = {
     "media": (Stop, EncodeRequest),
 }
 FROM_ROBOT: dict[LinkRole, tuple[type[LinkMessage], ...]] = {
-    "operator": (Feedback, Refusal, StopTaken, ActionUpdate, Status),
+    "operator": (Feedback, Refusal, StopTaken, ActionUpdate, Status, Navigation),
     "events": (EventNotice, Refusal, StopTaken),
-    "media": (Media, Refusal, StopTaken),
+    "media": (Media, OccupancyMap, Refusal, StopTaken),
 }
 
 
@@ -354,12 +355,16 @@ class ClientSession(LinkSession):
         return message
 
     def _receive_open(self, message: LinkMessage, now: float) -> LinkMessage | BadInput | None:
-        """Refuse a feedback or a status that does not fit as bad input: no part could show or record it."""
+        """Refuse a feedback, status, map or navigation that does not fit as bad input: no part could show it."""
         if isinstance(message, Status) and isinstance(message, self._allowed):
             if not all(map(fits_kind, message.items)):
                 return BadInput("malformed", "a status item whose value is not of its kind")
             if sum(map(status_item_bytes, message.items)) > MAX_STATUS_BYTES:
                 return BadInput("malformed", f"a status of more than {MAX_STATUS_BYTES} bytes")
+        if isinstance(message, OccupancyMap) and message.width * message.height > MAX_CELLS:
+            return BadInput("malformed", f"a map of more than {MAX_CELLS} cells")
+        if isinstance(message, Navigation) and (len(message.goal) not in (0, 3) or len(message.path) % 2):
+            return BadInput("malformed", "a goal or a path that is no pose or no points")
         described = None if self.hello is None else self.hello.description
         if isinstance(message, Feedback) and isinstance(message, self._allowed) and described is not None:
             wrong = misfit(message, described)

@@ -8,6 +8,7 @@ from lockstep.protocol.actions import ParameterValue, StatusItem
 from lockstep.protocol.description import RobotDescription
 from lockstep.protocol.messages import Media
 from lockstep.robot_bridge.robots.actions import ActionNotPossible, ActionRun
+from lockstep.robot_bridge.robots.navigation import GridMap, NavigationNow
 
 __all__ = ["Measurement", "MediaSource", "Robot", "Stamp", "Stamper"]
 
@@ -217,6 +218,20 @@ class Robot(ABC):
     def status(self) -> Sequence[StatusItem]:
         """Return everything that the robot reports of itself: battery, mode, temperatures. Called twice a second."""
         return ()
+
+    def grid_map(self) -> GridMap | None:
+        """Return the newest map, the same object until there is another; None before the first.
+
+        Called ten times a second if the description has `map`.
+        """
+        return None
+
+    def navigation(self) -> NavigationNow | None:
+        """Return where the robot is on its map and where it is going; called as `grid_map` is. None: it says nothing.
+
+        The goal is that of the action `map.goal` while it runs, or another that the robot pursues.
+        """
+        return None
 
     def sources(self) -> Sequence[MediaSource]:
         """Return the cameras and microphones, with the names that they have in the description."""

@@ -19,6 +19,7 @@ from lockstep.server.routes import (
     dial_in,
     episodes,
     ice,
+    maps,
     observer_websocket,
     recordings,
     session,
@@ -79,6 +80,7 @@ def session_app(settings: Settings, lifespan: Lifespan[FastAPI] | None = None) -
     app.include_router(whip.router)
     app.include_router(session.router)
     app.include_router(actions.router)
+    app.include_router(maps.router)
     app.include_router(access.router)
     app.include_router(ice.router)
     app.include_router(recordings.router)

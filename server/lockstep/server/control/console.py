@@ -24,6 +24,7 @@ from lockstep.protocol.console import (
 )
 from lockstep.protocol.description import RobotDescription
 from lockstep.protocol.episodes import EpisodeRequest
+from lockstep.protocol.maps import Navigation, OccupancyMap
 from lockstep.protocol.messages import (
     Command,
     Feedback,
@@ -42,6 +43,7 @@ from lockstep.protocol.messages import (
 )
 from lockstep.protocol.traces.trace_messages import TraceReport, TraceRequest
 from lockstep.server.actions.action_service import ActionService
+from lockstep.server.actions.navigation_service import NavigationService
 from lockstep.server.actions.status_service import StatusService
 from lockstep.server.audit.audit_trail import AuditTrail
 from lockstep.server.audit.records import Actor
@@ -81,6 +83,7 @@ from lockstep.server.session_events import (
     InputRefused,
     LinkDown,
     LinkUp,
+    NavigationReceived,
     Refused,
     RestForwarded,
     RobotTaken,
@@ -151,6 +154,7 @@ class Console:
         self.resets = ResetService(self.robot, self.stops, peers, clock, seat, events)
         self.actions = ActionService(self.robot, clock, self.seat.is_held_by, self.seat.may_move, events)
         self.status = StatusService()
+        self.navigation = NavigationService()
         self._fanout = FeedbackFanout(
             settings.observer_feedback_hz, self.seat.is_held_by, peers.drivers, peers.observers, relays
         )
@@ -209,6 +213,8 @@ class Console:
                 peer.send("session", update)
             if (status := self.status.message(time.monotonic())) is not None:
                 peer.send("session", status)
+            if (navigation := self.navigation.message(time.monotonic())) is not None:
+                peer.send("session", navigation)
             for news in self._further_news():
                 peer.send("session", news)
 
@@ -295,6 +301,7 @@ class Console:
         self._arbiter.epoch_ends()
         self.actions.epoch_ends()
         self.status.forget()
+        self.navigation.forget()
         self.traces.epoch_ends()
         self.clock.begin(epoch)
         self.speed_cap.forget()
@@ -363,6 +370,13 @@ class Console:
     def status_received(self, status: Status) -> None:
         if self.status.take(status, time.monotonic()):
             self._events.publish(StatusReceived(status))
+
+    def navigation_received(self, navigation: Navigation) -> None:
+        if self.navigation.take(navigation, time.monotonic()):
+            self._events.publish(NavigationReceived(navigation))
+
+    def map_received(self, map: OccupancyMap) -> None:
+        self.navigation.take_map(map)
 
     def link_failed(self, role: LinkRole, error: Exception) -> None:
         self._faults.caught(f"robot link {role}", error)

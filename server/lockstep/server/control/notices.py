@@ -9,6 +9,7 @@ from lockstep.server.session_events import (
     ActionUpdated,
     LinkDown,
     LinkUp,
+    NavigationReceived,
     NoteWritten,
     ParticipantsChanged,
     RobotTaken,
@@ -59,6 +60,7 @@ class Notices:
         events.subscribe(NoteWritten, self._note_written)
         events.subscribe(ActionUpdated, self._action_updated)
         events.subscribe(StatusReceived, self._status_received)
+        events.subscribe(NavigationReceived, self._navigation_received)
         events.subscribe(StopShown, self._stop_shown)
         events.subscribe(StopSent, self._stop_sent)
         events.subscribe(StopsDiskChanged, self._stops_disk_changed)
@@ -96,6 +98,9 @@ class Notices:
 
     def _status_received(self, event: StatusReceived) -> None:
         self._peers.announce(event.status)
+
+    def _navigation_received(self, event: NavigationReceived) -> None:
+        self._peers.announce(event.navigation)
 
     def _stop_shown(self, event: StopShown) -> None:
         self._peers.tell("stop", StopStateNotice(stop=event.stop, event=event.event))

@@ -12,6 +12,7 @@ import structlog
 from lockstep.protocol.actions import Act, ActionCancel, ActionUpdate, Status
 from lockstep.protocol.console import RobotState
 from lockstep.protocol.description import RobotDescription
+from lockstep.protocol.maps import Navigation, OccupancyMap
 from lockstep.protocol.messages import (
     Command,
     EncodeRequest,
@@ -62,6 +63,8 @@ class RobotHost(Protocol):
     def stop_taken(self, taken: StopTaken) -> None: ...
     def action_updated(self, update: ActionUpdate) -> None: ...
     def status_received(self, status: Status) -> None: ...
+    def navigation_received(self, navigation: Navigation) -> None: ...
+    def map_received(self, map: OccupancyMap) -> None: ...
     def link_failed(self, role: LinkRole, error: Exception) -> None: ...
 
 
@@ -189,3 +192,7 @@ class RobotConnection:
             self._host.action_updated(message)
         elif isinstance(message, Status):
             self._host.status_received(message)
+        elif isinstance(message, Navigation):
+            self._host.navigation_received(message)
+        elif isinstance(message, OccupancyMap):
+            self._host.map_received(message)

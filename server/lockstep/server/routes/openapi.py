@@ -77,6 +77,7 @@ from lockstep.server.routes.access import MAX_RECORDS, AuditPage, InvitationList
 from lockstep.server.routes.actions import ActionList, ActionRequest, RobotStatus
 from lockstep.server.routes.dial_in import NewPairingCode, RobotDialInfo
 from lockstep.server.routes.episodes import EpisodeBody
+from lockstep.server.routes.maps import NewestMap
 from lockstep.server.routes.observer_websocket import WatchTicket
 from lockstep.server.routes.recordings import (
     MAX_LISTED,
@@ -272,6 +273,7 @@ OPERATIONS: tuple[Operation, ...] = (
         parameters=(EPISODE_VERB,),
     ),
     Operation("get", "/api/status", "What the robot says of itself.", 200, RobotStatus),
+    Operation("get", "/api/map", "The robot's newest map.", 200, NewestMap, (NotFound,)),
     Operation("post", "/api/scene", "A ticket for the 3D scene.", 200, ScenePath, (SceneUnavailable,)),
     Operation("get", "/api/dial-in", "How the robot that dials in is paired, and its state.", 200, RobotDialInfo),
     Operation(

@@ -124,10 +124,17 @@ class ActionButton {
     );
     const isOff = refusal !== null || (runs && !mayCancel);
     this.main.setAttribute("aria-disabled", String(isOff));
+    setHidden(this.element, this.isByClick && !runs); // else it has nothing to be asked with
     this.main.title = refusal === null ? "" : ACT_REFUSAL_LABELS[refusal];
     setData(this.element, "state", runs ? "running" : asks ? "asking" : stateWord(update, engine, now));
     this.fill.style.width = runs ? `${update.progress * 100}%` : "0";
     this.form.disable(runs);
+  }
+
+  /** A click on a picture asks for it, never a button. */
+  private get isByClick(): boolean {
+    const cameras = this.engine.state.robot?.description.cameras ?? [];
+    return cameras.some((camera) => camera.click === this.action.name);
   }
 
   press(remote: boolean): void {
@@ -138,6 +145,7 @@ class ActionButton {
       engine.actions?.cancel(update.id);
       return;
     }
+    if (this.isByClick) return;
     const refusal = actRefusal(action, engine.state.actions, engine.actConditions(now, remote));
     if (refusal !== null) {
       note(engine.state, "warning", `${action.label}: ${ACT_REFUSAL_LABELS[refusal]}`, Date.now());

@@ -73,13 +73,25 @@ export class ViewGrid {
 
   /** The camera in the large view, or the first one while the scene is large. */
   mainStream(): string | null {
-    if (this.main !== null && this.main !== SCENE) return this.main;
-    return [...this.views.keys()].find((name) => name !== SCENE) ?? null;
+    return this.largeStream() ?? this.pictures()[0]?.name ?? null;
   }
 
-  /** The camera in the large view; null while the scene is there. */
+  /** The camera in the large view; null while the scene or the map is there. */
   largeStream(): string | null {
-    return this.main === SCENE ? null : this.main;
+    return this.views.get(this.main ?? "")?.canvas ? this.main : null;
+  }
+
+  /** Shows a view of no camera, large, or takes it away. It may be shown again. */
+  toggleView(name: string, content: HTMLElement): void {
+    if (this.views.has(name)) {
+      this.views.get(name)?.element.remove();
+      this.views.delete(name);
+      if (this.main === name) this.swapIn(this.mainStream() ?? SCENE);
+      else this.arrange();
+      return;
+    }
+    this.addView(this.createView(name, name, null, content));
+    this.swapIn(name);
   }
 
   /** The cameras' pictures as they are on the page, in their order. */
@@ -148,8 +160,8 @@ export class ViewGrid {
   private dropScene(scene: SceneView, engine: ConsoleEngine): void {
     if (scene.isFull) scene.unload();
     else this.sceneSwitch?.giveUp();
-    const camera = [...this.views.keys()].find((name) => name !== SCENE);
-    if (camera !== undefined && this.main === SCENE) this.swapIn(camera);
+    const camera = this.mainStream();
+    if (camera !== null && this.main === SCENE) this.swapIn(camera);
     note(engine.state, "warning", TOO_SLOW, Date.now());
   }
 

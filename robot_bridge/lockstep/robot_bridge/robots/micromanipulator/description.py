@@ -5,6 +5,7 @@ from typing import Final
 
 from lockstep.protocol.description import (
     Action,
+    ActionParameter,
     Axis,
     AxisGain,
     Binding,
@@ -37,7 +38,13 @@ __all__ = [
 
 # A sensor 6.4 mm wide behind a lens of 20x sees 320 µm; 640 columns make that half a micrometre each.
 MICROSCOPE: Final = Camera(
-    name="microscope", label="Microscope 20×", width=640, height=480, frame_rate=30.0, metres_per_pixel=0.5 * MICRO
+    name="microscope",
+    label="Microscope 20×",
+    width=640,
+    height=480,
+    frame_rate=30.0,
+    metres_per_pixel=0.5 * MICRO,
+    click="centre",
 )
 SIDE: Final = Camera(
     name="side", label="Section at the tip", width=320, height=240, frame_rate=15.0, metres_per_pixel=0.5 * MICRO
@@ -182,6 +189,15 @@ DESCRIPTION: Final = RobotDescription(
     actions=(
         Action(name="autofocus", label="Autofocus"),
         Action(name="snapshot", label="Snapshot", moves=False),
+        Action(
+            name="centre",
+            label="Tip to the place",
+            parameters=(
+                ActionParameter(name="x", label="From the left", kind="number", minimum=0, maximum=1),
+                ActionParameter(name="y", label="From the top", kind="number", minimum=0, maximum=1),
+                ActionParameter(name="event", label="Picture's event", kind="number", minimum=1, maximum=2**31 - 1),
+            ),
+        ),
     ),
     cameras=(MICROSCOPE, SIDE),
     microphones=(MICROPHONE,),

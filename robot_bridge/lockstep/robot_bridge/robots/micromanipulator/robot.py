@@ -2,15 +2,17 @@
 
 import math
 from collections import deque
-from collections.abc import Mapping, Sequence
+from collections.abc import Awaitable, Mapping, Sequence
 from typing import Final, NamedTuple
 
 from lockstep.protocol.actions import ParameterValue, StatusItem
 from lockstep.protocol.description import RobotDescription
-from lockstep.robot_bridge.robots.actions import ActionDone, ActionRun
+from lockstep.robot_bridge.control import clock
+from lockstep.robot_bridge.robots.actions import ActionDone, ActionNotPossible, ActionRun
 from lockstep.robot_bridge.robots.base import Measurement, MediaSource, Robot
 from lockstep.robot_bridge.robots.camera_source import CameraSource
 from lockstep.robot_bridge.robots.micromanipulator.autofocus import Autofocus
+from lockstep.robot_bridge.robots.micromanipulator.centring import Centring, ShownPictures
 from lockstep.robot_bridge.robots.micromanipulator.description import (
     DESCRIPTION,
     MICROPHONE,
@@ -21,6 +23,7 @@ from lockstep.robot_bridge.robots.micromanipulator.description import (
 )
 from lockstep.robot_bridge.robots.micromanipulator.draughtsman import Draughtsman
 from lockstep.robot_bridge.robots.micromanipulator.needle import Contact, Needle
+from lockstep.robot_bridge.robots.micromanipulator.samples import MICRO
 from lockstep.robot_bridge.robots.micromanipulator.sound import Sound
 from lockstep.robot_bridge.robots.micromanipulator.stepper import Stepper
 from lockstep.robot_bridge.robots.microphone_source import MicrophoneSource
@@ -62,9 +65,10 @@ class Micromanipulator(Robot):
         self._taken = 0  # snapshots since the start
         self._stopped = False  # no drive has a command to step
         self._draughtsman = Draughtsman()
+        self._shown = ShownPictures()
         self._sound = Sound()
         self._sources: tuple[MediaSource, ...] = (
-            CameraSource(MICROSCOPE, self._draughtsman.microscope, self.state),
+            CameraSource(MICROSCOPE, self._draw_microscope, self.state),
             CameraSource(SIDE, self._draughtsman.side, self.state),
             MicrophoneSource(MICROPHONE, self._hear),
         )
@@ -119,9 +123,26 @@ class Micromanipulator(Robot):
                 axis=FOCUS,
                 tick=self.tick_seconds,
             )
+        if name == "centre":
+            return self._centre(*(float(parameters[each]) for each in ("x", "y", "event")))
         self._taken += 1
         self._snapshots.append(self.state())
         return ActionDone(f"picture {self._taken}, focus {self._drives[FOCUS].position * 1e6:.1f} µm")
+
+    def _centre(self, across: float, down: float, event: float) -> ActionRun:
+        """`across`, `down`: shares of the microscope's picture from the left and from the top."""
+        self._shown.check(event, clock.now())
+        scale = MICROSCOPE.metres_per_pixel or MICRO
+        goal = (0.5 - down) * MICROSCOPE.height * scale, (0.5 - across) * MICROSCOPE.width * scale
+        for place, joint in zip(goal, ("probe.x", "probe.y"), strict=True):
+            low, high = WINDOWS[joint]
+            if not low < place < high:
+                raise ActionNotPossible("the tip does not reach that place")
+        return Centring(lambda: self._needle.tip, goal, axes=len(DESCRIPTION.axes), tick=self.tick_seconds)
+
+    def _draw_microscope(self, state: MicromanipulatorState, event: int) -> bytes | Awaitable[bytes]:
+        self._shown.shown(event, clock.now())
+        return self._draughtsman.microscope(state, event)
 
     @property
     def snapshots(self) -> Sequence[MicromanipulatorState]:

@@ -15,6 +15,7 @@ from lockstep.protocol.description import (
     Geofence,
     Geom,
     Joint,
+    MapView,
     Microphone,
     PlanarBase,
     RangeRing,
@@ -104,7 +105,21 @@ DESCRIPTION = RobotDescription(
             moves=False,
             parameters=(ActionParameter(name="on", label="On", kind="switch", default=True),),
         ),
+        Action(
+            name="go_to",
+            label="Go to",
+            parameters=(
+                ActionParameter(
+                    name="x", label="x", kind="number", unit="m", minimum=-HALF_LENGTH, maximum=HALF_LENGTH
+                ),
+                ActionParameter(name="y", label="y", kind="number", unit="m", minimum=-HALF_WIDTH, maximum=HALF_WIDTH),
+                ActionParameter(
+                    name="yaw", label="Heading", kind="number", unit="rad", minimum=-4, maximum=4, default=0.0
+                ),
+            ),
+        ),
     ),
+    map=MapView(x="base.x", y="base.y", yaw="base.yaw", radius=RADIUS, goal="go_to"),
     cameras=(OVERVIEW, FRONT),
     microphones=(MICROPHONE,),
     wrench=WrenchSensor(name="bumper", body="base", threshold_force=2.0, full_scale_force=80.0, full_scale_torque=20.0),

@@ -8,12 +8,16 @@ import numpy as np
 
 from lockstep.protocol.actions import ParameterValue, StatusItem
 from lockstep.protocol.description import RobotDescription
-from lockstep.robot_bridge.robots.actions import ActionDone, ActionRun
+from lockstep.robot_bridge.control import clock
+from lockstep.robot_bridge.robots.actions import ActionDone, ActionNotPossible, ActionRun
 from lockstep.robot_bridge.robots.base import Measurement, MediaSource, Robot
 from lockstep.robot_bridge.robots.camera_source import CameraSource
 from lockstep.robot_bridge.robots.microphone_source import MicrophoneSource
+from lockstep.robot_bridge.robots.navigation import GridMap, NavigationNow, PlanarPose
 from lockstep.robot_bridge.robots.planar.description import DESCRIPTION, FRONT, MICROPHONE, OVERVIEW, RADIUS, RANGES
 from lockstep.robot_bridge.robots.planar.drawing import FrontDrawing, OverviewDrawing
+from lockstep.robot_bridge.robots.planar.floor_map import has_room, make_map
+from lockstep.robot_bridge.robots.planar.going import Going
 from lockstep.robot_bridge.robots.planar.homing import Homing
 from lockstep.robot_bridge.robots.planar.room import contacts, ray_hits
 from lockstep.robot_bridge.robots.planar.sound import Synthesiser
@@ -24,6 +28,11 @@ __all__ = ["PlanarRobot", "PlanarState"]
 STIFFNESS = 150.0  # N per m/s that a contact blocks: the motors push harder the faster they should go
 HOMING_SPEED = 0.4  # m/s
 HOMING_TURN = 0.8  # rad/s
+GOING_SPEED = 0.6  # m/s
+CLEARANCE = 0.1  # m that `go_to` keeps from everything: the geofence's room to brake in, and some
+LEAVING = 0.4  # m from where it begins, within which it may be nearer
+TOUCHING = 0.02  # m
+HERE = (0.0, 0.0, 0.0)  # the measured pose is one on the map
 ANGLES = RANGES.angle_min + RANGES.angle_increment * np.arange(RANGES.count, dtype=np.float64)
 
 
@@ -49,6 +58,8 @@ class PlanarRobot(Robot):
         self._state = state or PlanarState()
         self._home = self._state[:3]
         self._light = False
+        self._map = make_map(clock.now())
+        self._going: Going | None = None
         self._battery = SimulatedBattery()
         self._command = (0.0, 0.0, 0.0)
         self._braked = False  # the stop holds the wheels
@@ -126,7 +137,40 @@ class PlanarRobot(Robot):
         if name == "light":
             self._light = parameters["on"] is True
             return ActionDone("on" if self._light else "off")
+        if name == "go_to":
+            return self._go((number(parameters["x"]), number(parameters["y"]), number(parameters["yaw"])))
         return Homing(lambda: self._state[:3], self._home, speed=HOMING_SPEED, turn=HOMING_TURN, tick=self.tick_seconds)
+
+    def _go(self, goal: PlanarPose) -> ActionRun:
+        if not has_room(goal[0], goal[1], RADIUS + CLEARANCE):
+            raise ActionNotPossible("there is no room at that place")
+        here = self._state[:2]
+
+        def leaves(x: float, y: float) -> bool:
+            """Return whether the robot fits there on its way out of a narrow place."""
+            return math.dist(here, (x, y)) < LEAVING and has_room(x, y, RADIUS - TOUCHING)
+
+        self._going = Going(
+            lambda: self._state[:3],
+            goal,
+            lambda x, y: has_room(x, y, RADIUS + CLEARANCE) or leaves(x, y),
+            speed=GOING_SPEED,
+            turn=HOMING_TURN,
+            tick=self.tick_seconds,
+            ended=self._arrived,
+        )
+        return self._going
+
+    def _arrived(self) -> None:
+        self._going = None
+
+    def grid_map(self) -> GridMap:
+        return self._map
+
+    def navigation(self) -> NavigationNow:
+        if self._going is None:
+            return NavigationNow(frame=HERE)
+        return NavigationNow(frame=HERE, goal=self._going.goal, path=self._going.path(), path_time=clock.now())
 
     def status(self) -> Sequence[StatusItem]:
         light = StatusItem(name="light", label="Light", kind="switch", value=self._light)
@@ -138,3 +182,9 @@ class PlanarRobot(Robot):
     def _hear(self) -> bytes:
         state = self._state
         return self._sound.segment(math.hypot(state.vx, state.vy) + 0.3 * abs(state.wz))
+
+
+def number(value: ParameterValue) -> float:
+    """Return the value of a parameter that the bridge has checked to be a number."""
+    assert isinstance(value, float | int)
+    return float(value)

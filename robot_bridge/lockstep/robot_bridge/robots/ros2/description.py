@@ -14,6 +14,7 @@ from lockstep.protocol.description import (
     ControlLayer,
     Geom,
     Joint,
+    MapView,
     PlanarBase,
     PositionLimit,
     RangeRing,
@@ -21,12 +22,25 @@ from lockstep.protocol.description import (
     WrenchSensor,
 )
 from lockstep.robot_bridge.robots.ros2.controls import arm_layers, base_layer
-from lockstep.robot_bridge.robots.ros2.settings import Arm, ArmJoint, Base, BaseAxis, Ros2Settings, Service, Servo
+from lockstep.robot_bridge.robots.ros2.settings import (
+    Arm,
+    ArmJoint,
+    Base,
+    BaseAxis,
+    Gripper,
+    MapGoal,
+    Ros2Settings,
+    RosAction,
+    Service,
+    Servo,
+)
 from lockstep.robot_bridge.yaml_file import SettingsPlace
 
-__all__ = ["BASE_JOINTS", "SERVO_AXES", "describe"]
+__all__ = ["BASE_JOINTS", "GOAL_ACTION", "SERVO_AXES", "describe"]
 
 BASE_JOINTS: Final = ("base.x", "base.y", "base.yaw")
+GOAL_ACTION: Final = "go_to"
+FARTHEST: Final = 1e5  # m, of a goal on the map
 BASE_BODY: Final = "base"
 # Four axes are a layer: two sticks move a tool and turn it about its vertical.
 SERVO_AXES: Final = ("tool.x", "tool.y", "tool.z", "tool.rz", "tool.rx", "tool.ry")
@@ -85,7 +99,8 @@ def describe(settings: Ros2Settings) -> RobotDescription:
         position_limits=() if arm is None else tuple(filter(None, map(_position_limit, arm.joints))),
         planar_base=None if base is None else _planar_base(base),
         geofences=settings.geofences,
-        actions=tuple(map(_action, settings.services)),
+        actions=_actions(settings),
+        map=_map(settings),
         hold=settings.hold,
         watchdog=settings.watchdog,
         max_event_age=settings.max_event_age,
@@ -93,7 +108,69 @@ def describe(settings: Ros2Settings) -> RobotDescription:
     )
 
 
-def _action(service: Service) -> Action:
+def _actions(settings: Ros2Settings) -> tuple[Action, ...]:
+    actions = [
+        *map(_service, settings.services),
+        *map(_ros_action, settings.actions),
+        *map(_gripper, settings.grippers),
+    ]
+    if settings.map is not None and settings.map.goal is not None:
+        actions.append(_goal(settings.map.goal))
+    return tuple(actions)
+
+
+def _ros_action(action: RosAction) -> Action:
+    return Action(
+        name=action.name,
+        label=action.label or action.name,
+        moves=action.moves,
+        confirm=action.confirm,
+        parameters=tuple(
+            ActionParameter(
+                name=parameter.name or parameter.field,
+                label=parameter.label or parameter.name or parameter.field,
+                kind=parameter.kind,
+                unit=parameter.unit,
+                minimum=parameter.minimum,
+                maximum=parameter.maximum,
+                choices=parameter.choices,
+                default=parameter.default,
+            )
+            for parameter in action.parameters
+        ),
+    )
+
+
+def _gripper(gripper: Gripper) -> Action:
+    opening = ActionParameter(
+        name="opening", label="Opening", kind="number", unit="%", minimum=0, maximum=100, default=100.0
+    )
+    return Action(name=gripper.name, label=gripper.label, parameters=(opening,))
+
+
+def _goal(goal: MapGoal) -> Action:
+    return Action(
+        name=GOAL_ACTION,
+        label=goal.label,
+        parameters=(
+            ActionParameter(name="x", label="x", kind="number", unit="m", minimum=-FARTHEST, maximum=FARTHEST),
+            ActionParameter(name="y", label="y", kind="number", unit="m", minimum=-FARTHEST, maximum=FARTHEST),
+            ActionParameter(name="yaw", label="Heading", kind="number", unit="rad", minimum=-4, maximum=4, default=0.0),
+        ),
+    )
+
+
+def _map(settings: Ros2Settings) -> MapView | None:
+    if settings.map is None:
+        return None
+    if settings.base is None:
+        raise SettingsPlace(("map",), "a map needs a base, whose place on it is shown")
+    x, y, yaw = BASE_JOINTS
+    radius = settings.base.radius or 0.1
+    return MapView(x=x, y=y, yaw=yaw, radius=radius, goal="" if settings.map.goal is None else GOAL_ACTION)
+
+
+def _service(service: Service) -> Action:
     on = ActionParameter(name="on", label="On", kind="switch", default=True)
     return Action(
         name=service.name,

@@ -7,17 +7,19 @@ from lockstep.protocol.description import RobotDescription
 from lockstep.robot_bridge.control import clock
 from lockstep.robot_bridge.robots.actions import ActionRun
 from lockstep.robot_bridge.robots.base import Measurement, MediaSource, Robot
+from lockstep.robot_bridge.robots.navigation import GridMap, NavigationNow
+from lockstep.robot_bridge.robots.ros2.actions.ros_actions import RosActions
 from lockstep.robot_bridge.robots.ros2.drives.arm_drive import ArmDrive
 from lockstep.robot_bridge.robots.ros2.drives.base_drive import BaseDrive
 from lockstep.robot_bridge.robots.ros2.drives.drive import Drive
 from lockstep.robot_bridge.robots.ros2.drives.servo_drive import ServoDrive
 from lockstep.robot_bridge.robots.ros2.drives.watchdog_rest import REST_CALL, rest_arguments
+from lockstep.robot_bridge.robots.ros2.mapping.map_topics import MapReader
 from lockstep.robot_bridge.robots.ros2.ros_side import RosSide
 from lockstep.robot_bridge.robots.ros2.sensing.battery import BatteryTopic
 from lockstep.robot_bridge.robots.ros2.sensing.camera import CameraSource
 from lockstep.robot_bridge.robots.ros2.sensing.diagnostics import DiagnosticsTopic
 from lockstep.robot_bridge.robots.ros2.sensing.sensors import LockoutTopic, RangeSensor, WrenchTopic
-from lockstep.robot_bridge.robots.ros2.services import Services
 from lockstep.robot_bridge.robots.ros2.settings import Ros2Settings
 
 __all__ = ["Ros2Robot"]
@@ -43,11 +45,16 @@ class Ros2Robot(Robot):
             arm = None if settings.arm is None else ArmDrive(self._ros, settings.arm, tick)
             servo = None if settings.servo is None else ServoDrive(self._ros, settings.servo, tick)
             self._drives: list[Drive] = [drive for drive in (base, arm, servo) if drive is not None]
+            self._map = None
+            if settings.map is not None and base is not None:
+                self._map = MapReader(self._ros, settings.map, base.pose)
+            self._actions = RosActions(self._ros, settings)
             self.rest_arguments = rest_arguments(
                 settings,
                 base=None if base is None else base.full_topic,
                 arm=None if arm is None else arm.full_topic,
                 servo=None if servo is None else servo.full_topic,
+                actions=self._actions.moving,
             )
             if self.rest_arguments:
                 self.rest_call = REST_CALL
@@ -57,7 +64,6 @@ class Ros2Robot(Robot):
             self._batteries = [BatteryTopic(self._ros, battery) for battery in settings.batteries]
             diagnostics = settings.diagnostics
             self._diagnostics = None if diagnostics is None else DiagnosticsTopic(self._ros, diagnostics)
-            self._services = Services(self._ros, settings.services)
             self._cameras = [CameraSource(self._ros, camera) for camera in settings.cameras]
             self._ros.start()
             if self._lockout is not None:
@@ -78,6 +84,7 @@ class Ros2Robot(Robot):
     def tick(self) -> None:
         if self._ros.failure is not None:
             raise self._ros.failure
+        self._actions.tick()
 
     def measure(self) -> Measurement:
         now = clock.now()
@@ -86,6 +93,9 @@ class Ros2Robot(Robot):
         for sensor in (self._ranges, self._wrench, *self._cameras):
             if sensor is not None:
                 faults += sensor.faults(now)
+        faults += self._actions.faults(now)
+        if self._map is not None:
+            faults += self._map.faults(now)
         return Measurement(
             axes=[value for part in sensed for value in part.axes],
             joints=[value for part in sensed for value in part.joints],
@@ -99,12 +109,18 @@ class Ros2Robot(Robot):
         return "" if self._lockout is None else self._lockout.reason(clock.now())
 
     def begin_action(self, name: str, parameters: Mapping[str, ParameterValue]) -> ActionRun:
-        return self._services.begin(name, parameters)
+        return self._actions.begin(name, parameters)
 
     def status(self) -> Sequence[StatusItem]:
         now = clock.now()
         items = [item for battery in self._batteries for item in battery.items(now)]
         return items + ([] if self._diagnostics is None else self._diagnostics.items(now))
+
+    def grid_map(self) -> GridMap | None:
+        return None if self._map is None else self._map.grid_map()
+
+    def navigation(self) -> NavigationNow | None:
+        return None if self._map is None else self._map.navigation(self._actions.goal())
 
     def positions(self) -> Sequence[float]:
         now = clock.now()
@@ -127,7 +143,7 @@ class Ros2Robot(Robot):
 
     def close(self) -> None:
         try:
-            call_all([drive.end for drive in self._drives])
+            call_all([*(drive.end for drive in self._drives), self._actions.settle])
         finally:
             self._ros.close()
 

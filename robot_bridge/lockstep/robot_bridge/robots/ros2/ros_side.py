@@ -43,6 +43,7 @@ class RosSide:
         self.failure: Exception | None = None
         self._closed = False
         self._publishers: list[Any] = []
+        self._action_clients: list[Any] = []
         self._rclpy = rclpy
         self._context = rclpy.Context()
         try:
@@ -85,6 +86,10 @@ class RosSide:
         self._publishers.append(publisher)
         return publisher
 
+    def subscribe_kept(self, kind: Any, topic: str, callback: Callable[[Any], None], *, depth: int = 1) -> None:
+        """Subscribe to a topic whose publishers keep their newest message for subscribers that come later."""
+        self._node.create_subscription(kind, topic, callback, self._profile("RELIABLE", depth, "TRANSIENT_LOCAL"))
+
     def subscribe(self, kind: Any, topic: str, callback: Callable[[Any], None], *, depth: int = 1) -> None:
         """Subscribe to a sensor: the newest message only, from reliable and best-effort publishers alike.
 
@@ -92,16 +97,38 @@ class RosSide:
         """
         self._node.create_subscription(kind, topic, callback, self._profile("BEST_EFFORT", depth))
 
-    def service(self, name: str) -> Any:
-        """Import and return a class of std_srvs.
+    def service(self, name: str, package: str = "std_srvs") -> Any:
+        """Import and return the class of a service.
 
         Raises:
             RobotUnavailable: it is not installed.
         """
         try:
-            return getattr(import_module("std_srvs.srv"), name)
+            return getattr(import_module(f"{package}.srv"), name)
         except (ImportError, AttributeError) as error:
-            raise RobotUnavailable(f"ROS 2 services std_srvs/{name} are missing: {error}") from error
+            raise RobotUnavailable(f"ROS 2 services {package}/{name} are missing: {error}") from error
+
+    def action(self, type: str) -> Any:
+        """Import and return an action class, "package/Name".
+
+        Raises:
+            RobotUnavailable: it is not installed.
+        """
+        package, _, name = type.partition("/")
+        try:
+            return getattr(import_module(f"{package}.action"), name.rpartition("/")[2])
+        except (ImportError, AttributeError) as error:
+            raise RobotUnavailable(f"the ROS 2 action {type} is missing: {error}") from error
+
+    def action_client(self, kind: Any, name: str) -> Any:
+        """Return a client of an action, whose answers come on the node's thread. Make it before `start`."""
+        client = import_module("rclpy.action").ActionClient(self._node, kind, name)
+        self._action_clients.append(client)
+        return client
+
+    def full_name(self, name: str) -> str:
+        """Return the full name of a topic, a service or an action."""
+        return str(self._node.resolve_service_name(name))
 
     def client(self, kind: Any, service: str) -> Any:
         """Return a client, whose `call_async` answers on the node's thread. Make it before `start`."""
@@ -134,14 +161,17 @@ class RosSide:
         self._executor.shutdown(timeout_sec=JOIN_SECONDS)
         if self._thread.is_alive():
             self._thread.join(JOIN_SECONDS)
+        for client in self._action_clients:
+            with suppress(Exception):
+                client.destroy()
         self._node.destroy_node()
         self._context.try_shutdown()
 
-    def _profile(self, reliability: str, depth: int = 1) -> Any:
+    def _profile(self, reliability: str, depth: int = 1, durability: str = "VOLATILE") -> Any:
         return self._qos.QoSProfile(
             depth=depth,
             reliability=self._qos.ReliabilityPolicy[reliability],
-            durability=self._qos.DurabilityPolicy.VOLATILE,
+            durability=self._qos.DurabilityPolicy[durability],
             history=self._qos.HistoryPolicy.KEEP_LAST,
         )
 

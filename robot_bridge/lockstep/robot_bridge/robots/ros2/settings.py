@@ -7,6 +7,7 @@ from msgspec import Meta, Struct, field
 from lockstep.protocol.description import Body, ControlLayer, Geofence
 
 __all__ = [
+    "ActionField",
     "Arm",
     "ArmCommand",
     "ArmJoint",
@@ -15,9 +16,14 @@ __all__ = [
     "Battery",
     "CameraTopic",
     "Diagnostics",
+    "Gripper",
     "JointStates",
+    "MapGoal",
+    "MapPlace",
+    "MapTopics",
     "Odometry",
     "Ranges",
+    "RosAction",
     "Ros2Settings",
     "Service",
     "Servo",
@@ -28,6 +34,10 @@ __all__ = [
 
 Name = Annotated[str, Meta(min_length=1, max_length=100)]
 Topic = Annotated[str, Meta(pattern=r"^[~/A-Za-z_][A-Za-z0-9_/]*$", max_length=200)]
+InterfaceType = Annotated[str, Meta(pattern=r"^[a-z][a-z0-9_]*/(action/)?[A-Z][A-Za-z0-9]*$", max_length=200)]
+FieldPath = Annotated[str, Meta(pattern=r"^[a-z][a-z0-9_]*(\.[a-z][a-z0-9_]*)*$", max_length=200)]
+MaybeFieldPath = Annotated[str, Meta(pattern=r"^([a-z][a-z0-9_]*(\.[a-z][a-z0-9_]*)*)?$", max_length=200)]
+MaybeTopic = Annotated[str, Meta(pattern=r"^([~/A-Za-z_][A-Za-z0-9_/]*)?$", max_length=200)]
 Positive = Annotated[float, Meta(gt=0, le=1e6)]
 NotNegative = Annotated[float, Meta(ge=0, le=1e6)]
 Timeout = Annotated[float, Meta(gt=0, le=10)]
@@ -193,6 +203,84 @@ class Service(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     timeout: Annotated[float, Meta(gt=0, le=600)] = 10.0  # s for the answer
 
 
+class ActionField(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """A parameter of an action, which is a field of its goal."""
+
+    field: FieldPath  # in the goal, "order" or "target.speed"
+    name: str = ""  # "": the field
+    label: str = ""  # "": the name
+    kind: Literal["number", "choice", "switch"] = "number"
+    unit: str = ""
+    minimum: float | None = None
+    maximum: float | None = None
+    choices: Annotated[tuple[str, ...], Meta(max_length=32)] = ()
+    default: bool | float | str | None = None
+
+
+class RosAction(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """A ROS 2 action that becomes an action of the robot. docs/ros2.md says when it is cancelled."""
+
+    name: Name
+    action: Topic  # name of the action server
+    type: InterfaceType  # "nav2_msgs/DockRobot"
+    label: str = ""  # "": the name
+    moves: bool = True
+    confirm: str = ""
+    goal: dict[FieldPath, bool | float | str] = {}  # fields of the goal that are always the same
+    parameters: Annotated[tuple[ActionField, ...], Meta(max_length=8)] = ()
+    left: MaybeFieldPath = ""  # number in the feedback that goes to 0 until the goal is reached
+    progress: MaybeFieldPath = ""  # number in the feedback that goes from 0 to 1
+    text: MaybeFieldPath = ""  # field of the feedback that is shown while it runs
+    result: MaybeFieldPath = ""  # field of the result that is shown at the end
+    timeout: Annotated[float, Meta(gt=0, le=60)] = 5.0  # s for the server to accept a goal, or to end a cancelled one
+
+
+class Gripper(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """A control_msgs/GripperCommand action: its opening is the parameter of an action of the robot."""
+
+    name: Name = "gripper"
+    label: str = "Gripper"
+    action: Topic = "/gripper_controller/gripper_cmd"
+    closed: float = 0.0  # position, m or rad as the controller takes it
+    open: float
+    effort: NotNegative = 0.0  # the most, N or N m; 0: as the controller likes
+    unit: Literal["m", "rad"] = "m"
+    timeout: Annotated[float, Meta(gt=0, le=60)] = 5.0
+
+
+class MapPlace(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """How the bridge knows where the frame of the odometry is on the map."""
+
+    source: Literal["tf", "topic", "same"] = "tf"  # same: the odometry is in the map's frame
+    topic: Topic = "/amcl_pose"  # the robot's pose on the map
+    message: Literal["PoseWithCovarianceStamped", "PoseStamped"] = "PoseWithCovarianceStamped"
+    odometry: str = "odom"  # frame_id of the odometry, for tf
+    timeout: Annotated[float, Meta(gt=0, le=3600)] = 10.0  # s after which the place counts as not known
+
+
+class MapGoal(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """The action that drives the robot to a pose on the map."""
+
+    action: Topic = "/navigate_to_pose"
+    type: InterfaceType = "nav2_msgs/NavigateToPose"
+    pose: FieldPath = "pose"  # field of the goal, a geometry_msgs/PoseStamped
+    left: MaybeFieldPath = "distance_remaining"  # m, in the feedback
+    result: MaybeFieldPath = ""
+    label: str = "Go to"
+    timeout: Annotated[float, Meta(gt=0, le=60)] = 5.0
+
+
+class MapTopics(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """The map of a base: what it is drawn from, and how the base is sent to a place on it."""
+
+    topic: Topic = "/map"  # nav_msgs/OccupancyGrid
+    durable: bool = True  # its publisher keeps the newest for subscribers that come later
+    frame: Name = "map"
+    place: MapPlace = field(default_factory=MapPlace)
+    path: MaybeTopic = "/plan"  # nav_msgs/Path
+    goal: MapGoal | None = None
+
+
 class Lockout(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """A std_msgs/Bool topic: true keeps everybody from driving, and so does silence for longer than `timeout`."""
 
@@ -220,6 +308,9 @@ class Ros2Settings(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
     batteries: Annotated[tuple[Battery, ...], Meta(max_length=8)] = ()
     diagnostics: Diagnostics | None = None
     services: Annotated[tuple[Service, ...], Meta(max_length=32)] = ()
+    actions: Annotated[tuple[RosAction, ...], Meta(max_length=32)] = ()
+    grippers: Annotated[tuple[Gripper, ...], Meta(max_length=4)] = ()
+    map: MapTopics | None = None  # needs a base
     cameras: Annotated[tuple[CameraTopic, ...], Meta(max_length=8)] = ()
     geofences: Annotated[tuple[Geofence, ...], Meta(max_length=32)] = ()
     bodies: tuple[Body, ...] = ()  # of the kinematic model, besides the base

@@ -4,6 +4,7 @@ import math
 from typing import Any, NamedTuple
 
 from lockstep.robot_bridge.control import clock
+from lockstep.robot_bridge.robots.navigation import PlanarPose
 from lockstep.robot_bridge.robots.ros2.drives.command_stream import Said
 from lockstep.robot_bridge.robots.ros2.drives.drive import Drive, Sensed
 from lockstep.robot_bridge.robots.ros2.drives.twists import TwistMaker
@@ -71,6 +72,11 @@ class BaseDrive(Drive):
         state = arrived.value
         axes = [value for value, has in zip(state[3:], self._has, strict=True) if has]
         return Sensed(axes, list(state[:3]), max(map(abs, state[3:])) <= self._still)
+
+    def pose(self, now: float) -> PlanarPose | None:
+        """Return the measured pose; None while it is not known. May be called from any thread."""
+        arrived = self._odometry.fresh(now)
+        return None if arrived is None else (arrived.value.x, arrived.value.y, arrived.value.yaw)
 
     def joints(self, now: float) -> list[float]:
         arrived = self._odometry.fresh(now)

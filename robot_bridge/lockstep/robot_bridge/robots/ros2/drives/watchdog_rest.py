@@ -1,10 +1,10 @@
 """Publishes zero to a ROS 2 robot from the watchdog's process, by a separate node, also when the bridge was killed.
 
-A base and a tool get a zero twist, a controller of velocities zeros. An arm that gets positions stays at the last one
-(docs/ros2.md) and needs nothing.
+A base and a tool get a zero twist, a controller of velocities zeros. Goals of actions that move the robot are
+cancelled. An arm that gets positions stays at the last one (docs/ros2.md) and needs nothing.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any
 
@@ -15,21 +15,29 @@ from lockstep.robot_bridge.robots.ros2.drives.arm_drive import PACKAGES, velocit
 from lockstep.robot_bridge.robots.ros2.drives.servo_drive import tool_twist
 from lockstep.robot_bridge.robots.ros2.drives.twists import TwistMaker
 from lockstep.robot_bridge.robots.ros2.ros_side import RosSide
-from lockstep.robot_bridge.robots.ros2.settings import Ros2Settings
+from lockstep.robot_bridge.robots.ros2.settings import Ros2Settings, RosAction
 from lockstep.robot_bridge.watchdog.watchdog_process import Act
 
 __all__ = ["REST_CALL", "prepare", "rest_arguments"]
 
+CANCELS = "action_msgs/CancelGoal"  # stands for the type of an action, which the process does not need
 REST_CALL = f"{__name__}:prepare"
 
 _read_settings = msgspec.json.Decoder(Ros2Settings)
 
 
-def rest_arguments(settings: Ros2Settings, *, base: str | None, arm: str | None, servo: str | None) -> tuple[str, ...]:
+def rest_arguments(
+    settings: Ros2Settings,
+    *,
+    base: str | None,
+    arm: str | None,
+    servo: str | None,
+    actions: Sequence[str] = (),
+) -> tuple[str, ...]:
     """Return the arguments of `prepare`; none if every part stays where it is without a word.
 
     `base`, `arm`, `servo`: the full names of the parts' command topics, since the process has a node of another name;
-    None for a part that the robot does not have.
+    None for a part that the robot does not have. `actions`: full names of action servers whose goals move the robot.
     """
     replace = msgspec.structs.replace
     own = Ros2Settings(
@@ -45,7 +53,8 @@ def rest_arguments(settings: Ros2Settings, *, base: str | None, arm: str | None,
     if settings.servo is not None and servo is not None:
         command = replace(settings.servo.command, topic=servo)
         own = replace(own, servo=replace(settings.servo, command=command))
-    if own.base is None and own.arm is None and own.servo is None:
+    own = replace(own, actions=tuple(RosAction(name=name, action=name, type=CANCELS) for name in actions))
+    if own.base is None and own.arm is None and own.servo is None and not own.actions:
         return ()
     return (msgspec.json.encode(own).decode(),)
 
@@ -73,9 +82,17 @@ def prepare(encoded: str) -> Act:
         still = [0.0] * len(SERVO_AXES)
         zeros.append((ros.publisher(kind, command.topic), partial(tool_twist, ros, kind, command, still)))
 
+    cancels = ros.service("CancelGoal", "action_msgs")
+    cancelling = [ros.client(cancels, f"{action.action}/_action/cancel_goal") for action in settings.actions]
+
     def rest() -> bool:
         # Subscribers and these publishers have found each other.
         is_heard = all(publisher.get_subscription_count() > 0 for publisher, _ in zeros)
+        for client in cancelling:
+            if client.service_is_ready():
+                client.call_async(cancels.Request())  # no id and no time: all goals (rcl_interfaces, CancelGoal)
+            elif not zeros:
+                is_heard = False
         for publisher, make in zeros:
             publisher.publish(make())
         ros.flush()

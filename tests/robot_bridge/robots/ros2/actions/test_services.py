@@ -7,7 +7,7 @@ import pytest
 
 from lockstep.robot_bridge.control import clock
 from lockstep.robot_bridge.robots.actions import ActionFailed, ActionNotPossible
-from lockstep.robot_bridge.robots.ros2.services import Services
+from lockstep.robot_bridge.robots.ros2.actions.services import Services
 from lockstep.robot_bridge.robots.ros2.settings import Service
 
 

@@ -1,0 +1,1 @@
+"""Maps of the robot, on their way to the console."""

@@ -1,0 +1,1 @@
+"""The map of a ROS 2 robot, and its place on it."""

@@ -1,0 +1,1 @@
+"""Actions of a ROS 2 robot."""
