@@ -6,6 +6,7 @@ the frame WORLD. The frames of bodies on joints come with each feedback, the oth
 
 from collections.abc import Iterable, Mapping
 
+from foxglove_schemas_protobuf.CameraCalibration_pb2 import CameraCalibration
 from foxglove_schemas_protobuf.Color_pb2 import Color
 from foxglove_schemas_protobuf.CubePrimitive_pb2 import CubePrimitive
 from foxglove_schemas_protobuf.CylinderPrimitive_pb2 import CylinderPrimitive
@@ -21,11 +22,12 @@ from foxglove_schemas_protobuf.SpherePrimitive_pb2 import SpherePrimitive
 from foxglove_schemas_protobuf.Vector3_pb2 import Vector3
 from google.protobuf.timestamp_pb2 import Timestamp
 
-from lockstep.protocol.description import Body, Geom, PlanarBase, RobotDescription
+from lockstep.protocol.description import Body, Camera, Geom, PlanarBase, RobotDescription
+from lockstep.protocol.description import CameraCalibration as Calibration
 from lockstep.server.scene.kinematics import Pose as BodyPose
 from lockstep.server.scene.kinematics import body_pose, joined
 
-__all__ = ["WORLD", "fixed_transforms", "moving_transforms", "odometry", "robot_shapes"]
+__all__ = ["WORLD", "camera_calibration", "fixed_transforms", "moving_transforms", "odometry", "robot_shapes"]
 
 WORLD = "world"  # frame of bodies without a parent, and of the base's pose
 SECOND = 1_000_000_000
@@ -38,8 +40,34 @@ def moving_transforms(description: RobotDescription, joints: Mapping[str, float]
 
 
 def fixed_transforms(description: RobotDescription, captured: int) -> bytes:
-    """Return FrameTransforms of the bodies without joints."""
-    return _transforms((each for each in description.bodies if not each.joints), {}, captured)
+    """Return FrameTransforms of the bodies without joints, and of the cameras whose place is known.
+
+    A camera's frame is its optical one and has the camera's name, as its pictures say; a body of that name goes first.
+    """
+    bodies = [each for each in description.bodies if not each.joints]
+    taken = {WORLD, *(each.name for each in description.bodies)}
+    for camera in description.cameras:
+        place = camera.calibration
+        if place is not None and camera.name not in taken:
+            frame = Body(name=camera.name, parent=place.body, position=place.position, orientation=place.orientation)
+            bodies.append(frame)
+    return _transforms(bodies, {}, captured)
+
+
+def camera_calibration(camera: Camera, found: Calibration, captured: int) -> bytes:
+    """Return the CameraCalibration of a camera for its full size, in its own frame."""
+    message = CameraCalibration(
+        timestamp=_stamp(captured),
+        frame_id=camera.name,
+        width=camera.width,
+        height=camera.height,
+        distortion_model=found.distortion_model,
+        D=found.distortion,
+        K=(found.fx, 0.0, found.cx, 0.0, found.fy, found.cy, 0.0, 0.0, 1.0),
+        R=(1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0),
+        P=(found.fx, 0.0, found.cx, 0.0, 0.0, found.fy, found.cy, 0.0, 0.0, 0.0, 1.0, 0.0),
+    )
+    return message.SerializeToString()
 
 
 def _transforms(bodies: Iterable[Body], joints: Mapping[str, float], captured: int) -> bytes:
