@@ -18,7 +18,7 @@ OWN = frozenset(
         *("cameras", "microphones", "whip", "speaker", "relay", "relay_public", "relay_codec", "observers_direct"),
         *("speed_cap", "seat_timeout", "seat_idle_seconds", "seat_claim_seconds", "observer_feedback_hz"),
         *("max_peers", "max_relayed", "max_thumbnails", "reserved_places", "scene", "scene_hz", "media", "recording"),
-        "foxglove",
+        *("foxglove", "rerun"),
     }
 )
 # A camera belongs to one robot: given to the whole console, it would show the same at every robot.
