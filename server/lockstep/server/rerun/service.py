@@ -34,6 +34,7 @@ class RerunService:
 
     Attributes:
         running: set while a process takes the session
+        process_id: of that process; None: there is none
     """
 
     def __init__(
@@ -46,6 +47,7 @@ class RerunService:
     ) -> None:
         """`on_dropped` gets the number of items that the console's own queue has dropped since the last call."""
         self.running = asyncio.Event()
+        self.process_id: int | None = None
         self._settings = settings
         self._target = target_of(settings.to or "")
         self._media = media
@@ -69,6 +71,7 @@ class RerunService:
         async with self._process() as (process, feed):
             self._records.begin(feed, RecordClock(time.time_ns(), time.monotonic_ns()))
             self._media.record(self._records.take_frame, self._keyframe_seconds)
+            self.process_id = process.pid
             self.running.set()
             told, keyframe_at = 0, time.monotonic()
             while process.returncode is None:
@@ -101,6 +104,7 @@ class RerunService:
             yield process, feed
         finally:
             self.running.clear()
+            self.process_id = None
             self._records.end()
             self._media.record(None, self._keyframe_seconds)
             feed.close()
