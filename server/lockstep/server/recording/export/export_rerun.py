@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+from lockstep.server.recording.errors import RecordingDamaged
 from lockstep.server.recording.export.rerun.session_log import Moment, SessionLog, new_stream
 from lockstep.server.recording.format.payload import own_record_of
 from lockstep.server.recording.format.records import ReportRecord, TraceRecord
@@ -24,6 +25,8 @@ def export(path: Path, out: Path | None, task: str) -> list[Path]:
         try:
             _write(reader, SessionLog(stream))
             stream.flush()
+        except (OverflowError, ValueError) as error:
+            raise RecordingDamaged(f"{path.name}: Rerun has no such value: {error}") from error
         finally:
             stream.disconnect()
     return [target]

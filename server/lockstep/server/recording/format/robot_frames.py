@@ -4,7 +4,7 @@ Each body is a frame with the body's name in its parent's, as in the robot descr
 the frame WORLD. The frames of bodies on joints come with each feedback, the others, and the shapes, once.
 """
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 
 from foxglove_schemas_protobuf.CameraCalibration_pb2 import CameraCalibration
 from foxglove_schemas_protobuf.Color_pb2 import Color
@@ -27,7 +27,16 @@ from lockstep.protocol.description import CameraCalibration as Calibration
 from lockstep.server.scene.kinematics import Pose as BodyPose
 from lockstep.server.scene.kinematics import body_pose, joined
 
-__all__ = ["WORLD", "camera_calibration", "fixed_transforms", "moving_transforms", "odometry", "robot_shapes"]
+__all__ = [
+    "WORLD",
+    "base_body",
+    "camera_calibration",
+    "camera_frames",
+    "fixed_transforms",
+    "moving_transforms",
+    "odometry",
+    "robot_shapes",
+]
 
 WORLD = "world"  # frame of bodies without a parent, and of the base's pose
 SECOND = 1_000_000_000
@@ -44,14 +53,17 @@ def fixed_transforms(description: RobotDescription, captured: int) -> bytes:
 
     A camera's frame is its optical one and has the camera's name, as its pictures say; a body of that name goes first.
     """
-    bodies = [each for each in description.bodies if not each.joints]
+    fixed = [each for each in description.bodies if not each.joints]
+    return _transforms([*fixed, *camera_frames(description)], {}, captured)
+
+
+def camera_frames(description: RobotDescription) -> Iterator[Body]:
+    """Yield the optical frames of the cameras whose place is known, as bodies."""
     taken = {WORLD, *(each.name for each in description.bodies)}
     for camera in description.cameras:
-        place = camera.calibration
-        if place is not None and camera.name not in taken:
-            frame = Body(name=camera.name, parent=place.body, position=place.position, orientation=place.orientation)
-            bodies.append(frame)
-    return _transforms(bodies, {}, captured)
+        at = camera.calibration
+        if at is not None and camera.name not in taken:
+            yield Body(name=camera.name, parent=at.body, position=at.position, orientation=at.orientation)
 
 
 def camera_calibration(camera: Camera, found: Calibration, captured: int) -> bytes:
@@ -129,7 +141,7 @@ def odometry(description: RobotDescription, base: PlanarBase, pose: Pose, axes: 
     found = Odometry(
         timestamp=_stamp(captured),
         frame_id=WORLD,
-        body_frame_id=_base_body(description, base),
+        body_frame_id=base_body(description, base),
         pose=pose,
         linear_velocity=Vector3(x=values.get(base.forward, 0.0), y=values.get(base.left, 0.0)),
         angular_velocity=Vector3(z=values.get(base.turn, 0.0)),
@@ -137,7 +149,7 @@ def odometry(description: RobotDescription, base: PlanarBase, pose: Pose, axes: 
     return found.SerializeToString()
 
 
-def _base_body(description: RobotDescription, base: PlanarBase) -> str:
+def base_body(description: RobotDescription, base: PlanarBase) -> str:
     """Return the name of the body that turns with the base; "" if no body does."""
     return next((body.name for body in description.bodies for joint in body.joints if joint.joint == base.yaw), "")
 
