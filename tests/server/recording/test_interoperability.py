@@ -15,6 +15,7 @@ from foxglove_schemas_protobuf.CompressedAudio_pb2 import CompressedAudio
 from foxglove_schemas_protobuf.CompressedVideo_pb2 import CompressedVideo as Message
 from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 from google.protobuf.descriptor_pb2 import FileDescriptorSet
+from mcap.decoder import DecoderFactory as McapDecoderFactory
 from mcap.reader import make_reader
 from mcap.records import Schema
 from mcap_protobuf.decoder import DecoderFactory
@@ -95,11 +96,11 @@ def test_every_message_decodes_by_the_schema_that_is_in_the_file(file: Path) -> 
     assert seen["/axis_commands"] == EVENTS - 1
 
 
-class JsonFactory:
+class JsonFactory(McapDecoderFactory):
     """Decodes JSON that its schema permits."""
 
-    def decoder_for(self, encoding: str, schema: Schema | None) -> Callable[[bytes], Any] | None:
-        if encoding != "json" or schema is None:
+    def decoder_for(self, message_encoding: str, schema: Schema | None) -> Callable[[bytes], Any] | None:
+        if message_encoding != "json" or schema is None:
             return None
         validator = jsonschema.Draft202012Validator(json.loads(schema.data))
 

@@ -10,7 +10,7 @@ import shutil
 import struct
 from collections.abc import Iterable
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 from rosbags.interfaces import (
     Connection,
@@ -38,7 +38,7 @@ __all__ = ["export"]
 
 FEEDBACK, ROBOT = OWN_TOPICS[FeedbackRecord], OWN_TOPICS[RobotRecord]
 TEXTS = set(OWN_TOPICS.values()) - {SIGNATURE, WRENCH}  # what signs the file signs no bag
-VERSION = 8  # of metadata.yaml: ROS 2 from Iron on reads it
+VERSION: Final = 8  # of metadata.yaml: ROS 2 from Iron on reads it
 CANNOT_BE_WRITTEN = (struct.error, OverflowError, ValueError)  # such as a time after 2038
 NOT_BOUNDED = QosTime(2147483647, 4294967295)
 MOST_NAME = 60  # characters of a camera's name in a topic

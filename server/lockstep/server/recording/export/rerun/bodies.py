@@ -72,7 +72,7 @@ def log_cameras(stream: rr.RecordingStream, cameras: Iterable[Camera], paths: Bo
 
 
 def _transform(position: Iterable[float], orientation: Iterable[float]) -> rr.Transform3D:
-    return rr.Transform3D(translation=tuple(position), quaternion=_xyzw(orientation))
+    return rr.Transform3D(translation=tuple(position), quaternion=rr.Quaternion(xyzw=_xyzw(orientation)))
 
 
 def _xyzw(orientation: Iterable[float]) -> tuple[float, ...]:
