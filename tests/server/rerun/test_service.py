@@ -14,7 +14,7 @@ import pytest
 
 from lockstep.protocol.console import SeatRequest
 from tests.server.recording.rrd import entities, recording_ids
-from tests.server.rig import PATIENCE, Rig, TestPeer, running_rig
+from tests.server.rig import PATIENCE, Rig, TestPeer, eventually, running_rig
 
 VIEWER = Path(sys.executable).with_name("rerun")  # Rerun's own program, which the wheel brings
 
@@ -123,6 +123,26 @@ async def test_a_viewer_that_never_reads_and_a_process_that_is_killed_take_nothi
             events += [(await operator.drive([0.1, 0.0, 0.0])).event for _ in range(20)]
             assert not operator.closed.is_set()
     assert events == sorted(set(events))
+
+
+async def test_a_process_that_takes_nothing_is_ended_and_another_begins(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setattr("lockstep.server.rerun.service.RETRY_SECONDS", 0.1)
+    monkeypatch.setattr("lockstep.server.rerun.service.BLOCKED_SECONDS", 0.3)
+    async with running_rig(rerun={"to": str(tmp_path / "a.rrd")}) as rig, rig.peer("operator") as operator:
+        await running(rig)
+        await take_seat(operator)
+        service = rig.dependencies.rerun
+        assert service is not None
+        assert service.process_id is not None
+        stopped = service.process_id
+        os.kill(stopped, signal.SIGSTOP)
+        async with asyncio.timeout(PATIENCE):
+            while service.process_id in (stopped, None):
+                await operator.drive([0.1, 0.0, 0.0])
+        await eventually((tmp_path / "a-2.rrd").exists)
+        assert not operator.closed.is_set()
 
 
 async def test_without_a_word_of_it_there_is_no_process() -> None:

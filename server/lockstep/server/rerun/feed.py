@@ -61,15 +61,15 @@ class Feed:
         return 0.0 if since is None else now - since
 
     def close(self) -> None:
-        """End after what waits. Does not block; `join` waits."""
+        """End after what waits, or at once if it has not begun. Does not block; `join` waits."""
+        if self._thread.ident is None and not self._closing.is_set():
+            os.close(self._pipe)
         self._closing.set()
         self._news.set()
 
     def join(self) -> None:
         """Wait for the end. Blocks for as long as the process neither reads nor ends."""
-        if self._thread.ident is None:
-            os.close(self._pipe)
-        else:
+        if self._thread.ident is not None:
             self._thread.join()
 
     def _run(self) -> None:

@@ -184,6 +184,8 @@ def main() -> None:
     os.nice(NICE)
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # a terminal's goes to the console, which ends this process
     resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
+    os.write(sys.stdout.fileno(), b"ready\n")
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # nobody reads what a library might print
     try:
         take_items(iter(Pipe(sys.stdin.fileno())), Sink(kind, value, int(file_bytes)))
     except OSError as error:

@@ -23,6 +23,7 @@ log = structlog.get_logger(__name__)
 
 MODULE = "lockstep.server.rerun.rerun_process"
 RETRY_SECONDS = 5.0  # until a process that has ended is started again
+START_SECONDS = 60.0  # until it reads
 LOOK_SECONDS = 0.25  # between two looks at the feed
 BLOCKED_SECONDS = 10.0  # that the process may take nothing: its viewer does not read, and never will
 KEYFRAME_SECONDS = 2.0  # between two keyframes that are asked for after pictures were dropped
@@ -69,6 +70,9 @@ class RerunService:
     async def _serve(self) -> int:
         """Run one process; return its exit code."""
         async with self._process() as (process, feed):
+            if not await _is_ready(process):
+                return await _killed(process)
+            feed.start()
             self._records.begin(feed, RecordClock(time.time_ns(), time.monotonic_ns()))
             self._media.record(self._records.take_frame, self._keyframe_seconds)
             self.process_id = process.pid
@@ -85,8 +89,7 @@ class RerunService:
                     self._media.request_keyframes()
                 if feed.blocked_for(now) > BLOCKED_SECONDS:
                     log.warning("Rerun takes nothing", seconds=BLOCKED_SECONDS)
-                    process.kill()
-                    await process.wait()
+                    return await _killed(process)
             return process.returncode
 
     @asynccontextmanager
@@ -97,10 +100,9 @@ class RerunService:
         try:
             kind, value = self._target
             words = (sys.executable, "-m", MODULE, kind, value, str(self._settings.file_bytes))
-            process = await asyncio.create_subprocess_exec(*words, stdin=reading, stdout=asyncio.subprocess.DEVNULL)
+            process = await asyncio.create_subprocess_exec(*words, stdin=reading, stdout=asyncio.subprocess.PIPE)
             os.close(reading)
             reading = -1
-            feed.start()
             yield process, feed
         finally:
             self.running.clear()
@@ -113,12 +115,28 @@ class RerunService:
             await asyncio.shield(_end(process, feed))
 
 
+async def _is_ready(process: asyncio.subprocess.Process) -> bool:
+    """Wait until the process has loaded what it needs, which takes seconds on a small computer."""
+    if process.stdout is None:
+        return False
+    try:
+        async with asyncio.timeout(START_SECONDS):
+            return bool(await process.stdout.readline())
+    except TimeoutError:
+        return False
+
+
+async def _killed(process: asyncio.subprocess.Process) -> int:
+    with suppress(ProcessLookupError):
+        process.kill()
+    return await process.wait()
+
+
 async def _end(process: asyncio.subprocess.Process | None, feed: Feed) -> None:
     """Give the process its time for what it got, then kill it: only then does its feed surely end."""
     if process is not None:
         try:
             await asyncio.wait_for(process.wait(), END_SECONDS)
         except TimeoutError:
-            process.kill()
-            await process.wait()
+            await _killed(process)
     await asyncio.to_thread(feed.join)
