@@ -8,7 +8,7 @@ turns with no viewer, so that the machine's other work falls on all of them.
 import socket
 import sys
 from collections.abc import AsyncIterator, Mapping
-from contextlib import AsyncExitStack, asynccontextmanager
+from contextlib import AsyncExitStack, asynccontextmanager, suppress
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -20,7 +20,7 @@ from lockstep.bench.harness.free_port import free_port
 from lockstep.bench.harness.processes import running_process, started
 from lockstep.bench.harness.stack import running_stack
 from lockstep.bench.viewers.idle_crowd import IDLE
-from lockstep.client import Console
+from lockstep.client import Console, NotArmed
 
 __all__ = ["run"]
 
@@ -29,6 +29,7 @@ ROBOT = "planar"
 EVENTS, QUICK_EVENTS = 250, 15  # of a turn
 TURNS, QUICK_TURNS = 3, 1
 VIEWERS, QUICK_VIEWERS = 30, 2
+ATTEMPTS = 20
 ALLOWED = 1.1  # times the operator's time without viewers
 FOXGLOVE = {
     "reads": "viewers in Foxglove's protocol read everything",
@@ -121,13 +122,18 @@ async def _crowd(module: str, port: int, kind: str, count: int) -> AsyncIterator
 async def _operator(link: str) -> AsyncIterator[Console]:
     async with Console(link, name="bench", codec="H264") as console:
         await console.take_seat()
-        await console_trips(console, 10)
         yield console
 
 
 async def _trips(console: Console, context: Context) -> list[float]:
-    trips = await console_trips(console, context.scale(EVENTS, QUICK_EVENTS))
-    return [trip.seconds * 1000 for trip in trips]
+    wanted, found = context.scale(EVENTS, QUICK_EVENTS), list[float]()
+    for _ in range(ATTEMPTS):
+        with suppress(NotArmed):  # a busy machine held the robot up, again and again
+            trips = await console_trips(console, wanted - len(found))
+            found += [trip.seconds * 1000 for trip in trips]
+        if len(found) >= wanted:
+            break
+    return found
 
 
 def _compare(times: Mapping[str, list[float]], kinds: Mapping[str, str], context: Context) -> list[Result]:
