@@ -72,7 +72,7 @@ def test_another_epoch_is_another_file_and_nothing_is_overwritten(tmp_path: Path
 def test_a_file_ends_at_its_bound_and_what_was_written_is_whole(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(rerun_process, "SEND_SECONDS", 0.0)
+    monkeypatch.setattr(rerun_process, "FILE_SECONDS", 0.0)
     path = tmp_path / "a.rrd"
 
     def without_end() -> Iterator[Item]:

@@ -44,6 +44,10 @@ async def test_a_driven_session_is_in_the_file_by_event_with_pictures(tmp_path: 
         await running(rig)
         async with rig.peer("operator") as operator:
             await take_seat(operator)
+            service = rig.dependencies.rerun
+            assert service is not None
+            assert service.process_id is not None
+            os.kill(service.process_id, signal.SIGTERM)  # as a service manager does with all processes at once
             driven = [await operator.drive([0.1, 0.0, 0.0]) for _ in range(20)]
             assert rig.dependencies.media.is_recorded
         epoch = rig.dependencies.console.clock.epoch

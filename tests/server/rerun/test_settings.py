@@ -20,5 +20,6 @@ def test_what_leads_nowhere_is_refused(to: str) -> None:
 def test_a_server_that_everybody_reaches_has_to_be_called_public() -> None:
     with pytest.raises(ValidationError, match="set public"):
         RerunSettings(to="9876")
-    assert RerunSettings(to="9876", public=True).to == "9876"
+    assert RerunSettings(to="9876", public=True).served_port == 9876
+    assert RerunSettings(to="127.0.0.1:9876").served_port is None
     assert RerunSettings().to is None

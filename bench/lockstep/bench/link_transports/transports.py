@@ -7,7 +7,9 @@ from contextlib import asynccontextmanager
 from pathlib import Path
 from typing import Any, Literal, Protocol
 
-from aioquic.asyncio import QuicConnectionProtocol, connect, serve
+from aioquic.asyncio.client import connect
+from aioquic.asyncio.protocol import QuicConnectionProtocol
+from aioquic.asyncio.server import serve
 from aioquic.quic.configuration import QuicConfiguration
 from aioquic.quic.events import DatagramFrameReceived, QuicEvent, StreamDataReceived
 
@@ -16,6 +18,7 @@ from lockstep.bench.link_transports.messages import Message, take_frames
 __all__ = ["KINDS", "Ends", "Kind", "Link", "console_link", "robot_link"]
 
 Kind = Literal["tls", "quic-streams", "quic-datagrams"]
+Pair = tuple[asyncio.StreamReader, asyncio.StreamWriter]
 KINDS: tuple[Kind, ...] = ("tls", "quic-streams", "quic-datagrams")
 ALPN = ["lockstep-bench"]
 LARGE = 1 << 26  # bytes: flow control is never what bounds
@@ -136,11 +139,9 @@ async def console_link(
         return
     context = ssl.create_default_context(ssl.Purpose.CLIENT_AUTH)
     context.load_cert_chain(chain, key)
-    queues = [asyncio.Queue[tuple[asyncio.StreamReader, asyncio.StreamWriter]]() for _ in range(2)]
+    queues = [asyncio.Queue[Pair]() for _ in range(2)]
     servers = [
-        await asyncio.start_server(
-            lambda reader, writer, queue=queue: queue.put_nowait((reader, writer)), host, port + number, ssl=context
-        )
+        await asyncio.start_server(_taker(queue), host, port + number, ssl=context)
         for number, queue in enumerate(queues)
     ]
     listening()
@@ -148,8 +149,12 @@ async def console_link(
         pairs = [await queue.get() for queue in queues]
     async with _reading(pairs, ends) as link:
         yield link
-    for server in servers:
-        server.close()
+    for each in servers:
+        each.close()
+
+
+def _taker(queue: asyncio.Queue[Pair]) -> Callable[[asyncio.StreamReader, asyncio.StreamWriter], None]:
+    return lambda reader, writer: queue.put_nowait((reader, writer))
 
 
 @asynccontextmanager
@@ -174,7 +179,7 @@ async def robot_link(kind: Kind, host: str, port: int, chain: Path, ends: Ends) 
 
 
 @asynccontextmanager
-async def _reading(pairs: list[tuple[asyncio.StreamReader, asyncio.StreamWriter]], ends: Ends) -> AsyncIterator[Link]:
+async def _reading(pairs: list[Pair], ends: Ends) -> AsyncIterator[Link]:
     (control, control_writer), (media, media_writer) = pairs
     async with asyncio.TaskGroup() as tasks:
         reading = [

@@ -75,7 +75,9 @@ async def _rerun(context: Context) -> dict[str, list[float]]:
             context.say(f"Rerun, {kind}")
             async with AsyncExitStack() as taking:
                 settings, port = await _taker(taking, kind)
-                stack = await taking.enter_async_context(running_stack(ROBOT, **settings))
+                stack = await taking.enter_async_context(
+                    running_stack(ROBOT, is_logged=True, is_secured=False, **settings)
+                )
                 if kind == "floods":
                     count = context.scale(VIEWERS, QUICK_VIEWERS)
                     await taking.enter_async_context(_crowd("connection_flood", port, "floods", count))

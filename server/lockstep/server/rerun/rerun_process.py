@@ -31,7 +31,8 @@ from lockstep.server.rerun.feed import LENGTH
 __all__ = ["Pipe", "Sink", "take_items"]
 
 NICE: Final = 10  # whoever drives goes first
-SEND_SECONDS: Final = 0.1  # between two batches of rows
+SEND_SECONDS: Final = 0.1  # between two batches of rows for those who look on
+FILE_SECONDS: Final = 1.0  # and for a file, which is a quarter as large then
 MEMORY: Final = 4_000_000_000  # bytes of addresses, about 3 of them for libraries and threads that use little
 EARLY: Final = 64  # items
 CONNECT_SECONDS: Final = 2.0
@@ -47,6 +48,9 @@ class Sink:
         kind: "file", "viewer" or "server"
         value: the file's path, the viewer's address, the port
         file_bytes: a file ends when it is larger
+
+    Attributes:
+        seconds: between two batches of rows
     """
 
     def __init__(self, kind: str, value: str, file_bytes: int) -> None:
@@ -54,6 +58,7 @@ class Sink:
         self._value = value
         self._file_bytes = file_bytes
         self._path: Path | None = None
+        self.seconds = FILE_SECONDS if kind == "file" else SEND_SECONDS
 
     def open(self, stream: rr.RecordingStream) -> None:
         """Attach the sink.
@@ -119,7 +124,7 @@ def take_items(items: Iterator[Item | None], sink: Sink) -> None:
             if item is not None and session is not None:
                 _take(item, session, epoch)
             now = time.monotonic()
-            if session is not None and now - sent >= SEND_SECONDS:
+            if session is not None and now - sent >= sink.seconds:
                 sent = now
                 session.flush()
                 if sink.is_full():
@@ -182,7 +187,8 @@ def main() -> None:
     """Run the process."""
     kind, value, file_bytes = sys.argv[1:]
     os.nice(NICE)
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # a terminal's goes to the console, which ends this process
+    for number in (signal.SIGINT, signal.SIGTERM):  # the console gets them too, and its end is the end of the items
+        signal.signal(number, signal.SIG_IGN)
     resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
     os.write(sys.stdout.fileno(), b"ready\n")
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # nobody reads what a library might print

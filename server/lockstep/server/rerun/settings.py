@@ -27,6 +27,12 @@ class RerunSettings(BaseModel):
     public: bool = False  # serve where other machines connect too
     file_bytes: Annotated[int, Field(ge=1_000_000)] = 2_000_000_000  # a file ends when it is larger
 
+    @property
+    def served_port(self) -> int | None:
+        """The port of Rerun's server; None: there is none."""
+        kind, value = target_of(self.to) if self.to is not None else ("", "")
+        return int(value) if kind == "server" else None
+
     @model_validator(mode="after")
     def _check(self) -> Self:
         if self.to is not None and target_of(self.to).kind == "server" and not self.public:
