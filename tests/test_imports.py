@@ -29,7 +29,7 @@ LAYERS = (
     "errors", "event_clock", "util", "telemetry", "evidence", "audit", "stop", "session_events", "webrtc", "media",
     "talkback", "auth", "http", "peers", "sfu", "robot", "actions", "federation", "publishing", "scene",
     "settings_file", "settings", "control", "recording",
-    "foxglove", "state", "routes", "composition", "fleet", "cli",
+    "foxglove", "rerun", "state", "routes", "composition", "fleet", "cli",
 )  # fmt: skip
 
 

@@ -36,6 +36,7 @@ SECTIONS = (
     "memory",
     "recording",
     "datagrams",
+    "live_tools",
 )
 BUSY_PERCENT = 8.0  # of the machine, used by other processes, above which the figures say more about them
 LOOK_SECONDS = 1.5  # of looking at other processes before each section

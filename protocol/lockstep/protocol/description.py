@@ -156,6 +156,23 @@ class RangeRing(msgspec.Struct, frozen=True, kw_only=True):
     range_max: float
 
 
+class CameraCalibration(msgspec.Struct, frozen=True, kw_only=True):
+    """The pinhole of a camera, for its full size, and where it is; terms of sensor_msgs/CameraInfo.
+
+    The pose is that of the optical frame of ROS REP 103: x right and y down in the picture, z into it.
+    """
+
+    fx: float  # pixels, focal lengths
+    fy: float
+    cx: float  # pixels, principal point
+    cy: float
+    distortion_model: str = ""  # "plumb_bob", "rational_polynomial", "equidistant"; "": no distortion
+    distortion: tuple[float, ...] = ()
+    body: str = ""  # that it is fixed to; "" for the world
+    position: Vector3 = (0.0, 0.0, 0.0)
+    orientation: Quaternion = (1.0, 0.0, 0.0, 0.0)
+
+
 class Camera(msgspec.Struct, frozen=True, kw_only=True):
     name: str
     label: str
@@ -166,6 +183,7 @@ class Camera(msgspec.Struct, frozen=True, kw_only=True):
     # Action that a click on the picture asks for. Its number parameters are "x" and "y", shares of the picture from the
     # left and from the top, and "event", the stamp of the picture that was clicked on. "": none.
     click: str = ""
+    calibration: CameraCalibration | None = None  # None: not known
 
 
 class Microphone(msgspec.Struct, frozen=True, kw_only=True):

@@ -19,6 +19,7 @@ from lockstep.server.media.settings import MediaSettings
 from lockstep.server.media.sources.source_settings import SourceSettings
 from lockstep.server.recording.episodes.settings import EpisodeSettings
 from lockstep.server.recording.settings import RecordingSettings
+from lockstep.server.rerun.settings import RerunSettings
 from lockstep.server.robot.credentials import link_access
 from lockstep.server.robot.dial_in import DIAL_IN
 from lockstep.server.settings_file import SettingsFileSource
@@ -82,6 +83,7 @@ class Settings(NetworkSettings, LimitSettings, SourceSettings, RelaySettings, Fl
     recording: RecordingSettings = RecordingSettings()
     episodes: EpisodeSettings = EpisodeSettings()
     foxglove: FoxgloveSettings = FoxgloveSettings()
+    rerun: RerunSettings = RerunSettings()
 
     @classmethod
     def settings_customise_sources(

@@ -1,4 +1,5 @@
 import math
+from typing import Any
 
 import msgspec
 import pytest
@@ -10,6 +11,7 @@ from lockstep.protocol.description import (
     BodyJoint,
     BodyTwist,
     Camera,
+    CameraCalibration,
     ControlLayer,
     ForceFeeling,
     Joint,
@@ -107,3 +109,23 @@ def test_a_contradiction_is_named(description: RobotDescription, message: str) -
 def test_a_camera_and_a_microphone_are_both_streams() -> None:
     camera = Camera(name="c", label="C", width=2, height=2, frame_rate=1)
     check_description(with_change(cameras=(camera,), microphones=()))
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"fx": 0.0}, "focal lengths must be positive"),
+        ({"cx": float("nan")}, "must be finite"),
+        ({"position": (0.0, 0.0, 1e7)}, "must be finite and at most"),
+        ({"distortion": (0.0,) * 15}, "15 coefficients of distortion"),
+        ({"body": "nowhere"}, "names the body 'nowhere'"),
+        ({"distortion_model": "a\nb"}, "cannot be printed"),
+    ],
+)
+def test_a_calibration_that_no_viewer_could_use_is_named(change: dict[str, Any], message: str) -> None:
+    whole = CameraCalibration(fx=1.0, fy=1.0, cx=1.0, cy=1.0)
+    camera = Camera(name="c", label="C", width=2, height=2, frame_rate=1, calibration=whole)
+    check_description(with_change(cameras=(camera,), microphones=()))
+    broken = msgspec.structs.replace(camera, calibration=msgspec.structs.replace(whole, **change))
+    with pytest.raises(DescriptionError, match=message):
+        check_description(with_change(cameras=(broken,), microphones=()))

@@ -85,6 +85,8 @@ def test_robots_of_a_fleet_serve_foxglove_at_ports_of_their_own(tmp_path: Path) 
     assert {name: each.foxglove.port for name, each in found.items()} == {"left": 8765, "right": None}
     with pytest.raises(BadFleet, match="left and right have the same port 8765"):
         robot_settings(Settings(robots=TWO, foxglove={"port": 8765}))  # type: ignore[arg-type]
+    with pytest.raises(BadFleet, match="left and right have the same port 9876"):
+        robot_settings(Settings(robots=TWO, rerun={"to": "9876", "public": True}))  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(

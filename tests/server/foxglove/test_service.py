@@ -35,9 +35,11 @@ async def test_a_viewer_gets_the_state_that_holds_and_the_feedback_of_a_robot_th
         moving = await viewer.next_of("/tf")
         fixed = await viewer.next_of("/tf_static")
         assert viewer.info["capabilities"] == []
-    bodies = {each["name"] for each in robot.message["description"]["bodies"]}
+    description = robot.message["description"]
+    bodies = {each["name"] for each in description["bodies"]}
+    cameras = {each["name"] for each in description["cameras"] if each["calibration"] is not None}
     frames = {each.child_frame_id for each in (*moving.message.transforms, *fixed.message.transforms)}
-    assert frames == bodies
+    assert frames == bodies | cameras
     assert robot.message["epoch"] == feedback.message["epoch"]
     assert feedback.message["event"] >= 1
 

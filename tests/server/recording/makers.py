@@ -23,7 +23,7 @@ from lockstep.protocol.messages import StopState
 from lockstep.protocol.serial import event_after
 from lockstep.server.media.codecs.picture_encoder import create_picture_encoder
 from lockstep.server.media.codecs.sound_encoder import Segment, create_sound_encoder
-from lockstep.server.recording.format.foxglove import camera_message, feedback_messages, sound_message
+from lockstep.server.recording.format.foxglove import camera_message, command_messages, feedback_messages, sound_message
 from lockstep.server.recording.format.info import RecordingInfo
 from lockstep.server.recording.format.records import (
     CommandRecord,
@@ -115,7 +115,9 @@ class Story:
         yield from self._feedback(event, at, 0)
         for number in range(1, self.events):
             event, at = event_after(event), at + INTERVAL
-            yield own_entry(self._command(event, number), at - 10_000_000)
+            command = self._command(event, number)
+            yield own_entry(command, at - 10_000_000)
+            yield from command_messages(DESCRIPTION, command, at - 10_000_000, at - 10_000_000)
             yield from self._feedback(event, at, number)
             key = number % KEYFRAMES == 1
             captured = at + 1_000_000

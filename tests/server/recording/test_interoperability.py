@@ -1,22 +1,30 @@
 """A recording is taken by viewers' own libraries. Where rerun-sdk is not installed that part says nothing."""
 
+import json
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import av
+import jsonschema
 import pytest
 from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey
-from foxglove.messages import CompressedVideo, FrameTransforms, Odometry, SceneUpdate
+from foxglove.messages import CameraCalibration, CompressedVideo, FrameTransforms, Odometry, SceneUpdate
 from foxglove.messages import JointStates as SdkJointStates
 from foxglove_schemas_protobuf.CompressedAudio_pb2 import CompressedAudio
 from foxglove_schemas_protobuf.CompressedVideo_pb2 import CompressedVideo as Message
 from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 from google.protobuf.descriptor_pb2 import FileDescriptorSet
+from mcap.decoder import DecoderFactory as McapDecoderFactory
 from mcap.reader import make_reader
+from mcap.records import Schema
+from mcap_protobuf.decoder import DecoderFactory
 
 from lockstep.protocol.messages import Feedback
 from lockstep.robot_bridge.robots.registry import create_robot
 from lockstep.server.evidence.signer import Signer
-from lockstep.server.recording.format.records import RobotRecord
+from lockstep.server.recording.format.payload import own_record_of
+from lockstep.server.recording.format.records import RobotRecord, WrenchRecord
 from lockstep.server.recording.format.signature import RecordingSigning
 from lockstep.server.recording.format.topics import topics_of
 from lockstep.server.recording.writing.queue_items import FeedbackItem, RobotItem, entries_of
@@ -67,9 +75,53 @@ def test_schemas_are_those_of_the_foxglove_sdk(file: Path) -> None:
     assert [joint.name for joint in JointStates.FromString(message.data).joints] == ["x", "y", "yaw"]
 
 
-@pytest.mark.parametrize("kind", [FrameTransforms, Odometry, SceneUpdate])
+def test_every_message_decodes_by_the_schema_that_is_in_the_file(file: Path) -> None:
+    """By libraries that know nothing of Lockstep: mcap-protobuf-support, and a JSON Schema validator."""
+    seen = dict[str, int]()
+    with file.open("rb") as stream:
+        reader = make_reader(stream, decoder_factories=[DecoderFactory(), JsonFactory()])
+        for _, channel, message, decoded in reader.iter_decoded_messages():
+            seen[channel.topic] = seen.get(channel.topic, 0) + 1
+            match channel.topic, message.sequence:
+                case "/wrench", 2:
+                    assert (decoded.force.x, decoded.frame_id, decoded.event) == (0.1, "base", 2)
+                case "/axis_commands", 31:
+                    commanded = [(axis.name, axis.value, axis.unit) for axis in decoded.axes]
+                    assert commanded == [("base.vx", 0.5, "m/s"), ("base.wz", 0.0, "m/s")]
+                    assert (decoded.driver, decoded.event) == ("Ada", 31)
+                case "/axis_states", 31:
+                    measured = [(axis.name, axis.measured, axis.HasField("goal")) for axis in decoded.axes]
+                    assert measured == [("base.vx", 0.5, False), ("base.wz", 0.0, False)]
+    assert seen["/axis_states"] == seen["/wrench"] == seen["/odom"] == EVENTS
+    assert seen["/axis_commands"] == EVENTS - 1
+
+
+class JsonFactory(McapDecoderFactory):
+    """Decodes JSON that its schema permits."""
+
+    def decoder_for(self, message_encoding: str, schema: Schema | None) -> Callable[[bytes], Any] | None:
+        if message_encoding != "json" or schema is None:
+            return None
+        validator = jsonschema.Draft202012Validator(json.loads(schema.data))
+
+        def decode(data: bytes) -> Any:
+            message = json.loads(data)
+            validator.validate(message)
+            return message
+
+        return decode
+
+
+def test_a_wrench_of_an_earlier_file_is_read() -> None:
+    data = b'{"epoch":"e","event":3,"frame_id":"base","force":{"x":1,"y":2,"z":3},"torque":{"x":4,"y":5,"z":6}}'
+    found = own_record_of("lockstep.Wrench", data)
+    assert isinstance(found, WrenchRecord)
+    assert found.force.z == 3
+
+
+@pytest.mark.parametrize("kind", [CameraCalibration, FrameTransforms, Odometry, SceneUpdate])
 def test_the_fields_of_frames_shapes_and_odometry_are_those_of_the_foxglove_sdk(
-    kind: type[FrameTransforms] | type[Odometry] | type[SceneUpdate],
+    kind: type[CameraCalibration] | type[FrameTransforms] | type[Odometry] | type[SceneUpdate],
 ) -> None:
     theirs = kind.get_schema()
     topics = topics_of(create_robot("mobile-manipulator").describe(), {})

@@ -120,6 +120,20 @@ export interface Camera {
   readonly frame_rate: number;
   readonly metres_per_pixel: number | null;
   readonly click: string;
+  readonly calibration: CameraCalibration | null;
+}
+
+/** The pinhole of a camera, for its full size, and where it is; terms of sensor_msgs/CameraInfo. The pose is that of the optical frame of ROS REP 103: x right and y down in the picture, z into it. */
+export interface CameraCalibration {
+  readonly fx: number;
+  readonly fy: number;
+  readonly cx: number;
+  readonly cy: number;
+  readonly distortion_model: string;
+  readonly distortion: readonly (number)[];
+  readonly body: string;
+  readonly position: readonly [number, number, number];
+  readonly orientation: readonly [number, number, number, number];
 }
 
 export type ClientMessage = Command | Rest | Report | Ping | SeatRequest | SeatGrant | SeatDecline | SeatTake | SeatRelease | SilenceStops | Rename | Note | Act | ActionCancel | EpisodeRequest | Stop | Reset | TraceRequest | TraceReport;

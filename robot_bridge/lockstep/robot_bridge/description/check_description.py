@@ -9,6 +9,7 @@ import msgspec
 from lockstep.protocol.description import (
     Body,
     Camera,
+    CameraCalibration,
     ControlLayer,
     ForceFeeling,
     Geofence,
@@ -33,6 +34,7 @@ MAX_BODIES = 1024
 MAX_GEOMS = 4096
 MAX_LAYERS = 32
 MAX_LIMITS = 256
+MAX_DISTORTION = 14  # coefficients, those of the longest model
 FARTHEST = 1e6  # m, for drawn parts; the bound of their other numbers too
 MAX_NAME = 200  # characters in a name or a label
 MAX_BYTES = 60_000  # of JSON: a peer that declares no maximum takes messages of 65,536 bytes (RFC 8841 6.1)
@@ -109,6 +111,7 @@ def _check_counts(description: RobotDescription) -> None:
         ("cameras and microphones", len(description.cameras) + len(description.microphones), MAX_STREAMS),
         ("bodies", len(description.bodies), MAX_BODIES),
         ("geoms", sum(len(body.geoms) for body in description.bodies), MAX_GEOMS),
+        ("coefficients of distortion", max(map(_coefficients, description.cameras), default=0), MAX_DISTORTION),
         ("layers", len(description.layers), MAX_LAYERS),
         ("bindings", sum(len(layer.bindings) for layer in description.layers), MAX_GEOMS),
         ("position limits", len(description.position_limits), MAX_LIMITS),
@@ -125,6 +128,10 @@ def _check_counts(description: RobotDescription) -> None:
             raise DescriptionError(f"{count} {kind}, the bound is {most}")
 
 
+def _coefficients(camera: Camera) -> int:
+    return 0 if camera.calibration is None else len(camera.calibration.distortion)
+
+
 def _check_reach(description: RobotDescription) -> None:
     """Check that drawn parts are within a bound: beyond it, computed numbers are not finite."""
     for body in description.bodies:
@@ -134,6 +141,9 @@ def _check_reach(description: RobotDescription) -> None:
         for geom in body.geoms:
             numbers += (*geom.size, *geom.position, *geom.orientation, *geom.rgba)
         _check_far(f"body {body.name}", numbers)
+    for camera in description.cameras:
+        if camera.calibration is not None:
+            _check_far(f"camera {camera.name}", _calibration_numbers(camera.calibration))
     for fence in description.geofences:
         _check_far(f"geofence {fence.name}", (number for corner in fence.polygon for number in corner))
     if (ring := description.ranges) is not None:
@@ -163,6 +173,7 @@ def _check_texts(description: RobotDescription) -> None:
     ]
     for each in labelled:
         texts += [each.name, each.label]
+    texts += [each.calibration.distortion_model for each in description.cameras if each.calibration is not None]
     texts += action_texts(description.actions)
     for text in texts:
         if len(text) > MAX_NAME:
@@ -179,6 +190,14 @@ def _check_camera(camera: Camera) -> None:
     scale = camera.metres_per_pixel
     if scale is not None and not (math.isfinite(scale) and scale > 0):
         raise DescriptionError(f"camera {camera.name}: metres_per_pixel must be positive, not {scale}")
+    found = camera.calibration
+    if found is not None and not (found.fx > 0 and found.fy > 0):
+        raise DescriptionError(f"camera {camera.name}: focal lengths must be positive, not {found.fx} and {found.fy}")
+
+
+def _calibration_numbers(found: CameraCalibration) -> list[float]:
+    pinhole = [found.fx, found.fy, found.cx, found.cy]
+    return [*pinhole, *found.distortion, *found.position, *found.orientation]
 
 
 def _check_microphone(microphone: Microphone) -> None:
@@ -253,6 +272,9 @@ def _check_references(description: RobotDescription) -> None:
     for sensor in (description.wrench, description.ranges):
         if sensor is not None:
             _check_known("body", sensor.body, bodies, f"sensor {sensor.name}")
+    for camera in description.cameras:
+        if camera.calibration is not None:
+            _check_known("body", camera.calibration.body, bodies, f"camera {camera.name}")
 
 
 def _check_known(kind: str, name: str, known: set[str], where: str) -> None:

@@ -12,6 +12,7 @@ __all__ = [
     "Cameras",
     "Config",
     "Foxglove",
+    "Rerun",
     "Microphones",
     "ObserversDirect",
     "PublicUrl",
@@ -123,6 +124,15 @@ Foxglove = Annotated[
         help="Serve the session live to Foxglove and Lichtblick, on this port of 127.0.0.1 (8765 is what they try "
         "first). Whoever reaches the port sees everything. docs/foxglove.md",
         metavar="PORT",
+    ),
+]
+Rerun = Annotated[
+    str | None,
+    typer.Option(
+        "--rerun",
+        help="Send the session live to a viewer of Rerun (127.0.0.1:9876 is where it listens), or into a file. "
+        "docs/rerun.md",
+        metavar="HOST:PORT|FILE.rrd",
     ),
 ]
 Speaker = Annotated[

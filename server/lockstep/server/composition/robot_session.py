@@ -32,6 +32,7 @@ from lockstep.server.recording.recording_store import RecordingStore
 from lockstep.server.recording.service import RecordingService
 from lockstep.server.recording.settings import recordings_directory
 from lockstep.server.recording.writing.recorder import Recorder
+from lockstep.server.rerun.service import RerunService
 from lockstep.server.robot.credentials import link_access
 from lockstep.server.robot.dial_in import DialIn
 from lockstep.server.scene.view import SceneView
@@ -119,6 +120,7 @@ async def _session(
     takers = FrameTakers(media)
     recorder = Recorder(settings.recording, shelf, clock, takers.add(), peers.announce, trail, signing)
     foxglove = _foxglove(settings, clock, takers, metrics) if settings.foxglove.port is not None else None
+    rerun = _rerun(settings, clock, takers, metrics) if settings.rerun.to is not None else None
     engine = JanusEngine(settings, context.endpoint, media, context.state.signing_key(settings) + robot)
     relays = SfuCoordinator(settings, engine, peers, context.state.invitations.has_ended)
     sources = SourceManager(settings.sources, clock, media, metrics.registry, peers.announce)
@@ -156,6 +158,8 @@ async def _session(
     episodes.subscribe(events)
     if foxglove is not None:
         foxglove.subscribe(events)
+    if rerun is not None:
+        rerun.subscribe(events)
     if scene is not None:
         scene.subscribe(events)
     revocation = TokenRevocation(context.state.invitations, peers, trail, silence, robot)
@@ -175,6 +179,7 @@ async def _session(
         scene=scene,
         recorder=recorder,
         foxglove=foxglove,
+        rerun=rerun,
         relays=relays,
         voice=voice,
         publishers=publishers,
@@ -204,6 +209,8 @@ async def _session(
             if foxglove is not None:
                 serving = keep_running("foxglove", foxglove.run, metrics.faults)
                 running.append(tasks.create_task(serving, name="foxglove"))
+            if rerun is not None:
+                running.append(tasks.create_task(keep_running("rerun", rerun.run, metrics.faults), name="rerun"))
             yield made
             for task in running:
                 task.cancel()
@@ -217,6 +224,11 @@ def _foxglove(settings: Settings, clock: EventClock, takers: FrameTakers, metric
     dropped = metrics.dropped.labels("foxglove")
     keyframe_seconds = settings.recording.keyframe_seconds
     return FoxgloveService(settings.foxglove, clock, takers.add(), keyframe_seconds, dropped.inc, metrics.faults.caught)
+
+
+def _rerun(settings: Settings, clock: EventClock, takers: FrameTakers, metrics: Metrics) -> RerunService:
+    dropped = metrics.dropped.labels("rerun")
+    return RerunService(settings.rerun, clock, takers.add(), settings.recording.keyframe_seconds, dropped.inc)
 
 
 def _dial_in(settings: Settings, context: ConsoleContext, directory: StateDir) -> DialIn:

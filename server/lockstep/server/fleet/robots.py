@@ -18,7 +18,7 @@ OWN = frozenset(
         *("cameras", "microphones", "whip", "speaker", "relay", "relay_public", "relay_codec", "observers_direct"),
         *("speed_cap", "seat_timeout", "seat_idle_seconds", "seat_claim_seconds", "observer_feedback_hz"),
         *("max_peers", "max_relayed", "max_thumbnails", "reserved_places", "scene", "scene_hz", "media", "recording"),
-        "foxglove",
+        *("foxglove", "rerun"),
     }
 )
 # A camera belongs to one robot: given to the whole console, it would show the same at every robot.
@@ -41,18 +41,18 @@ def robot_settings(settings: Settings) -> dict[str, Settings]:
         raise BadFleet("no_robots", f"{settings.fleet_file}: the file has no table [robots.NAME]")
     common = {name: getattr(settings, name) for name in settings.model_fields_set - {"robots", "fleet_file", "config"}}
     made = {name: _settings(name, common, table) for name, table in tables}
-    _check_foxglove_ports(made)
+    _check_ports("foxglove_port", {name: each.foxglove.port for name, each in made.items()})
+    _check_ports("rerun_port", {name: each.rerun.served_port for name, each in made.items()})
     return made
 
 
-def _check_foxglove_ports(robots: Mapping[str, Settings]) -> None:
-    """Raise BadFleet if two robots would serve Foxglove at the same port: a viewer would see one of them alone."""
+def _check_ports(problem: str, ports: Mapping[str, int | None]) -> None:
+    """Raise BadFleet if two robots would serve viewers at the same port: a viewer would see one of them alone."""
     taken: dict[int, str] = {}
-    for name, each in robots.items():
-        port = each.foxglove.port
+    for name, port in ports.items():
         if port and port in taken:
             detail = f"robots {taken[port]} and {name} have the same port {port}; give each its own in the fleet file"
-            raise BadFleet("foxglove_port", detail)
+            raise BadFleet(problem, detail)
         if port:
             taken[port] = name
 

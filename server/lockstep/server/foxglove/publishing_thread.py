@@ -6,7 +6,7 @@ from collections import deque
 from collections.abc import Callable, Iterable
 from typing import Protocol
 
-from lockstep.server.foxglove.stamp import STAMP_TOPIC, stamp_message
+from lockstep.server.recording.format.stamp import STAMP_TOPIC, stamp_message
 from lockstep.server.recording.format.topics import LOG, Topic, topics_of
 from lockstep.server.recording.writing.queue_items import FeedbackItem, Item, MediaItem, RobotItem, entries_of
 

@@ -23,6 +23,7 @@ from lockstep.server.publishing.publishers import Publishers
 from lockstep.server.recording.episodes.episode_service import EpisodeService
 from lockstep.server.recording.service import RecordingService
 from lockstep.server.recording.writing.recorder import Recorder
+from lockstep.server.rerun.service import RerunService
 from lockstep.server.robot.dial_in import DialIn
 from lockstep.server.scene.view import SceneView
 from lockstep.server.session_events import SessionEvents
@@ -69,6 +70,7 @@ class Dependencies:
     recordings: RecordingService
     episodes: EpisodeService
     foxglove: FoxgloveService | None = None  # None: no port was named
+    rerun: RerunService | None = None  # None: nothing was named
 
     @property
     def state(self) -> ConsoleState:

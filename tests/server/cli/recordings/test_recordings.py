@@ -85,7 +85,14 @@ def test_a_tampered_recording_ends_with_1_and_what_is_none_with_2(directory: Pat
 
 
 @pytest.mark.parametrize(
-    ("kind", "written"), [("mp4", "one-front.mp4"), ("csv", "one.csv"), ("parquet", "one.parquet")]
+    ("kind", "written"),
+    [
+        ("mp4", "one-front.mp4"),
+        ("csv", "one.csv"),
+        ("parquet", "one.parquet"),
+        ("rerun", "one.rrd"),
+        ("rosbag2", "one-rosbag2"),
+    ],
 )
 def test_an_export_says_what_it_wrote_beside_the_recording(directory: Path, kind: str, written: str) -> None:
     done = _lockstep(directory, "export", "one", "--to", kind)

@@ -1,6 +1,8 @@
 """The frames that 3D views get are those of the kinematics, whatever robot it is."""
 
+import msgspec
 import pytest
+from foxglove_schemas_protobuf.CameraCalibration_pb2 import CameraCalibration as CalibrationMessage
 from foxglove_schemas_protobuf.FrameTransforms_pb2 import FrameTransforms
 from foxglove_schemas_protobuf.Odometry_pb2 import Odometry
 from foxglove_schemas_protobuf.Pose_pb2 import Pose as PoseMessage
@@ -10,6 +12,8 @@ from lockstep.protocol.description import (
     Axis,
     Body,
     BodyJoint,
+    Camera,
+    CameraCalibration,
     Geom,
     Joint,
     PlanarBase,
@@ -18,12 +22,13 @@ from lockstep.protocol.description import (
 from lockstep.robot_bridge.robots.registry import create_robot
 from lockstep.server.recording.format.robot_frames import (
     WORLD,
+    camera_calibration,
     fixed_transforms,
     moving_transforms,
     odometry,
     robot_shapes,
 )
-from lockstep.server.scene.kinematics import Pose, joined, world_poses
+from lockstep.server.scene.kinematics import Pose, joined, rotate, world_poses
 
 AT = 1_800_000_000_123_456_789
 TURNED = (0.7071067811865476, 0.0, 0.7071067811865476, 0.0)  # 90 degrees about y: z becomes x
@@ -54,7 +59,10 @@ def test_transforms_lead_from_the_world_to_where_the_kinematics_put_each_body(na
     joints = {joint.name: 0.1 + 0.2 * number for number, joint in enumerate(description.joints)}
     moving, fixed = frames(moving_transforms(description, joints, AT)), frames(fixed_transforms(description, AT))
     assert not moving.keys() & fixed.keys()
+    cameras = {camera.name for camera in description.cameras if camera.calibration is not None}
+    assert cameras
     tree = moving | fixed
+    assert cameras == tree.keys() - {body.name for body in description.bodies}
 
     def in_world(body: str) -> Pose:
         parent, pose = tree[body]
@@ -64,6 +72,31 @@ def test_transforms_lead_from_the_world_to_where_the_kinematics_put_each_body(na
         found = in_world(body)
         assert found.position == pytest.approx(expected.position)
         assert found.orientation == pytest.approx(expected.orientation)
+
+
+def test_a_camera_whose_place_is_known_is_a_frame_where_it_looks_along_z() -> None:
+    ahead = CameraCalibration(
+        fx=200.0,
+        fy=210.0,
+        cx=160.0,
+        cy=120.0,
+        body="base",
+        position=(0.1, 0.0, 0.5),
+        orientation=(0.5, -0.5, 0.5, -0.5),
+    )
+    camera = Camera(name="front", label="F", width=320, height=240, frame_rate=15.0, calibration=ahead)
+    blind = Camera(name="blind", label="B", width=320, height=240, frame_rate=15.0)
+    named = msgspec.structs.replace(camera, name="base")  # a body's name: the body goes first
+    base = Body(name="base", parent="")
+    description = msgspec.structs.replace(robot(base), cameras=(camera, blind, named))
+    found = frames(fixed_transforms(description, AT))
+    assert set(found) == {"base", "front"}
+    assert found["front"] == ("base", Pose(ahead.position, ahead.orientation))
+    assert rotate(ahead.orientation, (0.0, 0.0, 1.0)) == pytest.approx((1.0, 0.0, 0.0))
+    message = CalibrationMessage.FromString(camera_calibration(camera, ahead, AT))
+    assert (message.frame_id, message.width, message.height) == ("front", 320, 240)
+    assert list(message.K) == [200.0, 0.0, 160.0, 0.0, 210.0, 120.0, 0.0, 0.0, 1.0]
+    assert list(message.P) == [200.0, 0.0, 160.0, 0.0, 0.0, 210.0, 120.0, 0.0, 0.0, 0.0, 1.0, 0.0]
 
 
 def test_a_body_that_is_called_as_the_root_is_not_a_frame_in_itself() -> None:

@@ -3,15 +3,15 @@
 import logging
 import math
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 import mujoco
 import numpy as np
 import numpy.typing as npt
 
-from lockstep.protocol.description import AxisGain, Body, PositionLimit, RobotDescription
+from lockstep.protocol.description import AxisGain, Body, Camera, PositionLimit, RobotDescription
 from lockstep.robot_bridge.robots.base import Measurement, MediaSource, Robot
 from lockstep.robot_bridge.robots.camera_source import CameraSource
 from lockstep.robot_bridge.robots.mjcf.actuators import Kind, actuators_of
@@ -24,7 +24,8 @@ from lockstep.robot_bridge.robots.mjcf.joints import joints_of
 from lockstep.robot_bridge.robots.mjcf.model_file import load_model
 from lockstep.robot_bridge.robots.mjcf.names import label_of
 from lockstep.robot_bridge.robots.mjcf.senses import range_sense, wrench_sense
-from lockstep.robot_bridge.robots.mujoco_view.canvas import Look
+from lockstep.robot_bridge.robots.mujoco_view.calibration import calibrated
+from lockstep.robot_bridge.robots.mujoco_view.canvas import FREE_CAMERA, Look
 from lockstep.robot_bridge.robots.mujoco_view.renderer import Renderer
 
 __all__ = ["MjcfRobot"]
@@ -68,7 +69,7 @@ class MjcfRobot(Robot):
         self._values = [drive.at_rest(drive.measured(data)) for drive in self._drives]
         self._stopped = False  # every drive holds its place, at any applied value
         self._moving = self._moving_dofs()
-        self._description = self._describe(path.stem, tuple(cameras))
+        self._description = self._describe(path.stem, cameras)
         step = float(model.opt.timestep)
         self._steps = max(1, round(TICK / step))
         self.tick_seconds = self._steps * step
@@ -197,7 +198,8 @@ class MjcfRobot(Robot):
                 weights[self.model.jnt_dofadr[joint]] = 1.0 / size
         return weights
 
-    def _describe(self, name: str, cameras: tuple[Any, ...]) -> RobotDescription:
+    def _describe(self, name: str, cameras: Mapping[Camera, int]) -> RobotDescription:
+        bodies = self._bodies()
         axes = tuple(drive.axis for drive in self._drives)
         by_stick = [drive for drive in self._drives if drive.axis.kind == "rate"]
         title = self.model.names[: self.model.names.index(b"\0")].decode(errors="replace")
@@ -211,12 +213,16 @@ class MjcfRobot(Robot):
             layers=layers_of(
                 self.model, self.data, [drive.axis for drive in by_stick], [drive.actuator for drive in by_stick]
             ),
-            cameras=cameras,
+            cameras=tuple(self._calibrated(camera, number, bodies) for camera, number in cameras.items()),
             wrench=None if self._wrench is None else self._wrench.description,
             ranges=None if self._ranges is None else self._ranges.description,
-            bodies=self._bodies(),
+            bodies=bodies,
             position_limits=tuple(self._limit(drive) for drive in self._drives if self._is_limited(drive)),
         )
+
+    def _calibrated(self, camera: Camera, number: int, bodies: tuple[Body, ...]) -> Camera:
+        named = number != FREE_CAMERA and self.model.camera(number).name
+        return calibrated(camera, self.model, bodies) if named else camera
 
     def _bodies(self) -> tuple[Body, ...]:
         found = bodies_of(self.model, self._joints)

@@ -17,6 +17,7 @@ from lockstep.robot_bridge.robots.mobile_manipulator.kinematics import describe_
 from lockstep.robot_bridge.robots.mobile_manipulator.limits import BASE_ON_FLOOR, GEOFENCES, arm_limits
 from lockstep.robot_bridge.robots.mobile_manipulator.range_ring import RING
 from lockstep.robot_bridge.robots.mobile_manipulator.simulation import MOUNT
+from lockstep.robot_bridge.robots.mujoco_view.calibration import calibrated
 
 __all__ = ["CAMERAS", "MICROPHONE", "describe"]
 
@@ -52,21 +53,21 @@ TOOL_TWIST: Final = BodyTwist(
 
 def describe(model: Any) -> RobotDescription:
     """Return the description that belongs to the compiled model."""
-    joints = describe_joints(model)
+    joints, bodies = describe_joints(model), describe_bodies(model)
     return RobotDescription(
         name="mobile-manipulator",
         label="Mobile manipulator (MuJoCo)",
         axes=AXES,
         joints=joints,
         layers=LAYERS,
-        cameras=CAMERAS,
+        cameras=tuple(calibrated(camera, model, bodies) for camera in CAMERAS),
         microphones=(MICROPHONE,),
         wrench=WRENCH,
         ranges=RING,
         force_feeling=FEELING,
         actions=ACTIONS,
         body_twists=(TOOL_TWIST,),
-        bodies=describe_bodies(model),
+        bodies=bodies,
         position_limits=arm_limits(joints),
         planar_base=BASE_ON_FLOOR,
         geofences=GEOFENCES,

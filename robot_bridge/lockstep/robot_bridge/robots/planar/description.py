@@ -10,6 +10,7 @@ from lockstep.protocol.description import (
     Body,
     BodyJoint,
     Camera,
+    CameraCalibration,
     ControlLayer,
     ForceFeeling,
     Geofence,
@@ -24,12 +25,29 @@ from lockstep.protocol.description import (
 )
 from lockstep.robot_bridge.robots.planar.room import CHARGER, HALF_LENGTH, HALF_WIDTH, PILLARS
 
-__all__ = ["DESCRIPTION", "FRONT", "MICROPHONE", "OVERVIEW", "RADIUS", "RANGES"]
+__all__ = ["DESCRIPTION", "FIELD_OF_VIEW", "FRONT", "MICROPHONE", "OVERVIEW", "RADIUS", "RANGES", "WALL_HEIGHT"]
 
 RADIUS = 0.3  # m
 
 OVERVIEW = Camera(name="overview", label="Overview", width=640, height=480, frame_rate=30.0)
-FRONT = Camera(name="front", label="Front", width=320, height=240, frame_rate=15.0)
+FIELD_OF_VIEW = math.radians(75)
+WALL_HEIGHT = 0.9  # m; the camera is at half of it
+FRONT = Camera(
+    name="front",
+    label="Front",
+    width=320,
+    height=240,
+    frame_rate=15.0,
+    calibration=CameraCalibration(
+        fx=160 / math.tan(FIELD_OF_VIEW / 2),
+        fy=160 / math.tan(FIELD_OF_VIEW / 2),
+        cx=160.0,
+        cy=120.0,
+        body="base",
+        position=(0.0, 0.0, WALL_HEIGHT / 2),
+        orientation=(0.5, -0.5, 0.5, -0.5),  # looks along x of the base
+    ),
+)
 MICROPHONE = Microphone(name="microphone", label="Microphone", sample_rate=48_000)
 
 RANGES = RangeRing(

@@ -7,7 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 from lockstep.robot_bridge.robots.event_strip import draw_event_strip, strip_height
-from lockstep.robot_bridge.robots.planar.description import RADIUS
+from lockstep.robot_bridge.robots.planar.description import FIELD_OF_VIEW, RADIUS, WALL_HEIGHT
 from lockstep.robot_bridge.robots.planar.room import CHARGER, HALF_LENGTH, HALF_WIDTH, PILLARS, ray_hits
 
 if TYPE_CHECKING:
@@ -27,8 +27,6 @@ BODY: Colour = (130, 168, 92)
 NOSE: Colour = (225, 128, 128)
 FORCE: Colour = (110, 96, 212)
 SKY: Colour = (36, 134, 124)
-FIELD_OF_VIEW = math.radians(75)
-WALL_HEIGHT = 0.9  # m; the camera is at half of it
 
 
 class Picture:

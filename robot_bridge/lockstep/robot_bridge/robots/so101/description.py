@@ -16,6 +16,7 @@ from lockstep.protocol.description import (
     WrenchSensor,
 )
 from lockstep.robot_bridge.robots.mujoco_bodies import describe_body, rounded
+from lockstep.robot_bridge.robots.mujoco_view.calibration import calibrated
 from lockstep.robot_bridge.robots.so101.arm_drive import SETTLES
 from lockstep.robot_bridge.robots.so101.contact_force import HAND
 from lockstep.robot_bridge.robots.so101.controls import AXES, LAYERS
@@ -58,17 +59,18 @@ ACTIONS: Final = (
 def describe(model: Any) -> RobotDescription:
     """Return the description that belongs to the compiled model."""
     joints = tuple(describe_joint(model, name) for name in JOINT_NAMES)
+    bodies = describe_bodies(model)
     return RobotDescription(
         name="so101",
         label="SO-101 (MuJoCo)",
         axes=AXES,
         joints=joints,
         layers=LAYERS,
-        cameras=CAMERAS,
+        cameras=tuple(calibrated(camera, model, bodies) for camera in CAMERAS),
         wrench=WRENCH,
         force_feeling=FEELING,
         actions=ACTIONS,
-        bodies=describe_bodies(model),
+        bodies=bodies,
         poses=(TOOL_POSE,),
         position_limits=limits(joints),
         hold=0.3,

@@ -31,6 +31,7 @@ from lockstep.server.cli.options import (
     PublicUrl,
     Record,
     Relay,
+    Rerun,
     Speaker,
     SpeedCap,
     StateDirOption,
@@ -162,6 +163,7 @@ def up(
     speed_cap: SpeedCap = None,
     record: Record = None,
     foxglove: Foxglove = None,
+    rerun: Rerun = None,
     relay: Relay = None,
     observers_direct: ObserversDirect = None,
     public_url: PublicUrl = None,
@@ -196,6 +198,7 @@ def up(
         speed_cap=speed_cap,
         recording=_recording(record),
         foxglove=None if foxglove is None else {"port": foxglove},
+        rerun=None if rerun is None else {"to": rerun},
         relay=relay,
         observers_direct=observers_direct,
         log_format=log_format,
@@ -274,6 +277,7 @@ def serve(
     speed_cap: SpeedCap = None,
     record: Record = None,
     foxglove: Foxglove = None,
+    rerun: Rerun = None,
     relay: Relay = None,
     observers_direct: ObserversDirect = None,
     public_url: PublicUrl = None,
@@ -314,6 +318,7 @@ def serve(
         speed_cap=speed_cap,
         recording=_recording(record),
         foxglove=None if foxglove is None else {"port": foxglove},
+        rerun=None if rerun is None else {"to": rerun},
         relay=relay,
         observers_direct=observers_direct,
         log_format=log_format,
@@ -403,6 +408,8 @@ def _run(
             raise BoardUnusable(NO_NAMES)
         if any(each.foxglove.port is not None for each in each_robot):
             load_extra("foxglove", "foxglove")
+        if any(each.rerun.to is not None for each in each_robot):
+            load_extra("rerun", "rerun")
         listener = bind(settings.host, settings.port)
         state = open_state(settings, fall_back=True)
         uvloop.run(run_console(settings, state, listener, bridges, as_json))

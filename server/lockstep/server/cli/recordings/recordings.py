@@ -47,6 +47,12 @@ class ExportFormat(StrEnum):
     CSV = "csv"
     PARQUET = "parquet"
     LEROBOT = "lerobot"
+    RERUN = "rerun"
+    ROSBAG2 = "rosbag2"
+
+
+# The extra that each needs; the others need "export", or none.
+EXTRAS = {ExportFormat.RERUN: "rerun", ExportFormat.ROSBAG2: "rosbag2"}
 
 
 def add_recording_commands(app: typer.Typer, make_settings: MakeSettings) -> None:
@@ -137,7 +143,9 @@ def add_recording_commands(app: typer.Typer, make_settings: MakeSettings) -> Non
     @app.command()
     def export(
         files: Annotated[list[Path], typer.Argument(help="Recordings: their files, or their ids.")],
-        to: Annotated[ExportFormat, typer.Option(help="mp4: pictures and sound; csv, parquet: tables; lerobot: v3.")],
+        to: Annotated[
+            ExportFormat, typer.Option(help="mp4: pictures and sound; csv, parquet: tables; others: for these tools.")
+        ],
         out: Annotated[
             Path | None, typer.Option(help="File or directory to write. Unset: beside the recording.")
         ] = None,
@@ -154,8 +162,8 @@ def add_recording_commands(app: typer.Typer, make_settings: MakeSettings) -> Non
         paths = [recording_file(file, settings, robot, directory) for file in files]
         if out is not None and len(paths) > 1 and to is not ExportFormat.LEROBOT:
             raise _usage("--out takes one recording at a time, but for lerobot")
-        # Loaded only here: parquet and lerobot need pyarrow, the extra "export".
-        exporter: Any = load_extra(f"lockstep.server.recording.export.export_{to.value}", "export")
+        # Loaded only here: what needs no extra takes none.
+        exporter: Any = load_extra(f"lockstep.server.recording.export.export_{to.value}", EXTRAS.get(to, "export"))
         if to is ExportFormat.LEROBOT:
             written = _or_usage(lambda: exporter.export_all(paths, out, task, tolerance))
         else:

@@ -3,7 +3,6 @@
 import math
 from collections.abc import Iterator
 
-import msgspec
 from foxglove_schemas_protobuf.CompressedAudio_pb2 import CompressedAudio
 from foxglove_schemas_protobuf.CompressedVideo_pb2 import CompressedVideo
 from foxglove_schemas_protobuf.JointState_pb2 import JointState
@@ -17,27 +16,33 @@ from foxglove_schemas_protobuf.Vector3_pb2 import Vector3
 from google.protobuf.timestamp_pb2 import Timestamp
 
 from lockstep.protocol.description import RobotDescription
-from lockstep.server.recording.format.records import FeedbackRecord, Vector, WrenchRecord
+from lockstep.server.recording.format.own_messages import AxisCommands, AxisStates, WrenchStamped
+from lockstep.server.recording.format.records import CommandRecord, FeedbackRecord
 from lockstep.server.recording.format.robot_frames import (
     WORLD,
+    camera_calibration,
     fixed_transforms,
     moving_transforms,
     odometry,
     robot_shapes,
 )
 from lockstep.server.recording.format.topics import (
+    AXIS_COMMANDS,
+    AXIS_STATES,
+    CALIBRATION,
     FIXED_TRANSFORMS,
     JOINTS,
     ODOMETRY,
-    OWN_TOPICS,
     POSE,
     SCAN,
     SHAPES,
     TRANSFORMS,
+    WRENCH,
+    has_frames,
 )
 from lockstep.server.recording.writing.writer import Entry
 
-__all__ = ["camera_message", "feedback_messages", "log_message", "robot_messages", "sound_message"]
+__all__ = ["camera_message", "command_messages", "feedback_messages", "log_message", "robot_messages", "sound_message"]
 
 SECOND = 1_000_000_000
 
@@ -63,10 +68,36 @@ def log_message(arrived: int, text: str, *, warning: bool = False) -> bytes:
 
 
 def robot_messages(description: RobotDescription, event: int, arrived: int) -> Iterator[Entry]:
-    """Yield what is fixed of a robot in Foxglove's schemas: frames of bodies without joints, and shapes."""
-    if description.bodies:
+    """Yield what is fixed of a robot in Foxglove's schemas: frames of cameras and of bodies without joints, shapes."""
+    for camera in description.cameras:
+        if camera.calibration is not None:
+            data = camera_calibration(camera, camera.calibration, arrived)
+            yield Entry(CALIBRATION + camera.name, event, arrived, arrived, data)
+    if has_frames(description):
         yield Entry(FIXED_TRANSFORMS, event, arrived, arrived, fixed_transforms(description, arrived))
+    if description.bodies:
         yield Entry(SHAPES, event, arrived, arrived, robot_shapes(description, arrived))
+
+
+def command_messages(
+    description: RobotDescription, command: CommandRecord, arrived: int, captured: int
+) -> Iterator[Entry]:
+    """Yield a command that went to the robot, with the names of its axes, for plots."""
+    if command.outcome != "forwarded" or len(command.values) != len(description.axes):
+        return
+    axes = [
+        {"name": axis.name, "value": value, "unit": axis.unit}
+        for axis, value in zip(description.axes, command.values, strict=True)
+    ]
+    message = AxisCommands(
+        timestamp=_stamp(captured),
+        epoch=command.epoch,
+        event=command.event,
+        axes=axes,
+        driver=command.name,
+        speed=command.speed,
+    )
+    yield Entry(AXIS_COMMANDS, command.event, arrived, captured, message.SerializeToString())
 
 
 def feedback_messages(
@@ -104,14 +135,28 @@ def feedback_messages(
         yield entry(POSE, PoseInFrame(timestamp=stamp, frame_id=WORLD, pose=pose).SerializeToString())
         yield entry(ODOMETRY, odometry(description, base, pose, feedback.axes, captured))
     if description.wrench is not None and len(feedback.wrench) == 6:
-        wrench = WrenchRecord(
+        force, torque = feedback.wrench[:3], feedback.wrench[3:]
+        wrench = WrenchStamped(
+            timestamp=stamp,
             epoch=feedback.epoch,
             event=feedback.event,
-            frame_id=description.wrench.body,
-            force=Vector(*feedback.wrench[:3]),
-            torque=Vector(*feedback.wrench[3:]),
+            frame_id=description.wrench.body or WORLD,
+            force=Vector3(x=force[0], y=force[1], z=force[2]),
+            torque=Vector3(x=torque[0], y=torque[1], z=torque[2]),
         )
-        yield entry(OWN_TOPICS[WrenchRecord], msgspec.json.encode(wrench))
+        yield entry(WRENCH, wrench.SerializeToString())
+    if len(feedback.axes) == len(description.axes):
+        yield entry(AXIS_STATES, _axis_states(description, feedback, stamp))
+
+
+def _axis_states(description: RobotDescription, feedback: FeedbackRecord, stamp: Timestamp) -> bytes:
+    goals = feedback.goals or [None] * len(description.axes)
+    axes = [
+        {"name": axis.name, "measured": measured, "goal": goal, "unit": axis.unit}
+        for axis, measured, goal in zip(description.axes, feedback.axes, goals, strict=False)
+    ]
+    found = AxisStates(timestamp=stamp, epoch=feedback.epoch, event=feedback.event, axes=axes)
+    return found.SerializeToString()
 
 
 def _pose(x: float, y: float, yaw: float) -> Pose:

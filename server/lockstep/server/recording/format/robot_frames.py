@@ -4,8 +4,9 @@ Each body is a frame with the body's name in its parent's, as in the robot descr
 the frame WORLD. The frames of bodies on joints come with each feedback, the others, and the shapes, once.
 """
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 
+from foxglove_schemas_protobuf.CameraCalibration_pb2 import CameraCalibration
 from foxglove_schemas_protobuf.Color_pb2 import Color
 from foxglove_schemas_protobuf.CubePrimitive_pb2 import CubePrimitive
 from foxglove_schemas_protobuf.CylinderPrimitive_pb2 import CylinderPrimitive
@@ -21,11 +22,21 @@ from foxglove_schemas_protobuf.SpherePrimitive_pb2 import SpherePrimitive
 from foxglove_schemas_protobuf.Vector3_pb2 import Vector3
 from google.protobuf.timestamp_pb2 import Timestamp
 
-from lockstep.protocol.description import Body, Geom, PlanarBase, RobotDescription
+from lockstep.protocol.description import Body, Camera, Geom, PlanarBase, RobotDescription
+from lockstep.protocol.description import CameraCalibration as Calibration
 from lockstep.server.scene.kinematics import Pose as BodyPose
 from lockstep.server.scene.kinematics import body_pose, joined
 
-__all__ = ["WORLD", "fixed_transforms", "moving_transforms", "odometry", "robot_shapes"]
+__all__ = [
+    "WORLD",
+    "base_body",
+    "camera_calibration",
+    "camera_frames",
+    "fixed_transforms",
+    "moving_transforms",
+    "odometry",
+    "robot_shapes",
+]
 
 WORLD = "world"  # frame of bodies without a parent, and of the base's pose
 SECOND = 1_000_000_000
@@ -38,8 +49,37 @@ def moving_transforms(description: RobotDescription, joints: Mapping[str, float]
 
 
 def fixed_transforms(description: RobotDescription, captured: int) -> bytes:
-    """Return FrameTransforms of the bodies without joints."""
-    return _transforms((each for each in description.bodies if not each.joints), {}, captured)
+    """Return FrameTransforms of the bodies without joints, and of the cameras whose place is known.
+
+    A camera's frame is its optical one and has the camera's name, as its pictures say; a body of that name goes first.
+    """
+    fixed = [each for each in description.bodies if not each.joints]
+    return _transforms([*fixed, *camera_frames(description)], {}, captured)
+
+
+def camera_frames(description: RobotDescription) -> Iterator[Body]:
+    """Yield the optical frames of the cameras whose place is known, as bodies."""
+    taken = {WORLD, *(each.name for each in description.bodies)}
+    for camera in description.cameras:
+        at = camera.calibration
+        if at is not None and camera.name not in taken:
+            yield Body(name=camera.name, parent=at.body, position=at.position, orientation=at.orientation)
+
+
+def camera_calibration(camera: Camera, found: Calibration, captured: int) -> bytes:
+    """Return the CameraCalibration of a camera for its full size, in its own frame."""
+    message = CameraCalibration(
+        timestamp=_stamp(captured),
+        frame_id=camera.name,
+        width=camera.width,
+        height=camera.height,
+        distortion_model=found.distortion_model,
+        D=found.distortion,
+        K=(found.fx, 0.0, found.cx, 0.0, found.fy, found.cy, 0.0, 0.0, 1.0),
+        R=(1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0),
+        P=(found.fx, 0.0, found.cx, 0.0, 0.0, found.fy, found.cy, 0.0, 0.0, 0.0, 1.0, 0.0),
+    )
+    return message.SerializeToString()
 
 
 def _transforms(bodies: Iterable[Body], joints: Mapping[str, float], captured: int) -> bytes:
@@ -101,7 +141,7 @@ def odometry(description: RobotDescription, base: PlanarBase, pose: Pose, axes: 
     found = Odometry(
         timestamp=_stamp(captured),
         frame_id=WORLD,
-        body_frame_id=_base_body(description, base),
+        body_frame_id=base_body(description, base),
         pose=pose,
         linear_velocity=Vector3(x=values.get(base.forward, 0.0), y=values.get(base.left, 0.0)),
         angular_velocity=Vector3(z=values.get(base.turn, 0.0)),
@@ -109,7 +149,7 @@ def odometry(description: RobotDescription, base: PlanarBase, pose: Pose, axes: 
     return found.SerializeToString()
 
 
-def _base_body(description: RobotDescription, base: PlanarBase) -> str:
+def base_body(description: RobotDescription, base: PlanarBase) -> str:
     """Return the name of the body that turns with the base; "" if no body does."""
     return next((body.name for body in description.bodies for joint in body.joints if joint.joint == base.yaw), "")
 

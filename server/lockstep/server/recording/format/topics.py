@@ -6,6 +6,7 @@ from functools import cache
 from typing import Any, NamedTuple
 
 import msgspec
+from foxglove_schemas_protobuf.CameraCalibration_pb2 import CameraCalibration
 from foxglove_schemas_protobuf.CompressedAudio_pb2 import CompressedAudio
 from foxglove_schemas_protobuf.CompressedVideo_pb2 import CompressedVideo
 from foxglove_schemas_protobuf.FrameTransforms_pb2 import FrameTransforms
@@ -19,6 +20,7 @@ from google.protobuf.descriptor_pb2 import FileDescriptorSet
 from google.protobuf.message import Message
 
 from lockstep.protocol.description import RobotDescription
+from lockstep.server.recording.format.own_messages import AxisCommands, AxisStates, WrenchStamped
 from lockstep.server.recording.format.records import (
     OWN_RECORDS,
     ActionRecord,
@@ -42,6 +44,9 @@ from lockstep.server.recording.format.records import (
 )
 
 __all__ = [
+    "AXIS_COMMANDS",
+    "AXIS_STATES",
+    "CALIBRATION",
     "CAMERA",
     "FIXED_TRANSFORMS",
     "JOINTS",
@@ -56,7 +61,9 @@ __all__ = [
     "SIGNATURE",
     "SOUND_FORMATS",
     "TRANSFORMS",
+    "WRENCH",
     "Topic",
+    "has_frames",
     "media_topic",
     "own_schema",
     "stream_of",
@@ -65,6 +72,8 @@ __all__ = [
 
 CAMERA, MICROPHONE = "/camera/", "/microphone/"  # and the stream's name
 JOINTS, SCAN, POSE, LOG = "/joint_states", "/scan", "/pose", "/log"
+AXIS_COMMANDS, AXIS_STATES, WRENCH = "/axis_commands", "/axis_states", "/wrench"
+CALIBRATION = "/camera_calibration/"  # and the camera's name
 TRANSFORMS, FIXED_TRANSFORMS, ODOMETRY, SHAPES = "/tf", "/tf_static", "/odom", "/robot_shapes"
 
 # The names of formats in messages, by codec. One topic can have several.
@@ -87,7 +96,7 @@ OWN_TOPICS: dict[type[OwnRecord], str] = {
     NoteRecord: "/lockstep/note",
     EpisodeRecord: "/lockstep/episode",
     Degraded: "/lockstep/degraded",
-    WrenchRecord: "/wrench",
+    WrenchRecord: WRENCH,  # in earlier files
     SignatureRecord: "/lockstep/signature",
 }
 SIGNATURE = OWN_TOPICS[SignatureRecord]
@@ -107,23 +116,33 @@ def topics_of(description: RobotDescription, codecs: Mapping[str, str], *, signe
     if signed:
         found.append(_own(SIGNATURE, SignatureRecord))
     if description.wrench is not None:
-        found.append(_own(OWN_TOPICS[WrenchRecord], WrenchRecord))
+        found.append(_protobuf(WRENCH, WrenchStamped))
+    found += [_protobuf(AXIS_COMMANDS, AxisCommands), _protobuf(AXIS_STATES, AxisStates)]
     for stream, codec in codecs.items():
         found.append(
-            _foxglove(media_topic(stream, codec), CompressedVideo if codec in PICTURE_FORMATS else CompressedAudio)
+            _protobuf(media_topic(stream, codec), CompressedVideo if codec in PICTURE_FORMATS else CompressedAudio)
         )
     if description.joints:
-        found.append(_foxglove(JOINTS, JointStates))
+        found.append(_protobuf(JOINTS, JointStates))
     if description.ranges is not None:
-        found.append(_foxglove(SCAN, LaserScan))
+        found.append(_protobuf(SCAN, LaserScan))
     if description.planar_base is not None:
-        found.append(_foxglove(POSE, PoseInFrame))
-        found.append(_foxglove(ODOMETRY, Odometry))
+        found.append(_protobuf(POSE, PoseInFrame))
+        found.append(_protobuf(ODOMETRY, Odometry))
+    if has_frames(description):
+        found.extend(_protobuf(topic, FrameTransforms) for topic in (TRANSFORMS, FIXED_TRANSFORMS))
     if description.bodies:
-        found.extend(_foxglove(topic, FrameTransforms) for topic in (TRANSFORMS, FIXED_TRANSFORMS))
-        found.append(_foxglove(SHAPES, SceneUpdate))
-    found.append(_foxglove(LOG, Log))
+        found.append(_protobuf(SHAPES, SceneUpdate))
+    for camera in description.cameras:
+        if camera.calibration is not None:
+            found.append(_protobuf(CALIBRATION + camera.name, CameraCalibration))
+    found.append(_protobuf(LOG, Log))
     return found
+
+
+def has_frames(description: RobotDescription) -> bool:
+    """Return whether there is any frame but the world's."""
+    return bool(description.bodies) or any(camera.calibration is not None for camera in description.cameras)
 
 
 def media_topic(stream: str, codec: str) -> str:
@@ -154,7 +173,7 @@ def _own(topic: str, kind: type[OwnRecord]) -> Topic:
     return Topic(topic, name, "jsonschema", json.dumps(own_schema(kind)).encode(), "json")
 
 
-def _foxglove(topic: str, kind: type[Message]) -> Topic:
+def _protobuf(topic: str, kind: type[Message]) -> Topic:
     return Topic(topic, kind.DESCRIPTOR.full_name, "protobuf", _descriptors(kind), "protobuf")
 
 

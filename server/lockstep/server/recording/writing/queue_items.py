@@ -9,12 +9,13 @@ from lockstep.protocol.description import RobotDescription
 from lockstep.protocol.messages import Feedback
 from lockstep.server.recording.format.foxglove import (
     camera_message,
+    command_messages,
     feedback_messages,
     log_message,
     robot_messages,
     sound_message,
 )
-from lockstep.server.recording.format.records import FeedbackRecord, OwnRecord, RobotRecord
+from lockstep.server.recording.format.records import CommandRecord, FeedbackRecord, OwnRecord, RobotRecord
 from lockstep.server.recording.format.records_in_words import in_words
 from lockstep.server.recording.format.topics import LOG, OWN_TOPICS, PICTURE_FORMATS, SOUND_FORMATS, media_topic
 from lockstep.server.recording.writing.writer import Entry
@@ -71,6 +72,8 @@ def entries_of(item: Item, description: RobotDescription) -> Iterator[Entry]:
             if words:
                 data = log_message(arrived, words.text, warning=words.warning)
                 yield Entry(LOG, record.event, arrived, arrived, data)
+            if isinstance(record, CommandRecord):
+                yield from command_messages(description, record, arrived, arrived)
             if isinstance(item, RobotItem):
                 yield from robot_messages(description, record.event, arrived)
 

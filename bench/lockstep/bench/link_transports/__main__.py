@@ -1,0 +1,3 @@
+from lockstep.bench.link_transports.cli import main
+
+main()

@@ -1,0 +1,48 @@
+"""`lockstep export --to rerun`: a file for Rerun's viewer, .rrd. Needs rerun-sdk."""
+
+from pathlib import Path
+
+from lockstep.server.recording.errors import RecordingDamaged
+from lockstep.server.recording.export.rerun.session_log import Moment, SessionLog, new_stream
+from lockstep.server.recording.format.payload import own_record_of
+from lockstep.server.recording.format.records import ReportRecord, TraceRecord
+from lockstep.server.recording.format.topics import CAMERA, OWN_TOPICS, SIGNATURE, WRENCH
+from lockstep.server.recording.reading.reader import RecordingReader
+
+__all__ = ["export"]
+
+UNUSED = {SIGNATURE, WRENCH, OWN_TOPICS[ReportRecord], OWN_TOPICS[TraceRecord]}
+READ = set(OWN_TOPICS.values()) - UNUSED
+
+
+def export(path: Path, out: Path | None, task: str) -> list[Path]:
+    """Write and return the file: `out`, or one beside `path`. Raises RecordingError, OSError."""
+    target = out or path.with_suffix(".rrd")
+    target.parent.mkdir(parents=True, exist_ok=True)
+    with RecordingReader(path) as reader, target.open("wb"):  # an OSError here says what Rerun would only log
+        stream = new_stream(reader.info.recording, reader.info.epoch)
+        stream.save(str(target))
+        try:
+            _write(reader, SessionLog(stream))
+            stream.flush()
+        except (OverflowError, ValueError) as error:
+            raise RecordingDamaged(f"{path.name}: Rerun has no such value: {error}") from error
+        finally:
+            stream.disconnect()
+    return [target]
+
+
+def _write(reader: RecordingReader, session: SessionLog) -> None:
+    session.begin(reader.description())
+    for record in reader.records():
+        at = Moment(record.event, record.arrived, record.captured)
+        if record.topic.startswith(CAMERA):
+            picture = record.picture
+            if picture is not None:
+                camera = record.topic.removeprefix(CAMERA)
+                session.picture(camera, picture.format, picture.data, at, keyframe=picture.keyframe)
+        elif record.topic in READ:
+            own = own_record_of(record.schema, record.data)
+            if own is not None:
+                session.own(own, at)
+    session.flush()

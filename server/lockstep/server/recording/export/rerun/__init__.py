@@ -1,0 +1,1 @@
+"""A session in Rerun's terms, with the event references as a timeline; for files and for live viewers."""

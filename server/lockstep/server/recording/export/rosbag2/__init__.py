@@ -1,0 +1,1 @@
+"""A session in ROS 2's messages, for bags."""

@@ -1,0 +1,101 @@
+"""The thread that hands a session to the process which speaks to Rerun. The console's loop only appends to a queue."""
+
+import os
+import pickle
+import threading
+import time
+from collections import deque
+
+from lockstep.server.recording.writing.queue_items import Item, MediaItem, RobotItem
+
+__all__ = ["LENGTH", "Feed"]
+
+MAX_WAITING = 512  # items, about 2 s
+DRAIN_SECONDS = 0.02  # between two looks at the queue: nobody is woken for each item
+LENGTH = 4  # bytes, big-endian, before each item
+
+
+class Feed:
+    """Writes items to a pipe. `put` from the loop at any rate.
+
+    A full queue drops its oldest item, and counts it. A process that does not read blocks this thread alone.
+
+    Attributes:
+        dropped: number of dropped items
+        dropped_media: whether a picture or sound was dropped since somebody last set this to False
+        broken: set when the process has closed its end
+    """
+
+    def __init__(self, pipe: int) -> None:
+        """`pipe`: the descriptor to write to, which the feed closes."""
+        self.dropped = 0
+        self.dropped_media = False
+        self.broken = threading.Event()
+        self._pipe = pipe
+        self._waiting: deque[Item] = deque(maxlen=MAX_WAITING)
+        self._robot: RobotItem | None = None  # the newest: without it nothing can be logged
+        self._robot_dropped = False
+        self._since: float | None = None  # s, monotonic: of the write that goes on
+        self._news = threading.Event()
+        self._closing = threading.Event()
+        self._thread = threading.Thread(target=self._run, name="rerun", daemon=True)
+
+    def start(self) -> None:
+        self._thread.start()
+
+    def put(self, item: Item) -> None:
+        """Queue an item without blocking."""
+        if len(self._waiting) == MAX_WAITING:
+            self.dropped += 1
+            oldest = self._waiting.popleft()
+            self.dropped_media |= isinstance(oldest, MediaItem)
+            self._robot_dropped |= isinstance(oldest, RobotItem)
+        if isinstance(item, RobotItem):
+            self._robot, self._robot_dropped = item, False
+        self._waiting.append(item)
+        self._news.set()
+
+    def blocked_for(self, now: float) -> float:
+        """Return for how many seconds the process has taken nothing of a write."""
+        since = self._since
+        return 0.0 if since is None else now - since
+
+    def close(self) -> None:
+        """End after what waits, or at once if it has not begun. Does not block; `join` waits."""
+        if self._thread.ident is None and not self._closing.is_set():
+            os.close(self._pipe)
+        self._closing.set()
+        self._news.set()
+
+    def join(self) -> None:
+        """Wait for the end. Blocks for as long as the process neither reads nor ends."""
+        if self._thread.ident is not None:
+            self._thread.join()
+
+    def _run(self) -> None:
+        try:
+            while not self.broken.is_set():
+                self._news.wait()
+                self._news.clear()
+                ending = self._closing.is_set()
+                for _ in range(len(self._waiting)):
+                    if self._robot_dropped and self._robot is not None:
+                        self._robot_dropped = False
+                        self._write(self._robot)
+                    self._write(self._waiting.popleft())
+                    time.sleep(0)  # the loop goes first
+                if ending:
+                    break
+                self._closing.wait(DRAIN_SECONDS)
+        except OSError:  # the process is gone
+            self.broken.set()
+        finally:
+            os.close(self._pipe)
+
+    def _write(self, item: Item) -> None:
+        data = pickle.dumps(item, protocol=pickle.HIGHEST_PROTOCOL)
+        left = memoryview(len(data).to_bytes(LENGTH, "big") + data)
+        while left:
+            self._since = time.monotonic()
+            left = left[os.write(self._pipe, left) :]
+        self._since = None

@@ -1,0 +1,154 @@
+"""A driven console whose session goes to Rerun; read and received by Rerun's own library and server."""
+
+import asyncio
+import os
+import shutil
+import signal
+import socket
+import sys
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from pathlib import Path
+
+import pytest
+
+from lockstep.protocol.console import SeatRequest
+from tests.server.recording.rrd import entities, recording_ids
+from tests.server.rig import PATIENCE, Rig, TestPeer, eventually, running_rig
+
+VIEWER = Path(sys.executable).with_name("rerun")  # Rerun's own program, which the wheel brings
+
+
+async def running(rig: Rig) -> None:
+    service = rig.dependencies.rerun
+    assert service is not None
+    async with asyncio.timeout(PATIENCE):
+        await service.running.wait()
+
+
+async def take_seat(peer: TestPeer) -> None:
+    await peer.feedback()
+    peer.send("session", SeatRequest())
+    await peer.drive([0.0, 0.0, 0.0])
+
+
+def free_port() -> int:
+    with socket.create_server(("127.0.0.1", 0)) as taken:
+        port: int = taken.getsockname()[1]
+        return port
+
+
+async def test_a_driven_session_is_in_the_file_by_event_with_pictures(tmp_path: Path) -> None:
+    path = tmp_path / "a.rrd"
+    async with running_rig(rerun={"to": str(path)}) as rig:
+        await running(rig)
+        async with rig.peer("operator") as operator:
+            await take_seat(operator)
+            service = rig.dependencies.rerun
+            assert service is not None
+            assert service.process_id is not None
+            os.kill(service.process_id, signal.SIGTERM)  # as a service manager does with all processes at once
+            driven = [await operator.drive([0.1, 0.0, 0.0]) for _ in range(20)]
+            assert rig.dependencies.media.is_recorded
+        epoch = rig.dependencies.console.clock.epoch
+    found = entities(path)
+    assert recording_ids(path) == [epoch]
+    measured = {row["event"]: row["Scalars:scalars"] for row in found["/axes/measured"].rows}
+    for feedback in driven:
+        assert measured[feedback.event] == pytest.approx(feedback.axes)
+    assert {feedback.event for feedback in driven} <= set(found["/axes/commanded"].column("event"))
+    overview = found["/camera/overview"]
+    assert overview.rows[0]["VideoStream:is_keyframe"] == [True]
+    assert any("drives" in text for (text,) in found["/log"].column("TextLog:text"))
+
+
+@asynccontextmanager
+async def viewer(port: int, path: Path) -> AsyncIterator[None]:
+    """Rerun's server, which saves what it gets."""
+    process = await asyncio.create_subprocess_exec(
+        *(str(VIEWER), "--save", str(path), "--port", str(port), "--bind", "127.0.0.1"),
+        stdout=asyncio.subprocess.DEVNULL,
+        stderr=asyncio.subprocess.DEVNULL,
+        env={**os.environ, "HOME": str(path.parent)},
+    )
+    try:
+        async with asyncio.timeout(PATIENCE):
+            while True:
+                try:
+                    _, writer = await asyncio.open_connection("127.0.0.1", port)
+                    writer.close()
+                    break
+                except OSError:
+                    await asyncio.sleep(0.05)
+        yield
+    finally:
+        process.send_signal(signal.SIGINT)
+        await process.wait()
+
+
+@pytest.mark.skipif(shutil.which(str(VIEWER)) is None, reason="the wheel of rerun-sdk brought no viewer")
+async def test_a_viewer_that_starts_later_gets_the_session(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("lockstep.server.rerun.service.RETRY_SECONDS", 0.2)
+    port, path = free_port(), tmp_path / "seen.rrd"
+    async with running_rig(rerun={"to": f"127.0.0.1:{port}"}) as rig, rig.peer("operator") as operator:
+        await take_seat(operator)
+        before = await operator.drive([0.1, 0.0, 0.0])  # nobody is there
+        async with viewer(port, path):
+            async with asyncio.timeout(PATIENCE):
+                while not path.exists() or b"/axes/measured" not in path.read_bytes():
+                    await operator.drive([0.1, 0.0, 0.0])
+            last = await operator.drive([0.1, 0.0, 0.0])
+            async with asyncio.timeout(PATIENCE):
+                while last.event not in entities(path)["/axes/measured"].column("event"):
+                    await operator.drive([0.1, 0.0, 0.0])
+    assert before.event < last.event
+
+
+async def test_a_viewer_that_never_reads_and_a_process_that_is_killed_take_nothing_from_who_drives(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr("lockstep.server.rerun.service.RETRY_SECONDS", 0.1)
+    monkeypatch.setattr("lockstep.server.rerun.service.END_SECONDS", 0.5)
+    listening = socket.create_server(("127.0.0.1", 0))
+    with listening:
+        address = f"127.0.0.1:{listening.getsockname()[1]}"
+        async with running_rig(rerun={"to": address}) as rig, rig.peer("operator") as operator:
+            await running(rig)
+            await take_seat(operator)
+            events = [(await operator.drive([0.1, 0.0, 0.0])).event for _ in range(20)]
+            service = rig.dependencies.rerun
+            assert service is not None
+            assert service.process_id is not None
+            killed = service.process_id
+            os.kill(killed, signal.SIGKILL)
+            async with asyncio.timeout(PATIENCE):
+                while service.process_id in (killed, None):
+                    await operator.drive([0.1, 0.0, 0.0])
+            events += [(await operator.drive([0.1, 0.0, 0.0])).event for _ in range(20)]
+            assert not operator.closed.is_set()
+    assert events == sorted(set(events))
+
+
+async def test_a_process_that_takes_nothing_is_ended_and_another_begins(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setattr("lockstep.server.rerun.service.RETRY_SECONDS", 0.1)
+    monkeypatch.setattr("lockstep.server.rerun.service.BLOCKED_SECONDS", 0.3)
+    async with running_rig(rerun={"to": str(tmp_path / "a.rrd")}) as rig, rig.peer("operator") as operator:
+        await running(rig)
+        await take_seat(operator)
+        service = rig.dependencies.rerun
+        assert service is not None
+        assert service.process_id is not None
+        stopped = service.process_id
+        os.kill(stopped, signal.SIGSTOP)
+        async with asyncio.timeout(PATIENCE):
+            while service.process_id in (stopped, None):
+                await operator.drive([0.1, 0.0, 0.0])
+        await eventually((tmp_path / "a-2.rrd").exists)
+        assert not operator.closed.is_set()
+
+
+async def test_without_a_word_of_it_there_is_no_process() -> None:
+    async with running_rig() as rig:
+        assert rig.dependencies.rerun is None
