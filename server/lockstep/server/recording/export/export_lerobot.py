@@ -6,8 +6,9 @@ as a whole. `lerobot_rows` says what a row is, `lerobot_layout` what is in it.
 
 import os
 import shutil
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import msgspec
 import numpy as np
@@ -29,7 +30,7 @@ from lockstep.server.recording.export.lerobot_video import camera_key
 from lockstep.server.recording.format.topics import CAMERA
 from lockstep.server.recording.reading.reader import RecordingReader
 
-__all__ = ["TOLERANCE", "DatasetOptions", "cameras_of", "export", "export_all", "new_state"]
+__all__ = ["TOLERANCE", "DatasetOptions", "cameras_of", "export", "export_all", "new_state", "options_of"]
 
 TOLERANCE = 4  # events, as the page's own
 
@@ -49,21 +50,23 @@ def export(path: Path, out: Path | None, task: str) -> list[Path]:
     return export_all([path], out, task)
 
 
+def options_of(chosen: Mapping[str, Any]) -> DatasetOptions:
+    """Return the options that have these values."""
+    return msgspec.convert(chosen, DatasetOptions)
+
+
 def export_all(
     paths: Sequence[Path],
     out: Path | None,
-    task: str,
-    tolerance: int = TOLERANCE,
-    *,
-    fps: int | None = None,
-    cameras: Sequence[str] = (),
-    layout: LayoutChoice | None = None,
+    options: DatasetOptions | str = "",
+    tolerance: int | None = None,
 ) -> list[Path]:
     """Write one dataset of the recordings, in their order. The directory appears when all of it is written.
 
     Args:
         out: a new directory; None: one beside the first recording
-        task, tolerance, fps, cameras, layout: see `DatasetOptions`
+        options: or the task alone
+        tolerance: instead of that in the options
 
     Raises:
         RecordingError: a recording cannot be read, none has a row, they are of different robots, or the options do not
@@ -73,13 +76,13 @@ def export_all(
     root = out or paths[0].with_suffix(".lerobot")
     if root.exists():
         raise FileExistsError(17, "it is there already", str(root))
-    options = DatasetOptions(
-        task=task, tolerance=tolerance, fps=fps, cameras=list(cameras), layout=layout or LayoutChoice()
-    )
-    description, chosen, topics, episodes = _read(paths, options)
+    chosen = options if isinstance(options, DatasetOptions) else DatasetOptions(task=options)
+    if tolerance is not None:
+        chosen = msgspec.structs.replace(chosen, tolerance=tolerance)
+    description, layout, topics, episodes = _read(paths, chosen)
     partial = root.with_name(f".{root.name}.partial-{os.getpid()}")
     try:
-        write_batch(partial, new_state(description, chosen, topics, options, episodes), chosen, episodes)
+        write_batch(partial, new_state(description, layout, topics, chosen, episodes), layout, episodes)
         partial.rename(root)
     except BaseException:
         shutil.rmtree(partial, ignore_errors=True)
