@@ -100,18 +100,34 @@ def add_recording_commands(app: typer.Typer, make_settings: MakeSettings) -> Non
 
     @app.command()
     def replay(
-        file: File,
+        file: Annotated[Path, typer.Argument(help="A recording: its file, or its id; with --to also a dataset.")],
         host: Annotated[str, typer.Option(help="Address to listen on.")] = "127.0.0.1",
         port: Annotated[int, typer.Option(min=0, max=65535, help="Port; 0: any free port.")] = 0,
+        to: Annotated[str, typer.Option(help="Drive the robot behind this operator's link along it instead.")] = "",
+        episode: Annotated[int, typer.Option(min=0, help="--to: the kept episode, counted from 0.")] = 0,
+        pace: Annotated[float, typer.Option(min=0.05, max=1.0, help="--to: 1 is as it was recorded.")] = 1.0,
+        from_anywhere: Annotated[
+            bool, typer.Option("--from-anywhere", help="--to: go to the beginning, however far it is.")
+        ] = False,
+        tls_ca: Annotated[Path | None, typer.Option(help="--to: a certificate to trust.")] = None,
         directory: DirectoryOption = None,
         robot: RobotOption = "",
         state_dir: StateDirOption = None,
         as_json: Json = False,
     ) -> None:
-        """Serve the player for one recording, without a robot, and print its link."""
+        """Serve the player for one recording, without a robot, and print its link; or drive a robot along it (--to)."""
+        is_dataset = (file / "meta" / "info.json").is_file()
+        path = file if is_dataset else recording_file(file, make_settings(state_dir=state_dir), robot, directory)
+        if to:
+            from lockstep.server.cli.recordings.replay_to import replay_to
+
+            replay_to(path, to, episode, pace, from_anywhere=from_anywhere, tls_ca=tls_ca, as_json=as_json)
+            return
+        if is_dataset:
+            raise usage_error("the player takes recordings alone; --to LINK drives a robot along a dataset")
         from lockstep.server.cli.recordings.replay import serve_replay
 
-        serve_replay(recording_file(file, make_settings(state_dir=state_dir), robot, directory), host, port, as_json)
+        serve_replay(path, host, port, as_json)
 
     @app.command()
     def verify(

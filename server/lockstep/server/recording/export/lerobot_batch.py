@@ -29,11 +29,10 @@ from lockstep.server.recording.export.lerobot_meta import (
 from lockstep.server.recording.export.lerobot_rows import EpisodeRows
 from lockstep.server.recording.export.lerobot_video import ExportedCamera, write_video
 
-__all__ = ["POLICY", "DatasetState", "write_batch"]
+__all__ = ["DatasetState", "write_batch"]
 
 Array = npt.NDArray[Any]
 SUCCESS = {"success": 1, "failure": 0, "": -1}
-POLICY = "policy"  # the role of a program that drives
 
 
 class DatasetState(msgspec.Struct, kw_only=True):
@@ -133,7 +132,7 @@ def _columns(rows: EpisodeRows, number: int, begin: int, fps: int, task: int) ->
         "lockstep.time": np.array([frame.time - frames[0].time for frame in frames], np.float64),
         "lockstep.age": np.array(rows.ages, np.float64),
         "lockstep.driver": np.array([frame.driver for frame in frames], object),
-        "lockstep.role": np.array([frame.role for frame in frames], object),
+        "lockstep.driver_kind": np.array([frame.kind for frame in frames], object),
         "lockstep.intervention": np.array(_interventions(rows), np.int64),
         "lockstep.success": np.full(count, SUCCESS[rows.stretch.outcome], np.int64),
         "timestamp": (np.arange(count) / fps).astype(np.float32),
@@ -148,8 +147,8 @@ def _interventions(rows: EpisodeRows) -> list[int]:
     """Return 1 for each row that a person drove after a policy had driven in the episode."""
     found, has_policy = [], False
     for frame in rows.frames:
-        has_policy = has_policy or frame.role == POLICY
-        found.append(int(has_policy and frame.role != POLICY))
+        has_policy = has_policy or frame.kind == "policy"
+        found.append(int(has_policy and frame.kind != "policy"))
     return found
 
 

@@ -24,7 +24,7 @@ from lockstep.server.recording.format.payload import own_record_of
 from lockstep.server.recording.format.records import CommandRecord, Degraded, EpisodeRecord, FeedbackRecord
 from lockstep.server.recording.format.topics import OWN_TOPICS
 from lockstep.server.recording.reading.reader import Record, RecordingReader
-from lockstep.server.recording.reading.seat_roles import SeatRoles
+from lockstep.server.recording.reading.seat_roles import DriverKind, SeatRoles
 
 __all__ = [
     "EpisodeRows",
@@ -51,7 +51,7 @@ class Frame(NamedTuple):
     state: dict[str, list[float]]  # by column
     action: list[float]
     driver: str  # name of the peer that sent the command
-    role: str  # its role when it took the seat; "" if that is not known
+    kind: DriverKind  # of the peer
 
 
 class Stretch(NamedTuple):
@@ -224,7 +224,7 @@ def _frames(reader: RecordingReader, layout: DatasetLayout, stretch: Stretch, ro
             after = None
         state, action = layout.state(feedback), layout.action(command, answer, after)
         if state is not None and action is not None:
-            yield Frame(feedback.event, feedback.time, state, action, command.name, roles.of(command.peer))
+            yield Frame(feedback.event, feedback.time, state, action, command.name, roles.kind(command.peer))
 
 
 class _Event(NamedTuple):

@@ -1,11 +1,16 @@
 """The role of each peer that held the control seat in a recording."""
 
+from typing import Literal
+
 from lockstep.server.recording.format.payload import own_record_of
 from lockstep.server.recording.format.records import SeatRecord
 from lockstep.server.recording.format.topics import OWN_TOPICS
 from lockstep.server.recording.reading.reader import RecordingReader
 
-__all__ = ["SeatRoles"]
+__all__ = ["DriverKind", "SeatRoles"]
+
+DriverKind = Literal["human", "policy"]
+POLICY = "policy"  # the role of a program that drives
 
 SEAT = {OWN_TOPICS[SeatRecord]}
 
@@ -26,6 +31,6 @@ class SeatRoles:
                     self._roles[seat.holder] = seat.role
         self._chunks = len(reader.index.chunks)
 
-    def of(self, peer: str) -> str:
-        """Return the role with which the peer held the seat last; "" if that is not known."""
-        return self._roles.get(peer, "")
+    def kind(self, peer: str) -> DriverKind:
+        """Return whether the peer held the seat as a policy; a peer that is not known is a person."""
+        return "policy" if self._roles.get(peer) == POLICY else "human"
