@@ -144,6 +144,7 @@ class MujocoSo101(Robot):
         self.bus = SimulatedMotors()
         views = VIEWS if config.picture else {}
         self.cameras = {name: SimulatedCamera(width, height) for name, (_, width, height) in views.items()}
+        self._painted = dict(self.cameras)  # the bridge takes them from `cameras` and reads them itself
         self._connected = False
         self._ended = threading.Event()
         self._painter = threading.Thread(target=self._paint, daemon=True)
@@ -194,14 +195,14 @@ class MujocoSo101(Robot):
         self._connected = False
 
     def _paint(self) -> None:
-        if not self.cameras:
+        if not self._painted:
             return
         canvas = Canvas(self.bus.simulation.model, 320, 240, Look())
         try:
             while not self._ended.wait(1 / FRAME_RATE):
                 with self.bus.lock:
                     positions = self.bus.simulation.snapshot()
-                for name, camera in self.cameras.items():
+                for name, camera in self._painted.items():
                     view, width, height = VIEWS[name]
                     pixels = np.zeros((height, width, 4), np.uint8)
                     canvas.draw(view, positions, pixels)

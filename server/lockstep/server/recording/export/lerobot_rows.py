@@ -64,6 +64,7 @@ class Stretch(NamedTuple):
     last_event: int
     task: str
     outcome: EpisodeOutcome
+    ended: int  # µs since 1970; pictures that came later are not of it, so that nobody has to wait for them
 
 
 class EpisodeRows(NamedTuple):
@@ -100,9 +101,11 @@ def stretches_of(reader: RecordingReader, episodes: list[EpisodeEntry], task: st
     if not episodes:
         task = task or reader.info.name or "teleoperation"
         first, last = reader.index.first_event, reader.index.last_event
-        return [Stretch(reader.path, reader.info, "", first, last, task, "")]
+        return [Stretch(reader.path, reader.info, "", first, last, task, "", reader.index.ended)]
     return [
-        Stretch(reader.path, reader.info, each.id, each.first_event, each.last_event, each.task, each.outcome)
+        Stretch(
+            reader.path, reader.info, each.id, each.first_event, each.last_event, each.task, each.outcome, each.ended
+        )
         for each in episodes
         if each.state == "kept"
     ]
@@ -174,7 +177,7 @@ def picture_records(reader: RecordingReader, topic: str, stretch: Stretch) -> It
             begun = False
             continue
         picture = record.picture
-        if picture is not None and (begun or picture.keyframe):
+        if picture is not None and (begun or picture.keyframe) and record.arrived // 1000 <= stretch.ended:
             begun = True
             yield record
 

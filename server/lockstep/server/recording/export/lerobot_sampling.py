@@ -13,6 +13,8 @@ __all__ = ["LONGEST", "Sample", "sampled"]
 
 LONGEST = 1.0  # s that an event stands for, at most; commands of an operator who is armed come 5 times a second
 
+ROUNDING = 1e-6  # s: a clock that counts in decimal fractions meets a moment that is a binary one
+
 
 class Sample(NamedTuple):
     place: int  # of the event
@@ -33,9 +35,9 @@ def sampled(times: Sequence[float], rate: int) -> list[Sample]:
     while True:
         moment = times[0] + step / rate
         step += 1
-        while place + 1 < len(times) and times[place + 1] <= moment:
+        while place + 1 < len(times) and times[place + 1] <= moment + ROUNDING:
             place += 1
-        age = moment - times[place]
+        age = max(moment - times[place], 0.0)
         if age <= LONGEST:
             found.append(Sample(place, age))
         elif place + 1 < len(times):  # on to the first moment that the next event has

@@ -21,7 +21,7 @@ __all__ = ["ExportedCamera", "camera_key", "write_video"]
 SAMPLES = 200  # pictures of a camera and an episode for its statistics
 PIXEL_STEP = 4  # between the pixels that are used, in both directions
 # A keyframe every second picture, since training reads pictures in any order. One thread: somebody may be driving.
-OPTIONS = {"crf": "23", "preset": "veryfast", "g": "2", "threads": "1"}
+OPTIONS = {"crf": "23", "preset": "veryfast", "g": "2", "bf": "0", "threads": "1"}
 
 Array = npt.NDArray[Any]
 
