@@ -11,7 +11,7 @@ from lockstep.client import Console, NotArmed
 from lockstep.protocol.messages import Feedback
 from tests.support.stack import Stack
 
-__all__ = ["PATIENCE", "Arm", "environment", "lerobot_python", "newest", "reach", "run_lerobot"]
+__all__ = ["PATIENCE", "ROOT", "Arm", "environment", "lerobot_python", "newest", "reach", "run_lerobot"]
 
 ROOT = Path(__file__).parents[2]
 PATIENCE = 200.0  # s; PyTorch takes its time
@@ -77,7 +77,7 @@ async def reach(console: Console, goals: dict[str, float]) -> Feedback:
     return await console.move_to(goals)
 
 
-async def run_lerobot(directory: Path, command: str, *flags: str, link: str = "") -> str:
+async def run_lerobot(directory: Path, command: str, *flags: str, link: str = "", patience: float = PATIENCE) -> str:
     """Run one of LeRobot's commands to its end; return all that it printed.
 
     Raises:
@@ -94,7 +94,7 @@ async def run_lerobot(directory: Path, command: str, *flags: str, link: str = ""
             env={**os.environ, **environment(directory), "LOCKSTEP_LINK": link, "LOCKSTEP_PYTHON": sys.executable},
         )
     try:
-        async with asyncio.timeout(PATIENCE):
+        async with asyncio.timeout(patience):
             await process.wait()
     except TimeoutError:
         process.kill()

@@ -10,6 +10,7 @@ import pty
 import threading
 import time
 import tty
+from contextlib import suppress
 
 __all__ = ["FeetechBus"]
 
@@ -90,6 +91,9 @@ class FeetechBus:
 
     def _run(self) -> None:
         waiting = b""
+        # LeRobot waits for some milliseconds and asks once. The motors of an arm answer whatever its computer does.
+        with suppress(PermissionError):
+            os.sched_setscheduler(threading.get_native_id(), os.SCHED_RR, os.sched_param(1))
         while True:
             try:
                 waiting += os.read(self._master, 4096)

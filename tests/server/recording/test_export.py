@@ -175,7 +175,7 @@ def test_a_lerobot_dataset_pairs_each_event_with_the_command_that_answered_it_an
     assert events == list(range(2, EVENTS))  # the first has no picture, the last no answer
     states, actions = table.column("observation.state").to_pylist(), table.column("action").to_pylist()
     names = info["features"]["observation.state"]["names"]
-    assert [state[names.index("joint.x")] for state in states] == [event - 1 for event in events]
+    assert [state[names.index("x.pos")] for state in states] == [event - 1 for event in events]
     assert [action[0] for action in actions] == pytest.approx([event / EVENTS for event in events])
     with av.open(str(root / "videos" / "observation.images.front" / "chunk-000" / "file-000.mp4")) as video:
         shown = [brightness(frame) for frame in video.decode(video=0)]

@@ -66,12 +66,14 @@ def _pairing() -> typer.Typer:
 
 def _recordings() -> typer.Typer:
     from lockstep.server.cli.recordings.episodes import add_episode_command
+    from lockstep.server.cli.recordings.export import add_export_command
     from lockstep.server.cli.recordings.recordings import add_recording_commands
     from lockstep.server.cli.settings_from_flags import make_settings
 
     commands = typer.Typer()
     add_recording_commands(commands, make_settings)
     add_episode_command(commands, make_settings)
+    add_export_command(commands, make_settings)
     return commands
 
 

@@ -3,10 +3,11 @@
 RecordingError
 ├── RecordingDamaged    not a recording, or not readable to its end
 ├── RecordingTampered   its checksums do not fit what it holds
+├── DatasetRefused      what was asked for does not fit the robot or the dataset
 └── DiskTrouble         it cannot be written
 """
 
-__all__ = ["DiskTrouble", "RecordingDamaged", "RecordingError", "RecordingTampered"]
+__all__ = ["DatasetRefused", "DiskTrouble", "RecordingDamaged", "RecordingError", "RecordingTampered"]
 
 
 class RecordingError(Exception):
@@ -29,6 +30,10 @@ class RecordingDamaged(RecordingError):
 
 
 class RecordingTampered(RecordingError):
+    pass
+
+
+class DatasetRefused(RecordingError):
     pass
 
 

@@ -1,11 +1,10 @@
-"""The commands about recordings: `record`, `recordings`, `replay`, `verify`, `export`, `report`."""
+"""The commands about recordings: `record`, `recordings`, `replay`, `verify`, `report`."""
 
 import os
 import sys
 from collections.abc import Callable
 from datetime import datetime
 from enum import StrEnum
-from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -29,11 +28,20 @@ from lockstep.server.state.persistent_state import ConsoleState, open_state, rob
 from lockstep.server.util.display_names import escaped, printable
 from lockstep.server.util.state_dir import StateDirUnusable
 
-__all__ = ["DirectoryOption", "File", "add_recording_commands", "recording_file"]
+__all__ = [
+    "EXTRA_OF",
+    "DirectoryOption",
+    "ExportFormat",
+    "File",
+    "add_recording_commands",
+    "or_usage",
+    "recording_file",
+    "recording_store",
+    "usage_error",
+]
 
 EXIT_BROKEN = 1  # a promise is not kept
 EXIT_USAGE = 2
-DATASET_TOLERANCE = 4  # events, as the page's own
 
 Json = Annotated[bool, typer.Option("--json", help="Print JSON.")]
 File = Annotated[Path, typer.Argument(help="A recording: its file, or its id in the recordings' directory.")]
@@ -52,7 +60,7 @@ class ExportFormat(StrEnum):
 
 
 # The extra that each needs; the others need "export", or none.
-EXTRAS = {ExportFormat.RERUN: "rerun", ExportFormat.ROSBAG2: "rosbag2"}
+EXTRA_OF = {ExportFormat.RERUN: "rerun", ExportFormat.ROSBAG2: "rosbag2"}
 
 
 def add_recording_commands(app: typer.Typer, make_settings: MakeSettings) -> None:
@@ -90,7 +98,7 @@ def add_recording_commands(app: typer.Typer, make_settings: MakeSettings) -> Non
         as_json: Json = False,
     ) -> None:
         """List the recordings that are complete."""
-        found = _shelf(make_settings(state_dir=state_dir), robot, directory).entries()
+        found = recording_store(make_settings(state_dir=state_dir), robot, directory).entries()
         if as_json:
             sys.stdout.write(msgspec.json.encode(found).decode() + "\n")
             return
@@ -99,18 +107,34 @@ def add_recording_commands(app: typer.Typer, make_settings: MakeSettings) -> Non
 
     @app.command()
     def replay(
-        file: File,
+        file: Annotated[Path, typer.Argument(help="A recording: its file, or its id; with --to also a dataset.")],
         host: Annotated[str, typer.Option(help="Address to listen on.")] = "127.0.0.1",
         port: Annotated[int, typer.Option(min=0, max=65535, help="Port; 0: any free port.")] = 0,
+        to: Annotated[str, typer.Option(help="Drive the robot behind this operator's link along it instead.")] = "",
+        episode: Annotated[int, typer.Option(min=0, help="--to: the kept episode, counted from 0.")] = 0,
+        pace: Annotated[float, typer.Option(min=0.05, max=1.0, help="--to: 1 is as it was recorded.")] = 1.0,
+        from_anywhere: Annotated[
+            bool, typer.Option("--from-anywhere", help="--to: go to the beginning, however far it is.")
+        ] = False,
+        tls_ca: Annotated[Path | None, typer.Option(help="--to: a certificate to trust.")] = None,
         directory: DirectoryOption = None,
         robot: RobotOption = "",
         state_dir: StateDirOption = None,
         as_json: Json = False,
     ) -> None:
-        """Serve the player for one recording, without a robot, and print its link."""
+        """Serve the player for one recording, without a robot, and print its link; or drive a robot along it (--to)."""
+        is_dataset = (file / "meta" / "info.json").is_file()
+        path = file if is_dataset else recording_file(file, make_settings(state_dir=state_dir), robot, directory)
+        if to:
+            from lockstep.server.cli.recordings.replay_to import replay_to
+
+            replay_to(path, to, episode, pace, from_anywhere=from_anywhere, tls_ca=tls_ca, as_json=as_json)
+            return
+        if is_dataset:
+            raise usage_error("the player takes recordings alone; --to LINK drives a robot along a dataset")
         from lockstep.server.cli.recordings.replay import serve_replay
 
-        serve_replay(recording_file(file, make_settings(state_dir=state_dir), robot, directory), host, port, as_json)
+        serve_replay(path, host, port, as_json)
 
     @app.command()
     def verify(
@@ -119,6 +143,7 @@ def add_recording_commands(app: typer.Typer, make_settings: MakeSettings) -> Non
             str,
             typer.Option(help="The public key that must have signed the recording. Unset: any key, or no signature."),
         ] = "",
+        pixels: Annotated[bool, typer.Option(help="Datasets: read the events that --event-strip has drawn.")] = False,
         directory: DirectoryOption = None,
         robot: RobotOption = "",
         state_dir: StateDirOption = None,
@@ -126,12 +151,12 @@ def add_recording_commands(app: typer.Typer, make_settings: MakeSettings) -> Non
     ) -> None:
         """Check what is promised against a recording or dataset. Exit code 1: it is not kept; 2: it cannot be read."""
         if (file / "meta" / "info.json").is_file():
-            _verify_dataset(file, as_json)
+            _verify_dataset(file, as_json, pixels)
             return
         path = recording_file(file, make_settings(state_dir=state_dir), robot, directory)
         if key and not is_public_key(key):
-            raise _usage("a public key has 64 hexadecimal digits")
-        verdict = _or_usage(lambda: verify_file(path, key))
+            raise usage_error("a public key has 64 hexadecimal digits")
+        verdict = or_usage(lambda: verify_file(path, key))
         if as_json:
             told = os.fsencode(path).decode(errors="replace")
             sys.stdout.write(msgspec.json.encode({"file": told, **msgspec.to_builtins(verdict)}).decode() + "\n")
@@ -139,37 +164,6 @@ def add_recording_commands(app: typer.Typer, make_settings: MakeSettings) -> Non
             sys.stdout.write(_in_words(verdict))
         if not verdict.ok:
             raise typer.Exit(EXIT_BROKEN)
-
-    @app.command()
-    def export(
-        files: Annotated[list[Path], typer.Argument(help="Recordings: their files, or their ids.")],
-        to: Annotated[
-            ExportFormat, typer.Option(help="mp4: pictures and sound; csv, parquet: tables; others: for these tools.")
-        ],
-        out: Annotated[
-            Path | None, typer.Option(help="File or directory to write. Unset: beside the recording.")
-        ] = None,
-        task: Annotated[str, typer.Option(help="lerobot: the task of recordings without episodes, in words.")] = "",
-        tolerance: Annotated[
-            int, typer.Option(min=0, help="lerobot: events by which a picture may be older than its row.")
-        ] = DATASET_TOLERANCE,
-        directory: DirectoryOption = None,
-        robot: RobotOption = "",
-        state_dir: StateDirOption = None,
-    ) -> None:
-        """Write recordings in another form; lerobot: the kept episodes of all of them as one dataset."""
-        settings = make_settings(state_dir=state_dir)
-        paths = [recording_file(file, settings, robot, directory) for file in files]
-        if out is not None and len(paths) > 1 and to is not ExportFormat.LEROBOT:
-            raise _usage("--out takes one recording at a time, but for lerobot")
-        # Loaded only here: what needs no extra takes none.
-        exporter: Any = load_extra(f"lockstep.server.recording.export.export_{to.value}", EXTRAS.get(to, "export"))
-        if to is ExportFormat.LEROBOT:
-            written = _or_usage(lambda: exporter.export_all(paths, out, task, tolerance))
-        else:
-            written = [each for path in paths for each in _or_usage(partial(exporter.export, path, out, task))]
-        for each in written:
-            sys.stdout.write(f"{escaped(each)}\n")
 
     @app.command()
     def report(
@@ -182,13 +176,13 @@ def add_recording_commands(app: typer.Typer, make_settings: MakeSettings) -> Non
         """Draw figures of a recorded session, and say which promises were kept, in one HTML file."""
         path = recording_file(file, make_settings(state_dir=state_dir), robot, directory)
         reporter: Any = load_extra("lockstep.server.recording.report.report", "report")  # needs matplotlib
-        written = _or_usage(lambda: reporter.write_report(path, out or path.with_suffix(".html")))
+        written = or_usage(lambda: reporter.write_report(path, out or path.with_suffix(".html")))
         sys.stdout.write(f"{escaped(written)}\n")
 
 
-def _verify_dataset(root: Path, as_json: bool) -> None:
+def _verify_dataset(root: Path, as_json: bool, pixels: bool) -> None:
     verifier: Any = load_extra("lockstep.server.recording.verify.verify_dataset", "export")  # needs pyarrow
-    verdict = _or_usage(lambda: verifier.verify_dataset(root))
+    verdict = or_usage(lambda: verifier.verify_dataset(root, pixels=pixels))
     if as_json:
         sys.stdout.write(msgspec.json.encode(verdict).decode() + "\n")
     else:
@@ -214,10 +208,11 @@ def _state(settings: Settings) -> ConsoleState:
     try:
         return open_state(settings)
     except StateDirUnusable as error:
-        raise _usage(str(error)) from error
+        raise usage_error(str(error)) from error
 
 
-def _shelf(settings: Settings, robot: str, directory: Path | None) -> RecordingStore:
+def recording_store(settings: Settings, robot: str, directory: Path | None) -> RecordingStore:
+    """Return the directory of recordings: `directory`, or that of the console's settings."""
     own = recordings_directory(settings.recording, robot_directory(settings, robot))
     if robot and settings.recording.directory is not None:
         own /= robot  # as the console does
@@ -228,17 +223,18 @@ def recording_file(file: Path, settings: Settings, robot: str, directory: Path |
     """Return `file` itself, or the recording of that id."""
     if file.is_file():
         return file
-    found = _shelf(settings, robot, directory).path(file.name)
+    found = recording_store(settings, robot, directory).path(file.name)
     if found is None:
-        raise _usage(f"there is no recording {file}")
+        raise usage_error(f"there is no recording {file}")
     return found
 
 
-def _or_usage(work: Callable[[], Any]) -> Any:
+def or_usage(work: Callable[[], Any]) -> Any:
+    """Return what `work` returns; an error of a recording or of the disk ends the command with one line."""
     try:
         return work()
     except (RecordingError, OSError, ImportError) as error:
-        raise _usage(str(error)) from error
+        raise usage_error(str(error)) from error
 
 
 def _line(entry: RecordingEntry) -> str:
@@ -277,7 +273,8 @@ def _signature_words(report: SignatureReport) -> list[str]:
     return lines
 
 
-def _usage(text: str) -> typer.Exit:
+def usage_error(text: str) -> typer.Exit:
+    """Say what is wrong, and return what ends the command."""
     _say(text)
     return typer.Exit(EXIT_USAGE)
 

@@ -9,13 +9,17 @@ import numpy as np
 import numpy.typing as npt
 import pyarrow as pa
 
+from lockstep.server.recording.export.lerobot_layout import LayoutChoice
+
 __all__ = [
-    "FILE",
+    "EVENTS",
+    "RATE",
     "DatasetEpisode",
     "DatasetNotes",
     "EpisodePlace",
     "Statistics",
     "episodes_table",
+    "file_of",
     "info_of",
     "merged_statistics",
     "picture_statistics",
@@ -27,13 +31,17 @@ Array = npt.NDArray[Any]
 Statistics = dict[str, Any]
 Features = dict[str, dict[str, Any]]
 
-FILE = "chunk-000/file-000"  # the only one of each kind
 CHUNKS = 1000  # files of a folder
 DATA_MB, VIDEO_MB = 100, 200  # of a file, for programs that append
 QUANTILES = (1, 10, 50, 90, 99)
 RULE = (
     "A row is an event s: the state is feedback s, the action command s+1, the picture of each camera the first one "
     "stamped s, or else the newest older one of the same episode, at most `tolerance` events older."
+)
+EVENTS = "Each event of an episode is a row. fps is the median rate of the first episodes; lockstep.time is the truth."
+RATE = (
+    "Row k of an episode is the newest event that had been executed at k / fps after its first row, by the bridge's "
+    "clock, as a whole; lockstep.age is how much older it is. Where none followed for 1 s there are no rows."
 )
 
 
@@ -49,18 +57,28 @@ class DatasetEpisode(msgspec.Struct, frozen=True, kw_only=True):
     task: str
     outcome: str
     rows: int
-    left_out: int  # events without a picture within the tolerance
+    left_out: int  # events that are in no row because a picture was too old
+    rate: float = 0.0  # Hz, by the median interval of its events; 0: not known
 
 
 class DatasetNotes(msgspec.Struct, frozen=True, kw_only=True):
     """meta/lockstep.json: what LeRobot has no place for."""
 
-    version: Literal[1] = 1
+    version: Literal[1, 2] = 2
     rule: str = RULE
+    sampling: str = EVENTS
+    has_rate: bool = False  # the dataset has a rate of its own, and an event may be in several rows
     tolerance: int  # events
+    batches: int = 1  # number of files of each kind
     cameras: list[str]  # in the order of `lockstep.stamp`
-    drivers: list[str]  # names, by the number in `lockstep.driver`
+    topics: list[str] = []  # of the cameras in recordings, in the same order
+    drivers: list[str] = []  # names of all that drove
+    units: dict[str, str] = {}  # of the values in state and action, by name
+    layout: LayoutChoice = LayoutChoice()
     success: str = "lockstep.success: 1 success, 0 failure, -1 not said"
+    intervention: str = (
+        "lockstep.intervention: 1 where the driver was no policy, in an episode that a policy had driven before, else 0"
+    )
     episodes: list[DatasetEpisode]
 
 
@@ -71,6 +89,8 @@ class EpisodePlace(NamedTuple):
     begin: int  # number of its first row
     end: int  # behind its last row
     statistics: dict[str, Statistics]
+    batch: int  # number of the files that it is in: one of each kind and camera
+    place: int  # number of its first row among those of the batch
 
 
 def info_of(robot: str, features: Features, frames: int, fps: int, episodes: int, tasks: int) -> dict[str, Any]:
@@ -114,9 +134,21 @@ def picture_statistics(pixels: Array) -> Statistics:
     return {name: value if name == "count" else np.reshape(value, (3, 1, 1)).tolist() for name, value in found.items()}
 
 
-def merged_statistics(pixels: Sequence[Array]) -> Statistics:
-    """Return the statistics of the pictures of all episodes."""
-    return picture_statistics(np.concatenate(pixels))
+def merged_statistics(parts: Sequence[Statistics]) -> Statistics:
+    """Return the statistics of several parts together, as LeRobot merges them: quantiles are weighted means."""
+    counts = np.array([part["count"][0] for part in parts], np.float64)
+    taken = {name: np.array([part[name] for part in parts], np.float64) for name in parts[0] if name != "count"}
+    weights = (counts / counts.sum()).reshape(-1, *[1] * (taken["mean"].ndim - 1))
+    mean = (taken["mean"] * weights).sum(axis=0)
+    variance = ((taken["std"] ** 2 + (taken["mean"] - mean) ** 2) * weights).sum(axis=0)
+    found = {name: (values * weights).sum(axis=0).tolist() for name, values in taken.items()}
+    own = {"min": taken["min"].min(axis=0), "max": taken["max"].max(axis=0), "mean": mean, "std": np.sqrt(variance)}
+    return found | {name: value.tolist() for name, value in own.items()} | {"count": [int(counts.sum())]}
+
+
+def file_of(batch: int) -> str:
+    """Return the name of a batch's files, without a suffix."""
+    return f"chunk-{batch // CHUNKS:03d}/file-{batch % CHUNKS:03d}"
 
 
 def tasks_table(tasks: Sequence[str]) -> pa.Table:
@@ -130,29 +162,31 @@ def tasks_table(tasks: Sequence[str]) -> pa.Table:
     return table.replace_schema_metadata({"pandas": json.dumps(pandas)})
 
 
-def episodes_table(episodes: Sequence[EpisodePlace], fps: int, videos: list[str]) -> pa.Table:
-    """Return meta/episodes/…: the place of each episode, and its statistics."""
-    rows = [_episode_row(number, each, fps, videos) for number, each in enumerate(episodes)]
+def episodes_table(episodes: Sequence[EpisodePlace], first: int, fps: int, videos: list[str]) -> pa.Table:
+    """Return meta/episodes/… of a batch: the place of each episode, from number `first` on, and its statistics."""
+    rows = [_episode_row(number, each, fps, videos) for number, each in enumerate(episodes, first)]
     return pa.table({name: [row[name] for row in rows] for name in rows[0]})
 
 
 def _episode_row(number: int, episode: EpisodePlace, fps: int, videos: list[str]) -> dict[str, Any]:
+    chunk, file = divmod(episode.batch, CHUNKS)
+    length = episode.end - episode.begin
     row: dict[str, Any] = {
         "episode_index": number,
         "tasks": [episode.task],
-        "length": episode.end - episode.begin,
-        "data/chunk_index": 0,
-        "data/file_index": 0,
+        "length": length,
+        "data/chunk_index": chunk,
+        "data/file_index": file,
         "dataset_from_index": episode.begin,
         "dataset_to_index": episode.end,
     }
     for key in videos:
         row |= {
-            f"videos/{key}/chunk_index": 0,
-            f"videos/{key}/file_index": 0,
-            f"videos/{key}/from_timestamp": episode.begin / fps,
-            f"videos/{key}/to_timestamp": episode.end / fps,
+            f"videos/{key}/chunk_index": chunk,
+            f"videos/{key}/file_index": file,
+            f"videos/{key}/from_timestamp": episode.place / fps,
+            f"videos/{key}/to_timestamp": (episode.place + length) / fps,
         }
     for feature, numbers in episode.statistics.items():
         row |= {f"stats/{feature}/{name}": value for name, value in numbers.items()}
-    return row | {"meta/episodes/chunk_index": 0, "meta/episodes/file_index": 0}
+    return row | {"meta/episodes/chunk_index": chunk, "meta/episodes/file_index": file}

@@ -2,26 +2,29 @@
 
 The rule (docs/episodes.md, "How rows are aligned"): a row is an event `s` of a kept episode. Its state is feedback
 `s`, its action command `s+1`, which answered it, and its picture of each camera the first one stamped `s`, or else the
-newest older one of the same episode. A row is left out where command `s+1` is not known or a picture is more than the
-tolerance older.
+newest older one of the same episode. An event is in no row where one of its values or command `s+1` is not known, or a
+picture is more than the tolerance older. With a rate of its own, `lerobot_sampling` says which events the rows are.
 """
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from itertools import pairwise
 from pathlib import Path
+from statistics import median
 from typing import NamedTuple
 
 from lockstep.protocol.description import RobotDescription
 from lockstep.protocol.episodes import EpisodeOutcome
 from lockstep.protocol.serial import event_after, event_gap, is_newer
 from lockstep.server.recording.errors import RecordingDamaged
+from lockstep.server.recording.export.lerobot_layout import DatasetLayout
+from lockstep.server.recording.export.lerobot_sampling import sampled
 from lockstep.server.recording.format.episodes import EpisodeBook, EpisodeEntry
 from lockstep.server.recording.format.info import RecordingInfo
 from lockstep.server.recording.format.payload import own_record_of
-from lockstep.server.recording.format.records import CommandRecord, Degraded, EpisodeRecord, FeedbackRecord, SeatRecord
+from lockstep.server.recording.format.records import CommandRecord, Degraded, EpisodeRecord, FeedbackRecord
 from lockstep.server.recording.format.topics import OWN_TOPICS
-from lockstep.server.recording.reading.event_rows import WRENCH
 from lockstep.server.recording.reading.reader import Record, RecordingReader
+from lockstep.server.recording.reading.seat_roles import DriverKind, SeatRoles
 
 __all__ = [
     "EpisodeRows",
@@ -31,22 +34,24 @@ __all__ = [
     "check_same_robot",
     "episodes_of",
     "picture_records",
+    "rate_of",
     "rows_of",
-    "state_names",
-    "state_of",
     "stretches_of",
 ]
 
 DEGRADED = OWN_TOPICS[Degraded]
-READ = {OWN_TOPICS[kind] for kind in (FeedbackRecord, CommandRecord, SeatRecord)}
+READ = {OWN_TOPICS[kind] for kind in (FeedbackRecord, CommandRecord)}
 
 
 class Frame(NamedTuple):
     """One event: the state of the robot, and the command that answered it."""
 
-    feedback: FeedbackRecord
+    event: int
+    time: float  # s, the bridge's clock
+    state: dict[str, list[float]]  # by column
     action: list[float]
-    driver: str  # name of the seat's holder
+    driver: str  # name of the peer that sent the command
+    kind: DriverKind  # of the peer
 
 
 class Stretch(NamedTuple):
@@ -59,20 +64,26 @@ class Stretch(NamedTuple):
     last_event: int
     task: str
     outcome: EpisodeOutcome
+    ended: int  # µs since 1970; pictures that came later are not of it, so that nobody has to wait for them
 
 
 class EpisodeRows(NamedTuple):
     """The rows of one episode.
 
     Attributes:
+        frames: an event may be in several rows when the dataset has a rate of its own
         stamps: of each camera's picture of each row, by topic
-        left_out: rows that were left out because a picture was too old
+        ages: s, of the row's event at the row's moment; 0 where each event is a row
+        left_out: events that are in no row because a picture was too old
+        rate: Hz, by the median interval of the events
     """
 
     stretch: Stretch
     frames: list[Frame]
     stamps: dict[str, list[int]]
+    ages: list[float]
     left_out: int
+    rate: float
 
 
 def episodes_of(reader: RecordingReader) -> list[EpisodeEntry]:
@@ -90,33 +101,68 @@ def stretches_of(reader: RecordingReader, episodes: list[EpisodeEntry], task: st
     if not episodes:
         task = task or reader.info.name or "teleoperation"
         first, last = reader.index.first_event, reader.index.last_event
-        return [Stretch(reader.path, reader.info, "", first, last, task, "")]
+        return [Stretch(reader.path, reader.info, "", first, last, task, "", reader.index.ended)]
     return [
-        Stretch(reader.path, reader.info, each.id, each.first_event, each.last_event, each.task, each.outcome)
+        Stretch(
+            reader.path, reader.info, each.id, each.first_event, each.last_event, each.task, each.outcome, each.ended
+        )
         for each in episodes
         if each.state == "kept"
     ]
 
 
 def rows_of(
-    reader: RecordingReader, description: RobotDescription, stretches: list[Stretch], cameras: list[str], tolerance: int
+    reader: RecordingReader,
+    layout: DatasetLayout,
+    stretches: list[Stretch],
+    cameras: list[str],
+    tolerance: int,
+    rate: int | None = None,
+    roles: SeatRoles | None = None,
 ) -> list[EpisodeRows]:
-    """Return the rows of each stretch. Raises RecordingError."""
-    frames = list(_frames(reader, description))
-    found = []
-    for stretch in stretches:
-        mine = [frame for frame in frames if _is_within(frame.feedback.event, stretch)]
-        stamps = {
-            topic: dict(_stamps(reader, topic, stretch, [frame.feedback.event for frame in mine])) for topic in cameras
-        }
-        kept = [
-            frame
-            for frame in mine
-            if all(_fits(frame.feedback.event, stamps[topic].get(frame.feedback.event), tolerance) for topic in cameras)
-        ]
-        of_kept = {topic: [stamps[topic][frame.feedback.event] for frame in kept] for topic in cameras}
-        found.append(EpisodeRows(stretch, kept, of_kept, len(mine) - len(kept)))
-    return found
+    """Return the rows of each stretch. Raises RecordingError.
+
+    Args:
+        rate: Hz, of the rows; None: each event is a row
+        roles: what is known of the recording's seat from before; None: nothing
+    """
+    roles = roles or SeatRoles()
+    roles.read(reader)
+    return [_episode(reader, layout, stretch, cameras, tolerance, rate, roles) for stretch in stretches]
+
+
+def _episode(
+    reader: RecordingReader,
+    layout: DatasetLayout,
+    stretch: Stretch,
+    cameras: list[str],
+    tolerance: int,
+    rate: int | None,
+    roles: SeatRoles,
+) -> EpisodeRows:
+    mine = [frame for frame in _frames(reader, layout, stretch, roles) if _is_within(frame.event, stretch)]
+    events = [frame.event for frame in mine]
+    stamps = {topic: dict(_stamps(reader, topic, stretch, events)) for topic in cameras}
+    kept = [
+        frame
+        for frame in mine
+        if all(_fits(frame.event, stamps[topic].get(frame.event), tolerance) for topic in cameras)
+    ]
+    own_rate = rate_of([frame.time for frame in kept])
+    left_out = len(mine) - len(kept)
+    if rate is None:
+        ages = [0.0] * len(kept)
+    else:
+        samples = sampled([frame.time for frame in kept], rate)
+        kept, ages = [kept[sample.place] for sample in samples], [sample.age for sample in samples]
+    of_kept = {topic: [stamps[topic][frame.event] for frame in kept] for topic in cameras}
+    return EpisodeRows(stretch, kept, of_kept, ages, left_out, own_rate)
+
+
+def rate_of(times: Sequence[float]) -> float:
+    """Return the events per second by their median interval, so that pauses do not count; 0 where there is none."""
+    intervals = [later - earlier for earlier, later in pairwise(times) if later > earlier]
+    return 1 / median(intervals) if intervals else 0.0
 
 
 def picture_records(reader: RecordingReader, topic: str, stretch: Stretch) -> Iterator[Record]:
@@ -131,7 +177,7 @@ def picture_records(reader: RecordingReader, topic: str, stretch: Stretch) -> It
             begun = False
             continue
         picture = record.picture
-        if picture is not None and (begun or picture.keyframe):
+        if picture is not None and (begun or picture.keyframe) and record.arrived // 1000 <= stretch.ended:
             begun = True
             yield record
 
@@ -152,17 +198,6 @@ def aligned_stamps(stamps: Iterable[int], events: Iterable[int]) -> Iterator[tup
         yield place, current
 
 
-def state_names(description: RobotDescription) -> list[str]:
-    names = [f"axis.{axis.name}" for axis in description.axes]
-    names += [f"joint.{joint.name}" for joint in description.joints]
-    names += [f"wrench.{name}" for name in WRENCH if description.wrench is not None]
-    return names + [f"range.{number}" for number in range(description.ranges.count if description.ranges else 0)]
-
-
-def state_of(feedback: FeedbackRecord) -> list[float]:
-    return [*feedback.axes, *feedback.joints, *feedback.wrench, *feedback.ranges]
-
-
 def _is_within(event: int, stretch: Stretch) -> bool:
     """Return whether the event, and the one that answers it, are of the stretch."""
     return not is_newer(stretch.first_event, event) and is_newer(stretch.last_event, event)
@@ -180,45 +215,47 @@ def _stamps(reader: RecordingReader, topic: str, stretch: Stretch, events: list[
             yield event, stamp
 
 
-def _frames(reader: RecordingReader, description: RobotDescription) -> Iterator[Frame]:
+def _frames(reader: RecordingReader, layout: DatasetLayout, stretch: Stretch, roles: SeatRoles) -> Iterator[Frame]:
     """Yield a frame for each event, but for those without an answer, as the last one, or with an incomplete state."""
-    length = len(state_names(description))
-    for (row, driver, _), (following, _, command) in pairwise(_events(reader)):
-        if command is None or following.event != event_after(row.event):
+    events = list(_events(reader, stretch))
+    for place, (answer, command) in enumerate(events[1:], 1):
+        feedback = events[place - 1].feedback
+        if command is None or answer.event != event_after(feedback.event):
             continue  # the recorder has left something out
-        action = _action(command, following)
-        if action is not None and len(state_of(row)) == length:
-            yield Frame(row, action, driver)
+        after = events[place + 1].feedback if place + 1 < len(events) else None
+        if after is not None and after.event != event_after(answer.event):
+            after = None
+        state, action = layout.state(feedback), layout.action(command, answer, after)
+        if state is not None and action is not None:
+            yield Frame(feedback.event, feedback.time, state, action, command.name, roles.kind(command.peer))
 
 
-def _events(reader: RecordingReader) -> Iterator[tuple[FeedbackRecord, str, CommandRecord | None]]:
-    """Yield the first feedback of each event, who held the seat, and the command that became the event."""
-    event, driver = 0, ""
+class _Event(NamedTuple):
+    feedback: FeedbackRecord  # the first of the event
+    command: CommandRecord | None  # that became the event; None: not in the recording
+
+
+def _events(reader: RecordingReader, stretch: Stretch) -> Iterator[_Event]:
+    """Yield the events of the stretch."""
+    event = 0
     command: CommandRecord | None = None
-    for record in reader.records(topics=READ):
+    for record in reader.records(stretch.first_event, stretch.last_event, READ):
         match own_record_of(record.schema, record.data):
             case CommandRecord(outcome="forwarded") as forwarded:
                 command = forwarded
-            case SeatRecord(name=name):
-                driver = name
             case FeedbackRecord() as feedback if feedback.event != event:
                 event = feedback.event
-                became = command if command is not None and command.event == event else None
-                yield feedback, driver, became
-
-
-def _action(command: CommandRecord, answer: FeedbackRecord) -> list[float] | None:
-    """Return the values of a command, and for a goal axis that is to stay its goal then; None if that is not known."""
-    stays = answer.goals or [None] * len(command.values)
-    values = [goal if value is None else value for value, goal in zip(command.values, stays, strict=False)]
-    known = [value for value in values if value is not None]
-    return known if len(known) == len(command.values) else None
+                yield _Event(feedback, command if command is not None and command.event == event else None)
 
 
 def check_same_robot(first: RobotDescription, other: RobotDescription) -> None:
     """Raise RecordingDamaged unless recordings of both fit into one dataset."""
-    names = [axis.name for axis in first.axes], state_names(first), first.name
-    if names != ([axis.name for axis in other.axes], state_names(other), other.name):
+    if _measured(first) != _measured(other):
         raise RecordingDamaged(
             f"recordings of different robots do not fit into one dataset: {first.name}, {other.name}"
         )
+
+
+def _measured(robot: RobotDescription) -> tuple[str, list[str], list[str], bool, int]:
+    axes, joints = [axis.name for axis in robot.axes], [joint.name for joint in robot.joints]
+    return robot.name, axes, joints, robot.wrench is not None, robot.ranges.count if robot.ranges else 0

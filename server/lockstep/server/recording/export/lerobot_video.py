@@ -1,4 +1,4 @@
-"""The video of a camera in a LeRobot dataset: one picture for each row, encoded anew into one file."""
+"""The video of a camera in a LeRobot dataset: one picture for each row, encoded anew, some episodes into one file."""
 
 import re
 from collections.abc import Iterator
@@ -11,16 +11,17 @@ import numpy as np
 import numpy.typing as npt
 
 from lockstep.server.recording.errors import RecordingDamaged
-from lockstep.server.recording.export.lerobot_meta import FILE
 from lockstep.server.recording.export.lerobot_rows import EpisodeRows, Stretch, aligned_stamps, picture_records
 from lockstep.server.recording.format.topics import CAMERA
 from lockstep.server.recording.reading.pictures import RecordedPictures
 from lockstep.server.recording.reading.reader import RecordingReader
 
-__all__ = ["ExportedCamera", "write_video"]
+__all__ = ["ExportedCamera", "camera_key", "write_video"]
 
 SAMPLES = 200  # pictures of a camera and an episode for its statistics
 PIXEL_STEP = 4  # between the pixels that are used, in both directions
+# A keyframe every second picture, since training reads pictures in any order. One thread: somebody may be driving.
+OPTIONS = {"crf": "23", "preset": "veryfast", "g": "2", "bf": "0", "threads": "1"}
 
 Array = npt.NDArray[Any]
 
@@ -58,25 +59,32 @@ def _decoded(reader: RecordingReader, topic: str, stretch: Stretch) -> Iterator[
         yield frame.pts or 0, frame
 
 
-def write_video(root: Path, topic: str, episodes: list[EpisodeRows], fps: int) -> ExportedCamera:
-    """Write the pictures of a camera, one for each row of the dataset, into one file."""
-    key = "observation.images." + re.sub(r"[^\w. -]", "_", topic.removeprefix(CAMERA))
-    target = root / "videos" / key / f"{FILE}.mp4"
-    target.parent.mkdir(parents=True)
+def camera_key(topic: str) -> str:
+    """Return the name of a camera's column."""
+    return "observation.images." + re.sub(r"[^\w. -]", "_", topic.removeprefix(CAMERA))
+
+
+def write_video(
+    target: Path, topic: str, episodes: list[EpisodeRows], fps: int, size: tuple[int, int] | None = None
+) -> ExportedCamera:
+    """Write the pictures of a camera, one for each row of the episodes, into one file.
+
+    Args:
+        size: pixels, width and height of the dataset's pictures; None: those of the first one
+    """
+    target.parent.mkdir(parents=True, exist_ok=True)
     pixels: list[Array] = []
-    size = 0, 0
     number = 0
     with av.open(str(target), "w") as output:
-        # A keyframe every second picture: training reads frames in any order.
-        stream = output.add_stream("libx264", rate=fps, options={"crf": "23", "preset": "veryfast", "g": "2"})
+        stream = output.add_stream("libx264", rate=fps, options=OPTIONS)
         stream.pix_fmt = "yuv420p"
         for each in episodes:
-            events = [frame.feedback.event for frame in each.frames]
+            events = [frame.event for frame in each.frames]
             every = max(1, len(events) // SAMPLES)
             samples: list[Array] = []
             for place, picture in enumerate(_pictures(each.stretch, topic, events)):
+                size = size or (picture.width, picture.height)
                 if number == 0:
-                    size = picture.width, picture.height
                     stream.width, stream.height = size
                 whole = picture.reformat(*size, format="yuv420p")
                 whole.pts, whole.time_base = number, Fraction(1, fps)
@@ -87,7 +95,9 @@ def write_video(root: Path, topic: str, episodes: list[EpisodeRows], fps: int) -
                     samples.append(shown.reshape(-1, 3) / 255.0)
             pixels.append(np.concatenate(samples))
         output.mux(stream.encode(None))
-    return ExportedCamera(key, _feature(*size, fps), pixels)
+    if size is None:
+        raise RecordingDamaged(f"{topic} has no picture")
+    return ExportedCamera(camera_key(topic), _feature(*size, fps), pixels)
 
 
 def _feature(width: int, height: int, fps: int) -> dict[str, Any]:

@@ -1,6 +1,6 @@
 """Checks a LeRobot dataset that Lockstep has exported: `lockstep verify DIRECTORY`. Needs pyarrow."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any, Literal
 
@@ -10,22 +10,28 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from lockstep.protocol.serial import event_gap, is_event
+from lockstep.robot_bridge.robots.event_strip import read_event_strip
+from lockstep.server.recording.dataset.commit import is_interrupted
 from lockstep.server.recording.errors import RecordingDamaged
-from lockstep.server.recording.export.lerobot_meta import DatasetEpisode, DatasetNotes
+from lockstep.server.recording.export.lerobot_meta import DatasetEpisode, DatasetNotes, file_of
+from lockstep.server.recording.export.lerobot_sampling import LONGEST
 
 __all__ = ["DatasetVerdict", "verify_dataset"]
 
 DatasetCheckName = Literal[
     "aligned",  # no picture is stamped newer than its row's event, or older by more than the tolerance
     "within",  # each row, and the picture in it, is of the kept stretch that its episode is
-    "ordered",  # the events of an episode go up, and no event is in two rows
-    "counted",  # rows, episodes and the pictures in the videos are as many as the dataset says
+    "ordered",  # the events of an episode go up, and none is in two rows but where it stood longer than a row
+    "timed",  # the rows of an episode are as far apart as the dataset says
+    "counted",  # rows, episodes and the pictures in the videos are as many as the dataset says, and no append is open
+    "shown",  # the event that is drawn into a picture is the one that the dataset says; with `pixels` alone
 ]
-CHECKS: tuple[DatasetCheckName, ...] = ("aligned", "within", "ordered", "counted")
+CHECKS: tuple[DatasetCheckName, ...] = ("aligned", "within", "ordered", "timed", "counted", "shown")
 _notes_decoder = msgspec.json.Decoder(DatasetNotes)
 _info_decoder = msgspec.json.Decoder(dict[str, Any])
 MOST = 50  # violations of a check that are listed
-FILE = "chunk-000/file-000"
+STEP = 0.01  # of an interval, by which the moment of a row may be wrong
+READABLE = 0.5  # of the pictures of a camera show an event: then all of them have to
 
 
 class DatasetViolation(msgspec.Struct, frozen=True):
@@ -58,8 +64,11 @@ class DatasetVerdict(msgspec.Struct, kw_only=True):
     checks: dict[DatasetCheckName, DatasetCheck]
 
 
-def verify_dataset(root: Path) -> DatasetVerdict:
+def verify_dataset(root: Path, *, pixels: bool = False) -> DatasetVerdict:
     """Check a dataset.
+
+    Args:
+        pixels: also decode all pictures and read the events in them, where the robot has drawn some (--event-strip)
 
     Raises:
         RecordingDamaged: Lockstep has not exported it, or it cannot be read.
@@ -68,22 +77,37 @@ def verify_dataset(root: Path) -> DatasetVerdict:
     try:
         notes = _notes_decoder.decode((root / "meta" / "lockstep.json").read_bytes())
         info = _info_decoder.decode((root / "meta" / "info.json").read_bytes())
-        rows = pq.read_table(root / "data" / f"{FILE}.parquet").to_pylist()
-        places = pq.read_table(root / "meta" / "episodes" / f"{FILE}.parquet").to_pylist()
+        parts = [_table(root / "data" / f"{file_of(batch)}.parquet") for batch in range(notes.batches)]
+        rows = [row for part in parts for row in part]
+        places = [
+            place
+            for batch in range(notes.batches)
+            for place in _table(root / "meta" / "episodes" / f"{file_of(batch)}.parquet")
+        ]
         checks: dict[DatasetCheckName, DatasetCheck] = {name: DatasetCheck() for name in CHECKS}
-        _check_rows(checks, notes, rows)
+        _check_rows(checks, notes, info["fps"], rows)
         _check_counts(checks["counted"], root, notes, info, rows, places)
+        for batch, part in enumerate(parts):
+            for place, camera in enumerate(notes.cameras):
+                video = root / "videos" / camera / f"{file_of(batch)}.mp4"
+                _check_video(
+                    checks, camera, video, [(row["index"], _stamps(row, notes)[place]) for row in part], pixels
+                )
     except (msgspec.DecodeError, pa.ArrowException, KeyError, TypeError, IndexError, av.FFmpegError) as error:
         raise RecordingDamaged(f"{root.name}: {error}") from error
     ok = all(check.ok for check in checks.values())
     return DatasetVerdict(ok=ok, episodes=len(notes.episodes), rows=len(rows), tolerance=notes.tolerance, checks=checks)
 
 
+def _table(path: Path) -> list[dict[str, Any]]:
+    return pq.read_table(path).to_pylist()  # type: ignore[no-any-return]
+
+
 def _check_rows(
-    checks: Mapping[DatasetCheckName, DatasetCheck], notes: DatasetNotes, rows: list[dict[str, Any]]
+    checks: Mapping[DatasetCheckName, DatasetCheck], notes: DatasetNotes, fps: int, rows: list[dict[str, Any]]
 ) -> None:
     seen: set[tuple[str, int]] = set()
-    before: tuple[int, int] | None = None  # episode and event of the row before
+    before: dict[str, Any] | None = None
     for number, row in enumerate(rows):
         event, index = row["lockstep.event"], row["episode_index"]
         episode = notes.episodes[index]
@@ -95,11 +119,55 @@ def _check_rows(
             checks["aligned"].look(good, number, f"{camera} shows event {stamp}, the row is event {event}")
             checks["within"].look(_is_in(stamp, episode), number, f"{camera} shows event {stamp}, of another stretch")
         checks["within"].look(_is_in(event, episode), number, f"event {event} is not of its episode")
-        goes_up = before is None or before[0] != index or event_gap(event, before[1]) > 0
-        is_new = (episode.epoch, event) not in seen
-        checks["ordered"].look(goes_up and is_new, number, f"event {event} again, or out of order")
+        before = before if before is not None and before["episode_index"] == index else None
+        again = notes.has_rate and before is not None and before["lockstep.event"] == event
+        goes_up = before is None or event_gap(event, before["lockstep.event"]) > 0
+        good = again or (goes_up and (episode.epoch, event) not in seen)
+        checks["ordered"].look(good, number, f"event {event} again, or out of order")
+        if "lockstep.time" in row:
+            checks["timed"].look(_is_timed(notes, fps, before, row), number, f"{row['lockstep.time']:.3f} s is off")
         seen.add((episode.epoch, event))
-        before = index, event
+        before = row
+
+
+def _is_timed(notes: DatasetNotes, fps: int, before: dict[str, Any] | None, row: dict[str, Any]) -> bool:
+    """Return whether the row is a whole number of intervals after the row before; without a rate, not before it."""
+    moment, frame = row["lockstep.time"] + row["lockstep.age"], row["frame_index"]
+    if abs(row["timestamp"] * fps - frame) > STEP or not 0 <= row["lockstep.age"] <= LONGEST:
+        return False
+    if before is None:
+        return bool(frame == 0 and moment == 0)
+    since = moment - before["lockstep.time"] - before["lockstep.age"]
+    if not notes.has_rate:
+        return bool(frame == before["frame_index"] + 1 and row["lockstep.age"] == 0 and since >= 0)
+    steps = round(since * fps)
+    return bool(frame == before["frame_index"] + 1 and steps >= 1 and abs(since * fps - steps) < STEP)
+
+
+def _check_video(
+    checks: Mapping[DatasetCheckName, DatasetCheck],
+    camera: str,
+    path: Path,
+    stamps: list[tuple[int, int]],
+    pixels: bool,
+) -> None:
+    """Count the pictures of a file; with `pixels`, read the events that are drawn into them."""
+    with av.open(str(path)) as video:
+        if not pixels:
+            count = sum(1 for packet in video.demux(video=0) if packet.size)
+        else:
+            events = list(_drawn(video))
+            count = len(events)
+            read = sum(event is not None for event in events)
+            for (row, stamp), event in zip(stamps, events, strict=False):
+                if read > READABLE * count:
+                    checks["shown"].look(event == stamp, row, f"{camera} shows event {event}, {stamp} is said")
+    checks["counted"].look(count == len(stamps), -1, f"{camera} has {count} pictures for {len(stamps)} rows")
+
+
+def _drawn(video: Any) -> Iterator[int | None]:
+    for frame in video.decode(video=0):
+        yield read_event_strip(frame.reformat(format="gray").to_ndarray())
 
 
 def _stamps(row: dict[str, Any], notes: DatasetNotes) -> list[int]:
@@ -123,13 +191,12 @@ def _check_counts(
     rows: list[dict[str, Any]],
     places: list[dict[str, Any]],
 ) -> None:
+    check.look(
+        not is_interrupted(root), -1, "an append was interrupted: the next `lockstep export --append` completes it"
+    )
     check.look(info["total_frames"] == len(rows), -1, f"{info['total_frames']} rows are said, {len(rows)} are there")
     check.look(len(places) == len(notes.episodes) == info["total_episodes"], -1, "the number of episodes differs")
     for index, (place, episode) in enumerate(zip(places, notes.episodes, strict=False)):
         mine = sum(1 for row in rows if row["episode_index"] == index)
         fits = place["length"] == mine == episode.rows
         check.look(fits, -1, f"episode {index} has {mine} rows, {place['length']} are said")
-    for camera in notes.cameras:
-        with av.open(str(root / "videos" / camera / f"{FILE}.mp4")) as video:
-            count = sum(1 for packet in video.demux(video=0) if packet.size)
-        check.look(count == len(rows), -1, f"{camera} has {count} pictures for {len(rows)} rows")

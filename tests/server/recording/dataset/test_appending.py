@@ -1,0 +1,189 @@
+"""Datasets that grow by kept episodes: whole at any moment, whatever ends the process that appends."""
+
+import asyncio
+import os
+import random
+from collections.abc import Callable
+from contextlib import nullcontext, suppress
+from pathlib import Path
+from typing import Any
+
+import pyarrow.parquet as pq
+import pytest
+
+from lockstep.bench.harness.stack import LOCKSTEP
+from lockstep.server.cli.recordings.follow import append_once
+from lockstep.server.recording.dataset import appending
+from lockstep.server.recording.dataset.appending import alone_with, read_state
+from lockstep.server.recording.dataset.commit import STAGE, commit, recover, stage_of
+from lockstep.server.recording.dataset.follower import DatasetFollower
+from lockstep.server.recording.errors import DatasetRefused
+from lockstep.server.recording.export import export_lerobot
+from lockstep.server.recording.export.export_lerobot import DatasetOptions
+from lockstep.server.recording.verify.verify_dataset import verify_dataset
+from tests.server.recording.dataset.growing_file import GrowingFile
+from tests.server.recording.test_episode_export import KEPT_AND_NOT, changed, episode, recording
+
+FILES = 7  # of an append to a dataset with one camera
+STEPS = FILES + 1
+
+
+def events_of(root: Path) -> list[list[int]]:
+    """The events of each episode that LeRobot would find: those that the metadata counts."""
+    state = read_state(root)
+    found: list[list[int]] = [[] for _ in range(state.info["total_episodes"])]
+    for row in all_rows(root)[: state.info["total_frames"]]:
+        found[row["episode_index"]].append(row["lockstep.event"])
+    return found
+
+
+def all_rows(root: Path) -> list[dict[str, Any]]:
+    return [row for path in sorted(root.glob("data/*/*.parquet")) for row in pq.read_table(path).to_pylist()]
+
+
+def follower(root: Path, said: list[str] | None = None, **options: Any) -> DatasetFollower:
+    return DatasetFollower(root, DatasetOptions(**options), (said if said is not None else []).append)
+
+
+def test_each_kept_episode_is_appended_once_it_is_on_the_disk_and_no_other(tmp_path: Path) -> None:
+    file, root = GrowingFile(tmp_path / "a.mcap", KEPT_AND_NOT), tmp_path / "dataset"
+    following = follower(root)
+    file.write_until(19)
+    assert following.look([file.path]) == 0
+    assert not root.exists()
+    file.write_until(44)
+    assert following.look([file.path]) == 1
+    assert events_of(root) == [[*range(10, 20)]]
+    assert verify_dataset(root).ok
+    assert following.look([file.path]) == 0
+    file.write_until(100)
+    assert following.look([file.path]) == 1
+    assert events_of(root) == [[*range(10, 20)], [*range(45, 60)]]
+    assert verify_dataset(root).ok
+    assert not (root / STAGE).exists()
+
+
+def test_a_dataset_that_was_appended_to_is_what_an_export_of_all_would_be(tmp_path: Path) -> None:
+    path = recording(tmp_path / "a.mcap", *KEPT_AND_NOT)
+    (whole,) = export_lerobot.export(path, tmp_path / "whole", "")
+    append_once([path], tmp_path / "grown", DatasetOptions(), print)
+    append_once([path], tmp_path / "grown", DatasetOptions(), print)
+    assert all_rows(tmp_path / "grown") == all_rows(whole)
+    assert read_state(tmp_path / "grown").statistics == read_state(whole).statistics
+
+
+def test_one_process_at_a_time_appends(tmp_path: Path) -> None:
+    with alone_with(tmp_path / "dataset"), pytest.raises(DatasetRefused), alone_with(tmp_path / "dataset"):
+        pass
+
+
+def test_episodes_of_another_robot_or_without_a_camera_are_left_out_and_said_once(tmp_path: Path) -> None:
+    said: list[str] = []
+    kept = (episode("a", "start", 10, 10), episode("a", "kept", 10, 20))
+    path = recording(tmp_path / "a.mcap", *kept, events=30)
+    following = follower(tmp_path / "dataset", said, cameras=["back"])
+    assert [following.look([path]), following.look([path])] == [0, 0]
+    assert said == ["episode a of a.mcap is left out: a.mcap has no pictures of back"]
+
+
+def test_a_change_before_the_append_counts_and_a_later_one_does_not(tmp_path: Path) -> None:
+    path = recording(tmp_path / "a.mcap", *KEPT_AND_NOT)
+    changed(path, "a", first_event=12)
+    changed(path, "c", dropped=True)
+    following = follower(tmp_path / "dataset")
+    assert following.look([path]) == 1
+    assert events_of(tmp_path / "dataset") == [[*range(12, 20)]]
+
+
+def has_both(root: Path) -> bool:
+    return (root / "meta" / "info.json").exists() and len(events_of(root)) == 2
+
+
+class Killed(BaseException):
+    pass
+
+
+def killed_after(steps: int) -> Callable[[Path, Path], None]:
+    left = [steps]
+
+    def replace(source: Path, target: Path) -> None:
+        if left[0] == 0:
+            raise Killed
+        left[0] -= 1
+        os.replace(source, target)
+
+    return replace
+
+
+@pytest.mark.parametrize("steps", range(STEPS))
+def test_an_append_that_is_cut_short_after_any_rename_leaves_whole_episodes_and_is_completed(
+    tmp_path: Path, steps: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    root, file = tmp_path / "dataset", GrowingFile(tmp_path / "a.mcap", KEPT_AND_NOT)
+    file.write_until(44)
+    following = follower(root)
+    assert following.look([file.path]) == 1
+    file.write_until(100)
+    monkeypatch.setattr(appending, "commit", lambda place, files: commit(place, files, killed_after(steps)))
+    with pytest.raises(Killed) if steps < FILES else nullcontext():
+        following.look([file.path])
+    monkeypatch.undo()
+    whole = [[*range(10, 20)], [*range(45, 60)]]
+    assert events_of(root) == (whole if steps >= FILES else whole[:1])
+    with alone_with(root):
+        assert events_of(root) == whole
+        assert follower(root).look([file.path]) == 0
+    assert verify_dataset(root).ok
+
+
+async def test_a_process_that_is_killed_at_any_moment_leaves_exactly_the_kept_episodes(tmp_path: Path) -> None:
+    """Killed 6 times within the second that an append takes; each next run goes on."""
+    root, folder = tmp_path / "dataset", tmp_path / "recordings"
+    folder.mkdir()
+    chance, whole = random.Random(7), {(10, 20), (45, 60)}
+    file = GrowingFile(folder / "a.mcap", KEPT_AND_NOT)
+    command = (str(LOCKSTEP), "export", "--to", "lerobot", "--follow", "--out", str(root), "--dir", str(folder))
+    for run in range(7):
+        process = await asyncio.create_subprocess_exec(
+            *command, "--state-dir", str(tmp_path / "state"), stdout=asyncio.subprocess.PIPE
+        )
+        assert process.stdout is not None
+        try:
+            async with asyncio.timeout(60):
+                assert b"follows" in await process.stdout.readline()
+                file.write_until(45 if run < 3 else 100)
+                if run < 6:
+                    await asyncio.sleep(chance.uniform(0.0, 1.2))
+                    process.kill()
+                else:
+                    while not has_both(root):  # noqa: ASYNC110
+                        await asyncio.sleep(0.05)
+                    process.terminate()
+                await process.wait()
+        finally:
+            with suppress(ProcessLookupError):
+                process.kill()
+        if (root / "meta" / "info.json").exists():
+            found = events_of(root)
+            assert {(each[0], each[-1] + 1) for each in found} <= whole
+            assert len(found) <= 2
+            assert all(len(each) == each[-1] + 1 - each[0] for each in found)
+    assert events_of(root) == [[*range(10, 20)], [*range(45, 60)]]
+    assert verify_dataset(root).ok
+    assert process.returncode == 0
+
+
+def test_a_stage_without_a_journal_never_happened(tmp_path: Path) -> None:
+    root = tmp_path / "dataset"
+    (stage_of(root) / "meta").mkdir()
+    (root / STAGE / "meta" / "info.json").write_text("{}")
+    assert recover(root)
+    assert list(root.iterdir()) == []
+    assert not recover(root)
+
+
+def test_a_journal_that_names_a_file_outside_of_the_dataset_moves_nothing(tmp_path: Path) -> None:
+    root = tmp_path / "dataset"
+    (stage_of(root) / "journal.json").write_text('{"files": ["../../evil"]}')
+    recover(root)
+    assert list(root.iterdir()) == []
