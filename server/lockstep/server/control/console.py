@@ -13,6 +13,7 @@ from lockstep.protocol.console import (
     Report,
     SeatDecline,
     SeatGrant,
+    SeatOffer,
     SeatRelease,
     SeatRequest,
     SeatTake,
@@ -237,13 +238,15 @@ class Console:
                     self._refuse_request(peer, reason, "note")
             case Reset():
                 self.resets.reset_by_peer(peer, message.number)
-            case SeatRequest() | SeatGrant() | SeatDecline() | SeatTake() | SilenceStops() | Rename() if (
+            case SeatRequest() | SeatTake() if self.seat.waits_for_nothing(peer, message):
+                self.seat.handle(peer, message)
+            case SeatRequest() | SeatGrant() | SeatDecline() | SeatTake() | SeatOffer() | SilenceStops() | Rename() if (
                 not peer.asks.take(now)
             ):
                 self._refuse_request(peer, "too_often")
             case SilenceStops():
                 self._silence(peer, message)
-            case SeatRequest() | SeatGrant() | SeatDecline() | SeatTake():
+            case SeatRequest() | SeatGrant() | SeatDecline() | SeatTake() | SeatOffer():
                 self.seat.handle(peer, message)
             case Rename():
                 self.people.rename(peer, message.name)
@@ -313,6 +316,7 @@ class Console:
 
     def link_down(self, detail: str) -> None:
         was_up, self._link_was_up = self._link_was_up, False
+        self.seat.link_lost()
         self._arbiter.link_down()
         self.stops.link_down()
         self.resets.link_down(detail)
@@ -331,7 +335,10 @@ class Console:
         self._fanout.publish(encode_console_message(feedback))  # first: the operator's next command waits for it
         back = time.monotonic() - now
         had_command = self._arbiter.in_flight is not None
+        stopped = feedback.stop.stopped or feedback.stop.number > self._shown_stop.number
         self._arbiter.feedback(feedback)
+        if stopped:
+            self.seat.stopped()
         self.resets.feedback(feedback.stop)
         self.speed_cap.fed_back(feedback, now)
         if had_command and self._arbiter.in_flight is None:
@@ -354,6 +361,7 @@ class Console:
         self._events.publish(Refused(Actor() if peer is None else peer.actor, "control", refusal, "robot"))
 
     def stop_taken(self, taken: StopTaken) -> None:
+        self.seat.stopped()
         self._arbiter.stop_taken(taken)
         self.stops.taken(taken)
 

@@ -4,9 +4,20 @@ import asyncio
 import time
 from typing import Protocol
 
-from lockstep.protocol.console import Seat, SeatClaim, SeatDecline, SeatGrant, SeatRelease, SeatRequest, SeatTake
+from lockstep.protocol.console import (
+    Seat,
+    SeatClaim,
+    SeatDecline,
+    SeatGrant,
+    SeatOffer,
+    SeatRelease,
+    SeatRequest,
+    SeatTake,
+    driver_kind,
+)
 from lockstep.server.audit.records import Actor
-from lockstep.server.control.seat import ControlSeat, SeatOutcome, SeatRefusal, Standing
+from lockstep.server.control.policies.seat_offer import PEOPLE
+from lockstep.server.control.seat import ControlSeat, SeatInput, SeatOutcome, SeatRefusal, Standing
 from lockstep.server.peers.peer import Peer
 from lockstep.server.peers.peer_registry import PeerRegistry
 from lockstep.server.session_events import SeatChanged, SessionEvents
@@ -16,7 +27,7 @@ __all__ = ["SeatHost", "SeatKeeper", "SeatMessage"]
 CHECKS = 12  # within one heartbeat timeout
 LINK_CLAIMS = 2  # at once by all connections of a link: there are few places for claims, and others want to ask too
 
-SeatMessage = SeatRequest | SeatGrant | SeatDecline | SeatTake | SeatRelease
+SeatMessage = SeatRequest | SeatGrant | SeatDecline | SeatTake | SeatOffer | SeatRelease
 
 
 class SeatHost(Protocol):
@@ -37,10 +48,15 @@ class SeatKeeper:
 
     def message(self) -> Seat:
         """Return the seat's state as everyone is told it."""
-        now = time.monotonic()
+        now, offer = time.monotonic(), self.rules.offer
+        holder = self._peers.by_id(self.rules.holder) if self.rules.holder else None
         return Seat(
             holder=self.rules.holder,
             name=self._name(self.rules.holder),
+            kind="none" if holder is None else driver_kind(holder.role),
+            offered=offer is not None,
+            offered_to="" if offer is None else offer.to,
+            offered_by="" if offer is None else self._name(offer.by),
             why=self.rules.why,
             claims=[
                 SeatClaim(peer=peer, name=self._name(peer), seconds_left=round(left, 1))
@@ -61,6 +77,14 @@ class SeatKeeper:
         holder = self._peers.by_id(self.rules.holder)
         return holder is not None and holder.identity.token_id == link
 
+    def waits_for_nothing(self, peer: Peer, message: object) -> bool:
+        """True if this is a person's press that takes the robot from a policy: it is never refused as too often.
+
+        It follows an offer, and those are counted.
+        """
+        takes = isinstance(message, SeatTake) or (isinstance(message, SeatRequest) and not message.only_if_free)
+        return takes and self.rules.policy_drives and peer.role in PEOPLE
+
     def handle(self, peer: Peer, message: SeatMessage) -> None:
         """Act on a request of `peer`."""
         now = time.monotonic()
@@ -75,6 +99,13 @@ class SeatKeeper:
                 self._act(self.rules.answer(peer.id, claimant, now, grant=True), peer)
             case SeatDecline(peer=claimant):
                 self._act(self.rules.answer(peer.id, claimant, now, grant=False), peer)
+            case SeatOffer(offered=False):
+                self._act(self.rules.withdraw_offer(peer.id, peer.role, now), peer)
+            case SeatOffer(peer=policy) if policy and not self._is_policy(policy):
+                self._host.refuse(peer, SeatRefusal(peer.id, "not_allowed", "this is no policy"))
+            case SeatOffer(peer=policy):
+                link = peer.identity.token_id
+                self._act(self.rules.offer_to_policies(peer.id, peer.role, link, now, to=policy), peer)
             case SeatRelease():
                 self._act(self.rules.release(peer.id, now), peer)
 
@@ -87,14 +118,33 @@ class SeatKeeper:
         return sum(each is not None and each.identity.token_id == link for each in asking) >= LINK_CLAIMS
 
     def heard(self, peer: Peer) -> None:
-        self.rules.heard(peer.id, time.monotonic(), peer.round_trip)
+        now = time.monotonic()
+        self.rules.heard(peer.id, now, peer.round_trip)
+        if peer.role in PEOPLE:
+            self.rules.attended(peer.identity.token_id, now, peer.round_trip)
 
     def moved(self, peer: Peer) -> None:
         """Called when a moving command of `peer` was forwarded."""
         self._act(self.rules.moved(peer.id, time.monotonic()), peer)
 
     def gone(self, peer: Peer) -> None:
-        self._act(self.rules.gone(peer.id, time.monotonic()), peer)
+        now = time.monotonic()
+        self._act(self.rules.gone(peer.id, now), peer)
+        link = peer.identity.token_id
+        if not any(each.identity.token_id == link and each.role in PEOPLE and not each.ended for each in self._peers):
+            self._act(self.rules.person_left(link, now), peer)
+
+    def stopped(self) -> None:
+        """Called when the robot is stopped: no policy moves it again before a person says so."""
+        self._act(self.rules.end_offer(SeatInput.STOPPED, time.monotonic()), None)
+
+    def link_lost(self) -> None:
+        """Called when the link to the robot is lost: nobody knows what has changed there."""
+        self._act(self.rules.end_offer(SeatInput.LINK_LOST, time.monotonic()), None)
+
+    def _is_policy(self, peer_id: str) -> bool:
+        peer = self._peers.by_id(peer_id)
+        return peer is not None and peer.role == "policy"
 
     def renamed(self, peers: list[Peer]) -> None:
         """Tell everyone, if the seat's message names one of `peers`."""
