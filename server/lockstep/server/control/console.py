@@ -18,6 +18,7 @@ from lockstep.protocol.console import (
     SeatRequest,
     SeatTake,
     ServerMessage,
+    Shadow,
     SilenceStops,
     StopStateNotice,
     Welcome,
@@ -56,6 +57,7 @@ from lockstep.server.control.command_arbiter import (
     RestOutcome,
 )
 from lockstep.server.control.participants import ParticipantList
+from lockstep.server.control.policies.shadow_service import ShadowService
 from lockstep.server.control.reset_service import ResetService
 from lockstep.server.control.seat import ControlSeat, SeatRefusal
 from lockstep.server.control.seat_keeper import SeatKeeper
@@ -152,6 +154,7 @@ class Console:
         self.resets = ResetService(self.robot, self.stops, peers, clock, seat, events)
         self.actions = ActionService(self.robot, clock, self.seat.is_held_by, self.seat.may_move, events)
         self.status = StatusService()
+        self.shadows = ShadowService(peers, events)
         self._fanout = FeedbackFanout(
             settings.observer_feedback_hz, self.seat.is_held_by, peers.drivers, peers.observers, relays
         )
@@ -225,6 +228,8 @@ class Console:
                 peer.send("control", Pong(id=message.id))
             case Stop():
                 self._stop(peer, channel, message)
+            case Shadow():
+                self._shadow(peer, message, now)
             case Act():
                 self.actions.act_by_peer(peer, message)
             case ActionCancel():
@@ -271,6 +276,7 @@ class Console:
 
     def peer_ended(self, peer: Peer) -> None:
         self.traces.forget(peer)
+        self.shadows.gone(peer)
         self.seat.gone(peer)
         self.people.left(peer)
 
@@ -297,6 +303,7 @@ class Console:
         self.resets.link_down("the robot bridge has restarted")
         self._arbiter.epoch_ends()
         self.actions.epoch_ends()
+        self.shadows.epoch_ends()
         self.status.forget()
         self.traces.epoch_ends()
         self.clock.begin(epoch)
@@ -312,6 +319,7 @@ class Console:
         self._link_was_up = True
         self.stops.link_up()
         self._arbiter.link_up(self.robot.description)
+        self.shadows.link_up(self.robot.description)
         self._events.publish(LinkUp(self.robot.state()))
 
     def link_down(self, detail: str) -> None:
@@ -334,20 +342,22 @@ class Console:
             return
         self._fanout.publish(encode_console_message(feedback))  # first: the operator's next command waits for it
         back = time.monotonic() - now
-        had_command = self._arbiter.in_flight is not None
+        command = self._arbiter.in_flight
         stopped = feedback.stop.stopped or feedback.stop.number > self._shown_stop.number
         self._arbiter.feedback(feedback)
         if stopped:
             self.seat.stopped()
         self.resets.feedback(feedback.stop)
         self.speed_cap.fed_back(feedback, now)
-        if had_command and self._arbiter.in_flight is None:
+        executed = command if self._arbiter.in_flight is None else None
+        if executed is not None:
             turnaround = now - self._forwarded_at
             spans = command_spans(robot, forward=self._forward_seconds, link=turnaround, back=back)
             self.traces.executed(feedback.event, spans)
             self._events.publish(FeedbackReceived(feedback, now, turnaround, spans))
         else:
             self._events.publish(FeedbackReceived(feedback, now, None))
+        self.shadows.feedback(feedback, executed)
         if feedback.stop != self._shown_stop:
             self._shown_stop = feedback.stop
             self._events.publish(StopShown(feedback.stop, feedback.event))
@@ -398,6 +408,11 @@ class Console:
                 self._events.publish(CommandRepeated(peer.actor, command, answered=True))
             case Absorbed():
                 self._events.publish(CommandRepeated(peer.actor, command, answered=False))
+
+    def _shadow(self, peer: Peer, shadow: Shadow, now: float) -> None:
+        reason = self.shadows.shadow(peer, shadow, drives=self.seat.is_held_by(peer))
+        if reason in ("not_allowed", "too_often") and peer.asks.take(now):
+            self._refuse_request(peer, reason, "shadow")
 
     def _rest(self, peer: Peer, outcome: RestOutcome) -> None:
         if isinstance(outcome, ForwardRest):

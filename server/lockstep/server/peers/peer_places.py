@@ -12,7 +12,8 @@ RESERVED_FOR_LINK = 2  # of the last places one link may have these: a page, and
 def check_place(role: Role, held: int, taken: int, bound: int, reserved: int) -> None:
     """Raise TooManyPeers unless there is a place for one more peer.
 
-    The last `reserved` places are for people who may drive, and one of them is for a supervisor. One link cannot take all.
+    The last `reserved` places are for people who may drive, and one of them is for a supervisor. One link cannot take
+    all.
 
     Args:
         held: places that the peer's link has already, at most `taken`

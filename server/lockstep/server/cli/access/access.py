@@ -48,7 +48,7 @@ def add_access_commands(app: typer.Typer, make_settings: MakeSettings) -> None:
 
     @app.command()
     def invite(
-        role: Annotated[str, typer.Option(help="observer, operator, supervisor, or policy for a program that may drive.")] = "observer",
+        role: Annotated[str, typer.Option(help="observer, operator, supervisor or policy.")] = "observer",
         expires: Annotated[str, typer.Option(help="The time for which the link is valid: 30m, 8h, 2d.")] = "8h",
         name: Annotated[str, typer.Option(help="The holder's name as others see it; the holder may change it.")] = "",
         for_robot: Annotated[
