@@ -249,6 +249,8 @@ class Console:
                 not peer.asks.take(now)
             ):
                 self._refuse_request(peer, "too_often")
+            case SeatOffer(offered=True) if (reason := self.why_no_offer()) is not None:
+                self._refuse_request(peer, reason, "no policy may drive now")
             case SilenceStops():
                 self._silence(peer, message)
             case SeatRequest() | SeatGrant() | SeatDecline() | SeatTake() | SeatOffer():
@@ -291,6 +293,12 @@ class Console:
         outcome = self._arbiter.abandon()
         if isinstance(outcome, ForwardRest) and self.robot.send(outcome.rest):
             self._events.publish(RestForwarded(Actor(), outcome.rest, why))
+
+    def why_no_offer(self) -> RefusalReason | None:
+        """Return why no policy may be let drive now: after a stop or an outage a person decides anew."""
+        if not self.robot.up or self.clock.feedback is None:
+            return "link_down"
+        return "stopped" if self.clock.stop.stopped or self.stops.unconfirmed else None
 
     def refuse(self, peer: Peer, refusal: SeatRefusal) -> None:
         self._refuse_request(peer, refusal.reason, refusal.detail)

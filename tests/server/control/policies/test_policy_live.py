@@ -2,7 +2,6 @@
 
 import secrets
 
-import msgspec
 import pytest
 
 from lockstep.protocol.actions import Act, ActionUpdate
@@ -137,6 +136,17 @@ async def test_a_stop_by_anybody_ends_the_offer_before_a_policy_has_taken_the_se
         await _seat(policy, offered=False)
         policy.send("session", SeatRequest(only_if_free=True))
         await _refused(policy, "not_allowed")
+
+
+async def test_no_policy_is_let_drive_while_the_robot_is_stopped() -> None:
+    async with running_rig(**PATIENT) as rig, rig.peer("operator") as person, rig.peer("policy") as policy:
+        person.send("stop", Stop(reason="wait"))
+        await policy.until(lambda each: isinstance(each, Feedback) and each.stop.stopped)
+        person.send("session", SeatOffer())
+        await _refused(person, "stopped")
+        policy.send("session", SeatRequest(only_if_free=True))
+        await _refused(policy, "not_allowed")
+        assert rig.dependencies.console.seat.rules.offer is None
 
 
 async def test_what_a_policy_may_not_do() -> None:
