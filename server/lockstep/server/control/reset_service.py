@@ -173,7 +173,7 @@ class ResetService:
         """Return the reason why `by` may not reset now; None: it may."""
         if by.role != "supervisor":
             if by.role not in PEOPLE:
-                return "not_allowed", "observers and policies may not reset a stop"
+                return "not_allowed", f"{'policies' if by.role == 'policy' else 'observers'} may not reset a stop"
             if not self._holds_seat(by):
                 return "no_seat", "only the holder of the control seat or a supervisor may reset"
         now = time.monotonic()

@@ -271,3 +271,19 @@ async def test_a_flood_of_shadows_ends_the_policy_that_sends_it_and_disturbs_nob
         for value in (0.1, 0.2, 0.3):
             await person.drive([value, 0.0, 0.0])
         await eventually(lambda: all(peer.role != "policy" for peer in rig.dependencies.console.peers))
+
+
+async def test_a_policy_that_is_slow_is_late_like_anybody_and_one_that_has_not_seen_is_refused() -> None:
+    async with running_rig(**PATIENT) as rig, rig.peer("operator") as person, rig.peer("policy") as policy:
+        await _policy_drives(rig, person, policy)
+        thought = policy.newest_feedback()
+        now = thought
+        while now.time - thought.time <= rig.dependencies.console.robot.description.max_event_age:  # type: ignore[union-attr]
+            before = now
+            now = await policy.feedback(lambda each, before=before: each.time > before.time)  # type: ignore[misc]
+        event = event_after(now.event)
+        policy.send("control", Command(event=event, issue=thought.issue, nonce=thought.nonce, values=[0.2, 0.0, 0.0]))
+        assert (await _refused(policy, "late")).event == event
+        policy.send("control", Command(event=event, issue=now.issue, nonce=now.nonce + 1, values=[0.2, 0.0, 0.0]))
+        assert (await _refused(policy, "unseen")).event == event
+        assert rig.dependencies.console.clock.event == now.event
