@@ -21,6 +21,7 @@ from lockstep.server.routes import (
     ice,
     observer_websocket,
     recordings,
+    seat,
     session,
     sfu,
     whep,
@@ -78,6 +79,7 @@ def session_app(settings: Settings, lifespan: Lifespan[FastAPI] | None = None) -
     app.include_router(whep.router)
     app.include_router(whip.router)
     app.include_router(session.router)
+    app.include_router(seat.router)
     app.include_router(actions.router)
     app.include_router(access.router)
     app.include_router(ice.router)

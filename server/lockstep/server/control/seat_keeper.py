@@ -18,6 +18,7 @@ from lockstep.protocol.console import (
 from lockstep.server.audit.records import Actor
 from lockstep.server.control.policies.seat_offer import PEOPLE
 from lockstep.server.control.seat import ControlSeat, SeatInput, SeatOutcome, SeatRefusal, Standing
+from lockstep.server.errors import NoSeat, NotAllowed, TooManyRequests
 from lockstep.server.peers.peer import Peer
 from lockstep.server.peers.peer_registry import PeerRegistry
 from lockstep.server.session_events import SeatChanged, SessionEvents
@@ -76,6 +77,60 @@ class SeatKeeper:
         """True if a peer with the link of this id holds the seat."""
         holder = self._peers.by_id(self.rules.holder)
         return holder is not None and holder.identity.token_id == link
+
+    # requests over HTTP, which carry a link and no peer
+
+    def take_with(self, link: str, by: Actor) -> None:
+        """End the turn of the policy that drives, for a person with this link. No I/O waits before the robot rests.
+
+        The person's connection gets the seat, if exactly one has this link; else the seat is free.
+
+        Raises:
+            NotAllowed: this role may not, or another person holds the seat.
+        """
+        now, mine = time.monotonic(), self._people_with(link)
+        if len(mine) == 1:
+            outcome = self.rules.take(mine[0].id, mine[0].role, now)
+        else:
+            outcome = self.rules.withdraw_offer("", by.role, now)  # type: ignore[arg-type]
+        self._act_for_link(outcome, mine[0] if len(mine) == 1 else by)
+
+    def offer_with(self, link: str, by: Actor, *, policy: str) -> None:
+        """Let a policy drive, for a person with this link, who has to be connected.
+
+        Raises:
+            NotAllowed: this role may not, nobody is connected with this link, or there is no such policy.
+            NoSeat: another person holds the seat or asks for it.
+            TooManyRequests: of this link.
+        """
+        mine = self._people_with(link)
+        if by.role not in PEOPLE or not mine:
+            raise NotAllowed("only people may offer the seat, with a connection that can take over")
+        if policy and not self._is_policy(policy):
+            raise NotAllowed("this is no policy")
+        peer = next((each for each in mine if self.rules.holds(each.id)), mine[0])
+        now = time.monotonic()
+        if not peer.asks.take(now):
+            raise TooManyRequests("too many offers with this link")
+        self._act_for_link(self.rules.offer_to_policies(peer.id, peer.role, link, now, to=policy), peer)
+
+    def withdraw_with(self, by: Actor) -> None:
+        """End the offer, and the turn of the policy that drives, for a person. Raises NotAllowed."""
+        outcome = self.rules.withdraw_offer("", by.role, time.monotonic())  # type: ignore[arg-type]
+        self._act_for_link(outcome, by)
+
+    def _people_with(self, link: str) -> list[Peer]:
+        return [
+            peer
+            for peer in self._peers
+            if peer.identity.token_id == link and peer.role in PEOPLE and peer.connected and not peer.ended
+        ]
+
+    def _act_for_link(self, outcome: SeatOutcome, actor: Peer | Actor) -> None:
+        if outcome.refusal is not None:
+            error = NoSeat if outcome.refusal.reason == "seat_taken" else NotAllowed
+            raise error(outcome.refusal.detail)
+        self._act(outcome, actor)
 
     def waits_for_nothing(self, peer: Peer, message: object) -> bool:
         """True if this is a person's press that takes the robot from a policy: it is never refused as too often.
@@ -158,7 +213,7 @@ class SeatKeeper:
             for outcome in self.rules.expire(time.monotonic()):
                 self._act(outcome, None)
 
-    def _act(self, outcome: SeatOutcome, actor: Peer | None) -> None:
+    def _act(self, outcome: SeatOutcome, actor: Peer | Actor | None) -> None:
         if outcome.rest:
             self._host.rest_robot(self.rules.why)
         if outcome.changed:
@@ -183,5 +238,5 @@ def _rounded(seconds: float | None) -> float | None:
     return None if seconds is None else round(seconds, 1)
 
 
-def _actor(peer: Peer | None) -> Actor:
-    return Actor() if peer is None else peer.actor
+def _actor(who: Peer | Actor | None) -> Actor:
+    return Actor() if who is None else who if isinstance(who, Actor) else who.actor

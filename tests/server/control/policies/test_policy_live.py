@@ -287,3 +287,28 @@ async def test_a_policy_that_is_slow_is_late_like_anybody_and_one_that_has_not_s
         policy.send("control", Command(event=event, issue=now.issue, nonce=now.nonce + 1, values=[0.2, 0.0, 0.0]))
         assert (await _refused(policy, "unseen")).event == event
         assert rig.dependencies.console.clock.event == now.event
+
+
+async def test_over_http_a_person_takes_over_and_gives_back() -> None:
+    async with running_rig(**PATIENT) as rig, rig.peer("operator") as person, rig.peer("policy") as policy:
+        await _policy_drives(rig, person, policy)
+        for stranger in (rig.token("observer"), policy.headers):
+            for path, body in (("take_over", {}), ("offer", {}), ("offer", {"offered": False})):
+                answer = await rig.http.post(f"/api/seat/{path}", headers=stranger, json=body)
+                assert (answer.status_code, answer.json()["error"]) == (403, "not_allowed")
+        assert rig.dependencies.console.seat.rules.policy_drives
+        taken = (await rig.http.post("/api/seat/take_over", headers=person.headers)).json()
+        assert (taken["holder"], taken["why"], taken["kind"]) == (await _id(person), "taken", "human")
+        absent = rig.token("operator")
+        answer = await rig.http.post("/api/seat/offer", headers=absent, json={})
+        assert (answer.status_code, answer.json()["error"]) == (403, "not_allowed")
+        given = (
+            await rig.http.post("/api/seat/offer", headers=person.headers, json={"peer": await _id(policy)})
+        ).json()
+        assert (given["holder"], given["offered"], given["offered_to"]) == ("", True, await _id(policy))
+        policy.heard.clear()
+        policy.send("session", SeatRequest(only_if_free=True))
+        await _seat(policy, kind="policy")
+        # a person who is not connected rests the robot all the same; the seat is free then
+        taken = (await rig.http.post("/api/seat/take_over", headers=absent)).json()
+        assert (taken["holder"], taken["why"], taken["offered"]) == ("", "offer withdrawn", False)
