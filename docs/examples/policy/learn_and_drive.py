@@ -122,13 +122,16 @@ async def correct(grace: Console) -> None:
     await grace.policies.offer()
 
 
-async def until_progress(net: Console, policy: NearestNeighbour, share: float) -> None:
-    """Wait until the policy drives, and is so far."""
+async def until_progress(giver: Console, net: Console, policy: NearestNeighbour, share: float) -> None:
+    """Wait until the policy drives, and is so far; the person gives it another turn when it has released the seat."""
     async with asyncio.timeout(DRIVE_SECONDS):
         async for _ in net.feedbacks():
             if net.seat.kind == "policy" and policy.progress >= share:
                 return
-            if net.seat.kind == "none" and not net.seat.offered:
+            if giver.seat.kind == "none" and not giver.seat.offered:
+                if giver.seat.why == "released":
+                    await giver.policies.offer(net.peer)
+                    continue
                 raise ConsoleError(f"the policy's turn has ended: {net.seat.why}")
 
 
@@ -140,10 +143,12 @@ async def drive_corrected(ada: Console, grace: Console, net: Console, policy: Ne
     async with asyncio.TaskGroup() as tasks:
         running = [tasks.create_task(drive_when_let(net, policy)), tasks.create_task(shadow(net, thinking))]
         await ada.policies.offer(net.peer)
+        giver = ada
         for share in CORRECTED_AT:
-            await until_progress(net, policy, share)
+            await until_progress(giver, net, policy, share)
             await correct(grace)
-        await until_progress(net, policy, 1.0)
+            giver = grace
+        await until_progress(giver, net, policy, 1.0)
         placed = await blocks_in_bowl(grace, 1)
         await grace.episodes.keep("success" if placed else "failure")
         grace.policies.withdraw()
@@ -161,7 +166,7 @@ async def recording(console: httpx.AsyncClient, folder: Path, name: str) -> Asyn
         yield found
     finally:
         (await console.post("/api/recordings/stop")).raise_for_status()
-        found += folder.rglob(f"*{begun}*.mcap")
+        found += await asyncio.to_thread(lambda: list(folder.rglob(f"*{begun}*.mcap")))
 
 
 async def main(operator: str, policy_link: str, folder: Path, episodes: int) -> bool:

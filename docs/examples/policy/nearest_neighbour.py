@@ -1,4 +1,4 @@
-"""A policy that follows demonstrations: it does what was done in the most alike moment. numpy alone; no I/O, no clock."""
+"""A policy that follows demonstrations: it does what was done in the most alike moment. It needs numpy alone."""
 
 from collections.abc import Sequence
 from pathlib import Path

@@ -34,7 +34,7 @@ async def test_a_policy_learns_drives_and_is_corrected_twice(tmp_path: Path) -> 
         )
         said, _ = await script.communicate()
     assert script.returncode == 0, said.decode()
-    recordings = sorted(tmp_path.rglob("*.mcap"))
+    recordings = sorted(await asyncio.to_thread(lambda: list(tmp_path.rglob("*.mcap"))))
     assert len(recordings) == 2
     judged = judge(recordings[1])
     assert judged.verdict.ok
