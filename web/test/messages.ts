@@ -88,6 +88,17 @@ export function welcomeOf(role: Welcome["role"]): Welcome {
   return { type: "welcome", peer: "me", role, name: "somebody", streams: [], voice: "" };
 }
 
+const NOT_OFFERED = { offered: false, offered_to: "", offered_by: "" };
+
 export function seatOf(holder: string, name = ""): Seat {
-  return { type: "seat", holder, name, why: "", claims: [], idle_seconds_left: null };
+  return {
+    type: "seat",
+    holder,
+    name,
+    why: "",
+    kind: holder === "" ? "none" : "human",
+    claims: [],
+    idle_seconds_left: null,
+    ...NOT_OFFERED,
+  };
 }

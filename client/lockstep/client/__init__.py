@@ -22,6 +22,7 @@ from lockstep.client.errors import (
     StopUnconfirmed,
 )
 from lockstep.client.media.stream import Picture, Sound
+from lockstep.client.policies import Policies
 from lockstep.client.statistics import ConsoleStatistics, Percentiles, StreamStatistics
 
 __all__ = [
@@ -42,6 +43,7 @@ __all__ = [
     "NoSuchStream",
     "NotArmed",
     "Percentiles",
+    "Policies",
     "Picture",
     "Refused",
     "SeatRefused",

@@ -22,6 +22,7 @@ from lockstep.client.media.media_gate import GateMode
 from lockstep.client.media.newest_queue import NewestQueue, QueueClosed
 from lockstep.client.media.render_log import FeedbackArrival, Rendering
 from lockstep.client.media.stream import Picture, Sound, Stream
+from lockstep.client.policies import Policies
 from lockstep.client.statistics import ConsoleStatistics
 from lockstep.client.transport.webrtc_peer import Route
 from lockstep.protocol.actions import ActionUpdate, ParameterValue, StatusItem
@@ -211,6 +212,14 @@ class Console:
         return self._live().episodes
 
     @property
+    def policies(self) -> Policies:
+        """Policies: offering them the seat, and what a policy itself calls (docs/policies.md)."""
+        connection = self._live()
+        return Policies(
+            connection.transport, connection.session, connection.driving, connection.requests, self._command
+        )
+
+    @property
     def status(self) -> list[StatusItem]:
         """What the robot reports of itself: battery, mode, temperatures. Empty before the first report.
 
@@ -276,6 +285,18 @@ class Console:
         """
         connection = self._live()
         await connection.requests.take_seat()
+        await self._arm_if_possible(connection)
+
+    async def take_over(self) -> None:
+        """Take the seat from the policy that drives, at once, or a free one; then `arm`, as `take_seat` does.
+
+        The robot rests first. A clutch has to be engaged anew, so that the robot does not jump to where the device is.
+
+        Raises:
+            SeatRefused: another person holds the seat, or this link is an observer's or a policy's.
+        """
+        connection = self._live()
+        await connection.requests.take_over()
         await self._arm_if_possible(connection)
 
     async def request_seat(self, seconds: float = 65.0) -> None:

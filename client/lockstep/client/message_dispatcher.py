@@ -15,6 +15,7 @@ from lockstep.protocol.console import (
     Participants,
     RobotState,
     Seat,
+    ShadowVerdict,
     SharedNote,
     StopStateNotice,
     Welcome,
@@ -100,7 +101,7 @@ class MessageDispatcher:
                 self.news.hear(message, asyncio.get_running_loop().time())
             case EpisodeState() | EpisodeAnswer():
                 self.episodes.hear(message)
-            case Welcome() | Seat() | Participants() | SharedNote() | Traces():
+            case Welcome() | Seat() | Participants() | SharedNote() | Traces() | ShadowVerdict():
                 self._session.hear(message)
         self._wake_waiters()
 

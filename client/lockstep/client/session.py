@@ -3,7 +3,7 @@
 from collections import deque
 from collections.abc import Callable
 
-from lockstep.protocol.console import Participants, Role, Seat, SharedNote, Welcome
+from lockstep.protocol.console import Participants, Role, Seat, ShadowVerdict, SharedNote, Welcome
 from lockstep.protocol.messages import Refusal, StopState, StopTaken
 from lockstep.protocol.traces.trace_messages import CommandTrace, PictureTrace, Traces
 
@@ -33,6 +33,7 @@ class Session:
         self.notes: deque[SharedNote] = deque(maxlen=KEPT_NOTES)
         self.traced_pictures: deque[PictureTrace] = deque(maxlen=KEPT_TRACES)
         self.traced_commands: deque[CommandTrace] = deque(maxlen=KEPT_TRACES)
+        self.verdicts: deque[ShadowVerdict] = deque(maxlen=KEPT_TRACES)
         self.seated: Callable[[], None] = _ignore
         self.unseated: Callable[[], None] = _ignore
         self.refusals: deque[Refusal] = deque(maxlen=16)
@@ -58,11 +59,13 @@ class Session:
     def claims_seat(self) -> bool:
         return any(claim.peer == self.peer for claim in self.seat.claims)
 
-    def hear(self, message: Welcome | Seat | Participants | SharedNote | Traces) -> None:
+    def hear(self, message: Welcome | Seat | Participants | SharedNote | Traces | ShadowVerdict) -> None:
         match message:
             case Traces():
                 self.traced_pictures.extend(message.pictures)
                 self.traced_commands.extend(message.commands)
+            case ShadowVerdict():
+                self.verdicts.append(message)
             case Welcome():
                 self.welcome = message
             case Participants():

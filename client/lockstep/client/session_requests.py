@@ -15,6 +15,7 @@ from lockstep.protocol.console import (
     Note,
     SeatDecline,
     SeatGrant,
+    SeatOffer,
     SeatRelease,
     SeatRequest,
     SeatTake,
@@ -62,6 +63,32 @@ class SessionRequests:
         finally:
             if not self._session.holds_seat:
                 self.release_seat()
+
+    async def take_over(self) -> None:
+        """Take the control seat from a policy, or a free one. Raises SeatRefused."""
+        await self._seat(SeatTake(), ANSWER_SECONDS)
+
+    async def offer(self, policy: str) -> None:
+        """Offer the seat to a policy; "": to any. Raises SeatRefused."""
+        before = self._session.seat  # another person's offer may hold already; the console tells of each new one
+
+        def is_new() -> bool:
+            return self._session.seat is not before and self._session.seat.offered
+
+        refusal = await self._ask(is_new, "session", SeatOffer(peer=policy), ANSWER_SECONDS)
+        if refusal is not None:
+            raise SeatRefused(refusal.reason, refusal.detail)
+
+    def withdraw_offer(self) -> None:
+        self._transport.send("session", SeatOffer(offered=False))
+
+    async def offered_here(self) -> None:
+        """Wait until the free seat is offered to this connection."""
+        await self._until(self._is_offered_here)
+
+    def _is_offered_here(self) -> bool:
+        seat = self._session.seat
+        return seat.offered and not seat.holder and seat.offered_to in ("", self._session.peer)
 
     def release_seat(self) -> None:
         self._transport.send("session", SeatRelease())

@@ -5,10 +5,10 @@ import the other. JSON Schemas and the page's TypeScript types are generated fro
 
 | channel | reliability | who | messages |
 |---|---|---|---|
-| control | unordered, 0 retransmits | client | command, rest, report, ping, trace_report |
-| | | server | feedback, refusal, pong, traces |
+| control | unordered, 0 retransmits | client | command, rest, report, ping, trace_report, shadow |
+| | | server | feedback, refusal, pong, traces, shadow_verdict |
 | session | reliable | client | seat_request, seat_grant, seat_decline, seat_take, seat_release, rename, note |
-| | | client | silence_stops, act, action_cancel, trace_request, episode_request |
+| | | client | seat_offer, silence_stops, act, action_cancel, trace_request, episode_request |
 | | | server | welcome, robot, seat, participants, quality, speed_cap, sources, voice, recording, note_shared |
 | | | server | notice, refusal, action, status, episode, episode_answer |
 | stop | reliable | client | stop, reset |
@@ -42,6 +42,7 @@ from lockstep.protocol.traces.trace_messages import TraceReport, TraceRequest, T
 
 __all__ = [
     "ClientMessage",
+    "DriverKind",
     "Note",
     "Notice",
     "Participant",
@@ -56,10 +57,14 @@ __all__ = [
     "SeatClaim",
     "SeatDecline",
     "SeatGrant",
+    "SeatOffer",
     "SeatRelease",
     "SeatRequest",
     "SeatTake",
     "ServerMessage",
+    "Shadow",
+    "ShadowJudgement",
+    "ShadowVerdict",
     "SharedNote",
     "SilenceStops",
     "SourceStatus",
@@ -76,10 +81,14 @@ __all__ = [
     "Welcome",
     "decode_client_message",
     "decode_server_message",
+    "driver_kind",
     "encode_console_message",
 ]
 
-Role = Literal["operator", "observer", "supervisor"]
+# "policy": a program that may drive when a person offers it the seat (docs/policies.md).
+Role = Literal["operator", "observer", "supervisor", "policy"]
+DriverKind = Literal["none", "human", "policy"]  # of whoever drives; by the role of the link, never by a name
+ShadowJudgement = Literal["in_time", "late", "unseen", "wrong_size", "not_a_number", "out_of_limits"]
 SpeedCapMode = Literal["on", "off", "operator"]  # the console's setting; "operator": as the holder of the seat wants
 Tier = Literal["operator", "high", "low"]  # of the encoded media: the operator's own, and the observers' two
 Name = Annotated[str, msgspec.Meta(max_length=60)]
@@ -87,6 +96,7 @@ Count = Annotated[int, msgspec.Meta(ge=0, le=2**53 - 1)]  # a JavaScript number 
 Difference = Annotated[int, msgspec.Meta(ge=-(2**53 - 1), le=2**53 - 1)]
 Milliseconds = Annotated[float, msgspec.Meta(ge=-1e9, le=1e9)]
 MAX_STREAMS = 32
+MAX_SHADOW_VALUES = 64  # axes
 
 
 class StreamReport(msgspec.Struct, frozen=True, kw_only=True):
@@ -140,7 +150,26 @@ class SeatDecline(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", t
 
 
 class SeatTake(msgspec.Struct, frozen=True, tag_field="type", tag="seat_take"):
-    """A supervisor takes the seat from its holder, at once."""
+    """Take the seat at once: a supervisor from any holder, an operator from a policy or when it is free."""
+
+
+class SeatOffer(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", tag="seat_offer"):
+    """An operator or supervisor lets a policy drive, or no longer does; the seat's holder frees it by that.
+
+    Without an offer no policy gets the seat, and the end of the offer ends the policy's turn.
+    """
+
+    offered: bool = True  # False: withdraw the offer, which rests the robot if a policy drives
+    peer: Name = ""  # the only policy that may take the seat; "": any
+
+
+class Shadow(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", tag="shadow"):
+    """The command that a policy would send, if it drove. It is judged and recorded, and never reaches the robot."""
+
+    event: EventReference  # the one that it would become
+    issue: Annotated[int, msgspec.Meta(ge=1)]  # of the feedback that it answers
+    nonce: Annotated[int, msgspec.Meta(ge=0, le=2**53 - 1)] = 0  # of that feedback
+    values: Annotated[list[float | None], msgspec.Meta(max_length=MAX_SHADOW_VALUES)]  # as in a command
 
 
 class SeatRelease(msgspec.Struct, frozen=True, tag_field="type", tag="seat_release"):
@@ -218,7 +247,11 @@ class Seat(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", tag="sea
     holder: str = ""  # the peer's id
     name: str = ""  # the holder's
     why: str = ""  # of the last change: "released", "heartbeat lost", "disconnected", "granted", "taken", "idle" …
+    kind: DriverKind = "none"  # of the holder
     claims: list[SeatClaim] = []  # the one that waits longest first
+    offered: bool = False  # to policies; stays while one drives, and its turn ends with the offer
+    offered_to: str = ""  # the only policy that may take it, a peer id; "": any
+    offered_by: str = ""  # name of the person who did
     idle_seconds_left: float | None = None  # until the idle holder loses it; sent when the countdown begins or ends
 
 
@@ -317,6 +350,17 @@ class SharedNote(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", ta
     time: float  # s since 1970, the console's clock: for people to read, never for a decision
 
 
+class ShadowVerdict(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", tag="shadow_verdict"):
+    """What a shadow policy wanted for an event, beside what was done; the newest ones, a few times a second."""
+
+    peer: str  # the policy's
+    name: str
+    event: EventReference
+    values: list[float | None]  # as the policy sent them
+    judgement: ShadowJudgement
+    difference: float | None = None  # 0: the same as was done; 1: one axis apart by all its range; None: not compared
+
+
 class Participants(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", tag="participants"):
     participants: list[Participant]
 
@@ -344,6 +388,7 @@ ClientMessage = (
     | SeatGrant
     | SeatDecline
     | SeatTake
+    | SeatOffer
     | SeatRelease
     | SilenceStops
     | Rename
@@ -355,6 +400,7 @@ ClientMessage = (
     | Reset
     | TraceRequest
     | TraceReport
+    | Shadow
 )
 ServerMessage = (
     Feedback
@@ -379,11 +425,17 @@ ServerMessage = (
     | Status
     | Navigation
     | Traces
+    | ShadowVerdict
 )
 
 _client_decoder: msgspec.json.Decoder[ClientMessage] = msgspec.json.Decoder(ClientMessage)
 _server_decoder: msgspec.json.Decoder[ServerMessage] = msgspec.json.Decoder(ServerMessage)
 _encoder = msgspec.json.Encoder()
+
+
+def driver_kind(role: str) -> DriverKind:
+    """Return the kind of a driver whose link has this role; "": nobody."""
+    return "policy" if role == "policy" else "human" if role else "none"
 
 
 def encode_console_message(message: ClientMessage | ServerMessage) -> str:

@@ -9,7 +9,7 @@ from typing import Literal, TypeVar
 import msgspec
 
 from lockstep.protocol.actions import Act, ActionUpdate, Status
-from lockstep.protocol.console import Participants, Report, RobotState, Seat, SharedNote, SpeedCapState
+from lockstep.protocol.console import Participants, Report, RobotState, Seat, ShadowVerdict, SharedNote, SpeedCapState
 from lockstep.protocol.description import RobotDescription
 from lockstep.protocol.episodes import EpisodeRequest
 from lockstep.protocol.maps import Navigation
@@ -50,6 +50,7 @@ __all__ = [
     "SessionBegan",
     "SessionEvent",
     "SessionEvents",
+    "ShadowJudged",
     "SilenceChanged",
     "SpeedCapChanged",
     "SpeedReported",
@@ -122,6 +123,13 @@ class SpeedReported(SessionEvent, frozen=True):
 
 class SpeedCapChanged(SessionEvent, frozen=True):
     state: SpeedCapState
+
+
+class ShadowJudged(SessionEvent, frozen=True):
+    """What a shadow policy wanted for an event was judged; it did not reach the robot."""
+
+    by: Actor
+    verdict: ShadowVerdict
 
 
 # the robot

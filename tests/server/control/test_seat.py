@@ -6,6 +6,7 @@ from lockstep.server.control.seat import (
     COUNTDOWN,
     DECLINED_FOR,
     MAX_CLAIMS,
+    OFFER_ENDS,
     TABLE,
     ControlSeat,
     Move,
@@ -22,7 +23,10 @@ NOW = 10.0
 def _seat(standing: Standing) -> ControlSeat:
     """A seat as "me" sees it."""
     seat = ControlSeat(TIMES)
-    if standing is not Standing.FREE:
+    if standing is Standing.POLICY:
+        seat.offer_to_policies("person", "operator", "link", 0.0)
+        seat.request("other", "policy", 0.0)
+    elif standing is not Standing.FREE:
         seat.request("me" if standing is Standing.HOLDER else "other", "operator", 0.0)
     if standing is Standing.CLAIMANT:
         seat.request("me", "operator", 0.0)
@@ -48,15 +52,24 @@ def _apply(seat: ControlSeat, what: SeatInput) -> SeatOutcome:
             return seat.gone("me", NOW)
         case SeatInput.SILENT:
             seat.heard("other", NOW)
+            seat.attended("link", NOW)
             return _expire(seat, TIMES.heartbeat)
+        case SeatInput.OFFERED:
+            if not seat.holds("me"):
+                return SeatOutcome()  # it is the holder's
+            return seat.offer_to_policies("me", "operator", "link", NOW)
+        case SeatInput.WITHDRAWN | SeatInput.STOPPED | SeatInput.LINK_LOST | SeatInput.UNATTENDED:
+            return SeatOutcome()  # about the policy that drives, below
         case SeatInput.IDLE:
             seat.heard("me", TIMES.idle)
             seat.heard("other", TIMES.idle)
+            seat.attended("link", TIMES.idle)
             seat.moved("other", TIMES.idle)
             return _expire(seat, TIMES.idle) if not seat.claims(0.0) else SeatOutcome()
         case SeatInput.UNANSWERED:
             seat.heard("me", TIMES.claim)
             seat.heard("other", TIMES.claim)
+            seat.attended("link", TIMES.claim)
             return _expire(seat, TIMES.claim)
 
 
@@ -68,7 +81,9 @@ def test_the_table_is_complete() -> None:
     assert set(TABLE) == set(product(Standing, SeatInput))
 
 
-@pytest.mark.parametrize(("standing", "what"), list(product(Standing, SeatInput)))
+@pytest.mark.parametrize(
+    ("standing", "what"), [each for each in product(Standing, SeatInput) if each[1] not in OFFER_ENDS]
+)
 def test_every_cell_of_the_table(standing: Standing, what: SeatInput) -> None:
     seat = _seat(standing)
     assert seat.standing("me") is standing
@@ -81,7 +96,8 @@ def test_every_cell_of_the_table(standing: Standing, what: SeatInput) -> None:
             assert seen == (False, False, None, standing)
         case Move.SEATED:
             assert seen == (bool(holder), True, None, Standing.HOLDER)
-            assert seat.why == what.value.removesuffix(" if free")
+            took = (Standing.POLICY, SeatInput.REQUEST)
+            assert seat.why == ("taken" if (standing, what) == took else what.value.removesuffix(" if free"))
         case Move.LEAVES:
             assert seen == (True, True, None, Standing.FREE)
             assert seat.why == what.value.removesuffix(" if free")
@@ -228,3 +244,65 @@ def test_what_others_send_does_not_end_the_countdown() -> None:
     seat.neutral("other")
     assert not seat.may_move("me")
     assert _idle(seat, TIMES.idle).rest
+
+
+@pytest.mark.parametrize("what", OFFER_ENDS)
+def test_the_end_of_the_offer_ends_the_turn_of_the_policy_and_concerns_no_person(what: SeatInput) -> None:
+    seat = _seat(Standing.POLICY)
+    assert seat.end_offer(what, NOW) == SeatOutcome(rest=True, changed=True)
+    assert (seat.holder, seat.why, seat.offer) == ("", what.value, None)
+    assert seat.end_offer(what, NOW) == SeatOutcome()
+    seat = _seat(Standing.HOLDER)
+    assert seat.end_offer(what, NOW) == SeatOutcome()
+    assert seat.holds("me")
+
+
+def test_an_offer_that_no_policy_takes_ends_as_a_request_does() -> None:
+    seat = ControlSeat(TIMES)
+    seat.offer_to_policies("me", "operator", "link", NOW)
+    seat.attended("link", NOW + TIMES.claim)
+    assert list(seat.expire(NOW + TIMES.claim - 0.1)) == []
+    assert list(seat.expire(NOW + TIMES.claim)) == [SeatOutcome(changed=True)]
+    assert seat.request("other", "policy", NOW + TIMES.claim).refusal is not None
+
+
+def test_a_policy_whose_person_falls_silent_loses_the_seat_within_the_heartbeat_time() -> None:
+    seat = _seat(Standing.POLICY)
+    seat.attended("link", NOW, round_trip=0.5)
+    seat.attended("another link", NOW + 10)
+    for now, outcomes in ((NOW + 4.9, []), (NOW + 5.0, [SeatOutcome(rest=True, changed=True)])):
+        seat.heard("other", now)
+        assert list(seat.expire(now)) == outcomes
+    assert seat.why == "nobody attends"
+
+
+def test_a_person_offers_only_a_seat_that_is_free_or_their_own_and_that_nobody_asks_for() -> None:
+    seat = _seat(Standing.CLAIMANT)
+    for peer, role, reason in (
+        ("me", "operator", "seat_taken"),
+        ("third", "supervisor", "seat_taken"),
+        ("third", "observer", "not_allowed"),
+        ("third", "policy", "not_allowed"),
+        ("other", "operator", "seat_taken"),  # its own, but somebody waits for it
+    ):
+        refusal = seat.offer_to_policies(peer, role, "link", NOW).refusal  # type: ignore[arg-type]
+        assert refusal is not None
+        assert refusal.reason == reason
+    assert (seat.holder, seat.offer) == ("other", None)
+
+
+def test_another_person_may_become_responsible_for_the_policy_that_drives() -> None:
+    seat = _seat(Standing.POLICY)
+    assert seat.offer_to_policies("second", "operator", "second link", NOW) == SeatOutcome(changed=True)
+    assert seat.holds("other")
+    assert seat.person_left("link", NOW) == SeatOutcome()
+    assert seat.person_left("second link", NOW) == SeatOutcome(rest=True, changed=True)
+
+
+def test_a_policy_does_not_stay_by_asking_again() -> None:
+    seat = _seat(Standing.POLICY)
+    seat.heard("other", TIMES.idle)
+    seat.attended("link", TIMES.idle)
+    seat.request("other", "policy", TIMES.idle - 1)
+    assert list(seat.expire(TIMES.idle)) == [SeatOutcome(rest=True, changed=True)]
+    assert seat.why == "idle"

@@ -110,6 +110,8 @@ async def test_a_moving_command_of_a_new_driver_is_refused_until_a_neutral_one_c
 
 async def test_a_supervisor_resets_and_an_operator_does_not_take() -> None:
     async with running_rig() as rig, rig.peer("supervisor") as above, rig.peer("operator") as driver:
+        above.send("session", SeatTake())
+        await _seat(driver, why="taken")
         driver.send("session", SeatTake())
         await _refused(driver, "not_allowed")
         above.send("stop", Reset())

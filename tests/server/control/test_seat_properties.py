@@ -1,4 +1,7 @@
-"""The seat with the desk behind it, in any order of inputs: never pinned, one driver, rest before the next."""
+"""The seat with the arbiter behind it, in any order of inputs.
+
+Never pinned, one driver, rest before the next; a policy drives only while a person lets it.
+"""
 
 from hypothesis import settings
 from hypothesis import strategies as st
@@ -8,14 +11,15 @@ from lockstep.protocol.description import Axis, RobotDescription
 from lockstep.protocol.messages import Command, Feedback, Rest
 from lockstep.protocol.serial import event_after
 from lockstep.server.control.command_arbiter import CommandArbiter, Forward, ForwardRest
-from lockstep.server.control.seat import MAX_CLAIMS, ControlSeat, SeatOutcome, SeatTimes
+from lockstep.server.control.seat import MAX_CLAIMS, ControlSeat, SeatInput, SeatOutcome, SeatTimes
 from lockstep.server.event_clock import EventClock
 
 TIMES = SeatTimes(heartbeat=3.0, idle=5.0, claim=6.0)
 ROBOT = RobotDescription(
     name="r", label="R", axes=(Axis(name="x", label="x", unit="m/s", minimum=-1, maximum=1, slew=1, brake=1),)
 )
-PEERS = {"a": "operator", "b": "operator", "c": "supervisor", "d": "observer"}
+PEERS = {"a": "operator", "b": "operator", "c": "supervisor", "d": "observer", "p": "policy", "q": "policy"}
+POLICIES, PEOPLE = ("p", "q"), ("a", "b", "c")
 peers = st.sampled_from(sorted(PEERS))
 
 
@@ -35,7 +39,7 @@ class SeatMachine(RuleBasedStateMachine):
         self.answer()
         self.heard = dict.fromkeys(PEERS, 0.0)
         self.moved_at = 0.0
-        self.claimed: dict[str, float] = {}
+        self.offered_to: str | None = None  # as the people have said since the last end of an offer; "": any policy
 
     def act(self, outcome: SeatOutcome) -> None:
         """As the keeper does."""
@@ -52,13 +56,21 @@ class SeatMachine(RuleBasedStateMachine):
             assert last_rest >= 0
         if before != self.seat.holder:
             self.heard[self.seat.holder] = self.moved_at = self.now
+            if self.seat.holder in POLICIES:
+                assert before == "", "a policy takes the seat from nobody"
+                assert self.offered_to in ("", self.seat.holder), "a person has let this policy drive"
+            else:
+                self.offered_to = None  # a person drives, or the policy's turn is over
 
     @rule(peer=peers, only_if_free=st.booleans())
     def request(self, peer: str, only_if_free: bool) -> None:
         before = self.seat.holder
         self.act(self.seat.request(peer, PEERS[peer], self.now, only_if_free=only_if_free))  # type: ignore[arg-type]
-        assert before in ("", self.seat.holder), "a request deposes nobody"
-        if before == peer and not only_if_free:
+        if before in POLICIES and peer in PEOPLE and not only_if_free:
+            assert self.seat.holder == peer, "a person's one press takes the robot from a policy"
+        else:
+            assert before in ("", self.seat.holder), "a request deposes no person"
+        if before == peer and not only_if_free and peer in PEOPLE:
             self.moved_at = self.now
         self.watched(before)
 
@@ -66,12 +78,61 @@ class SeatMachine(RuleBasedStateMachine):
     def take(self, peer: str) -> None:
         before = self.seat.holder
         self.act(self.seat.take(peer, PEERS[peer], self.now))  # type: ignore[arg-type]
-        if PEERS[peer] == "supervisor":
+        if PEERS[peer] == "supervisor" or (PEERS[peer] == "operator" and before in ("", peer, *POLICIES)):
             assert self.seat.holder == peer
             self.moved_at = self.now
         else:
             assert self.seat.holder == before
         self.watched(before)
+
+    @rule(peer=peers, to=st.sampled_from(["", "p", "q"]))
+    def offer(self, peer: str, to: str) -> None:
+        before, claims = self.seat.holder, self.seat.claims(self.now)
+        outcome = self.seat.offer_to_policies(peer, PEERS[peer], f"link of {peer}", self.now, to=to)  # type: ignore[arg-type]
+        self.act(outcome)
+        self.watched(before)
+        if peer in PEOPLE and before in ("", peer, *POLICIES) and not claims:
+            assert outcome.refusal is None
+            assert self.seat.holder == (before if before in POLICIES else "")
+            self.offered_to = self.seat.holder or to
+        else:
+            assert outcome.refusal is not None
+            assert self.seat.holder == before
+
+    @rule(peer=peers)
+    def withdraw(self, peer: str) -> None:
+        before = self.seat.holder
+        self.act(self.seat.withdraw_offer(peer, PEERS[peer], self.now))  # type: ignore[arg-type]
+        self.watched(before)
+        self.offer_is_over(before, ends=peer in PEOPLE)
+
+    @rule(what=st.sampled_from([SeatInput.STOPPED, SeatInput.LINK_LOST]))
+    def end_offer(self, what: SeatInput) -> None:
+        before = self.seat.holder
+        self.act(self.seat.end_offer(what, self.now))
+        self.watched(before)
+        self.offer_is_over(before, ends=True)
+
+    @rule(peer=st.sampled_from(PEOPLE))
+    def person_leaves(self, peer: str) -> None:
+        before, offer = self.seat.holder, self.seat.offer
+        self.act(self.seat.person_left(f"link of {peer}", self.now))
+        self.watched(before)
+        self.offer_is_over(before, ends=offer is not None and offer.by == peer)
+
+    def offer_is_over(self, before: str, *, ends: bool) -> None:
+        if ends:
+            self.offered_to = None
+            assert self.seat.offer is None
+            assert self.seat.holder == ("" if before in POLICIES else before)
+        else:
+            assert self.seat.holder == before
+
+    @rule(policy=st.sampled_from(POLICIES), value=st.sampled_from([0.0, 0.5]))
+    def policy_begins(self, policy: str, value: float) -> None:
+        """A policy that asks at once, and drives whether it has got the seat or not."""
+        self.request(policy, only_if_free=True)
+        self.command(policy, value, answered=True)
 
     @rule(peer=peers, claimant=peers, grant=st.booleans())
     def answer_claim(self, peer: str, claimant: str, grant: bool) -> None:
@@ -97,12 +158,14 @@ class SeatMachine(RuleBasedStateMachine):
         self.now += seconds
         if alive:
             self.hear(self.seat.holder)
+            for person in PEOPLE:
+                self.seat.attended(f"link of {person}", self.now)
         before = self.seat.holder
         for outcome in self.seat.expire(self.now):
             self.act(outcome)
         if before and self.seat.holder != before:
             overdue = self.now - self.heard[before] >= TIMES.heartbeat or self.now - self.moved_at >= TIMES.idle
-            assert overdue
+            assert overdue or (before in POLICIES and not alive), "or nobody attends the policy"
         self.watched(before)
 
     @rule(peer=peers)
@@ -147,6 +210,19 @@ class SeatMachine(RuleBasedStateMachine):
         self.arbiter.feedback(feedback)
 
     @invariant()
+    def a_policy_drives_only_while_a_person_lets_it(self) -> None:
+        if not hasattr(self, "seat"):
+            return
+        assert not set(self.seat.claims(self.now)) & set(POLICIES), "a policy waits for no seat"
+        if self.seat.holder in POLICIES:
+            assert self.seat.policy_drives
+            assert self.seat.offer is not None
+            assert self.seat.offer.by in PEOPLE
+        elif self.seat.holder:
+            assert not self.seat.policy_drives
+            assert self.seat.offer is None, "no policy drives after this person without a new press"
+
+    @invariant()
     def the_seat_is_never_pinned(self) -> None:
         """Neither by the silent nor by the idle, and nobody waits for a free one."""
         if not hasattr(self, "seat"):
@@ -167,6 +243,9 @@ class SeatMachine(RuleBasedStateMachine):
             list(self.seat.expire(self.now))
         assert self.seat.holder == ""
         assert not self.seat.claims(self.now)
+        self.now += TIMES.claim
+        list(self.seat.expire(self.now))
+        assert self.seat.offer is None
 
 
 SeatMachine.TestCase.settings = settings(max_examples=80, stateful_step_count=30, deadline=None)
@@ -185,3 +264,28 @@ def test_a_stick_that_is_held_through_a_hand_over_moves_nothing() -> None:
     machine.command("c", 0.0, answered=True)
     machine.command("c", 0.5, answered=True)
     assert [peer for peer, _ in machine.sent] == ["a", "a", None, "c", "c"]
+
+
+def test_a_policy_gets_no_seat_by_itself_and_loses_it_to_one_press() -> None:
+    machine = SeatMachine()
+    machine.start()
+    machine.request("p", only_if_free=True)
+    assert machine.seat.holder == ""
+    machine.request("a", only_if_free=False)
+    machine.offer("a", "p")
+    machine.request("q", only_if_free=True)
+    assert machine.seat.holder == "", "the other policy was not meant"
+    machine.request("p", only_if_free=True)
+    for value in (0.5, 0.0, 0.5):
+        machine.command("p", value, answered=True)
+    assert machine.sent[-1][0] == "p"
+    machine.request("b", only_if_free=False)
+    assert (machine.seat.holder, machine.seat.why) == ("b", "taken")
+    assert machine.sent[-1][0] is None, "the robot rests"
+    machine.command("p", 0.5, answered=True)
+    machine.command("b", 0.5, answered=True)
+    assert machine.sent[-1][0] is None, "the policy has no seat, and the person has to arm"
+    machine.request("p", only_if_free=True)
+    machine.leave("b", gone=False)
+    machine.request("p", only_if_free=True)
+    assert machine.seat.holder == "", "the take-over has ended the offer"

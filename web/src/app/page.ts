@@ -98,6 +98,7 @@ export class Page {
       return (this.robot = parts.createRobotStrip(engine));
     });
     const episodes = later.panel((parts) => parts.createEpisodeBar(engine));
+    const policies = later.panel((parts) => parts.createPolicyBar(engine));
     const event = createEventPanel(engine);
     grid.card = event.element;
     const force = later.panel((parts) => parts.createForceGauge(engine, false));
@@ -130,7 +131,7 @@ export class Page {
     const deck = h("footer", "deck", {}, arm.element, axes.element, left, right, stop.element);
     this.root.append(
       ...[bar.element, seat.element],
-      h("div", "strips", {}, alarm.element, banner.element, episodes.element),
+      h("div", "strips", {}, alarm.element, banner.element, policies.element, episodes.element),
       ...[grid.element, rail],
       ...[charts.element, sheets.element, deck, announcer.element],
     );
@@ -142,6 +143,7 @@ export class Page {
       alarm,
       banner,
       robot,
+      policies,
       episodes,
       event,
       force,

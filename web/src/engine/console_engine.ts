@@ -105,6 +105,7 @@ export class ConsoleEngine {
   measuredMs: number | null = null; // when the newest feedback came
   episode: unknown = null; // the newest message of episodes, whose schema comes with the bar that shows it
   navigation: { readonly value: unknown; readonly atMs: number } | null = null; // the newest, whose schema comes with the map
+  takeShadow: (message: unknown) => void = () => undefined; // the policy bar replaces it
   takeEpisode = (message: unknown): void => void (this.episode = message); // the bar replaces it
   statusMs = 0; // when the robot's newest status came
   actionMs = -Infinity; // when the newest news of an action came
@@ -233,6 +234,7 @@ export class ConsoleEngine {
       this.disarm("operator");
       return;
     }
+    if (this.session.takeOver()) return; // armed by the next press, once the seat is here
     const refusal = arming.arm(this.arming, this.conditions(), this.controls.deadman);
     if (refusal !== null) note(this.state, "warning", ARM_REFUSAL_LABELS[refusal], Date.now());
     else if (this.driver !== null) driver.driverArm(this.driver);
@@ -340,6 +342,10 @@ export class ConsoleEngine {
       }
       if (parsed.kind === "unknown" && parsed.type === "navigation") {
         this.navigation = { value: parsed.value, atMs: at };
+        return;
+      }
+      if (parsed.kind === "unknown" && parsed.type === "shadow_verdict") {
+        this.takeShadow(parsed.value);
         return;
       }
       this.state.badMessages += 1;

@@ -136,7 +136,7 @@ export interface CameraCalibration {
   readonly orientation: readonly [number, number, number, number];
 }
 
-export type ClientMessage = Command | Rest | Report | Ping | SeatRequest | SeatGrant | SeatDecline | SeatTake | SeatRelease | SilenceStops | Rename | Note | Act | ActionCancel | EpisodeRequest | Stop | Reset | TraceRequest | TraceReport;
+export type ClientMessage = Command | Rest | Report | Ping | SeatRequest | SeatGrant | SeatDecline | SeatTake | SeatOffer | SeatRelease | SilenceStops | Rename | Note | Act | ActionCancel | EpisodeRequest | Stop | Reset | TraceRequest | TraceReport | Shadow;
 
 /** Event `event`, valid only as the answer to issue `issue` of feedback `event - 1`. */
 export interface Command {
@@ -329,7 +329,7 @@ export interface Notice {
 export interface Participant {
   readonly peer: string;
   readonly name: string;
-  readonly role: "observer" | "operator" | "supervisor";
+  readonly role: "observer" | "operator" | "policy" | "supervisor";
   readonly carrier: "capture-time" | "native" | "none" | "trailer";
   readonly gap: number;
   readonly picture_delay_ms: number | null;
@@ -534,7 +534,11 @@ export interface Seat {
   readonly holder: string;
   readonly name: string;
   readonly why: string;
+  readonly kind: "human" | "none" | "policy";
   readonly claims: readonly (SeatClaim)[];
+  readonly offered: boolean;
+  readonly offered_to: string;
+  readonly offered_by: string;
   readonly idle_seconds_left: number | null;
 }
 
@@ -557,6 +561,13 @@ export interface SeatGrant {
   readonly peer: string;
 }
 
+/** An operator or supervisor lets a policy drive, or no longer does; the seat's holder frees it by that. Without an offer no policy gets the seat, and the end of the offer ends the policy's turn. */
+export interface SeatOffer {
+  readonly type: "seat_offer";
+  readonly offered?: boolean;
+  readonly peer?: string;
+}
+
 /** Give the control seat back. */
 export interface SeatRelease {
   readonly type: "seat_release";
@@ -568,12 +579,32 @@ export interface SeatRequest {
   readonly only_if_free?: boolean;
 }
 
-/** A supervisor takes the seat from its holder, at once. */
+/** Take the seat at once: a supervisor from any holder, an operator from a policy or when it is free. */
 export interface SeatTake {
   readonly type: "seat_take";
 }
 
-export type ServerMessage = Feedback | Refusal | Pong | Welcome | RobotState | Seat | Participants | Quality | SpeedCapState | Sources | Voice | RecordingState | SharedNote | Notice | StopStateNotice | StopTaken | ActionUpdate | EpisodeState | EpisodeAnswer | Status | Navigation | Traces;
+export type ServerMessage = Feedback | Refusal | Pong | Welcome | RobotState | Seat | Participants | Quality | SpeedCapState | Sources | Voice | RecordingState | SharedNote | Notice | StopStateNotice | StopTaken | ActionUpdate | EpisodeState | EpisodeAnswer | Status | Navigation | Traces | ShadowVerdict;
+
+/** The command that a policy would send, if it drove. It is judged and recorded, and never reaches the robot. */
+export interface Shadow {
+  readonly type: "shadow";
+  readonly event: number;
+  readonly issue: number;
+  readonly nonce?: number;
+  readonly values: readonly (number | null)[];
+}
+
+/** What a shadow policy wanted for an event, beside what was done; the newest ones, a few times a second. */
+export interface ShadowVerdict {
+  readonly type: "shadow_verdict";
+  readonly peer: string;
+  readonly name: string;
+  readonly event: number;
+  readonly values: readonly (number | null)[];
+  readonly judgement: "in_time" | "late" | "not_a_number" | "out_of_limits" | "unseen" | "wrong_size";
+  readonly difference: number | null;
+}
 
 /** A participant's note, with the event it belongs to. Newcomers get the last ones. */
 export interface SharedNote {
@@ -581,7 +612,7 @@ export interface SharedNote {
   readonly id: number;
   readonly peer: string;
   readonly name: string;
-  readonly role: "observer" | "operator" | "supervisor";
+  readonly role: "observer" | "operator" | "policy" | "supervisor";
   readonly text: string;
   readonly epoch: string;
   readonly event: number;
@@ -748,7 +779,7 @@ export interface Voice {
 export interface Welcome {
   readonly type: "welcome";
   readonly peer: string;
-  readonly role: "observer" | "operator" | "supervisor";
+  readonly role: "observer" | "operator" | "policy" | "supervisor";
   readonly name: string;
   readonly streams: readonly (StreamInfo)[];
   readonly voice: string;

@@ -150,6 +150,10 @@ export function holdsSeat(state: ConsoleState): boolean {
   return state.seat !== null && state.seat.holder !== "" && state.seat.holder === state.welcome?.peer;
 }
 
+export function policyDrives(state: ConsoleState): boolean {
+  return state.seat?.kind === "policy";
+}
+
 export function robotIsUp(state: ConsoleState): boolean {
   return state.robot?.link === "up";
 }
@@ -208,6 +212,7 @@ export function applyMessage(state: ConsoleState, message: ServerMessage, wallMs
       state.status = message;
       return;
     case "pong":
+    case "shadow_verdict": // the policy bar's
     case "episode": // the episode bar's
     case "episode_answer":
     case "stop_taken": // the stop sender's

@@ -27,8 +27,8 @@ export const EXPIRIES: readonly { readonly label: string; readonly seconds: numb
 
 /** Whom this role may invite. */
 export function invitableRoles(role: Role | null): readonly Role[] {
-  if (role === "supervisor") return ["observer", "operator", "supervisor"];
-  return role === "operator" ? ["observer", "operator"] : [];
+  if (role === "supervisor") return ["observer", "policy", "operator", "supervisor"];
+  return role === "operator" ? ["observer", "policy", "operator"] : [];
 }
 
 export function parseInvitations(answer: unknown): Invitation[] {
@@ -69,7 +69,7 @@ function parseInvitation(value: unknown): Invitation | null {
   if (!isRecord(value)) return null;
   const { id, name, role, by, expires, revoked, connected } = value;
   if (typeof id !== "string" || typeof expires !== "number") return null;
-  if (role !== "observer" && role !== "operator" && role !== "supervisor") return null;
+  if (role !== "observer" && role !== "operator" && role !== "supervisor" && role !== "policy") return null;
   return {
     id,
     role,

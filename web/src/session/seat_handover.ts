@@ -20,6 +20,7 @@ export function seatHandover(before: Seat | null, after: Seat, me: string | null
 }
 
 function changeWords(giver: string, taker: string, fromMe: boolean, after: Seat): string {
+  if (after.why === "offered") return `${giver} offered the control seat to policies`;
   if (after.why === "granted") return `${giver} handed control to ${taker}`;
   if (after.why === "taken") return `${taker} took control from ${giver}`;
   const has = taker === "you" ? "you have" : `${taker} has`;
@@ -30,6 +31,10 @@ function changeWords(giver: string, taker: string, fromMe: boolean, after: Seat)
 }
 
 function leaveWords(why: string, wasMe: boolean): string {
+  if (why === "stopped") return wasMe ? "were stopped" : "was stopped";
+  if (why === "nobody attends") return "drove with nobody to take over";
+  if (why === "offer withdrawn") return "was told to stop driving";
+  if (why === "robot link lost") return "lost the robot";
   if (why === "disconnected") return "left";
   if (why === "heartbeat lost") return "fell silent";
   if (why === "idle") return wasMe ? "were idle" : "was idle";

@@ -21,6 +21,7 @@ export interface SeatView {
   readonly role: Role | null; // null while not connected
   readonly status: SeatStatus;
   readonly holder: string; // name
+  readonly policy: boolean; // the holder is one
   readonly claims: readonly Claim[];
   readonly me: string | null;
   readonly idleSeconds: number | null;
@@ -39,7 +40,11 @@ export function seatLabels(view: SeatView): SeatLabels {
       return holderWords(view);
     case "asked":
     case "held":
-      return { tone: "off", title: `${view.holder} drives`, text: view.notice ?? waitingWords(view) };
+      return {
+        tone: "off",
+        title: `${view.policy ? "Policy " : ""}${view.holder} drives`,
+        text: view.notice ?? waitingWords(view),
+      };
   }
 }
 
@@ -67,7 +72,7 @@ function holderWords(view: SeatView): SeatLabels {
 }
 
 function freeWords(role: Role | null): string {
-  if (role === "observer") return "You watch, and may stop the robot at any time";
+  if (!mayTake(role)) return "You watch, and may stop the robot at any time";
   return "The control seat is free";
 }
 
@@ -81,6 +86,11 @@ function waitingWords(view: SeatView): string {
     const others = more.length === 0 ? "" : ` and ${more.length} more`;
     return `${first.name}${others} asked for control: ${first.secondsLeft} s to answer`;
   }
-  if (view.role === "observer") return "You watch, and may stop the robot at any time";
+  if (!mayTake(view.role)) return "You watch, and may stop the robot at any time";
+  if (view.policy) return "You may take over at any time";
   return view.role === "supervisor" ? "You watch, and may take control at once" : "";
+}
+
+function mayTake(role: Role | null): boolean {
+  return role === "operator" || role === "supervisor";
 }

@@ -39,11 +39,15 @@ export function idleSecondsAfter(seat: Seat | null, agedMs: number): number | nu
   return left(seat.idle_seconds_left, agedMs);
 }
 
-/** The button beside the seat for this role; null for who may only watch. It never goes away for who may drive. */
-export function seatAction(role: Role | null, status: SeatStatus): SeatAction | null {
-  if (role === "observer" || role === null) return null;
+/**
+ * The button beside the seat for this role; null for who may only watch. It never goes away for who may drive.
+ * `policy`: one drives, and every person who may drive takes the robot from it at once.
+ */
+export function seatAction(role: Role | null, status: SeatStatus, policy = false): SeatAction | null {
+  if (role !== "operator" && role !== "supervisor") return null;
   if (status === "mine") return { kind: "release", label: "Give control back", why: null };
   const why = status === "unknown" ? "Not connected" : null;
+  if (policy) return { kind: "take", label: "Take over", why };
   if (role === "supervisor") return { kind: "take", label: "Take control", why };
   if (status === "asked") return { kind: "withdraw", label: "Withdraw request", why };
   return { kind: "request", label: "Request control", why };

@@ -1,4 +1,4 @@
-import { holdsSeat, type ConsoleState } from "./console_state";
+import { holdsSeat, mayDrive, policyDrives, type ConsoleState } from "./console_state";
 import { claimsAfter, idleSecondsAfter, type Claim, type Role } from "./seat_status";
 import type { ClientMessage, Welcome } from "../protocol/wire";
 
@@ -52,6 +52,18 @@ export class SessionClient {
     this.tell({ type: "seat_take" });
   }
 
+  /** One press of a person ends the turn of the policy that drives. Says whether one does. */
+  takeOver(): boolean {
+    if (!policyDrives(this.state) || !mayDrive(this.state)) return false;
+    this.takeSeat();
+    return true;
+  }
+
+  /** Lets a policy drive, which frees an own seat, or no longer. `peer`: the only one that may; "": any. */
+  offer(peer: string, offered: boolean): void {
+    this.tell({ type: "seat_offer", peer, offered });
+  }
+
   release(): void {
     this.tell({ type: "seat_release" });
   }
@@ -66,6 +78,7 @@ export class SessionClient {
    */
   answerShown(grant: boolean): boolean {
     const { shownClaim, state } = this;
+    if (grant && this.takeOver()) return true;
     if (shownClaim === null || !holdsSeat(state)) return false;
     if (state.seat?.claims.some((each) => each.peer === shownClaim) === true) this.answer(shownClaim, grant);
     return true;

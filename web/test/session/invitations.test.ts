@@ -17,7 +17,7 @@ function invitation(id: string, rest: Partial<Invitation> = {}): Invitation {
 
 describe("invitations", () => {
   it("may be made by who may invite", () => {
-    expect(invitableRoles("operator")).toEqual(["observer", "operator"]);
+    expect(invitableRoles("operator")).toEqual(["observer", "policy", "operator"]);
     expect(invitableRoles("supervisor")).toContain("supervisor");
     expect([...invitableRoles("observer"), ...invitableRoles(null)]).toEqual([]);
   });

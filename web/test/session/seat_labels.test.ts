@@ -4,6 +4,7 @@ import { seatLabels, type SeatView } from "../../src/session/seat_labels";
 const VIEW: SeatView = {
   role: "operator",
   status: "held",
+  policy: false,
   holder: "Ann",
   claims: [],
   me: "me",

@@ -18,6 +18,7 @@ from lockstep.protocol.actions import Act, ActionCancel, ActionReason, ActionUpd
 from lockstep.protocol.description import RobotDescription
 from lockstep.rtc.token_bucket import TokenBucket
 from lockstep.server.audit.records import Actor
+from lockstep.server.control.policies.seat_offer import PEOPLE
 from lockstep.server.errors import ActionIdUsed, LinkDown, NotFound, NotRenewable, TooManyRequests, Unconfirmed
 from lockstep.server.event_clock import EventClock
 from lockstep.server.peers.peer import Peer
@@ -103,8 +104,8 @@ class ActionService:
             self._events.publish(ActionRefused(peer.actor, refused))
 
     def _why_not(self, peer: Peer, act: Act) -> ActionReason | None:
-        if peer.role == "observer":
-            return "not_allowed"
+        if peer.role not in PEOPLE:
+            return "not_allowed"  # a policy drives by commands alone
         if not self._holds_seat(peer):
             return "no_seat"
         description = self._robot.description

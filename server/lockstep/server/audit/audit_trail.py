@@ -41,6 +41,7 @@ class AuditTrail:
         self._holder = Actor()
         self._holder_is_noted = True  # the newest record of the seat says who has it
         self._claims: list[str] = []
+        self._offered = False  # to policies
         self._description = next((each.what for each in reversed([*log]) if each.kind == "epoch"), "")
 
     def record(self, kind: AuditKind, actor: Actor = NOBODY, what: str = "", detail: str = "") -> None:
@@ -97,6 +98,10 @@ class AuditTrail:
         if claims != self._claims:
             self.record("claim", by, detail=", ".join(f"{each.name} ({each.peer})" for each in seat.claims) or "none")
             self._claims = claims
+        if seat.offered != self._offered:
+            what = "offered to policies" if seat.offered else "no longer offered"
+            self.record("seat", by, what, seat.offered_to)
+            self._offered = seat.offered
 
     def again(self, kind: AuditKind, actor: Actor, what: str) -> None:
         """Count a record that is merged with its repetitions, for what may come many times a second."""

@@ -2,8 +2,8 @@
 
 | role | may invite | sees and revokes |
 |---|---|---|
-| observer | – | – |
-| operator | observers, operators | what it invited |
+| observer, policy | – | – |
+| operator | observers, policies, operators | what it invited |
 | supervisor | anyone | everything |
 
 An invitation ends no later than the link it was made with, is revoked with it, and is good only for robots that this
@@ -33,8 +33,9 @@ SHOWN_AFTER_END = 24 * 3600.0  # s that an ended one stays in the list
 
 _MAY_INVITE: dict[Role, tuple[Role, ...]] = {
     "observer": (),
-    "operator": ("observer", "operator"),
-    "supervisor": ("observer", "operator", "supervisor"),
+    "policy": (),
+    "operator": ("observer", "policy", "operator"),
+    "supervisor": ("observer", "policy", "operator", "supervisor"),
 }
 
 

@@ -22,6 +22,7 @@ from lockstep.server.routes import (
     maps,
     observer_websocket,
     recordings,
+    seat,
     session,
     sfu,
     whep,
@@ -79,6 +80,7 @@ def session_app(settings: Settings, lifespan: Lifespan[FastAPI] | None = None) -
     app.include_router(whep.router)
     app.include_router(whip.router)
     app.include_router(session.router)
+    app.include_router(seat.router)
     app.include_router(actions.router)
     app.include_router(maps.router)
     app.include_router(access.router)

@@ -247,10 +247,15 @@ def _episodes(
     trail: AuditTrail,
 ) -> EpisodeService:
     def may_ask(by: Actor) -> bool:
-        """Return True for supervisors and the operator who holds the seat; nobody else has a say, a policy neither."""
+        """Return True for supervisors, the operator who holds the seat, and the one who lets a policy drive.
+
+        Nobody else has a say, a policy neither.
+        """
         if by.role == "supervisor":
             return True
-        return by.role == "operator" and (seat.holds(by.peer) if by.peer else console.seat.is_held_with(by.link))
+        lets_drive = seat.offer is not None and bool(by.link) and seat.offer.link == by.link
+        holds = seat.holds(by.peer) if by.peer else console.seat.is_held_with(by.link)
+        return by.role == "operator" and (holds or lets_drive)
 
     reset = ResetAction(settings.episodes.reset_action, console.robot, clock, console.actions.act_by_console)
     return EpisodeService(

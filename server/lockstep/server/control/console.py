@@ -13,10 +13,12 @@ from lockstep.protocol.console import (
     Report,
     SeatDecline,
     SeatGrant,
+    SeatOffer,
     SeatRelease,
     SeatRequest,
     SeatTake,
     ServerMessage,
+    Shadow,
     SilenceStops,
     StopStateNotice,
     Welcome,
@@ -57,6 +59,7 @@ from lockstep.server.control.command_arbiter import (
     RestOutcome,
 )
 from lockstep.server.control.participants import ParticipantList
+from lockstep.server.control.policies.shadow_service import ShadowService
 from lockstep.server.control.reset_service import ResetService
 from lockstep.server.control.seat import ControlSeat, SeatRefusal
 from lockstep.server.control.seat_keeper import SeatKeeper
@@ -155,6 +158,7 @@ class Console:
         self.actions = ActionService(self.robot, clock, self.seat.is_held_by, self.seat.may_move, events)
         self.status = StatusService()
         self.navigation = NavigationService()
+        self.shadows = ShadowService(peers, events)
         self._fanout = FeedbackFanout(
             settings.observer_feedback_hz, self.seat.is_held_by, peers.drivers, peers.observers, relays
         )
@@ -230,6 +234,8 @@ class Console:
                 peer.send("control", Pong(id=message.id))
             case Stop():
                 self._stop(peer, channel, message)
+            case Shadow():
+                self._shadow(peer, message, now)
             case Act():
                 self.actions.act_by_peer(peer, message)
             case ActionCancel():
@@ -243,13 +249,17 @@ class Console:
                     self._refuse_request(peer, reason, "note")
             case Reset():
                 self.resets.reset_by_peer(peer, message.number)
-            case SeatRequest() | SeatGrant() | SeatDecline() | SeatTake() | SilenceStops() | Rename() if (
+            case SeatRequest() | SeatTake() if self.seat.waits_for_nothing(peer, message):
+                self.seat.handle(peer, message)
+            case SeatRequest() | SeatGrant() | SeatDecline() | SeatTake() | SeatOffer() | SilenceStops() | Rename() if (
                 not peer.asks.take(now)
             ):
                 self._refuse_request(peer, "too_often")
+            case SeatOffer(offered=True) if (reason := self.why_no_offer()) is not None:
+                self._refuse_request(peer, reason, "no policy may drive now")
             case SilenceStops():
                 self._silence(peer, message)
-            case SeatRequest() | SeatGrant() | SeatDecline() | SeatTake():
+            case SeatRequest() | SeatGrant() | SeatDecline() | SeatTake() | SeatOffer():
                 self.seat.handle(peer, message)
             case Rename():
                 self.people.rename(peer, message.name)
@@ -274,6 +284,7 @@ class Console:
 
     def peer_ended(self, peer: Peer) -> None:
         self.traces.forget(peer)
+        self.shadows.gone(peer)
         self.seat.gone(peer)
         self.people.left(peer)
 
@@ -289,6 +300,12 @@ class Console:
         if isinstance(outcome, ForwardRest) and self.robot.send(outcome.rest):
             self._events.publish(RestForwarded(Actor(), outcome.rest, why))
 
+    def why_no_offer(self) -> RefusalReason | None:
+        """Return why no policy may be let drive now: after a stop or an outage a person decides anew."""
+        if not self.robot.up or self.clock.feedback is None:
+            return "link_down"
+        return "stopped" if self.clock.stop.stopped or self.stops.unconfirmed else None
+
     def refuse(self, peer: Peer, refusal: SeatRefusal) -> None:
         self._refuse_request(peer, refusal.reason, refusal.detail)
 
@@ -300,6 +317,7 @@ class Console:
         self.resets.link_down("the robot bridge has restarted")
         self._arbiter.epoch_ends()
         self.actions.epoch_ends()
+        self.shadows.epoch_ends()
         self.status.forget()
         self.navigation.forget()
         self.traces.epoch_ends()
@@ -316,10 +334,12 @@ class Console:
         self._link_was_up = True
         self.stops.link_up()
         self._arbiter.link_up(self.robot.description)
+        self.shadows.link_up(self.robot.description)
         self._events.publish(LinkUp(self.robot.state()))
 
     def link_down(self, detail: str) -> None:
         was_up, self._link_was_up = self._link_was_up, False
+        self.seat.link_lost()
         self._arbiter.link_down()
         self.stops.link_down()
         self.resets.link_down(detail)
@@ -337,17 +357,22 @@ class Console:
             return
         self._fanout.publish(encode_console_message(feedback))  # first: the operator's next command waits for it
         back = time.monotonic() - now
-        had_command = self._arbiter.in_flight is not None
+        command = self._arbiter.in_flight
+        stopped = feedback.stop.stopped or feedback.stop.number > self._shown_stop.number
         self._arbiter.feedback(feedback)
+        if stopped:
+            self.seat.stopped()
         self.resets.feedback(feedback.stop)
         self.speed_cap.fed_back(feedback, now)
-        if had_command and self._arbiter.in_flight is None:
+        executed = command if self._arbiter.in_flight is None else None
+        if executed is not None:
             turnaround = now - self._forwarded_at
             spans = command_spans(robot, forward=self._forward_seconds, link=turnaround, back=back)
             self.traces.executed(feedback.event, spans)
             self._events.publish(FeedbackReceived(feedback, now, turnaround, spans))
         else:
             self._events.publish(FeedbackReceived(feedback, now, None))
+        self.shadows.feedback(feedback, executed)
         if feedback.stop != self._shown_stop:
             self._shown_stop = feedback.stop
             self._events.publish(StopShown(feedback.stop, feedback.event))
@@ -361,6 +386,7 @@ class Console:
         self._events.publish(Refused(Actor() if peer is None else peer.actor, "control", refusal, "robot"))
 
     def stop_taken(self, taken: StopTaken) -> None:
+        self.seat.stopped()
         self._arbiter.stop_taken(taken)
         self.stops.taken(taken)
 
@@ -404,6 +430,11 @@ class Console:
                 self._events.publish(CommandRepeated(peer.actor, command, answered=True))
             case Absorbed():
                 self._events.publish(CommandRepeated(peer.actor, command, answered=False))
+
+    def _shadow(self, peer: Peer, shadow: Shadow, now: float) -> None:
+        reason = self.shadows.shadow(peer, shadow, drives=self.seat.is_held_by(peer))
+        if reason in ("not_allowed", "too_often") and peer.asks.take(now):
+            self._refuse_request(peer, reason, "shadow")
 
     def _rest(self, peer: Peer, outcome: RestOutcome) -> None:
         if isinstance(outcome, ForwardRest):

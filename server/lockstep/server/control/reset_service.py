@@ -12,6 +12,7 @@ import structlog
 
 from lockstep.protocol.messages import Refusal, RefusalReason, Reset, StopState
 from lockstep.server.audit.records import Actor
+from lockstep.server.control.policies.seat_offer import PEOPLE
 from lockstep.server.errors import (
     LinkDown,
     LockedOut,
@@ -171,8 +172,8 @@ class ResetService:
     def _refusal(self, by: Actor, number: int) -> tuple[RefusalReason, str] | None:
         """Return the reason why `by` may not reset now; None: it may."""
         if by.role != "supervisor":
-            if by.role == "observer":
-                return "not_allowed", "observers may not reset a stop"
+            if by.role not in PEOPLE:
+                return "not_allowed", f"{'policies' if by.role == 'policy' else 'observers'} may not reset a stop"
             if not self._holds_seat(by):
                 return "no_seat", "only the holder of the control seat or a supervisor may reset"
         now = time.monotonic()

@@ -1,28 +1,33 @@
 """The control seat, the right to drive. No I/O, no clock.
 
 At most one peer holds the seat. It never stays with a peer that is gone, silent or idle, and whenever it changes hands
-the robot rests first. Each input is about one peer, to which the seat is FREE, its own (HOLDER), somebody else's while
-it asks for it (CLAIMANT), or somebody else's (OTHER):
+the robot rests first. Each input is about one peer, to which the seat is FREE, its own (HOLDER), another person's while
+it asks for it (CLAIMANT), another person's (OTHER), or a policy's (POLICY):
 
-| input | FREE | HOLDER | CLAIMANT | OTHER |
-|---|---|---|---|---|
-| request | seated | stays, idle time anew | – | claims |
-| request if free | seated | – | refused seat_taken | refused seat_taken |
-| take (supervisor) | seated | stays, idle time anew | seated | seated |
-| granted by the holder | – | – | seated | – |
-| declined by the holder | – | – | refused declined | – |
-| no answer for `claim_seconds` | – | – | refused declined | – |
-| release | – | leaves | withdraws | – |
-| disconnected | – | leaves | withdraws | – |
-| heartbeat lost for `heartbeat_seconds` and four round trips | – | leaves | – | – |
-| idle for `idle_seconds` | – | leaves | – | – |
+| input | FREE | HOLDER | CLAIMANT | OTHER | POLICY |
+|---|---|---|---|---|---|
+| request | seated | stays, idle time anew | – | claims | seated (as "taken") |
+| request if free | seated | – | refused seat_taken | refused seat_taken | refused seat_taken |
+| take | seated | stays, idle time anew | seated | seated | seated |
+| granted by the holder | – | – | seated | – | – |
+| declined by the holder | – | – | refused declined | – | – |
+| no answer for `claim_seconds` | – | – | refused declined | – | – |
+| release | – | leaves | withdraws | – | – |
+| disconnected | – | leaves | withdraws | – | – |
+| heartbeat lost for `heartbeat_seconds` and four round trips | – | leaves | – | – | – |
+| idle for `idle_seconds` | – | leaves | – | – | – |
+| offered to policies, by the holder | – | leaves | – | – | – |
+| the offer ends, of the policy that drives | – | leaves | – | – | – |
 
 *Seated* while somebody else holds it, and *leaves*, rest the robot. When the holder leaves, the claim that has waited
 longest gets the seat; without a claim the seat is free. A claim goes to each later holder too and keeps its deadline.
 
-Before the table applies: a role that may not drive is refused `not_allowed`, and so is take by anyone but a
-supervisor; a grant or decline by another than the holder is refused `no_seat`; a claim too many, or soon after a
-decline, is refused.
+Before the table applies: a role that may not drive is refused `not_allowed`; so is the take of an operator while
+another person holds the seat; a grant or decline by another than the holder is refused `no_seat`; a claim too many, or
+soon after a decline, is refused.
+
+A policy is seated only in a free seat that a person has offered (`policies/seat_offer.py`); it never claims, takes or
+answers. Every person's request takes the seat from it at once.
 
 A lost packet silences a browser's data channels for a round trip or two, and once more until SCTP has told the other
 side what it gave up, so that a silence has to be longer on a longer path. The robot does not wait for it: without
@@ -38,6 +43,7 @@ from typing import NamedTuple
 
 from lockstep.protocol.console import Role
 from lockstep.protocol.messages import RefusalReason
+from lockstep.server.control.policies.seat_offer import PEOPLE, Offer
 
 __all__ = ["TABLE", "ControlSeat", "Move", "SeatInput", "SeatOutcome", "SeatRefusal", "SeatTimes", "Standing"]
 
@@ -52,6 +58,7 @@ class Standing(Enum):
     HOLDER = "holder"
     CLAIMANT = "claimant"
     OTHER = "other"
+    POLICY = "policy"
 
 
 class SeatInput(Enum):
@@ -67,6 +74,14 @@ class SeatInput(Enum):
     GONE = "disconnected"
     SILENT = "heartbeat lost"
     IDLE = "idle"
+    OFFERED = "offered"
+    WITHDRAWN = "offer withdrawn"
+    STOPPED = "stopped"
+    LINK_LOST = "robot link lost"
+    UNATTENDED = "nobody attends"
+
+
+OFFER_ENDS = (SeatInput.WITHDRAWN, SeatInput.STOPPED, SeatInput.LINK_LOST, SeatInput.UNATTENDED)
 
 
 class Move(Enum):
@@ -106,17 +121,23 @@ class SeatTimes(NamedTuple):
 
 NOTHING = SeatOutcome()
 
-_ROWS: dict[SeatInput, tuple[Move, Move, Move, Move]] = {
-    SeatInput.REQUEST: (Move.SEATED, Move.STAYS, Move.NOTHING, Move.CLAIMS),
-    SeatInput.REQUEST_IF_FREE: (Move.SEATED, Move.NOTHING, Move.REFUSED_TAKEN, Move.REFUSED_TAKEN),
-    SeatInput.TAKE: (Move.SEATED, Move.STAYS, Move.SEATED, Move.SEATED),
-    SeatInput.GRANTED: (Move.NOTHING, Move.NOTHING, Move.SEATED, Move.NOTHING),
-    SeatInput.DECLINED: (Move.NOTHING, Move.NOTHING, Move.REFUSED_DECLINED, Move.NOTHING),
-    SeatInput.UNANSWERED: (Move.NOTHING, Move.NOTHING, Move.REFUSED_DECLINED, Move.NOTHING),
-    SeatInput.RELEASE: (Move.NOTHING, Move.LEAVES, Move.WITHDRAWS, Move.NOTHING),
-    SeatInput.GONE: (Move.NOTHING, Move.LEAVES, Move.WITHDRAWS, Move.NOTHING),
-    SeatInput.SILENT: (Move.NOTHING, Move.LEAVES, Move.NOTHING, Move.NOTHING),
-    SeatInput.IDLE: (Move.NOTHING, Move.LEAVES, Move.NOTHING, Move.NOTHING),
+_LEAVES = (Move.NOTHING, Move.LEAVES, Move.NOTHING, Move.NOTHING, Move.NOTHING)
+_ROWS: dict[SeatInput, tuple[Move, Move, Move, Move, Move]] = {
+    SeatInput.REQUEST: (Move.SEATED, Move.STAYS, Move.NOTHING, Move.CLAIMS, Move.SEATED),
+    SeatInput.REQUEST_IF_FREE: (
+        *(Move.SEATED, Move.NOTHING),
+        *(Move.REFUSED_TAKEN, Move.REFUSED_TAKEN, Move.REFUSED_TAKEN),
+    ),
+    SeatInput.TAKE: (Move.SEATED, Move.STAYS, Move.SEATED, Move.SEATED, Move.SEATED),
+    SeatInput.GRANTED: (Move.NOTHING, Move.NOTHING, Move.SEATED, Move.NOTHING, Move.NOTHING),
+    SeatInput.DECLINED: (Move.NOTHING, Move.NOTHING, Move.REFUSED_DECLINED, Move.NOTHING, Move.NOTHING),
+    SeatInput.UNANSWERED: (Move.NOTHING, Move.NOTHING, Move.REFUSED_DECLINED, Move.NOTHING, Move.NOTHING),
+    SeatInput.RELEASE: (Move.NOTHING, Move.LEAVES, Move.WITHDRAWS, Move.NOTHING, Move.NOTHING),
+    SeatInput.GONE: (Move.NOTHING, Move.LEAVES, Move.WITHDRAWS, Move.NOTHING, Move.NOTHING),
+    SeatInput.SILENT: _LEAVES,
+    SeatInput.IDLE: _LEAVES,
+    SeatInput.OFFERED: _LEAVES,
+    **dict.fromkeys(OFFER_ENDS, _LEAVES),
 }
 TABLE: dict[tuple[Standing, SeatInput], Move] = {
     (standing, what): move for what, row in _ROWS.items() for standing, move in zip(Standing, row, strict=True)
@@ -133,6 +154,7 @@ class ControlSeat:
     Attributes:
         holder: "" while the seat is free
         why: the input that decided on the holder, "" at first
+        offer: to policies; None: no policy may have the seat
         times: its time limits
     """
 
@@ -140,6 +162,10 @@ class ControlSeat:
         self.holder = ""
         self.why = ""
         self.times = times
+        self.offer: Offer | None = None
+        self._role: Role = "operator"  # of the holder
+        self._attended_at = 0.0  # last message of the person who made the offer
+        self._attended_round_trip = 0.0  # s, of that person
         self._heard_at = 0.0
         self._round_trip = 0.0  # s, of the holder
         self._moved_at = 0.0
@@ -153,10 +179,17 @@ class ControlSeat:
             return Standing.FREE
         if self.holder == peer:
             return Standing.HOLDER
+        if self.policy_drives:
+            return Standing.POLICY
         return Standing.CLAIMANT if peer in self._claims else Standing.OTHER
 
     def holds(self, peer: str) -> bool:
         return self.standing(peer) is Standing.HOLDER
+
+    @property
+    def policy_drives(self) -> bool:
+        """True if a policy holds the seat."""
+        return bool(self.holder) and self._role == "policy"
 
     def may_move(self, peer: str) -> bool:
         """True if `peer` holds the seat and a neutral command of it was executed since one was last needed."""
@@ -173,14 +206,34 @@ class ControlSeat:
     # requests of peers
 
     def request(self, peer: str, role: Role, now: float, *, only_if_free: bool = False) -> SeatOutcome:
-        if role == "observer":
+        if role == "policy":
+            return self._request_by_policy(peer, now)
+        if role not in PEOPLE:
             return SeatOutcome(refusal=SeatRefusal(peer, "not_allowed"))
-        return self._step(peer, SeatInput.REQUEST_IF_FREE if only_if_free else SeatInput.REQUEST, now)
+        what = SeatInput.REQUEST_IF_FREE if only_if_free else SeatInput.REQUEST
+        if what is SeatInput.REQUEST and self.standing(peer) is Standing.POLICY:
+            what = SeatInput.TAKE
+        return self._step(peer, what, now, role)
+
+    def _request_by_policy(self, peer: str, now: float) -> SeatOutcome:
+        """Seat a policy if a person lets it; it waits for no seat."""
+        match self.standing(peer):
+            case Standing.FREE if self.offer is not None and self.offer.admits(peer):
+                return self._step(peer, SeatInput.REQUEST, now, "policy")
+            case Standing.FREE:
+                return SeatOutcome(refusal=SeatRefusal(peer, "not_allowed", "no person offers the seat to this policy"))
+            case Standing.HOLDER:
+                return NOTHING  # asking is no sign that it drives
+            case _:
+                return SeatOutcome(refusal=SeatRefusal(peer, "seat_taken"))
 
     def take(self, peer: str, role: Role, now: float) -> SeatOutcome:
-        if role != "supervisor":
-            return SeatOutcome(refusal=SeatRefusal(peer, "not_allowed", "only a supervisor may take the seat"))
-        return self._step(peer, SeatInput.TAKE, now)
+        if role not in PEOPLE:
+            return SeatOutcome(refusal=SeatRefusal(peer, "not_allowed", "only people may take the seat"))
+        if role != "supervisor" and self.standing(peer) in (Standing.CLAIMANT, Standing.OTHER):
+            detail = "only a supervisor may take the seat from another person"
+            return SeatOutcome(refusal=SeatRefusal(peer, "not_allowed", detail))
+        return self._step(peer, SeatInput.TAKE, now, role)
 
     def answer(self, peer: str, claimant: str, now: float, *, grant: bool) -> SeatOutcome:
         """Take the answer of `peer` to the claim of `claimant`; ignore it if there is no such claim any more."""
@@ -190,6 +243,46 @@ class ControlSeat:
 
     def release(self, peer: str, now: float) -> SeatOutcome:
         return self._step(peer, SeatInput.RELEASE, now)
+
+    # the offer to policies
+
+    def offer_to_policies(self, peer: str, role: Role, link: str, now: float, *, to: str = "") -> SeatOutcome:
+        """Let a policy drive. `link`: of `peer`, which is responsible; `to`: the only policy, "": any."""
+        if role not in PEOPLE:
+            return SeatOutcome(refusal=SeatRefusal(peer, "not_allowed", "only people may offer the seat"))
+        if self.holder and not self.policy_drives and not self.holds(peer):
+            return SeatOutcome(refusal=SeatRefusal(peer, "seat_taken", "its holder may offer it"))
+        if self._claims:
+            return SeatOutcome(refusal=SeatRefusal(peer, "seat_taken", "somebody asks for the seat; answer first"))
+        outcome = self._step(peer, SeatInput.OFFERED, now)
+        self.offer = Offer(peer, link, self.holder or to, now + self.times.claim)
+        self._attended_at, self._attended_round_trip = now, 0.0
+        return outcome._replace(changed=True)
+
+    def withdraw_offer(self, peer: str, role: Role, now: float) -> SeatOutcome:
+        if role not in PEOPLE:
+            return SeatOutcome(refusal=SeatRefusal(peer, "not_allowed", "only people may withdraw the offer"))
+        return self.end_offer(SeatInput.WITHDRAWN, now)
+
+    def end_offer(self, what: SeatInput, now: float) -> SeatOutcome:
+        """End the offer and the turn of the policy that drives. `what`: one of OFFER_ENDS."""
+        if self.offer is None:
+            return NOTHING
+        self.offer = None
+        if self.policy_drives:
+            return self._step(self.holder, what, now)
+        return SeatOutcome(changed=True)
+
+    def attended(self, link: str, now: float, round_trip: float = 0.0) -> None:
+        """Called for each message of a person. `link`: that person's; `round_trip`: s, as in `heard`."""
+        if self.offer is not None and self.offer.link == link:
+            self._attended_at, self._attended_round_trip = now, round_trip
+
+    def person_left(self, link: str, now: float) -> SeatOutcome:
+        """Called when the last connection of a link has ended with which a person takes part."""
+        if self.offer is None or self.offer.link != link:
+            return NOTHING
+        return self.end_offer(SeatInput.UNATTENDED, now)
 
     # observations of peers
 
@@ -215,28 +308,33 @@ class ControlSeat:
 
     def expire(self, now: float) -> Iterator[SeatOutcome]:
         """Yield an outcome for each time limit that has run out; act on each before the next."""
-        if self.holder and now - self._heard_at >= self._patience():
+        if self.offer is not None and now - self._attended_at >= self._patience(self._attended_round_trip):
+            yield self.end_offer(SeatInput.UNATTENDED, now)
+        if self.holder and now - self._heard_at >= self._patience(self._round_trip):
             yield self._step(self.holder, SeatInput.SILENT, now)
         if self.holder and now >= self._idle_at():
             yield self._step(self.holder, SeatInput.IDLE, now)
         for peer in [peer for peer, deadline in self._claims.items() if now >= deadline]:
             yield self._step(peer, SeatInput.UNANSWERED, now)
+        if self.offer is not None and not self.holder and now >= self.offer.until:
+            yield self.end_offer(SeatInput.WITHDRAWN, now)
         if self.holder and not self._counting and now >= self._idle_at() - COUNTDOWN:
             self._counting = True
             yield SeatOutcome(changed=True)
 
-    def _patience(self) -> float:
-        """Return the seconds of silence after which the holder is gone."""
-        return self.times.heartbeat + min(ROUND_TRIPS * self._round_trip, MOST_ROUND_TRIPS)
+    def _patience(self, round_trip: float) -> float:
+        """Return the seconds of silence after which a peer counts as gone."""
+        return self.times.heartbeat + min(ROUND_TRIPS * round_trip, MOST_ROUND_TRIPS)
 
     # the moves
 
-    def _step(self, peer: str, what: SeatInput, now: float) -> SeatOutcome:
+    def _step(self, peer: str, what: SeatInput, now: float, role: Role = "operator") -> SeatOutcome:
+        """`role`: of `peer`, for inputs that may seat it."""
         match TABLE[self.standing(peer), what]:
             case Move.NOTHING:
                 return NOTHING
             case Move.SEATED:
-                return self._seat(peer, what, now)
+                return self._seat(peer, what, now, role)
             case Move.STAYS:
                 return self._stay(now)
             case Move.LEAVES:
@@ -253,9 +351,12 @@ class ControlSeat:
                 self._declined[peer] = now + DECLINED_FOR
                 return SeatOutcome(changed=True, refusal=SeatRefusal(peer, "declined", what.value))
 
-    def _seat(self, peer: str, what: SeatInput, now: float) -> SeatOutcome:
-        """Give the seat to `peer`, or to nobody."""
+    def _seat(self, peer: str, what: SeatInput, now: float, role: Role = "operator") -> SeatOutcome:
+        """Give the seat to `peer`, or to nobody. One offer is one turn: it lives on only with a policy that begins."""
         rest = bool(self.holder)
+        self._role = role
+        if role != "policy":
+            self.offer = None
         self.holder, self.why = peer, (SeatInput.REQUEST if what is SeatInput.REQUEST_IF_FREE else what).value
         self._heard_at = self._moved_at = now
         self._round_trip = 0.0

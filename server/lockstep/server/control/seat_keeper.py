@@ -4,9 +4,21 @@ import asyncio
 import time
 from typing import Protocol
 
-from lockstep.protocol.console import Seat, SeatClaim, SeatDecline, SeatGrant, SeatRelease, SeatRequest, SeatTake
+from lockstep.protocol.console import (
+    Seat,
+    SeatClaim,
+    SeatDecline,
+    SeatGrant,
+    SeatOffer,
+    SeatRelease,
+    SeatRequest,
+    SeatTake,
+    driver_kind,
+)
 from lockstep.server.audit.records import Actor
-from lockstep.server.control.seat import ControlSeat, SeatOutcome, SeatRefusal, Standing
+from lockstep.server.control.policies.seat_offer import PEOPLE
+from lockstep.server.control.seat import ControlSeat, SeatInput, SeatOutcome, SeatRefusal, Standing
+from lockstep.server.errors import NoSeat, NotAllowed, TooManyRequests
 from lockstep.server.peers.peer import Peer
 from lockstep.server.peers.peer_registry import PeerRegistry
 from lockstep.server.session_events import SeatChanged, SessionEvents
@@ -16,7 +28,7 @@ __all__ = ["SeatHost", "SeatKeeper", "SeatMessage"]
 CHECKS = 12  # within one heartbeat timeout
 LINK_CLAIMS = 2  # at once by all connections of a link: there are few places for claims, and others want to ask too
 
-SeatMessage = SeatRequest | SeatGrant | SeatDecline | SeatTake | SeatRelease
+SeatMessage = SeatRequest | SeatGrant | SeatDecline | SeatTake | SeatOffer | SeatRelease
 
 
 class SeatHost(Protocol):
@@ -37,10 +49,15 @@ class SeatKeeper:
 
     def message(self) -> Seat:
         """Return the seat's state as everyone is told it."""
-        now = time.monotonic()
+        now, offer = time.monotonic(), self.rules.offer
+        holder = self._peers.by_id(self.rules.holder) if self.rules.holder else None
         return Seat(
             holder=self.rules.holder,
             name=self._name(self.rules.holder),
+            kind="none" if holder is None else driver_kind(holder.role),
+            offered=offer is not None,
+            offered_to="" if offer is None else offer.to,
+            offered_by="" if offer is None else self._name(offer.by),
             why=self.rules.why,
             claims=[
                 SeatClaim(peer=peer, name=self._name(peer), seconds_left=round(left, 1))
@@ -61,6 +78,68 @@ class SeatKeeper:
         holder = self._peers.by_id(self.rules.holder)
         return holder is not None and holder.identity.token_id == link
 
+    # requests over HTTP, which carry a link and no peer
+
+    def take_with(self, link: str, by: Actor) -> None:
+        """End the turn of the policy that drives, for a person with this link. No I/O waits before the robot rests.
+
+        The person's connection gets the seat, if exactly one has this link; else the seat is free.
+
+        Raises:
+            NotAllowed: this role may not, or another person holds the seat.
+        """
+        now, mine = time.monotonic(), self._people_with(link)
+        if len(mine) == 1:
+            outcome = self.rules.take(mine[0].id, mine[0].role, now)
+        else:
+            outcome = self.rules.withdraw_offer("", by.role, now)  # type: ignore[arg-type]
+        self._act_for_link(outcome, mine[0] if len(mine) == 1 else by)
+
+    def offer_with(self, link: str, by: Actor, *, policy: str) -> None:
+        """Let a policy drive, for a person with this link, who has to be connected.
+
+        Raises:
+            NotAllowed: this role may not, nobody is connected with this link, or there is no such policy.
+            NoSeat: another person holds the seat or asks for it.
+            TooManyRequests: of this link.
+        """
+        mine = self._people_with(link)
+        if by.role not in PEOPLE or not mine:
+            raise NotAllowed("only people may offer the seat, with a connection that can take over")
+        if policy and not self._is_policy(policy):
+            raise NotAllowed("this is no policy")
+        peer = next((each for each in mine if self.rules.holds(each.id)), mine[0])
+        now = time.monotonic()
+        if not peer.asks.take(now):
+            raise TooManyRequests("too many offers with this link")
+        self._act_for_link(self.rules.offer_to_policies(peer.id, peer.role, link, now, to=policy), peer)
+
+    def withdraw_with(self, by: Actor) -> None:
+        """End the offer, and the turn of the policy that drives, for a person. Raises NotAllowed."""
+        outcome = self.rules.withdraw_offer("", by.role, time.monotonic())  # type: ignore[arg-type]
+        self._act_for_link(outcome, by)
+
+    def _people_with(self, link: str) -> list[Peer]:
+        return [
+            peer
+            for peer in self._peers
+            if peer.identity.token_id == link and peer.role in PEOPLE and peer.connected and not peer.ended
+        ]
+
+    def _act_for_link(self, outcome: SeatOutcome, actor: Peer | Actor) -> None:
+        if outcome.refusal is not None:
+            error = NoSeat if outcome.refusal.reason == "seat_taken" else NotAllowed
+            raise error(outcome.refusal.detail)
+        self._act(outcome, actor)
+
+    def waits_for_nothing(self, peer: Peer, message: object) -> bool:
+        """True if this is a person's press that takes the robot from a policy: it is never refused as too often.
+
+        It follows an offer, and those are counted.
+        """
+        takes = isinstance(message, SeatTake) or (isinstance(message, SeatRequest) and not message.only_if_free)
+        return takes and self.rules.policy_drives and peer.role in PEOPLE
+
     def handle(self, peer: Peer, message: SeatMessage) -> None:
         """Act on a request of `peer`."""
         now = time.monotonic()
@@ -75,6 +154,13 @@ class SeatKeeper:
                 self._act(self.rules.answer(peer.id, claimant, now, grant=True), peer)
             case SeatDecline(peer=claimant):
                 self._act(self.rules.answer(peer.id, claimant, now, grant=False), peer)
+            case SeatOffer(offered=False):
+                self._act(self.rules.withdraw_offer(peer.id, peer.role, now), peer)
+            case SeatOffer(peer=policy) if policy and not self._is_policy(policy):
+                self._host.refuse(peer, SeatRefusal(peer.id, "not_allowed", "this is no policy"))
+            case SeatOffer(peer=policy):
+                link = peer.identity.token_id
+                self._act(self.rules.offer_to_policies(peer.id, peer.role, link, now, to=policy), peer)
             case SeatRelease():
                 self._act(self.rules.release(peer.id, now), peer)
 
@@ -87,14 +173,33 @@ class SeatKeeper:
         return sum(each is not None and each.identity.token_id == link for each in asking) >= LINK_CLAIMS
 
     def heard(self, peer: Peer) -> None:
-        self.rules.heard(peer.id, time.monotonic(), peer.round_trip)
+        now = time.monotonic()
+        self.rules.heard(peer.id, now, peer.round_trip)
+        if peer.role in PEOPLE:
+            self.rules.attended(peer.identity.token_id, now, peer.round_trip)
 
     def moved(self, peer: Peer) -> None:
         """Called when a moving command of `peer` was forwarded."""
         self._act(self.rules.moved(peer.id, time.monotonic()), peer)
 
     def gone(self, peer: Peer) -> None:
-        self._act(self.rules.gone(peer.id, time.monotonic()), peer)
+        now = time.monotonic()
+        self._act(self.rules.gone(peer.id, now), peer)
+        link = peer.identity.token_id
+        if not any(each.identity.token_id == link and each.role in PEOPLE and not each.ended for each in self._peers):
+            self._act(self.rules.person_left(link, now), peer)
+
+    def stopped(self) -> None:
+        """Called when the robot is stopped: no policy moves it again before a person says so."""
+        self._act(self.rules.end_offer(SeatInput.STOPPED, time.monotonic()), None)
+
+    def link_lost(self) -> None:
+        """Called when the link to the robot is lost: nobody knows what has changed there."""
+        self._act(self.rules.end_offer(SeatInput.LINK_LOST, time.monotonic()), None)
+
+    def _is_policy(self, peer_id: str) -> bool:
+        peer = self._peers.by_id(peer_id)
+        return peer is not None and peer.role == "policy"
 
     def renamed(self, peers: list[Peer]) -> None:
         """Tell everyone, if the seat's message names one of `peers`."""
@@ -108,7 +213,7 @@ class SeatKeeper:
             for outcome in self.rules.expire(time.monotonic()):
                 self._act(outcome, None)
 
-    def _act(self, outcome: SeatOutcome, actor: Peer | None) -> None:
+    def _act(self, outcome: SeatOutcome, actor: Peer | Actor | None) -> None:
         if outcome.rest:
             self._host.rest_robot(self.rules.why)
         if outcome.changed:
@@ -133,5 +238,5 @@ def _rounded(seconds: float | None) -> float | None:
     return None if seconds is None else round(seconds, 1)
 
 
-def _actor(peer: Peer | None) -> Actor:
-    return Actor() if peer is None else peer.actor
+def _actor(who: Peer | Actor | None) -> Actor:
+    return Actor() if who is None else who if isinstance(who, Actor) else who.actor

@@ -9,6 +9,7 @@ from fastapi import APIRouter, Depends, Request, Response
 
 from lockstep.protocol.console import Role
 from lockstep.server.auth.tokens import Right
+from lockstep.server.control.policies.seat_offer import PEOPLE
 from lockstep.server.errors import LinkOtherRobot
 from lockstep.server.federation.board import BoardState
 from lockstep.server.federation.robot_summary import Tile
@@ -93,7 +94,7 @@ class FleetReadiness(msgspec.Struct, frozen=True, kw_only=True):
 @router.get("/api/fleet")
 async def fleet(request: Request, caller: Caller) -> Response:
     here = fleet_of(request)
-    may_drive = caller.role != "observer"
+    may_drive = caller.role in PEOPLE
     return json_answer(
         FleetInfo(
             you=You(caller.role, caller.name),

@@ -13,9 +13,11 @@ from lockstep.protocol.console import (
     Report,
     SeatDecline,
     SeatGrant,
+    SeatOffer,
     SeatRelease,
     SeatRequest,
     SeatTake,
+    Shadow,
     SilenceStops,
     decode_client_message,
 )
@@ -48,9 +50,10 @@ class _AnyStop(msgspec.Struct, frozen=True, kw_only=True):
 
 
 CHANNELS: dict[ChannelName, tuple[type[ClientMessage], ...]] = {
-    "control": (Command, Rest, Report, Ping, TraceReport, Stop),  # a stop is accepted on every channel
+    "control": (Command, Rest, Report, Ping, TraceReport, Shadow, Stop),  # a stop is accepted on every channel
     "session": (
-        *(SeatRequest, SeatGrant, SeatDecline, SeatTake, SeatRelease, SilenceStops, Rename, Note),
+        *(SeatRequest, SeatGrant, SeatDecline, SeatTake, SeatOffer, SeatRelease),
+        *(SilenceStops, Rename, Note),
         *(Act, ActionCancel, EpisodeRequest, TraceRequest, Stop),
     ),
     "stop": (Stop, Reset),

@@ -12,7 +12,8 @@ RESERVED_FOR_LINK = 2  # of the last places one link may have these: a page, and
 def check_place(role: Role, held: int, taken: int, bound: int, reserved: int) -> None:
     """Raise TooManyPeers unless there is a place for one more peer.
 
-    The last `reserved` places are not for observers, and one of them is for a supervisor. One link cannot take all.
+    The last `reserved` places are for people who may drive, and one of them is for a supervisor. One link cannot take
+    all.
 
     Args:
         held: places that the peer's link has already, at most `taken`
@@ -20,7 +21,7 @@ def check_place(role: Role, held: int, taken: int, bound: int, reserved: int) ->
         bound: number of places
     """
     usual = max(1, bound - reserved)
-    limit = usual if role == "observer" else bound - 1 if role == "operator" and reserved > 1 else bound
+    limit = usual if role in ("observer", "policy") else bound - 1 if role == "operator" and reserved > 1 else bound
     if taken >= limit:
         raise TooManyPeers(f"all {limit} places are taken")
     share = -(-usual * LINK_SHARE[0] // LINK_SHARE[1])

@@ -1,6 +1,6 @@
 """The rights to recordings: one rule for lists, chunks, records and files (docs/recording.md). No I/O, no clock.
 
-| | observer | operator | supervisor |
+| | observer, policy | operator | supervisor |
 |---|---|---|---|
 | list, details | of what reaches into the time of the link | the same | all |
 | chunks, records | begun while the link existed | the same | all |
@@ -69,7 +69,7 @@ class RecordingReaderRight(NamedTuple):
 
 def check_end(role: Role, *, automatic: bool, holds_seat: bool) -> None:
     """Raise NotAllowed unless that role may end the running recording."""
-    if role == "observer":
+    if role not in ("operator", "supervisor"):
         raise NotAllowed("only the operator or the supervisor may do this")
     if automatic and role != "supervisor" and not holds_seat:
         raise NotAllowed("only the holder of the seat or a supervisor may end an automatic recording")

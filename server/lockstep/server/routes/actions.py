@@ -8,6 +8,7 @@ from fastapi import APIRouter, Depends, Request, Response
 
 from lockstep.protocol.actions import ActionUpdate, Parameters, RenewedAction, Status
 from lockstep.server.auth.tokens import Right
+from lockstep.server.control.policies.seat_offer import PEOPLE
 from lockstep.server.errors import NoSeat, NotAllowed
 from lockstep.server.http.json_response import json_answer
 from lockstep.server.http.request_body import read_json
@@ -51,8 +52,8 @@ async def act(request: Request, caller: Caller, name: str) -> Response:
     wanted = await read_json(request, ActionRequest)
     caller = await authorized(request)
     console = dependencies(request).console
-    if caller.role == "observer":
-        raise NotAllowed("observers watch")
+    if caller.role not in PEOPLE:
+        raise NotAllowed("only people may ask for actions")
     if not console.seat.is_held_with(caller.identity.token_id):
         raise NoSeat("take the control seat first, with a connection of this link")
     return json_answer(

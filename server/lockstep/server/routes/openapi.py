@@ -12,7 +12,7 @@ from typing import Any, NamedTuple, get_args
 import msgspec
 
 from lockstep.protocol.actions import ActionUpdate
-from lockstep.protocol.console import RecordingState
+from lockstep.protocol.console import RecordingState, Seat
 from lockstep.protocol.episodes import EpisodeState, EpisodeVerb
 from lockstep.protocol.serial import MAX_EVENT
 from lockstep.server.errors import (
@@ -86,6 +86,7 @@ from lockstep.server.routes.recordings import (
     RecordingList,
     RecordingRequest,
 )
+from lockstep.server.routes.seat import OfferRequest
 from lockstep.server.routes.session import Delivered, Health, Released, ResetRequest, ScenePath, SessionInfo
 from lockstep.server.routes.stop_body import StopRequest
 from lockstep.server.sfu.tickets import RelayAnswer
@@ -245,6 +246,13 @@ OPERATIONS: tuple[Operation, ...] = (
             *WITH_JSON,
         ),
         body=ResetRequest,
+    ),
+    Operation("get", "/api/seat", "Who may drive.", 200, Seat),
+    Operation("post", "/api/seat/take_over", "Take the robot from the policy that drives.", 200, Seat, (NotAllowed,)),
+    Operation(
+        *("post", "/api/seat/offer", "Let a policy drive, or no longer.", 200, Seat),
+        (BadJson, BodyTooLarge, BodyTooSlow, WrongMediaType, NotAllowed, NoSeat, TooManyRequests, LinkDown),
+        body=OfferRequest,
     ),
     Operation("get", "/api/actions", "How the newest actions of the robot do.", 200, ActionList),
     Operation(

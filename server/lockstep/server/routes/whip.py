@@ -10,6 +10,7 @@ from lockstep.rtc.endpoint import TooManyPeers
 from lockstep.rtc.sdp import MID_URI, Codec, LocalMedia, MediaSection, SdpError, SessionDescription, write_description
 from lockstep.rtc.sdp.codecs import common_codecs, is_same_format
 from lockstep.server.auth.tokens import Right
+from lockstep.server.control.policies.seat_offer import PEOPLE
 from lockstep.server.errors import (
     BadSdp,
     ConsoleError,
@@ -61,8 +62,8 @@ async def create(
     `camera`: its name; "" is the first that nobody publishes.
     """
     here = _enabled(request)
-    if caller.identity.role == "observer":
-        raise NotAllowed("observers may not publish")
+    if caller.identity.role not in PEOPLE:
+        raise NotAllowed("observers and policies may not publish")
     if here.console.robot.description is None:
         raise RobotUnreachable(here.console.robot.detail)
     here.guard.offer(caller.token_id)  # before it costs anything

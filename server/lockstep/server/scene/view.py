@@ -106,7 +106,7 @@ class SceneView:
         if not self._opens.spend(ticket.link, time.monotonic()):
             raise SceneUnavailable("this link opens 3D scenes too often; wait a moment")
         bound = self._max_viewers
-        if ticket.role == "observer":
+        if ticket.role in ("observer", "policy"):
             bound = max(1, bound - max(1, bound // RESERVED_PART))
         if self._viewers >= bound:
             raise SceneUnavailable(f"all {bound} places of the 3D scene are taken")

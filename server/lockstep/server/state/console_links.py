@@ -2,7 +2,7 @@
 
 import socket
 from collections.abc import Mapping
-from typing import NamedTuple, get_args
+from typing import NamedTuple
 
 import structlog
 
@@ -17,6 +17,7 @@ __all__ = ["ConsoleLinks", "console_link", "console_links", "listening_url"]
 
 log = structlog.get_logger(__name__)
 
+AT_START: tuple[Role, ...] = ("operator", "observer", "supervisor")  # `lockstep invite` makes links for policies
 ANY = ("0.0.0.0", "::")
 
 
@@ -68,11 +69,11 @@ def listening_url(settings: Settings, listener: socket.socket) -> str:
 
 
 def console_links(settings: Settings, console: str, state: ConsoleState) -> ConsoleLinks:
-    """Return one link for each role: those of the last start, while they are good for long enough."""
+    """Return one link for each role of people: those of the last start, while they are good for long enough."""
     now = state.invitations.now()
 
     def for_start(known: Invitations) -> dict[Role, Invitation]:
-        return {role: known.for_start(role, settings.token_seconds, now) for role in get_args(Role)}
+        return {role: known.for_start(role, settings.token_seconds, now) for role in AT_START}
 
     try:
         made = state.invitations.update(for_start)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from prometheus_client import CollectorRegistry, Counter, Gauge
 
 from lockstep.protocol.console import Role, Voice
+from lockstep.server.control.policies.seat_offer import PEOPLE
 from lockstep.server.talkback.speaker import Speaker
 from lockstep.server.talkback.speaker_url import SpeakerSpec
 from lockstep.server.talkback.talkback_arbiter import SPEAKS_FOR, TalkbackArbiter, VoicePacket
@@ -59,7 +60,7 @@ class Talkback:
 
     def line(self, role: Role) -> VoiceLine | None:
         """Return the voice line of a peer that may hold the seat; None if its voice is not taken."""
-        return VoiceLine(self) if self.enabled and role != "observer" else None
+        return VoiceLine(self) if self.enabled and role in PEOPLE else None
 
     def state(self) -> Voice:
         return self._arbiter.state(time.monotonic())

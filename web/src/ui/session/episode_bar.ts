@@ -3,7 +3,7 @@ import { drivingKeys } from "../../input/shortcuts";
 import { FIELDS } from "../../input/keyboard";
 import type { EpisodeRequest, EpisodeState } from "../../protocol/wire";
 import { drawId } from "../../robot/action_client";
-import { holdsSeat, note } from "../../session/console_state";
+import { holdsSeat, isOperator, note } from "../../session/console_state";
 import { EPISODE_REFUSALS, episodeLabels, problemWords } from "../../session/episode_labels";
 import { readEpisodeMessage } from "../../session/episode_reader";
 import { button, h, setData, setHidden, setText, type Panel } from "../elements/dom";
@@ -76,7 +76,10 @@ export function createEpisodeBar(engine: ConsoleEngine): Panel {
   }
 
   /** Whether this person may ask, by the rule of the console, which decides in the end. */
-  const may = (): boolean => holdsSeat(engine.state) || engine.state.welcome?.role === "supervisor";
+  const may = (): boolean =>
+    holdsSeat(engine.state) ||
+    engine.state.welcome?.role === "supervisor" ||
+    (engine.state.seat?.offered === true && isOperator(engine.state));
 
   /** Each request names the episode that the page shows, so that a late request never ends a later episode. */
   function ask(request: Request): void {

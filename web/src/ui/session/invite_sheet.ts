@@ -10,6 +10,7 @@ import type { SheetContent } from "../elements/sheet";
 
 const ROLE_WORDS: Readonly<Record<Role, string>> = {
   observer: "Watches, may stop the robot and write notes",
+  policy: "A program: drives when a person offers it the seat",
   operator: "May ask for control and drive",
   supervisor: "May take control, invite anyone, revoke links and read the audit trail",
 };

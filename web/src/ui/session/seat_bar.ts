@@ -1,5 +1,5 @@
 import { isMeant, seatAction, seatStatus, type SeatAction } from "../../session/seat_status";
-import { robotIsUp } from "../../session/console_state";
+import { policyDrives, robotIsUp } from "../../session/console_state";
 import { seatLabels, type Obstacle } from "../../session/seat_labels";
 import type { SeatNotice } from "../../session/seat_notices";
 import type { ConsoleEngine } from "../../engine/console_engine";
@@ -48,6 +48,7 @@ export function createSeatBar(engine: ConsoleEngine, talk: Panel): Panel {
         role: state.welcome?.role ?? null,
         status: status,
         holder: state.seat?.name ?? "",
+        policy: policyDrives(state),
         claims,
         me,
         idleSeconds: session.idleSecondsLeft(now),
@@ -57,6 +58,7 @@ export function createSeatBar(engine: ConsoleEngine, talk: Panel): Panel {
       });
       session.shownClaim = found.tone === "asked" ? (claims[0]?.peer ?? null) : null;
       setData(element, "tone", found.tone);
+      setData(element, "driver", state.seat?.kind ?? "none");
       setText(title, found.title);
       setText(text, found.text);
       setText(spoken, found.tone === "asked" || found.tone === "idle" ? found.title : (told?.words ?? ""));
@@ -81,7 +83,7 @@ function obstacleOf(engine: ConsoleEngine, now: number): Obstacle | null {
 
 function actionOf(engine: ConsoleEngine): SeatAction | null {
   const { welcome, seat } = engine.state;
-  return seatAction(engine.session.role, seatStatus(seat, welcome?.peer ?? null));
+  return seatAction(engine.session.role, seatStatus(seat, welcome?.peer ?? null), policyDrives(engine.state));
 }
 
 /** What the button says, and since when. */

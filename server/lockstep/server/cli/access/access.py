@@ -48,7 +48,7 @@ def add_access_commands(app: typer.Typer, make_settings: MakeSettings) -> None:
 
     @app.command()
     def invite(
-        role: Annotated[str, typer.Option(help="observer, operator or supervisor.")] = "observer",
+        role: Annotated[str, typer.Option(help="observer, operator, supervisor or policy.")] = "observer",
         expires: Annotated[str, typer.Option(help="The time for which the link is valid: 30m, 8h, 2d.")] = "8h",
         name: Annotated[str, typer.Option(help="The holder's name as others see it; the holder may change it.")] = "",
         for_robot: Annotated[
@@ -69,7 +69,7 @@ def add_access_commands(app: typer.Typer, make_settings: MakeSettings) -> None:
             robots = tuple(for_robot or ())
             made = with_state.invitations.update(lambda known: known.invite(None, wanted, name, seconds, now, robots))
         except msgspec.ValidationError as error:
-            raise _usage("--role is observer, operator or supervisor") from error
+            raise _usage("--role is observer, operator, supervisor or policy") from error
         except ValueError as error:
             raise _usage(str(error)) from error
         except ConsoleError as error:

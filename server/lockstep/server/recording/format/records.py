@@ -9,7 +9,7 @@ from typing import Annotated, Literal
 import msgspec
 
 from lockstep.protocol.actions import ActionReason, ActionState, ParameterValue, StatusItem
-from lockstep.protocol.console import Participant, Report
+from lockstep.protocol.console import DriverKind, Participant, Report, ShadowJudgement
 from lockstep.protocol.description import RobotDescription
 from lockstep.protocol.episodes import EpisodeOutcome
 from lockstep.protocol.messages import EventReference, RefusalReason, StopState
@@ -31,6 +31,7 @@ __all__ = [
     "RestRecord",
     "RobotRecord",
     "SeatRecord",
+    "ShadowRecord",
     "SignatureRecord",
     "StatusRecord",
     "StopRecord",
@@ -74,6 +75,7 @@ class CommandRecord(OwnRecord, frozen=True, kw_only=True):
     nonce: int = 0  # as its sender named it; 0 in recordings from before there were nonces
     action: str = ""  # id of the moving action that it lets go on
     speed: float = 1.0  # of the goal axes' largest speed that is used at most; as forwarded, else as asked
+    kind: DriverKind = "none"  # of its sender; "none" in recordings from before there were policies
 
 
 class FeedbackRecord(OwnRecord, frozen=True, kw_only=True):
@@ -94,6 +96,9 @@ class FeedbackRecord(OwnRecord, frozen=True, kw_only=True):
     nonce: int = 0  # of this issue; 0 in recordings from before there were nonces
     neutral_needed: bool = False  # no moving command executes before a neutral one
     warning: float = 0.0  # s that the robot still warns before it may move
+    driver: str = ""  # name of the sender of the command that became this event
+    driver_kind: DriverKind = "none"  # "none": no command became it, or an old recording
+    intervention: bool = False  # of a person, in an episode in which a policy has driven before
 
 
 class RefusalRecord(OwnRecord, frozen=True, kw_only=True):
@@ -121,6 +126,17 @@ class SeatRecord(OwnRecord, frozen=True, kw_only=True):
     name: str = ""
     role: str = ""
     why: str = ""  # "request", "granted", "taken", "released", "disconnected", "heartbeat lost", "idle"
+
+
+class ShadowRecord(OwnRecord, frozen=True, kw_only=True):
+    """What a shadow policy wanted for `event`, which somebody else drove; it never reached the robot."""
+
+    peer: str
+    name: str
+    values: list[float | None]  # as it sent them
+    judgement: ShadowJudgement
+    difference: float | None = None  # to what was done, as a share of the range of the axis that is furthest apart
+    driver_kind: DriverKind = "none"  # of who drove the event; "none": not compared
 
 
 class StopRecord(OwnRecord, frozen=True, kw_only=True):
@@ -250,6 +266,7 @@ OWN_RECORDS: dict[str, type[OwnRecord]] = {
     "lockstep.Refusal": RefusalRecord,
     "lockstep.Rest": RestRecord,
     "lockstep.Seat": SeatRecord,
+    "lockstep.Shadow": ShadowRecord,
     "lockstep.Stop": StopRecord,
     "lockstep.Action": ActionRecord,
     "lockstep.Status": StatusRecord,

@@ -30,6 +30,8 @@ def in_words(record: OwnRecord) -> Words | None:
             return Words(f"robot link {link}{': ' + detail if detail else ''}", link == "down")
         case SeatRecord(holder="", why=why):
             return Words(f"nobody drives ({why})" if why else "nobody drives")
+        case SeatRecord(name=name, role="policy", why=why):
+            return Words(f"policy {name} drives ({why})")
         case SeatRecord(name=name, why=why):
             return Words(f"{name} drives ({why})")
         case StopRecord(kind="taken", by=by, number=number, kept=kept):

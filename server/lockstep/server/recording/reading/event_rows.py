@@ -5,16 +5,18 @@ from typing import NamedTuple
 
 from lockstep.protocol.description import RobotDescription
 from lockstep.protocol.serial import event_gap
+from lockstep.server.recording.format.drivers import NOBODY, EventDriver
 from lockstep.server.recording.format.payload import own_record_of
 from lockstep.server.recording.format.records import CommandRecord, FeedbackRecord, SeatRecord
 from lockstep.server.recording.format.topics import CAMERA, MICROPHONE, OWN_TOPICS
+from lockstep.server.recording.reading.drivers import DRIVER_TOPICS, RecordedDrivers
 from lockstep.server.recording.reading.reader import RecordingReader
 
 __all__ = ["EventRow", "columns_of", "event_rows", "values_of"]
 
 Value = str | int | float | bool | None
 WRENCH = ("fx", "fy", "fz", "tx", "ty", "tz")
-READ = {OWN_TOPICS[FeedbackRecord], OWN_TOPICS[CommandRecord], OWN_TOPICS[SeatRecord]}
+READ = {*DRIVER_TOPICS, OWN_TOPICS[SeatRecord]}
 
 
 class EventRow(NamedTuple):
@@ -26,6 +28,7 @@ class EventRow(NamedTuple):
     command: CommandRecord | None  # command that became the event; None for the file's first event
     driver: str  # name of the seat's holder
     stamps: dict[str, int]  # of the newest picture and sound that had arrived, by stream
+    driven_by: EventDriver = NOBODY  # sender of the command that became the event
 
 
 def event_rows(reader: RecordingReader) -> Iterator[EventRow]:
@@ -34,13 +37,16 @@ def event_rows(reader: RecordingReader) -> Iterator[EventRow]:
     command: CommandRecord | None = None
     driver = ""
     stamps: dict[str, int] = {}
+    drivers = RecordedDrivers()
     for record in reader.records():
         for prefix in (CAMERA, MICROPHONE):
             if record.topic.startswith(prefix):
                 stamps[record.topic.removeprefix(prefix)] = record.event
         if record.topic not in READ:
             continue
-        match own_record_of(record.schema, record.data):
+        own = own_record_of(record.schema, record.data)
+        drivers.take(own)
+        match own:
             case CommandRecord(outcome="forwarded") as forwarded:
                 command = forwarded
             case SeatRecord(name=name):
@@ -48,7 +54,9 @@ def event_rows(reader: RecordingReader) -> Iterator[EventRow]:
             case FeedbackRecord() as feedback if feedback.event != event:
                 event = feedback.event
                 became = command if command is not None and command.event == event else None
-                yield EventRow(feedback, record.arrived, record.captured, became, driver, dict(stamps))
+                yield EventRow(
+                    feedback, record.arrived, record.captured, became, driver, dict(stamps), drivers.of(feedback)
+                )
 
 
 def columns_of(description: RobotDescription, streams: list[str]) -> dict[str, type]:
@@ -59,6 +67,8 @@ def columns_of(description: RobotDescription, streams: list[str]) -> dict[str, t
         "captured_us": int,
         "bridge_time_s": float,
         "driver": str,
+        "driver_kind": str,
+        "intervention": bool,
         "command_peer": str,
         "command_issue": int,
     }
@@ -85,6 +95,8 @@ def values_of(row: EventRow, description: RobotDescription, streams: list[str]) 
         row.captured // 1000,
         feedback.time,
         row.driver,
+        row.driven_by.kind,
+        row.driven_by.intervention,
         "" if command is None else command.peer,
         None if command is None else command.issue,
     ]

@@ -5,6 +5,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from lockstep.server.recording.report.drawing import PAGE_STYLE
+from lockstep.server.recording.report.driver_figures import drivers_table
 from lockstep.server.recording.report.figures import Figure, session_figures
 from lockstep.server.recording.report.session import Session, read_session
 from lockstep.server.recording.verify.promises import Verdict
@@ -35,7 +36,7 @@ def _page(recording: Path, session: Session, verdict: Verdict, figures: list[Fig
         f"<header><h1>{_text(title)}</h1>",
         f"<p class='lead'>{_text(session.info.robot)}, {began:%Y-%m-%d %H:%M:%S} UTC, {session.seconds:.1f} s, ",
         f"{verdict.events} events, {verdict.commands} commands, {verdict.pictures_and_sounds} pictures and sounds.</p>",
-        f"</header><main>{_promises(verdict)}",
+        f"</header><main>{_promises(verdict)}{drivers_table(session.drivers)}",
         *(
             f"<section id='{_text(each.name)}'><h2>{_text(each.title)}</h2><p class='quiet'>{_text(each.words)}</p>"
             f"{each.svg}{each.below}</section>"

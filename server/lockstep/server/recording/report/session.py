@@ -12,6 +12,7 @@ from lockstep.server.recording.format.topics import stream_of
 from lockstep.server.recording.reading.bookmarks import Mark
 from lockstep.server.recording.reading.event_rows import EventRow, event_rows
 from lockstep.server.recording.reading.reader import RecordingReader
+from lockstep.server.recording.report.driver_figures import DriverTally
 from lockstep.server.recording.report.traced_events import MOST_STREAMS, TracedEvents
 
 __all__ = ["Series", "Session", "Shown", "read_session"]
@@ -60,6 +61,7 @@ class Session:
     measured: dict[str, Series] = field(default_factory=dict)
     applied: dict[str, Series] = field(default_factory=dict)  # by goal axis: where it was commanded to be then
     traced: TracedEvents = field(default_factory=TracedEvents)  # where the time of each event went
+    drivers: DriverTally = field(default_factory=DriverTally)
 
 
 def read_session(path: Path) -> Session:
@@ -88,7 +90,9 @@ def read_session(path: Path) -> Session:
                 shown.captured.add((record.captured - origin) / SECOND, record.event)
                 continue
             at = (record.arrived - origin) / SECOND
-            match own_record_of(record.schema, record.data):
+            own = own_record_of(record.schema, record.data)
+            session.drivers.take(own)
+            match own:
                 case CommandRecord(outcome="forwarded", event=event):
                     sent = {event: record.arrived}  # never more than one is on its way
                 case FeedbackRecord(event=event) if event in sent:

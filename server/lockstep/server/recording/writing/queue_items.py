@@ -7,6 +7,7 @@ import msgspec
 
 from lockstep.protocol.description import RobotDescription
 from lockstep.protocol.messages import Feedback
+from lockstep.server.recording.format.drivers import NOBODY, EventDriver
 from lockstep.server.recording.format.foxglove import (
     camera_message,
     command_messages,
@@ -36,6 +37,7 @@ class FeedbackItem(NamedTuple):
     captured: int
     epoch: str
     feedback: Feedback
+    driver: EventDriver = NOBODY
 
 
 class MediaItem(NamedTuple):
@@ -62,8 +64,14 @@ def entries_of(item: Item, description: RobotDescription) -> Iterator[Entry]:
     match item:
         case MediaItem():
             yield _media(item)
-        case FeedbackItem(arrived, captured, epoch, feedback):
-            record = FeedbackRecord(epoch=epoch, **msgspec.structs.asdict(feedback))
+        case FeedbackItem(arrived, captured, epoch, feedback, driver):
+            record = FeedbackRecord(
+                epoch=epoch,
+                **msgspec.structs.asdict(feedback),
+                driver=driver.name,
+                driver_kind=driver.kind,
+                intervention=driver.intervention,
+            )
             yield _own(record, arrived, captured)
             yield from feedback_messages(description, record, arrived, captured)
         case RobotItem(arrived=arrived, record=record) | OwnItem(arrived=arrived, record=record):

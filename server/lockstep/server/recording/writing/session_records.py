@@ -4,11 +4,12 @@ import time
 from collections.abc import Mapping
 from typing import Literal, Protocol, TypedDict
 
-from lockstep.protocol.console import Participants, RobotState, Seat
+from lockstep.protocol.console import Participants, RobotState, Seat, driver_kind
 from lockstep.protocol.messages import Command, Feedback, RefusalReason
 from lockstep.server.audit.records import Actor
 from lockstep.server.event_clock import EventClock
 from lockstep.server.media.pipeline.frame import EncodedFrame
+from lockstep.server.recording.format.drivers import EventDrivers
 from lockstep.server.recording.format.records import (
     ActionRecord,
     CommandOutcome,
@@ -22,6 +23,7 @@ from lockstep.server.recording.format.records import (
     RestRecord,
     RobotRecord,
     SeatRecord,
+    ShadowRecord,
     StatusRecord,
     StopRecord,
 )
@@ -45,6 +47,7 @@ from lockstep.server.session_events import (
     RestForwarded,
     SeatChanged,
     SessionEvents,
+    ShadowJudged,
     SpeedReported,
     StatusReceived,
     StopAnswered,
@@ -80,12 +83,13 @@ class SessionRecords:
     def __init__(self, clock: EventClock, media: RecordedCodecs) -> None:
         self._clock = clock
         self._media = media
-        self._role_of: dict[str, str] = {}
+        self._drivers = EventDrivers()
         self._times = RecordClock(time.time_ns(), time.monotonic_ns())
         self._link_times = LinkTimes()
         self._link_epoch = ""
         self._robot: RobotState | None = None
         self._seat = Seat()
+        self._seat_role = ""  # of the holder
         self._participants = Participants(participants=[])
         self._queue: ItemQueue | None = None  # None: nothing is recorded
         self._traces = TraceRecords(clock, self._put_own)
@@ -125,6 +129,7 @@ class SessionRecords:
         events.subscribe(ActionCancelled, self._action_cancelled)
         events.subscribe(ActionUpdated, self._action_updated)
         events.subscribe(StatusReceived, self._status_received)
+        events.subscribe(ShadowJudged, self._shadow_judged)
         self._traces.subscribe(events)
 
     def _link_changed(self, event: LinkUp | LinkDown) -> None:
@@ -139,13 +144,12 @@ class SessionRecords:
 
     def _seat_changed(self, event: SeatChanged) -> None:
         changed = event.seat.holder != self._seat.holder
-        self._seat = event.seat
+        self._seat, self._seat_role = event.seat, event.holder.role
         if changed:
             self._put_own(self._seat_record(event.seat))
 
     def _participants_changed(self, event: ParticipantsChanged) -> None:
         self._participants = event.participants
-        self._role_of = {each.peer: each.role for each in event.participants.participants}
         self._put_own(self._participants_record(event.participants))
 
     def _note_written(self, event: NoteWritten) -> None:
@@ -153,6 +157,8 @@ class SessionRecords:
         self._put_own(NoteRecord(**self._now(), peer=note.peer, name=note.name, role=note.role, text=note.text))
 
     def _command_forwarded(self, event: CommandForwarded) -> None:
+        kind = driver_kind(event.by.role)
+        self._drivers.forwarded(self._clock.epoch, event.command.event, event.by.name, kind)
         self._put_command(event.by, event.command, "forwarded")
 
     def _command_refused(self, event: CommandRefused) -> None:
@@ -180,6 +186,23 @@ class SessionRecords:
                 name=by.name,
                 outcome=outcome,
                 reason=reason,
+                kind=driver_kind(by.role),
+            )
+        )
+
+    def _shadow_judged(self, event: ShadowJudged) -> None:
+        verdict = event.verdict
+        compared = verdict.difference is not None
+        self._put_own(
+            ShadowRecord(
+                epoch=self._clock.epoch,
+                event=verdict.event,
+                peer=verdict.peer,
+                name=verdict.name,
+                values=verdict.values,
+                judgement=verdict.judgement,
+                difference=verdict.difference,
+                driver_kind=self._drivers.executed(self._clock.epoch, verdict.event).kind if compared else "none",
             )
         )
 
@@ -192,10 +215,11 @@ class SessionRecords:
         self._put_feedback(event.feedback, event.now)
 
     def _put_feedback(self, feedback: Feedback, now: float) -> None:
+        driver = self._drivers.executed(self._clock.epoch, feedback.event)
         if self._queue is None:
             return
         captured = self._times.at(self._link_times.captured(feedback.time, now))
-        self._put(FeedbackItem(self._times.at(now), captured, self._clock.epoch, feedback))
+        self._put(FeedbackItem(self._times.at(now), captured, self._clock.epoch, feedback, driver))
 
     def _refused(self, event: Refused) -> None:
         refusal = event.refusal
@@ -287,6 +311,8 @@ class SessionRecords:
         self._put_own(StatusRecord(epoch=self._clock.epoch, event=status.event, items=status.items))
 
     def put_episode(self, record: EpisodeRecord) -> None:
+        if record.kind != "mark":
+            self._drivers.episode(begins=record.kind == "start")
         self._put_own(record)
 
     # handing over to the thread
@@ -312,8 +338,7 @@ class SessionRecords:
         return {"epoch": self._clock.epoch, "event": self._clock.event}
 
     def _seat_record(self, seat: Seat) -> OwnRecord:
-        role = self._role_of.get(seat.holder, "")
-        return SeatRecord(**self._now(), holder=seat.holder, name=seat.name, role=role, why=seat.why)
+        return SeatRecord(**self._now(), holder=seat.holder, name=seat.name, role=self._seat_role, why=seat.why)
 
     def _participants_record(self, message: Participants) -> OwnRecord:
         return ParticipantsRecord(**self._now(), participants=message.participants)

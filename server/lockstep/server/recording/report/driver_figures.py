@@ -1,0 +1,205 @@
+"""Who drove a recorded session: interventions, success by driver, and how far shadows agree with people. No I/O.
+
+- Time is the robot's, from one event to the next, at most `LONGEST` for one event.
+- An intervention is a spell of a person's events in an episode in which a policy has driven before; their number is
+  related to the minutes of the episodes in which a policy drove.
+- An episode is the policy's `alone`, the policy's `corrected` by a person, or a person's.
+- A shadow agrees if each axis is within `AGREES` of its range of what a person did; out of limits never agrees.
+"""
+
+import html
+from collections import Counter
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+
+from lockstep.protocol.console import DriverKind
+from lockstep.server.recording.format.drivers import NOBODY, EventDriver
+from lockstep.server.recording.format.records import EpisodeRecord, FeedbackRecord, OwnRecord, ShadowRecord
+from lockstep.server.recording.reading.drivers import RecordedDrivers
+
+__all__ = ["AGREES", "DriverTally", "Driven", "Outcomes", "Shadowed", "drivers_table"]
+
+LONGEST = 2.0  # s: after a pause nobody has driven all the time
+AGREES = 0.05  # of an axis' range
+MOST = 50  # names that are told; a client may take any number
+
+
+@dataclass
+class Driven:
+    """What one driver did."""
+
+    events: int = 0
+    seconds: float = 0.0
+    interventions: int = 0  # spells
+    intervention_events: int = 0
+
+
+@dataclass
+class Outcomes:
+    """Kept episodes."""
+
+    success: int = 0
+    failure: int = 0
+    unsaid: int = 0
+
+    @property
+    def share(self) -> float | None:
+        """The share of successes among those of which somebody said how they went; None without any."""
+        said = self.success + self.failure
+        return self.success / said if said else None
+
+
+@dataclass
+class Shadowed:
+    """How the shadows of one policy were judged."""
+
+    judgements: Counter[str] = field(default_factory=Counter)
+    compared: int = 0  # with what a person did
+    agreed: int = 0
+
+    @property
+    def agreement(self) -> float | None:
+        return self.agreed / self.compared if self.compared else None
+
+
+class DriverTally:
+    """Call `take` with the records of a recording, in order.
+
+    Attributes:
+        drivers: by name and kind
+        outcomes: of kept episodes, by who drove them: "policy net alone", "policy net corrected", "Ada"
+        shadows: by name of the policy
+        policy_seconds: of the kept and discarded episodes in which a policy drove
+    """
+
+    def __init__(self) -> None:
+        self.drivers: dict[tuple[str, DriverKind], Driven] = {}
+        self.outcomes: dict[str, Outcomes] = {}
+        self.shadows: dict[str, Shadowed] = {}
+        self.policy_seconds = 0.0
+        self._reader = RecordedDrivers()
+        self._event: tuple[str, int] = ("", 0)
+        self._time = 0.0  # s, of the bridge, of the newest event
+        self._before = NOBODY  # the newest event's driver
+        self._episode: list[EventDriver] = []  # drivers of the open one, each once
+        self._episode_seconds = 0.0
+
+    @property
+    def interventions(self) -> int:
+        return sum(each.interventions for each in self.drivers.values())
+
+    @property
+    def interventions_per_minute(self) -> float | None:
+        """None if no policy drove in an episode."""
+        return self.interventions / self.policy_seconds * 60 if self.policy_seconds else None
+
+    def take(self, record: OwnRecord | None) -> None:
+        self._reader.take(record)
+        match record:
+            case FeedbackRecord() if (record.epoch, record.event) != self._event:
+                self._feedback(record, self._reader.of(record))
+            case EpisodeRecord(kind="start"):
+                self._episode, self._episode_seconds = [], 0.0
+            case EpisodeRecord(kind="kept" | "discarded" | "cut"):
+                self._ended(record)
+            case ShadowRecord():
+                self._shadow(record)
+
+    def _feedback(self, feedback: FeedbackRecord, driver: EventDriver) -> None:
+        goes_on = feedback.epoch == self._event[0]
+        seconds = min(max(0.0, feedback.time - self._time), LONGEST) if goes_on else 0.0
+        self._event, self._time = (feedback.epoch, feedback.event), feedback.time
+        before, self._before = self._before, driver
+        self._episode_seconds += seconds
+        if driver.kind == "none":
+            return
+        if driver not in self._episode and len(self._episode) < MOST:
+            self._episode.append(driver)
+        key = (driver.name, driver.kind)
+        if key not in self.drivers and len(self.drivers) >= MOST:
+            return
+        driven = self.drivers.setdefault(key, Driven())
+        driven.events += 1
+        driven.seconds += seconds
+        if driver.intervention:
+            driven.intervention_events += 1
+            driven.interventions += driver != before
+
+    def _ended(self, record: EpisodeRecord) -> None:
+        policies = sorted({each.name for each in self._episode if each.kind == "policy"})
+        if policies and record.kind != "cut":
+            self.policy_seconds += self._episode_seconds
+        if record.kind == "kept" and self._episode:
+            who = self._who(policies)
+            if who in self.outcomes or len(self.outcomes) < MOST:
+                outcomes = self.outcomes.setdefault(who, Outcomes())
+                name = record.outcome or "unsaid"
+                setattr(outcomes, name, getattr(outcomes, name) + 1)
+        self._episode = []
+
+    def _who(self, policies: list[str]) -> str:
+        if not policies:
+            return ", ".join(sorted({each.name for each in self._episode}))
+        corrected = any(each.intervention for each in self._episode)
+        return f"policy {', '.join(policies)} {'corrected' if corrected else 'alone'}"
+
+    def _shadow(self, record: ShadowRecord) -> None:
+        if record.name not in self.shadows and len(self.shadows) >= MOST:
+            return
+        shadow = self.shadows.setdefault(record.name, Shadowed())
+        shadow.judgements[record.judgement] += 1
+        if record.difference is not None and record.driver_kind == "human":
+            shadow.compared += 1
+            shadow.agreed += record.judgement == "in_time" and record.difference <= AGREES
+
+
+def drivers_table(tally: DriverTally) -> str:
+    """Return the section of a report, as HTML; "" if only people drove and nothing was shadowed or kept."""
+    if not (tally.outcomes or tally.shadows or any(kind == "policy" for _, kind in tally.drivers)):
+        return ""
+    rate = tally.interventions_per_minute
+    words = (
+        "No policy drove in an episode."
+        if rate is None
+        else f"{tally.interventions} interventions in {tally.policy_seconds / 60:.1f} minutes of episodes in which a "
+        f"policy drove: {rate:.2f} a minute."
+    )
+    parts = [f"<section id='drivers'><h2>Drivers</h2><p>{words}</p>"]
+    parts.append(
+        _table(
+            ("driver", "kind", "events", "seconds", "interventions"),
+            (
+                (name, kind, each.events, f"{each.seconds:.1f}", each.interventions or "")
+                for (name, kind), each in tally.drivers.items()
+            ),
+        )
+    )
+    if tally.outcomes:
+        rows = (
+            (who, each.success, each.failure, each.unsaid, _percent(each.share))
+            for who, each in sorted(tally.outcomes.items())
+        )
+        parts.append(_table(("kept episodes of", "success", "failure", "not said", "success rate"), rows))
+    if tally.shadows:
+        shown = (
+            (
+                name,
+                each.judgements.total(),
+                ", ".join(f"{count} {what}" for what, count in each.judgements.most_common()),
+                each.compared,
+                _percent(each.agreement),
+            )
+            for name, each in sorted(tally.shadows.items())
+        )
+        head = ("shadow", "events", "judged", "beside a person", f"within {AGREES:.0%} of the range")
+        parts.append(_table(head, shown))
+    return "".join([*parts, "</section>"])
+
+
+def _table(head: Iterable[str], rows: Iterable[Iterable[object]]) -> str:
+    body = "".join(f"<tr>{''.join(f'<td>{html.escape(str(cell))}</td>' for cell in row)}</tr>" for row in rows)
+    return f"<table><thead><tr>{''.join(f'<th>{each}</th>' for each in head)}</tr></thead><tbody>{body}</tbody></table>"
+
+
+def _percent(share: float | None) -> str:
+    return "" if share is None else f"{share:.0%}"

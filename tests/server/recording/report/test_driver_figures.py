@@ -1,0 +1,101 @@
+import pytest
+
+from lockstep.protocol.console import DriverKind, ShadowJudgement
+from lockstep.server.recording.format.records import EpisodeRecord, FeedbackRecord, ShadowRecord
+from lockstep.server.recording.report.driver_figures import MOST, DriverTally, Outcomes, drivers_table
+
+
+def _event(tally: DriverTally, event: int, name: str, kind: DriverKind, *, intervention: bool = False) -> None:
+    tally.take(
+        FeedbackRecord(
+            epoch="e", event=event, issue=1, time=0.5 * event, axes=[0.0], driver=name, driver_kind=kind,
+            intervention=intervention,
+        )
+    )  # fmt: skip
+
+
+def _episode(tally: DriverTally, kind: str, outcome: str = "") -> None:
+    record = EpisodeRecord(
+        epoch="e", event=1, episode="x", number=1, kind=kind, task="t", outcome=outcome, first_event=1, last_event=1
+    )  # type: ignore[arg-type]
+    tally.take(record)
+
+
+def _shadow(tally: DriverTally, judgement: ShadowJudgement, difference: float | None, kind: DriverKind) -> None:
+    tally.take(
+        ShadowRecord(
+            epoch="e", event=1, peer="p", name="net", values=[0.0], judgement=judgement, difference=difference,
+            driver_kind=kind,
+        )
+    )  # fmt: skip
+
+
+def test_interventions_are_spells_for_each_minute_of_episodes_with_a_policy() -> None:
+    tally = DriverTally()
+    _event(tally, 1, "", "none")
+    _episode(tally, "start")
+    for event in range(2, 62):  # 30 s
+        corrects = event in (10, 11, 12, 40)
+        _event(tally, event, *(("Ada", "human") if corrects else ("net", "policy")), intervention=corrects)  # type: ignore[arg-type]
+    _episode(tally, "kept", "success")
+    assert tally.interventions == 2
+    assert tally.policy_seconds == pytest.approx(30)
+    assert tally.interventions_per_minute == pytest.approx(4)
+    assert tally.outcomes == {"policy net corrected": Outcomes(success=1)}
+    assert (tally.drivers["Ada", "human"].events, tally.drivers["Ada", "human"].intervention_events) == (4, 4)
+    assert tally.drivers["net", "policy"].seconds == pytest.approx(28)
+
+
+def test_success_is_told_by_driver_and_what_nobody_said_counts_for_neither() -> None:
+    tally = DriverTally()
+    for number, (name, kind, outcome) in enumerate(
+        [
+            ("Ada", "human", "success"),
+            ("net", "policy", "success"),
+            ("net", "policy", "failure"),
+            ("net", "policy", ""),
+        ]
+    ):
+        _episode(tally, "start")
+        _event(tally, 10 * number + 2, name, kind)  # type: ignore[arg-type]
+        _episode(tally, "kept", outcome)
+    _episode(tally, "start")
+    _event(tally, 90, "net", "policy")
+    _episode(tally, "discarded")
+    assert tally.outcomes == {"Ada": Outcomes(success=1), "policy net alone": Outcomes(1, 1, 1)}
+    assert tally.outcomes["policy net alone"].share == 0.5
+    assert tally.interventions == 0
+
+
+def test_a_shadow_is_compared_with_people_alone_and_never_agrees_out_of_limits() -> None:
+    tally = DriverTally()
+    for judgement, difference, kind in (
+        ("in_time", 0.05, "human"),
+        ("in_time", 0.06, "human"),
+        ("out_of_limits", 0.01, "human"),
+        ("in_time", 0.0, "policy"),
+        ("late", None, "none"),
+    ):
+        _shadow(tally, judgement, difference, kind)  # type: ignore[arg-type]
+    shadow = tally.shadows["net"]
+    assert (shadow.compared, shadow.agreed) == (3, 1)
+    assert shadow.judgements == {"in_time": 3, "out_of_limits": 1, "late": 1}
+
+
+def test_names_are_bounded_and_escaped_in_the_report() -> None:
+    tally = DriverTally()
+    assert drivers_table(tally) == ""
+    for event in range(2, 2 + 2 * MOST):
+        _event(tally, event, f"<b>{event}", "policy")
+    assert len(tally.drivers) == MOST
+    text = drivers_table(tally)
+    assert "<b>" not in text
+    assert "&lt;b&gt;2" in text
+    assert "No policy drove in an episode" in text
+
+
+def test_a_pause_is_no_time_of_driving() -> None:
+    tally = DriverTally()
+    _event(tally, 2, "Ada", "human")
+    _event(tally, 1000, "Ada", "human")
+    assert tally.drivers["Ada", "human"].seconds == 2.0
