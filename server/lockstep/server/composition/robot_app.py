@@ -20,6 +20,7 @@ from lockstep.server.routes import (
     episodes,
     ice,
     observer_websocket,
+    recorded_episodes,
     recordings,
     session,
     sfu,
@@ -82,6 +83,7 @@ def session_app(settings: Settings, lifespan: Lifespan[FastAPI] | None = None) -
     app.include_router(access.router)
     app.include_router(ice.router)
     app.include_router(recordings.router)
+    app.include_router(recorded_episodes.router)
     app.include_router(episodes.router)
     app.include_router(sfu.router)
     app.include_router(proxy.router)

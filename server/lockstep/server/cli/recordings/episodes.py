@@ -107,8 +107,8 @@ def _named(episodes: list[EpisodeEntry], name: str) -> str:
 def _change_line(each: EpisodeChange) -> str:
     at = datetime.fromtimestamp(min(max(each.at, 0.0), MAX_TIME)).astimezone().strftime("%Y-%m-%d %H:%M:%S")
     state = "undone" if each.undone else f"no effect: {each.problem}" if each.problem else ""
-    words = "  ".join(filter(None, (each.episode, each.text, state)))
-    return f"{each.number:4}  {at}  {printable(each.by):16}  {printable(words)}"
+    words = "  ".join(printable(word) for word in (each.episode, each.text, state) if word)
+    return f"{each.number:4}  {at}  {printable(each.by):16}  {words}"
 
 
 def _line(each: ListedEpisode) -> str:
