@@ -13,7 +13,8 @@ const recordings = h(
   "Recordings",
 );
 const bar = h("header", "bar recordings-bar", {}, h("span", "bar-brand", {}, "Lockstep"), recordings);
-const page = token === "" ? null : new EpisodesPage(new EpisodesApi(new ConsoleApi(token)), token, recording ?? "");
+const page =
+  token === "" ? null : new EpisodesPage(new EpisodesApi(new ConsoleApi(token)), token, recording ?? "");
 const content =
   page?.element ??
   h(

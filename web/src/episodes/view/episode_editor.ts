@@ -112,9 +112,7 @@ export class EpisodeEditor {
     clearTimeout(this.timer);
     for (const box of Object.values(this.boxes)) box.close();
     setText(this.title, titleOf(episode));
-    this.tags.replaceChildren(
-      ...tagsOf(episode).map(({ text, tone }) => h("span", `tag ${tone}`, {}, text)),
-    );
+    this.tags.replaceChildren(...tagsOf(episode).map(({ text, tone }) => h("span", `tag ${tone}`, {}, text)));
     const words = [
       `Take ${episode.number}`,
       lengthLabel(episode),
@@ -164,7 +162,14 @@ export class EpisodeEditor {
           h("figure", `still-figure ${handle}`, {}, box.element, h("figcaption", "figure-label", {}, words)),
         );
     }
-    const element = h("section", "editor-part", { "aria-label": "Stretch" }, this.cameras(), stills, track.element);
+    const element = h(
+      "section",
+      "editor-part",
+      { "aria-label": "Stretch" },
+      this.cameras(),
+      stills,
+      track.element,
+    );
     if (may) {
       const tools = h("div", "editor-tools", {}, trim, reset, split);
       const merge = this.merge();
@@ -197,7 +202,12 @@ export class EpisodeEditor {
     const { recording, episode } = this.listed;
     for (const handle of ["cursor", "first", "last"] as const) {
       const event = eventAt(episode, span, handle);
-      const wanted = { recording: recording.id, camera: this.camera, event, width: handle === "cursor" ? 640 : 320 };
+      const wanted = {
+        recording: recording.id,
+        camera: this.camera,
+        event,
+        width: handle === "cursor" ? 640 : 320,
+      };
       this.boxes[handle]?.show(
         this.camera === "" ? null : wanted,
         `Picture of ${this.camera || "no camera"} at event ${event}`,

@@ -7,6 +7,7 @@ import { PictureLoader } from "../picture_loader";
 import { EpisodeEditor } from "./episode_editor";
 import { EpisodeRow } from "./episode_row";
 import { FilterBar } from "./filter_bar";
+import { saveReport } from "../../replay/save_report";
 import { ConsoleError } from "../../transport/signalling/console_api";
 import { requestErrorLabel } from "../../transport/signalling/session_api";
 import { button, grouped, h, setHidden, setText } from "../../ui/elements/dom";
@@ -307,10 +308,7 @@ export class EpisodesPage {
 
   private async report({ recording }: Listed): Promise<string> {
     try {
-      const page = await this.api.report(recording.id);
-      const url = URL.createObjectURL(new Blob([page], { type: "text/html" }));
-      h("a", "", { href: url, download: `${recording.id}-report.html` }).click();
-      setTimeout(() => URL.revokeObjectURL(url), 60_000);
+      saveReport(recording.id, await this.api.report(recording.id));
       return "";
     } catch (error) {
       return requestErrorLabel(error);
@@ -322,9 +320,7 @@ function readingWords(pending: number, unreadable: number): string {
   const words = [];
   if (pending > 0) words.push(`Reading ${grouped(pending)} more recordings …`);
   if (unreadable > 0)
-    words.push(
-      unreadable === 1 ? "1 file cannot be read." : `${grouped(unreadable)} files cannot be read.`,
-    );
+    words.push(unreadable === 1 ? "1 file cannot be read." : `${grouped(unreadable)} files cannot be read.`);
   return words.join(" ");
 }
 

@@ -96,7 +96,9 @@ export class FilterBar {
   update(all: readonly Listed[]): void {
     const tasks = valuesOf(all, (episode) => [episode.task]);
     const drivers = valuesOf(all, (episode) => episode.drivers);
-    const recordings = [...new Map(all.map(({ recording }) => [recording.id, recording.name || recording.id]))];
+    const recordings = [
+      ...new Map(all.map(({ recording }) => [recording.id, recording.name || recording.id])),
+    ];
     const offered = JSON.stringify([tasks, drivers, recordings]);
     if (offered === this.offered) return;
     this.offered = offered;
@@ -124,9 +126,7 @@ export class FilterBar {
     const offered = before === "" || values.includes(before) ? values : [before, ...values];
     field.replaceChildren(
       h("option", "", { value: "" }, all),
-      ...offered
-        .slice(0, MOST_VALUES)
-        .map((value) => h("option", "", { value }, names.get(value) ?? value)),
+      ...offered.slice(0, MOST_VALUES).map((value) => h("option", "", { value }, names.get(value) ?? value)),
     );
     field.value = before;
   }
