@@ -67,26 +67,28 @@ async def test_recorded_discarded_relabelled_trimmed_split_and_exported_the_rows
     tmp_path: Path, chromium: Browser
 ) -> None:
     recordings = tmp_path / "recordings"
-    async with running_stack(tmp_path, settings=SETTINGS, extra=("--record", str(recordings))) as stack:
-        async with Console(stack.operator, video=1, audio=False, codec="H264", name="Ada") as driver:
-            await driver.take_seat()
-            for task, end in (("push the box", "keep"), ("push the box", "discard"), ("open the door", "keep")):
-                await _record(driver, task, end)
-            async with open_page(chromium, _page_of(stack, stack.operator), width=1366, height=768) as page:
-                await _settled(page, 3)  # live: it is still being recorded
-                await expect(page.locator(".library-count")).to_contain_text("3 episodes · 2 kept")
-                await _shot(page, "live")
-                door = _rows(page).filter(has_text="open the door")
-                dropped = await _answered(page, door.get_by_role("button", name="Discard").click())
-                assert [each["state"] for each in dropped["episodes"]] == ["kept", "discarded", "discarded"]
-                await expect(door.get_by_text("Discarded")).to_be_visible()
-                await page.locator(".undo-bar").get_by_role("button", name="Undo").click()
-                await expect(page.locator(".library-count")).to_contain_text("2 kept")
-                await _relabel_and_trim(page)
-                await _split(page)
-                await door.get_by_role("button", name="Discard").click()
-                await expect(page.locator(".library-count")).to_contain_text("4 episodes · 2 kept")
-                await _shot(page, "changed")
+    async with (
+        running_stack(tmp_path, settings=SETTINGS, extra=("--record", str(recordings))) as stack,
+        Console(stack.operator, video=1, audio=False, codec="H264", name="Ada") as driver,
+    ):
+        await driver.take_seat()
+        for task, end in (("push the box", "keep"), ("push the box", "discard"), ("open the door", "keep")):
+            await _record(driver, task, end)
+        async with open_page(chromium, _page_of(stack, stack.operator), width=1366, height=768) as page:
+            await _settled(page, 3)  # live: it is still being recorded
+            await expect(page.locator(".library-count")).to_contain_text("3 episodes · 2 kept")
+            await _shot(page, "live")
+            door = _rows(page).filter(has_text="open the door")
+            dropped = await _answered(page, door.get_by_role("button", name="Discard").click())
+            assert [each["state"] for each in dropped["episodes"]] == ["kept", "discarded", "discarded"]
+            await expect(door.get_by_text("Discarded")).to_be_visible()
+            await page.locator(".undo-bar").get_by_role("button", name="Undo").click()
+            await expect(page.locator(".library-count")).to_contain_text("2 kept")
+            await _relabel_and_trim(page)
+            await _split(page)
+            await door.get_by_role("button", name="Discard").click()
+            await expect(page.locator(".library-count")).to_contain_text("4 episodes · 2 kept")
+            await _shot(page, "changed")
     (path,) = await asyncio.to_thread(lambda: list(recordings.glob("*.mcap")))
     with RecordingReader(path) as reader:
         first = reader.index.episodes[0]

@@ -11,6 +11,7 @@ from lockstep.client.errors import (
     ConnectFailed,
     ConsoleError,
     ConsoleLost,
+    EditRefused,
     EpisodeRefused,
     GoalNotReached,
     LinkFormatError,
@@ -22,6 +23,13 @@ from lockstep.client.errors import (
     StopUnconfirmed,
 )
 from lockstep.client.media.stream import Picture, Sound
+from lockstep.client.recorded_episodes import (
+    EpisodePicture,
+    RecordedEpisode,
+    RecordedEpisodes,
+    RecordingInfo,
+    RecordingWithEpisodes,
+)
 from lockstep.client.statistics import ConsoleStatistics, Percentiles, StreamStatistics
 
 __all__ = [
@@ -36,6 +44,8 @@ __all__ = [
     "ConsoleError",
     "ConsoleLost",
     "ConsoleStatistics",
+    "EditRefused",
+    "EpisodePicture",
     "EpisodeRefused",
     "GoalNotReached",
     "LinkFormatError",
@@ -43,6 +53,10 @@ __all__ = [
     "NotArmed",
     "Percentiles",
     "Picture",
+    "RecordedEpisode",
+    "RecordedEpisodes",
+    "RecordingInfo",
+    "RecordingWithEpisodes",
     "Refused",
     "SeatRefused",
     "SignallingRefused",

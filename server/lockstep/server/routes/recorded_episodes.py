@@ -2,7 +2,7 @@
 
 import hashlib
 import time
-from typing import Annotated, Literal
+from typing import Annotated
 
 import msgspec
 from fastapi import APIRouter, Query, Request, Response
@@ -10,7 +10,7 @@ from fastapi import APIRouter, Query, Request, Response
 from lockstep.protocol.episodes import EpisodeOutcome, Task
 from lockstep.protocol.serial import MAX_EVENT
 from lockstep.server.auth.tokens import require_role
-from lockstep.server.errors import TooManyRequests
+from lockstep.server.errors import BadParameter, TooManyRequests
 from lockstep.server.http.json_response import json_answer
 from lockstep.server.http.request_body import read_json
 from lockstep.server.recording.episodes.edits import EpisodeEdit
@@ -24,7 +24,7 @@ __all__ = ["EpisodeChangeBody", "EpisodeList", "router"]
 
 router = APIRouter()
 
-Width = Literal[160, 320, 640]
+WIDTHS = (160, 320, 640)  # pixels, of pictures: few, so that a kept one serves many
 Id = Annotated[str, msgspec.Meta(max_length=80)]
 
 
@@ -131,9 +131,11 @@ async def picture(
     recording_id: str,
     event: Annotated[int, Query(ge=1, le=MAX_EVENT)],
     camera: Annotated[str, Query(min_length=1, max_length=80)],
-    width: Width = 160,
+    width: int = WIDTHS[0],
 ) -> Response:
     """The picture that belongs to an event, as a dataset's row has it. `Lockstep-Event`: its own stamp."""
+    if width not in WIDTHS:
+        raise BadParameter("a picture is 160, 320 or 640 pixels wide")
     service = recording_service(request)
     if not service.pictures.spend(caller.token_id, time.monotonic()):
         raise TooManyRequests("pictures of recordings are asked for too often with this link")
