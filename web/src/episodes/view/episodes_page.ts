@@ -105,7 +105,7 @@ export class EpisodesPage {
     this.bar.update(all);
     const { filter } = this.bar;
     this.shown = filtered(all, filter);
-    setText(this.count, recordings === null ? "" : summaryWords(this.shown, all.length));
+    setText(this.count, all.length === 0 ? "" : summaryWords(this.shown, all.length));
     const words = this.emptyWords(recordings, all.length);
     setText(this.noteWords, words);
     setHidden(this.note, words === "");

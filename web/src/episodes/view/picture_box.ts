@@ -43,9 +43,9 @@ export class PictureBox {
     });
   }
 
-  /** It is not seen any more: whoever scrolls on does not wait for it. */
+  /** It is not seen any more: whoever scrolls on does not wait for it, and who comes back asks again. */
   rest(): void {
-    if (this.element.dataset["state"] !== "waiting") return;
+    if (this.element.dataset["state"] === "shown") return;
     this.asking?.abort();
     this.shown = "";
   }
