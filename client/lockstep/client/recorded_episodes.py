@@ -22,54 +22,52 @@ REPORT_TIMEOUT = 150.0
 class RecordedEpisode(msgspec.Struct, frozen=True, kw_only=True):
     """One episode with the changes to it. Times in µs since 1970."""
 
-    id: str
-    number: int
+    id: str  # "edit-3a" of a part that change 3 has made
+    number: int  # counts the takes of a recording; the parts of a split have that of the whole
     state: str  # "open", "kept", "discarded", "cut"
-    editable: bool
+    editable: bool  # it was kept, so it can be changed
     restorable: bool  # a change has discarded it
-    task: str
-    outcome: EpisodeOutcome
-    first_event: int
-    last_event: int
-    events: int
-    first_bound: int  # a trim stays within
-    last_bound: int
-    started: int
-    ended: int
-    drivers: list[str]
-    problems: list[str]
+    task: str  # in words
+    outcome: EpisodeOutcome  # "success", "failure" or, if nobody has said, ""
+    first_event: int  # event reference
+    last_event: int  # event reference
+    events: int  # from the first to the last: rows of a dataset
+    first_bound: int  # event; a trim stays within the bounds
+    last_bound: int  # event
+    started: int  # time of the first event
+    ended: int  # time of the last event
+    drivers: list[str]  # names of all that held the seat in it
+    problems: list[str]  # what the live checks have seen: "camera_missing front"
     pause: int  # µs, longest time without a new event; 0 if below a second
-    made_of: list[str]
-    merges_with: str  # "" for none
+    made_of: list[str]  # ids of the recorded episodes, of a part or a merge; else empty
+    merges_with: str  # id of the one behind it that it can be merged with; "" for none
 
 
 class RecordingInfo(msgspec.Struct, frozen=True, kw_only=True):
-    id: str
-    name: str
-    robot: str
-    started: int
-    ended: int
-    running: bool
+    """A file of a recording. Times in µs since 1970."""
+
+    id: str  # as in addresses, and as `lockstep recordings` shows it
+    name: str  # "" when nobody named it
+    robot: str  # its label
+    started: int  # of its first record
+    ended: int  # of its newest record
+    running: bool  # it is being written
 
 
 class RecordingWithEpisodes(msgspec.Struct, frozen=True, kw_only=True):
-    """A recording.
+    """A recording with its episodes. A change is made of what it says, and refused when there is a newer one."""
 
-    Attributes:
-        revision: number of the newest change: a change is made of it, and refused when there is a newer one
-    """
-
-    info: RecordingInfo
-    cameras: list[str]
-    revision: int
-    episodes: list[RecordedEpisode]
+    info: RecordingInfo  # of the file
+    cameras: list[str]  # of which there are pictures
+    revision: int  # number of the newest change
+    episodes: list[RecordedEpisode]  # in the order of their events
 
 
 class EpisodePicture(msgspec.Struct, frozen=True):
-    """A JPEG, and the event that it is stamped with."""
+    """A picture of a recording."""
 
-    stamp: int
-    jpeg: bytes
+    stamp: int  # event that it is stamped with
+    jpeg: bytes  # as a file
 
 
 class _List(msgspec.Struct):
