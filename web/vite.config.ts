@@ -115,7 +115,7 @@ export default defineConfig({
     assetsInlineLimit: 0,
     modulePreload: { polyfill: false },
     rolldownOptions: {
-      input: ["index.html", "recordings.html", "fleet.html"],
+      input: ["index.html", "recordings.html", "episodes.html", "fleet.html"],
       output: {
         codeSplitting: { groups: [{ name: "shared", minShareCount: 2, test: (id) => first.has(id) }] },
       },

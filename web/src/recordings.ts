@@ -25,9 +25,15 @@ function put(next: View): void {
     { href: `./${replayHash({ ...here(), recording: null, event: null })}` },
     "Lockstep",
   );
-  document.body.replaceChildren(
-    h("div", "recordings", {}, h("header", "bar recordings-bar", {}, home), next.element),
+  const { token } = here();
+  const episodes = h(
+    "a",
+    "bar-link",
+    { href: `./episodes${replayHash({ token, recording: null, event: null })}` },
+    "Episodes",
   );
+  const bar = h("header", "bar recordings-bar", {}, home, ...(token === "" ? [] : [episodes]));
+  document.body.replaceChildren(h("div", "recordings", {}, bar, next.element));
 }
 
 function here(): ReturnType<typeof readReplayLink> {

@@ -11,6 +11,7 @@ from lockstep.client.errors import (
     ConnectFailed,
     ConsoleError,
     ConsoleLost,
+    EditRefused,
     EpisodeRefused,
     GoalNotReached,
     LinkFormatError,
@@ -23,6 +24,13 @@ from lockstep.client.errors import (
 )
 from lockstep.client.media.stream import Picture, Sound
 from lockstep.client.policies import Policies
+from lockstep.client.recorded_episodes import (
+    EpisodePicture,
+    RecordedEpisode,
+    RecordedEpisodes,
+    RecordingInfo,
+    RecordingWithEpisodes,
+)
 from lockstep.client.statistics import ConsoleStatistics, Percentiles, StreamStatistics
 
 __all__ = [
@@ -37,6 +45,8 @@ __all__ = [
     "ConsoleError",
     "ConsoleLost",
     "ConsoleStatistics",
+    "EditRefused",
+    "EpisodePicture",
     "EpisodeRefused",
     "GoalNotReached",
     "LinkFormatError",
@@ -45,6 +55,10 @@ __all__ = [
     "Percentiles",
     "Policies",
     "Picture",
+    "RecordedEpisode",
+    "RecordedEpisodes",
+    "RecordingInfo",
+    "RecordingWithEpisodes",
     "Refused",
     "SeatRefused",
     "SignallingRefused",

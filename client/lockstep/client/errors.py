@@ -15,6 +15,7 @@ ConsoleError
     ├── ActionRefused       … to an action
     ├── CommandRefused      … to a command
     │   └── NotArmed        … until `await console.arm()`: after a stop, a reset, a lost link, …
+    ├── EditRefused         … to a change of a recorded episode
     ├── EpisodeRefused      … to a request about an episode
     └── SeatRefused         … to the control seat
 """
@@ -28,6 +29,7 @@ __all__ = [
     "ConnectFailed",
     "ConsoleError",
     "ConsoleLost",
+    "EditRefused",
     "EpisodeRefused",
     "GoalNotReached",
     "LinkFormatError",
@@ -182,6 +184,14 @@ class EpisodeRefused(Refused):
 
     Attributes:
         reason: one of `lockstep.protocol.episodes.EpisodeReason`
+    """
+
+
+class EditRefused(Refused):
+    """A change of a recorded episode was refused; nothing was changed.
+
+    Attributes:
+        reason: "stale_edit": somebody has changed the recording's episodes since; "edit_refused": it is not allowed
     """
 
 

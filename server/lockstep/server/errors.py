@@ -25,6 +25,7 @@ ConsoleError
 │   ├── BodyTooLarge
 │   ├── BodyTooSlow
 │   ├── CameraTaken         another client publishes it
+│   ├── EditRefused         a change of a recorded episode that is not allowed
 │   ├── EpisodeEmpty        no event was executed in it
 │   ├── EpisodeOpen         an episode is open, or about to begin
 │   ├── HostRefused         a host name that is not the console's
@@ -46,6 +47,7 @@ ConsoleError
 │   ├── ResetTooSoon        a reset right after the stop that it names
 │   ├── PressUsed           the stop of this press has been reset
 │   ├── TooFewSections      fewer media sections than streams, and the peer wants all of them
+│   ├── StaleEdit           somebody else has changed the episodes since
 │   ├── StaleReset          a reset that does not name the newest stop
 │   ├── TooManyRequests
 │   └── WrongMediaType
@@ -92,6 +94,7 @@ __all__ = [
     "ChannelError",
     "ConsoleError",
     "DuplicateChannel",
+    "EditRefused",
     "Flood",
     "HostRefused",
     "HttpError",
@@ -126,6 +129,7 @@ __all__ = [
     "ShuttingDown",
     "Silenced",
     "PressUsed",
+    "StaleEdit",
     "StaleReset",
     "StateUnavailable",
     "TokenInvalid",
@@ -331,6 +335,14 @@ class WrongMediaType(RequestError):
     pass
 
 
+class EditRefused(RequestError):
+    pass
+
+
+class StaleEdit(RequestError):
+    pass
+
+
 class EpisodeEmpty(RequestError):
     pass
 
@@ -473,6 +485,8 @@ HTTP_ERRORS: dict[type[ConsoleError], HttpError] = {
     OtherEpisode: HttpError(409, "other_episode"),
     EpisodeEmpty: HttpError(409, "empty"),
     NoTask: HttpError(422, "no_task"),
+    StaleEdit: HttpError(409, "stale_edit"),
+    EditRefused: HttpError(422, "edit_refused"),
     BadJson: HttpError(400, "bad_json"),
     BadParameter: HttpError(422, "bad_parameter"),
     BadSdp: HttpError(400, "bad_sdp"),

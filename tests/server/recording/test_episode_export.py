@@ -205,7 +205,8 @@ def test_pictures_are_aligned_across_the_wrap_of_the_event_reference() -> None:
 
 def changed(path: Path, id: str, **change: object) -> list[EpisodeEntry]:
     with RecordingReader(path) as reader:
-        return add_edit(path, episodes_of(reader), EpisodeEdit(episode=id, at=1.0, **change))  # type: ignore[arg-type]
+        edit = EpisodeEdit(episode=id, at=1.0, **change)  # type: ignore[arg-type]
+        return [each.entry for each in add_edit(path, episodes_of(reader), edit).episodes]
 
 
 def test_an_episode_that_is_relabelled_trimmed_or_dropped_is_so_in_the_dataset_and_its_recording_unchanged(

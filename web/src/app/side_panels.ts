@@ -166,7 +166,8 @@ export class SidePanels {
     const people = createParticipantsPanel(engine, {
       invite: () => this.sheets.open(this.inviting()),
       audit: () => this.sheets.open(this.auditing()),
-      recordings: openRecordings,
+      recordings: () => openBeside("recordings"),
+      episodes: () => openBeside("episodes"),
       robotLink: () => (this.mayPair ? () => this.sheets.open(this.pairing()) : null),
     });
     const notes = createNotesPanel(engine);
@@ -195,9 +196,9 @@ export class SidePanels {
 }
 
 /** In a tab of its own: this one goes on. */
-function openRecordings(): void {
+function openBeside(page: "recordings" | "episodes"): void {
   const { token } = readFragment(location.hash);
-  window.open(`./recordings${replayHash({ token: token ?? "", recording: null, event: null })}`, "_blank");
+  window.open(`./${page}${replayHash({ token: token ?? "", recording: null, event: null })}`, "_blank");
 }
 
 /** Makes it when it is first wanted. */

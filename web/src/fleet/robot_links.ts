@@ -11,6 +11,17 @@ export function robotPage(url: string, hash: string, base: string): string | nul
   return found.href;
 }
 
+/** The robot's episodes, in the page of its console. null: as of `robotPage`. */
+export function episodesPage(url: string, hash: string, base: string): string | null {
+  const page = robotPage(url, hash, base);
+  if (page === null) return null;
+  const found = new URL(page);
+  const token = new URLSearchParams(found.hash.slice(1)).get("token") ?? "";
+  const address = new URL("./episodes", found);
+  address.hash = `#${new URLSearchParams({ token })}`;
+  return address.href;
+}
+
 /** The overview that a robot's page was opened from; null when it was not. */
 export function overviewPage(hash: string, page: string): string | null {
   const fields = new URLSearchParams(hash.replace(/^#/, ""));

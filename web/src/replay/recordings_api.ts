@@ -7,6 +7,7 @@ import type { RobotDescription } from "../protocol/wire";
 import { parseDescription } from "../protocol/wire_parser";
 
 const LIMIT_MS = 20_000;
+const REPORT_MS = 150_000; // a long recording is read as a whole
 
 export interface RecordingDetails {
   readonly entry: RecordingEntry;
@@ -49,6 +50,12 @@ export class RecordingsApi {
     if (typeof link !== "string" || !link.startsWith(new URL("./api/recordings/", document.baseURI).pathname))
       throw new ConsoleError(200, "malformed", "no path", null);
     return link;
+  }
+
+  /** An HTML page. */
+  async report(id: string): Promise<ArrayBuffer> {
+    const path = `/api/recordings/${encodeURIComponent(id)}/report`;
+    return await this.api.bytes(path, AbortSignal.timeout(REPORT_MS));
   }
 
   async delete(id: string): Promise<RecordingList> {

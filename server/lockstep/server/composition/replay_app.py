@@ -1,5 +1,7 @@
 """The player for one file, without a robot: `lockstep replay FILE`."""
 
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
 from pathlib import Path
 
 from fastapi import FastAPI, Request, Response
@@ -14,7 +16,7 @@ from lockstep.server.http.static_files import page_router
 from lockstep.server.http.trusted_host import HostNames, TrustedHost
 from lockstep.server.recording.library import FileLibrary
 from lockstep.server.recording.service import RecordingService
-from lockstep.server.routes import recordings
+from lockstep.server.routes import recorded_episodes, recordings
 from lockstep.server.util.rate_limits import RateLimits
 
 __all__ = ["create_replay_app"]
@@ -24,9 +26,19 @@ REQUESTS = 200.0  # Hz, of one address, after a burst of twice as many
 
 def create_replay_app(path: Path, access: Access, host: str) -> FastAPI:
     """Return an app that answers /api/recordings and the page, both for this file alone."""
-    app = FastAPI(title="Lockstep replay", docs_url=None, redoc_url=None, openapi_url=None)
-    app.state.recordings = RecordingService(FileLibrary(path), access, opens_all=True)
+    service = RecordingService(FileLibrary(path), access, opens_all=True)
+
+    @asynccontextmanager
+    async def lifespan(app: FastAPI) -> AsyncIterator[None]:
+        try:
+            yield
+        finally:
+            await service.close()
+
+    app = FastAPI(title="Lockstep replay", docs_url=None, redoc_url=None, openapi_url=None, lifespan=lifespan)
+    app.state.recordings = service
     app.include_router(recordings.router)
+    app.include_router(recorded_episodes.router)
     app.include_router(page_router())
     app.add_exception_handler(ConsoleError, _answer_console_error)
     app.add_exception_handler(HTTPException, _answer_http_exception)

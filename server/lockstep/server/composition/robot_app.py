@@ -21,6 +21,7 @@ from lockstep.server.routes import (
     ice,
     maps,
     observer_websocket,
+    recorded_episodes,
     recordings,
     seat,
     session,
@@ -86,6 +87,7 @@ def session_app(settings: Settings, lifespan: Lifespan[FastAPI] | None = None) -
     app.include_router(access.router)
     app.include_router(ice.router)
     app.include_router(recordings.router)
+    app.include_router(recorded_episodes.router)
     app.include_router(episodes.router)
     app.include_router(sfu.router)
     app.include_router(proxy.router)

@@ -215,7 +215,7 @@ async def _session(
             for task in running:
                 task.cancel()
     finally:
-        made.recordings.close()
+        await made.recordings.close()
         if scene is not None:
             await scene.close()
 

@@ -88,7 +88,7 @@ def takes_coding(accepted: str, coding: str) -> bool:
 
 
 def page_router(directory: Path = WEB_DIST, first: str = "index.html", *, of_robot: bool = True) -> APIRouter:
-    """Return routes for `/`, `/recordings`, the hashed assets (cached for good) and the few files beside them.
+    """Return routes for the pages, the hashed assets (cached for good) and the few files beside them.
 
     Pages use relative addresses, so all of this may lie below any prefix.
 
@@ -114,6 +114,10 @@ def page_router(directory: Path = WEB_DIST, first: str = "index.html", *, of_rob
         @router.get("/recordings")
         async def recordings(request: Request) -> Response:
             return await page("recordings.html", request)
+
+        @router.get("/episodes")
+        async def episodes(request: Request) -> Response:
+            return await page("episodes.html", request)
 
     @router.get("/{path:path}")
     async def asset(request: Request, path: str) -> Response:

@@ -1,5 +1,6 @@
 """The recordings of a console, or one file. Methods that block say so: call them on a thread."""
 
+from contextlib import suppress
 from pathlib import Path
 from typing import Protocol
 
@@ -36,6 +37,15 @@ class Library(Protocol):
 
     def delete(self, recording_id: str) -> None:
         """Delete a recording. Blocks. Raises NotFound, AlreadyRecording, NotAllowed, OSError."""
+
+    def files(self) -> list[Path]:
+        """Return the files, the one that changed last first. Blocks. Raises OSError."""
+
+    def path(self, recording_id: str) -> Path:
+        """Return the file. Blocks. Raises NotFound, OSError."""
+
+    def running(self) -> Path | None:
+        """Return the file that this console writes now."""
 
 
 class ConsoleLibrary:
@@ -85,6 +95,22 @@ class ConsoleLibrary:
             raise NotFound("no such recording")
         self._recorder.shelf.delete(path)
 
+    def files(self) -> list[Path]:
+        return _newest_first(self._recorder.shelf.files())
+
+    def path(self, recording_id: str) -> Path:
+        running = self.running()
+        if running is not None and id_of(running) == recording_id:
+            return running
+        path = self._recorder.shelf.path(recording_id)
+        if path is None:
+            raise NotFound("no such recording")
+        return path
+
+    def running(self) -> Path | None:
+        running = self._running()
+        return None if running is None or not running[1].chunks else running[0]
+
     def _running(self) -> tuple[Path, EventIndex] | None:
         thread = self._recorder.running
         path, index = (None, None) if thread is None else (thread.path, thread.index())
@@ -121,6 +147,25 @@ class FileLibrary:
 
     def delete(self, recording_id: str) -> None:
         raise NotAllowed("a replayed file cannot be deleted here")
+
+    def files(self) -> list[Path]:
+        return [self._path]
+
+    def path(self, recording_id: str) -> Path:
+        if recording_id != id_of(self._path):
+            raise NotFound("no such recording")
+        return self._path
+
+    def running(self) -> Path | None:
+        return None
+
+
+def _newest_first(paths: list[Path]) -> list[Path]:
+    dated = []
+    for path in paths:
+        with suppress(OSError):  # it was deleted meanwhile
+            dated.append((path.stat().st_mtime_ns, path))
+    return [path for _, path in sorted(dated, reverse=True)]
 
 
 def _open(path: Path, indexes: KnownIndexes) -> tuple[RecordingReader, RecordingEntry]:

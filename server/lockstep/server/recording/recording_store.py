@@ -13,15 +13,24 @@ from typing import NamedTuple
 import msgspec
 import structlog
 
-from lockstep.server.recording.episodes.edits import edits_path
+from lockstep.server.recording.episodes.edits import edited, edits_path, edits_version, read_edits
 from lockstep.server.recording.errors import RecordingError
+from lockstep.server.recording.format.episodes import EpisodeEntry
 from lockstep.server.recording.format.event_index import EventIndex
 from lockstep.server.recording.format.info import RecordingInfo
 from lockstep.server.recording.reading.reader import RecordingReader
 from lockstep.server.recording.reading.scan import complete_file
 from lockstep.server.recording.settings import RecordingSettings
 
-__all__ = ["RecordingEntry", "RecordingStore", "entry_of", "recording_id"]
+__all__ = [
+    "FileVersion",
+    "RecordingEntry",
+    "RecordingStore",
+    "entry_of",
+    "file_version",
+    "is_written",
+    "recording_id",
+]
 
 log = structlog.get_logger(__name__)
 
@@ -47,10 +56,19 @@ class RecordingEntry(msgspec.Struct, frozen=True, kw_only=True):
     last_event: int
     bytes: int
     marks: dict[str, int]  # number of each kind
-    episodes: dict[str, int] = {}  # number in each state: "kept", "discarded", "cut", "open"; as they were recorded
+    episodes: dict[str, int] = {}  # number in each state: "kept", "discarded", "cut", "open"; with all changes
     lost: int
     running: bool
     interrupted: bool
+
+
+class FileVersion(NamedTuple):
+    """Differs whenever a recording, or a change to its episodes, was written."""
+
+    inode: int
+    size: int
+    changed: int  # ns
+    edits: tuple[int, int, int]
 
 
 class _Listed(NamedTuple):
@@ -79,7 +97,7 @@ class RecordingStore:
         self._busy = threading.Lock()  # one list at a time: the next one finds all entries known
         self._listed = _Listed(-math.inf, -1, [], [])
         self._written: list[Path] = []  # files being written that the list under way has found
-        self._known: dict[Path, tuple[tuple[int, int], RecordingEntry | None]] = {}  # by size and time of change
+        self._known: dict[Path, tuple[FileVersion, RecordingEntry | None]] = {}
 
     def prepare(self) -> None:
         """Make the directory. Raises OSError."""
@@ -124,8 +142,7 @@ class RecordingStore:
 
     def _entry(self, path: Path) -> RecordingEntry | None:
         try:
-            status = path.stat()
-            version = status.st_size, status.st_mtime_ns
+            version = file_version(path)
             known = self._known.get(path)
             if known is not None and known[0] == version:
                 return known[1]
@@ -196,11 +213,32 @@ class RecordingStore:
         edits_path(path).unlink(missing_ok=True)
 
 
+def file_version(path: Path) -> FileVersion:
+    """Return the version of a recording and of the changes to its episodes. Raises OSError."""
+    status = path.stat()
+    return FileVersion(status.st_ino, status.st_size, status.st_mtime_ns, edits_version(path))
+
+
+def is_written(path: Path) -> bool:
+    """Return whether a process writes the file now. Raises OSError."""
+    return _is_locked(path)
+
+
+def _edited(path: Path, index: EventIndex) -> list[EpisodeEntry]:
+    """Return the episodes with the changes to them; as they were recorded where the changes cannot be read."""
+    if not index.episodes:
+        return []
+    try:
+        return edited(index.episodes, read_edits(path))
+    except OSError:
+        return index.episodes
+
+
 def entry_of(
     path: Path, info: RecordingInfo, index: EventIndex, *, running: bool = False, interrupted: bool = False
 ) -> RecordingEntry:
     episodes: dict[str, int] = {}
-    for episode in index.episodes:
+    for episode in _edited(path, index):
         episodes[episode.state] = episodes.get(episode.state, 0) + 1
     marks: dict[str, int] = {}
     for mark in index.marks:

@@ -5,11 +5,13 @@ import contextvars
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Protocol, TypeVar
 
 from lockstep.server.audit.records import Actor, AuditKind
 from lockstep.server.auth.tokens import Access
 from lockstep.server.errors import ShuttingDown
+from lockstep.server.recording.browsing.catalog import EpisodeCatalog
 from lockstep.server.recording.library import Library
 from lockstep.server.util.rate_limits import RateLimits
 
@@ -17,6 +19,9 @@ __all__ = ["RecordingAudit", "RecordingService"]
 
 
 STARTS, START_RATE = 20, 0.1  # Hz, of one link: the recording store is bounded in bytes, not in files
+EDITS, EDIT_RATE = 40, 2.0
+PICTURES, PICTURE_RATE = 200, 30.0
+REPORTS, REPORT_RATE = 4, 0.05
 READERS = 2  # threads; readers of recordings wait for each other
 
 Result = TypeVar("Result")
@@ -43,7 +48,8 @@ class RecordingService:
 
     Attributes:
         holds_seat: whether a peer with the link of this id drives
-        starts: how often each link may begin a recording
+        starts, edits, pictures, reports: how often each link may begin a recording, change an episode, ask for one
+            picture, or ask for a report
         opens_all: every good link reads everything: it was made for the one file that is replayed
     """
 
@@ -53,7 +59,15 @@ class RecordingService:
     holds_seat: Callable[[str], bool] = lambda link: False
     opens_all: bool = False
     starts: RateLimits = field(default_factory=lambda: RateLimits(START_RATE, STARTS))
+    edits: RateLimits = field(default_factory=lambda: RateLimits(EDIT_RATE, EDITS))
+    pictures: RateLimits = field(default_factory=lambda: RateLimits(PICTURE_RATE, PICTURES))
+    reports: RateLimits = field(default_factory=lambda: RateLimits(REPORT_RATE, REPORTS))
     threads: ThreadPoolExecutor = field(default_factory=lambda: ThreadPoolExecutor(READERS, "recordings"))
+
+    @cached_property
+    def catalog(self) -> EpisodeCatalog:
+        """The episodes of all recordings."""
+        return EpisodeCatalog(self.library, self.in_thread)
 
     async def in_thread(self, work: Callable[[], Result]) -> Result:
         """Run `work`, which reads files. A slow disk, or many readers, take no thread from anything else.
@@ -68,6 +82,7 @@ class RecordingService:
             raise ShuttingDown("the session of this robot ends") from error
         return await reading
 
-    def close(self) -> None:
-        """Close the threads. Idempotent; waits for nothing."""
+    async def close(self) -> None:
+        """Close the threads, and end the processes. Idempotent; waits for no thread."""
+        await self.catalog.close()
         self.threads.shutdown(wait=False, cancel_futures=True)

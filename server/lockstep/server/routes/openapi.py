@@ -29,6 +29,7 @@ from lockstep.server.errors import (
     BodyTooSlow,
     CameraTaken,
     ConsoleError,
+    EditRefused,
     EpisodeEmpty,
     EpisodeOpen,
     HostRefused,
@@ -61,6 +62,7 @@ from lockstep.server.errors import (
     SceneUnavailable,
     ShuttingDown,
     Silenced,
+    StaleEdit,
     StaleReset,
     StateUnavailable,
     TokenInvalid,
@@ -73,12 +75,14 @@ from lockstep.server.errors import (
     WrongMediaType,
 )
 from lockstep.server.http.problem import PROBLEM_JSON, Problem
+from lockstep.server.recording.episodes.listed import RecordingEpisodes
 from lockstep.server.routes.access import MAX_RECORDS, AuditPage, InvitationList, InvitationRequest, NewInvitation
 from lockstep.server.routes.actions import ActionList, ActionRequest, RobotStatus
 from lockstep.server.routes.dial_in import NewPairingCode, RobotDialInfo
 from lockstep.server.routes.episodes import EpisodeBody
 from lockstep.server.routes.maps import NewestMap
 from lockstep.server.routes.observer_websocket import WatchTicket
+from lockstep.server.routes.recorded_episodes import EpisodeChangeBody, EpisodeList
 from lockstep.server.routes.recordings import (
     MAX_LISTED,
     FileTicket,
@@ -99,6 +103,8 @@ FRAGMENT = "application/trickle-ice-sdpfrag"
 JSON = "application/json"
 OCTETS = "application/octet-stream"
 MCAP = "application/x-mcap"
+JPEG = "image/jpeg"
+HTML = "text/html"
 
 Errors = tuple[type[ConsoleError], ...]
 
@@ -153,6 +159,11 @@ FROM = Parameter("from", "query", {"type": "integer", "minimum": 1, "maximum": M
 TO = Parameter("to", "query", {"type": "integer", "minimum": 1, "maximum": MAX_EVENT}, required=True)
 TOPIC = Parameter("topic", "query", {"type": "array", "items": {"type": "string"}, "maxItems": 50})
 DECODABLE = Parameter("decodable", "query", {"type": "boolean", "default": False})
+EVENT = Parameter("event", "query", {"type": "integer", "minimum": 1, "maximum": MAX_EVENT}, required=True)
+PICTURE_CAMERA = Parameter("camera", "query", {"type": "string", "minLength": 1, "maxLength": 80}, required=True)
+WIDTH = Parameter("width", "query", {"enum": [160, 320, 640], "default": 160})
+SKIP = Parameter("skip", "query", {"type": "integer", "minimum": 0, "maximum": 1_000_000, "default": 0})
+KNOWN = Parameter("known", "query", {"type": "string", "maxLength": 64})
 TICKET = Parameter("ticket", "query", {"type": "string"})
 EPISODE_VERB = Parameter("do", "path", {"enum": list(get_args(EpisodeVerb))}, required=True)
 ACTION = Parameter("name", "path", {"type": "string"}, required=True)
@@ -327,6 +338,34 @@ OPERATIONS: tuple[Operation, ...] = (
         *("get", "/api/recordings/{recording_id}", "One recording with its index.", 200, RecordingDetails),
         errors=(NotFound, BadParameter, RecordingUnreadable, RecordingFailed),
         parameters=(RECORDING, AFTER_CHUNK),
+    ),
+    Operation(
+        *("get", "/api/episodes", "The episodes of all recordings, with the changes to them.", 200, EpisodeList),
+        errors=(BadParameter, RecordingFailed),
+        parameters=(SKIP, KNOWN),
+    ),
+    Operation(
+        *("get", "/api/recordings/{recording_id}/episodes", "The episodes of a recording.", 200, RecordingEpisodes),
+        errors=(NotFound, NotAllowed, RecordingUnreadable, RecordingFailed),
+        parameters=(RECORDING,),
+    ),
+    Operation(
+        *("post", "/api/recordings/{recording_id}/episodes", "Change an episode.", 200, RecordingEpisodes),
+        errors=(NotFound, NotAllowed, StaleEdit, EditRefused, RecordingUnreadable, RecordingFailed, *WITH_JSON),
+        body=EpisodeChangeBody,
+        parameters=(RECORDING,),
+    ),
+    Operation(
+        *("get", "/api/recordings/{recording_id}/picture", "The picture of an event.", 200, JPEG),
+        errors=(NotFound, NotAllowed, BadParameter, RecordingUnreadable, RecordingFailed),
+        parameters=(RECORDING, EVENT, PICTURE_CAMERA, WIDTH),
+        headers=("Lockstep-Event",),
+    ),
+    Operation(
+        *("get", "/api/recordings/{recording_id}/report", "A report of the recording, as a page.", 200, HTML),
+        errors=(NotFound, NotAllowed, AlreadyRecording, BadParameter, RecordingUnreadable, RecordingFailed),
+        parameters=(RECORDING,),
+        headers=("Content-Disposition",),
     ),
     Operation(
         *("get", "/api/recordings/{recording_id}/chunks/{number}", "The records of a chunk.", 200, OCTETS),

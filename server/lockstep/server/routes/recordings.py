@@ -42,7 +42,11 @@ __all__ = [
     "RecordingDetails",
     "RecordingList",
     "RecordingRequest",
+    "Caller",
     "RecordingService",
+    "reader_right",
+    "recording_error",
+    "recording_service",
     "router",
 ]
 
@@ -85,7 +89,7 @@ class FileTicket(msgspec.Struct, frozen=True):
     path: str
 
 
-def _service(request: Request) -> RecordingService:
+def recording_service(request: Request) -> RecordingService:
     found = request.app.state.recordings
     if found is None:
         raise RobotFailed("the console's session of this robot has failed; it is started again")
@@ -95,22 +99,22 @@ def _service(request: Request) -> RecordingService:
 
 
 async def _caller(request: Request) -> Right:
-    return known_caller(request, _service(request).access.bearer(request.headers.get("authorization")))
+    return known_caller(request, recording_service(request).access.bearer(request.headers.get("authorization")))
 
 
 Caller = Annotated[Right, Depends(_caller)]
 
 
-def _right(request: Request, caller: Right) -> RecordingReaderRight:
+def reader_right(request: Request, caller: Right) -> RecordingReaderRight:
     """Return the caller's right to read recordings."""
     identity = caller.identity
-    if _service(request).opens_all:
+    if recording_service(request).opens_all:
         return RecordingReaderRight(identity.role, None)
     return RecordingReaderRight.of(identity.role, identity.issued)
 
 
 def _told_audit(request: Request, caller: Right, what: str, recording_id: str) -> None:
-    _service(request).audit.record("recording", caller.actor, what, recording_id)
+    recording_service(request).audit.record("recording", caller.actor, what, recording_id)
 
 
 @router.get("/api/recordings")
@@ -121,7 +125,7 @@ async def recordings(
     limit: Annotated[int, Query(ge=1, le=MAX_LISTED)] = MAX_LISTED,
 ) -> Response:
     """The newest; with `before` the newest of those that began before that time, in µs since 1970."""
-    library = _service(request).library
+    library = recording_service(request).library
     return _json(await _list(request, library, caller, before, limit))
 
 
@@ -129,7 +133,7 @@ async def recordings(
 async def start(request: Request, caller: Caller) -> Response:
     require_role(caller, "operator", "supervisor")
     wanted = await read_json(request, RecordingRequest)
-    service = _service(request)
+    service = recording_service(request)
     if not service.starts.spend(caller.token_id, time.monotonic()):
         raise TooManyRequests("recordings begin too often with this link")
     state = service.library.start(caller.name, printable(wanted.name))
@@ -140,7 +144,7 @@ async def start(request: Request, caller: Caller) -> Response:
 @router.post("/api/recordings/stop")
 async def stop(request: Request, caller: Caller) -> Response:
     """Answers when the file is closed."""
-    service = _service(request)
+    service = recording_service(request)
     holds_seat = service.holds_seat(caller.token_id)
     check_end(caller.role, automatic=service.library.automatic, holds_seat=holds_seat)
     running = service.library.state().recording
@@ -158,7 +162,7 @@ async def details(
     """`after`: only what the index has from that chunk on, for one who follows a running recording."""
 
     packed = "gzip" in request.headers.get("accept-encoding", "")
-    right = _right(request, caller)
+    right = reader_right(request, caller)
     actor = caller.actor
 
     def read(reader: RecordingReader, entry: RecordingEntry) -> bytes:
@@ -169,7 +173,7 @@ async def details(
         return gzip.compress(body, compresslevel=1) if packed else body
 
     body = await _with_reader(request, recording_id, read)
-    _service(request).audit.again("reading", actor, recording_id)
+    recording_service(request).audit.again("reading", actor, recording_id)
     headers = {"Cache-Control": "no-store", "Vary": "Accept-Encoding"} | (
         {"Content-Encoding": "gzip"} if packed else {}
     )
@@ -179,7 +183,7 @@ async def details(
 @router.get("/api/recordings/{recording_id}/chunks/{number}")
 async def chunk(request: Request, caller: Caller, recording_id: str, number: int) -> Response:
     """A chunk never changes, but who may read it does: nobody keeps it."""
-    right = _right(request, caller)
+    right = reader_right(request, caller)
     actor = caller.actor
 
     def read(reader: RecordingReader, entry: RecordingEntry) -> bytes:
@@ -189,7 +193,7 @@ async def chunk(request: Request, caller: Caller, recording_id: str, number: int
         return b"".join(map(_framed, reader.chunk(number)))
 
     body = await _with_reader(request, recording_id, read)
-    _service(request).audit.again("reading", actor, recording_id)
+    recording_service(request).audit.again("reading", actor, recording_id)
     headers = {"Cache-Control": "no-store"}
     return Response(body, media_type="application/octet-stream", headers=headers)
 
@@ -208,7 +212,7 @@ async def records(
     if not 0 <= event_gap(last, first) <= MAX_EVENTS:
         raise BadParameter(f"from 0 to {MAX_EVENTS} events at once")
     topics = None if topic is None else frozenset(topic)
-    right = _right(request, caller)
+    right = reader_right(request, caller)
     actor = caller.actor
     reader, _ = await _open(request, recording_id)
     try:
@@ -216,7 +220,7 @@ async def records(
     except NotAllowed:
         reader.close()
         raise
-    _service(request).audit.again("reading", actor, recording_id)
+    recording_service(request).audit.again("reading", actor, recording_id)
     # The response closes the iterator, and with it the file, also when the client is gone.
     body = _bounded(reader, first, last, topics, decodable, right)
     answer = StreamingResponse(body, media_type="application/octet-stream", headers={"Cache-Control": "no-store"})
@@ -227,25 +231,25 @@ async def records(
 async def ticket(request: Request, caller: Caller, recording_id: str) -> Response:
     """For a link that the browser downloads by itself: it sends no token."""
     require_role(caller, "operator", "supervisor")
-    right = _right(request, caller)
+    right = reader_right(request, caller)
     actor = caller.actor
     await _with_reader(request, recording_id, lambda reader, entry: right.check_reads(entry.started))
-    _service(request).audit.record("recording", actor, "downloaded", recording_id)
+    recording_service(request).audit.record("recording", actor, "downloaded", recording_id)
     root = request.scope.get("root_path", "")
-    permission = _service(request).access.issue_file_ticket(recording_id, caller.identity)
+    permission = recording_service(request).access.issue_file_ticket(recording_id, caller.identity)
     return _json(FileTicket(f"{root}/api/recordings/{recording_id}/file?ticket={permission}"))
 
 
 @router.get("/api/recordings/{recording_id}/file")
 async def download(request: Request, recording_id: str, ticket: str = "") -> Response:
     """Of a running recording what is there now; `lockstep export` and other tools take that too."""
-    access = _service(request).access
+    access = recording_service(request).access
     right = None
     if ticket:  # it was audited, and checked against the link, when it was made
         caller = access.verify_file_ticket(ticket, recording_id)
     else:
         caller = await _caller(request)
-        right = _right(request, caller)
+        right = reader_right(request, caller)
     require_role(caller, "operator", "supervisor")
 
     def read(reader: RecordingReader, entry: RecordingEntry) -> Path:
@@ -266,7 +270,7 @@ async def download(request: Request, recording_id: str, ticket: str = "") -> Res
 async def delete(request: Request, caller: Caller, recording_id: str) -> Response:
     require_role(caller, "supervisor")
     actor = caller.actor  # also for the audit, should the link end meanwhile
-    service = _service(request)
+    service = recording_service(request)
     library = service.library
     try:
         await service.in_thread(lambda: library.delete(recording_id))
@@ -279,27 +283,27 @@ async def delete(request: Request, caller: Caller, recording_id: str) -> Respons
 async def _list(
     request: Request, library: Library, caller: Right, before: int = 0, limit: int = MAX_LISTED
 ) -> RecordingList:
-    right = _right(request, caller)
+    right = reader_right(request, caller)
     try:
-        entries = await _service(request).in_thread(library.entries)
+        entries = await recording_service(request).in_thread(library.entries)
     except (RecordingError, OSError) as error:
-        raise _told(error) from error
+        raise recording_error(error) from error
     found = [each for each in entries if right.sees(each.ended) and (not before or each.started < before)]
     return RecordingList(state=library.state(), recordings=found[:limit], older=max(0, len(found) - limit))
 
 
 async def _open(request: Request, recording_id: str) -> tuple[RecordingReader, RecordingEntry]:
-    service = _service(request)
+    service = recording_service(request)
     try:
         return await service.in_thread(lambda: service.library.open(recording_id))
     except (RecordingError, OSError) as error:
-        raise _told(error) from error
+        raise recording_error(error) from error
 
 
 async def _with_reader(
     request: Request, recording_id: str, read: Callable[[RecordingReader, RecordingEntry], Result]
 ) -> Result:
-    service = _service(request)
+    service = recording_service(request)
 
     def work() -> Result:
         reader, entry = service.library.open(recording_id)
@@ -309,10 +313,10 @@ async def _with_reader(
     try:
         return await service.in_thread(work)
     except (RecordingError, OSError) as error:
-        raise _told(error) from error
+        raise recording_error(error) from error
 
 
-def _told(error: RecordingError | OSError) -> ConsoleError:
+def recording_error(error: RecordingError | OSError) -> ConsoleError:
     """Return the error to answer with. Damage is permanent; another reason may pass."""
     if isinstance(error, FileNotFoundError):
         return NotFound("it was deleted")

@@ -57,6 +57,33 @@ def test_what_cannot_be_changed_is_said_with_exit_code_2(
     assert sorted(each.name for each in directory.iterdir()) == ["one.mcap", "two.mcap"]
 
 
+def test_an_episode_is_split_its_parts_are_changed_and_all_of_it_is_taken_back(directory: Path) -> None:
+    def ids(*arguments: str) -> list[tuple[str, int, int, str]]:
+        found = json.loads(_lockstep(directory, "episodes", "one", *arguments, "--json").stdout)
+        return [(each["id"], each["first_event"], each["last_event"], each["state"]) for each in found][:2]
+
+    assert ids("--edit", "a", "--split", "15") == [("edit-1a", 10, 15, "kept"), ("edit-1b", 15, 20, "kept")]
+    assert ids("--edit", "edit-1b", "--drop")[1] == ("edit-1b", 15, 20, "discarded")
+    assert ids("--undo", "2")[1][3] == "kept"
+    assert ids("--edit", "edit-1a", "--merge", "edit-1b")[0] == ("edit-4", 10, 20, "kept")
+    words = _lockstep(directory, "episodes", "one", "--changes").stdout
+    assert [line.split()[0] for line in words.splitlines()] == ["1", "2", "3", "4"]
+    assert "command line" in words
+    assert words.splitlines()[1].endswith("discarded  undone")
+
+
+def test_a_stale_change_is_refused_and_so_is_a_number_that_several_have(directory: Path) -> None:
+    assert _lockstep(directory, "episodes", "one", "--edit", "a", "--task", "x", "--after", "0").exit_code == 0
+    for arguments, words in (
+        (("--edit", "a", "--task", "y", "--after", "0"), "there are 1 changes by now"),
+        (("--edit", "1", "--task", "y"), "several episodes have the number 1"),
+        (("--task", "y"), "--edit names the episode"),
+        (("--undo", "7"), "no change 7"),
+    ):
+        found = _lockstep(directory, "episodes", "one", *arguments)
+        assert (found.exit_code, words in found.stderr) == (2, True), found.stderr
+
+
 def test_a_dataset_is_verified_and_never_written_over_another(directory: Path, tmp_path: Path) -> None:
     command = ("export", "one", "--to", "lerobot", "--out", str(tmp_path / "dataset"))
     done = _lockstep(directory, *command)

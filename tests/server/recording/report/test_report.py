@@ -28,7 +28,7 @@ def test_the_report_draws_every_stream_and_says_what_was_kept(tmp_path: Path) ->
     path = tmp_path / "a.mcap"
     Story(events=80, force_at=20).write(path)
     text = write_report(path, tmp_path / "a.html").read_text()
-    assert text.count("<svg") == 6  # events, camera, microphone, delays, force, axes
+    assert text.count("<svg") == 7  # the session at a glance, events, camera, microphone, delays, force, axes
     assert "front: server" in text
     assert "times not" not in text
 

@@ -1,5 +1,5 @@
 import type { FleetRobot } from "../fleet_status";
-import { robotPage } from "../robot_links";
+import { episodesPage, robotPage } from "../robot_links";
 import { gapLabel, pictureLabel } from "../tile_labels";
 import type { TileState } from "../tile_state";
 import { grouped, h, setData, setHidden, setText } from "../../ui/elements/dom";
@@ -30,6 +30,7 @@ export class Tile {
     people: createFigure("People"),
   };
   private readonly openHow = h("span", "tile-open-how");
+  private readonly episodes = h("a", "tile-episodes", { target: "_blank", rel: "noopener" }, "Episodes");
   private readonly link = h("a", "tile-open", {}, "Open", this.openHow);
   private isPointedAt = false;
 
@@ -51,6 +52,7 @@ export class Tile {
         {},
         this.icon.element,
         h("p", "tile-says", {}, this.stateWords, this.stateMore),
+        this.episodes,
         this.link,
       ),
       h("dl", "tile-figures", {}, ...Object.values(this.figures).map((figure) => figure.element)),
@@ -111,6 +113,12 @@ export class Tile {
     setText(this.openHow, how);
     if (this.link.ariaLabel !== `Open${how}: ${robot.name}`)
       this.link.ariaLabel = `Open${how}: ${robot.name}`;
+    const episodes = episodesPage(robot.url, location.hash, document.baseURI);
+    setHidden(this.episodes, episodes === null);
+    if (episodes !== null && this.episodes.getAttribute("href") !== episodes) {
+      this.episodes.setAttribute("href", episodes);
+      this.episodes.ariaLabel = `Episodes of ${robot.name}`;
+    }
     if (href === null) this.link.removeAttribute("href");
     else if (this.link.getAttribute("href") !== href) this.link.setAttribute("href", href);
   }

@@ -9,6 +9,8 @@ import {
   type RecordingList,
 } from "../recording_list";
 import { requestErrorLabel } from "../../transport/signalling/session_api";
+import { replayHash } from "../replay_link";
+import { saveReport } from "../save_report";
 import { button, grouped, h, setHidden, setText } from "../../ui/elements/dom";
 import type { RecordingsApi } from "../recordings_api";
 
@@ -33,6 +35,7 @@ export class ListView {
   private readonly count = h("span", "muted");
   private readonly older = button("chip-button", "", () => void this.askOlder());
   private readonly trouble = h("p", "library-trouble", { role: "alert" });
+  private reports = ""; // what is being made
   private asked: string | null = null; // id of the one that is about to be deleted
   private readonly role: unknown;
   private timer: ReturnType<typeof setTimeout> | undefined;
@@ -41,7 +44,7 @@ export class ListView {
 
   constructor(
     private readonly api: RecordingsApi,
-    token: string,
+    private readonly token: string,
     private readonly events: ListEvents,
   ) {
     this.role = roleOf(token);
@@ -123,6 +126,7 @@ export class ListView {
   }
 
   private noteWords(entries: readonly RecordingEntry[] | null, found: number): string {
+    if (this.reports !== "") return this.reports;
     if (entries === null) return this.trouble.hidden ? "Loading the recordings …" : "";
     if (entries.length === 0)
       return "Nothing has been recorded yet. Press Record on the console's page, or start the console with lockstep up --record.";
@@ -171,6 +175,12 @@ export class ListView {
         button("chip-button", "Keep", () => this.ask(null)),
       ];
     const tools = [];
+    if (entry.episodes.size > 0) {
+      const href = `./episodes${replayHash({ token: this.token, recording: entry.id, event: null })}`;
+      tools.push(h("a", "chip-button", { href }, "Episodes"));
+    }
+    if (mayDownload(this.role) && !entry.running)
+      tools.push(button("chip-button", "Report", () => void this.report(entry)));
     if (mayDownload(this.role))
       tools.push(button("chip-button", "Download", () => void this.download(entry)));
     if (this.role === "supervisor" && !entry.running)
@@ -192,6 +202,19 @@ export class ListView {
     } catch (error) {
       this.say(error);
     }
+    this.draw();
+  }
+
+  private async report(entry: RecordingEntry): Promise<void> {
+    this.reports = `Making a report of ${entry.name || entry.id} …`;
+    this.draw();
+    try {
+      saveReport(entry.id, await this.api.report(entry.id));
+      this.say(null);
+    } catch (error) {
+      this.say(error);
+    }
+    this.reports = "";
     this.draw();
   }
 

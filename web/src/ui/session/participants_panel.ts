@@ -14,6 +14,7 @@ export interface ParticipantsTools {
   invite(): void;
   audit(): void;
   recordings(): void;
+  episodes(): void;
   /** The dialogue of a robot that dials in; null while this person has none. */
   robotLink(): (() => void) | null;
 }
@@ -23,8 +24,9 @@ export function createParticipantsPanel(engine: ConsoleEngine, tools: Participan
   const invite = button("field-button", "Invite…", () => tools.invite());
   const audit = button("field-button quiet", "Audit trail…", () => tools.audit());
   const recordings = button("field-button quiet", "Recordings", () => tools.recordings());
+  const episodes = button("field-button quiet", "Episodes", () => tools.episodes());
   const robotLink = button("field-button quiet", "Robot link…", () => tools.robotLink()?.());
-  const toolRow = h("div", "people-tools", {}, invite, recordings, audit, robotLink);
+  const toolRow = h("div", "people-tools", {}, invite, recordings, episodes, audit, robotLink);
   const empty = h("p", "muted", {}, "Nobody is connected");
   const leading = h("ul", "people");
   const rename = createRenameForm(engine);
@@ -51,6 +53,7 @@ export function createParticipantsPanel(engine: ConsoleEngine, tools: Participan
       const crowded = people.watching.length > FEW;
       setHidden(toolRow, welcome === null && !mayPair);
       setHidden(recordings, welcome === null);
+      setHidden(episodes, welcome === null);
       setHidden(robotLink, !mayPair);
       setHidden(invite, !mayDrive(engine.state));
       setHidden(audit, welcome?.role !== "supervisor");

@@ -168,12 +168,20 @@ def add_recording_commands(app: typer.Typer, make_settings: MakeSettings) -> Non
     @app.command()
     def report(
         file: File,
-        out: Annotated[Path | None, typer.Option(help="HTML file to write; unset: beside the recording.")] = None,
+        out: Annotated[
+            Path | None, typer.Option("--out", "--html", help="HTML file to write; unset: beside the recording.")
+        ] = None,
         directory: DirectoryOption = None,
         robot: RobotOption = "",
         state_dir: StateDirOption = None,
     ) -> None:
-        """Draw figures of a recorded session, and say which promises were kept, in one HTML file."""
+        """Write what was kept, lost and refused in a recording or dataset, by driver and camera, as one HTML file."""
+        if (file / "meta" / "info.json").is_file():
+            pages: Any = load_extra("lockstep.server.recording.report.dataset_page", "export")  # needs pyarrow
+            target = out or file.with_name(f"{file.resolve().name}.html")
+            or_usage(lambda: target.write_text(pages.dataset_page(file), encoding="utf-8"))
+            sys.stdout.write(f"{escaped(target)}\n")
+            return
         path = recording_file(file, make_settings(state_dir=state_dir), robot, directory)
         reporter: Any = load_extra("lockstep.server.recording.report.report", "report")  # needs matplotlib
         written = or_usage(lambda: reporter.write_report(path, out or path.with_suffix(".html")))

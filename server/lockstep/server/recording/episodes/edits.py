@@ -1,40 +1,50 @@
 """Changes to the episodes of a recording, in a file beside it: the recording itself never changes. Blocks.
 
-`NAME.episodes.jsonl` belongs to `NAME.mcap`. Each line is one change; later lines win. Only a kept episode can be
-changed: nothing makes a discarded or a cut one count.
+`NAME.episodes.jsonl` belongs to `NAME.mcap`. Each line is one change; lines are only added. `edit_rules` says what they
+mean. The file is as little trusted as a recording is: its bytes are bounded, and a link to elsewhere is not followed.
 """
 
+import errno
+import fcntl
 import os
+import stat
+from collections.abc import Sequence
 from pathlib import Path
+from typing import BinaryIO
 
 import msgspec
 
-from lockstep.protocol.episodes import EpisodeOutcome, Task
-from lockstep.protocol.serial import event_gap
+from lockstep.server.recording.episodes.edit_rules import (
+    EditedEpisodes,
+    EpisodeEdit,
+    apply_edits,
+    edited,
+)
 from lockstep.server.recording.errors import RecordingError
 from lockstep.server.recording.format.episodes import EpisodeEntry
-from lockstep.server.recording.format.records import Whole
 
-__all__ = ["EpisodeEdit", "EpisodeEditRefused", "add_edit", "edited", "edits_path", "read_edits"]
+__all__ = [
+    "MAX_EDITS",
+    "EpisodeEdit",
+    "EpisodeEditRefused",
+    "EpisodeEditStale",
+    "add_edit",
+    "edited",
+    "edits_path",
+    "edits_version",
+    "read_edits",
+]
 
 MAX_BYTES = 16 * 1024 * 1024
+MAX_EDITS = 10_000
 
 
 class EpisodeEditRefused(RecordingError):
     """This change of an episode is not allowed."""
 
 
-class EpisodeEdit(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
-    """One change. None: as before."""
-
-    episode: str
-    at: float  # s since 1970
-    by: str = ""
-    task: Task | None = None
-    outcome: EpisodeOutcome | None = None
-    first_event: Whole | None = None  # a trim; within the episode as it was recorded
-    last_event: Whole | None = None
-    dropped: bool | None = None  # True: it is in no dataset; False: it is again
+class EpisodeEditStale(EpisodeEditRefused):
+    """Somebody else has changed the episodes since."""
 
 
 _decoder = msgspec.json.Decoder(EpisodeEdit)
@@ -44,70 +54,104 @@ def edits_path(recording: Path) -> Path:
     return recording.with_suffix(".episodes.jsonl")
 
 
-def read_edits(recording: Path) -> list[EpisodeEdit]:
-    """Return the changes, oldest first. A line that cannot be read changes nothing. Raises OSError."""
+def edits_version(recording: Path) -> tuple[int, int, int]:
+    """Return what differs after each change: inode, size and time of change; zeros without the file."""
     try:
-        with edits_path(recording).open("rb") as file:
-            lines = file.read(MAX_BYTES).splitlines()
+        found = edits_path(recording).lstat()
+    except OSError:
+        return 0, 0, 0
+    return found.st_ino, found.st_size, found.st_mtime_ns
+
+
+def read_edits(recording: Path) -> list[EpisodeEdit | None]:
+    """Return the changes by their numbers; None for a line that cannot be read. Raises OSError."""
+    try:
+        with _opened(edits_path(recording), os.O_RDONLY) as file:
+            return _read(file)
     except FileNotFoundError:
         return []
-    found = []
-    for line in lines:
-        try:
-            found.append(_decoder.decode(line))
-        except (msgspec.DecodeError, UnicodeError, RecursionError):
-            continue
+
+
+def add_edit(
+    recording: Path, episodes: Sequence[EpisodeEntry], edit: EpisodeEdit, after: int | None = None
+) -> EditedEpisodes:
+    """Add a change; return all episodes as they are then.
+
+    Args:
+        episodes: as they were recorded
+        after: number of the newest change that its author knows; None: any
+
+    Raises:
+        EpisodeEditStale: there are newer changes than `after`.
+        EpisodeEditRefused: it is not allowed; nothing was written.
+        OSError: the change cannot be written.
+    """
+    path = edits_path(recording)
+    is_new = not path.exists()
+    if is_new:
+        _checked(episodes, [], edit)  # a refused one makes no file
+    with _opened(path, os.O_RDWR | os.O_CREAT | os.O_APPEND) as file:
+        fcntl.flock(file, fcntl.LOCK_EX)  # another process may add one too
+        edits = _read(file)
+        if after is not None and after != len(edits):
+            raise EpisodeEditStale(f"there are {len(edits)} changes by now, and this one was made after {after}")
+        line = msgspec.json.encode(edit)
+        size = file.seek(0, os.SEEK_END)
+        if len(edits) >= MAX_EDITS or size + len(line) + 2 > MAX_BYTES:
+            raise EpisodeEditRefused(f"there are {len(edits)} changes already, and no room for more")
+        found = _checked(episodes, edits, edit)
+        # A line that a crash has cut short ends here.
+        file.write((b"\n" if size else b"") + line + b"\n")
+        file.flush()
+        os.fsync(file.fileno())
+    if is_new:
+        _sync_directory(path.parent)
     return found
 
 
-def add_edit(recording: Path, episodes: list[EpisodeEntry], edit: EpisodeEdit) -> list[EpisodeEntry]:
-    """Add a change; return all episodes as they are then. `episodes`: as they were recorded.
-
-    Raises:
-        EpisodeEditRefused: there is no such kept episode, or the trim is not within it.
-        OSError: the change cannot be written.
-    """
-    original = next((each for each in episodes if each.id == edit.episode), None)
-    if original is None or original.state != "kept":
-        raise EpisodeEditRefused(f"{recording.name} has no kept episode {edit.episode!r}")
-    edits = [*read_edits(recording), edit]
-    if _changed(original, edits) is None:
-        raise EpisodeEditRefused(f"a trim stays within the events {original.first_event} to {original.last_event}")
-    path = edits_path(recording)
-    is_new = not path.exists()
-    with path.open("ab") as file:
-        # A line that a crash has cut short ends here.
-        file.write((b"" if is_new else b"\n") + msgspec.json.encode(edit) + b"\n")
-        file.flush()
-        os.fsync(file.fileno())
-    return edited(episodes, edits)
+def _checked(
+    episodes: Sequence[EpisodeEntry], edits: Sequence[EpisodeEdit | None], edit: EpisodeEdit
+) -> EditedEpisodes:
+    """Return the episodes with the change. Raises EpisodeEditRefused."""
+    found = apply_edits(episodes, [*edits, edit])
+    why = found.without_effect.get(len(edits) + 1)
+    if why is not None:
+        raise EpisodeEditRefused(why)
+    if edit.undo is not None:
+        before = apply_edits(episodes, edits)
+        if edit.undo in before.without_effect:
+            raise EpisodeEditRefused(f"change {edit.undo} has no effect")
+        if found.without_effect.keys() - before.without_effect.keys():
+            raise EpisodeEditRefused(f"a later change builds on change {edit.undo}; take that back first")
+    return found
 
 
-def edited(episodes: list[EpisodeEntry], edits: list[EpisodeEdit]) -> list[EpisodeEntry]:
-    """Return the episodes with the changes. A trim that is not within the episode changes nothing."""
-    return [
-        each if each.state != "kept" else _changed(each, [edit for edit in edits if edit.episode == each.id]) or each
-        for each in episodes
-    ]
+def _opened(path: Path, flags: int) -> BinaryIO:
+    """Open a regular file; a link, a FIFO or a device is refused. Raises OSError."""
+    number = os.open(path, flags | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC, 0o600)
+    file = os.fdopen(number, "r+b") if flags & os.O_RDWR else os.fdopen(number, "rb")
+    if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
+        file.close()
+        raise OSError(errno.EINVAL, "not a regular file", str(path))
+    return file
 
 
-def _changed(original: EpisodeEntry, edits: list[EpisodeEdit]) -> EpisodeEntry | None:
-    """Return the kept episode with the changes that are of it; None if they trim it to something else."""
-    now = original
-    for edit in edits:
-        if edit.episode != original.id:
-            continue
-        now = msgspec.structs.replace(
-            now,
-            task=now.task if edit.task is None else edit.task,
-            outcome=now.outcome if edit.outcome is None else edit.outcome,
-            first_event=now.first_event if edit.first_event is None else edit.first_event,
-            last_event=now.last_event if edit.last_event is None else edit.last_event,
-            state=now.state if edit.dropped is None else "discarded" if edit.dropped else "kept",
-        )
-    within = (
-        event_gap(now.first_event, original.first_event) >= 0
-        and event_gap(original.last_event, now.last_event) >= 0
-        and event_gap(now.last_event, now.first_event) > 0
-    )
-    return now if within else None
+def _read(file: BinaryIO) -> list[EpisodeEdit | None]:
+    file.seek(0)
+    lines = [line for line in file.read(MAX_BYTES).splitlines() if line.strip()]
+    return [_decoded(line) for line in lines[:MAX_EDITS]]
+
+
+def _decoded(line: bytes) -> EpisodeEdit | None:
+    try:
+        return _decoder.decode(line)
+    except (msgspec.DecodeError, UnicodeError, RecursionError):
+        return None
+
+
+def _sync_directory(directory: Path) -> None:
+    handle = os.open(directory, os.O_RDONLY)
+    try:
+        os.fsync(handle)
+    finally:
+        os.close(handle)

@@ -1,0 +1,1 @@
+"""Lists the episodes of recordings and shows their pictures, without a cost for whoever drives."""

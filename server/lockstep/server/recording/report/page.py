@@ -1,0 +1,254 @@
+"""The report of a recorded session as one HTML page: what was kept, by driver and camera, and what was wrong."""
+
+from collections.abc import Sequence
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import NamedTuple
+
+from lockstep.server.recording.episodes.edits import read_edits
+from lockstep.server.recording.episodes.listed import ListedEpisode, listed_episodes
+from lockstep.server.recording.errors import RecordingError
+from lockstep.server.recording.format.payload import own_record_of
+from lockstep.server.recording.format.topics import CAMERA, stream_of
+from lockstep.server.recording.reading.picture_at import picture_at
+from lockstep.server.recording.reading.reader import RecordingReader
+from lockstep.server.recording.recording_store import entry_of
+from lockstep.server.recording.report import page_parts as parts
+from lockstep.server.recording.report.timeline import timeline_svg
+from lockstep.server.recording.report.totals import Moment, Totals
+from lockstep.server.recording.verify.promises import Verdict
+from lockstep.server.recording.verify.verify_file import verify_file
+
+__all__ = ["session_page"]
+
+MAX_SHOWN = 24  # moments that are shown with pictures
+MAX_CAMERAS = 3  # of each
+MAX_EPISODES = 500
+WIDTH = 320  # pixels
+
+
+class Figure(NamedTuple):
+    """A drawing of the page."""
+
+    name: str
+    title: str
+    words: str
+    body: str  # HTML
+
+
+class SessionFacts(NamedTuple):
+    title: str
+    robot: str
+    began: int  # µs since 1970
+    seconds: float
+    totals: Totals
+    episodes: list[ListedEpisode]
+    pictures: dict[int, list[str]]  # HTML, by the place of the moment
+
+
+def session_page(recording: Path, figures: Sequence[Figure] = ()) -> str:
+    """Return the page of a recording, with further figures at its end.
+
+    Raises:
+        RecordingError, OSError: the recording cannot be read.
+    """
+    facts = _facts(recording)
+    verdict = verify_file(recording)
+    totals = facts.totals
+    at = datetime.fromtimestamp(facts.began / 1e6, UTC)
+    lead = (
+        f"{facts.robot}, {at:%Y-%m-%d %H:%M:%S} UTC, {facts.seconds:.1f} s, {verdict.events} events, "
+        f"{verdict.commands} commands, {verdict.pictures_and_sounds} pictures and sounds."
+    )
+    sections = [
+        parts.section(
+            "overview", "Overview", _overview(facts), timeline_svg(facts.episodes, totals, facts.began, facts.seconds)
+        ),
+        _promises(verdict),
+        parts.section("drivers", "Drivers", _drivers(totals)),
+        parts.section("cameras", "Cameras", _cameras(totals)),
+        parts.section("episodes", "Episodes", _episodes(facts.episodes)),
+        parts.section("wrong", "What was wrong", _wrong(facts)),
+        *(
+            parts.section(each.name, each.title, f"<p class='quiet'>{parts.text(each.words)}</p>", each.body)
+            for each in figures
+        ),
+    ]
+    return parts.page(facts.title, lead, sections)
+
+
+def _facts(path: Path) -> SessionFacts:
+    with RecordingReader(path) as reader:
+        index = reader.index
+        totals = Totals(reader.description())
+        for number in range(len(index.chunks)):
+            try:
+                for record in reader.chunk(number):
+                    arrived = record.arrived // 1000
+                    if record.topic.startswith(CAMERA):
+                        keyframe, captured = record.keyframe, record.captured // 1000
+                        totals.picture(stream_of(record.topic), record.event, arrived, captured, keyframe=keyframe)
+                        continue
+                    own = own_record_of(record.schema, record.data)
+                    if own is not None:
+                        totals.own(own, arrived)
+            except RecordingError:
+                continue  # the check of what is promised says so
+        totals.end(index.ended)
+        try:
+            edits = read_edits(path)
+        except OSError:
+            edits = []
+        listed = listed_episodes(entry_of(path, reader.info, index), index, edits)
+        pictures = {at: _pictures(reader, moment) for at, moment in enumerate(totals.moments[:MAX_SHOWN])}
+        title = reader.info.name or path.stem
+        seconds = (index.ended - index.started) / 1e6
+        return SessionFacts(title, reader.info.robot, index.started, seconds, totals, listed.episodes, pictures)
+
+
+def _pictures(reader: RecordingReader, moment: Moment) -> list[str]:
+    """Return the pictures of a moment, as HTML. One that cannot be decoded is left out."""
+    names = (
+        [moment.camera]
+        if moment.camera
+        else [topic.removeprefix(CAMERA) for topic in reader.index.keyframes if topic.startswith(CAMERA)]
+    )
+    found = []
+    for camera in names[:MAX_CAMERAS]:
+        try:
+            shown = picture_at(reader, camera, moment.event, WIDTH)
+        except (RecordingError, OSError):
+            continue
+        if shown is not None:
+            words = f"{camera}, stamped {shown.stamp}"
+            found.append(
+                f"<figure>{parts.picture(shown.jpeg, words)}<figcaption>{parts.text(words)}</figcaption></figure>"
+            )
+    return found
+
+
+def _overview(facts: SessionFacts) -> str:
+    totals = facts.totals
+    median = totals.intervals.percentile(0.5)
+    kept = [each for each in facts.episodes if each.state == "kept"]
+    rows = [
+        ("Events a second, median", parts.number(1 / median if median else None, 1)),
+        ("Refusals", sum(sum(each.refusals.values()) for each in totals.drivers.values())),
+        ("Interventions", sum(each.interventions for each in totals.drivers.values())),
+        ("Interventions a minute", parts.number(_rate(facts), 2)),
+        ("Stops that were pressed", totals.stops),
+        ("Records that the recorder left out", totals.lost),
+        ("Episodes kept", f"{len(kept)} of {len(facts.episodes)}"),
+        ("Of these, successes", f"{sum(each.outcome == 'success' for each in kept)}"),
+    ]
+    tiles = "".join(f"<div><dt>{parts.text(name)}</dt><dd>{parts.text(value)}</dd></div>" for name, value in rows)
+    return f"<dl class='tiles'>{tiles}</dl>"
+
+
+def _rate(facts: SessionFacts) -> float | None:
+    driven = sum(each.seconds for each in facts.totals.drivers.values())
+    count = sum(each.interventions for each in facts.totals.drivers.values())
+    return count * 60 / driven if driven else None
+
+
+def _promises(verdict: Verdict) -> str:
+    rows = "".join(
+        f"<tr><th scope='row' class='left'>{name.replace('_', ' ')}</th><td>{check.looked or ''}</td>"
+        f"<td><span class='{'good' if check.ok else 'bad'}'>"
+        f"{'kept' if check.ok else f'{check.count} times not'}</span></td></tr>"
+        for name, check in verdict.checks.items()
+    )
+    names = ("<th scope='col' class='left'>promise</th>", "<th scope='col'>looked at</th>", "<th scope='col'></th>")
+    head = f"<thead><tr>{''.join(names)}</tr></thead>"
+    return parts.section("promises", "Promises", f"<table class='plain'>{head}<tbody>{rows}</tbody></table>")
+
+
+def _drivers(totals: Totals) -> str:
+    rows = [
+        (
+            each.name or "nobody",
+            each.role,
+            parts.number(each.seconds),
+            each.events,
+            each.commands,
+            ", ".join(f"{reason} {count}" for reason, count in sorted(each.refusals.items())) or "0",
+            each.interventions,
+            parts.number(each.answered.percentile(0.5)),
+            parts.number(each.answered.percentile(0.95)),
+            parts.number(each.pictures.percentile(0.5), 0),
+            parts.number(each.pictures.percentile(0.95), 0),
+        )
+        for each in totals.drivers.values()
+        if each.name or each.events > 1 or each.refusals
+    ]
+    head = ("Driver", "Role", "With the seat, s", "Events", "Commands", "Refusals", "Interventions")
+    delays = ("Command → feedback, ms", "95 %", "Command → picture, ms", "95 %")
+    words = (
+        "An intervention: the seat went from one person directly to another, or a supervisor took it. Command to "
+        "feedback is measured at the console, command to picture by the driver's own page."
+    )
+    return parts.table((*head, *delays), rows, words, left=2)
+
+
+def _cameras(totals: Totals) -> str:
+    def hertz(interval: float | None) -> float | None:
+        return 1 / interval if interval else None
+
+    rows = [
+        (
+            each.name,
+            each.count,
+            parts.number(hertz(each.intervals.percentile(0.5))),
+            parts.number(each.promised or None),
+            each.silences,
+            parts.number(each.longest),
+            parts.number(each.behind.percentile(0.5), 0),
+            parts.number(each.behind.percentile(0.99), 0),
+            each.shown_gap,
+        )
+        for each in totals.cameras.values()
+    ]
+    head = ("Camera", "Pictures", "Rate, Hz", "Promised, Hz", "Silences", "Longest, s")
+    gaps = ("Behind the feedback, events", "99 %", "Largest gap that was shown")
+    words = (
+        "A silence: more than a second without a picture, or three of its intervals. Behind: by how many events the "
+        "stamp of a picture was older than the newest feedback when it came."
+    )
+    return parts.table((*head, *gaps), rows, words)
+
+
+def _episodes(episodes: list[ListedEpisode]) -> str:
+    rows = [
+        (
+            f"{each.number} {each.task}",
+            " ".join(filter(None, (each.state, each.outcome, each.why))),
+            ", ".join(each.drivers),
+            parts.number(max(0, each.ended - each.started) / 1e6),
+            each.events,
+            "; ".join([*each.problems, *([f"pause {each.pause / 1e6:.1f} s"] if each.pause else [])]),
+        )
+        for each in episodes[:MAX_EPISODES]
+    ]
+    words = "With all changes that were made to them." if episodes else ""
+    if len(episodes) > MAX_EPISODES:
+        words += f" The first {MAX_EPISODES} of {len(episodes)}."
+    return parts.table(("Take and task", "State", "Drivers", "Length, s", "Events", "Problems"), rows, words, left=3)
+
+
+def _wrong(facts: SessionFacts) -> str:
+    moments = facts.totals.moments
+    if not moments:
+        return "<p>Nothing that the recording tells of.</p>"
+    shown = []
+    for at, each in enumerate(moments[:MAX_SHOWN]):
+        when = f"{(each.time - facts.began) / 1e6:.1f} s, event {each.event}"
+        stills = "".join(facts.pictures.get(at, []))
+        shown.append(
+            f"<li><h3>{parts.text(each.kind)}: {parts.text(each.text)}</h3><p class='quiet'>{when}</p>"
+            f"<div class='stills'>{stills}</div></li>"
+        )
+    rest = [
+        (each.kind, each.text, f"{(each.time - facts.began) / 1e6:.1f} s", each.event) for each in moments[MAX_SHOWN:]
+    ]
+    more = parts.table(("Kind", "What", "When", "Event"), rest, left=2) if rest else ""
+    return f"<ol class='moments'>{''.join(shown)}</ol>{more}"
