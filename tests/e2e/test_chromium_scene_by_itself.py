@@ -64,6 +64,7 @@ async def test_the_robot_stands_in_the_scene_by_itself_where_the_machine_has_gra
         assert min(code) > first, "what draws it comes after the first picture"
 
 
+@pytest.mark.alone  # a page gives up a scene that it draws too slowly
 async def test_the_scene_drawn_by_the_page_shows_no_newer_event_than_the_picture_and_no_old_one_unveiled(
     stack: Stack, chromium: Browser
 ) -> None:

@@ -92,6 +92,7 @@ async def test_peers_that_do_not_connect_take_no_more_than_their_places() -> Non
             assert [each.status_code for each in answers] == [201, 201, 429, 429]
             async with rig.peer("observer"):
                 pass  # another link is not disturbed
+            await eventually(lambda: len(rig.webrtc_peers) == 2)  # its place is free again
             refused = await rig.http.post(
                 "/whep", content=offer, headers={**rig.token("observer"), **headers, **observer}
             )

@@ -178,6 +178,7 @@ async def test_bad_messages_are_named_and_counted_and_in_the_end_the_line_is_clo
         with suppress(ConnectionClosed):
             while True:  # on a slow machine the first of them are forgiven by now
                 await line.socket.send("{")
+                await asyncio.sleep(0)  # the console is in this process: it has to read
         assert await line.ended() == (1008, "bad messages")
         assert rig.count("lockstep_peers_ended_total", why="bad messages") == 1
 
