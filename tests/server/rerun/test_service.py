@@ -38,7 +38,10 @@ def free_port() -> int:
         return port
 
 
-async def test_a_driven_session_is_in_the_file_by_event_with_pictures(tmp_path: Path) -> None:
+async def test_a_driven_session_is_in_the_file_by_event_with_pictures(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("lockstep.server.rerun.service.END_SECONDS", PATIENCE)  # its priority is low
     path = tmp_path / "a.rrd"
     async with running_rig(rerun={"to": str(path)}) as rig:
         await running(rig)
@@ -133,7 +136,7 @@ async def test_a_process_that_takes_nothing_is_ended_and_another_begins(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     monkeypatch.setattr("lockstep.server.rerun.service.RETRY_SECONDS", 0.1)
-    monkeypatch.setattr("lockstep.server.rerun.service.BLOCKED_SECONDS", 0.3)
+    monkeypatch.setattr("lockstep.server.rerun.service.BLOCKED_SECONDS", 2.0)
     async with running_rig(rerun={"to": str(tmp_path / "a.rrd")}) as rig, rig.peer("operator") as operator:
         await running(rig)
         await take_seat(operator)
