@@ -1,6 +1,9 @@
 """The Foxglove SDK's WebSocket server with the topics of one robot. The SDK is an optional extra of the console."""
 
+import os
 from collections.abc import Iterable
+from contextlib import suppress
+from pathlib import Path
 
 import foxglove
 from foxglove import Channel, Context, Schema
@@ -10,6 +13,8 @@ from lockstep.server.recording.format.topics import Topic
 __all__ = ["SdkServer"]
 
 NAME = "Lockstep"
+SDK_THREADS = "tokio"  # begin of their names, which the console's own threads have not
+NICE = 10
 BACKLOG = 256  # messages kept for each client, about 1 s; then the SDK drops the oldest
 
 
@@ -40,6 +45,7 @@ class SdkServer:
             message_backlog_size=BACKLOG,
         )
         self.port = self._server.port
+        _yield_to_the_operator()
 
     def advertise(self, topics: Iterable[Topic]) -> None:
         """Offer exactly these topics. Channels of topics that stay are kept, with their subscriptions."""
@@ -70,3 +76,13 @@ class SdkServer:
         for _, channel in self._channels.values():
             channel.close()
         self._channels.clear()
+
+
+def _yield_to_the_operator() -> None:
+    """Lower the priority of the SDK's own threads, where the system has one for each: a viewer that floods the server
+    takes the time that others leave.
+    """
+    for task in Path("/proc/self/task").glob("*"):
+        with suppress(OSError, AttributeError):  # it has just ended; or the system has no such priorities
+            if (task / "comm").read_text().startswith(SDK_THREADS):
+                os.setpriority(os.PRIO_PROCESS, int(task.name), NICE)
