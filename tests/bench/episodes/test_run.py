@@ -23,7 +23,7 @@ def arm(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv(FOLDER_VARIABLE, str(MODEL_FOLDER))
 
 
-@pytest.mark.timeout(300)
+@pytest.mark.timeout(600)
 @pytest.mark.usefixtures("arm")
 def test_a_dataset_of_two_drivers_has_the_kept_episodes_alone_and_each_picture_shows_its_rows_event(
     tmp_path: Path,
@@ -54,7 +54,7 @@ def _shift_events(root: Path) -> None:
     pq.write_table(table.set_column(place, "lockstep.event", events), path)
 
 
-@pytest.mark.timeout(300)
+@pytest.mark.timeout(600)
 @pytest.mark.usefixtures("arm")
 def test_a_console_that_is_killed_while_it_keeps_an_episode_leaves_a_dataset_of_whole_episodes() -> None:
     done = CliRunner().invoke(app, ["--fault", "kill-keeping", "--json", "-"])

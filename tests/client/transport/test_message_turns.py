@@ -27,7 +27,8 @@ async def _flooding() -> AsyncIterator[int]:
     async def flood(connection: ServerConnection) -> None:
         reading = asyncio.create_task(connection.wait_closed())
         while not reading.done():
-            connection.transport.write(PIECE)
+            with suppress(RuntimeError):  # it is closing
+                connection.transport.write(PIECE)
             await asyncio.sleep(0)
             while connection.transport.get_write_buffer_size() > len(PIECE) and not reading.done():  # noqa: ASYNC110
                 await asyncio.sleep(0.001)  # until TCP has taken it

@@ -107,6 +107,9 @@ async def run_fault(fault: FaultName, say: Callable[[str], None]) -> dict[str, A
     Raises:
         ProcessFailed, ConsoleError, TimeoutError: a part did not start, or was lost before the fault.
     """
+    task = asyncio.current_task()
+    if task is not None:  # a terminated run leaves no mounted disk either
+        asyncio.get_running_loop().add_signal_handler(signal.SIGTERM, task.cancel)
     async with _running(fault) as run:
         await run.keep_one()
         await _FAULTS[fault](run)

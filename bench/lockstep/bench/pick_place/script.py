@@ -21,7 +21,7 @@ THERE: Final = 0.006  # m, of the measured tool
 APPLIED: Final = 0.02  # rad and m, of the applied goal
 STANDS: Final = 0.01  # rad, from one feedback to the next: the tool does not turn
 PAUSE: Final = 0.25  # s of the robot's clock that a motion settles for
-LONGEST: Final = 30.0  # s for one motion
+LONGEST: Final = 60.0  # s for one motion, on a busy machine too
 
 Value = TypeVar("Value", float, float | None)
 
