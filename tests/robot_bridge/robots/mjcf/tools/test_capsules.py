@@ -1,4 +1,5 @@
 import itertools
+from functools import partial
 from typing import Any
 
 import mujoco
@@ -8,8 +9,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 
+from lockstep.robot_bridge.kinematics.capsules import capsule_around, separate_pairs
+from lockstep.robot_bridge.kinematics.chain import Chain
 from lockstep.robot_bridge.kinematics.clearance import Capsule
-from lockstep.robot_bridge.robots.mjcf.tools.capsules import capsule_around, parts_of
+from lockstep.robot_bridge.robots.mjcf.bodies import bodies_of
+from lockstep.robot_bridge.robots.mjcf.joints import joints_of
+from lockstep.robot_bridge.robots.mjcf.tools.capsules import capsules_of, may_touch
 
 SHAPES = {
     "sphere": '<geom type="sphere" size="0.1"/>',
@@ -49,7 +54,7 @@ def test_a_capsule_holds_all_spheres(points: Any, radius: float) -> None:
 @pytest.mark.parametrize("shape", SHAPES)
 def test_the_capsule_of_a_body_holds_its_shape(shape: str) -> None:
     model, data = compiled(f'<body name="a"><joint/>{SHAPES[shape]}</body>')
-    capsule = parts_of(model, data, range(2), range(1)).capsules["a"]
+    capsule = capsules_of(model, range(2))["a"]
     hit = np.zeros(1, dtype=np.int32)
     far = 2.0
     for direction in itertools.product((-1.0, 0.0, 1.0), repeat=3):
@@ -69,8 +74,9 @@ def arm(*sizes: float) -> str:
 
 
 def pairs(bodies: str, count: int, more: str = "") -> set[tuple[str, str]]:
-    model, data = compiled(bodies, more)
-    return set(parts_of(model, data, range(count + 1), range(count)).pairs)
+    model, _ = compiled(bodies, more)
+    chain = Chain(bodies_of(model, joints_of(model)), "abcdef"[count - 1])
+    return set(separate_pairs(chain, capsules_of(model, range(count + 1)), [0.0] * count, partial(may_touch, model)))
 
 
 def test_parts_with_more_than_one_joint_between_them_must_not_touch() -> None:

@@ -1,18 +1,20 @@
 """Makes the pose of a model's tool: its axes, its body, and the inverse kinematics that drives the joints."""
 
 from collections.abc import Sequence
+from functools import partial
 from typing import Any, Final, NamedTuple
 
 import numpy as np
 
 from lockstep.protocol.description import Axis, Binding, Body, ControlLayer, Pose
+from lockstep.robot_bridge.kinematics.capsules import separate_pairs
 from lockstep.robot_bridge.kinematics.chain import Chain
 from lockstep.robot_bridge.kinematics.clearance import Clearance
 from lockstep.robot_bridge.kinematics.pose_solver import JointBounds
 from lockstep.robot_bridge.kinematics.rotations import quaternion
 from lockstep.robot_bridge.robots.mjcf.drives import Drive
 from lockstep.robot_bridge.robots.mjcf.names import label_of, name_of
-from lockstep.robot_bridge.robots.mjcf.tools.capsules import parts_of
+from lockstep.robot_bridge.robots.mjcf.tools.capsules import capsules_of, may_touch
 from lockstep.robot_bridge.robots.mjcf.tools.tool_setting import ModelTool
 from lockstep.robot_bridge.robots.tool_pose.axes import tool_axes, tool_layer
 from lockstep.robot_bridge.robots.tool_pose.posed_tool import PosedTool, ToolPlace, tool_pose
@@ -55,8 +57,9 @@ def tool_parts(
         upper=tuple(np.inf if drive.axis.wrap else drive.axis.maximum for drive in own),
         rates=tuple(FASTER * drive.axis.slew for drive in own),
     )
-    parts = parts_of(model, data, tool.path, joints)
-    clearance = Clearance(chain, parts.capsules, parts.pairs) if parts.pairs else None
+    capsules = capsules_of(model, tool.path)
+    pairs = separate_pairs(chain, capsules, posture, partial(may_touch, model))
+    clearance = Clearance(chain, capsules, pairs) if pairs else None
     solver = tool_solver(chain, bounds, axes, clearance=clearance, posture=posture)
     pose = tool_pose(tool.name, label, body.name, axes, [drive.axis.name for drive in own], base)
     place = ToolPlace(places, tuple(range(first, first + len(axes.all))))
