@@ -83,6 +83,10 @@ class Chain:
         self.begins: Array = self._links[0].offset
         self.length = sum(math.hypot(*link.offset) for link in self._links[1:]) + math.hypot(*self._end)
 
+    def has(self, body: str) -> bool:
+        """Return whether a body is between the base and the tool, these included."""
+        return body in self._bodies
+
     def point(self, body: str, position: Sequence[float]) -> ChainPoint:
         """Return a point of a body of the chain; `position`: m, in the body's frame.
 

@@ -78,6 +78,7 @@ class MjcfRobot(Robot):
         self._values = [drive.at_rest(drive.measured(data)) for drive in self._drives] + self._tools.measured()
         self._now = now
         self._ticked_at = now()
+        self._pursued: Sequence[str] = ()  # poses that commands drive
         self._stopped = False  # every drive holds its place, at any applied value
         self._moving = self._moving_dofs()
         self._description = self._describe(path.stem, tuple(cameras), bodies)
@@ -99,6 +100,9 @@ class MjcfRobot(Robot):
 
     def describe(self) -> RobotDescription:
         return self._description
+
+    def pursue_poses(self, names: Sequence[str]) -> None:
+        self._pursued = names
 
     def apply(self, values: Sequence[float]) -> None:
         self._values = self._at_rest() if self._stopped else list(values)
@@ -194,7 +198,7 @@ class MjcfRobot(Robot):
         """Set the controls for the coming tick. `since`: s since the last."""
         values, seconds = list(self._values), self.tick_seconds
         if not self._stopped:
-            self._tools.drive(values, seconds, since)
+            self._tools.drive(values, seconds, since, self._pursued)
         self._tools.put_pursued(values)
         for drive, value in zip(self._drives, values, strict=False):
             drive.drive(self.data, value, seconds)

@@ -75,11 +75,18 @@ class PosedTool:
         return self._drive.faults
 
     def drive(
-        self, values: Sequence[float], seconds: float, since: float, measured: Sequence[float] | None = None
+        self,
+        values: Sequence[float],
+        seconds: float,
+        since: float,
+        measured: Sequence[float] | None = None,
+        *,
+        pursues: bool = False,
     ) -> Array:
         """Take the values of all axes of the robot; return the rates of this arm's joints for the coming `seconds`.
 
-        `since`: s since the call before. `measured`: rad or m, where the joints are.
+        `since`: s since the call before. `measured`: rad or m, where the joints are. `pursues`: a command drives the
+        tool, also where its goal stands still.
         """
         own = [values[number] for number in (*self.place.joints, *self.place.pose)]
         return self._drive.drive(own, seconds, since, measured)

@@ -1,6 +1,6 @@
 """All tools of a model: what they add to the robot's axes, and to its values."""
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from typing import Any
 
 from lockstep.protocol.description import Axis, Body, ControlLayer, Pose
@@ -46,10 +46,13 @@ class ToolSet:
         for each in self._parts:
             each.tool.put_pursued(values)
 
-    def drive(self, values: Sequence[float], seconds: float, since: float) -> None:
-        """Take the values of all axes for the coming `seconds`. `since`: s since the call before."""
+    def drive(self, values: Sequence[float], seconds: float, since: float, pursued: Collection[str]) -> None:
+        """Take the values of all axes for the coming `seconds`.
+
+        `since`: s since the call before. `pursued`: names of the poses that commands drive.
+        """
         for each in self._parts:
-            each.tool.drive(values, seconds, since, self._joints(each))
+            each.tool.drive(values, seconds, since, self._joints(each), pursues=each.tool.name in pursued)
 
     def hold(self) -> None:
         """Stay where the goals are until the values change."""
