@@ -155,6 +155,21 @@ class RangeRing(msgspec.Struct, frozen=True, kw_only=True):
     range_max: float
 
 
+class CameraView(msgspec.Struct, frozen=True, kw_only=True):
+    """Where a camera is, and where in its picture a point is seen: at (cx + fx x/z, cy + fy y/z), z ahead of it.
+
+    For a camera without distortion, or whose pictures were rectified.
+    """
+
+    body: str = ""  # that it is fixed to; "" for the world
+    position: Vector3  # m, in the body's frame
+    orientation: Quaternion  # of its frame in the body's: x right in the picture, y down, z ahead (REP 103)
+    fx: float  # pixels, the focal lengths
+    fy: float
+    cx: float  # pixels from the upper left corner, where the optical axis is
+    cy: float
+
+
 class Camera(msgspec.Struct, frozen=True, kw_only=True):
     name: str
     label: str
@@ -162,6 +177,7 @@ class Camera(msgspec.Struct, frozen=True, kw_only=True):
     height: int
     frame_rate: float  # Hz
     metres_per_pixel: float | None = None  # m, of a camera that looks at one plane: a scale bar; None: it has no scale
+    view: CameraView | None = None  # None: not known, and nothing is drawn on its pictures
 
 
 class Microphone(msgspec.Struct, frozen=True, kw_only=True):

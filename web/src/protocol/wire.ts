@@ -119,6 +119,18 @@ export interface Camera {
   readonly height: number;
   readonly frame_rate: number;
   readonly metres_per_pixel: number | null;
+  readonly view: CameraView | null;
+}
+
+/** Where a camera is, and where in its picture a point is seen: at (cx + fx x/z, cy + fy y/z), z ahead of it. For a camera without distortion, or whose pictures were rectified. */
+export interface CameraView {
+  readonly body: string;
+  readonly position: readonly [number, number, number];
+  readonly orientation: readonly [number, number, number, number];
+  readonly fx: number;
+  readonly fy: number;
+  readonly cx: number;
+  readonly cy: number;
 }
 
 export type ClientMessage = Command | Rest | Report | Ping | SeatRequest | SeatGrant | SeatDecline | SeatTake | SeatRelease | SilenceStops | Rename | Note | Act | ActionCancel | EpisodeRequest | Stop | Reset | TraceRequest | TraceReport;

@@ -123,7 +123,7 @@ describe("a hand that takes the deadman", () => {
 
 describe("a pose in the frame of a camera", () => {
   const CAMERAS = ["front", "side"].map((name) => ({
-    ...{ name, label: name, width: 640, height: 480, frame_rate: 30, metres_per_pixel: null },
+    ...{ name, label: name, width: 640, height: 480, frame_rate: 30, metres_per_pixel: null, view: null },
   }));
   const description = { ...descriptionOf(AXES), cameras: CAMERAS, poses: [{ ...TOOL, frame: "side" }] };
 

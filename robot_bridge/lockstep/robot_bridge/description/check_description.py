@@ -176,6 +176,11 @@ def _check_camera(camera: Camera) -> None:
     scale = camera.metres_per_pixel
     if scale is not None and not (math.isfinite(scale) and scale > 0):
         raise DescriptionError(f"camera {camera.name}: metres_per_pixel must be positive, not {scale}")
+    if (view := camera.view) is not None:
+        numbers = (*view.position, *view.orientation, view.fx, view.fy, view.cx, view.cy)
+        _check_far(f"camera {camera.name}", numbers)
+        if not (view.fx > 0 and view.fy > 0 and any(view.orientation)):
+            raise DescriptionError(f"camera {camera.name}: its view needs focal lengths above 0 and an orientation")
 
 
 def _check_microphone(microphone: Microphone) -> None:
@@ -247,6 +252,9 @@ def _check_references(description: RobotDescription) -> None:
             _check_known("axis", name, axes | {""}, where)
         if not all(map(math.isfinite, twist.point)):
             raise DescriptionError(f"{where}: its point must be finite")
+    for camera in description.cameras:
+        if camera.view is not None:
+            _check_known("body", camera.view.body, bodies, f"camera {camera.name}")
     for sensor in (description.wrench, description.ranges):
         if sensor is not None:
             _check_known("body", sensor.body, bodies, f"sensor {sensor.name}")

@@ -74,7 +74,7 @@ class MjcfRobot(Robot):
         self._tools = ToolSet(model, data, found, self._drives, bodies)
         self._wrench = wrench_sense(model)
         self._ranges = range_sense(model, data)
-        cameras = cameras_of(model)
+        cameras = cameras_of(model, {body.name for body in bodies})
         self._values = [drive.at_rest(drive.measured(data)) for drive in self._drives] + self._tools.measured()
         self._now = now
         self._ticked_at = now()

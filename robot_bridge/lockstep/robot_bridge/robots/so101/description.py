@@ -3,6 +3,8 @@
 from collections.abc import Sequence
 from typing import Any, Final
 
+import msgspec
+
 from lockstep.protocol.description import (
     Action,
     AxisGain,
@@ -16,6 +18,7 @@ from lockstep.protocol.description import (
     WrenchSensor,
 )
 from lockstep.robot_bridge.robots.mujoco_bodies import describe_body, rounded
+from lockstep.robot_bridge.robots.mujoco_view.camera_view import camera_view
 from lockstep.robot_bridge.robots.so101.arm_drive import SETTLES
 from lockstep.robot_bridge.robots.so101.contact_force import HAND
 from lockstep.robot_bridge.robots.so101.controls import AXES, LAYERS
@@ -64,7 +67,7 @@ def describe(model: Any) -> RobotDescription:
         axes=AXES,
         joints=joints,
         layers=LAYERS,
-        cameras=CAMERAS,
+        cameras=tuple(with_view(model, camera) for camera in CAMERAS),
         wrench=WRENCH,
         force_feeling=FEELING,
         actions=ACTIONS,
@@ -76,6 +79,12 @@ def describe(model: Any) -> RobotDescription:
         max_event_age=2.0,
         max_event_rate=60.0,
     )
+
+
+def with_view(model: Any, camera: Camera) -> Camera:
+    number = model.camera(camera.name).id
+    body = model.body(model.cam_bodyid[number]).name if model.cam_bodyid[number] else ""
+    return msgspec.structs.replace(camera, view=camera_view(model, number, camera, body))
 
 
 def limits(joints: Sequence[Joint]) -> tuple[PositionLimit, ...]:
