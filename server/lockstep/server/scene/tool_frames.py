@@ -1,7 +1,7 @@
 """Draws the frames of a robot's tools in the 3D scene: as measured, and where they are to be."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import viser
 
@@ -26,7 +26,7 @@ def tool_place(pose: ToolPose, bodies: Mapping[str, Pose]) -> Pose | None:
 
 
 def goal_pose(
-    description: RobotDescription, pose: ToolPose, goals: list[float | None], bodies: Mapping[str, Pose]
+    description: RobotDescription, pose: ToolPose, goals: Sequence[float | None], bodies: Mapping[str, Pose]
 ) -> Pose | None:
     """Return where a tool is to be in the world; None where that is not known."""
     values = {axis.name: goal for axis, goal in zip(description.axes, goals, strict=False)}
@@ -61,11 +61,16 @@ class SceneTools:
         self._description = description
         self._same = SAME_PLACE * factor
         length = AXIS * radius
-        sizes = {"axes_length": length, "axes_radius": THICK * length, "origin_radius": 0.0}
         self.frames = [
             (
                 pose,
-                server.scene.add_frame(f"/tools/{number}/measured", visible=False, **sizes),
+                server.scene.add_frame(
+                    f"/tools/{number}/measured",
+                    visible=False,
+                    axes_length=length,
+                    axes_radius=THICK * length,
+                    origin_radius=0.0,
+                ),
                 server.scene.add_frame(
                     f"/tools/{number}/goal",
                     visible=False,
