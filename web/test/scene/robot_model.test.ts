@@ -17,7 +17,15 @@ interface Poses {
 const poses = readVectors("poses") as Poses;
 
 function robot(fields: Partial<RobotDescription>): RobotDescription {
-  return { joints: [], bodies: [], wrench: null, ranges: null, geofences: [], poses: [], ...fields } as RobotDescription;
+  return {
+    joints: [],
+    bodies: [],
+    wrench: null,
+    ranges: null,
+    geofences: [],
+    poses: [],
+    ...fields,
+  } as RobotDescription;
 }
 
 function body(name: string, parent: string, fields: Partial<Body> = {}): Body {
