@@ -15,7 +15,7 @@ from lockstep.robot_bridge.robots.planar.description import DESCRIPTION, FRONT
 from lockstep.robot_bridge.robots.planar.drawing import FrontDrawing, OverviewDrawing
 from lockstep.robot_bridge.robots.planar.robot import PlanarRobot
 
-__all__ = ["START", "TOOL", "PosedArm"]
+__all__ = ["START", "TOOL", "CameraPosedArm", "PosedArm"]
 
 
 def _goal(name: str, label: str, unit: str, bound: float) -> Axis:
@@ -92,3 +92,12 @@ class PosedArm(PlanarRobot):
 
     def sources(self) -> Sequence[MediaSource]:
         return self._eyes
+
+
+class CameraPosedArm(PosedArm):
+    """The same with the tool's pose in the frame of a camera: right, down and away in its picture."""
+
+    def describe(self) -> RobotDescription:
+        description = super().describe()
+        (pose,) = description.poses
+        return msgspec.structs.replace(description, poses=(msgspec.structs.replace(pose, frame=EYES[0].name),))

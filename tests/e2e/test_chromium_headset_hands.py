@@ -2,6 +2,7 @@
 
 import itertools
 from collections.abc import AsyncIterator
+from pathlib import Path
 
 import pytest
 import pytest_asyncio
@@ -85,6 +86,18 @@ async def test_a_controller_leads_the_tool_from_where_it_is_and_letting_go_anywh
             given = [value[index] for value in values if value[index] is not None]
             assert max(abs(later - sooner) for sooner, later in itertools.pairwise(given)) < 0.12, (axis, given)
         assert not [record for record in await posed.events("refused") if record.get("reason") in ("jump", "conflict")]
+
+
+async def test_a_pose_in_the_frame_of_a_camera_follows_the_hand_as_seen_in_that_picture(
+    half_rate: None, tmp_path: Path, chromium: Browser
+) -> None:
+    async with (
+        running_stack(tmp_path, robot="tests.e2e.posed_arm:CameraPosedArm") as stack,
+        open_headset(chromium, stack.operator) as headset,
+    ):
+        await headset.enter()
+        to = _moved(GRIP, (0.08, 0.05, -0.1))  # to the right, up, and into the picture
+        await _lead(headset, GRIP, to, f"{_near('x', 0.08)} && {_near('y', -0.05)} && {_near('z', 0.1)}")
 
 
 async def test_sticks_drive_the_base_and_the_trigger_the_gripper_while_a_hand_leads_the_tool(

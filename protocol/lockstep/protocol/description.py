@@ -239,7 +239,7 @@ class BodyTwist(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Pose(msgspec.Struct, frozen=True, kw_only=True):
-    """Goal axes that together are the pose of a body: a position and a rotation vector, in the axes of `frame`.
+    """Goal axes that together are the pose of a body: a position and a rotation vector, in the frame `frame`.
 
     They move the joints that the axes `instead_of` move too. A command drives the ones or the others.
     """
@@ -247,7 +247,7 @@ class Pose(msgspec.Struct, frozen=True, kw_only=True):
     name: str  # "tool"
     label: str
     body: str
-    frame: str = ""  # body or camera in whose axes the pose is given; "" for the world
+    frame: str = ""  # body or camera in whose frame it is; "" for the world; a camera has x right, y down, z ahead
     point: Vector3 = (0.0, 0.0, 0.0)  # m, the point of the body that is at the position, in its own frame
     position: tuple[str, str, str]  # axes, m; "" without such an axis
     rotation: tuple[str, str, str] = ("", "", "")  # axes, rad

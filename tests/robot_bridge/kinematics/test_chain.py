@@ -65,3 +65,10 @@ def test_a_tool_without_a_joint_is_no_chain() -> None:
 def test_a_point_of_another_body_is_refused() -> None:
     with pytest.raises(NoChain, match="not a part"):
         Chain(DESK_ARM, "fore").point("hand", (0.0, 0.0, 0.0))
+
+
+@given(postures)
+def test_no_tool_is_further_from_where_the_chain_begins_than_it_is_long(posture: tuple[float, ...]) -> None:
+    chain = desk_arm()
+    assert chain.begins == pytest.approx((0.03, 0.0, 0.1))
+    assert np.linalg.norm(chain.at(posture).position - chain.begins) <= chain.length + 1e-9

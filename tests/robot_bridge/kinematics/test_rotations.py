@@ -9,6 +9,7 @@ from lockstep.robot_bridge.kinematics.rotations import (
     about_axis,
     from_quaternion,
     from_rotation_vector,
+    quaternion,
     rotation_vector,
 )
 
@@ -50,7 +51,15 @@ def test_a_quaternion_of_any_length_is_a_rotation() -> None:
     assert from_quaternion((2.0, 0.0, 0.0, 2.0)) == pytest.approx(about_axis((0.0, 0.0, 1.0), math.pi / 2))
 
 
-@pytest.mark.parametrize("quaternion", [(0.0, 0.0, 0.0, 0.0), (math.nan, 0.0, 0.0, 1.0), (math.inf, 0.0, 0.0, 0.0)])
-def test_a_quaternion_without_a_length_is_none(quaternion: tuple[float, float, float, float]) -> None:
+@pytest.mark.parametrize("zero", [(0.0, 0.0, 0.0, 0.0), (math.nan, 0.0, 0.0, 1.0), (math.inf, 0.0, 0.0, 0.0)])
+def test_a_quaternion_without_a_length_is_none(zero: tuple[float, float, float, float]) -> None:
     with pytest.raises(ValueError, match="not a rotation"):
-        from_quaternion(quaternion)
+        from_quaternion(zero)
+
+
+@given(vectors)
+def test_the_quaternion_of_a_matrix_is_the_same_rotation(vector: tuple[float, float, float]) -> None:
+    matrix = from_rotation_vector(vector)
+    found = quaternion(matrix)
+    assert math.hypot(*found) == pytest.approx(1.0)
+    assert from_quaternion(found) == pytest.approx(matrix, abs=1e-6)

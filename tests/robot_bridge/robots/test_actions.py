@@ -58,10 +58,12 @@ def test_autofocus_finds_the_height_of_the_tip_and_a_snapshot_is_kept() -> None:
 
 @pytest.mark.skipif(importlib.util.find_spec("mujoco") is None, reason="needs MuJoCo")
 def test_the_arm_goes_home_and_stays_where_it_is_when_cancelled() -> None:
+    from lockstep.robot_bridge.robots.mobile_manipulator.arm_drive import ArmDrive
     from lockstep.robot_bridge.robots.mobile_manipulator.robot import MobileManipulator
 
     robot = MobileManipulator()
     try:
+        assert isinstance(robot._arm, ArmDrive)
         lift = [0.0] * 5 + [0.2] + [0.0] * 3
         for _ in range(400):
             robot.apply(lift)

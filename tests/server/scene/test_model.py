@@ -3,11 +3,13 @@
 import math
 from collections.abc import Iterator
 
+import msgspec
 import pytest
 import rich
 import viser
 
-from lockstep.protocol.description import Body, BodyJoint, Geom, Joint, RangeRing, RobotDescription, WrenchSensor
+from lockstep.protocol.description import Axis, Body, BodyJoint, Geom, Joint, RangeRing, RobotDescription, WrenchSensor
+from lockstep.protocol.description import Pose as ToolPose
 from lockstep.protocol.messages import Feedback, StopState
 from lockstep.server.scene.kinematics import Pose, world_poses
 from lockstep.server.scene.model import SceneModel, length_words
@@ -38,6 +40,17 @@ ROBOT = RobotDescription(
     ranges=RangeRing(
         name="ring", body="arm", count=3, angle_min=0.0, angle_increment=1.0, range_min=0.1, range_max=5.0
     ),
+)
+
+
+def goal_axis(name: str) -> Axis:
+    return Axis(name=name, label=name, unit="m", minimum=-9, maximum=9, slew=1, brake=1, kind="goal")
+
+
+TOOL_ROBOT = msgspec.structs.replace(
+    ROBOT,
+    axes=tuple(map(goal_axis, "xyz")),
+    poses=(ToolPose(name="tool", label="Tool", body="arm", point=(0.1, 0.0, 0.0), position=("x", "y", "z")),),
 )
 
 
@@ -197,3 +210,16 @@ def test_the_event_stands_above_a_body_whose_own_frame_is_turned_over(server: vi
     x, y, z = SceneModel(server, robot).label.position
     assert (x, y) == pytest.approx((0.0, 0.0))
     assert z < 0  # down in the body's frame is up
+
+
+def test_a_tool_has_its_frame_as_measured_and_its_goal_while_that_is_somewhere_else(server: viser.ViserServer) -> None:
+    model = SceneModel(server, TOOL_ROBOT)
+    _, measured, goal = model.tools.frames[0]
+    model.pose(_feedback(joints=[math.pi / 2, 0.5], goals=[0.3, 0.2, 0.1]))
+    assert (measured.visible, goal.visible) == (True, True)
+    assert tuple(measured.position) == pytest.approx((0.0, 0.1, 0.5))
+    assert tuple(goal.position) == pytest.approx((0.3, 0.2, 0.1))
+    model.pose(_feedback(joints=[0.0, 0.5], goals=[0.1, 0.0, 0.501]))
+    assert (measured.visible, goal.visible) == (True, False)
+    model.pose(_feedback(joints=[0.0, 0.5], goals=[0.3, 0.2, 0.1], unknown=["turn"]))
+    assert (measured.visible, goal.visible) == (False, False)

@@ -7,7 +7,8 @@ import threading
 import msgspec
 import pytest
 
-from lockstep.protocol.description import Body, BodyJoint, Geom, RobotDescription
+from lockstep.protocol.description import Axis, Body, BodyJoint, CameraCalibration, Geom, RobotDescription
+from lockstep.protocol.description import Pose as Pose3
 from lockstep.protocol.messages import Feedback
 from lockstep.robot_bridge.robots.micromanipulator.description import DESCRIPTION as MICRO
 from lockstep.robot_bridge.robots.planar.description import DESCRIPTION as PLANAR
@@ -45,6 +46,26 @@ def test_angles_are_not_magnified() -> None:
     scale = SceneScale(msgspec.structs.replace(MICRO, joints=joints))
     assert scale.factor > 1
     assert scale.feedback(FEEDBACK).joints == FEEDBACK.joints
+
+
+def test_goals_and_the_places_of_cameras_are_magnified_with_the_robot() -> None:
+    goal = {"minimum": -9, "maximum": 9, "slew": 1, "brake": 1, "kind": "goal", "label": ""}
+    units = (("x", "m"), ("r", "rad"))
+    axes = tuple(msgspec.convert(goal | {"name": name, "unit": unit}, Axis) for name, unit in units)
+    view = CameraCalibration(position=(1e-6, 0.0, 0.0), orientation=(1.0, 0.0, 0.0, 0.0), fx=9, fy=9, cx=1, cy=1)
+    (camera, *_) = MICRO.cameras
+    cameras = tuple(msgspec.structs.replace(camera, name=str(each), calibration=each) for each in (view, None))
+    pose = Pose3(name="p", label="", body="", point=(0.0, 1e-6, 0.0), position=("x", "", ""))
+    robot = msgspec.structs.replace(MICRO, axes=axes, cameras=cameras, poses=(pose,))
+    scale = SceneScale(robot)
+    large = scale.description(robot)
+    assert large.poses[0].point == pytest.approx((0.0, 1e-6 * scale.factor, 0.0))
+    assert large.cameras[0].calibration is not None
+    assert large.cameras[0].calibration.position == pytest.approx((1e-6 * scale.factor, 0.0, 0.0))
+    assert large.cameras[1].calibration is None
+    feedback = msgspec.structs.replace(FEEDBACK, goals=[2e-6, 0.5])
+    assert scale.feedback(feedback).goals == pytest.approx([2e-6 * scale.factor, 0.5])
+    assert scale.feedback(msgspec.structs.replace(FEEDBACK, goals=[None, 0.5])).goals == [None, 0.5]
 
 
 @pytest.mark.parametrize("size", [0.0, math.nan, math.inf, 1e300])

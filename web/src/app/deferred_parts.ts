@@ -6,6 +6,7 @@ export { ContactTone } from "../haptics/contact_tone";
 export { SoundStream } from "../media/sound/sound_stream";
 export { SidePanels } from "./side_panels";
 export { createForceGauge } from "../ui/driving/force_gauge";
+export { ToolOverlay } from "../media/tool_overlay";
 export { createScene } from "../scene/page_scene";
 export { createAxisBars } from "../ui/driving/axis_bars";
 export { createAxisPositionPanel } from "../ui/driving/axis_position_panel";

@@ -52,13 +52,20 @@ export class Page {
       isOccupied: () => this.isOccupied(),
       armedChanged: () => this.draw(performance.now()),
       actionPressed: (index) => this.robot?.press(index),
-      feedbackTaken: (now) => this.grid.update(this.engine, now),
+      feedbackTaken: (now) => {
+        const { feedback } = this.engine.state;
+        if (feedback !== null) this.engine.streams.overlay?.take(feedback);
+        this.grid.update(this.engine, now);
+      },
       pictureDrawn: () => this.grid.scene?.settle(),
     };
     this.engine = new ConsoleEngine(api, options, name, new TouchSticks(left, right), events, first);
     this.panels = this.build(left, right, api);
     this.later.use(({ installHook }) => installHook(this));
     this.later.use(({ watchPictureClicks }) => watchPictureClicks(this.engine, this.grid.element));
+    this.later.use(({ ToolOverlay }) => {
+      this.engine.streams.overlay = new ToolOverlay(() => this.engine.state.robot?.description ?? null);
+    });
     this.later.use(({ Rumble, ContactTone, SceneSwitch, SoundStream, createScene }) => {
       this.engine.streams.sound = SoundStream;
       this.grid.takeScene(createScene(this.engine, this.grid, api), new SceneSwitch());

@@ -2,7 +2,10 @@ import type { Feedback } from "../protocol/wire";
 import { eventGap } from "./serial";
 
 /** What the page's own drawing needs of a feedback. */
-export type ScenePose = Pick<Feedback, "event" | "joints" | "wrench" | "ranges" | "limits" | "unknown">;
+export type ScenePose = Pick<
+  Feedback,
+  "event" | "goals" | "joints" | "wrench" | "ranges" | "limits" | "unknown"
+>;
 
 /** The newest feedbacks, oldest first, one for each event: pictures show an event some feedbacks ago. */
 export interface ScenePoses {

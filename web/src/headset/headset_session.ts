@@ -266,6 +266,7 @@ export class HeadsetSession implements HeadsetControls {
     const device = new PoseDevice(description, {
       pose: (side) => (this.input.held.has(side) ? (this.input.hands.get(side)?.pose ?? null) : null),
       forward: () => this.view.forward,
+      panel: (camera) => this.view.panelOf(camera),
       settings: () => this.handSettings(),
     });
     this.poses = { description, device };

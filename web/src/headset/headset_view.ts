@@ -1,7 +1,7 @@
 import { Color, GridHelper, Group, PerspectiveCamera, Scene, type Object3D } from "three";
 import { layoutPanels } from "../xr/panel_layout";
 import { pairStreams, type PanelStreams } from "../xr/stereo_pairs";
-import { heading, type RigidPose } from "../xr/rigid";
+import { about, heading, type Quaternion, type RigidPose } from "../xr/rigid";
 import type { Side } from "../xr/headset_input";
 import { CanvasPanel } from "./canvas_panel";
 import { drawButton, drawStatus } from "./panel_drawings";
@@ -99,6 +99,12 @@ export class HeadsetView {
   /** The button that the hand points at; null: none. */
   buttonAt(side: Side): ButtonName | null {
     return this.pointed.get(side) ?? null;
+  }
+
+  /** How a camera's picture stands in the headset's space; null: it is not shown. */
+  panelOf(camera: string): Quaternion | null {
+    const found = this.pictures.find(({ streams }) => streams.left === camera || streams.right === camera);
+    return found === undefined ? null : about([0, 1, 0], this.room.rotation.y + found.group.rotation.y);
   }
 
   close(): void {

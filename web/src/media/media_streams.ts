@@ -5,6 +5,7 @@ import { BoundedLog } from "../util/bounded_log";
 import type { AudioDevice } from "./sound/audio_device";
 import type { SoundStream } from "./sound/sound_stream";
 import type { PictureTrace } from "./picture_trace";
+import type { ToolOverlay } from "./tool_overlay";
 import { VideoStream } from "./video_stream";
 import type { Peer } from "../transport/peer";
 import type { MediaSection } from "../transport/webrtc/media_section";
@@ -30,6 +31,7 @@ export interface MediaStreamsEvents {
 
 /** All streams of one connection, judged against the same newest feedback. */
 export class MediaStreams {
+  overlay: ToolOverlay | null = null; // until its code is there
   readonly videos = new Map<string, VideoStream>();
   readonly sounds = new Map<string, SoundStream>();
   sound: typeof SoundStream | null = null; // until its code is there, after the first picture
@@ -134,6 +136,7 @@ export class MediaStreams {
     const video = new VideoStream(info, section, this.events.canvas(info), {
       context: () => this.context("video"),
       drawn: (stream, stamp, at) => this.events.drawn(stream, stamp, at),
+      over: (...picture) => this.overlay?.paint(...picture),
     });
     video.trace = this.newTrace?.() ?? null;
     return video;

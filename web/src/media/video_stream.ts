@@ -11,6 +11,7 @@ import { RenderLog } from "./render_log";
 export interface VideoStreamEvents {
   context(): GateContext; // read at the moment of drawing
   drawn(stream: VideoStream, stamp: number | null, at: number): void;
+  over(context: CanvasRenderingContext2D, stream: string, stamp: number | null): void; // draws on the picture
 }
 
 /** One camera: its pictures pass the gate and are drawn on a canvas. */
@@ -71,7 +72,10 @@ export class VideoStream {
     this.height = picture.height;
     if (canvas.width !== picture.width) canvas.width = picture.width;
     if (canvas.height !== picture.height) canvas.height = picture.height;
-    this.drawing?.drawImage(picture.image, 0, 0);
+    if (this.drawing !== null) {
+      this.drawing.drawImage(picture.image, 0, 0);
+      this.events.over(this.drawing, this.info.stream, stamp);
+    }
     const at = performance.now();
     this.lastDrawnMs = at;
     noteOccurrence(this.frames, at);

@@ -394,7 +394,7 @@ export interface Pong {
   readonly id: number;
 }
 
-/** Goal axes that together are the pose of a body: a position and a rotation vector, in the axes of `frame`. They move the joints that the axes `instead_of` move too. A command drives the ones or the others. */
+/** Goal axes that together are the pose of a body: a position and a rotation vector, in the frame `frame`. They move the joints that the axes `instead_of` move too. A command drives the ones or the others. */
 export interface Pose {
   readonly name: string;
   readonly label: string;

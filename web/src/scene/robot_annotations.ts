@@ -11,7 +11,9 @@ import {
   Vector3,
 } from "three";
 import type { Geofence, RangeRing, RobotDescription, WrenchSensor } from "../protocol/wire";
+import type { ToolState } from "../robot/tool_frames";
 import type { RobotModel } from "./robot_model";
+import { toolSign } from "./tool_signs";
 
 const FORCE = 0xffb020;
 const SEEN = 0x40c8ff;
@@ -24,8 +26,7 @@ const ARROW = 0.9; // of the robot's size, at full scale
 const SHORTEST = 0.18;
 
 /** What a feedback says besides joints. */
-export interface SceneState {
-  readonly joints: readonly number[];
+export interface SceneState extends ToolState {
   readonly wrench: readonly number[];
   readonly ranges: readonly number[];
   readonly limits: readonly string[]; // names of the zones that act
@@ -44,6 +45,7 @@ export function addAnnotations(model: RobotModel, description: RobotDescription,
   if (wrench !== null && hand !== undefined) signs.push(forceArrow(hand, wrench, size));
   const ring = ranges === null ? undefined : model.bodies.get(ranges.body);
   if (ranges !== null && ring !== undefined) signs.push(rangeRays(ring, ranges));
+  if (description.poses.length > 0) signs.push(toolSign(model, description, size));
   for (const fence of description.geofences)
     if (fence.polygon.length > 1) signs.push(zone(model.root, fence, size));
   return signs;

@@ -2,15 +2,24 @@ import { clutchOf, type Clutch } from "../drive/goals/clutch";
 import type { GoalDevice } from "../drive/goals/goal_driving";
 import type { AxisValue } from "../drive/goals/goal_range";
 import type { Feedback, Pose, RobotDescription } from "../protocol/wire";
-import { bindHand, handValues, type HandBinding, type HandSettings } from "./hand_mapping";
+import {
+  baseFrame,
+  bindHand,
+  cameraFrame,
+  handValues,
+  type HandBinding,
+  type HandFrame,
+  type HandSettings,
+} from "./hand_mapping";
 import type { Side } from "./headset_input";
-import type { RigidPose, Vector } from "./rigid";
+import { about, type Quaternion, type RigidPose, type Vector } from "./rigid";
 
 /** The hands that may drive now. */
 export interface DrivingHands {
   /** In the headset's space; null: not tracked, or it does not hold the deadman. */
   pose(side: Side): RigidPose | null;
   forward(): number; // the operator's heading in that space, rad
+  panel(camera: string): Quaternion | null; // how a camera's picture stands in that space; null: it is not shown
   settings(): HandSettings;
 }
 
@@ -88,13 +97,21 @@ export class PoseDevice implements GoalDevice {
       const binding = bindHand(
         hand,
         this.rotation(drive, feedback),
-        this.hands.forward(),
+        this.frame(drive.pose),
         this.hands.settings(),
       );
       drive.leading = { side, binding };
       drive.clutch.engage(present(drive, handValues(binding, hand)));
     }
     return drive.clutch.goals(present(drive, handValues(drive.leading.binding, hand)));
+  }
+
+  /** The frame of a body counts as the robot's base. A camera that is not shown would stand in front. */
+  private frame({ frame }: Pose): HandFrame {
+    const { bodies, cameras } = this.description;
+    const isCamera = cameras.some(({ name }) => name === frame) && !bodies.some(({ name }) => name === frame);
+    if (!isCamera) return baseFrame(this.hands.forward(), this.hands.settings());
+    return cameraFrame(this.hands.panel(frame) ?? about([0, 1, 0], this.hands.forward()));
   }
 
   /** The applied goal of the pose's rotation. */

@@ -3,7 +3,7 @@ import { createScenePoses, forgetPoses, keepPose, poseDue, type ScenePose } from
 import { MAX_EVENT } from "../../src/gate/serial";
 
 function pose(event: number, joint = event): ScenePose {
-  return { event, joints: [joint], wrench: [], ranges: [], limits: [], unknown: [] };
+  return { event, goals: [], joints: [joint], wrench: [], ranges: [], limits: [], unknown: [] };
 }
 
 describe("the poses that the page's own drawing has to choose from", () => {

@@ -17,14 +17,22 @@ interface Poses {
 const poses = readVectors("poses") as Poses;
 
 function robot(fields: Partial<RobotDescription>): RobotDescription {
-  return { joints: [], bodies: [], wrench: null, ranges: null, geofences: [], ...fields } as RobotDescription;
+  return {
+    joints: [],
+    bodies: [],
+    wrench: null,
+    ranges: null,
+    geofences: [],
+    poses: [],
+    ...fields,
+  } as RobotDescription;
 }
 
 function body(name: string, parent: string, fields: Partial<Body> = {}): Body {
   return { name, parent, position: [0, 0, 0], orientation: [1, 0, 0, 0], joints: [], geoms: [], ...fields };
 }
 
-const STILL: SceneState = { joints: [], wrench: [], ranges: [], limits: [] };
+const STILL: SceneState = { joints: [], wrench: [], goals: [], unknown: [], ranges: [], limits: [] };
 
 describe("bodies stand where the console's own 3D scene has them", () => {
   const joints = poses.joints.map((name) => ({ name, unit: "rad" as const, minimum: null, maximum: null }));

@@ -1,5 +1,5 @@
 import { describe, expect, it } from "vitest";
-import { baseFromSpace, bindHand, DEFAULT_HAND, handValues } from "../../src/xr/hand_mapping";
+import { baseFrame, baseFromSpace, bindHand, DEFAULT_HAND, handValues } from "../../src/xr/hand_mapping";
 import { about, multiply, rotate, type Quaternion, type RigidPose, type Vector } from "../../src/xr/rigid";
 
 const STILL: Quaternion = [0, 0, 0, 1];
@@ -39,24 +39,27 @@ describe("a hand", () => {
   const start = handAt([0.2, 1.3, -0.4], about([0, 1, 0], 0.8));
 
   it("says at the start that nothing has moved, whatever its pose is", () => {
-    const binding = bindHand(start, [0.3, -0.2, 2.9], 0.5, DEFAULT_HAND);
+    const binding = bindHand(start, [0.3, -0.2, 2.9], baseFrame(0.5, DEFAULT_HAND), DEFAULT_HAND);
     expectVector(handValues(binding, start), [0, 0, 0, 0.3, -0.2, 2.9]);
   });
 
   it("says at the start a rotation beyond half a revolution as the robot says it", () => {
-    const binding = bindHand(start, [0, 0, 3.8], 0, DEFAULT_HAND);
+    const binding = bindHand(start, [0, 0, 3.8], baseFrame(0, DEFAULT_HAND), DEFAULT_HAND);
     expectVector(handValues(binding, start), [0, 0, 0, 0, 0, 3.8]);
   });
 
   it("moves the tool by its own way, times the scale", () => {
-    const binding = bindHand(start, [0, 0, 0], 0, { ...DEFAULT_HAND, scale: 0.5 });
+    const binding = bindHand(start, [0, 0, 0], baseFrame(0, { ...DEFAULT_HAND, scale: 0.5 }), {
+      ...DEFAULT_HAND,
+      scale: 0.5,
+    });
     const moved = handAt([0.3, 1.5, -0.8], start.orientation);
     expectVector(handValues(binding, moved), [0.2, -0.05, 0.1, 0, 0, 0]);
   });
 
   it("turns the tool about the base's axes as it turns itself, from where the tool was", () => {
     const tool: Vector = [0.4, 0, 0];
-    const binding = bindHand(start, tool, 0, DEFAULT_HAND);
+    const binding = bindHand(start, tool, baseFrame(0, DEFAULT_HAND), DEFAULT_HAND);
     const turned = handAt(start.position, multiply(about([0, 1, 0], 0.6), start.orientation)); // to the left
     const [, , , rx = 0, ry = 0, rz = 0] = handValues(binding, turned);
     const expected = multiply(about([0, 0, 1], 0.6), about([1, 0, 0], 0.4));
@@ -66,7 +69,7 @@ describe("a hand", () => {
   });
 
   it("goes on turning past half a revolution without a jump", () => {
-    const binding = bindHand(start, [0, 0, 0], 0, DEFAULT_HAND);
+    const binding = bindHand(start, [0, 0, 0], baseFrame(0, DEFAULT_HAND), DEFAULT_HAND);
     for (let angle = 0; angle < 7; angle += 0.1) {
       const turned = handAt(start.position, multiply(about([0, 1, 0], angle), start.orientation));
       expect(handValues(binding, turned)[5]).toBeCloseTo(angle, 6);
@@ -75,7 +78,10 @@ describe("a hand", () => {
 
   it("keeps still what is locked", () => {
     const locked = { x: false, y: true, z: true, rotation: true };
-    const binding = bindHand(start, [0.1, 0.2, 0.3], 0, { ...DEFAULT_HAND, locked });
+    const binding = bindHand(start, [0.1, 0.2, 0.3], baseFrame(0, { ...DEFAULT_HAND, locked }), {
+      ...DEFAULT_HAND,
+      locked,
+    });
     const moved = handAt([1, 2, -0.9], about([1, 0, 0], 1));
     expectVector(handValues(binding, moved), [0.5, 0, 0, 0.1, 0.2, 0.3]);
   });

@@ -1,8 +1,8 @@
 import { describe, expect, it } from "vitest";
-import { bindHand, DEFAULT_HAND, handValues } from "../../src/xr/hand_mapping";
+import { baseFrame, bindHand, cameraFrame, DEFAULT_HAND, handValues } from "../../src/xr/hand_mapping";
 import { PoseDevice, sideOf, type DrivingHands } from "../../src/xr/pose_drive";
 import type { Side } from "../../src/xr/headset_input";
-import { about, multiply, type RigidPose, type Vector } from "../../src/xr/rigid";
+import { about, multiply, type Quaternion, type RigidPose, type Vector } from "../../src/xr/rigid";
 import type { Pose } from "../../src/protocol/wire";
 import { axisOf, descriptionOf, feedbackOf, goalAxisOf } from "../messages";
 import { randomNumbers } from "../random";
@@ -15,6 +15,8 @@ const TOOL: Pose = {
   ...{ position: POSITION, rotation: ROTATION, instead_of: [], settling: 0 },
 };
 
+const AT_ZERO = { position: [0, 0, 0], orientation: [1, 0, 0, 0] } as const;
+
 class Hands implements DrivingHands {
   readonly held = new Map<Side, RigidPose>();
   settingsNow = DEFAULT_HAND;
@@ -25,6 +27,12 @@ class Hands implements DrivingHands {
 
   forward(): number {
     return 0;
+  }
+
+  readonly panels = new Map<string, Quaternion>();
+
+  panel(camera: string): Quaternion | null {
+    return this.panels.get(camera) ?? null;
   }
 
   settings(): typeof DEFAULT_HAND {
@@ -113,6 +121,72 @@ describe("a hand that takes the deadman", () => {
   });
 });
 
+describe("a pose in the frame of a camera", () => {
+  const CAMERAS = ["front", "side"].map((name) => ({
+    ...{
+      name,
+      label: name,
+      width: 640,
+      height: 480,
+      frame_rate: 30,
+      metres_per_pixel: null,
+      calibration: null,
+      click: "",
+    },
+  }));
+  const description = { ...descriptionOf(AXES), cameras: CAMERAS, poses: [{ ...TOOL, frame: "side" }] };
+
+  it("follows the hand as seen in that camera's picture, however the picture stands in the room", () => {
+    const hands = new Hands();
+    const device = new PoseDevice(description, hands);
+    hands.panels.set("side", about([0, 1, 0], -Math.PI / 2)); // on the right, facing left
+    hands.at("right", [1, 1, 1]);
+    expectGoals(device.goals(feedbackAt(PLACE)), [null, ...PLACE]);
+    hands.at("right", [1.1, 1.02, 1.03]); // into the picture, up, and to its right
+    expectGoals(device.goals(feedbackAt(PLACE)), [null, 0.33, 0.08, 0.3, 0, 0, 1.2]);
+  });
+
+  it("turns the tool as the hand turns in the picture", () => {
+    const hands = new Hands();
+    const device = new PoseDevice(description, hands);
+    hands.panels.set("side", about([0, 1, 0], 0.7));
+    hands.at("right", [0, 1, 0]);
+    const still = [0, 0, 0, 0, 0, 0];
+    device.goals(feedbackAt(still));
+    hands.at("right", [0, 1, 0], 0.5); // to the left, about the vertical: about -y, which points up in the picture
+    expectGoals(device.goals(feedbackAt(still)), [null, 0, 0, 0, 0, -0.5, 0]);
+  });
+
+  it("counts a picture that is not shown as one in front", () => {
+    const hands = new Hands();
+    const device = new PoseDevice(description, hands);
+    hands.at("right", [0, 1, 0]);
+    device.goals(feedbackAt(PLACE));
+    hands.at("right", [0.1, 1, -0.2]);
+    expectGoals(device.goals(feedbackAt(PLACE)), [null, 0.4, 0.1, 0.4, 0, 0, 1.2]);
+  });
+
+  it("holds still what the operator locks, in the operator's own directions", () => {
+    const hands = new Hands();
+    const device = new PoseDevice(description, hands);
+    hands.settingsNow = { ...DEFAULT_HAND, locked: { ...DEFAULT_HAND.locked, x: true, z: true } };
+    hands.at("right", [0, 1, 0]);
+    device.goals(feedbackAt(PLACE));
+    hands.at("right", [0.1, 1.3, -0.2]);
+    expectGoals(device.goals(feedbackAt(PLACE)), [null, 0.4, 0.1, 0.2, 0, 0, 1.2]);
+  });
+
+  it("is that of the body where a body has the camera's name", () => {
+    const hands = new Hands();
+    const side = { name: "side", parent: "", joints: [], geoms: [], ...AT_ZERO };
+    const device = new PoseDevice({ ...description, bodies: [side] }, hands);
+    hands.at("right", [0, 1, 0]);
+    device.goals(feedbackAt(PLACE));
+    hands.at("right", [0, 1, -0.1]);
+    expectGoals(device.goals(feedbackAt(PLACE)), [null, 0.4, 0.1, 0.2, 0, 0, 1.2]);
+  });
+});
+
 it("the first goal is where the robot is, for any hand, robot, heading and setting", () => {
   const random = randomNumbers(3);
   const some = (size: number): number => (random() - 0.5) * size;
@@ -121,7 +195,8 @@ it("the first goal is where the robot is, for any hand, robot, heading and setti
     const orientation = multiply(about([0, 1, 0], some(6)), about([1, 0, 0], some(6)));
     const hand = { position: [some(4), some(4), some(4)] as const, orientation };
     const settings = { ...DEFAULT_HAND, scale: random() * 2, view: some(6) };
-    const values = handValues(bindHand(hand, rotation, some(6), settings), hand);
+    const frame = turn % 2 === 0 ? baseFrame(some(6), settings) : cameraFrame(about([0, 1, 0], some(6)));
+    const values = handValues(bindHand(hand, rotation, frame, settings), hand);
     for (const [at, value] of [0, 0, 0, ...rotation].entries()) expect(values[at]).toBeCloseTo(value, 6);
   }
 });
@@ -129,7 +204,7 @@ it("the first goal is where the robot is, for any hand, robot, heading and setti
 it("a small motion of the hand is a small one of the tool, through any turns", () => {
   const random = randomNumbers(11);
   let hand: RigidPose = { position: [0, 1, 0], orientation: [0, 0, 0, 1] };
-  const binding = bindHand(hand, [0, 0, 0], 0.4, DEFAULT_HAND);
+  const binding = bindHand(hand, [0, 0, 0], baseFrame(0.4, DEFAULT_HAND), DEFAULT_HAND);
   let last = handValues(binding, hand);
   for (let step = 0; step < 2000; step++) {
     // Turns about one axis for a while, so that it goes through whole revolutions.

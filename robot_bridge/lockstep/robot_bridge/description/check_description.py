@@ -191,8 +191,8 @@ def _check_camera(camera: Camera) -> None:
     if scale is not None and not (math.isfinite(scale) and scale > 0):
         raise DescriptionError(f"camera {camera.name}: metres_per_pixel must be positive, not {scale}")
     found = camera.calibration
-    if found is not None and not (found.fx > 0 and found.fy > 0):
-        raise DescriptionError(f"camera {camera.name}: focal lengths must be positive, not {found.fx} and {found.fy}")
+    if found is not None and not (found.fx > 0 and found.fy > 0 and any(found.orientation)):
+        raise DescriptionError(f"camera {camera.name}: its calibration needs focal lengths above 0 and an orientation")
 
 
 def _calibration_numbers(found: CameraCalibration) -> list[float]:

@@ -1,5 +1,6 @@
 """A serial chain of joints: where its tool is, and how each joint moves it."""
 
+import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -49,6 +50,8 @@ class Chain:
 
     Attributes:
         joints: names of the joints, from the base to the tool
+        begins: m, where the first joint is, in the base's frame
+        length: m, of the way from the first joint to the tool along the bodies, with every slide at zero
     """
 
     def __init__(
@@ -77,6 +80,12 @@ class Chain:
         self._end = offset + turn @ np.array(point)
         self._end_turn = turn
         self._slides = np.array([link.slides for link in self._links])
+        self.begins: Array = self._links[0].offset
+        self.length = sum(math.hypot(*link.offset) for link in self._links[1:]) + math.hypot(*self._end)
+
+    def has(self, body: str) -> bool:
+        """Return whether a body is between the base and the tool, these included."""
+        return body in self._bodies
 
     def point(self, body: str, position: Sequence[float]) -> ChainPoint:
         """Return a point of a body of the chain; `position`: m, in the body's frame.

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
-__all__ = ["about_axis", "from_quaternion", "from_rotation_vector", "rotation_vector"]
+__all__ = ["about_axis", "from_quaternion", "from_rotation_vector", "quaternion", "rotation_vector"]
 
 Array = npt.NDArray[np.float64]
 
@@ -67,3 +67,11 @@ def rotation_vector(matrix: Array) -> Array:
         return axis * (-angle if axis @ (x, y, z) < 0.0 else angle)
     scale = angle / (2.0 * sine)
     return np.array((x * scale, y * scale, z * scale))
+
+
+def quaternion(matrix: Array) -> tuple[float, float, float, float]:
+    """Return the quaternion w, x, y, z of a rotation matrix, of length 1."""
+    x, y, z = rotation_vector(matrix).tolist()
+    angle = math.hypot(x, y, z)
+    share = math.sin(angle / 2.0) / angle if angle > SMALL else 0.5
+    return (math.cos(angle / 2.0), x * share, y * share, z * share)

@@ -10,6 +10,7 @@ __all__ = ["create_robot", "is_robot", "robot_names", "simulated_names"]
 
 _PACKAGES = {
     "mobile-manipulator": "lockstep.robot_bridge.robots.mobile_manipulator",
+    "mobile-manipulator-goals": "lockstep.robot_bridge.robots.mobile_manipulator.goal_driven",
     "micromanipulator": "lockstep.robot_bridge.robots.micromanipulator",
     "planar": "lockstep.robot_bridge.robots.planar",
     "so101": "lockstep.robot_bridge.robots.so101",

@@ -21,6 +21,7 @@ from lockstep.server.scene.kinematics import (
 )
 from lockstep.server.scene.path_trace import SceneTrails
 from lockstep.server.scene.shapes import add_geom
+from lockstep.server.scene.tool_frames import SceneTools
 
 __all__ = ["SceneModel", "length_words"]
 
@@ -74,6 +75,7 @@ class SceneModel:
         self.ghost = SceneGhost(server, description, description.hold, self._radius() * GHOST_APART)
         self.trails = SceneTrails(server, description, self._radius() * TRAIL_STEP)
         self.fences = SceneFences(server, description)
+        self.tools = SceneTools(server, description, self._radius(), factor)
 
     def pose(self, feedback: Feedback, commanded: Mapping[str, Pose] | None = None) -> None:
         """Show a feedback. `commanded`: poses of the bodies by the commands alone; None: nothing is commanded."""
@@ -90,6 +92,7 @@ class SceneModel:
             measured = world_poses(self._description, joints)
             self.ghost.show(commanded, measured)
             self.trails.follow(measured)
+            self.tools.show(feedback, measured)
 
     def _build_surroundings(self, factor: float) -> None:
         scene, camera = self._server.scene, self._server.initial_camera

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 
 import msgspec
 
-from lockstep.protocol.description import Body, Geofence, Geom, Joint, RangeRing, RobotDescription
+from lockstep.protocol.description import Body, Camera, Geofence, Geom, Joint, RangeRing, RobotDescription
 from lockstep.protocol.messages import Feedback
 from lockstep.server.scene.kinematics import Pose
 
@@ -29,6 +29,7 @@ class SceneScale:
     def __init__(self, description: RobotDescription) -> None:
         self.factor = _factor(max(_reaches(description), default=1.0))
         self._in_metres = [joint.unit == "m" for joint in description.joints]
+        self._goals_in_metres = [axis.unit == "m" for axis in description.axes]
 
     def description(self, description: RobotDescription) -> RobotDescription:
         """Return the same robot, magnified by `factor`."""
@@ -40,6 +41,8 @@ class SceneScale:
             bodies=tuple(_body(body, by) for body in description.bodies),
             joints=tuple(_joint(joint, by) for joint in description.joints),
             ranges=None if description.ranges is None else _ring(description.ranges, by),
+            poses=tuple(msgspec.structs.replace(pose, point=_times(pose.point, by)) for pose in description.poses),
+            cameras=tuple(_camera(camera, by) for camera in description.cameras),
             geofences=tuple(_fence(fence, by) for fence in description.geofences),
             body_twists=tuple(
                 msgspec.structs.replace(twist, point=_times(twist.point, by)) for twist in description.body_twists
@@ -54,8 +57,12 @@ class SceneScale:
             value * self.factor if metres else value
             for value, metres in zip(feedback.joints, self._in_metres, strict=False)
         ]
+        goals = [
+            value * self.factor if metres and value is not None else value
+            for value, metres in zip(feedback.goals, self._goals_in_metres, strict=False)
+        ]
         ranges = [value * self.factor for value in feedback.ranges]
-        return msgspec.structs.replace(feedback, joints=joints, ranges=ranges)
+        return msgspec.structs.replace(feedback, joints=joints, goals=goals, ranges=ranges)
 
     def poses(self, poses: dict[str, Pose] | None) -> dict[str, Pose] | None:
         """Return the poses of the magnified robot, from those of the robot as it is."""
@@ -97,6 +104,13 @@ def _joint(joint: Joint, by: float) -> Joint:
         return joint
     low, high = (None if bound is None else bound * by for bound in (joint.minimum, joint.maximum))
     return msgspec.structs.replace(joint, minimum=low, maximum=high)
+
+
+def _camera(camera: Camera, by: float) -> Camera:
+    if camera.calibration is None:
+        return camera
+    view = msgspec.structs.replace(camera.calibration, position=_times(camera.calibration.position, by))
+    return msgspec.structs.replace(camera, calibration=view)
 
 
 def _ring(ring: RangeRing, by: float) -> RangeRing:

@@ -3,10 +3,9 @@
 from collections.abc import Sequence
 from typing import Any, Final
 
-import mujoco
-
 from lockstep.robot_bridge.errors import ModelError
 from lockstep.robot_bridge.robots.mjcf.actuators import Actuator, Kind
+from lockstep.robot_bridge.robots.mjcf.texts import words_of
 
 __all__ = ["goal_actuators"]
 
@@ -20,11 +19,7 @@ def goal_actuators(model: Any, actuators: Sequence[Actuator]) -> set[int]:
     Raises:
         ModelError: the text names an actuator that does not exist or cannot be one.
     """
-    number = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_TEXT, TEXT)
-    if number < 0:
-        return set()
-    begin, size = int(model.text_adr[number]), int(model.text_size[number])
-    words = bytes(model.text_data)[begin : begin + size].rstrip(b"\0").decode(errors="replace").split()
+    words = words_of(model, TEXT)
     servos = {each.name: each for each in actuators if each.kind is Kind.POSITION and each.joint is not None}
     if words == [ALL]:
         return {each.number for each in servos.values()}

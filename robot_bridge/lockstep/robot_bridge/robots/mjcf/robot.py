@@ -3,7 +3,7 @@
 import logging
 import math
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Final
 
@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from lockstep.protocol.description import AxisGain, Body, Camera, PositionLimit, RobotDescription
+from lockstep.robot_bridge.control import clock
 from lockstep.robot_bridge.robots.base import Measurement, MediaSource, Robot
 from lockstep.robot_bridge.robots.camera_source import CameraSource
 from lockstep.robot_bridge.robots.mjcf.actuators import Kind, actuators_of
@@ -24,6 +25,8 @@ from lockstep.robot_bridge.robots.mjcf.joints import joints_of
 from lockstep.robot_bridge.robots.mjcf.model_file import load_model
 from lockstep.robot_bridge.robots.mjcf.names import label_of
 from lockstep.robot_bridge.robots.mjcf.senses import range_sense, wrench_sense
+from lockstep.robot_bridge.robots.mjcf.tools.tool_set import ToolSet
+from lockstep.robot_bridge.robots.mjcf.tools.tool_setting import tools_of
 from lockstep.robot_bridge.robots.mujoco_view.calibration import calibrated
 from lockstep.robot_bridge.robots.mujoco_view.canvas import FREE_CAMERA, Look
 from lockstep.robot_bridge.robots.mujoco_view.renderer import Renderer
@@ -43,13 +46,16 @@ _logger = logging.getLogger(__name__)
 
 
 class MjcfRobot(Robot):
-    """A robot with an axis for every actuator, except velocity servos that only damp a position servo."""
+    """A robot with an axis for every actuator, except velocity servos that only damp a position servo.
+
+    The axes of tools that are driven by their pose follow.
+    """
 
     ticks_on_command = True
     rests_from_thread = True
 
-    def __init__(self, path: Path) -> None:
-        """Load the model and start the renderer.
+    def __init__(self, path: Path, *, now: Callable[[], float] = clock.now) -> None:
+        """Load the model and start the renderer. `now`: s, monotonic.
 
         Raises:
             ModelError: the file is not a model that can be driven.
@@ -61,15 +67,22 @@ class MjcfRobot(Robot):
         self.restarts = 0
         self._begin()
         actuators = actuators_of(model)
-        self._drives = drives_of(model, data, actuators, goal_actuators(model, actuators))
+        found = tools_of(model, actuators)
+        goals = goal_actuators(model, actuators) | {servo.number for tool in found for servo in tool.servos}
+        self._drives = drives_of(model, data, actuators, goals)
         self._joints = joints_of(model)
+        bodies = bodies_of(model, self._joints)
+        self._tools = ToolSet(model, data, found, self._drives, bodies)
         self._wrench = wrench_sense(model)
         self._ranges = range_sense(model, data)
         cameras = cameras_of(model)
-        self._values = [drive.at_rest(drive.measured(data)) for drive in self._drives]
+        self._values = [drive.at_rest(drive.measured(data)) for drive in self._drives] + self._tools.measured()
+        self._now = now
+        self._ticked_at = now()
+        self._pursued: Sequence[str] = ()  # poses that commands drive
         self._stopped = False  # every drive holds its place, at any applied value
         self._moving = self._moving_dofs()
-        self._description = self._describe(path.stem, cameras)
+        self._description = self._describe(path.stem, cameras, bodies)
         step = float(model.opt.timestep)
         self._steps = max(1, round(TICK / step))
         self.tick_seconds = self._steps * step
@@ -89,12 +102,16 @@ class MjcfRobot(Robot):
     def describe(self) -> RobotDescription:
         return self._description
 
+    def pursue_poses(self, names: Sequence[str]) -> None:
+        self._pursued = names
+
     def apply(self, values: Sequence[float]) -> None:
         self._values = self._at_rest() if self._stopped else list(values)
 
     def tick(self) -> None:
-        before = self.data.time
-        self._drive()
+        before, ticked_at = self.data.time, self._ticked_at
+        self._ticked_at = self._now()
+        self._drive(self._ticked_at - ticked_at)
         mujoco.mj_step(self.model, self.data, self._steps)
         if self.data.time <= before or not np.isfinite(self.data.qvel).all():
             self._restart()
@@ -114,24 +131,28 @@ class MjcfRobot(Robot):
         )
 
     def measured_axes(self) -> list[float]:
-        return [short(drive.measured(self.data)) for drive in self._drives]
+        measured = [drive.measured(self.data) for drive in self._drives]
+        return [short(value) for value in (*measured, *self._tools.measured())]
 
     def goals(self) -> list[float]:
-        return list(self._values)  # also while it is stopped: the servos hold there
+        goals = list(self._values)  # also while it is stopped: the servos hold there
+        self._tools.put_pursued(goals)
+        return goals
 
     def positions(self) -> Sequence[float]:
         qpos = self.data.qpos
         return [value for joint in self._joints for value in joint.values(qpos)]
 
     def rest_from_thread(self) -> None:
-        self._values = self._at_rest()
+        self._rest()
 
     def stop(self) -> None:
         self._stopped = True
-        self._values = self._at_rest()
+        self._rest()
 
     def reset(self) -> None:
         self._stopped = False
+        self._tools.restart()
 
     def sources(self) -> Sequence[MediaSource]:
         return self._sources
@@ -156,17 +177,32 @@ class MjcfRobot(Robot):
     def _restart(self) -> None:
         self.restarts += 1
         self._begin()
-        for drive in self._drives:
-            drive.release(self.data)
+        self._release()
         if self._wrench is not None:
             self._wrench.clear()
 
-    def _at_rest(self) -> list[float]:
-        return [drive.at_rest(value) for drive, value in zip(self._drives, self._values, strict=True)]
+    def _release(self) -> None:
+        """Hold everything where the state begins."""
+        for drive in self._drives:
+            drive.release(self.data)
+        self._tools.restart(measured=True)
 
-    def _drive(self) -> None:
-        for drive, value in zip(self._drives, self._values, strict=True):
-            drive.drive(self.data, value, self.tick_seconds)
+    def _rest(self) -> None:
+        self._values = self._at_rest()
+        self._tools.hold()
+
+    def _at_rest(self) -> list[float]:
+        values = [drive.at_rest(value) for drive, value in zip(self._drives, self._values, strict=False)]
+        return [*values, *self._values[len(values) :]]
+
+    def _drive(self, since: float) -> None:
+        """Set the controls for the coming tick. `since`: s since the last."""
+        values, seconds = list(self._values), self.tick_seconds
+        if not self._stopped:
+            self._tools.drive(values, seconds, since, self._pursued)
+        self._tools.put_pursued(values)
+        for drive, value in zip(self._drives, values, strict=False):
+            drive.drive(self.data, value, seconds)
 
     def _keep_up(self) -> float:
         """Reduce the steps of a tick if they would take too long; return how many times slower than real time they run.
@@ -174,12 +210,11 @@ class MjcfRobot(Robot):
         The steps must leave the loop some time.
         """
         began = time.process_time()
-        self._drive()
+        self._drive(0.0)
         mujoco.mj_step(self.model, self.data, self._steps * TRIED_TICKS)
         taken = (time.process_time() - began) / TRIED_TICKS
         self._begin()
-        for drive in self._drives:
-            drive.release(self.data)
+        self._release()
         fitting = max(1, math.floor(self._steps * BUSIEST * self.tick_seconds / max(taken, 1e-9)))
         if fitting >= self._steps:
             return 1.0
@@ -198,37 +233,38 @@ class MjcfRobot(Robot):
                 weights[self.model.jnt_dofadr[joint]] = 1.0 / size
         return weights
 
-    def _describe(self, name: str, cameras: Mapping[Camera, int]) -> RobotDescription:
-        bodies = self._bodies()
-        axes = tuple(drive.axis for drive in self._drives)
-        by_stick = [drive for drive in self._drives if drive.axis.kind == "rate"]
+    def _describe(self, name: str, cameras: Mapping[Camera, int], bodies: Sequence[Body]) -> RobotDescription:
+        by_stick = [drive for drive in self._drives if self._tools.poses or drive.axis.kind == "rate"]
         title = self.model.names[: self.model.names.index(b"\0")].decode(errors="replace")
         return RobotDescription(
             name=name,
             watchdog=WATCHDOG,
             max_event_rate=EVENT_RATE,
             label=label_of(name if title in ("", "MuJoCo Model") else title),
-            axes=axes,
+            axes=(*(drive.axis for drive in self._drives), *self._tools.axes),
             joints=tuple(part for joint in self._joints for part in joint.parts),
-            layers=layers_of(
-                self.model, self.data, [drive.axis for drive in by_stick], [drive.actuator for drive in by_stick]
+            layers=(
+                *self._tools.layers,
+                *layers_of(
+                    self.model, self.data, [drive.axis for drive in by_stick], [drive.actuator for drive in by_stick]
+                ),
             ),
             cameras=tuple(self._calibrated(camera, number, bodies) for camera, number in cameras.items()),
             wrench=None if self._wrench is None else self._wrench.description,
             ranges=None if self._ranges is None else self._ranges.description,
-            bodies=bodies,
+            bodies=(*self._with_rays(bodies), *self._tools.bodies),
+            poses=self._tools.poses,
             position_limits=tuple(self._limit(drive) for drive in self._drives if self._is_limited(drive)),
         )
 
-    def _calibrated(self, camera: Camera, number: int, bodies: tuple[Body, ...]) -> Camera:
+    def _calibrated(self, camera: Camera, number: int, bodies: Sequence[Body]) -> Camera:
         named = number != FREE_CAMERA and self.model.camera(number).name
         return calibrated(camera, self.model, bodies) if named else camera
 
-    def _bodies(self) -> tuple[Body, ...]:
-        found = bodies_of(self.model, self._joints)
+    def _with_rays(self, found: Sequence[Body]) -> tuple[Body, ...]:
         rays = self._ranges
         names = {body.name for body in found}
-        return (*found, rays.body) if rays is not None and rays.body.parent in names else found
+        return (*found, rays.body) if rays is not None and rays.body.parent in names else tuple(found)
 
     def _is_limited(self, drive: Drive) -> bool:
         joint = drive.actuator.joint
@@ -250,7 +286,7 @@ class MjcfRobot(Robot):
         )
 
     def _faults(self) -> list[str]:
-        faults = []
+        faults = self._tools.faults
         if self.restarts:
             faults.append(f"the simulation diverged and was restarted ({self.restarts} times)")
         if self._slowness > 1:

@@ -1,5 +1,6 @@
 """Drives the arm: turns a twist of the tool into goals of position servos, which hold their posture at rest."""
 
+import math
 from collections.abc import Sequence
 from operator import sub
 from typing import Final, NamedTuple
@@ -7,6 +8,8 @@ from typing import Final, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from lockstep.robot_bridge.robots.actions import ActionRun
+from lockstep.robot_bridge.robots.mobile_manipulator.homing import Homing
 from lockstep.robot_bridge.robots.mobile_manipulator.resolved_rates import Resolution, ResolvedRates
 from lockstep.robot_bridge.robots.mobile_manipulator.simulation import ARM, JOINTS, Simulation
 
@@ -50,6 +53,7 @@ class ArmDrive:
         self._home = tuple(self._posture)
         self._goes_home = False
         self._resolved: _Resolved | None = None  # the last one
+        self._wanted = False
         self.faults: list[str] = []
 
     def release(self) -> None:
@@ -81,8 +85,31 @@ class ArmDrive:
         """Return the velocities of the joints, rad/s, that `twist` would cause in the present posture."""
         return self._resolve(twist).velocities if any(twist) else STILL
 
-    def drive(self, twist: Sequence[float], seconds: float) -> None:
-        """Use `twist` (base frame, m/s and rad/s) for the coming `seconds`."""
+    @property
+    def moving(self) -> bool:
+        """A twist was wanted in the last tick."""
+        return self._wanted
+
+    def measured(self) -> list[float]:
+        """Return the measured value of each axis: the tool's twist."""
+        twist: list[float] = self._simulation.tool_twist().tolist()
+        return twist
+
+    def pursued(self) -> list[float]:
+        """Return the goal of each axis: they are rates, and have none."""
+        return [math.nan] * len(FASTEST)
+
+    def restart(self) -> None:
+        """Go on after a stop; the arm has held its posture."""
+
+    def home(self, tick: float) -> ActionRun:
+        """Return the action that brings the arm home. `tick`: s between two steps."""
+        return Homing(self, tick)
+
+    def drive(self, values: Sequence[float] | None, seconds: float) -> None:
+        """Use a twist (base frame, m/s and rad/s) for the coming `seconds`; None: at rest."""
+        twist = STILL if values is None else values
+        self._wanted = any(twist)
         self.faults = []
         velocities = self._follow(twist) if any(twist) else self._homewards() if self._goes_home else STILL
         posture, aims = [], []

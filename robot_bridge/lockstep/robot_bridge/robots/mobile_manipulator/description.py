@@ -2,6 +2,8 @@
 
 from typing import Any, Final
 
+import msgspec
+
 from lockstep.protocol.description import (
     Action,
     ActionParameter,
@@ -13,13 +15,14 @@ from lockstep.protocol.description import (
     WrenchSensor,
 )
 from lockstep.robot_bridge.robots.mobile_manipulator.controls import AXES, LAYERS
+from lockstep.robot_bridge.robots.mobile_manipulator.goal_driven.description import describe_arm
 from lockstep.robot_bridge.robots.mobile_manipulator.kinematics import describe_bodies, describe_joints
 from lockstep.robot_bridge.robots.mobile_manipulator.limits import BASE_ON_FLOOR, GEOFENCES, arm_limits
 from lockstep.robot_bridge.robots.mobile_manipulator.range_ring import RING
 from lockstep.robot_bridge.robots.mobile_manipulator.simulation import MOUNT
 from lockstep.robot_bridge.robots.mujoco_view.calibration import calibrated
 
-__all__ = ["CAMERAS", "MICROPHONE", "describe"]
+__all__ = ["CAMERAS", "MICROPHONE", "describe", "with_goals"]
 
 CAMERAS: Final = (  # names are those of the model's cameras
     Camera(name="overview", label="Overview", width=640, height=480, frame_rate=30.0),
@@ -49,6 +52,22 @@ TOOL_TWIST: Final = BodyTwist(
     linear=("tool.vx", "tool.vy", "tool.vz"),
     angular=("tool.wx", "tool.wy", "tool.wz"),
 )
+
+
+def with_goals(description: RobotDescription) -> RobotDescription:
+    """Return the same robot with an arm that is driven by goals."""
+    arm = describe_arm(description.joints, description.bodies)
+    base = tuple(axis for axis in AXES if axis.name.startswith("base."))
+    return msgspec.structs.replace(
+        description,
+        name="mobile-manipulator-goals",
+        label="Mobile manipulator with goals (MuJoCo)",
+        axes=(*base, *arm.joints, *arm.axes.all),
+        layers=arm.layers,
+        body_twists=(),
+        position_limits=arm.limits,
+        poses=(arm.pose,),
+    )
 
 
 def describe(model: Any) -> RobotDescription:

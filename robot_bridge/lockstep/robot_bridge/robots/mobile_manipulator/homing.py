@@ -1,15 +1,27 @@
 """The mobile manipulator's action `home`: the arm goes back to the posture in which it began."""
 
-from typing import Final
+from typing import Final, Protocol
 
 from lockstep.robot_bridge.robots.actions import ActionFailed, ActionRun, ActionStep
-from lockstep.robot_bridge.robots.mobile_manipulator.arm_drive import ArmDrive
 
-__all__ = ["Homing"]
+__all__ = ["HomingArm", "Homing"]
 
 NEAR: Final = 0.02  # rad, of every joint
 NEARER: Final = 0.01  # rad, of all joints together, that count as nearer
 PATIENCE: Final = 2.0  # s without getting nearer
+
+
+class HomingArm(Protocol):
+    """An arm that finds home by itself."""
+
+    def from_home(self) -> list[float]:
+        """Return the distance of each joint from home, rad."""
+
+    def go_home(self) -> None:
+        """Move there until `stay`."""
+
+    def stay(self) -> None:
+        """Go no farther."""
 
 
 class Homing(ActionRun):
@@ -18,7 +30,7 @@ class Homing(ActionRun):
     The servos' lead bounds the push of an arm that is blocked, as it does while driving.
     """
 
-    def __init__(self, arm: ArmDrive, tick: float) -> None:
+    def __init__(self, arm: HomingArm, tick: float) -> None:
         """`tick`: s between two steps."""
         self._arm = arm
         self._tick = tick

@@ -14,9 +14,9 @@ from lockstep.robot_bridge.robots.microphone_source import SEGMENT_SECONDS, Micr
 from lockstep.robot_bridge.robots.mobile_manipulator.arm_drive import ArmDrive
 from lockstep.robot_bridge.robots.mobile_manipulator.base_drive import BaseDrive
 from lockstep.robot_bridge.robots.mobile_manipulator.contact_sense import ContactSense
-from lockstep.robot_bridge.robots.mobile_manipulator.description import CAMERAS, MICROPHONE, describe
+from lockstep.robot_bridge.robots.mobile_manipulator.description import CAMERAS, MICROPHONE, describe, with_goals
+from lockstep.robot_bridge.robots.mobile_manipulator.goal_driven.arm import GoalArm
 from lockstep.robot_bridge.robots.mobile_manipulator.hearing import Hearing
-from lockstep.robot_bridge.robots.mobile_manipulator.homing import Homing
 from lockstep.robot_bridge.robots.mobile_manipulator.range_ring import RangeSensors
 from lockstep.robot_bridge.robots.mobile_manipulator.simulation import BASE, Simulation
 from lockstep.robot_bridge.robots.mobile_manipulator.sound import Sound
@@ -27,16 +27,20 @@ __all__ = ["MobileManipulator"]
 
 STEPS_PER_TICK: Final = 2
 DIGITS: Final = 5  # of measured values on the wire
+STILL: Final = (0.0, 0.0, 0.0)  # of the base
 REST_SPEED: Final = 0.02  # m/s and rad/s, of every joint
 
 
 class MobileManipulator(Robot):
-    """The axes are the base's velocity in its own frame and the tool's twist against the base, in the base frame."""
+    """The axes are the base's velocity in its own frame and the tool's twist against the base, in the base frame.
+
+    With goals, the arm's axes are the places of its joints and the tool's pose against its mount instead.
+    """
 
     ticks_on_command = True
     rests_from_thread = True
 
-    def __init__(self) -> None:
+    def __init__(self, *, goals: bool = False) -> None:
         """Start the simulation and the renderer.
 
         Raises:
@@ -47,13 +51,15 @@ class MobileManipulator(Robot):
         self.tick_seconds = STEPS_PER_TICK * float(model.opt.timestep)
         self._description = describe(model)
         self._base = BaseDrive()
-        self._arm = ArmDrive(self.simulation)
+        self._arm: ArmDrive | GoalArm = ArmDrive(self.simulation)
+        if goals:
+            self._description = with_goals(self._description)
+            self._arm = GoalArm(self.simulation, self._description)
         self._contacts = ContactSense(model)
         self._ranges = RangeSensors(model)
         self._hearing = Hearing(model)
         self._sound = Sound(MICROPHONE.sample_rate, round(MICROPHONE.sample_rate * SEGMENT_SECONDS))
-        self._rest_values = [0.0] * len(self._description.axes)
-        self._values: Sequence[float] = self._rest_values
+        self._values: Sequence[float] | None = None  # None: at rest
         self._stopped = False  # the base is parked and the arm holds its posture, at any applied value
         self._light = False
         self._battery = SimulatedBattery()
@@ -67,13 +73,18 @@ class MobileManipulator(Robot):
         return self._description
 
     def apply(self, values: Sequence[float]) -> None:
-        self._values = self._rest_values if self._stopped else values
+        self._values = None if self._stopped else values
+
+    def pursue_poses(self, names: Sequence[str]) -> None:
+        if isinstance(self._arm, GoalArm):
+            self._arm.pursues = bool(names)
 
     def tick(self) -> None:
-        data = self.simulation.data
-        self._battery.tick(self.tick_seconds, moving=any(self._values))
-        self._base.drive(data, self._values[BASE])
-        self._arm.drive(self._values[BASE.stop :], self.tick_seconds)
+        data, values = self.simulation.data, self._values
+        base = STILL if values is None else values[BASE]
+        self._battery.tick(self.tick_seconds, moving=any(base) or self._arm.moving)
+        self._base.drive(data, base)
+        self._arm.drive(None if values is None else values[BASE.stop :], self.tick_seconds)
         if not self.simulation.step(STEPS_PER_TICK):
             self._base.release()
             self._arm.release()
@@ -82,9 +93,8 @@ class MobileManipulator(Robot):
 
     def measure(self) -> Measurement:
         simulation = self.simulation
-        axes = np.concatenate((simulation.base_velocity(), simulation.tool_twist()))
         return Measurement(
-            axes=on_wire(axes),
+            axes=on_wire(np.array(self.measured_axes())),
             joints=on_wire(simulation.joints),
             wrench=on_wire(self._contacts.wrench),
             ranges=on_wire(self._ranges.read(simulation.data)),
@@ -92,17 +102,24 @@ class MobileManipulator(Robot):
             faults=self._faults(),
         )
 
+    def measured_axes(self) -> list[float]:
+        return [*self.simulation.base_velocity().tolist(), *self._arm.measured()]
+
+    def goals(self) -> list[float]:
+        return [*STILL, *self._arm.pursued()]
+
     def positions(self) -> Sequence[float]:
         joints: list[float] = self.simulation.joints.tolist()
         return joints
 
-    def joint_rates(self, values: Sequence[float]) -> Sequence[float]:
+    def joint_rates(self, values: Sequence[float]) -> Sequence[float] | None:
         """Return the rates of the arm's joints; the base's rates are left out: no limit by posture needs them."""
-        return [0.0, 0.0, 0.0, *self._arm.rates(values[BASE.stop :])]
+        rates = self._arm.rates(values[BASE.stop :])
+        return None if rates is None else [*STILL, *rates]
 
     def begin_action(self, name: str, parameters: Mapping[str, ParameterValue]) -> ActionRun:
         if name == "home":
-            return Homing(self._arm, self.tick_seconds)
+            return self._arm.home(self.tick_seconds)
         self._light = parameters["on"] is True
         return ActionDone("on" if self._light else "off")
 
@@ -111,16 +128,17 @@ class MobileManipulator(Robot):
         return (self._battery.item(), light)
 
     def rest_from_thread(self) -> None:
-        self._values = self._rest_values
+        self._values = None
         self._arm.stay()
 
     def stop(self) -> None:
         self._stopped = True
         self._arm.stay()
-        self._values = self._rest_values
+        self._values = None
 
     def reset(self) -> None:
         self._stopped = False
+        self._arm.restart()
 
     def sources(self) -> Sequence[MediaSource]:
         return self._sources

@@ -22,8 +22,8 @@ from lockstep.protocol.description import (
     WrenchSensor,
 )
 from lockstep.robot_bridge.robots.ros2.controls import arm_layers, base_layer
+from lockstep.robot_bridge.robots.ros2.joint_axes import SLEW_TIME, brake_for, joint_axes
 from lockstep.robot_bridge.robots.ros2.settings import (
-    Arm,
     ArmJoint,
     Base,
     BaseAxis,
@@ -34,6 +34,7 @@ from lockstep.robot_bridge.robots.ros2.settings import (
     Service,
     Servo,
 )
+from lockstep.robot_bridge.robots.ros2.tool import describe_tool
 from lockstep.robot_bridge.yaml_file import SettingsPlace
 
 __all__ = ["BASE_JOINTS", "GOAL_ACTION", "SERVO_AXES", "describe"]
@@ -44,8 +45,6 @@ FARTHEST: Final = 1e5  # m, of a goal on the map
 BASE_BODY: Final = "base"
 # Four axes are a layer: two sticks move a tool and turn it about its vertical.
 SERVO_AXES: Final = ("tool.x", "tool.y", "tool.z", "tool.rz", "tool.rx", "tool.ry")
-SLEW_TIME: Final = 0.5  # s from rest to full speed unless the settings say otherwise
-BRAKE_SHARE: Final = 0.5  # of `hold`, from full speed to rest
 _COLOUR = (0.25, 0.55, 0.85, 1.0)
 
 
@@ -71,16 +70,20 @@ def describe(settings: Ros2Settings) -> RobotDescription:
         if name in names[:number]:
             raise SettingsPlace(("batteries", number, "name"), f"{name!r} is the name of another battery")
     base_axes = () if base is None else _base_axes(base, settings.hold)
-    arm_axes = () if arm is None else tuple(_arm_axis(arm, number, settings.hold) for number in range(len(arm.joints)))
+    bodies = (() if base is None else (_base_body(base),)) + settings.bodies
+    arm_axes = () if arm is None else joint_axes(arm, settings.hold)
+    tool = None if arm is None or arm.tool is None else describe_tool(arm, bodies, settings.hold)
     if settings.servo is not None:
         arm_axes = _servo_axes(settings.servo, settings.hold)
     layers: tuple[ControlLayer, ...] = ()
     if base is not None:
         layers += (base_layer("base.vx", "base.vy" if base.left else None, "base.wz" if base.turn else None),)
+    if tool is not None:
+        layers += (tool.layer,)
     return RobotDescription(
         name=settings.name,
         label=settings.label or settings.name,
-        axes=base_axes + arm_axes,
+        axes=base_axes + arm_axes + (() if tool is None else tool.axes.all),
         joints=_joints(settings),
         layers=settings.layers or layers + arm_layers(arm_axes),
         cameras=tuple(
@@ -95,7 +98,8 @@ def describe(settings: Ros2Settings) -> RobotDescription:
         ),
         wrench=_wrench(settings),
         ranges=_ranges(settings),
-        bodies=(() if base is None else (_base_body(base),)) + settings.bodies,
+        bodies=bodies + (() if tool is None else (tool.body,)),
+        poses=() if tool is None else (tool.pose,),
         position_limits=() if arm is None else tuple(filter(None, map(_position_limit, arm.joints))),
         planar_base=None if base is None else _planar_base(base),
         geofences=settings.geofences,
@@ -204,20 +208,7 @@ def _base_axis(name: str, label: str, unit: str, axis: BaseAxis, hold: float, ke
         minimum=minimum,
         maximum=axis.maximum,
         slew=axis.slew or fastest / SLEW_TIME,
-        brake=_brake(axis.brake, fastest, hold, ("base", key, "brake")),
-    )
-
-
-def _arm_axis(arm: Arm, number: int, hold: float) -> Axis:
-    joint = arm.joints[number]
-    return Axis(
-        name=f"arm.{joint.name}",
-        label=joint.label or joint.name,
-        unit=f"{joint.unit}/s",
-        minimum=-joint.maximum,
-        maximum=joint.maximum,
-        slew=joint.slew or joint.maximum / SLEW_TIME,
-        brake=_brake(joint.brake, joint.maximum, hold, ("arm", "joints", number, "brake")),
+        brake=brake_for(axis.brake, fastest, hold, ("base", key, "brake")),
     )
 
 
@@ -237,19 +228,10 @@ def _servo_axes(servo: Servo, hold: float) -> tuple[Axis, ...]:
                 minimum=-fastest,
                 maximum=fastest,
                 slew=fastest / SLEW_TIME,
-                brake=_brake(None, fastest, hold, ()),
+                brake=brake_for(None, fastest, hold, ()),
             )
         )
     return tuple(axes)
-
-
-def _brake(brake: float | None, fastest: float, hold: float, keys: tuple[str | int, ...]) -> float:
-    if brake is None:
-        return fastest / (BRAKE_SHARE * hold)
-    if fastest > brake * hold:
-        taken = fastest / brake
-        raise SettingsPlace(keys, f"braking from {fastest:g} would take {taken:.2f} s, longer than hold ({hold:g} s)")
-    return brake
 
 
 def _joints(settings: Ros2Settings) -> tuple[Joint, ...]:

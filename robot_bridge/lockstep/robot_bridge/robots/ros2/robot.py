@@ -12,15 +12,17 @@ from lockstep.robot_bridge.robots.ros2.actions.ros_actions import RosActions
 from lockstep.robot_bridge.robots.ros2.drives.arm_drive import ArmDrive
 from lockstep.robot_bridge.robots.ros2.drives.base_drive import BaseDrive
 from lockstep.robot_bridge.robots.ros2.drives.drive import Drive
+from lockstep.robot_bridge.robots.ros2.drives.goal_arm_drive import GoalArmDrive
 from lockstep.robot_bridge.robots.ros2.drives.servo_drive import ServoDrive
 from lockstep.robot_bridge.robots.ros2.drives.watchdog_rest import REST_CALL, rest_arguments
+from lockstep.robot_bridge.robots.ros2.joint_axes import is_goal_arm
 from lockstep.robot_bridge.robots.ros2.mapping.map_topics import MapReader
 from lockstep.robot_bridge.robots.ros2.ros_side import RosSide
 from lockstep.robot_bridge.robots.ros2.sensing.battery import BatteryTopic
 from lockstep.robot_bridge.robots.ros2.sensing.camera import CameraSource
 from lockstep.robot_bridge.robots.ros2.sensing.diagnostics import DiagnosticsTopic
 from lockstep.robot_bridge.robots.ros2.sensing.sensors import LockoutTopic, RangeSensor, WrenchTopic
-from lockstep.robot_bridge.robots.ros2.settings import Ros2Settings
+from lockstep.robot_bridge.robots.ros2.settings import Arm, Ros2Settings
 
 __all__ = ["Ros2Robot"]
 
@@ -42,7 +44,7 @@ class Ros2Robot(Robot):
         try:
             tick = self.tick_seconds
             base = None if settings.base is None else BaseDrive(self._ros, settings.base, tick)
-            arm = None if settings.arm is None else ArmDrive(self._ros, settings.arm, tick)
+            arm = None if settings.arm is None else self._arm_drive(settings.arm)
             servo = None if settings.servo is None else ServoDrive(self._ros, settings.servo, tick)
             self._drives: list[Drive] = [drive for drive in (base, arm, servo) if drive is not None]
             self._map = None
@@ -74,6 +76,11 @@ class Ros2Robot(Robot):
 
     def describe(self) -> RobotDescription:
         return self._description
+
+    def pursue_poses(self, names: Sequence[str]) -> None:
+        for drive in self._drives:
+            if isinstance(drive, GoalArmDrive):
+                drive.pursues = bool(names)
 
     def apply(self, values: Sequence[float]) -> None:
         start = 0
@@ -126,6 +133,14 @@ class Ros2Robot(Robot):
         now = clock.now()
         return [value for drive in self._drives for value in drive.joints(now)]
 
+    def measured_axes(self) -> Sequence[float]:
+        now = clock.now()
+        return [value for drive in self._drives for value in drive.measured_axes(now)]
+
+    def goals(self) -> Sequence[float]:
+        now = clock.now()
+        return [value for drive in self._drives for value in drive.goals(now)]
+
     def rest_from_thread(self) -> None:
         """rclpy publishes from any thread; a middleware that blocks all of them blocks this one too."""
         call_all([drive.rest_from_thread for drive in self._drives])
@@ -140,6 +155,11 @@ class Ros2Robot(Robot):
 
     def sources(self) -> Sequence[MediaSource]:
         return self._cameras
+
+    def _arm_drive(self, arm: Arm) -> ArmDrive | GoalArmDrive:
+        if is_goal_arm(arm):
+            return GoalArmDrive(self._ros, arm, self._description, self.tick_seconds)
+        return ArmDrive(self._ros, arm, self.tick_seconds)
 
     def close(self) -> None:
         try:

@@ -4,7 +4,7 @@ from typing import Annotated, Literal
 
 from msgspec import Meta, Struct, field
 
-from lockstep.protocol.description import Body, ControlLayer, Geofence
+from lockstep.protocol.description import Body, ControlLayer, Geofence, Vector3
 
 __all__ = [
     "ActionField",
@@ -28,6 +28,7 @@ __all__ = [
     "Service",
     "Servo",
     "ServoStatus",
+    "Tool",
     "TwistCommand",
     "Wrench",
 ]
@@ -80,6 +81,7 @@ class Base(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
 class ArmCommand(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     topic: Topic = "/joint_trajectory_controller/joint_trajectory"
     message: Literal["JointTrajectory", "JointState", "Float64MultiArray"] = "JointTrajectory"
+    interface: Literal["velocity", "position"] = "velocity"  # what the numbers of a Float64MultiArray are
     rate: Rate = 25.0  # Hz
     horizon: Annotated[float, Meta(ge=0.02, le=0.5)] = 0.1  # s ahead that each trajectory ends
     lead: Annotated[float, Meta(gt=0, le=5)] = 0.5  # s at full speed that the setpoint may be ahead of the arm
@@ -102,11 +104,23 @@ class ArmJoint(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     upper: float | None = None
     margin: NotNegative = 0.0
     latency: Annotated[float, Meta(ge=0, le=1)] = 0.1
+    reach: Positive | None = None  # rad or m that a goal may be ahead of the joint; None: 0.5 rad, 0.1 m
+
+
+class Tool(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """A tool that is driven by its pose, through inverse kinematics."""
+
+    tip: Name  # a body, or a link of the URDF
+    point: Vector3 = (0.0, 0.0, 0.0)  # m, of the tool in the tip's frame
+    linear: Positive | None = None  # m/s, the fastest along x, y and z; None: by the arm's length, at most 0.25
+    posture: Annotated[tuple[float, ...], Meta(max_length=64)] = ()  # of the joints, where the tool's rotation is zero
 
 
 class Arm(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """An arm (or gripper, lift …) whose joints are driven by their velocities."""
+    """An arm (or gripper, lift …) whose joints are driven by their velocities, or by goals."""
 
+    goals: bool = False  # each axis is the place where a joint is to be
+    tool: Tool | None = None  # its pose is driven, or the joints' goals
     joints: Annotated[tuple[ArmJoint, ...], Meta(min_length=1, max_length=64)]
     command: ArmCommand = field(default_factory=ArmCommand)
     states: JointStates = field(default_factory=JointStates)
@@ -313,5 +327,6 @@ class Ros2Settings(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
     map: MapTopics | None = None  # needs a base
     cameras: Annotated[tuple[CameraTopic, ...], Meta(max_length=8)] = ()
     geofences: Annotated[tuple[Geofence, ...], Meta(max_length=32)] = ()
+    urdf: Annotated[str, Meta(max_length=1000)] = ""  # a file, beside this one; gives `bodies` and limits of joints
     bodies: tuple[Body, ...] = ()  # of the kinematic model, besides the base
     layers: tuple[ControlLayer, ...] = ()  # replace those that are made for the axes

@@ -23,10 +23,14 @@ class GoTo(ActionRun):
         joints: Callable[[], Sequence[float]],
         tick: float,
         text: str,
+        rest: Sequence[float | None] = (),
     ) -> None:
-        """`goals`: rad, by number of axis. `axes`: their count. `joints`: measured. `tick`: s between two steps."""
+        """`goals`: rad, by number of axis. `axes`: their count. `joints`: measured. `tick`: s between two steps.
+
+        `rest`: what the other axes get, if not all of them are goal axes.
+        """
         self._goals = dict(goals)
-        self._axes = axes
+        self._rest = tuple(rest) or (None,) * axes
         self._joints = joints
         self._tick = tick
         self._text = text
@@ -55,4 +59,4 @@ class GoTo(ActionRun):
         return [abs(goal - joints[number]) for number, goal in self._goals.items()]
 
     def _values(self) -> list[float | None]:
-        return [self._goals.get(number) for number in range(self._axes)]
+        return [self._goals.get(number, rest) for number, rest in enumerate(self._rest)]

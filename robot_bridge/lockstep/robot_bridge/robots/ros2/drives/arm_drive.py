@@ -6,13 +6,19 @@ from lockstep.robot_bridge.control import clock
 from lockstep.robot_bridge.robots.ros2.drives.command_stream import Said
 from lockstep.robot_bridge.robots.ros2.drives.drive import Drive, Sensed
 from lockstep.robot_bridge.robots.ros2.drives.joint_feedback import JointFeedback
+from lockstep.robot_bridge.robots.ros2.drives.position_messages import PositionMessages
 from lockstep.robot_bridge.robots.ros2.drives.setpoints import Setpoints
 from lockstep.robot_bridge.robots.ros2.ros_side import RosSide
-from lockstep.robot_bridge.robots.ros2.settings import Arm
+from lockstep.robot_bridge.robots.ros2.settings import Arm, ArmCommand
 
-__all__ = ["PACKAGES", "ArmDrive", "velocities_message"]
+__all__ = ["PACKAGES", "ArmDrive", "takes_velocities", "velocities_message"]
 
 PACKAGES = {"JointTrajectory": "trajectory_msgs", "JointState": "sensor_msgs", "Float64MultiArray": "std_msgs"}
+
+
+def takes_velocities(command: ArmCommand) -> bool:
+    """Return whether the controller takes velocities, and so goes on until it gets zeros."""
+    return command.message == "Float64MultiArray" and command.interface == "velocity"
 
 
 def velocities_message(kind: Any, values: list[float]) -> Any:
@@ -38,8 +44,8 @@ class ArmDrive(Drive):
         self._setpoints = Setpoints([joint.maximum * command.lead for joint in settings.joints])
         self._moving = False
         self._feedback = JointFeedback(ros, settings.states, self._names)
-        makers = {"JointTrajectory": self._trajectory, "JointState": self._joint_state}
-        self._make = makers.get(command.message, self._velocities)
+        self._messages = PositionMessages(ros, command, self._names, kind)
+        self._takes_velocities = takes_velocities(command)
 
     def seen(self, now: float) -> bool:
         return self._feedback.is_complete(now)
@@ -55,7 +61,9 @@ class ArmDrive(Drive):
         self._moving = moving
         if said is Said.NOTHING:
             return None
-        return self._make(said, values)
+        if self._takes_velocities:
+            return velocities_message(self._kind, values)
+        return self._messages.make(self._points(said, values), values)
 
     def sense(self, now: float) -> Sensed:
         known = self._feedback.known(now)
@@ -67,27 +75,6 @@ class ArmDrive(Drive):
 
     def sensor_faults(self, now: float) -> list[str]:
         return self._feedback.faults(now)
-
-    def _trajectory(self, said: Said, values: list[float]) -> Any:
-        """Return a trajectory of positions alone: controllers refuse one that ends with a velocity."""
-        message = self._kind()
-        message.joint_names = self._names
-        point = self._ros.message("trajectory_msgs", "JointTrajectoryPoint")()
-        point.positions = self._points(said, values)
-        point.time_from_start = self._ros.span_message(self._horizon)
-        message.points = [point]
-        return message
-
-    def _joint_state(self, said: Said, values: list[float]) -> Any:
-        message = self._kind()
-        message.header.stamp = self._ros.now_message()
-        message.name = self._names
-        message.position = self._points(said, values)
-        message.velocity = values
-        return message
-
-    def _velocities(self, said: Said, values: list[float]) -> Any:
-        return velocities_message(self._kind, values)
 
     def _points(self, said: Said, values: list[float]) -> list[float]:
         return self._setpoints.points if said is Said.ZERO else self._setpoints.ahead(values, self._horizon)

@@ -1,5 +1,6 @@
 """The common base of the parts of a ROS 2 robot that take commands."""
 
+import math
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from typing import Any, NamedTuple
@@ -45,11 +46,28 @@ class Drive(ABC):
     def step(self, values: Sequence[float], dt: float) -> None:
         """Run one tick with these values."""
         now = clock.now()
-        if now - self._looked >= LOOK_INTERVAL:
-            self._heard, self._looked = self._publisher.get_subscription_count() > 0, now
-        lost = self._stopped or not (self._heard and self.seen(now))
+        lost = self.lost(now)
         step = self._stream.step(values, lost, now)
         self._say(step.said, step.values, dt)
+
+    def lost(self, now: float) -> bool:
+        """Look whether a node listens; return whether the part must not move."""
+        if now - self._looked >= LOOK_INTERVAL:
+            self._heard, self._looked = self._publisher.get_subscription_count() > 0, now
+        return self._stopped or not (self._heard and self.seen(now))
+
+    @property
+    def withheld(self) -> bool:
+        """True if values are kept from the robot because its side was lost."""
+        return self._stream.withheld
+
+    def goals(self, now: float) -> list[float]:
+        """Return the goal that each axis pursues; NaN for one that has none."""
+        return [math.nan] * self.size
+
+    def measured_axes(self, now: float) -> list[float]:
+        """Return the measured value of each axis now; cheaper than `sense` where that matters."""
+        return self.sense(now).axes
 
     def end(self) -> None:
         """Publish zero if the last message was another, because the bridge closes."""

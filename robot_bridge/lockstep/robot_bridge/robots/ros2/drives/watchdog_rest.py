@@ -11,7 +11,7 @@ from typing import Any
 import msgspec
 
 from lockstep.robot_bridge.robots.ros2.description import SERVO_AXES
-from lockstep.robot_bridge.robots.ros2.drives.arm_drive import PACKAGES, velocities_message
+from lockstep.robot_bridge.robots.ros2.drives.arm_drive import PACKAGES, takes_velocities, velocities_message
 from lockstep.robot_bridge.robots.ros2.drives.servo_drive import tool_twist
 from lockstep.robot_bridge.robots.ros2.drives.twists import TwistMaker
 from lockstep.robot_bridge.robots.ros2.ros_side import RosSide
@@ -48,7 +48,7 @@ def rest_arguments(
     )
     if settings.base is not None and base is not None:
         own = replace(own, base=replace(settings.base, command=replace(settings.base.command, topic=base)))
-    if settings.arm is not None and arm is not None and settings.arm.command.message == "Float64MultiArray":
+    if settings.arm is not None and arm is not None and takes_velocities(settings.arm.command):
         own = replace(own, arm=replace(settings.arm, command=replace(settings.arm.command, topic=arm)))
     if settings.servo is not None and servo is not None:
         command = replace(settings.servo.command, topic=servo)

@@ -1,0 +1,1 @@
+"""Tools of a model that are driven by their pose."""

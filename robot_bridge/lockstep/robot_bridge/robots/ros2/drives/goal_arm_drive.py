@@ -1,0 +1,138 @@
+"""Drives an arm to the goals of its joints, or its tool to a pose, by the positions that its controller takes."""
+
+from collections.abc import Sequence
+from typing import Any, Final
+
+from lockstep.protocol.description import RobotDescription
+from lockstep.robot_bridge.control import clock
+from lockstep.robot_bridge.robots.ros2.arm_goals import ArmGoals
+from lockstep.robot_bridge.robots.ros2.drives.arm_drive import PACKAGES
+from lockstep.robot_bridge.robots.ros2.drives.command_stream import Said
+from lockstep.robot_bridge.robots.ros2.drives.drive import Drive, Sensed
+from lockstep.robot_bridge.robots.ros2.drives.joint_feedback import JointFeedback
+from lockstep.robot_bridge.robots.ros2.drives.position_messages import PositionMessages
+from lockstep.robot_bridge.robots.ros2.ros_side import RosSide
+from lockstep.robot_bridge.robots.ros2.settings import Arm
+
+__all__ = ["GoalArmDrive"]
+
+QUIET: Final = 0.5  # s without a word, after which the arm is looked at: something else may have moved it
+SAME: Final = 1e-9  # rad or m
+
+
+class GoalArmDrive(Drive):
+    """An arm whose axes are the places of its joints, and the pose of its tool.
+
+    While the joints' goals move they are published ahead by the horizon; when they stand still, once more as they are.
+    """
+
+    def __init__(self, ros: RosSide, settings: Arm, description: RobotDescription, tick_seconds: float) -> None:
+        command = settings.command
+        kind = ros.message(PACKAGES[command.message], command.message)
+        count = len(settings.joints)
+        size = count + sum(len((*pose.position, *pose.rotation)) for pose in description.poses)
+        super().__init__(ros, kind, command.topic, command.rate, size, tick_seconds)
+        self._settings = settings
+        self._described = description
+        self._joints = count
+        self._leads = [joint.maximum * command.lead for joint in settings.joints]
+        self._feedback = JointFeedback(ros, settings.states, [joint.name for joint in settings.joints])
+        self._messages = PositionMessages(ros, command, [joint.name for joint in settings.joints], kind)
+        self._goals: ArmGoals | None = None  # until the arm was measured
+        self._before: list[float] = []  # values of the tick before
+        self._ticked_at: float | None = None  # s
+        self._spoke_at = float("-inf")  # s, when a joint's goal moved last
+        self.pursues = False  # a command drives the tool
+
+    def seen(self, now: float) -> bool:
+        return self._feedback.is_complete(now)
+
+    def step(self, values: Sequence[float], dt: float) -> None:
+        now = clock.now()
+        since = dt if self._ticked_at is None else now - self._ticked_at
+        self._ticked_at = now
+        changed = any(abs(a - b) > SAME for a, b in zip(values, self._before, strict=False))
+        self._before = list(values)
+        lost = self.lost(now)
+        held = lost or self.withheld
+        rates = self._advance(values, dt, since, now, held)
+        if held and changed:  # goals that move have to end before the arm is driven again; nothing of this is published
+            rates = [1.0] * self.size
+        step = self._stream.step(rates, lost, now)
+        self._say(step.said, step.values, dt)
+
+    def advance(self, said: Said, values: list[float], dt: float) -> Any:
+        if said is Said.NOTHING or self._goals is None:
+            return None
+        rates = values[: self._joints]
+        return self._messages.make(self._points(rates if said is Said.VALUES else [0.0] * self._joints), rates)
+
+    def stop(self) -> None:
+        if self._goals is not None:
+            self._goals.hold()
+        super().stop()
+
+    def reset(self) -> None:
+        super().reset()
+        if self._goals is not None:
+            self._goals.restart()
+
+    def rest_from_thread(self) -> None:
+        if self._goals is not None:
+            self._goals.hold()
+        super().rest_from_thread()
+
+    def sense(self, now: float) -> Sensed:
+        known = self._feedback.known(now)
+        positions = [joint.position for joint in known]
+        return Sensed(self.measured_axes(now), positions, self._feedback.is_still(known))
+
+    def measured_axes(self, now: float) -> list[float]:
+        """Return where the joints and the tool are; NaN where that is not known."""
+        if not self._begun(now) or self._goals is None or not self.seen(now):
+            joints = self.joints(now)
+            return [*joints, *[float("nan")] * (self.size - len(joints))]
+        return self._goals.measured_axes(self.joints(now))
+
+    def goals(self, now: float) -> list[float]:
+        """Return the goal of each axis; where the arm is before the first motion."""
+        return self._goals.pursued() if self._begun(now) and self._goals is not None else self.measured_axes(now)
+
+    def joints(self, now: float) -> list[float]:
+        return [joint.position for joint in self._feedback.known(now)]
+
+    def sensor_faults(self, now: float) -> list[str]:
+        return self._feedback.faults(now) + ([] if self._goals is None else self._goals.faults)
+
+    def _begun(self, now: float) -> bool:
+        """Begin where the arm is measured first. Return whether it was."""
+        if self._goals is None and self.seen(now):
+            self._goals = ArmGoals(self._settings, self._described, self.joints(now))
+        return self._goals is not None
+
+    def _advance(self, values: Sequence[float], dt: float, since: float, now: float, held: bool) -> list[float]:
+        """Let a tick pass; return the joints' rates, and nought for each axis of the tool."""
+        still = [0.0] * self.size
+        if not self._begun(now) or self._goals is None:
+            return still
+        if held:
+            self._goals.hold()
+            return still
+        measured = self.joints(now)
+        if now - self._spoke_at > QUIET:
+            self._goals.take_up(measured)
+        rates = self._goals.drive(values, dt, since, measured, self.pursues)
+        if any(rates):
+            self._spoke_at = now
+        still[: len(rates)] = rates
+        return still
+
+    def _points(self, rates: Sequence[float]) -> list[float]:
+        """Return the positions to publish, which never run far ahead of a joint that is blocked."""
+        goals = [] if self._goals is None else self._goals.goals
+        measured = self.joints(clock.now())
+        horizon = self._settings.command.horizon
+        return [
+            goal + rate * horizon if place != place else min(max(goal + rate * horizon, place - lead), place + lead)
+            for goal, rate, place, lead in zip(goals, rates, measured, self._leads, strict=True)
+        ]

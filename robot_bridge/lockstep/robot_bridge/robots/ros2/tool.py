@@ -1,0 +1,116 @@
+"""Makes the pose of an arm's tool from the settings: its axes, its body, and the inverse kinematics."""
+
+import math
+from collections.abc import Sequence
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from lockstep.protocol.description import Body, ControlLayer, Pose, RobotDescription
+from lockstep.robot_bridge.kinematics.body_capsules import body_capsules
+from lockstep.robot_bridge.kinematics.capsules import separate_pairs
+from lockstep.robot_bridge.kinematics.chain import Chain, NoChain
+from lockstep.robot_bridge.kinematics.clearance import Clearance
+from lockstep.robot_bridge.kinematics.pose_solver import JointBounds
+from lockstep.robot_bridge.kinematics.rotations import quaternion
+from lockstep.robot_bridge.robots.ros2.settings import Arm
+from lockstep.robot_bridge.robots.tool_pose.axes import ToolAxes, shortest_hold, tool_axes, tool_layer
+from lockstep.robot_bridge.robots.tool_pose.posed_tool import PosedTool, ToolPlace, tool_pose
+from lockstep.robot_bridge.robots.tool_pose.solver import tool_solver
+from lockstep.robot_bridge.yaml_file import SettingsPlace
+
+__all__ = ["ToolDescription", "arm_tool", "describe_tool"]
+
+NAME: Final = "tool"
+FEWEST: Final = 3  # joints
+KEYS: Final = ("arm", "tool")
+
+
+class ToolDescription(NamedTuple):
+    """What a tool adds to the robot's description."""
+
+    axes: ToolAxes
+    body: Body
+    pose: Pose
+    layer: ControlLayer
+
+
+def describe_tool(arm: Arm, bodies: Sequence[Body], hold: float) -> ToolDescription:
+    """Return the tool's part of the description. `bodies`: of the robot.
+
+    Raises:
+        SettingsPlace: the tool has no chain of joints, or the settings contradict each other.
+    """
+    tool = arm.tool
+    if tool is None:
+        raise ValueError("the arm has no tool")
+    if hold < shortest_hold():
+        raise SettingsPlace((*KEYS, "tip"), f"a tool needs a hold of {shortest_hold():g} s at least, not {hold:g} s")
+    joints = {joint.name: number for number, joint in enumerate(arm.joints)}
+    base = _base(bodies, tool.tip, set(joints))
+    try:
+        chain = Chain(bodies, tool.tip, base)
+    except NoChain as error:
+        raise SettingsPlace((*KEYS, "tip"), str(error)) from error
+    if len(chain.joints) < FEWEST:
+        found = f"between {tool.tip} and {base or 'the world'} are {len(chain.joints)} joints of the arm"
+        raise SettingsPlace(
+            (*KEYS, "tip"),
+            f"{found}; a pose needs {FEWEST}",
+        )
+    if tool.posture and len(tool.posture) != len(arm.joints):
+        raise SettingsPlace((*KEYS, "posture"), f"needs one value for each of the {len(arm.joints)} joints of the arm")
+    turn = np.eye(3)
+    if tool.posture:
+        turn = chain.at([tool.posture[joints[name]] for name in chain.joints]).rotation.T
+    body = Body(name=f"{tool.tip}.tool", parent=tool.tip, position=tool.point, orientation=quaternion(turn))
+    chain = Chain((*bodies, body), body.name, base)
+    axes = tool_axes(NAME, "Tool", chain.begins.tolist(), chain.length, tool.linear)
+    pose = tool_pose(NAME, "Tool", body.name, axes, [f"arm.{name}" for name in chain.joints], base)
+    return ToolDescription(axes, body, pose, tool_layer(NAME, "Tool", axes.names))
+
+
+def arm_tool(arm: Arm, description: RobotDescription, measured: Sequence[float]) -> PosedTool:
+    """Return the drive of the tool. Its values are numbered within the arm's axes. `measured`: of the arm's joints."""
+    (pose,) = description.poses
+    axes = {axis.name: axis for axis in description.axes}
+    base = _base(description.bodies, pose.body, {joint.name for joint in arm.joints})
+    chain = Chain(description.bodies, pose.body, base)
+    numbers = {joint.name: number for number, joint in enumerate(arm.joints)}
+    places = tuple(numbers[name] for name in chain.joints)
+    joints = [axes[f"arm.{name}"] for name in chain.joints]
+    bounds = JointBounds(
+        lower=tuple(-math.inf if axis.wrap else axis.minimum for axis in joints),
+        upper=tuple(math.inf if axis.wrap else axis.maximum for axis in joints),
+        rates=tuple(arm.joints[number].maximum for number in places),
+    )
+    posture = [measured[number] for number in places]
+    given = arm.tool.posture if arm.tool is not None else ()
+    home = [given[number] for number in places] if given else None
+    capsules = body_capsules([body for body in description.bodies if chain.has(body.name)])
+    pairs = separate_pairs(chain, capsules, home or posture)
+    return PosedTool(
+        pose.name,
+        ToolPlace(places, tuple(range(len(arm.joints), len(arm.joints) + 6))),
+        chain,
+        tool_solver(
+            chain,
+            bounds,
+            ToolAxes(tuple(axes[name] for name in pose.position), tuple(axes[name] for name in pose.rotation)),
+            clearance=Clearance(chain, capsules, pairs) if pairs else None,
+            posture=home,
+        ),
+        bounds.rates,
+        posture,
+    )
+
+
+def _base(bodies: Sequence[Body], tip: str, joints: set[str]) -> str:
+    """Return the body on which the arm stands: the nearest one above that another joint moves; "": the world."""
+    known = {body.name: body for body in bodies}
+    name, seen = tip, 0
+    while (body := known.get(name)) is not None and seen <= len(known):
+        if any(joint.joint not in joints for joint in body.joints):
+            return name
+        name, seen = body.parent, seen + 1
+    return ""

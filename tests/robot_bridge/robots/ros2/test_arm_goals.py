@@ -1,0 +1,106 @@
+"""The joints' goals of an arm behind ROS 2, through the bridge's shaping of goals, in simulated time."""
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from lockstep.robot_bridge.control.limits.axis_shaper import AxisShaper
+from lockstep.robot_bridge.robots.ros2 import read_settings
+from lockstep.robot_bridge.robots.ros2.arm_goals import MOVED, ArmGoals
+from tests.robot_bridge.robots.ros2.test_tool_settings import JOINTS, POSTURE
+from tests.robot_bridge.robots.ros2.test_tool_settings import settings as written
+
+TICK, EVENT = 0.01, 0.04  # s
+START = [0.0, -1.0, 1.0, 0.0, 0.5, 0.0]
+NAMES = [f"arm.{name}" for name in JOINTS]
+
+
+class World:
+    """The arm is where its goals are, but for `offset`."""
+
+    def __init__(self, directory: Path) -> None:
+        path = written(directory, f"  tool: {{tip: wrist_3, posture: {POSTURE}}}\n")
+        found, self.description = read_settings(path)
+        assert found.arm is not None
+        self.arm = found.arm
+        self.goals = ArmGoals(found.arm, self.description, START)
+        self.names = [axis.name for axis in self.description.axes]
+        self._shaper = AxisShaper(
+            self.description.axes,
+            hold=self.description.hold,
+            poses=self.description.poses,
+            pursued=self.goals.pursued,
+        )
+        self._shaper.begin(self.goals.pursued(), self.goals.pursued())
+        self._now = 0.0
+        self.way = [list(START)]
+
+    def command(self, values: Mapping[str, float], events: int = 1) -> None:
+        for _ in range(events):
+            self._shaper.drive([values.get(name) for name in self.names], self._now)
+            self.wait(EVENT)
+
+    def wait(self, seconds: float) -> None:
+        for _ in range(round(seconds / TICK)):
+            values, before = self._shaper.step(self._now, TICK), list(self.goals.goals)
+            rates = self.goals.drive(values, TICK, TICK, before, False)
+            assert self.goals.goals == pytest.approx(np.add(before, np.multiply(rates, TICK)).tolist(), abs=1e-9)
+            self.way.append(list(self.goals.goals))
+            self._now += TICK
+
+    def at(self, name: str) -> float:
+        return self.goals.pursued()[self.names.index(name)]
+
+
+@pytest.fixture(scope="module")
+def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("arm")
+
+
+ways = st.tuples(*[st.floats(-0.4, 0.4)] * 3, *[st.floats(-2.0, 2.0)] * 3)
+
+
+@pytest.mark.slow
+@settings(max_examples=10, deadline=None)
+@given(way=ways, joint=st.integers(0, 5), events=st.integers(1, 20))
+def test_tool_and_joints_in_turn_keep_rates_and_ranges_and_rest_within_hold(
+    place: Path, way: tuple[float, ...], joint: int, events: int
+) -> None:
+    world = World(place)
+    axes = ("tool.x", "tool.y", "tool.z", "tool.rx", "tool.ry", "tool.rz")
+    world.command({name: world.at(name) + step for name, step in zip(axes, way, strict=True)}, events)
+    world.command({NAMES[joint]: world.at(NAMES[joint]) + 0.3}, events)
+    world.wait(world.description.hold)
+    rest = list(world.goals.goals)
+    world.wait(0.2)
+    assert world.goals.goals == rest
+    steps = np.abs(np.diff(np.array(world.way), axis=0))
+    assert (steps <= np.array([each.maximum for each in world.arm.joints]) * TICK + 1e-9).all()
+    for each, places in zip(world.arm.joints, np.array(world.way).T, strict=True):
+        if each.lower is not None and each.upper is not None:
+            assert each.lower <= places.min()
+            assert places.max() <= each.upper
+
+
+def test_an_arm_that_something_else_moved_goes_on_from_where_it_is(place: Path) -> None:
+    world = World(place)
+    near, away = [value + 0.9 * MOVED for value in START], [value + 0.3 for value in START]
+    world.goals.take_up(near)
+    assert world.goals.goals == START  # a load that pulls it down does not move its goal
+    world.goals.take_up(away)
+    assert world.goals.goals == away
+    world.command({"tool.z": world.at("tool.z") - 0.05}, 5)
+    assert world.way[1] == pytest.approx(away)
+
+
+def test_after_a_restart_the_next_values_move_nothing(place: Path) -> None:
+    world = World(place)
+    world.command({NAMES[0]: 0.4}, 5)
+    world.goals.restart()
+    held = list(world.goals.goals)
+    assert not any(world.goals.drive([1.0] * 12, TICK, TICK, held, False))
+    assert world.goals.goals == held
