@@ -13,6 +13,7 @@ import pytest_asyncio
 from lockstep.client import Console
 from lockstep.server.recording.export import export_lerobot
 from lockstep.server.recording.export.export_lerobot import DatasetOptions
+from lockstep.server.recording.export.lerobot_layout import LayoutChoice
 from lockstep.server.recording.verify.verify_dataset import verify_dataset
 from tests.lerobot.commands import ROOT, environment, lerobot_python, run_lerobot
 from tests.lerobot.sessions import PATIENCE, drive, following, recorded_stack, so101_joints, so101_tool
@@ -162,7 +163,7 @@ async def test_a_robot_of_rates_trains_too(tmp_path: Path) -> None:
         await console.episodes.start("drive on")
         await drive(console, lambda seconds, at: {console.description.axes[0].name: 0.2}, 3.0)
         await console.episodes.success()
-    choice = export_lerobot.LayoutChoice(axes=["base.vx"], extras=["ranges"])
+    choice = LayoutChoice(axes=["base.vx"], extras=["ranges"])
     options = DatasetOptions(fps=FPS, layout=choice)
     (root,) = export_lerobot.export_all(sorted(recordings.glob("*.mcap")), tmp_path / "dataset", options)
     assert verify_dataset(root, pixels=True).ok
