@@ -3,6 +3,7 @@
 import asyncio
 import json
 import os
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -11,11 +12,17 @@ import pytest
 import pytest_asyncio
 
 from lockstep.client import Console
+from lockstep.server.recording.dataset import appending
+from lockstep.server.recording.dataset.commit import commit
 from lockstep.server.recording.export import export_lerobot
 from lockstep.server.recording.export.export_lerobot import DatasetOptions
+from lockstep.server.recording.export.lerobot_layout import LayoutChoice
 from lockstep.server.recording.verify.verify_dataset import verify_dataset
 from tests.lerobot.commands import ROOT, environment, lerobot_python, run_lerobot
 from tests.lerobot.sessions import PATIENCE, drive, following, recorded_stack, so101_joints, so101_tool
+from tests.server.recording.dataset.growing_file import GrowingFile
+from tests.server.recording.dataset.test_appending import FILES, Killed, follower, killed_after
+from tests.server.recording.test_episode_export import KEPT_AND_NOT
 
 pytestmark = [pytest.mark.long, pytest.mark.timeout(900)]
 
@@ -162,7 +169,7 @@ async def test_a_robot_of_rates_trains_too(tmp_path: Path) -> None:
         await console.episodes.start("drive on")
         await drive(console, lambda seconds, at: {console.description.axes[0].name: 0.2}, 3.0)
         await console.episodes.success()
-    choice = export_lerobot.LayoutChoice(axes=["base.vx"], extras=["ranges"])
+    choice = LayoutChoice(axes=["base.vx"], extras=["ranges"])
     options = DatasetOptions(fps=FPS, layout=choice)
     (root,) = export_lerobot.export_all(sorted(recordings.glob("*.mcap")), tmp_path / "dataset", options)
     assert verify_dataset(root, pixels=True).ok
@@ -174,3 +181,21 @@ async def test_a_robot_of_rates_trains_too(tmp_path: Path) -> None:
         patience=600,
     )
     assert "End of training" in said
+
+
+async def test_lerobot_reads_whole_episodes_alone_after_any_step_of_an_append_that_was_cut_short(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    roots = []
+    for steps in range(FILES + 1):
+        root, file = tmp_path / f"dataset{steps}", GrowingFile(tmp_path / f"{steps}.mcap", KEPT_AND_NOT)
+        file.write_until(44)
+        following = follower(root)
+        assert following.look([file.path]) == 1
+        file.write_until(100)
+        with monkeypatch.context() as patch, suppress(Killed):
+            patch.setattr(appending, "commit", lambda place, files, n=steps: commit(place, files, killed_after(n)))
+            following.look([file.path])
+        roots.append(root)
+    first, whole = [*range(10, 20)], [*range(10, 20), *range(45, 60)]
+    assert (await used(tmp_path, "count", *roots))["events"] == [*[first] * FILES, whole]

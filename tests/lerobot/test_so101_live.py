@@ -98,9 +98,9 @@ async def test_a_stop_takes_the_torque_where_the_settings_say_so_and_a_reset_doe
         await console.take_seat()
         await console.stop()
         async with asyncio.timeout(PATIENCE):
-            while bus.place(2) > 1500:  # noqa: ASYNC110
+            # It may have sunk that far already while LeRobot configured it on a busy machine.
+            while has_torque(bus) or bus.place(2) > 1500:  # noqa: ASYNC110
                 await asyncio.sleep(0.05)
-        assert not has_torque(bus)
         await asyncio.sleep(1.0)  # the bridge takes no reset within a second
         await console.reset()
         fallen = bus.place(2)

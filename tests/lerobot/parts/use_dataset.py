@@ -79,7 +79,20 @@ def merge(out: Path, roots: list[Path]) -> dict[str, Any]:
     }
 
 
+def count(roots: list[Path]) -> dict[str, Any]:
+    """The events of all rows of each dataset, every row read with its pictures."""
+    found = []
+    for number, root in enumerate(roots):
+        dataset = LeRobotDataset(f"tests/count{number}", root=root, video_backend=BACKEND)
+        rows = [dataset[place] for place in range(len(dataset))]
+        found.append([int(row["lockstep.event"]) for row in rows])
+    return {"events": found}
+
+
 if __name__ == "__main__":
     command, *paths = sys.argv[1:]
     given = [Path(path) for path in paths]
-    print(json.dumps(load(*given) if command == "load" else merge(given[0], given[1:])))
+    if command == "load":
+        print(json.dumps(load(*given)))
+    else:
+        print(json.dumps(count(given) if command == "count" else merge(given[0], given[1:])))

@@ -71,9 +71,9 @@ def fit(trajectory: Trajectory, description: RobotDescription) -> FittedTrajecto
         if unit != axis.unit:
             raise ReplayUnfit(f"{name} was recorded in {unit}, and {axis.name} of this robot is in {axis.unit}")
     measured = {
-        place: axis.name
+        place: shown.name
         for place, name in enumerate(trajectory.state_names)
-        if (axis := _found(name, axes)) is not None and axis.kind == "goal" and axis in driven
+        if (shown := _found(name, axes)) is not None and shown.kind == "goal" and shown in driven
     }
     rows = []
     for number, action in enumerate(trajectory.actions):
@@ -81,8 +81,8 @@ def fit(trajectory: Trajectory, description: RobotDescription) -> FittedTrajecto
         for axis in driven:
             _check(axis, values[axis.name], number)
         state = trajectory.states[number] if trajectory.states else ()
-        shown = {name: state[place] for place, name in measured.items() if place < len(state)}
-        rows.append(Row(trajectory.times[number] - trajectory.times[0], values, shown))
+        places = {name: state[place] for place, name in measured.items() if place < len(state)}
+        rows.append(Row(trajectory.times[number] - trajectory.times[0], values, places))
     return FittedTrajectory(rows, {axis.name: axis for axis in driven})
 
 
