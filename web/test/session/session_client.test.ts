@@ -154,11 +154,9 @@ describe("a page while a policy drives", () => {
   });
 
   it("does not take back a seat that it has offered to a policy", () => {
-    const { desk, told, connect, seat } = rig();
+    const { told, connect, seat } = rig();
     connect("operator");
     seat({ holder: "me", kind: "human" });
-    desk.offer("net", true);
-    expect(told.at(-1)).toEqual({ type: "seat_offer", peer: "net", offered: true });
     told.length = 0;
     seat({ holder: "", why: "offered", offered: true });
     connect("operator");
