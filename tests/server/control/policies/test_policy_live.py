@@ -322,11 +322,17 @@ async def test_a_moving_action_ends_before_a_policy_drives_and_none_runs_while_i
         await person.drive([0.0, 0.0, 0.0])
         for _ in range(3):
             await person.drive([0.3, 0.0, 0.0])
-        person.send("session", Act(id="h", name="home", nonce=person.newest_feedback().nonce))
-        await person.until(lambda each: isinstance(each, ActionUpdate) and each.id == "h")
+        begun, number = False, 0
+        while not begun:  # a busy machine may hold the robot up: then a neutral command comes first again
+            number += 1
+            await person.drive([0.0, 0.0, 0.0])
+            person.send("session", Act(id=f"h{number}", name="home", nonce=person.newest_feedback().nonce))
+            said = await person.until(
+                lambda each, id=f"h{number}": isinstance(each, ActionUpdate) and each.id == id  # type: ignore[misc]
+            )
+            begun = isinstance(said, ActionUpdate) and said.state != "refused"
         person.send("session", SeatOffer())
-        ended = await person.until(lambda each: isinstance(each, ActionUpdate) and each.state in ("cancelled", "done"))
-        assert isinstance(ended, ActionUpdate)
+        await person.until(lambda each: isinstance(each, ActionUpdate) and each.state in ("cancelled", "done"))
         policy.send("session", SeatRequest(only_if_free=True))
         await _seat(policy, holder=await _id(policy))
         person.send("session", Act(id="i", name="home", nonce=person.newest_feedback().nonce))
