@@ -41,6 +41,7 @@ from lockstep.protocol.messages import (
 from lockstep.protocol.traces.trace_messages import TraceReport, TraceRequest, Traces
 
 __all__ = [
+    "PEOPLE",
     "ClientMessage",
     "DriverKind",
     "Note",
@@ -87,6 +88,7 @@ __all__ = [
 
 # "policy": a program that may drive when a person offers it the seat (docs/policies.md).
 Role = Literal["operator", "observer", "supervisor", "policy"]
+PEOPLE: frozenset[Role] = frozenset({"operator", "supervisor"})  # roles of people who may drive
 DriverKind = Literal["none", "human", "policy"]  # of whoever drives; by the role of the link, never by a name
 ShadowJudgement = Literal["in_time", "late", "unseen", "wrong_size", "not_a_number", "out_of_limits"]
 SpeedCapMode = Literal["on", "off", "operator"]  # the console's setting; "operator": as the holder of the seat wants

@@ -209,6 +209,9 @@ class SeatMachine(RuleBasedStateMachine):
         self.clock.observe(feedback, self.now)
         self.arbiter.feedback(feedback)
 
+    def last_sender(self) -> str | None:
+        return self.sent[-1][0]
+
     @invariant()
     def a_policy_drives_only_while_a_person_lets_it(self) -> None:
         if not hasattr(self, "seat"):
@@ -278,13 +281,13 @@ def test_a_policy_gets_no_seat_by_itself_and_loses_it_to_one_press() -> None:
     machine.request("p", only_if_free=True)
     for value in (0.5, 0.0, 0.5):
         machine.command("p", value, answered=True)
-    assert machine.sent[-1][0] == "p"
+    assert machine.last_sender() == "p"
     machine.request("b", only_if_free=False)
     assert (machine.seat.holder, machine.seat.why) == ("b", "taken")
-    assert machine.sent[-1][0] is None, "the robot rests"
+    assert machine.last_sender() is None, "the robot rests"
     machine.command("p", 0.5, answered=True)
     machine.command("b", 0.5, answered=True)
-    assert machine.sent[-1][0] is None, "the policy has no seat, and the person has to arm"
+    assert machine.last_sender() is None, "the policy has no seat, and the person has to arm"
     machine.request("p", only_if_free=True)
     machine.leave("b", gone=False)
     machine.request("p", only_if_free=True)

@@ -31,14 +31,11 @@ function changeWords(giver: string, taker: string, fromMe: boolean, after: Seat)
 }
 
 function leaveWords(why: string, wasMe: boolean): string {
-  if (why === "stopped") return wasMe ? "were stopped" : "was stopped";
-  if (why === "nobody attends") return "drove with nobody to take over";
-  if (why === "offer withdrawn") return "was told to stop driving";
-  if (why === "robot link lost") return "lost the robot";
   if (why === "disconnected") return "left";
   if (why === "heartbeat lost") return "fell silent";
   if (why === "idle") return wasMe ? "were idle" : "was idle";
-  return wasMe ? "no longer drive" : "no longer drives";
+  const words = wasMe ? "no longer drive" : "no longer drives";
+  return why === "" ? words : `${words} (${why})`;
 }
 
 function nameOf(name: string): string {

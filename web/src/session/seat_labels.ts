@@ -72,7 +72,7 @@ function holderWords(view: SeatView): SeatLabels {
 }
 
 function freeWords(role: Role | null): string {
-  if (!mayTake(role)) return "You watch, and may stop the robot at any time";
+  if (role === "observer") return "You watch, and may stop the robot at any time";
   return "The control seat is free";
 }
 
@@ -86,11 +86,6 @@ function waitingWords(view: SeatView): string {
     const others = more.length === 0 ? "" : ` and ${more.length} more`;
     return `${first.name}${others} asked for control: ${first.secondsLeft} s to answer`;
   }
-  if (!mayTake(view.role)) return "You watch, and may stop the robot at any time";
-  if (view.policy) return "You may take over at any time";
+  if (view.role === "observer") return "You watch, and may stop the robot at any time";
   return view.role === "supervisor" ? "You watch, and may take control at once" : "";
-}
-
-function mayTake(role: Role | null): boolean {
-  return role === "operator" || role === "supervisor";
 }

@@ -59,11 +59,6 @@ export class SessionClient {
     return true;
   }
 
-  /** Lets a policy drive, which frees an own seat, or no longer. `peer`: the only one that may; "": any. */
-  offer(peer: string, offered: boolean): void {
-    this.tell({ type: "seat_offer", peer, offered });
-  }
-
   release(): void {
     this.tell({ type: "seat_release" });
   }

@@ -78,3 +78,16 @@ describe("the button beside the seat", () => {
     expect(isMeant("take", 0)).toBe(true);
   });
 });
+
+describe("the seat's button while a policy drives", () => {
+  it.each([
+    ["operator", "held", "take"],
+    ["supervisor", "held", "take"],
+    ["operator", "mine", "release"],
+    ["observer", "held", undefined],
+    ["policy", "held", undefined],
+    ["policy", "mine", undefined],
+  ] as const)("of %s, to whom it is %s, is %s", (role, status, kind) => {
+    expect(seatAction(role, status, true)?.kind).toBe(kind);
+  });
+});

@@ -125,3 +125,41 @@ describe("names and notes", () => {
     ]);
   });
 });
+
+describe("a page while a policy drives", () => {
+  const DRIVES = { holder: "net", name: "net", kind: "policy", offered: true } as const;
+
+  it.each(["operator", "supervisor"] as const)("takes over with the first press of %s", (role) => {
+    const { desk, told, connect, seat } = rig();
+    connect(role);
+    seat(DRIVES);
+    told.length = 0;
+    expect(desk.takeOver()).toBe(true);
+    expect(desk.answerShown(true)).toBe(true); // the key of the seat's answers does the same
+    expect(told).toEqual([{ type: "seat_take" }, { type: "seat_take" }]);
+  });
+
+  it("takes nothing over by a key that declines, for an observer, or from a person", () => {
+    const { desk, told, connect, seat } = rig();
+    connect("operator");
+    seat(DRIVES);
+    told.length = 0;
+    expect(desk.answerShown(false)).toBe(false);
+    seat({ holder: "ann", name: "Ann", kind: "human" });
+    expect(desk.takeOver()).toBe(false);
+    connect("observer");
+    seat(DRIVES);
+    expect(desk.takeOver()).toBe(false);
+    expect(told.filter((each) => each.type !== "seat_request")).toEqual([]);
+  });
+
+  it("does not take back a seat that it has offered to a policy", () => {
+    const { told, connect, seat } = rig();
+    connect("operator");
+    seat({ holder: "me", kind: "human" });
+    told.length = 0;
+    seat({ holder: "", why: "offered", offered: true });
+    connect("operator");
+    expect(told).toEqual([]);
+  });
+});

@@ -15,10 +15,10 @@ from typing import Protocol
 import msgspec
 
 from lockstep.protocol.actions import Act, ActionCancel, ActionReason, ActionUpdate, ParameterValue
+from lockstep.protocol.console import PEOPLE
 from lockstep.protocol.description import RobotDescription
 from lockstep.rtc.token_bucket import TokenBucket
 from lockstep.server.audit.records import Actor
-from lockstep.server.control.policies.seat_offer import PEOPLE
 from lockstep.server.errors import ActionIdUsed, LinkDown, NotFound, NotRenewable, TooManyRequests, Unconfirmed
 from lockstep.server.event_clock import EventClock
 from lockstep.server.peers.peer import Peer

@@ -10,9 +10,9 @@ from typing import NamedTuple, Protocol
 
 import structlog
 
+from lockstep.protocol.console import PEOPLE
 from lockstep.protocol.messages import Refusal, RefusalReason, Reset, StopState
 from lockstep.server.audit.records import Actor
-from lockstep.server.control.policies.seat_offer import PEOPLE
 from lockstep.server.errors import (
     LinkDown,
     LockedOut,

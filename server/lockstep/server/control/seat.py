@@ -41,9 +41,9 @@ from collections.abc import Iterator
 from enum import Enum
 from typing import NamedTuple
 
-from lockstep.protocol.console import Role
+from lockstep.protocol.console import PEOPLE, Role
 from lockstep.protocol.messages import RefusalReason
-from lockstep.server.control.policies.seat_offer import PEOPLE, Offer
+from lockstep.server.control.policies.seat_offer import Offer
 
 __all__ = ["TABLE", "ControlSeat", "Move", "SeatInput", "SeatOutcome", "SeatRefusal", "SeatTimes", "Standing"]
 

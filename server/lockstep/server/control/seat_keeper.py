@@ -5,6 +5,7 @@ import time
 from typing import Protocol
 
 from lockstep.protocol.console import (
+    PEOPLE,
     Seat,
     SeatClaim,
     SeatDecline,
@@ -16,7 +17,6 @@ from lockstep.protocol.console import (
     driver_kind,
 )
 from lockstep.server.audit.records import Actor
-from lockstep.server.control.policies.seat_offer import PEOPLE
 from lockstep.server.control.seat import ControlSeat, SeatInput, SeatOutcome, SeatRefusal, Standing
 from lockstep.server.errors import NoSeat, NotAllowed, TooManyRequests
 from lockstep.server.peers.peer import Peer

@@ -7,9 +7,8 @@ from typing import Annotated, Literal
 import msgspec
 from fastapi import APIRouter, Depends, Request, Response
 
-from lockstep.protocol.console import Role
+from lockstep.protocol.console import PEOPLE, Role
 from lockstep.server.auth.tokens import Right
-from lockstep.server.control.policies.seat_offer import PEOPLE
 from lockstep.server.errors import LinkOtherRobot
 from lockstep.server.federation.board import BoardState
 from lockstep.server.federation.robot_summary import Tile

@@ -7,8 +7,8 @@ import msgspec
 from fastapi import APIRouter, Depends, Request, Response
 
 from lockstep.protocol.actions import ActionUpdate, Parameters, RenewedAction, Status
+from lockstep.protocol.console import PEOPLE
 from lockstep.server.auth.tokens import Right
-from lockstep.server.control.policies.seat_offer import PEOPLE
 from lockstep.server.errors import NoSeat, NotAllowed
 from lockstep.server.http.json_response import json_answer
 from lockstep.server.http.request_body import read_json

@@ -6,11 +6,11 @@ from typing import Annotated, cast
 
 from fastapi import APIRouter, Depends, HTTPException, Query, Request, Response
 
+from lockstep.protocol.console import PEOPLE
 from lockstep.rtc.endpoint import TooManyPeers
 from lockstep.rtc.sdp import MID_URI, Codec, LocalMedia, MediaSection, SdpError, SessionDescription, write_description
 from lockstep.rtc.sdp.codecs import common_codecs, is_same_format
 from lockstep.server.auth.tokens import Right
-from lockstep.server.control.policies.seat_offer import PEOPLE
 from lockstep.server.errors import (
     BadSdp,
     ConsoleError,

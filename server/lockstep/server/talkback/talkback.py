@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING
 
 from prometheus_client import CollectorRegistry, Counter, Gauge
 
-from lockstep.protocol.console import Role, Voice
-from lockstep.server.control.policies.seat_offer import PEOPLE
+from lockstep.protocol.console import PEOPLE, Role, Voice
 from lockstep.server.talkback.speaker import Speaker
 from lockstep.server.talkback.speaker_url import SpeakerSpec
 from lockstep.server.talkback.talkback_arbiter import SPEAKS_FOR, TalkbackArbiter, VoicePacket

@@ -312,3 +312,30 @@ async def test_over_http_a_person_takes_over_and_gives_back() -> None:
         # a person who is not connected rests the robot all the same; the seat is free then
         taken = (await rig.http.post("/api/seat/take_over", headers=absent)).json()
         assert (taken["holder"], taken["why"], taken["offered"]) == ("", "offer withdrawn", False)
+
+
+async def test_a_moving_action_ends_before_a_policy_drives_and_none_runs_while_it_does() -> None:
+    async with running_rig(**PATIENT) as rig, rig.peer("operator") as person, rig.peer("policy") as policy:
+        person.send("session", SeatRequest())
+        await _seat(person, holder=await _id(person))
+        await person.feedback()
+        await person.drive([0.0, 0.0, 0.0])
+        for _ in range(3):
+            await person.drive([0.3, 0.0, 0.0])
+        begun, number = False, 0
+        while not begun:  # a busy machine may hold the robot up: then a neutral command comes first again
+            number += 1
+            await person.drive([0.0, 0.0, 0.0])
+            person.send("session", Act(id=f"h{number}", name="home", nonce=person.newest_feedback().nonce))
+            said = await person.until(
+                lambda each, id=f"h{number}": isinstance(each, ActionUpdate) and each.id == id  # type: ignore[misc]
+            )
+            begun = isinstance(said, ActionUpdate) and said.state != "refused"
+        person.send("session", SeatOffer())
+        await person.until(lambda each: isinstance(each, ActionUpdate) and each.state in ("cancelled", "done"))
+        policy.send("session", SeatRequest(only_if_free=True))
+        await _seat(policy, holder=await _id(policy))
+        person.send("session", Act(id="i", name="home", nonce=person.newest_feedback().nonce))
+        refused = await person.until(lambda each: isinstance(each, ActionUpdate) and each.id == "i")
+        assert isinstance(refused, ActionUpdate)
+        assert (refused.state, refused.reason) == ("refused", "no_seat")

@@ -1,6 +1,10 @@
+from typing import Literal
+
+import msgspec
 import pytest
 
 from lockstep.protocol.console import DriverKind, ShadowJudgement
+from lockstep.protocol.episodes import EpisodeOutcome
 from lockstep.server.recording.format.records import EpisodeRecord, FeedbackRecord, ShadowRecord
 from lockstep.server.recording.report.driver_figures import MOST, DriverTally, Outcomes, drivers_table
 
@@ -14,11 +18,9 @@ def _event(tally: DriverTally, event: int, name: str, kind: DriverKind, *, inter
     )  # fmt: skip
 
 
-def _episode(tally: DriverTally, kind: str, outcome: str = "") -> None:
-    record = EpisodeRecord(
-        epoch="e", event=1, episode="x", number=1, kind=kind, task="t", outcome=outcome, first_event=1, last_event=1
-    )  # type: ignore[arg-type]
-    tally.take(record)
+def _episode(tally: DriverTally, kind: Literal["start", "kept", "discarded"], outcome: EpisodeOutcome = "") -> None:
+    fields = {"epoch": "e", "event": 1, "episode": "x", "number": 1, "task": "t", "first_event": 1, "last_event": 1}
+    tally.take(msgspec.convert({**fields, "kind": kind, "outcome": outcome}, EpisodeRecord))
 
 
 def _shadow(tally: DriverTally, judgement: ShadowJudgement, difference: float | None, kind: DriverKind) -> None:
@@ -36,7 +38,7 @@ def test_interventions_are_spells_for_each_minute_of_episodes_with_a_policy() ->
     _episode(tally, "start")
     for event in range(2, 62):  # 30 s
         corrects = event in (10, 11, 12, 40)
-        _event(tally, event, *(("Ada", "human") if corrects else ("net", "policy")), intervention=corrects)  # type: ignore[arg-type]
+        _event(tally, event, *(("Ada", "human") if corrects else ("net", "policy")), intervention=corrects)
     _episode(tally, "kept", "success")
     assert tally.interventions == 2
     assert tally.policy_seconds == pytest.approx(30)
@@ -58,7 +60,7 @@ def test_success_is_told_by_driver_and_what_nobody_said_counts_for_neither() -> 
     ):
         _episode(tally, "start")
         _event(tally, 10 * number + 2, name, kind)  # type: ignore[arg-type]
-        _episode(tally, "kept", outcome)
+        _episode(tally, "kept", outcome)  # type: ignore[arg-type]
     _episode(tally, "start")
     _event(tally, 90, "net", "policy")
     _episode(tally, "discarded")

@@ -27,7 +27,7 @@ export function createPolicyBar(engine: ConsoleEngine): Panel {
   const title = h("strong", "policy-title", { role: "status" });
   const text = h("span", "policy-text");
   const takeOver = press("Take over", "policy-take", "F8", () => engine.session.takeOver());
-  const withdraw = press("Withdraw the offer", "policy-withdraw", "", () => engine.session.offer("", false));
+  const withdraw = press("Withdraw the offer", "policy-withdraw", "", () => offer("", false));
   const offers = h("span", "policy-offers");
   const bars = h("div", "policy-shadows", { "aria-label": "What shadow policies want" });
   const element = h("section", "policy-bar", { "aria-label": "Policies" });
@@ -35,11 +35,16 @@ export function createPolicyBar(engine: ConsoleEngine): Panel {
   line.append(h("span", "policy-lamp", { "aria-hidden": "true" }), title, text, withdraw, offers, takeOver);
   element.append(line, bars);
 
+  /** Lets a policy drive, which frees an own seat, or no longer. `peer`: the only one that may; "": any. */
+  function offer(peer: string, offered: boolean): void {
+    engine.tell("session", { type: "seat_offer", peer, offered });
+  }
+
   /** The person gives the robot out of their hands: whatever they hold is let go first. */
-  function give(offer: PolicyOffer | undefined): void {
-    if (offer === undefined) return;
+  function give(wanted: PolicyOffer | undefined): void {
+    if (wanted === undefined) return;
     engine.disarm("operator");
-    engine.session.offer(offer.peer, true);
+    offer(wanted.peer, true);
   }
 
   engine.takeShadow = (value: unknown): void => {

@@ -21,12 +21,7 @@ There is no offer when the console starts.
 
 from typing import NamedTuple
 
-from lockstep.protocol.console import Role
-
-__all__ = ["PEOPLE", "Offer"]
-
-PEOPLE: frozenset[Role] = frozenset({"operator", "supervisor"})
-"""The roles of people who may drive."""
+__all__ = ["Offer"]
 
 
 class Offer(NamedTuple):
