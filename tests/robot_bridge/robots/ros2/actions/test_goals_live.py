@@ -5,9 +5,7 @@ The interfaces that no wheel has are built from their text.
 
 import asyncio
 import math
-import os
 import secrets
-import signal
 from collections.abc import AsyncIterator, Callable
 from pathlib import Path
 
@@ -69,7 +67,8 @@ async def node(tmp_path: Path, interfaces: Path) -> AsyncIterator[RosRobot]:
 @pytest.fixture
 async def bridge(tmp_path: Path, node: RosRobot) -> AsyncIterator[RosBridge]:
     settings = tmp_path / "acting.yaml"
-    settings.write_text((EXAMPLES / "base.yaml").read_text() + MORE)
+    base = (EXAMPLES / "base.yaml").read_text().replace("ranges:\n", "ranges:\n  frame: base_link\n")
+    settings.write_text(base + MORE)
     async with running_ros_bridge(tmp_path, node, settings) as bridge:
         yield bridge
 
@@ -204,9 +203,9 @@ async def test_whatever_ends_an_armed_motion_cancels_the_goal_at_its_server(
         case "link":
             await armed.link.close()
         case "kill":
-            os.kill(bridge.process.process.pid, signal.SIGKILL)
+            await bridge.process.kill()
         case "end":
-            os.kill(bridge.process.process.pid, signal.SIGTERM)
+            await bridge.process.end()
     if reason:
         ended = await armed.ended()
         assert ended.state == "cancelled"
@@ -293,3 +292,12 @@ async def test_a_goal_on_the_map_rests_when_nothing_renews_it_and_a_robot_that_i
     before = "" if armed.navigation is None else armed.navigation.map
     await armed.until(lambda: armed.navigation is not None and armed.navigation.map not in ("", before))
     await armed.until(lambda: armed.navigation is not None and not armed.navigation.located)
+
+
+async def test_a_scanner_that_looks_back_by_tf_shows_what_it_sees_behind(armed: Armed) -> None:
+    await armed.ready()
+    await armed.until(lambda: armed.feedback is not None and min(armed.feedback.ranges, default=9.0) < 7.0)
+    assert armed.feedback is not None
+    ranges = armed.feedback.ranges  # the node's wall is ahead of its scanner
+    assert min(ranges[0], ranges[1], ranges[-1]) < 4.0
+    assert ranges[36] > 7.0
