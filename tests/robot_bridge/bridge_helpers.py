@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Protocol, TypeVar
 
 from lockstep.protocol.framing import FrameReader, frame
+from lockstep.protocol.maps import OccupancyMap
 from lockstep.protocol.messages import (
     Command,
     Feedback,
@@ -39,6 +40,7 @@ __all__ = [
     "RawLink",
     "RecordingRobot",
     "log_lines",
+    "next_map",
     "operator",
     "raw_link",
     "running_bridge",
@@ -185,6 +187,15 @@ class Operator:
     async def refused(self, message: LinkMessage) -> Refusal:
         self.link.send(message)
         return await self.next(Refusal)
+
+
+async def next_map(link: RobotLink) -> OccupancyMap:
+    """The next map on a media link."""
+    async with asyncio.timeout(PATIENCE):
+        async for message in link:
+            if isinstance(message, OccupancyMap):
+                return message
+    raise AssertionError("the link ended")
 
 
 @asynccontextmanager

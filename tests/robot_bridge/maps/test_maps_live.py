@@ -3,23 +3,14 @@
 import asyncio
 
 from lockstep.protocol.actions import Act, ActionUpdate
-from lockstep.protocol.maps import Navigation, OccupancyMap, map_cells
-from lockstep.protocol.messages import Feedback, Media
+from lockstep.protocol.maps import Navigation, map_cells
+from lockstep.protocol.messages import Feedback
 from lockstep.robot_bridge.bridge import Bridge
 from lockstep.robot_bridge.link.link_client import RobotLink
 from lockstep.robot_bridge.robots.planar.floor_map import make_map
 from lockstep.robot_bridge.settings import BridgeSettings
-from tests.robot_bridge.bridge_helpers import NEUTRAL, RecordingRobot, operator
+from tests.robot_bridge.bridge_helpers import NEUTRAL, RecordingRobot, next_map, operator
 from tests.waiting import PATIENCE
-
-
-async def next_map(link: RobotLink) -> OccupancyMap:
-    async with asyncio.timeout(PATIENCE):
-        async for message in link:
-            if isinstance(message, OccupancyMap):
-                return message
-            assert isinstance(message, Media)
-    raise AssertionError("the link ended")
 
 
 async def test_every_media_link_gets_the_newest_map_and_the_operator_its_id() -> None:

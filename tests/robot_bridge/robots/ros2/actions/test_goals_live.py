@@ -12,11 +12,11 @@ from pathlib import Path
 import pytest
 
 from lockstep.protocol.actions import Act, ActionCancel, ActionUpdate, ParameterValue
-from lockstep.protocol.maps import Navigation, OccupancyMap, map_cells
+from lockstep.protocol.maps import Navigation, map_cells
 from lockstep.protocol.messages import Command, Feedback, Rest, Stop
 from lockstep.protocol.serial import event_after
 from lockstep.robot_bridge.link.link_client import RobotLink
-from tests.robot_bridge.bridge_helpers import Operator
+from tests.robot_bridge.bridge_helpers import next_map
 from tests.support.ros2 import (
     ACTIONS,
     EXAMPLES,
@@ -77,7 +77,6 @@ class Armed:
     """An operator that sends neutral commands, which renew the action that it has asked for last."""
 
     def __init__(self, link: RobotLink) -> None:
-        self.operator = Operator(link)
         self.link = link
         self.renews = True
         self.id = ""
@@ -134,10 +133,14 @@ class Armed:
             act = Act(id=self.id, name=name, parameters=dict(parameters), nonce=self.feedback.nonce)
             self.link.send(act)
             self.link.send(act)  # a copy begins nothing
-            await self.until(lambda: self.update is not None)
-            assert self.update is not None
-            if not self.update.text.startswith("nobody offers") and self.update.reason != "late":
-                return self.update
+            update = await self._answer()
+            if not update.text.startswith("nobody offers") and update.reason != "late":
+                return update
+
+    async def _answer(self) -> ActionUpdate:
+        await self.until(lambda: self.update is not None)
+        assert self.update is not None
+        return self.update
 
     async def ended(self) -> ActionUpdate:
         await self.until(lambda: self.update is not None and self.update.state != "running")
@@ -253,10 +256,7 @@ async def test_a_goal_on_the_map_drives_the_base_there_with_path_and_place(
     assert armed.navigation is not None
     assert armed.navigation.frame == pytest.approx((1.0, -0.5, 0.0))
     async with RobotLink(*bridge.address, "media", name="test") as media:
-        async with asyncio.timeout(PATIENCE):
-            async for message in media:
-                if isinstance(message, OccupancyMap):
-                    break
+        message = await next_map(media)
     assert message.id == armed.navigation.map
     assert (message.width, message.height) == (80, 60)
     cells = map_cells(message)
