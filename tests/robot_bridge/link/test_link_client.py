@@ -299,7 +299,8 @@ async def test_closing_with_data_unread_does_not_reset_the_connection_and_the_br
     loop = asyncio.get_running_loop()
     with socket.create_server(("127.0.0.1", 0)) as listener:
         listener.setblocking(False)
-        link = RobotLink(*listener.getsockname(), "operator")
+        host, port = listener.getsockname()
+        link = RobotLink(host, port, "operator")
         async with asyncio.timeout(20), asyncio.TaskGroup() as tasks:
             connecting = tasks.create_task(link.connect())
             bridge, _ = await loop.sock_accept(listener)
