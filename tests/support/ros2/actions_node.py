@@ -115,7 +115,7 @@ class ActingRobot(RobotNode):  # type: ignore[misc]
                 handle.canceled()
                 self.note("ended", how="canceled", count=len(sequence))
                 return Fibonacci.Result(sequence=sequence)
-            sequence.append(sequence[-1] + sequence[-2])
+            sequence.append((sequence[-1] + sequence[-2]) % 1000)  # stays within its 32 bits
             handle.publish_feedback(Fibonacci.Feedback(sequence=sequence))
         if handle.request.order == 7:
             handle.abort()
