@@ -27,6 +27,7 @@ from lockstep.protocol.serial import FIRST_EVENT, event_after
 from lockstep.robot_bridge.bridge import Bridge
 from lockstep.robot_bridge.link.link_client import RobotLink
 from lockstep.robot_bridge.robots.base import MediaSource, Robot
+from lockstep.robot_bridge.robots.navigation import GridMap
 from lockstep.robot_bridge.robots.planar.robot import PlanarRobot, PlanarState
 from lockstep.robot_bridge.settings import BridgeSettings
 from tests.waiting import PATIENCE
@@ -65,11 +66,12 @@ NEUTRAL = [0.0, 0.0, 0.0]
 class RecordingRobot(PlanarRobot):
     """Remembers what was applied when, and what was called."""
 
-    def __init__(self, *, media: bool = False, state: PlanarState | None = None) -> None:
+    def __init__(self, *, media: bool = False, map: bool = False, state: PlanarState | None = None) -> None:
         super().__init__(state)
         self.applied: list[tuple[float, list[float]]] = []
         self.calls: list[str] = []
         self._media = media
+        self._has_map = map
         self._ticked = asyncio.Event()
 
     async def until(self, condition: Callable[[], bool], what: str) -> None:
@@ -100,6 +102,9 @@ class RecordingRobot(PlanarRobot):
 
     def sources(self) -> Sequence[MediaSource]:
         return super().sources() if self._media else ()
+
+    def grid_map(self) -> GridMap | None:
+        return super().grid_map() if self._has_map else None
 
 
 @asynccontextmanager

@@ -14,13 +14,13 @@ from tests.waiting import PATIENCE
 
 
 async def test_every_media_link_gets_the_newest_map_and_the_operator_its_id() -> None:
-    robot = RecordingRobot()
+    robot = RecordingRobot(map=True)
     async with Bridge(robot, BridgeSettings(port=0)) as bridge:
         async with RobotLink(*bridge.address, "media", name="early") as early:
             first = await next_map(early)
             async with RobotLink(*bridge.address, "media", name="late") as late:
                 assert await next_map(late) == first
-            assert map_cells(first) == robot.grid_map().cells
+            assert map_cells(first) == robot._map.cells
             robot._map = make_map(0.0)._replace(resolution=0.06)
             second = await next_map(early)
             assert (second.id != first.id, second.resolution) == (True, 0.06)
@@ -31,7 +31,7 @@ async def test_every_media_link_gets_the_newest_map_and_the_operator_its_id() ->
 
 
 async def test_a_goal_that_runs_is_told_with_its_path_until_nothing_renews_it() -> None:
-    robot = RecordingRobot()
+    robot = RecordingRobot(map=True)
     async with Bridge(robot, BridgeSettings(port=0)) as bridge, operator(bridge) as driver:
         async with asyncio.timeout(PATIENCE):
             await driver.drive(NEUTRAL)

@@ -82,7 +82,7 @@ def test_it_gives_up_when_it_is_held() -> None:
 
 
 def test_the_map_shows_walls_and_pillars_and_nothing_behind_them() -> None:
-    grid = PlanarRobot().grid_map()
+    grid = PlanarRobot()._map
     cells = np.frombuffer(grid.cells, np.uint8).reshape(grid.height, grid.width)
 
     def at(x: float, y: float) -> int:

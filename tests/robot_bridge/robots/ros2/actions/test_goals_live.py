@@ -79,6 +79,7 @@ class Armed:
     def __init__(self, link: RobotLink) -> None:
         self.link = link
         self.renews = True
+        self.values = [0.0, 0.0]
         self.id = ""
         self.update: ActionUpdate | None = None
         self.navigation: Navigation | None = None
@@ -98,20 +99,16 @@ class Armed:
                     if self.renews:
                         self._send(message)
 
-    def _send(self, feedback: Feedback, values: list[float] | None = None) -> None:
+    def _send(self, feedback: Feedback) -> None:
         self.link.send(
             Command(
                 event=event_after(feedback.event),
                 issue=feedback.issue,
-                values=values or [0.0, 0.0],
+                values=self.values,
                 nonce=feedback.nonce,
                 action=self.id,
             )
         )
-
-    def move(self) -> None:
-        assert self.feedback is not None
-        self._send(self.feedback, [0.2, 0.0])
 
     async def ready(self) -> None:
         """Until a neutral command was executed, and the base is known."""
@@ -196,7 +193,7 @@ async def test_whatever_ends_an_armed_motion_cancels_the_goal_at_its_server(
         case "silence":
             armed.renews = False
         case "stick":
-            armed.move()
+            armed.values = [0.2, 0.0]
         case "rest":
             armed.link.send(Rest(event=event_after(armed.feedback.event)))
         case "stop":
