@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Protocol, TypeVar
 
 from lockstep.protocol.framing import FrameReader, frame
+from lockstep.protocol.maps import OccupancyMap
 from lockstep.protocol.messages import (
     Command,
     Feedback,
@@ -26,6 +27,7 @@ from lockstep.protocol.serial import FIRST_EVENT, event_after
 from lockstep.robot_bridge.bridge import Bridge
 from lockstep.robot_bridge.link.link_client import RobotLink
 from lockstep.robot_bridge.robots.base import MediaSource, Robot
+from lockstep.robot_bridge.robots.navigation import GridMap
 from lockstep.robot_bridge.robots.planar.robot import PlanarRobot, PlanarState
 from lockstep.robot_bridge.settings import BridgeSettings
 from tests.waiting import PATIENCE
@@ -39,6 +41,7 @@ __all__ = [
     "RawLink",
     "RecordingRobot",
     "log_lines",
+    "next_map",
     "operator",
     "raw_link",
     "running_bridge",
@@ -63,11 +66,12 @@ NEUTRAL = [0.0, 0.0, 0.0]
 class RecordingRobot(PlanarRobot):
     """Remembers what was applied when, and what was called."""
 
-    def __init__(self, *, media: bool = False, state: PlanarState | None = None) -> None:
+    def __init__(self, *, media: bool = False, map: bool = False, state: PlanarState | None = None) -> None:
         super().__init__(state)
         self.applied: list[tuple[float, list[float]]] = []
         self.calls: list[str] = []
         self._media = media
+        self._has_map = map
         self._ticked = asyncio.Event()
 
     async def until(self, condition: Callable[[], bool], what: str) -> None:
@@ -98,6 +102,9 @@ class RecordingRobot(PlanarRobot):
 
     def sources(self) -> Sequence[MediaSource]:
         return super().sources() if self._media else ()
+
+    def grid_map(self) -> GridMap | None:
+        return super().grid_map() if self._has_map else None
 
 
 @asynccontextmanager
@@ -185,6 +192,15 @@ class Operator:
     async def refused(self, message: LinkMessage) -> Refusal:
         self.link.send(message)
         return await self.next(Refusal)
+
+
+async def next_map(link: RobotLink) -> OccupancyMap:
+    """The next map on a media link."""
+    async with asyncio.timeout(PATIENCE):
+        async for message in link:
+            if isinstance(message, OccupancyMap):
+                return message
+    raise AssertionError("the link ended")
 
 
 @asynccontextmanager

@@ -9,7 +9,7 @@ const LAYERS: readonly (readonly string[])[] = [
   ["drive", "force_feedback", "gamepad", "robot", "session", "stop", "xr"],
   ["haptics", "input", "media", "sfu", "talkback", "transport"],
   ["engine", "fleet", "replay"],
-  ["charts", "headset", "scene", "ui"],
+  ["charts", "headset", "map", "scene", "ui"],
   ["app", "fleet/view", "replay/view"],
   [""], // the pages' first files
 ];

@@ -16,7 +16,7 @@ SWITCH = ActionParameter(name="on", label="On", kind="switch")
 
 
 def check(*actions: Action) -> None:
-    check_description(msgspec.structs.replace(DESCRIPTION, actions=actions))
+    check_description(msgspec.structs.replace(DESCRIPTION, actions=actions, map=None))
 
 
 def with_parameter(parameter: ActionParameter, **changes: object) -> Action:

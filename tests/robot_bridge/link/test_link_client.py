@@ -319,3 +319,29 @@ async def test_closing_with_data_unread_does_not_reset_the_connection_and_the_br
                     await loop.sock_sendall(bridge, NOTICE)
             await closing
     assert received.endswith(wire(Goodbye(error="closing", detail="")))
+
+
+async def test_closing_after_the_bridge_has_reset_the_connection_raises_nothing() -> None:
+    class Reset(asyncio.Transport):
+        def __init__(self) -> None:
+            super().__init__()
+            self.closed = False
+
+        def can_write_eof(self) -> bool:
+            return True
+
+        def write_eof(self) -> None:
+            raise OSError(107, "Transport endpoint is not connected")
+
+        def write(self, data: bytes | bytearray | memoryview) -> None: ...
+
+        def set_write_buffer_limits(self, high: int | None = None, low: int | None = None) -> None: ...
+
+        def close(self) -> None:
+            self.closed = True
+
+    link, transport = RobotLink("127.0.0.1", 1, "operator"), Reset()
+    link._transport.connection_made(transport)
+    link._transport.say_goodbye()
+    assert transport.closed
+    link._transport.connection_lost(None)

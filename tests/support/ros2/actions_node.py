@@ -52,6 +52,12 @@ class ActingRobot(RobotNode):  # type: ignore[misc]
                 cancel_callback=self._cancel,
             )
         self.create_timer(0.1, self._place)
+        self._mounts = self.create_publisher(TFMessage, "/tf_static", kept)
+        mount = TransformStamped()
+        mount.header.frame_id, mount.child_frame_id = "base_link", "laser"
+        mount.transform.rotation.z = 1.0  # it looks back
+        mount.transform.rotation.w = 0.0
+        self._mounts.publish(TFMessage(transforms=[mount]))
         self._publish_map(column=60)
 
     def tell(self, line: str) -> None:
@@ -109,7 +115,7 @@ class ActingRobot(RobotNode):  # type: ignore[misc]
                 handle.canceled()
                 self.note("ended", how="canceled", count=len(sequence))
                 return Fibonacci.Result(sequence=sequence)
-            sequence.append(sequence[-1] + sequence[-2])
+            sequence.append((sequence[-1] + sequence[-2]) % 1000)  # stays within its 32 bits
             handle.publish_feedback(Fibonacci.Feedback(sequence=sequence))
         if handle.request.order == 7:
             handle.abort()

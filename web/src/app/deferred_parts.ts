@@ -17,7 +17,7 @@ export { createTalkButton } from "../ui/session/talk_button";
 export { Talkback } from "../talkback/talkback";
 export { createRobotStrip } from "../ui/robot/robot_strip";
 export { ActionClient, drawId } from "../robot/action_client";
-export { watchPictureClicks } from "../robot/picture_clicks";
 export { createPolicyBar } from "../ui/session/policy_bar";
+export { watchPictureClicks } from "../ui/robot/picture_clicks";
 export { createEpisodeBar } from "../ui/session/episode_bar";
 export { createLimitsStrip } from "../ui/driving/limits_strip";

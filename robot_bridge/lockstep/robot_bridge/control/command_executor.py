@@ -96,7 +96,10 @@ class CommandExecutor:
             case Reset():
                 self._stops.reset(peer, message)
             case Act():
+                moved = self._actions.moving
                 self._actions.act(peer, message)
+                if self._actions.moving and not moved:  # the bridge may be killed before the next tick tells it
+                    self._watchdogs.ticked(self._now(), moving=True)
             case ActionCancel():
                 self._actions.cancel(message)
 

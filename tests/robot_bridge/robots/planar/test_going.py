@@ -8,7 +8,8 @@ import pytest
 from lockstep.protocol.maps import OCCUPIED, UNKNOWN
 from lockstep.robot_bridge.description.check_description import check_description
 from lockstep.robot_bridge.robots.actions import ActionFailed, ActionNotPossible, ActionRun
-from lockstep.robot_bridge.robots.planar.robot import CLEARANCE, RADIUS, PlanarRobot, PlanarState
+from lockstep.robot_bridge.robots.planar.description import RADIUS
+from lockstep.robot_bridge.robots.planar.robot import CLEARANCE, PlanarRobot, PlanarState
 from lockstep.robot_bridge.robots.planar.room import PILLARS
 
 MOST = 60.0  # s of simulated time
@@ -20,7 +21,7 @@ def go(robot: PlanarRobot, x: float, y: float, yaw: float = 0.0) -> ActionRun:
 
 def drive(robot: PlanarRobot, run: ActionRun) -> list[PlanarState]:
     """Let the action run to its end, as a bridge without limits does; return the states on the way."""
-    states = []
+    states: list[PlanarState] = []
     for _ in range(round(MOST / robot.tick_seconds)):
         step = run.step()
         if step.done:
@@ -81,7 +82,7 @@ def test_it_gives_up_when_it_is_held() -> None:
 
 
 def test_the_map_shows_walls_and_pillars_and_nothing_behind_them() -> None:
-    grid = PlanarRobot().grid_map()
+    grid = PlanarRobot()._map
     cells = np.frombuffer(grid.cells, np.uint8).reshape(grid.height, grid.width)
 
     def at(x: float, y: float) -> int:

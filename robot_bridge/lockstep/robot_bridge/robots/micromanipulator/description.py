@@ -195,7 +195,7 @@ DESCRIPTION: Final = RobotDescription(
             parameters=(
                 ActionParameter(name="x", label="From the left", kind="number", minimum=0, maximum=1),
                 ActionParameter(name="y", label="From the top", kind="number", minimum=0, maximum=1),
-                ActionParameter(name="event", label="Picture's event", kind="number", minimum=1, maximum=2**31 - 1),
+                ActionParameter(name="event", label="Event of the picture", kind="number", minimum=1),
             ),
         ),
     ),

@@ -164,7 +164,7 @@ class PlanarRobot(Robot):
     def _arrived(self) -> None:
         self._going = None
 
-    def grid_map(self) -> GridMap:
+    def grid_map(self) -> GridMap | None:
         return self._map
 
     def navigation(self) -> NavigationNow:

@@ -16,6 +16,7 @@ from lockstep.robot_bridge.robots.ros2.drives.goal_arm_drive import GoalArmDrive
 from lockstep.robot_bridge.robots.ros2.drives.servo_drive import ServoDrive
 from lockstep.robot_bridge.robots.ros2.drives.watchdog_rest import REST_CALL, rest_arguments
 from lockstep.robot_bridge.robots.ros2.joint_axes import is_goal_arm
+from lockstep.robot_bridge.robots.ros2.mapping.frame_listener import FrameListener
 from lockstep.robot_bridge.robots.ros2.mapping.map_topics import MapReader
 from lockstep.robot_bridge.robots.ros2.ros_side import RosSide
 from lockstep.robot_bridge.robots.ros2.sensing.battery import BatteryTopic
@@ -47,9 +48,10 @@ class Ros2Robot(Robot):
             arm = None if settings.arm is None else self._arm_drive(settings.arm)
             servo = None if settings.servo is None else ServoDrive(self._ros, settings.servo, tick)
             self._drives: list[Drive] = [drive for drive in (base, arm, servo) if drive is not None]
+            frames = FrameListener(self._ros) if needs_frames(settings) else None
             self._map = None
             if settings.map is not None and base is not None:
-                self._map = MapReader(self._ros, settings.map, base.pose)
+                self._map = MapReader(self._ros, settings.map, base.pose, frames)
             self._actions = RosActions(self._ros, settings)
             self.rest_arguments = rest_arguments(
                 settings,
@@ -60,7 +62,7 @@ class Ros2Robot(Robot):
             )
             if self.rest_arguments:
                 self.rest_call = REST_CALL
-            self._ranges = None if settings.ranges is None else RangeSensor(self._ros, settings.ranges)
+            self._ranges = None if settings.ranges is None else RangeSensor(self._ros, settings.ranges, frames)
             self._wrench = None if settings.wrench is None else WrenchTopic(self._ros, settings.wrench)
             self._lockout = None if settings.lockout is None else LockoutTopic(self._ros, settings.lockout)
             self._batteries = [BatteryTopic(self._ros, battery) for battery in settings.batteries]
@@ -166,6 +168,12 @@ class Ros2Robot(Robot):
             call_all([*(drive.end for drive in self._drives), self._actions.settle])
         finally:
             self._ros.close()
+
+
+def needs_frames(settings: Ros2Settings) -> bool:
+    """Return whether something has to be looked up in TF."""
+    place = None if settings.map is None else settings.map.place
+    return (place is not None and place.source == "tf") or (settings.ranges is not None and settings.ranges.frame != "")
 
 
 def call_all(calls: Sequence[Callable[[], None]]) -> None:

@@ -158,6 +158,7 @@ class Ranges(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     timeout: Timeout = 1.0
     body: str | None = None  # the body that it sits on; None: the base, or the world without one
     yaw: float = 0.0  # rad, of the scanner's frame in the body's
+    frame: str = ""  # the body's frame, "base_link": TF says where the scanner is in it, not `yaw`; "": `yaw` does
     count: Annotated[int, Meta(ge=3, le=720)] = 72
     range_min: NotNegative = 0.05  # m
     range_max: Positive = 10.0

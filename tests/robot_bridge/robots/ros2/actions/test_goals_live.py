@@ -5,20 +5,18 @@ The interfaces that no wheel has are built from their text.
 
 import asyncio
 import math
-import os
 import secrets
-import signal
 from collections.abc import AsyncIterator, Callable
 from pathlib import Path
 
 import pytest
 
 from lockstep.protocol.actions import Act, ActionCancel, ActionUpdate, ParameterValue
-from lockstep.protocol.maps import Navigation, OccupancyMap, map_cells
+from lockstep.protocol.maps import Navigation, map_cells
 from lockstep.protocol.messages import Command, Feedback, Rest, Stop
 from lockstep.protocol.serial import event_after
 from lockstep.robot_bridge.link.link_client import RobotLink
-from tests.robot_bridge.bridge_helpers import Operator
+from tests.robot_bridge.bridge_helpers import next_map
 from tests.support.ros2 import (
     ACTIONS,
     EXAMPLES,
@@ -47,7 +45,7 @@ actions:
     parameters: [{field: order, minimum: 0, maximum: 100}]
     text: sequence
     result: sequence
-    timeout: 2
+    timeout: 10
 grippers:
   - {open: 0.08, effort: 5}
 map:
@@ -69,7 +67,8 @@ async def node(tmp_path: Path, interfaces: Path) -> AsyncIterator[RosRobot]:
 @pytest.fixture
 async def bridge(tmp_path: Path, node: RosRobot) -> AsyncIterator[RosBridge]:
     settings = tmp_path / "acting.yaml"
-    settings.write_text((EXAMPLES / "base.yaml").read_text() + MORE)
+    base = (EXAMPLES / "base.yaml").read_text().replace("ranges:\n", "ranges:\n  frame: base_link\n")
+    settings.write_text(base + MORE)
     async with running_ros_bridge(tmp_path, node, settings) as bridge:
         yield bridge
 
@@ -78,9 +77,9 @@ class Armed:
     """An operator that sends neutral commands, which renew the action that it has asked for last."""
 
     def __init__(self, link: RobotLink) -> None:
-        self.operator = Operator(link)
         self.link = link
         self.renews = True
+        self.values = [0.0, 0.0]
         self.id = ""
         self.update: ActionUpdate | None = None
         self.navigation: Navigation | None = None
@@ -100,20 +99,16 @@ class Armed:
                     if self.renews:
                         self._send(message)
 
-    def _send(self, feedback: Feedback, values: list[float] | None = None) -> None:
+    def _send(self, feedback: Feedback) -> None:
         self.link.send(
             Command(
                 event=event_after(feedback.event),
                 issue=feedback.issue,
-                values=values or [0.0, 0.0],
+                values=self.values,
                 nonce=feedback.nonce,
                 action=self.id,
             )
         )
-
-    def move(self) -> None:
-        assert self.feedback is not None
-        self._send(self.feedback, [0.2, 0.0])
 
     async def ready(self) -> None:
         """Until a neutral command was executed, and the base is known."""
@@ -135,10 +130,14 @@ class Armed:
             act = Act(id=self.id, name=name, parameters=dict(parameters), nonce=self.feedback.nonce)
             self.link.send(act)
             self.link.send(act)  # a copy begins nothing
-            await self.until(lambda: self.update is not None)
-            assert self.update is not None
-            if not self.update.text.startswith("nobody offers") and self.update.reason != "late":
-                return self.update
+            update = await self._answer()
+            if not update.text.startswith("nobody offers") and update.reason != "late":
+                return update
+
+    async def _answer(self) -> ActionUpdate:
+        await self.until(lambda: self.update is not None)
+        assert self.update is not None
+        return self.update
 
     async def ended(self) -> ActionUpdate:
         await self.until(lambda: self.update is not None and self.update.state != "running")
@@ -188,13 +187,13 @@ async def test_whatever_ends_an_armed_motion_cancels_the_goal_at_its_server(
     armed: Armed, node: RosRobot, bridge: RosBridge, how: str, reason: str
 ) -> None:
     await armed.ask("count", order=90.0)
-    await armed.until(lambda: armed.update is not None and armed.update.text != "asked")
+    await armed.until(lambda: armed.update is not None and armed.update.text.startswith("["))
     assert armed.feedback is not None
     match how:
         case "silence":
             armed.renews = False
         case "stick":
-            armed.move()
+            armed.values = [0.2, 0.0]
         case "rest":
             armed.link.send(Rest(event=event_after(armed.feedback.event)))
         case "stop":
@@ -204,14 +203,17 @@ async def test_whatever_ends_an_armed_motion_cancels_the_goal_at_its_server(
         case "link":
             await armed.link.close()
         case "kill":
-            os.kill(bridge.process.process.pid, signal.SIGKILL)
+            await bridge.process.kill()
         case "end":
-            os.kill(bridge.process.process.pid, signal.SIGTERM)
+            await bridge.process.end()
     if reason:
         ended = await armed.ended()
-        assert ended.state == "cancelled"
+        assert ended.state == "cancelled", ended.text
         assert ended.reason in (reason, "interrupted"), "a machine that holds the bridge up interrupts it too"
-    ends = await node.noted("ended", lambda notes: len(notes) > 0)
+    try:
+        ends = await node.noted("ended", lambda notes: len(notes) > 0)
+    except TimeoutError:
+        raise AssertionError("\n".join(bridge.process.errors[-30:])) from None
     assert ends[0]["how"] == "canceled"
     assert ends[0]["count"] < 90
 
@@ -229,7 +231,7 @@ async def test_a_server_that_goes_on_after_the_cancel_is_a_fault_and_gets_no_oth
     armed: Armed, node: RosRobot
 ) -> None:
     await armed.ask("count", order=90.0)
-    await armed.until(lambda: armed.update is not None and armed.update.text != "asked")
+    await armed.until(lambda: armed.update is not None and armed.update.text.startswith("["))
     await node.tell("stubborn")
     armed.link.send(ActionCancel(id=armed.id))
     await armed.ended()
@@ -254,10 +256,7 @@ async def test_a_goal_on_the_map_drives_the_base_there_with_path_and_place(
     assert armed.navigation is not None
     assert armed.navigation.frame == pytest.approx((1.0, -0.5, 0.0))
     async with RobotLink(*bridge.address, "media", name="test") as media:
-        async with asyncio.timeout(PATIENCE):
-            async for message in media:
-                if isinstance(message, OccupancyMap):
-                    break
+        message = await next_map(media)
     assert message.id == armed.navigation.map
     assert (message.width, message.height) == (80, 60)
     cells = map_cells(message)
@@ -293,3 +292,12 @@ async def test_a_goal_on_the_map_rests_when_nothing_renews_it_and_a_robot_that_i
     before = "" if armed.navigation is None else armed.navigation.map
     await armed.until(lambda: armed.navigation is not None and armed.navigation.map not in ("", before))
     await armed.until(lambda: armed.navigation is not None and not armed.navigation.located)
+
+
+async def test_a_scanner_that_looks_back_by_tf_shows_what_it_sees_behind(armed: Armed) -> None:
+    await armed.ready()
+    await armed.until(lambda: armed.feedback is not None and min(armed.feedback.ranges, default=9.0) < 7.0)
+    assert armed.feedback is not None
+    ranges = armed.feedback.ranges  # the node's wall is ahead of its scanner
+    assert min(ranges[0], ranges[1], ranges[-1]) < 4.0
+    assert ranges[36] > 7.0

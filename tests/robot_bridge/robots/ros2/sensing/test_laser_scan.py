@@ -86,3 +86,11 @@ def test_whatever_a_scan_says_the_sectors_are_numbers_within_bounds() -> None:
             range_max=random.choice(odd),
         )
         assert all(0.05 <= distance <= 8.0 for distance in Sectors(12, 0.05, 8.0).gather(scan))
+
+
+def test_a_scanner_in_front_of_the_middle_sees_from_the_middle() -> None:
+    ranges = [math.inf] * 360
+    ranges[180] = 2.0  # straight ahead of the scanner, which looks to the left
+    gathered = Sectors(36, 0.05, 8.0).gather(Scan(ranges), mount=(0.5, 0.0, math.pi / 2))
+    assert gathered[sector(math.atan2(2.0, 0.5))] == pytest.approx(math.hypot(2.0, 0.5))
+    assert sum(distance < 8.0 for distance in gathered) == 1

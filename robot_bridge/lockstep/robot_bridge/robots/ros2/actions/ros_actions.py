@@ -1,7 +1,7 @@
 """The actions of a ROS 2 robot, by their names: services, actions, grippers, and the goal on the map."""
 
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from typing import Any
 
@@ -147,7 +147,7 @@ def _reading_of(action: RosAction) -> Reading:
     return FieldReading(left=action.left, progress=action.progress, text=action.text, result=action.result)
 
 
-def _filled(goal: Any, fields: list[tuple[str, ParameterValue]]) -> Any:
+def _filled(goal: Any, fields: Sequence[tuple[str, ParameterValue]]) -> Any:
     """Return the goal with these fields.
 
     Raises:

@@ -6,7 +6,8 @@ from typing import Any
 
 from lockstep.robot_bridge.control import clock
 from lockstep.robot_bridge.robots.navigation import GridMap, NavigationNow, PlanarPose
-from lockstep.robot_bridge.robots.ros2.mapping.transforms import TransformTree, composed, inverted, planar
+from lockstep.robot_bridge.robots.ros2.mapping.frame_listener import FrameListener
+from lockstep.robot_bridge.robots.ros2.mapping.transforms import composed, inverted, planar
 from lockstep.robot_bridge.robots.ros2.ros_side import RosSide
 from lockstep.robot_bridge.robots.ros2.sensing.latest_message import Newest
 from lockstep.robot_bridge.robots.ros2.settings import MapTopics
@@ -16,7 +17,6 @@ __all__ = ["BadMap", "MapReader", "grid_of"]
 MOST_CELLS = 1 << 26  # of a map that is read: 64 MiB
 MOST_POINTS = 100_000  # of a path that is read
 SAME: PlanarPose = (0.0, 0.0, 0.0)
-TF_DEPTH = 100  # messages: every node of the robot publishes on that topic
 
 Points = tuple[tuple[float, float], ...]
 
@@ -46,8 +46,16 @@ def grid_of(message: Any, now: float) -> GridMap:
 class MapReader:
     """The node's thread writes what came, the bridge's loop reads it."""
 
-    def __init__(self, ros: RosSide, settings: MapTopics, odometry: Callable[[float], PlanarPose | None]) -> None:
+    def __init__(
+        self,
+        ros: RosSide,
+        settings: MapTopics,
+        odometry: Callable[[float], PlanarPose | None],
+        frames: FrameListener | None,
+    ) -> None:
         """`odometry`: the base's measured pose now, given the time; None if it is not known.
+
+        `frames`: needed where the place comes from tf.
 
         Raises:
             RobotUnavailable: a message is not installed.
@@ -56,7 +64,7 @@ class MapReader:
         self._odometry = odometry
         self._map: GridMap | None = None
         self._maps: Newest[bool] = Newest(settings.topic, math.inf)
-        self._frames = TransformTree()
+        self._frames = frames
         self._place: tuple[PlanarPose, float] | None = None  # of the odometry's frame on the map, and when that came
         self._path: Newest[Points] = Newest(settings.path, math.inf)
         subscribe = ros.subscribe_kept if settings.durable else ros.subscribe
@@ -66,10 +74,6 @@ class MapReader:
         place = settings.place
         if place.source == "topic":
             ros.subscribe(ros.message("geometry_msgs", place.message), place.topic, self._take_place)
-        elif place.source == "tf":
-            frames = ros.message("tf2_msgs", "TFMessage")
-            ros.subscribe(frames, "/tf", self._take_frames, depth=TF_DEPTH)
-            ros.subscribe_kept(frames, "/tf_static", self._take_static_frames, depth=TF_DEPTH)
 
     def grid_map(self) -> GridMap | None:
         return self._map
@@ -90,6 +94,8 @@ class MapReader:
         if place.source == "same":
             return SAME
         if place.source == "tf":
+            if self._frames is None:
+                return None
             return self._frames.pose(self._settings.frame, place.odometry, now, place.timeout)
         known = self._place
         return None if known is None or now - known[1] > place.timeout else known[0]
@@ -123,9 +129,3 @@ class MapReader:
         odometry = self._odometry(now)
         if pose is not None and odometry is not None:
             self._place = composed(pose, inverted(odometry)), now
-
-    def _take_frames(self, message: Any) -> None:
-        self._frames.take(message, clock.now(), static=False)
-
-    def _take_static_frames(self, message: Any) -> None:
-        self._frames.take(message, clock.now(), static=True)

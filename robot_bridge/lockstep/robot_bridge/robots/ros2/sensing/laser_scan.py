@@ -41,8 +41,10 @@ class Sectors:
         self._range_max = range_max
         self._yaw = yaw
 
-    def gather(self, scan: Scan) -> list[float]:
+    def gather(self, scan: Scan, mount: tuple[float, float, float] | None = None) -> list[float]:
         """Return the distance of each sector, m.
+
+        `mount`: pose of the scanner in the body, m and rad; None: in its middle, with the yaw of the settings.
 
         Raises:
             BadScan: the scan contradicts itself.
@@ -52,10 +54,15 @@ class Sectors:
             raise BadScan("scan without rays, or with far too many")
         if not (math.isfinite(scan.angle_min) and math.isfinite(scan.angle_increment)) or scan.angle_increment == 0:
             raise BadScan("scan with invalid angles")
-        angles = scan.angle_min + self._yaw + scan.angle_increment * np.arange(ranges.size)
+        x, y, yaw = mount or (0.0, 0.0, self._yaw)
+        angles = scan.angle_min + yaw + scan.angle_increment * np.arange(ranges.size)
         # Beyond its own limits a scanner says nothing (REP 117: NaN is wrong, infinite is free).
         seen = (ranges >= max(scan.range_min, self._range_min)) & (ranges <= min(scan.range_max, self._range_max))
-        sectors = np.rint((angles[seen] + math.pi) * (self._count / math.tau)).astype(np.int64) % self._count
+        angles, ranges = angles[seen], ranges[seen]
+        if x or y:  # as seen from the middle of the body
+            along, across = x + ranges * np.cos(angles), y + ranges * np.sin(angles)
+            angles, ranges = np.arctan2(across, along), np.minimum(np.hypot(along, across), self._range_max)
+        sectors = np.rint((angles + math.pi) * (self._count / math.tau)).astype(np.int64) % self._count
         nearest = np.full(self._count, self._range_max)
-        np.minimum.at(nearest, sectors, ranges[seen])
+        np.minimum.at(nearest, sectors, ranges)
         return [float(distance) for distance in nearest]

@@ -5,6 +5,8 @@ import threading
 from typing import Any
 
 from lockstep.robot_bridge.control import clock
+from lockstep.robot_bridge.robots.navigation import PlanarPose
+from lockstep.robot_bridge.robots.ros2.mapping.frame_listener import FrameListener
 from lockstep.robot_bridge.robots.ros2.ros_side import RosSide, header_ns
 from lockstep.robot_bridge.robots.ros2.sensing.laser_scan import BadScan, Sectors
 from lockstep.robot_bridge.robots.ros2.sensing.latest_message import Newest
@@ -12,13 +14,17 @@ from lockstep.robot_bridge.robots.ros2.settings import Lockout, Ranges, Wrench
 
 __all__ = ["LockoutTopic", "RangeSensor", "WrenchTopic"]
 
+MOUNT_TIMEOUT = 10.0  # s after which a transform that is not static is too old
 FIRST_WORD = 3.0  # s for the first message of a lock-out, while the nodes find each other
 
 
 class RangeSensor:
     """Reads ranges from sensor_msgs/LaserScan."""
 
-    def __init__(self, ros: RosSide, settings: Ranges) -> None:
+    def __init__(self, ros: RosSide, settings: Ranges, frames: FrameListener | None = None) -> None:
+        """`frames`: needed where the settings name the body's frame."""
+        self._frames = frames
+        self._frame = settings.frame
         self._sectors = Sectors(settings.count, settings.range_min, settings.range_max, settings.yaw)
         self._scans: Newest[list[float]] = Newest(settings.topic, settings.timeout)
         ros.subscribe(ros.message("sensor_msgs", "LaserScan"), settings.topic, self._take)
@@ -34,9 +40,17 @@ class RangeSensor:
     def _take(self, message: Any) -> None:
         now = clock.now()
         try:
-            self._scans.put(self._sectors.gather(message), now, header_ns(message.header))
+            self._scans.put(self._sectors.gather(message, self._mount(message, now)), now, header_ns(message.header))
         except BadScan as error:
             self._scans.refuse(str(error), now)
+
+    def _mount(self, message: Any, now: float) -> PlanarPose | None:
+        if self._frames is None or not self._frame:
+            return None
+        mount = self._frames.pose(self._frame, message.header.frame_id, now, MOUNT_TIMEOUT)
+        if mount is None:
+            raise BadScan("scan in a frame that is not connected with the body's")
+        return mount
 
 
 class WrenchTopic:

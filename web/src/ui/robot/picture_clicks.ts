@@ -1,8 +1,8 @@
-import { MapGestures, LONG_PRESS_MS, type Gesture } from "../map/map_gestures";
-import type { ConsoleEngine } from "../engine/console_engine";
-import { mayDrive, note } from "../session/console_state";
-import { ACT_REFUSAL_LABELS } from "./act_refusal_labels";
-import { actRefusal } from "./actions";
+import { MapGestures, LONG_PRESS_MS, type Gesture } from "../../map/map_gestures";
+import type { ConsoleEngine } from "../../engine/console_engine";
+import { mayDrive, note } from "../../session/console_state";
+import { ACT_REFUSAL_LABELS } from "../../robot/act_refusal_labels";
+import { actRefusal } from "../../robot/actions";
 
 /** Where a place on a canvas is in its picture, in shares from the left and the top; null: beside it. */
 export function pictureShare(

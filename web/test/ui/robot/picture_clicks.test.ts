@@ -1,5 +1,5 @@
 import { expect, it } from "vitest";
-import { pictureShare } from "../../src/robot/picture_clicks";
+import { pictureShare } from "../../../src/ui/robot/picture_clicks";
 
 it("finds the place in a picture that keeps its shape on a wider canvas, and nothing beside it", () => {
   const canvas = { width: 640, height: 480, wide: 800, high: 480 };
