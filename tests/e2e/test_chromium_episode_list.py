@@ -96,12 +96,12 @@ async def test_recorded_discarded_relabelled_trimmed_split_and_exported_the_rows
     assert len(read_edits(path)) == 6
     (root,) = export_lerobot.export_all([path], tmp_path / "dataset", "")
     table = pq.read_table(root / "data/chunk-000/file-000.parquet").to_pylist()
-    begin, end, middle = first.first_event + 2, first.last_event - 3, first.first_event + 6
+    begin, behind, middle = first.first_event + 2, first.last_event - 3, first.first_event + 6
     events = [row["lockstep.event"] for row in table]
-    assert set(events) <= set(range(begin, end))
-    assert len(events) >= (end - begin) - 2
+    assert set(events) <= set(range(begin, behind))
+    assert len(events) >= (behind - begin) - 2
     assert {row["lockstep.event"] for row in table if row["episode_index"] == 0} <= set(range(begin, middle))
-    assert {row["lockstep.event"] for row in table if row["episode_index"] == 1} <= set(range(middle, end))
+    assert {row["lockstep.event"] for row in table if row["episode_index"] == 1} <= set(range(middle, behind))
     assert {row["lockstep.success"] for row in table} == {0}
     assert pq.read_table(root / "meta/tasks.parquet").column("task").to_pylist() == ["shove the box"]
     assert verify_dataset(root).ok
