@@ -220,8 +220,8 @@ async def test_a_fault_while_a_session_ends_does_not_keep_the_console_from_endin
 ) -> None:
     close = RecordingService.close
 
-    def fault(recordings: RecordingService) -> None:
-        close(recordings)
+    async def fault(recordings: RecordingService) -> None:
+        await close(recordings)
         raise RuntimeError("a fault of ours")
 
     monkeypatch.setattr(RecordingService, "close", fault)

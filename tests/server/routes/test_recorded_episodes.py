@@ -59,7 +59,8 @@ def ids(answer: dict[str, Any]) -> list[str]:
 
 
 async def test_all_roles_see_the_list_and_only_operators_and_supervisors_change_it(rig: Rig) -> None:
-    for role in ("observer", "operator", "supervisor"):
+    roles: tuple[Role, ...] = ("observer", "operator", "supervisor")
+    for role in roles:
         page = await listed(rig, link_made_at(rig, role, 1))
         (found,) = page["recordings"]
         assert (page["pending"], page["older"], page["unreadable"]) == (0, 0, 0)
@@ -68,7 +69,7 @@ async def test_all_roles_see_the_list_and_only_operators_and_supervisors_change_
         assert found["info"]["episodes"] == {"kept": 2, "discarded": 1, "cut": 1, "open": 1}
     refused = await change(rig, link_made_at(rig, "observer", 1), revision=0, episode="a", task="x")
     assert (refused.status_code, refused.json()["error"]) == (403, "not_allowed")
-    for revision, role in enumerate(("operator", "supervisor")):
+    for revision, role in enumerate(roles[1:]):
         done = await change(rig, link_made_at(rig, role, 1), revision=revision, episode="a", task=f"by {role}")
         assert (done.status_code, done.json()["episodes"][0]["task"]) == (200, f"by {role}"), done.text
     again = await listed(rig, rig.token("supervisor"))
@@ -213,8 +214,7 @@ async def test_pictures_and_changes_have_a_rate_and_the_change_is_in_the_audit(r
     assert answers == {409, 429}
     object.__setattr__(rig.app.state.recordings, "pictures", RateLimits(0.0, 1))
     path = "/api/recordings/one/picture?camera=front&event=30"
-    answers = [(await rig.http.get(path, headers=token)).status_code for _ in range(2)]
-    assert answers == [200, 429]
+    assert [(await rig.http.get(path, headers=token)).status_code for _ in range(2)] == [200, 429]
 
 
 async def test_a_running_recording_is_listed_with_its_pictures(tmp_path: Path) -> None:

@@ -109,7 +109,7 @@ def test_an_undo_takes_back_one_change_and_leaves_the_others() -> None:
 
 def test_what_was_made_of_an_undone_split_is_gone_with_it() -> None:
     result = apply_edits(RECORDED, [edit("a", split=15), edit("edit-1a", task="x"), edit(undo=1)])
-    assert (result.undone, result.without_effect.keys()) == ({1}, {2})
+    assert (result.undone, set(result.without_effect)) == ({1}, {2})
     assert [each.entry for each in result.episodes] == RECORDED
 
 

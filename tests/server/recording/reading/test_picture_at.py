@@ -21,7 +21,7 @@ def shown(path: Path, event: int, width: int = 160) -> PictureAt | None:
 
 
 def brightness(jpeg: bytes) -> float:
-    with av.open(io.BytesIO(jpeg)) as image:
+    with av.open(io.BytesIO(jpeg), "r") as image:
         (frame,) = image.decode(video=0)
         return float(frame.to_ndarray(format="gray")[20:100, 20:100].mean())
 
@@ -57,7 +57,7 @@ def test_a_picture_is_no_wider_than_asked_and_never_enlarged(tmp_path: Path) -> 
     for width, wide in ((160, 160), (640, 320)):
         found = shown(path, 5, width)
         assert found is not None
-        with av.open(io.BytesIO(found.jpeg)) as image:
+        with av.open(io.BytesIO(found.jpeg), "r") as image:
             assert (image.streams.video[0].width, image.streams.video[0].height) == (wide, wide * 3 // 4)
 
 

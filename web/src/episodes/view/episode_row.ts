@@ -109,11 +109,10 @@ export class EpisodeRow {
   }
 
   private toolsOf(): HTMLElement[] {
-    const { listed } = this;
-    const { episode } = listed;
+    const { episode } = this.listed;
     if (!this.mayEdit || !episode.editable) return [];
     const label = episode.restorable ? "Restore" : "Discard";
-    const drop = button("chip-button", label, () => this.events.drop(listed, !episode.restorable));
+    const drop = button("chip-button", label, () => this.events.drop(this.listed, !episode.restorable));
     drop.setAttribute("aria-label", `${label}: ${titleOf(episode)}, take ${episode.number}`);
     return [drop];
   }

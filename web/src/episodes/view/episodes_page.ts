@@ -7,7 +7,7 @@ import { PictureLoader } from "../picture_loader";
 import { EpisodeEditor } from "./episode_editor";
 import { EpisodeRow } from "./episode_row";
 import { FilterBar } from "./filter_bar";
-import { saveReport } from "../../replay/save_report";
+import { saveReport } from "../../replay/view/save_report";
 import { ConsoleError } from "../../transport/signalling/console_api";
 import { requestErrorLabel } from "../../transport/signalling/session_api";
 import { button, grouped, h, setHidden, setText } from "../../ui/elements/dom";

@@ -10,7 +10,7 @@ import {
 } from "../recording_list";
 import { requestErrorLabel } from "../../transport/signalling/session_api";
 import { replayHash } from "../replay_link";
-import { saveReport } from "../save_report";
+import { saveReport } from "./save_report";
 import { button, grouped, h, setHidden, setText } from "../../ui/elements/dom";
 import type { RecordingsApi } from "../recordings_api";
 

@@ -129,11 +129,10 @@ def _checked(
 def _opened(path: Path, flags: int) -> BinaryIO:
     """Open a regular file; a link, a FIFO or a device is refused. Raises OSError."""
     number = os.open(path, flags | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC, 0o600)
-    file = os.fdopen(number, "r+b") if flags & os.O_RDWR else os.fdopen(number, "rb")
-    if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
-        file.close()
+    if not stat.S_ISREG(os.fstat(number).st_mode):
+        os.close(number)
         raise OSError(errno.EINVAL, "not a regular file", str(path))
-    return file
+    return os.fdopen(number, "r+b") if flags & os.O_RDWR else os.fdopen(number, "rb")
 
 
 def _read(file: BinaryIO) -> list[EpisodeEdit | None]:

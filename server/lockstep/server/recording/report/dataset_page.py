@@ -92,7 +92,9 @@ def _tasks(notes: DatasetNotes) -> str:
         counts[2] += each.outcome == "failure"
         counts[3] += each.rows
         counts[4] += each.left_out
-    rows = [(task, *counts, parts.share(counts[1], counts[1] + counts[2])) for task, counts in found.items()]
+    rows: list[tuple[parts.Cell, ...]] = [
+        (task, *counts, parts.share(counts[1], counts[1] + counts[2])) for task, counts in found.items()
+    ]
     head = ("Task", "Episodes", "Success", "Failure", "Rows", "Rows left out", "Success of those that say")
     return parts.table(head, rows)
 
@@ -123,7 +125,7 @@ def _drivers(rows: list[Row], notes: DatasetNotes) -> str:
 
 
 def _cameras(rows: list[Row], notes: DatasetNotes) -> str:
-    table = []
+    table: list[tuple[parts.Cell, ...]] = []
     for at, camera in enumerate(notes.cameras):
         stamps = [(row["lockstep.event"], _stamps(row)[at]) for row in rows if len(_stamps(row)) > at]
         gaps = sorted(event_gap(event, stamp) for event, stamp in stamps if is_event(stamp))

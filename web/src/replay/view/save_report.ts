@@ -1,4 +1,4 @@
-import { h } from "../ui/elements/dom";
+import { h } from "../../ui/elements/dom";
 
 const KEPT_MS = 60_000; // for the browser to write it
 
