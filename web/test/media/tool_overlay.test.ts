@@ -14,7 +14,15 @@ const HAND: Body = {
 };
 /** It looks along the world's z axis, from 1 m below. */
 const CAMERA: Camera = {
-  ...{ name: "front", label: "Front", width: 640, height: 480, frame_rate: 30, metres_per_pixel: null },
+  ...{
+    name: "front",
+    label: "Front",
+    width: 640,
+    height: 480,
+    frame_rate: 30,
+    metres_per_pixel: null,
+    click: "",
+  },
   calibration: {
     body: "",
     position: [0, 0, -1],

@@ -24,7 +24,15 @@ const HAND: Body = {
   joints: [{ joint: "turn", kind: "revolute", axis: [0, 1, 0] }],
 };
 const CAMERA: Camera = {
-  ...{ name: "front", label: "Front", width: 640, height: 480, frame_rate: 30, metres_per_pixel: null },
+  ...{
+    name: "front",
+    label: "Front",
+    width: 640,
+    height: 480,
+    frame_rate: 30,
+    metres_per_pixel: null,
+    click: "",
+  },
   calibration: {
     body: "",
     position: [0, 0, 2],
