@@ -147,7 +147,8 @@ async def test_a_robot_link_between_the_sides_takes_the_robots_paths() -> None:
         "import asyncio, sys\nfrom lockstep.robot_bridge.link.link_client import RobotLink\n"
         "async def main():\n"
         "    async with RobotLink(sys.argv[1], 5600, 'media') as link:\n"
-        "        print(type(await anext(link)).__name__, flush=True)\n"
+        "        while (kind := type(await anext(link)).__name__) != 'Media': pass\n"
+        "        print(kind, flush=True)\n"
         "asyncio.run(main())"
     )
     async with Namespaces(profile) as spaces:

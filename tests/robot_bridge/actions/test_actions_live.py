@@ -54,7 +54,7 @@ class OwnWayRobot(RecordingRobot):
 
     def describe(self) -> RobotDescription:
         actions = (Action(name="dock", label="Dock"), Action(name="light", label="Light", moves=False))
-        return msgspec.structs.replace(super().describe(), actions=actions)
+        return msgspec.structs.replace(super().describe(), actions=actions, map=None)
 
     def begin_action(self, name: str, parameters: Mapping[str, ParameterValue]) -> ActionRun:
         if name == "light":

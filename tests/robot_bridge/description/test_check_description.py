@@ -114,7 +114,7 @@ def test_a_camera_and_a_microphone_are_both_streams() -> None:
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"fx": 0.0}, "focal lengths must be positive"),
+        ({"fx": 0.0}, "needs focal lengths above 0"),
         ({"cx": float("nan")}, "must be finite"),
         ({"position": (0.0, 0.0, 1e7)}, "must be finite and at most"),
         ({"distortion": (0.0,) * 15}, "15 coefficients of distortion"),

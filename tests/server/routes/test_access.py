@@ -52,7 +52,7 @@ async def test_an_invitation_gives_a_link_with_its_role_and_name() -> None:
         assert session.json()["you"] == {"role": "observer", "name": "Ada"}
         listed = (await rig.http.get("/api/invitations", headers=rig.token("supervisor"))).json()
         assert [each["id"] for each in listed["invitations"]] == [made["id"]]
-        assert listed["may_invite"] == ["observer", "operator", "supervisor"]
+        assert listed["may_invite"] == ["observer", "policy", "operator", "supervisor"]
         assert "link" not in listed["invitations"][0]
 
 

@@ -180,11 +180,14 @@ class _small_disk:
 
 
 async def _kill_countdown(run: _Run) -> None:
-    starting = asyncio.ensure_future(run.driver.episodes.start(TASK))
-    await run.until(lambda state: state.phase == "countdown", "a count-down")
-    await _kill(run)
-    with suppress(ConsoleLost, EpisodeRefused):
-        await starting
+    async def start() -> None:
+        with suppress(ConsoleLost, EpisodeRefused):
+            await run.driver.episodes.start(TASK)
+
+    async with asyncio.TaskGroup() as tasks:
+        tasks.create_task(start())
+        await run.until(lambda state: state.phase == "countdown", "a count-down")
+        await _kill(run)
 
 
 async def _kill_open(run: _Run) -> None:
@@ -196,14 +199,18 @@ async def _kill_open(run: _Run) -> None:
 
 async def _kill_keeping(run: _Run) -> None:
     second = await run.begun()
-    keeping = asyncio.ensure_future(run.driver.episodes.success())
-    await run.until(lambda state: state.phase != "open", "that it keeps the episode")
-    await _kill(run)
-    try:
-        await keeping
-        run.kept.append(second)  # it was said to be on the disk
-    except (ConsoleLost, EpisodeRefused):
-        run.perhaps.append(second)
+
+    async def keep() -> None:
+        try:
+            await run.driver.episodes.success()
+            run.kept.append(second)  # it was said to be on the disk
+        except (ConsoleLost, EpisodeRefused):
+            run.perhaps.append(second)
+
+    async with asyncio.TaskGroup() as tasks:
+        tasks.create_task(keep())
+        await run.until(lambda state: state.phase != "open", "that it keeps the episode")
+        await _kill(run)
 
 
 async def _kill_export(run: _Run) -> None:
@@ -236,8 +243,13 @@ async def _disk(run: _Run) -> None:
     left = LOW_BYTES + LOW_BYTES // 8 if run.fault == "disk-low" else 64 << 10
     with ballast.open("wb") as file:
         os.posix_fallocate(file.fileno(), 0, max(1, free - left))
-    driving = asyncio.ensure_future(_drive_on(run))
-    await run.until(lambda state: state.phase == "idle", "the end of the episode")
+    async with _driving_on(run):
+        await run.until(lambda state: state.phase == "idle", "the end of the episode")
+        await _refuses_to_keep(run)
+    ballast.unlink()
+
+
+async def _refuses_to_keep(run: _Run) -> None:
     run.said.append(run.state.last)
     if run.state.cut != 1 or "lost" not in run.state.last:
         run.wrong.append(f"the console said {run.state.last!r}, and {run.state.cut} lost")
@@ -246,26 +258,30 @@ async def _disk(run: _Run) -> None:
         run.wrong.append("an episode was kept after its recording had ended")
     except EpisodeRefused:
         pass
-    driving.cancel()
-    with suppress(asyncio.CancelledError):
-        await driving
-    ballast.unlink()
 
 
-async def _drive_on(run: _Run) -> None:
-    while True:
-        await run.drive()
+@asynccontextmanager
+async def _driving_on(run: _Run) -> AsyncIterator[None]:
+    """Drive without end meanwhile."""
+
+    async def drive() -> None:
+        while True:
+            await run.drive()
+
+    async with asyncio.TaskGroup() as tasks:
+        driving = tasks.create_task(drive())
+        yield
+        driving.cancel()
 
 
 async def _camera_hangs(run: _Run) -> None:
     """One episode in the middle of which a camera hangs, and is kept all the same."""
     second = await run.begun()
     run.bridge.process.signal(signal.SIGUSR1)
-    driving = asyncio.ensure_future(_drive_on(run))
-    await run.until(lambda state: any(each.kind == "camera_missing" for each in state.problems), "a camera is missing")
-    driving.cancel()
-    with suppress(asyncio.CancelledError):
-        await driving
+    async with _driving_on(run):
+        await run.until(
+            lambda state: any(each.kind == "camera_missing" for each in state.problems), "a camera is missing"
+        )
     run.note_problems()
     await run.driver.episodes.success()
     run.kept.append(second)

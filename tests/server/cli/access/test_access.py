@@ -134,7 +134,7 @@ def test_without_a_console_the_settings_say_where_it_will_be(tmp_path: Path) -> 
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (("invite", "--role", "admin"), "observer, operator or supervisor"),
+        (("invite", "--role", "admin"), "observer, operator, supervisor or policy"),
         (("invite", "--expires", "soon"), "not a time"),
         (("invite", "--expires", "1s"), "valid for 60"),
         (("revoke", "nothing"), "no such invitation"),

@@ -34,7 +34,6 @@ from lockstep.robot_bridge.robots.ros2.settings import (
     Service,
     Servo,
 )
-from lockstep.robot_bridge.robots.ros2.tool import describe_tool
 from lockstep.robot_bridge.yaml_file import SettingsPlace
 
 __all__ = ["BASE_JOINTS", "GOAL_ACTION", "SERVO_AXES", "describe"]
@@ -72,7 +71,11 @@ def describe(settings: Ros2Settings) -> RobotDescription:
     base_axes = () if base is None else _base_axes(base, settings.hold)
     bodies = (() if base is None else (_base_body(base),)) + settings.bodies
     arm_axes = () if arm is None else joint_axes(arm, settings.hold)
-    tool = None if arm is None or arm.tool is None else describe_tool(arm, bodies, settings.hold)
+    tool = None
+    if arm is not None and arm.tool is not None:
+        from lockstep.robot_bridge.robots.ros2.tool import describe_tool  # needs numpy, as few robots do
+
+        tool = describe_tool(arm, bodies, settings.hold)
     if settings.servo is not None:
         arm_axes = _servo_axes(settings.servo, settings.hold)
     layers: tuple[ControlLayer, ...] = ()
