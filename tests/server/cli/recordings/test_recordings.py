@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey
+from mcap.reader import SeekingReader
 from typer.testing import CliRunner, Result
 
 from lockstep.server.cli.main import app
@@ -71,8 +72,12 @@ def test_who_signed_it_is_said_and_a_key_that_did_not_is_named(directory: Path) 
 
 def test_a_tampered_recording_ends_with_1_and_what_is_none_with_2(directory: Path) -> None:
     path = directory / "one.mcap"
+    with path.open("rb") as file:
+        summary = SeekingReader(file).get_summary()
+    assert summary is not None
+    first = summary.chunk_indexes[0]
     data = bytearray(path.read_bytes())
-    data[len(data) // 3] ^= 1
+    data[first.chunk_start_offset + first.chunk_length // 2] ^= 1
     path.write_bytes(data)
     verdict = _lockstep(directory, "verify", "one")
     assert verdict.exit_code == 1
