@@ -98,6 +98,16 @@ async def test_no_bound_on_requests_keeps_a_person_from_taking_the_robot_from_a_
         await _seat(policy, holder=await _id(person), why="taken")
 
 
+async def test_no_bound_on_requests_keeps_a_person_from_ending_the_turn_of_a_policy() -> None:
+    async with running_rig(**PATIENT) as rig, rig.peer("operator") as person, rig.peer("policy") as policy:
+        await _policy_drives(rig, person, policy)
+        for number in range(30):
+            person.send("session", Rename(name=f"Ada {number}"))
+        await _refused(person, "too_often")
+        person.send("session", SeatOffer(offered=False))
+        await _seat(policy, holder="", why="offer withdrawn", offered=False)
+
+
 async def test_a_page_that_only_looks_for_a_free_seat_does_not_take_it_from_a_policy() -> None:
     async with (
         running_rig(**PATIENT) as rig,
@@ -120,7 +130,7 @@ async def test_a_policy_may_stop_the_robot_which_ends_its_turn_and_may_not_reset
         assert "policies" in (await _refused(policy, "not_allowed")).detail
         policy.send("session", SeatRequest(only_if_free=True))
         await policy.until(lambda each: isinstance(each, Refusal) and "offers" in each.detail)
-        assert rig.dependencies.console.clock.stop.stopped
+        await person.feedback(lambda each: each.stop.stopped)
 
 
 async def test_a_stop_by_anybody_ends_the_offer_before_a_policy_has_taken_the_seat() -> None:
