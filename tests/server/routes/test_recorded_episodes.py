@@ -217,6 +217,15 @@ async def test_pictures_and_changes_have_a_rate_and_the_change_is_in_the_audit(r
     assert [(await rig.http.get(path, headers=token)).status_code for _ in range(2)] == [200, 429]
 
 
+@pytest.mark.parametrize("path", ["/api/episodes", "/api/recordings/one/episodes"])
+async def test_the_list_has_a_rate_for_each_link(rig: Rig, path: str) -> None:
+    object.__setattr__(rig.app.state.recordings, "lists", RateLimits(0.0, 1))
+    token, another = rig.token("observer"), rig.token("supervisor")
+    answers = [(await rig.http.get(path, headers=each)).status_code for each in (another, another, token)]
+    assert answers[:2] == [200, 429]
+    assert answers[2] != 429
+
+
 async def test_a_running_recording_is_listed_with_its_pictures(tmp_path: Path) -> None:
     settings = RecordingSettings(directory=tmp_path / "recordings", free_bytes=0)
     async with running_rig(recording=settings) as rig:
@@ -224,6 +233,8 @@ async def test_a_running_recording_is_listed_with_its_pictures(tmp_path: Path) -
         assert (await rig.http.post("/api/recordings", headers=token)).status_code == 201
         found: dict[str, Any] = {}
 
+        # It asks all the time until the first chunk is written.
+        object.__setattr__(rig.app.state.recordings, "lists", RateLimits(1e9, 10**9))
         async with rig.peer("operator"):
             while not found.get("recordings") or not found["recordings"][0]["cameras"]:
                 found = await listed(rig, token, f"?known={found.get('version', '')}")

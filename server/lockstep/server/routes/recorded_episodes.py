@@ -13,11 +13,18 @@ from lockstep.server.auth.tokens import require_role
 from lockstep.server.errors import BadParameter, TooManyRequests
 from lockstep.server.http.json_response import json_answer
 from lockstep.server.http.request_body import read_json
+from lockstep.server.recording.browsing.catalog import CatalogPage
 from lockstep.server.recording.episodes.edits import EpisodeEdit
 from lockstep.server.recording.episodes.listed import RecordingEpisodes
 from lockstep.server.recording.errors import RecordingError
 from lockstep.server.recording.format.records import Whole
-from lockstep.server.routes.recordings import Caller, reader_right, recording_error, recording_service
+from lockstep.server.routes.recordings import (
+    Caller,
+    RecordingService,
+    reader_right,
+    recording_error,
+    recording_service,
+)
 from lockstep.server.util.display_names import printable
 
 __all__ = ["EpisodeChangeBody", "EpisodeList", "router"]
@@ -63,17 +70,29 @@ async def episodes(
 ) -> Response:
     """The episodes of all recordings, with the changes to them."""
     service = recording_service(request)
+    _spend_list(service, caller.token_id)
     try:
         page = await service.catalog.page(reader_right(request, caller), skip)
     except (RecordingError, OSError) as error:
         raise recording_error(error) from error
+    # It may have many megabytes, and whoever drives waits for the loop.
+    body = await service.in_thread(lambda: _list_body(page, known))
+    return Response(body, media_type="application/json", headers={"Cache-Control": "no-store"})
+
+
+def _spend_list(service: RecordingService, link: str) -> None:
+    if not service.lists.spend(link, time.monotonic()):
+        raise TooManyRequests("the episodes are asked for too often with this link")
+
+
+def _list_body(page: CatalogPage, known: str) -> bytes:
     digest = hashlib.blake2b(repr(page[1:]).encode(), digest_size=12)
     for each in page.recordings:
         digest.update(each)
     version = digest.hexdigest()
     if version == known:
-        return json_answer(EpisodeList(version=version, unchanged=True, recordings=[]))
-    return json_answer(
+        return msgspec.json.encode(EpisodeList(version=version, unchanged=True, recordings=[]))
+    return msgspec.json.encode(
         {
             "version": version,
             "unchanged": False,
@@ -87,8 +106,10 @@ async def episodes(
 
 @router.get("/api/recordings/{recording_id}/episodes")
 async def of_recording(request: Request, caller: Caller, recording_id: str) -> Response:
+    service = recording_service(request)
+    _spend_list(service, caller.token_id)
     try:
-        return json_answer(await recording_service(request).catalog.one(recording_id, reader_right(request, caller)))
+        return json_answer(await service.catalog.one(recording_id, reader_right(request, caller)))
     except (RecordingError, OSError) as error:
         raise recording_error(error) from error
 
