@@ -40,6 +40,7 @@ __all__ = ["CatalogPage", "EpisodeCatalog", "InThread"]
 
 MAX_FILES = 500  # in one answer
 MAX_EPISODES = 20_000  # in one answer; the rest is counted as older
+MAX_LIST_BYTES = 8 * 1024 * 1024  # of one file's list, about MAX_EPISODES: it is parsed on the loop
 MAX_KEPT_BYTES = 48 * 1024 * 1024  # of lists, as JSON
 MAX_PICTURE_BYTES = 24 * 1024 * 1024
 LIST_SECONDS = 20.0  # for one file; an interrupted one is read as a whole
@@ -171,6 +172,8 @@ class EpisodeCatalog:
         """Have a file read. One that cannot be read is not read again before it has changed."""
         try:
             text = await self._worker.ask(ListEpisodes(str(path)), LIST_SECONDS)
+            if len(text) > MAX_LIST_BYTES:
+                raise RecordingUnreadable("it has far too many episodes")
             known = _Known(version, _decoder.decode(text), text)
         except (TooManyRequests, NotFound):
             raise
