@@ -244,17 +244,31 @@ class EpisodeCatalog:
     # changes
 
     async def change(
-        self, recording_id: str, edit: EpisodeEdit, revision: int, right: RecordingReaderRight
+        self,
+        recording_id: str,
+        edit: EpisodeEdit,
+        revision: int,
+        right: RecordingReaderRight,
+        check: Callable[[], None],
     ) -> RecordingEpisodes:
         """Make a change that its author made of `revision`; return the recording as it is then.
+
+        `check`: called on another thread right before the change; raises ConsoleError if its author may not any more.
 
         Raises:
             StaleEdit, EditRefused, NotAllowed, NotFound, RecordingError, OSError: it is not made.
         """
-        await self._in_thread(lambda: self._change(recording_id, edit, revision, right))
+        await self._in_thread(lambda: self._change(recording_id, edit, revision, right, check))
         return await self.one(recording_id, right)
 
-    def _change(self, recording_id: str, edit: EpisodeEdit, revision: int, right: RecordingReaderRight) -> None:
+    def _change(
+        self,
+        recording_id: str,
+        edit: EpisodeEdit,
+        revision: int,
+        right: RecordingReaderRight,
+        check: Callable[[], None],
+    ) -> None:
         """Blocks."""
         reader, _ = self._library.open(recording_id)
         with reader:
@@ -264,6 +278,7 @@ class EpisodeCatalog:
             before, after = apply_edits(recorded, edits).episodes, apply_edits(recorded, [*edits, edit]).episodes
             if not all(right.reads(each.entry.started) for each in _differing(before, after)):
                 raise NotAllowed("an episode of this change was recorded before your link was made")
+        check()
         try:
             add_edit(path, recorded, edit, after=revision)
         except EpisodeEditStale as error:
