@@ -1,6 +1,7 @@
 """Reads and writes fields of ROS messages by their path, "target.speed". No I/O."""
 
 import math
+from collections.abc import Collection
 from typing import Any
 
 from lockstep.protocol.actions import ParameterValue
@@ -57,7 +58,7 @@ def number_at(message: Any, path: str) -> float:
         BadField: the field is not there, is none, or is not finite.
     """
     value = value_at(message, path)
-    if hasattr(value, "__len__") and not isinstance(value, str):
+    if isinstance(value, Collection) and not isinstance(value, str):
         return float(len(value))
     if isinstance(value, str) or not math.isfinite(value):
         raise BadField(f"the field {path} is no number")
@@ -73,7 +74,9 @@ def text_at(message: Any, path: str) -> str:
     value = value_at(message, path)
     if isinstance(value, float):
         return f"{value:.3g}"
-    return str(value if isinstance(value, bool | int | str) else list(value) if hasattr(value, "__len__") else value)
+    return str(
+        value if isinstance(value, bool | int | str) else list(value) if isinstance(value, Collection) else value
+    )
 
 
 def put_pose(message: Any, path: str, x: float, y: float, yaw: float, frame: str, stamp: Any) -> None:
