@@ -15,6 +15,7 @@ from lockstep.protocol.console import (
     ServerMessage,
     Shadow,
     ShadowVerdict,
+    StopStateNotice,
     Welcome,
 )
 from lockstep.protocol.episodes import EpisodeAnswer, EpisodeRequest
@@ -130,7 +131,7 @@ async def test_a_policy_may_stop_the_robot_which_ends_its_turn_and_may_not_reset
         assert "policies" in (await _refused(policy, "not_allowed")).detail
         policy.send("session", SeatRequest(only_if_free=True))
         await policy.until(lambda each: isinstance(each, Refusal) and "offers" in each.detail)
-        await person.feedback(lambda each: each.stop.stopped)
+        await person.until(lambda each: isinstance(each, StopStateNotice) and each.stop.stopped)
 
 
 async def test_a_stop_by_anybody_ends_the_offer_before_a_policy_has_taken_the_seat() -> None:

@@ -74,9 +74,7 @@ def text_at(message: Any, path: str) -> str:
     value = value_at(message, path)
     if isinstance(value, float):
         return f"{value:.3g}"
-    return str(
-        value if isinstance(value, bool | int | str) else list(value) if isinstance(value, Collection) else value
-    )
+    return str(value if isinstance(value, bool | int | str) else list(value) if isinstance(value, Collection) else value)
 
 
 def put_pose(message: Any, path: str, x: float, y: float, yaw: float, frame: str, stamp: Any) -> None:
