@@ -1,5 +1,6 @@
 """The episodes of a console's recordings: list them, look at them, change them (docs/episodes.md). Over HTTP."""
 
+import asyncio
 import ssl
 from pathlib import Path
 from types import TracebackType
@@ -16,6 +17,7 @@ from lockstep.protocol.episodes import EpisodeOutcome
 __all__ = ["EpisodePicture", "RecordedEpisode", "RecordedEpisodes", "RecordingInfo", "RecordingWithEpisodes"]
 
 TIMEOUT = 30.0  # s for one request
+PENDING_SECONDS = 0.3  # between two requests while the console is still reading files
 REPORT_TIMEOUT = 150.0
 
 
@@ -117,6 +119,7 @@ class RecordedEpisodes:
             found = _list.decode((await self._request("GET", "/api/episodes")).content)
             if not found.pending:
                 return found.recordings
+            await asyncio.sleep(PENDING_SECONDS)
 
     async def of(self, recording: str) -> RecordingWithEpisodes:
         """Return one recording, by its id."""

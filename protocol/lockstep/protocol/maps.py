@@ -14,8 +14,10 @@ from lockstep.protocol.serial import MAX_EVENT
 
 __all__ = [
     "MAX_CELLS",
+    "MAX_COORDINATE",
     "MAX_MAP_BYTES",
     "MAX_PATH_POINTS",
+    "MAX_RESOLUTION",
     "OCCUPIED",
     "UNKNOWN",
     "MapId",
@@ -27,6 +29,8 @@ __all__ = [
 
 MAX_CELLS = 1 << 20
 MAX_SIDE = 4096  # cells
+MAX_COORDINATE = 1e6  # m or rad
+MAX_RESOLUTION = 1e3  # m
 MAX_MAP_BYTES = 32 << 10  # of the compressed cells: half a second at 512 kbit/s, in which no picture comes
 MAX_PATH_POINTS = 64
 OCCUPIED = 65  # from this value on a cell counts as occupied, as in nav2's map server
@@ -35,8 +39,8 @@ UNKNOWN = 255  # value of a cell that the robot knows nothing of
 # Letters that nothing has to escape: the id stands in a path.
 MapId = Annotated[str, msgspec.Meta(pattern=r"^[0-9a-f]{0,32}(?![\s\S])")]
 Side = Annotated[int, msgspec.Meta(ge=1, le=MAX_SIDE)]
-Coordinate = Annotated[float, msgspec.Meta(ge=-1e6, le=1e6)]  # m or rad
-Resolution = Annotated[float, msgspec.Meta(gt=0, le=1e3)]
+Coordinate = Annotated[float, msgspec.Meta(ge=-MAX_COORDINATE, le=MAX_COORDINATE)]  # m or rad
+Resolution = Annotated[float, msgspec.Meta(gt=0, le=MAX_RESOLUTION)]
 PlanarPose = tuple[Coordinate, Coordinate, Coordinate]  # x (m), y (m), yaw (rad)
 Seconds = Annotated[float, msgspec.Meta(ge=0, le=1e9)]
 

@@ -1,11 +1,13 @@
 """What is driven when, and when a replay ends."""
 
+import math
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from lockstep.client.control.clutch import REACH_SHARE
-from lockstep.client.replay.errors import ReplayDeviated, ReplayTooFar
+from lockstep.client.replay.errors import ReplayDeviated, ReplayTooFar, ReplayUnfit
 from lockstep.client.replay.replay_core import HELD, SETTLE, ReplayCore
 from lockstep.client.replay.trajectory import Trajectory, fit
 from lockstep.protocol.messages import Feedback
@@ -76,3 +78,18 @@ def test_a_robot_that_does_not_follow_ends_the_replay() -> None:
     with pytest.raises(ReplayDeviated, match="j1 is at 0"):
         found.heard(at(0.0))
     assert found.report.deviation["j1"] == pytest.approx(0.5)
+
+
+def test_a_place_that_is_not_a_number_is_neither_near_nor_followed() -> None:
+    found = core([0.0], [0.5])
+    with pytest.raises(ReplayTooFar):
+        found.check_start(at(math.nan))
+    found.values(0.0, at(0.5))
+    with pytest.raises(ReplayDeviated):
+        found.heard(at(math.nan))
+
+
+@pytest.mark.parametrize("pace", [0.0, -1.0, math.nan, math.inf])
+def test_a_pace_at_which_the_replay_would_never_end_is_refused(pace: float) -> None:
+    with pytest.raises(ReplayUnfit, match="a pace is a number above 0"):
+        core([0.0, 0.1], [0.5, 0.5], pace=pace)

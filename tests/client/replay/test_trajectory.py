@@ -40,6 +40,9 @@ def test_a_rate_has_no_beginning() -> None:
         ({"actions": [[0.1], [math.nan]]}, "not finite in row 1"),
         ({"units": {"j1.pos": "deg"}}, "recorded in deg"),
         ({"actions": [], "times": []}, "no rows"),
+        ({"times": [math.nan, 5.1]}, "not a number"),
+        ({"times": [5.0, math.inf]}, "not a number"),
+        ({"times": [5.0, 4.9]}, "go down"),
     ],
 )
 def test_what_does_not_fit_is_said_by_name(more: dict[str, object], said: str) -> None:
@@ -49,3 +52,9 @@ def test_what_does_not_fit_is_said_by_name(more: dict[str, object], said: str) -
 
 def test_a_value_just_beyond_its_range_is_one_that_the_bridge_clamps() -> None:
     assert fit(recorded(actions=[[2.01], [0.0]]), ARM).rows[0].values == {"j1": 2.01}
+
+
+def test_a_state_that_is_not_a_number_was_not_measured() -> None:
+    fitted = fit(recorded(state_names=["j1.pos"], states=[[math.nan], [0.2]]), ARM)
+    assert [row.state for row in fitted.rows] == [{}, {"j1": 0.2}]
+    assert fitted.start == {"j1": 0.1}

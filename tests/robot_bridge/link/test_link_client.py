@@ -345,3 +345,27 @@ async def test_closing_after_the_bridge_has_reset_the_connection_raises_nothing(
     link._transport.say_goodbye()
     assert transport.closed
     link._transport.connection_lost(None)
+
+
+async def test_a_close_that_is_cancelled_leaves_no_connection_to_a_bridge_that_goes_on_sending() -> None:
+    gone = asyncio.Event()
+
+    async def send_for_ever(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        writer.write(wire(HELLO))
+        with contextlib.suppress(ConnectionError):
+            while True:
+                writer.write(NOTICE * 1000)
+                await writer.drain()
+        gone.set()
+        writer.close()
+
+    server = await asyncio.start_server(send_for_ever, "127.0.0.1", 0)
+    async with server, asyncio.timeout(20):
+        link = RobotLink("127.0.0.1", server.sockets[0].getsockname()[1], "events")
+        await link.connect()
+        closing = asyncio.ensure_future(link.close())
+        await asyncio.sleep(0)
+        closing.cancel()
+        with pytest.raises(asyncio.CancelledError):
+            await closing
+        await gone.wait()

@@ -73,3 +73,11 @@ def test_a_message_is_inflated_no_further_than_it_says() -> None:
             map_cells(wrong)
     with pytest.raises(MessageError, match="bound"):
         map_cells(OccupancyMap(id="", width=4096, height=MAX_CELLS // 4096 + 1, resolution=math.pi, cells=b""))
+
+
+@pytest.mark.parametrize(
+    "more", [{"origin": (5e6, 0.0, 0.0)}, {"origin": (math.nan, 0.0, 0.0)}, {"resolution": 0.0}, {"resolution": 2e3}]
+)
+def test_a_map_whose_place_or_scale_no_console_takes_is_refused_here(more: dict[str, object]) -> None:
+    with pytest.raises(ValueError, match="a map w"):
+        pack_map(grid(np.zeros((2, 2), np.uint8))._replace(**more))  # type: ignore[arg-type]

@@ -2,7 +2,10 @@
 
 import math
 
-from lockstep.protocol.maps import MAX_PATH_POINTS, Navigation, OccupancyMap
+import pytest
+
+from lockstep.protocol.maps import MAX_COORDINATE, MAX_PATH_POINTS, Navigation, OccupancyMap
+from lockstep.protocol.messages import decode_message, encode_message
 from lockstep.robot_bridge.maps.navigation_issuer import MAP_RATE, NavigationIssuer, shortened
 from lockstep.robot_bridge.robots.navigation import GridMap, NavigationNow
 
@@ -75,3 +78,12 @@ def test_a_long_path_keeps_its_ends() -> None:
     assert len(short) == MAX_PATH_POINTS
     assert (short[0], short[-1]) == (path[0], path[-1])
     assert shortened(path[:5]) == path[:5]
+
+
+@pytest.mark.parametrize("far", [1.01 * MAX_COORDINATE, -math.inf, math.nan])
+def test_a_place_that_the_message_does_not_take_is_not_known_and_leaves_no_older_one_standing(far: float) -> None:
+    state = NavigationNow(frame=(far, 0.0, 0.0), goal=(0.0, far, 0.0), path=[(0.0, 0.0), (far, 1.0)])
+    told = look(NavigationIssuer(), state, 1.0)
+    assert told is not None
+    assert (told.located, told.goal, told.path) == (False, [], [])
+    assert decode_message(encode_message(told)) == told

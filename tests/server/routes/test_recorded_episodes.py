@@ -1,7 +1,9 @@
 """Episodes of recordings over HTTP: who sees and changes what, and what a stale change meets."""
 
+import asyncio
 import json
 import os
+import time
 from collections.abc import AsyncIterator
 from pathlib import Path
 from typing import Any
@@ -217,6 +219,15 @@ async def test_pictures_and_changes_have_a_rate_and_the_change_is_in_the_audit(r
     assert [(await rig.http.get(path, headers=token)).status_code for _ in range(2)] == [200, 429]
 
 
+@pytest.mark.parametrize("path", ["/api/episodes", "/api/recordings/one/episodes"])
+async def test_the_list_has_a_rate_for_each_link(rig: Rig, path: str) -> None:
+    object.__setattr__(rig.app.state.recordings, "lists", RateLimits(0.0, 1))
+    token, another = rig.token("observer"), rig.token("supervisor")
+    answers = [(await rig.http.get(path, headers=each)).status_code for each in (another, another, token)]
+    assert answers[:2] == [200, 429]
+    assert answers[2] != 429
+
+
 async def test_a_running_recording_is_listed_with_its_pictures(tmp_path: Path) -> None:
     settings = RecordingSettings(directory=tmp_path / "recordings", free_bytes=0)
     async with running_rig(recording=settings) as rig:
@@ -224,6 +235,8 @@ async def test_a_running_recording_is_listed_with_its_pictures(tmp_path: Path) -
         assert (await rig.http.post("/api/recordings", headers=token)).status_code == 201
         found: dict[str, Any] = {}
 
+        # It asks all the time until the first chunk is written.
+        object.__setattr__(rig.app.state.recordings, "lists", RateLimits(1e9, 10**9))
         async with rig.peer("operator"):
             while not found.get("recordings") or not found["recordings"][0]["cameras"]:
                 found = await listed(rig, token, f"?known={found.get('version', '')}")
@@ -237,3 +250,52 @@ async def test_a_running_recording_is_listed_with_its_pictures(tmp_path: Path) -
         busy = await rig.http.get(f"/api/recordings/{running['info']['id']}/report", headers=token)
         assert busy.json()["error"] == "already_recording"
     assert json.dumps(found)
+
+
+@pytest.mark.parametrize(
+    ("method", "path"),
+    [
+        ("page", "/api/episodes"),
+        ("one", PATH),
+        ("picture", "/api/recordings/one/picture?camera=front&event=30"),
+        ("report", "/api/recordings/one/report"),
+    ],
+)
+async def test_a_link_that_ends_while_its_answer_is_made_gets_none(
+    rig: Rig, monkeypatch: pytest.MonkeyPatch, method: str, path: str
+) -> None:
+    now = time.time()
+    ends = now + 1.0
+    token = {
+        "Authorization": f"Bearer {rig.access.sign(Identity('supervisor', 'late', 'late', ends, issued=now), now)}"
+    }
+    catalog = rig.app.state.recordings.catalog
+    make = getattr(catalog, method)
+
+    async def slowly(*given: Any) -> Any:
+        answer = await make(*given)
+        await asyncio.sleep(max(0.0, ends - time.time()) + 0.01)  # the jobs of others come first
+        return answer
+
+    monkeypatch.setattr(catalog, method, slowly)
+    assert (await rig.http.get(path, headers=token)).status_code == 401
+
+
+async def test_a_link_that_ends_while_its_change_waits_for_a_thread_changes_nothing(
+    rig: Rig, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    now = time.time()
+    ends = now + 1.0
+    signed = rig.access.sign(Identity("operator", "late", "late", ends, issued=START / SECOND), now)
+    library = rig.app.state.recordings.library
+    opened = library.open
+
+    def slowly(recording_id: str) -> Any:
+        time.sleep(max(0.0, ends - time.time()) + 0.01)  # a slow disk
+        return opened(recording_id)
+
+    monkeypatch.setattr(library, "open", slowly)
+    token = {"Authorization": f"Bearer {signed}"}
+    assert (await change(rig, token, revision=0, episode="a", task="x")).status_code == 401
+    monkeypatch.undo()
+    assert (await rig.http.get(PATH, headers=rig.token("supervisor"))).json()["revision"] == 0

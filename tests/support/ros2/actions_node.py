@@ -109,7 +109,8 @@ class ActingRobot(RobotNode):  # type: ignore[misc]
 
     def _count(self, handle: Any) -> Fibonacci.Result:
         sequence = [0, 1]
-        while len(sequence) < handle.request.order:
+        # One that ignores cancels goes on for longer than the bridge waits for its end.
+        while len(sequence) < handle.request.order * (4 if self._stubborn else 1):
             time.sleep(STEP)
             if handle.is_cancel_requested:
                 handle.canceled()

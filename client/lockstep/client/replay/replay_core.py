@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from lockstep.client.pipe.reach import within_reach
-from lockstep.client.replay.errors import ReplayDeviated, ReplayTooFar
+from lockstep.client.replay.errors import ReplayDeviated, ReplayTooFar, ReplayUnfit
 from lockstep.client.replay.trajectory import FittedTrajectory, Row
 from lockstep.protocol.description import Axis, RobotDescription
 from lockstep.protocol.messages import Feedback
@@ -37,9 +37,14 @@ class ReplayCore:
 
     Args:
         pace: 1: as fast as it was recorded; below 1 slower
+
+    Raises:
+        ReplayUnfit: the pace is not a number above 0: the replay would never end.
     """
 
     def __init__(self, trajectory: FittedTrajectory, description: RobotDescription, pace: float = 1.0) -> None:
+        if not 0.0 < pace < math.inf:
+            raise ReplayUnfit(f"a pace is a number above 0, not {pace:g}")
         self._rows = trajectory.rows
         self._axes = trajectory.axes
         self._start = trajectory.start
@@ -53,7 +58,7 @@ class ReplayCore:
         """Raise ReplayTooFar when a goal axis is further than its reach from where the episode begins."""
         for name, start in self._start.items():
             axis, measured = self._axes[name], feedback.axes[self._place[name]]
-            if abs(_way(axis, measured, start)) > axis.reach:
+            if not abs(_way(axis, measured, start)) <= axis.reach:  # a place that is not a number is not near
                 raise ReplayTooFar(name, axis.unit, measured, start, axis.reach)
 
     def values(self, seconds: float, feedback: Feedback) -> list[float | None] | None:
@@ -83,7 +88,7 @@ class ReplayCore:
             axis, measured = self._axes[name], feedback.axes[self._place[name]]
             distance = abs(_way(axis, measured, recorded))
             self.report.deviation[name] = max(self.report.deviation.get(name, 0.0), distance)
-            if distance > axis.reach:
+            if not distance <= axis.reach:  # a place that is not a number is no sign that the robot follows
                 raise ReplayDeviated(name, axis.unit, measured, recorded)
 
     @property
@@ -101,7 +106,7 @@ class ReplayCore:
 
 def _way(axis: Axis, measured: float, goal: float) -> float:
     way = goal - measured
-    return way if axis.wrap is None else math.remainder(way, axis.wrap)
+    return way if axis.wrap is None or not math.isfinite(way) else math.remainder(way, axis.wrap)
 
 
 def _clamped(axis: Axis, value: float) -> float:

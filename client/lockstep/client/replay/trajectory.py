@@ -3,6 +3,7 @@
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise
 from typing import NamedTuple
 
 from lockstep.client.replay.errors import ReplayUnfit
@@ -59,12 +60,13 @@ def fit(trajectory: Trajectory, description: RobotDescription) -> FittedTrajecto
     """Return the trajectory by the robot's axes.
 
     Raises:
-        ReplayUnfit: there are no rows, a name is none of an axis, the units differ, or a value is not finite or out of
-            an axis' range.
+        ReplayUnfit: there are no rows, their times are not finite or go down, a name is none of an axis, the units
+            differ, or a value is not finite or out of an axis' range.
     """
     axes = {axis.name: axis for axis in description.axes}
     if not trajectory.actions:
         raise ReplayUnfit("the episode has no rows")
+    _check_times(trajectory.times)
     driven = [_axis_of(name, axes) for name in trajectory.action_names]
     for name, axis in zip(trajectory.action_names, driven, strict=True):
         unit = trajectory.units.get(name, axis.unit)
@@ -81,9 +83,21 @@ def fit(trajectory: Trajectory, description: RobotDescription) -> FittedTrajecto
         for axis in driven:
             _check(axis, values[axis.name], number)
         state = trajectory.states[number] if trajectory.states else ()
-        places = {name: state[place] for place, name in measured.items() if place < len(state)}
+        places = {
+            name: state[place]
+            for place, name in measured.items()
+            if place < len(state) and math.isfinite(state[place])  # else it was not measured
+        }
         rows.append(Row(trajectory.times[number] - trajectory.times[0], values, places))
     return FittedTrajectory(rows, {axis.name: axis for axis in driven})
+
+
+def _check_times(times: Sequence[float]) -> None:
+    """Check that each row ends: one whose time compares with nothing would be driven for ever."""
+    if not all(map(math.isfinite, times)):
+        raise ReplayUnfit("the time of a row is not a number")
+    if any(after < before for before, after in pairwise(times)):
+        raise ReplayUnfit("the times of the rows go down")
 
 
 def _axis_of(name: str, axes: Mapping[str, Axis]) -> Axis:

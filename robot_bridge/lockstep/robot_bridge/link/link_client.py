@@ -178,7 +178,7 @@ class RobotLink:
             await self._news.wait()
 
     async def close(self) -> None:
-        """Say goodbye and close. May be called again."""
+        """Say goodbye and close, in a second at most. May be called again."""
         self._closed = True
         if self._ticker is not None:
             self._ticker.cancel()
@@ -188,8 +188,10 @@ class RobotLink:
             async with asyncio.timeout(1.0):
                 await self._transport.gone.wait()
         except TimeoutError:
+            pass
+        finally:  # also when this is cancelled: a bridge that goes on sending would be read for ever
             self._transport.abort()
-        self._news.set()
+            self._news.set()
 
     async def __aenter__(self) -> Self:
         await self.connect()

@@ -5,7 +5,17 @@ import zlib
 import numpy as np
 import numpy.typing as npt
 
-from lockstep.protocol.maps import MAX_CELLS, MAX_MAP_BYTES, MAX_SIDE, OCCUPIED, UNKNOWN, OccupancyMap, map_id
+from lockstep.protocol.maps import (
+    MAX_CELLS,
+    MAX_COORDINATE,
+    MAX_MAP_BYTES,
+    MAX_RESOLUTION,
+    MAX_SIDE,
+    OCCUPIED,
+    UNKNOWN,
+    OccupancyMap,
+    map_id,
+)
 from lockstep.robot_bridge.robots.navigation import GridMap
 
 __all__ = ["pack_map"]
@@ -22,15 +32,20 @@ def pack_map(grid: GridMap) -> OccupancyMap:
     if one of them is, not known if one of them is not, else the least free. So a coarser map never shows more room.
 
     Raises:
-        ValueError: the cells are not `width` times `height`, or there are none.
+        ValueError: the cells are not `width` times `height`, or there are none; its place or its scale is out of the
+            message's bounds.
     """
     if grid.width < 1 or grid.height < 1 or len(grid.cells) != grid.width * grid.height:
         raise ValueError(f"a map of {grid.width} by {grid.height} cells with {len(grid.cells)} of them")
+    if not all(abs(number) <= MAX_COORDINATE for number in grid.origin):
+        raise ValueError(f"a map whose origin is {grid.origin}: beyond {MAX_COORDINATE:g} m")
     cells = np.frombuffer(grid.cells, np.uint8).reshape(grid.height, grid.width)
     if ((cells > FULL) & (cells != UNKNOWN)).any():
         cells = np.where(cells > FULL, UNKNOWN, cells).astype(np.uint8)
     resolution = grid.resolution
     while True:
+        if not 0.0 < resolution <= MAX_RESOLUTION:
+            raise ValueError(f"a map with cells of {resolution:g} m")
         height, width = cells.shape
         if width <= MAX_SIDE and height <= MAX_SIDE and cells.size <= MAX_CELLS:
             plain = cells.tobytes()

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 
 import msgspec
 
-from lockstep.protocol.maps import MAX_PATH_POINTS, Navigation, OccupancyMap
+from lockstep.protocol.maps import MAX_COORDINATE, MAX_PATH_POINTS, Navigation, OccupancyMap
 from lockstep.robot_bridge.robots.navigation import GridMap, NavigationNow, PlanarPose
 
 __all__ = ["NavigationIssuer", "shortened"]
@@ -57,8 +57,8 @@ class NavigationIssuer:
 
     def _message(self, state: NavigationNow, now: float, event: int) -> Navigation:
         numbers = [number for point in shortened(state.path) for number in point]
-        path = [round(number, MILLIMETRES) for number in numbers] if all(map(math.isfinite, numbers)) else []
-        frame, goal = _finite(state.frame), _finite(state.goal)
+        path = [round(number, MILLIMETRES) for number in numbers] if all(map(_is_coordinate, numbers)) else []
+        frame, goal = _sendable(state.frame), _sendable(state.goal)
         return Navigation(
             event=event,
             map="" if self._map is None else self._map.id,
@@ -79,8 +79,13 @@ def shortened(path: Sequence[tuple[float, float]]) -> Sequence[tuple[float, floa
     return [path[round(index * step)] for index in range(MAX_PATH_POINTS)]
 
 
-def _finite(pose: PlanarPose | None) -> PlanarPose | None:
-    return pose if pose is not None and all(map(math.isfinite, pose)) else None
+def _sendable(pose: PlanarPose | None) -> PlanarPose | None:
+    """Return a pose that the message takes; None for another one: the console would keep an older place instead."""
+    return pose if pose is not None and all(map(_is_coordinate, pose)) else None
+
+
+def _is_coordinate(number: float) -> bool:
+    return abs(number) <= MAX_COORDINATE
 
 
 def _without_ages(message: Navigation) -> Navigation:

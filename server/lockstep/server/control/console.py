@@ -249,7 +249,7 @@ class Console:
                     self._refuse_request(peer, reason, "note")
             case Reset():
                 self.resets.reset_by_peer(peer, message.number)
-            case SeatRequest() | SeatTake() if self.seat.waits_for_nothing(peer, message):
+            case SeatRequest() | SeatTake() | SeatOffer() if self.seat.waits_for_nothing(peer, message):
                 self.seat.handle(peer, message)
             case SeatRequest() | SeatGrant() | SeatDecline() | SeatTake() | SeatOffer() | SilenceStops() | Rename() if (
                 not peer.asks.take(now)

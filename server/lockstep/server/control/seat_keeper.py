@@ -137,7 +137,11 @@ class SeatKeeper:
 
         It follows an offer, and those are counted.
         """
-        takes = isinstance(message, SeatTake) or (isinstance(message, SeatRequest) and not message.only_if_free)
+        takes = (
+            isinstance(message, SeatTake)
+            or (isinstance(message, SeatRequest) and not message.only_if_free)
+            or (isinstance(message, SeatOffer) and not message.offered)
+        )
         return takes and self.rules.policy_drives and peer.role in PEOPLE
 
     def handle(self, peer: Peer, message: SeatMessage) -> None:

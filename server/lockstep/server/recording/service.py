@@ -20,6 +20,7 @@ __all__ = ["RecordingAudit", "RecordingService"]
 
 STARTS, START_RATE = 20, 0.1  # Hz, of one link: the recording store is bounded in bytes, not in files
 EDITS, EDIT_RATE = 40, 2.0
+LISTS, LIST_RATE = 60, 10.0  # of all episodes: many pages with one link ask every few seconds
 PICTURES, PICTURE_RATE = 200, 30.0
 REPORTS, REPORT_RATE = 4, 0.05
 READERS = 2  # threads; readers of recordings wait for each other
@@ -48,8 +49,8 @@ class RecordingService:
 
     Attributes:
         holds_seat: whether a peer with the link of this id drives
-        starts, edits, pictures, reports: how often each link may begin a recording, change an episode, ask for one
-            picture, or ask for a report
+        starts, edits, lists, pictures, reports: how often each link may begin a recording, change an episode, ask for
+            the list of episodes, for one picture, or for a report
         opens_all: every good link reads everything: it was made for the one file that is replayed
     """
 
@@ -60,6 +61,7 @@ class RecordingService:
     opens_all: bool = False
     starts: RateLimits = field(default_factory=lambda: RateLimits(START_RATE, STARTS))
     edits: RateLimits = field(default_factory=lambda: RateLimits(EDIT_RATE, EDITS))
+    lists: RateLimits = field(default_factory=lambda: RateLimits(LIST_RATE, LISTS))
     pictures: RateLimits = field(default_factory=lambda: RateLimits(PICTURE_RATE, PICTURES))
     reports: RateLimits = field(default_factory=lambda: RateLimits(REPORT_RATE, REPORTS))
     threads: ThreadPoolExecutor = field(default_factory=lambda: ThreadPoolExecutor(READERS, "recordings"))

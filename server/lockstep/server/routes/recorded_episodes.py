@@ -2,22 +2,30 @@
 
 import hashlib
 import time
-from typing import Annotated
+from typing import Annotated, get_args
 
 import msgspec
 from fastapi import APIRouter, Query, Request, Response
 
+from lockstep.protocol.console import Role
 from lockstep.protocol.episodes import EpisodeOutcome, Task
 from lockstep.protocol.serial import MAX_EVENT
-from lockstep.server.auth.tokens import require_role
+from lockstep.server.auth.tokens import Right, require_role
 from lockstep.server.errors import BadParameter, TooManyRequests
 from lockstep.server.http.json_response import json_answer
 from lockstep.server.http.request_body import read_json
+from lockstep.server.recording.browsing.catalog import CatalogPage
 from lockstep.server.recording.episodes.edits import EpisodeEdit
 from lockstep.server.recording.episodes.listed import RecordingEpisodes
 from lockstep.server.recording.errors import RecordingError
 from lockstep.server.recording.format.records import Whole
-from lockstep.server.routes.recordings import Caller, reader_right, recording_error, recording_service
+from lockstep.server.routes.recordings import (
+    Caller,
+    RecordingService,
+    reader_right,
+    recording_error,
+    recording_service,
+)
 from lockstep.server.util.display_names import printable
 
 __all__ = ["EpisodeChangeBody", "EpisodeList", "router"]
@@ -63,17 +71,35 @@ async def episodes(
 ) -> Response:
     """The episodes of all recordings, with the changes to them."""
     service = recording_service(request)
+    _spend_list(service, caller.token_id)
     try:
         page = await service.catalog.page(reader_right(request, caller), skip)
     except (RecordingError, OSError) as error:
         raise recording_error(error) from error
+    # It may have many megabytes, and whoever drives waits for the loop.
+    body = await service.in_thread(lambda: _list_body(page, known))
+    _check_still(caller)
+    return Response(body, media_type="application/json", headers={"Cache-Control": "no-store"})
+
+
+def _spend_list(service: RecordingService, link: str) -> None:
+    if not service.lists.spend(link, time.monotonic()):
+        raise TooManyRequests("the episodes are asked for too often with this link")
+
+
+def _check_still(caller: Right) -> None:
+    """Check the right again before the answer: a job may have waited for minutes. Raises ConsoleError: it has ended."""
+    require_role(caller, *get_args(Role))
+
+
+def _list_body(page: CatalogPage, known: str) -> bytes:
     digest = hashlib.blake2b(repr(page[1:]).encode(), digest_size=12)
     for each in page.recordings:
         digest.update(each)
     version = digest.hexdigest()
     if version == known:
-        return json_answer(EpisodeList(version=version, unchanged=True, recordings=[]))
-    return json_answer(
+        return msgspec.json.encode(EpisodeList(version=version, unchanged=True, recordings=[]))
+    return msgspec.json.encode(
         {
             "version": version,
             "unchanged": False,
@@ -87,10 +113,14 @@ async def episodes(
 
 @router.get("/api/recordings/{recording_id}/episodes")
 async def of_recording(request: Request, caller: Caller, recording_id: str) -> Response:
+    service = recording_service(request)
+    _spend_list(service, caller.token_id)
     try:
-        return json_answer(await recording_service(request).catalog.one(recording_id, reader_right(request, caller)))
+        found = await service.catalog.one(recording_id, reader_right(request, caller))
     except (RecordingError, OSError) as error:
         raise recording_error(error) from error
+    _check_still(caller)
+    return json_answer(found)
 
 
 @router.post("/api/recordings/{recording_id}/episodes")
@@ -117,7 +147,8 @@ async def change(request: Request, caller: Caller, recording_id: str) -> Respons
     )
     actor = caller.actor
     try:
-        found = await service.catalog.change(recording_id, edit, body.revision, reader_right(request, caller))
+        right = reader_right(request, caller)
+        found = await service.catalog.change(recording_id, edit, body.revision, right, lambda: _check_still(caller))
     except (RecordingError, OSError) as error:
         raise recording_error(error) from error
     service.audit.record("recording", actor, "episode changed", f"{recording_id} change {body.revision + 1}")
@@ -144,6 +175,7 @@ async def picture(
         found = await service.catalog.picture(recording_id, camera, event, width, right)
     except (RecordingError, OSError) as error:
         raise recording_error(error) from error
+    _check_still(caller)
     service.audit.again("reading", actor, recording_id)
     headers = {"Cache-Control": "no-store", "Lockstep-Event": str(found.stamp)}
     return Response(found.jpeg, media_type="image/jpeg", headers=headers)
@@ -161,6 +193,7 @@ async def report(request: Request, caller: Caller, recording_id: str) -> Respons
         page = await service.catalog.report(recording_id, right)
     except (RecordingError, OSError) as error:
         raise recording_error(error) from error
+    _check_still(caller)
     service.audit.record("recording", actor, "report", recording_id)
     headers = {"Cache-Control": "no-store", "Content-Disposition": 'attachment; filename="report.html"'}
     return Response(page, media_type="text/html; charset=utf-8", headers=headers)

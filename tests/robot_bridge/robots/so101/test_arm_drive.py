@@ -108,3 +108,19 @@ def test_a_held_posture_is_kept_until_the_values_change() -> None:
     assert world.drive.goals == settled
     world.play(Spell("joints", (0.2,) * 11, 40))
     assert world.drive.goals[0] == pytest.approx(settled[0] + 0.2, abs=1e-6)
+
+
+@pytest.mark.parametrize("number", [0, 5])
+def test_what_a_tick_has_changed_that_was_held_up_moves_nothing_after_the_hold(number: int) -> None:
+    """The watchdog has brought the arm to rest between `apply` and `tick`, behind the tool's goal as it is then."""
+    world = World()
+    world.play(Spell("tool", (0.1,) * 11, 12))
+    world.drive.hold()
+    held, applied = world.drive.goals, list(world.values)
+    applied[number] += 0.001
+    assert not world.drive.drive(applied, TICK, pursues=True).any(), "of the tick that was held up"
+    for _ in range(100):
+        assert not world.drive.drive(applied, TICK).any()
+    assert world.drive.goals == held
+    applied[0] += 0.01
+    assert world.drive.drive(applied, TICK).any(), "a new command drives it"

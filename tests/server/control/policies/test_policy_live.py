@@ -99,6 +99,16 @@ async def test_no_bound_on_requests_keeps_a_person_from_taking_the_robot_from_a_
         await _seat(policy, holder=await _id(person), why="taken")
 
 
+async def test_no_bound_on_requests_keeps_a_person_from_ending_the_turn_of_a_policy() -> None:
+    async with running_rig(**PATIENT) as rig, rig.peer("operator") as person, rig.peer("policy") as policy:
+        await _policy_drives(rig, person, policy)
+        for number in range(30):
+            person.send("session", Rename(name=f"Ada {number}"))
+        await _refused(person, "too_often")
+        person.send("session", SeatOffer(offered=False))
+        await _seat(policy, holder="", why="offer withdrawn", offered=False)
+
+
 async def test_a_page_that_only_looks_for_a_free_seat_does_not_take_it_from_a_policy() -> None:
     async with (
         running_rig(**PATIENT) as rig,

@@ -65,8 +65,15 @@ class ArmDrive:
         return self._goals
 
     def hold(self, posture: Sequence[float] | None = None) -> None:
-        """Stay where the goals are, or in a posture, until the values change."""
-        self._goals = self._goals if posture is None else tuple(posture)
+        """Stay where the goals are, or in a posture, until the values change.
+
+        Without a posture, the values of the next tick count as those that stand still: the tick that was held up may
+        have changed them, and nobody drives any more.
+        """
+        if posture is None:
+            self._before = None
+        else:
+            self._goals = tuple(posture)
         self._joints = self._pose = self._tool = None
         self._still = math.inf
         self.faults = []
@@ -74,7 +81,6 @@ class ArmDrive:
     def restart(self) -> None:
         """Stay where the goals are, whatever the next values are."""
         self.hold()
-        self._before = None
 
     def pursued(self) -> list[float]:
         """Return what the joints' goals are, and the tool's pose at them."""

@@ -44,12 +44,13 @@ class JointFollower:
         return np.subtract(self.goals, old) / seconds
 
     def hold(self, posture: Sequence[float] | None = None) -> None:
-        """Stay where the goals are, or in a posture, until the values change."""
+        """Stay where the goals are, or in a posture, until the values change; as `ArmDrive.hold`."""
         self._wanted = None
-        if posture is not None:
+        if posture is None:
+            self._before = None
+        else:
             self.goals = tuple(posture)
 
     def restart(self) -> None:
         """Stay where the goals are, whatever the next values are."""
         self.hold()
-        self._before = None

@@ -40,6 +40,7 @@ __all__ = ["CatalogPage", "EpisodeCatalog", "InThread"]
 
 MAX_FILES = 500  # in one answer
 MAX_EPISODES = 20_000  # in one answer; the rest is counted as older
+MAX_LIST_BYTES = 8 * 1024 * 1024  # of one file's list, about MAX_EPISODES: it is parsed on the loop
 MAX_KEPT_BYTES = 48 * 1024 * 1024  # of lists, as JSON
 MAX_PICTURE_BYTES = 24 * 1024 * 1024
 LIST_SECONDS = 20.0  # for one file; an interrupted one is read as a whole
@@ -171,6 +172,8 @@ class EpisodeCatalog:
         """Have a file read. One that cannot be read is not read again before it has changed."""
         try:
             text = await self._worker.ask(ListEpisodes(str(path)), LIST_SECONDS)
+            if len(text) > MAX_LIST_BYTES:
+                raise RecordingUnreadable("it has far too many episodes")
             known = _Known(version, _decoder.decode(text), text)
         except (TooManyRequests, NotFound):
             raise
@@ -241,17 +244,31 @@ class EpisodeCatalog:
     # changes
 
     async def change(
-        self, recording_id: str, edit: EpisodeEdit, revision: int, right: RecordingReaderRight
+        self,
+        recording_id: str,
+        edit: EpisodeEdit,
+        revision: int,
+        right: RecordingReaderRight,
+        check: Callable[[], None],
     ) -> RecordingEpisodes:
         """Make a change that its author made of `revision`; return the recording as it is then.
+
+        `check`: called on another thread right before the change; raises ConsoleError if its author may not any more.
 
         Raises:
             StaleEdit, EditRefused, NotAllowed, NotFound, RecordingError, OSError: it is not made.
         """
-        await self._in_thread(lambda: self._change(recording_id, edit, revision, right))
+        await self._in_thread(lambda: self._change(recording_id, edit, revision, right, check))
         return await self.one(recording_id, right)
 
-    def _change(self, recording_id: str, edit: EpisodeEdit, revision: int, right: RecordingReaderRight) -> None:
+    def _change(
+        self,
+        recording_id: str,
+        edit: EpisodeEdit,
+        revision: int,
+        right: RecordingReaderRight,
+        check: Callable[[], None],
+    ) -> None:
         """Blocks."""
         reader, _ = self._library.open(recording_id)
         with reader:
@@ -261,6 +278,7 @@ class EpisodeCatalog:
             before, after = apply_edits(recorded, edits).episodes, apply_edits(recorded, [*edits, edit]).episodes
             if not all(right.reads(each.entry.started) for each in _differing(before, after)):
                 raise NotAllowed("an episode of this change was recorded before your link was made")
+        check()
         try:
             add_edit(path, recorded, edit, after=revision)
         except EpisodeEditStale as error:

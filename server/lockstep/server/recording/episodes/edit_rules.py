@@ -202,7 +202,7 @@ class _State:
 
     def _replace(self, old: list[EditedEpisode], new: list[EditedEpisode]) -> None:
         gone = {each.entry.id for each in old}
-        if any(each.entry.id in self._known.keys() - gone for each in new):
+        if any(each.entry.id in self._known and each.entry.id not in gone for each in new):
             raise EditRefused("an episode has the id that the new one would get")
         at = self._order.index(old[0].entry.id)
         self._order[at : at + len(old)] = [each.entry.id for each in new]

@@ -1,9 +1,11 @@
 """Runs goals of ROS 2 action servers, and cancels them until they have ended.
 
 A goal goes on in its server until that ends it. So a cancelled goal is cancelled again and again, also when its server
-accepts it only after the cancel, and a fault says so while it has not ended.
+accepts it only after the cancel, and a fault says so while it has not ended. A server that cannot be found has not
+ended its goal: it may be behind a network that is down, and drives on. It is asked when it is found again.
 """
 
+import math
 from collections.abc import Callable
 from typing import Any
 
@@ -100,7 +102,8 @@ class GoalRun(ActionRun):
         self._handle: Any = None  # of the accepted goal
         self._result: Any = None  # its future
         self._cancelled_at: float | None = None
-        self._cancel_tried_at = 0.0
+        self._cancel_tried_at = -math.inf
+        self._is_lost = False  # the server was not there at the last look after the cancel
         self._over = False  # its end was told
         self._accepting = client.send_goal_async(goal, feedback_callback=self._take)
 
@@ -154,10 +157,11 @@ class GoalRun(ActionRun):
             return True
         if self._result.done():
             return True
-        if self._owner.is_there():
-            self._seen_at = now
-        elif now - self._seen_at > GONE:
-            return True
+        was_lost, self._is_lost = self._is_lost, not self._owner.is_there()
+        if self._is_lost:
+            return False
+        if was_lost:  # the result may have been lost too; a server that has been restarted answers that it knows none
+            self._result = self._handle.get_result_async()
         if now - self._cancel_tried_at >= CANCEL_AGAIN:
             self._cancel_tried_at = now
             self._handle.cancel_goal_async()
