@@ -114,7 +114,7 @@ class DatasetFollower:
         topics = cameras_of(reader, self._options.cameras) if state is None else state.notes.topics
         tolerance = self._options.tolerance if state is None else state.notes.tolerance
         fps = self._options.fps if state is None else state.fps if state.notes.has_rate else None
-        (rows,) = rows_of(reader, layout, [stretch], topics, tolerance, fps, growing.roles)
+        (rows,) = rows_of(reader, layout, [stretch], topics, tolerance, fps)
         if not rows.frames:
             raise DatasetRefused(
                 "no event has a feedback, a command that answers it, and a picture of every camera "

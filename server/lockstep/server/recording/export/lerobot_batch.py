@@ -79,7 +79,7 @@ def write_batch(stage: Path, state: DatasetState, layout: DatasetLayout, episode
     frames = state.info.get("total_frames", 0) + sum(len(each.frames) for each in episodes)
     state.statistics = _all_statistics(state, places)
     state.info = info_of(state.robot, features, frames, state.fps, count + len(episodes), len(state.tasks))
-    drivers = [frame.driver for each in episodes for frame in each.frames]
+    drivers = [frame.driver.name for each in episodes for frame in each.frames]
     state.notes = msgspec.structs.replace(
         state.notes,
         batches=batch + 1,
@@ -131,9 +131,9 @@ def _columns(rows: EpisodeRows, number: int, begin: int, fps: int, task: int) ->
     return columns | {
         "lockstep.time": np.array([frame.time - frames[0].time for frame in frames], np.float64),
         "lockstep.age": np.array(rows.ages, np.float64),
-        "lockstep.driver": np.array([frame.driver for frame in frames], object),
-        "lockstep.driver_kind": np.array([frame.kind for frame in frames], object),
-        "lockstep.intervention": np.array(_interventions(rows), np.int64),
+        "lockstep.driver": np.array([frame.driver.name for frame in frames], object),
+        "lockstep.driver_kind": np.array([frame.driver.kind for frame in frames], object),
+        "lockstep.intervention": np.array([frame.driver.intervention for frame in frames], np.int64),
         "lockstep.success": np.full(count, SUCCESS[rows.stretch.outcome], np.int64),
         "timestamp": (np.arange(count) / fps).astype(np.float32),
         "frame_index": np.arange(count, dtype=np.int64),
@@ -141,15 +141,6 @@ def _columns(rows: EpisodeRows, number: int, begin: int, fps: int, task: int) ->
         "index": np.arange(begin, begin + count, dtype=np.int64),
         "task_index": np.full(count, task, np.int64),
     }
-
-
-def _interventions(rows: EpisodeRows) -> list[int]:
-    """Return 1 for each row that a person drove after a policy had driven in the episode."""
-    found, has_policy = [], False
-    for frame in rows.frames:
-        has_policy = has_policy or frame.kind == "policy"
-        found.append(int(has_policy and frame.kind != "policy"))
-    return found
 
 
 def _features(
