@@ -168,6 +168,14 @@ def test_pictures_that_build_on_one_that_was_left_out_are_in_no_row(tmp_path: Pa
     assert [row["lockstep.event"] for row in rows(root)] == [*range(30, 40), *range(52, 60)]
 
 
+def test_no_row_has_a_picture_that_builds_on_one_that_was_left_out_before_the_episode(tmp_path: Path) -> None:
+    """Keyframes are those of events 2 and 52; something was left out at event 26, and the episode begins at 30."""
+    lost = own_entry(Degraded(epoch=EPOCH, event=26, lost=1), START + 25 * INTERVAL + 1_000_000)
+    path = recording(tmp_path / "a.mcap", lost, episode("a", "start", 30, 30), episode("a", "kept", 30, 60))
+    (root,) = export_lerobot.export_all([path], tmp_path / "dataset", "", tolerance=0)
+    assert [row["lockstep.event"] for row in rows(root)] == list(range(52, 60))
+
+
 @pytest.mark.parametrize(
     ("column", "change", "check"),
     [
