@@ -29,7 +29,7 @@ from lockstep.server.recording.export.lerobot_meta import (
 from lockstep.server.recording.export.lerobot_rows import EpisodeRows
 from lockstep.server.recording.export.lerobot_video import ExportedCamera, write_video
 
-__all__ = ["DatasetState", "write_batch"]
+__all__ = ["DatasetState", "noted_without_rows", "write_batch", "write_notes"]
 
 Array = npt.NDArray[Any]
 SUCCESS = {"success": 1, "failure": 0, "": -1}
@@ -85,13 +85,34 @@ def write_batch(stage: Path, state: DatasetState, layout: DatasetLayout, episode
         batches=batch + 1,
         drivers=list(dict.fromkeys([*state.notes.drivers, *drivers])),
         episodes=[*state.notes.episodes, *map(_noted, episodes)],
+        without_rows=_others(state.notes.without_rows, episodes),
     )
     _write_json(stage / "meta/stats.json", state.statistics)
-    (stage / "meta/lockstep.json").write_bytes(msgspec.json.format(msgspec.json.encode(state.notes)) + b"\n")
+    write_notes(stage, state.notes)
     _write_json(stage / "meta/info.json", state.info)
     videos = [f"videos/{key}/{file_of(batch)}.mp4" for key in keys]
     meta = ["meta/tasks.parquet", "meta/stats.json", "meta/lockstep.json", episodes_file, "meta/info.json"]
     return [*videos, data, *meta]
+
+
+def noted_without_rows(notes: DatasetNotes, episodes: Sequence[EpisodeRows]) -> DatasetNotes:
+    """Return the notes with these kept episodes, which have no row."""
+    found = [*_others(notes.without_rows, episodes), *map(_noted, episodes)]
+    return msgspec.structs.replace(notes, without_rows=found)
+
+
+def write_notes(stage: Path, notes: DatasetNotes) -> str:
+    """Write meta/lockstep.json under `stage`, and return its path in the dataset. Raises OSError."""
+    path = stage / "meta/lockstep.json"
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_bytes(msgspec.json.format(msgspec.json.encode(notes)) + b"\n")
+    return "meta/lockstep.json"
+
+
+def _others(noted: Sequence[DatasetEpisode], episodes: Sequence[EpisodeRows]) -> list[DatasetEpisode]:
+    """Return those that are none of the episodes, trimmed or not."""
+    own = {(each.recording, each.part, each.episode) for each in map(_noted, episodes)}
+    return [each for each in noted if (each.recording, each.part, each.episode) not in own]
 
 
 def _write_videos(
