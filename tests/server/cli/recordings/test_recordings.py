@@ -11,6 +11,7 @@ from typer.testing import CliRunner, Result
 from lockstep.server.cli.main import app
 from lockstep.server.evidence.signer import Signer
 from lockstep.server.recording.format.signature import RecordingSigning
+from lockstep.server.recording.reading.reader import RecordingReader
 from tests.server.recording.makers import Story
 
 EVENTS = 60
@@ -71,8 +72,10 @@ def test_who_signed_it_is_said_and_a_key_that_did_not_is_named(directory: Path) 
 
 def test_a_tampered_recording_ends_with_1_and_what_is_none_with_2(directory: Path) -> None:
     path = directory / "one.mcap"
+    with RecordingReader(path) as reader:
+        chunk = reader.index.chunks[1]
     data = bytearray(path.read_bytes())
-    data[len(data) // 3] ^= 1
+    data[chunk.offset + 200] ^= 1  # within the chunk's records
     path.write_bytes(data)
     verdict = _lockstep(directory, "verify", "one")
     assert verdict.exit_code == 1
