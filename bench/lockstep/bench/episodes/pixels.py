@@ -76,7 +76,7 @@ def look(root: Path) -> Pixels:
         events = [row["lockstep.event"] for row in mine]
         found.rows.append(len(mine))
         found.events.append((min(events), max(events)) if events else (0, 0))
-        found.drivers.append(sorted({notes["drivers"][row["lockstep.driver"]] for row in mine}))
+        found.drivers.append(sorted({row["lockstep.driver"] for row in mine}))
     del found.wrong[LISTED:]
     return found
 

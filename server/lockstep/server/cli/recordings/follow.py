@@ -10,8 +10,8 @@ from pathlib import Path
 from types import FrameType
 
 from lockstep.server.recording.dataset.appending import alone_with
-from lockstep.server.recording.dataset.follower import DatasetFollower, Say
-from lockstep.server.recording.export.export_lerobot import DatasetOptions
+from lockstep.server.recording.dataset.follower import DatasetFollower
+from lockstep.server.recording.export.export_lerobot import DatasetOptions, Say
 
 __all__ = ["append_once", "follow"]
 
