@@ -169,12 +169,12 @@ async def test_a_robot_of_rates_trains_too(tmp_path: Path) -> None:
         await console.episodes.start("drive on")
         await drive(console, lambda seconds, at: {console.description.axes[0].name: 0.2}, 3.0)
         await console.episodes.success()
-    choice = LayoutChoice(axes=["base.vx"], extras=["ranges"])
+    choice = LayoutChoice(axes=["base.wz", "base.vx"], extras=["ranges"])
     options = DatasetOptions(fps=FPS, layout=choice)
     (root,) = export_lerobot.export_all(sorted(recordings.glob("*.mcap")), tmp_path / "dataset", options)
     assert verify_dataset(root, pixels=True).ok
     seen = await used(tmp_path, "load", root)
-    assert seen["names"]["action"] == ["base.vx.vel"]
+    assert seen["names"]["action"] == ["base.wz.vel", "base.vx.vel"]
     said = await run_lerobot(
         *(tmp_path, "lerobot-train", "--dataset.repo_id=tests/planar", f"--dataset.root={root}"),
         *(*SMALL_ACT, f"--output_dir={tmp_path / 'out'}"),

@@ -13,10 +13,11 @@ from lockstep.server.recording.errors import DatasetRefused
 from lockstep.server.recording.export import export_lerobot
 from lockstep.server.recording.export.export_lerobot import DatasetOptions
 from lockstep.server.recording.export.lerobot_layout import LayoutChoice, layout_of
-from lockstep.server.recording.format.records import CommandRecord, FeedbackRecord, SeatRecord
+from lockstep.server.recording.format.drivers import EventDriver
+from lockstep.server.recording.format.records import CommandRecord, FeedbackRecord
 from lockstep.server.recording.verify.verify_dataset import verify_dataset
 from lockstep.server.recording.writing.writer import Entry
-from tests.server.recording.makers import DESCRIPTION, EPOCH, START, Story, own_entry, rewritten
+from tests.server.recording.makers import DESCRIPTION, Story, own_entry, rewritten
 from tests.server.recording.test_episode_export import episode, rows
 
 
@@ -83,33 +84,39 @@ def test_what_the_robot_has_not_is_refused_by_name(choice: LayoutChoice, said: s
         layout_of(ARM, choice)
 
 
-def driven(path: Path) -> Path:
-    """A policy drives, a person corrects it from event 15 on, and the policy goes on from event 20 on."""
+def driven(path: Path, *, by_feedback: bool = True) -> Path:
+    """A policy drives, a person corrects it from event 15 on, and the policy goes on from event 20 on.
 
-    def by(event: int) -> tuple[str, str]:
-        return ("p2", "Bo") if 15 <= event < 20 else ("p1", "act")
+    Args:
+        by_feedback: feedbacks name their drivers; else the commands alone do
+    """
+
+    def by(event: int) -> EventDriver:
+        return EventDriver("Bo", "human", True) if 15 <= event < 20 else EventDriver("act", "policy")
 
     def change(entry: Entry) -> list[Entry]:
-        record = entry.record
+        record, driver = entry.record, by(entry.event)
         if isinstance(record, CommandRecord):
-            peer, name = by(record.event)
-            return [own_entry(msgspec.structs.replace(record, peer=peer, name=name), entry.arrived)]
-        if isinstance(record, SeatRecord) and record.holder == "p1":
-            return [own_entry(msgspec.structs.replace(record, name="act", role="policy"), entry.arrived)]
+            changed = msgspec.structs.replace(record, peer=driver.name, name=driver.name, kind=driver.kind)
+            return [own_entry(changed, entry.arrived)]
+        if isinstance(record, FeedbackRecord) and by_feedback and entry.event > 1:
+            named = msgspec.structs.replace(
+                record, driver=driver.name, driver_kind=driver.kind, intervention=driver.intervention
+            )
+            return [own_entry(named, entry.arrived, entry.captured)]
         return [entry]
 
-    taken = SeatRecord(epoch=EPOCH, event=14, holder="p2", name="Bo", role="operator", why="taken")
     entries = [
         *Story(events=40, real=True).entries(),
-        own_entry(taken, START + 13 * 40_000_000 + 1_000_000),
         episode("a", "start", 10, 10),
         episode("a", "kept", 10, 25),
     ]
     return rewritten(path, sorted(entries, key=lambda each: each.arrived), change, DESCRIPTION)
 
 
-def test_each_row_says_who_sent_its_action_and_where_a_person_intervened(tmp_path: Path) -> None:
-    (root,) = export_lerobot.export(driven(tmp_path / "a.mcap"), tmp_path / "dataset", "")
+@pytest.mark.parametrize("by_feedback", [True, False])
+def test_each_row_says_who_sent_its_action_and_where_a_person_intervened(tmp_path: Path, by_feedback: bool) -> None:
+    (root,) = export_lerobot.export(driven(tmp_path / "a.mcap", by_feedback=by_feedback), tmp_path / "dataset", "")
     found = {row["lockstep.event"]: row for row in rows(root)}
     corrected = range(14, 19)  # their actions are commands 15 to 19
     assert {event for event, row in found.items() if row["lockstep.intervention"]} == set(corrected)

@@ -125,6 +125,25 @@ def test_a_recording_whose_episodes_were_all_discarded_gives_no_dataset_and_leav
     assert sorted(each.name for each in tmp_path.iterdir()) == ["a.mcap"]
 
 
+def test_a_kept_episode_without_a_row_is_said_by_name_and_noted_in_the_dataset(tmp_path: Path) -> None:
+    """Something was left out at event 12, and the next keyframe is that of event 52."""
+    lost = own_entry(Degraded(epoch=EPOCH, event=12, lost=1), START + 11 * INTERVAL + 1_000_000)
+    more = (episode("b", "start", 25, 25, task="lift"), episode("b", "kept", 25, 40, task="lift"))
+    path = recording(tmp_path / "a.mcap", lost, *more, *KEPT_AND_NOT[4:6])
+    said: list[str] = []
+    (root,) = export_lerobot.export_all([path], tmp_path / "dataset", "", say=said.append)
+    (line,) = said
+    assert line.startswith("episode b of a.mcap is left out: no event has ")
+    notes = json.loads((root / "meta" / "lockstep.json").read_text())
+    assert [each["episode"] for each in notes["episodes"]] == ["c"]
+    (without,) = notes["without_rows"]
+    assert (without["episode"], without["task"], without["rows"], without["left_out"]) == ("b", "lift", 0, 15)
+    assert verify_dataset(root).ok
+    alone = recording(tmp_path / "b.mcap", lost, *more)
+    with pytest.raises(RecordingDamaged, match="no kept episode has a row"):
+        export_lerobot.export(alone, tmp_path / "none", "")
+
+
 def test_an_episode_that_was_kept_in_another_file_than_it_began_in_is_in_no_dataset(tmp_path: Path) -> None:
     path = recording(
         tmp_path / "a.mcap",
@@ -166,6 +185,14 @@ def test_pictures_that_build_on_one_that_was_left_out_are_in_no_row(tmp_path: Pa
     path = recording(tmp_path / "a.mcap", lost, episode("a", "start", 30, 30), episode("a", "kept", 30, 60))
     (root,) = export_lerobot.export_all([path], tmp_path / "dataset", "", tolerance=0)
     assert [row["lockstep.event"] for row in rows(root)] == [*range(30, 40), *range(52, 60)]
+
+
+def test_no_row_has_a_picture_that_builds_on_one_that_was_left_out_before_the_episode(tmp_path: Path) -> None:
+    """Keyframes are those of events 2 and 52; something was left out at event 26, and the episode begins at 30."""
+    lost = own_entry(Degraded(epoch=EPOCH, event=26, lost=1), START + 25 * INTERVAL + 1_000_000)
+    path = recording(tmp_path / "a.mcap", lost, episode("a", "start", 30, 30), episode("a", "kept", 30, 60))
+    (root,) = export_lerobot.export_all([path], tmp_path / "dataset", "", tolerance=0)
+    assert [row["lockstep.event"] for row in rows(root)] == list(range(52, 60))
 
 
 @pytest.mark.parametrize(

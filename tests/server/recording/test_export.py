@@ -16,10 +16,11 @@ from lockstep.server.recording.errors import RecordingDamaged
 from lockstep.server.recording.export import export_csv, export_lerobot, export_mp4, export_parquet
 from lockstep.server.recording.format.foxglove import sound_message
 from lockstep.server.recording.format.payload import sound_of
+from lockstep.server.recording.format.records import Degraded
 from lockstep.server.recording.format.topics import CAMERA, MICROPHONE
 from lockstep.server.recording.reading.reader import RecordingReader
 from lockstep.server.recording.writing.writer import RecordingWriter
-from tests.server.recording.makers import CODECS, DESCRIPTION, INFO, Story, rewritten
+from tests.server.recording.makers import CODECS, DESCRIPTION, EPOCH, INFO, INTERVAL, START, Story, own_entry, rewritten
 
 EVENTS = 60
 
@@ -54,6 +55,18 @@ def test_mp4_has_the_same_pictures_and_sound_and_not_encoded_again(file: Path, t
     with av.open(str(target)) as video:
         samples = sum(frame.samples for frame in video.decode(audio=0))
         assert samples >= (2 * (EVENTS - 1) - 2) * 960
+
+
+@pytest.mark.parametrize("codecs", [("H264",), ("H264", "VP8")])
+def test_mp4_has_no_picture_that_builds_on_one_that_was_left_out(codecs: tuple[str, ...], tmp_path: Path) -> None:
+    """Keyframes are those of events 2 and 52; something was left out before the picture of event 40."""
+    lost = own_entry(Degraded(epoch=EPOCH, event=40, lost=3), START + 39 * INTERVAL + 4_000_000)
+    entries = sorted([*Story(events=EVENTS, real=True, codecs=codecs).entries(), lost], key=lambda each: each.arrived)
+    path = rewritten(tmp_path / "a.mcap", entries, lambda each: [each])
+    (target,) = export_mp4.export(path, tmp_path / "a.mp4", "")
+    with av.open(str(target)) as video:
+        frames = [brightness(frame) for frame in video.decode(video=0)]
+    assert frames == pytest.approx([2.0 * event for event in [*range(2, 40), *range(52, EVENTS + 1)]], abs=8)
 
 
 @pytest.mark.parametrize("codecs", [("VP8",), ("H264", "VP8")])

@@ -10,13 +10,13 @@ import pytest
 from lockstep.protocol.description import Axis, Geom, RobotDescription
 from lockstep.protocol.messages import Feedback
 from lockstep.robot_bridge.robots.registry import create_robot
-from lockstep.server.recording.format.records import CommandRecord, FeedbackRecord, RobotRecord
+from lockstep.server.recording.format.records import CommandRecord, Degraded, FeedbackRecord, RobotRecord
 from lockstep.server.recording.format.topics import CAMERA, OWN_TOPICS
 from lockstep.server.recording.reading.reader import RecordingReader
 from lockstep.server.recording.writing.queue_items import FeedbackItem, OwnItem, RobotItem, entries_of
 from lockstep.server.recording.writing.writer import RecordingWriter
 from lockstep.server.scene.kinematics import body_pose
-from tests.server.recording.makers import EPOCH, INFO, SECOND, START, Story
+from tests.server.recording.makers import EPOCH, INFO, INTERVAL, SECOND, START, Story, own_entry, rewritten
 from tests.server.recording.rrd import entities, recording_ids, rerun
 
 from lockstep.server.recording.export import export_rerun  # isort: skip  (needs rerun, which `rrd` looks for)
@@ -68,6 +68,15 @@ def test_pictures_are_the_recorded_ones_on_the_event_of_their_stamp_and_decode(f
     assert rerun.VideoCodec.H264.value in camera.static[0]["VideoStream:codec"]
     decoder = av.CodecContext.create("h264", "r")
     assert sum(len(decoder.decode(av.Packet(sample))) for sample in samples) == EVENTS - 1
+
+
+def test_no_picture_builds_on_one_that_the_recorder_left_out(tmp_path: Path) -> None:
+    """Keyframes are those of events 2 and 52; something was left out before the picture of event 40."""
+    lost = own_entry(Degraded(epoch=EPOCH, event=40, lost=3), START + 39 * INTERVAL + 4_000_000)
+    entries = sorted([*Story(events=EVENTS, real=True).entries(), lost], key=lambda each: each.arrived)
+    path = rewritten(tmp_path / "a.mcap", entries, lambda each: [each])
+    (target,) = export_rerun.export(path, tmp_path / "a.rrd", "")
+    assert entities(target)["/camera/front"].column("event") == [*range(2, 40), *range(52, EVENTS + 1)]
 
 
 def test_pictures_of_two_codecs_are_two_streams(tmp_path: Path) -> None:

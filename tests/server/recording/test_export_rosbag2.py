@@ -15,14 +15,14 @@ from mcap_ros2.decoder import DecoderFactory
 from lockstep.protocol.messages import Feedback
 from lockstep.robot_bridge.robots.registry import create_robot
 from lockstep.server.recording.errors import RecordingDamaged
-from lockstep.server.recording.format.records import FeedbackRecord, RobotRecord
+from lockstep.server.recording.format.records import Degraded, FeedbackRecord, RobotRecord
 from lockstep.server.recording.format.robot_frames import WORLD
 from lockstep.server.recording.format.topics import CAMERA, OWN_TOPICS
 from lockstep.server.recording.reading.reader import RecordingReader
 from lockstep.server.recording.writing.queue_items import FeedbackItem, RobotItem, entries_of
 from lockstep.server.recording.writing.writer import Entry, RecordingWriter
 from lockstep.server.scene.kinematics import body_pose
-from tests.server.recording.makers import EPOCH, INFO, SECOND, START, Story, rewritten
+from tests.server.recording.makers import EPOCH, INFO, INTERVAL, SECOND, START, Story, own_entry, rewritten
 from tests.support.ros2 import have_ros, ros_python
 
 pytest.importorskip("rosbags")
@@ -111,6 +111,17 @@ def test_pictures_are_the_recorded_ones_with_the_event_of_each_beside_them(file:
         assert (at.sec, at.nanosec) == (stamp["timestamp"]["sec"], stamp["timestamp"]["nsec"])
     decoder = av.CodecContext.create("h264", "r")
     assert sum(len(decoder.decode(av.Packet(bytes(each.decoded.data)))) for each in pictures) == EVENTS - 1
+
+
+def test_no_picture_builds_on_one_that_the_recorder_left_out(tmp_path: Path) -> None:
+    """Keyframes are those of events 2 and 52; something was left out before the picture of event 40."""
+    lost = own_entry(Degraded(epoch=EPOCH, event=40, lost=3), START + 39 * INTERVAL + 4_000_000)
+    entries = sorted([*Story(events=EVENTS, real=True).entries(), lost], key=lambda each: each.arrived)
+    path = rewritten(tmp_path / "a.mcap", entries, lambda each: [each])
+    (out,) = export_rosbag2.export(path, tmp_path / "bag", "")
+    found = read(out)
+    assert len(found["/camera/front"]) == 38 + EVENTS - 51
+    assert len(found["/lockstep/degraded"]) == 1
 
 
 def test_the_mcap_library_decodes_every_message_by_the_schemas_in_the_file(bag: Path) -> None:

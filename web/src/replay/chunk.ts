@@ -48,6 +48,7 @@ export interface ReplayChunkContent {
   readonly feedback: readonly ReplayFeedback[];
   readonly commands: readonly ReplayCommand[];
   readonly seats: readonly { readonly arrived: number; readonly name: string }[];
+  readonly losses: readonly number[]; // ids of the records that say that some before them were left out
   readonly broken: boolean; // it is damaged, and holds nothing that could be trusted
 }
 
@@ -65,6 +66,7 @@ export function parseChunkBody(number: number, body: ArrayBuffer): ReplayChunkCo
   const feedback: ReplayFeedback[] = [];
   const commands: ReplayCommand[] = [];
   const seats: { arrived: number; name: string }[] = [];
+  const losses: number[] = [];
   for (const record of recordsOf(number, body)) {
     const { topic, payload, arrived } = record;
     if (topic.startsWith(CAMERA) || topic.startsWith(MICROPHONE)) {
@@ -73,17 +75,27 @@ export function parseChunkBody(number: number, body: ArrayBuffer): ReplayChunkCo
       else list.push(record);
     } else if (topic === "/lockstep/feedback") feedback.push(...parseFeedback(json(payload), arrived));
     else if (topic === "/lockstep/command") commands.push(...parseCommand(json(payload), arrived));
+    else if (topic === "/lockstep/degraded") losses.push(record.id);
     else if (topic === "/lockstep/seat") {
       const seat = json(payload);
       if (isRecord(seat)) seats.push({ arrived, name: displayText(seat["name"]) });
     }
   }
-  return { number, bytes: body.byteLength, media, feedback, commands, seats, broken: false };
+  return { number, bytes: body.byteLength, media, feedback, commands, seats, losses, broken: false };
 }
 
 /** What stands for a chunk that is damaged. */
 export function brokenChunk(number: number): ReplayChunkContent {
-  return { number, bytes: 0, media: new Map(), feedback: [], commands: [], seats: [], broken: true };
+  return {
+    number,
+    bytes: 0,
+    media: new Map(),
+    feedback: [],
+    commands: [],
+    seats: [],
+    losses: [],
+    broken: true,
+  };
 }
 
 /** In which chunk a record stands. */

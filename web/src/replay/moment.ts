@@ -70,11 +70,16 @@ export function momentOf(chunks: readonly ReplayChunkContent[], place: ReplayPla
   const lastBroken = chunks.findLast((chunk) => chunk.broken)?.number ?? -1;
   const isWhole = (first: ReplayRecord | undefined): boolean =>
     first !== undefined && chunkOfRecord(first) > lastBroken;
+  const losses = chunks.flatMap((chunk) => chunk.losses);
+  /** A picture may build on one that was left out. */
+  const isTorn = ([first]: readonly ReplayRecord[], record: ReplayRecord): boolean =>
+    first !== undefined && losses.some((id) => first.id < id && id < record.id);
   for (const topic of topicsOf(chunks)) {
     const records = chunks.flatMap((chunk) => chunk.media.get(topic) ?? []);
     if (topic.startsWith(CAMERA)) {
       const picture = pictureAt(records, place.event, until);
-      if (picture !== null && isWhole(picture.sequence[0])) pictures.set(topic, picture);
+      if (picture === null || isTorn(picture.sequence, picture.record)) continue;
+      if (isWhole(picture.sequence[0])) pictures.set(topic, picture);
     } else if (topic.startsWith(MICROPHONE)) {
       const segment = segmentAt(records, place.event, until);
       if (isWhole(segment.packets[0])) sounds.set(topic, segment);

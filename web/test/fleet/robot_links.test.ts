@@ -1,5 +1,6 @@
 import { describe, expect, it } from "vitest";
-import { isOwnOrigin, overviewPage, robotName, robotPage } from "../../src/fleet/robot_links";
+import { overviewPage, robotName } from "../../src/fleet/robot_links";
+import { isOwnOrigin, robotPage } from "../../src/fleet/robot_pages";
 
 const BASE = "https://hall.example/a/";
 

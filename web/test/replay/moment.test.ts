@@ -132,6 +132,15 @@ describe("a moment", () => {
   });
 });
 
+it("a picture that builds on one that was left out is not shown, and one from the next keyframe on is", () => {
+  const lost = { topic: "/lockstep/degraded", event: 3, arrived: 3, payload: '{"lost": 1}' };
+  const parts = [picture(1, 1, true), picture(2, 2, false), lost, picture(4, 4, false), picture(5, 5, true)];
+  const chunk = parseChunkBody(0, bodyOf(parts));
+  const stamp = (event: number) =>
+    momentOf([chunk], { event, until: null }).pictures.get("/camera/front")?.record.event;
+  expect([1, 2, 3, 4, 5].map(stamp)).toEqual([1, 2, 2, undefined, 5]);
+});
+
 it("a chunk that is cut off is refused", () => {
   const whole = bodyOf([feedback(5, 1, 20)]);
   for (const length of [2, 10, whole.byteLength - 1])

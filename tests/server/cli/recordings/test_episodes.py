@@ -7,7 +7,7 @@ import pytest
 from typer.testing import CliRunner, Result
 
 from lockstep.server.cli.main import app
-from tests.server.recording.test_episode_export import KEPT_AND_NOT, recording
+from tests.server.recording.test_episode_export import KEPT_AND_NOT, episode, recording
 
 
 @pytest.fixture
@@ -93,6 +93,15 @@ def test_a_dataset_is_verified_and_never_written_over_another(directory: Path, t
     assert verdict.stdout.startswith("2 episodes, 25 rows, tolerance 4 events\n")
     again = _lockstep(directory, *command)
     assert (again.exit_code, "already" in again.stderr) == (2, True)
+
+
+def test_a_kept_episode_that_has_no_row_is_said_by_name(directory: Path, tmp_path: Path) -> None:
+    recording(directory / "three.mcap", episode("x", "start", 1, 1), episode("x", "kept", 1, 2))
+    done = _lockstep(directory, "export", "one", "three", "--to", "lerobot", "--out", str(tmp_path / "dataset"))
+    assert done.exit_code == 0, done.output
+    first, last = done.stdout.splitlines()
+    assert first.startswith("episode x of three.mcap is left out: no event has ")
+    assert last == str(tmp_path / "dataset")
 
 
 def test_recordings_of_the_same_events_become_one_dataset_and_the_check_says_that_they_are(

@@ -20,8 +20,10 @@ from lockstep.server.recording.dataset.follower import DatasetFollower
 from lockstep.server.recording.errors import DatasetRefused
 from lockstep.server.recording.export import export_lerobot
 from lockstep.server.recording.export.export_lerobot import DatasetOptions
+from lockstep.server.recording.format.records import Degraded
 from lockstep.server.recording.verify.verify_dataset import verify_dataset
 from tests.server.recording.dataset.growing_file import GrowingFile
+from tests.server.recording.makers import EPOCH, INTERVAL, START, own_entry
 from tests.server.recording.test_episode_export import KEPT_AND_NOT, changed, episode, recording
 
 FILES = 7  # of an append to a dataset with one camera
@@ -93,6 +95,29 @@ def test_a_change_before_the_append_counts_and_a_later_one_does_not(tmp_path: Pa
     following = follower(tmp_path / "dataset")
     assert following.look([path]) == 1
     assert events_of(tmp_path / "dataset") == [[*range(12, 20)]]
+
+
+def test_a_kept_episode_without_a_row_is_noted_in_the_dataset_also_before_it_begins(tmp_path: Path) -> None:
+    """Something was left out at events 8 and 62; keyframes are those of events 2, 52 and 102."""
+    lost = [
+        own_entry(Degraded(epoch=EPOCH, event=at, lost=1), START + (at - 1) * INTERVAL + 1_000_000) for at in (8, 62)
+    ]
+    last = (episode("e", "start", 80, 80), episode("e", "kept", 80, 90))
+    said: list[str] = []
+    file, root = GrowingFile(tmp_path / "a.mcap", [*lost, *KEPT_AND_NOT[:6], *last]), tmp_path / "dataset"
+    following = follower(root, said)
+    for event, noted in ((44, None), (61, ["a"]), (100, ["a", "e"])):
+        file.write_until(event)
+        following.look([file.path])
+        assert (root.exists() and [each.episode for each in read_state(root).notes.without_rows]) == (noted or False)
+    assert [line.partition(":")[0] for line in said] == [
+        "episode a of a.mcap is left out",
+        "episode c of a.mcap",
+        "episode e of a.mcap is left out",
+    ]
+    assert verify_dataset(root).ok
+    assert follower(root).look([file.path]) == 0
+    assert [each.episode for each in read_state(root).notes.without_rows] == ["a", "e"]
 
 
 def has_both(root: Path) -> bool:

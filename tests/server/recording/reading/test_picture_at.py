@@ -79,6 +79,21 @@ def test_a_picture_that_builds_on_one_that_was_left_out_is_not_shown(tmp_path: P
     assert shown(path, 60) is not None, "behind the next keyframe"
 
 
+def test_a_picture_that_came_late_behind_what_was_left_out_is_not_shown(tmp_path: Path) -> None:
+    """The recorder says at event 31 that it left something out; then come the pictures of 21 to 30."""
+    lost = own_entry(Degraded(epoch=EPOCH, event=31, lost=1), START + 25 * INTERVAL + 1_000_000)
+    path = recording(tmp_path / "a.mcap", lost, events=80, stamps={event: event - 5 for event in range(27, 36)})
+    assert shown(path, 28) is None
+
+
+def test_what_is_left_out_behind_a_picture_does_not_hide_it(tmp_path: Path) -> None:
+    lost = own_entry(Degraded(epoch=EPOCH, event=24, lost=1), START + 23 * INTERVAL + 1_000_000)
+    path = recording(tmp_path / "a.mcap", lost, events=40, stamps={20: 19, 21: 19, 22: 19, 23: 25, 24: 25})
+    found = shown(path, 22)
+    assert found is not None
+    assert found.stamp == 19
+
+
 def test_pictures_that_are_none_and_too_many_from_a_keyframe_are_an_error(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

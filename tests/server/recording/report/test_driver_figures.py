@@ -6,7 +6,7 @@ import pytest
 from lockstep.protocol.console import DriverKind, ShadowJudgement
 from lockstep.protocol.episodes import EpisodeOutcome
 from lockstep.server.recording.format.records import EpisodeRecord, FeedbackRecord, ShadowRecord
-from lockstep.server.recording.report.driver_figures import MOST, DriverTally, Outcomes, drivers_table
+from lockstep.server.recording.report.driver_figures import MOST, DriverTally, Outcomes
 
 
 def _event(tally: DriverTally, event: int, name: str, kind: DriverKind, *, intervention: bool = False) -> None:
@@ -84,16 +84,11 @@ def test_a_shadow_is_compared_with_people_alone_and_never_agrees_out_of_limits()
     assert shadow.judgements == {"in_time": 3, "out_of_limits": 1, "late": 1}
 
 
-def test_names_are_bounded_and_escaped_in_the_report() -> None:
+def test_names_are_bounded() -> None:
     tally = DriverTally()
-    assert drivers_table(tally) == ""
     for event in range(2, 2 + 2 * MOST):
-        _event(tally, event, f"<b>{event}", "policy")
+        _event(tally, event, f"{event}", "policy")
     assert len(tally.drivers) == MOST
-    text = drivers_table(tally)
-    assert "<b>" not in text
-    assert "&lt;b&gt;2" in text
-    assert "No policy drove in an episode" in text
 
 
 def test_a_pause_is_no_time_of_driving() -> None:

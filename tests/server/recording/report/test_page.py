@@ -78,7 +78,7 @@ def test_a_session_is_told_by_driver_and_camera_with_pictures_of_what_was_wrong(
     assert re.search(r"Ada\s+", plain)
     assert re.search(r"Bo\s+supervisor", plain)
     assert re.search(r"front\s+99\s+25\.0\s+25\.0\s+0\s", plain)
-    assert re.search(r"Interventions\s+1\s", plain)
+    assert re.search(r"Take-overs\s+1\s", plain)
     assert re.search(r"Episodes kept\s+2 of 5", plain)
 
 

@@ -1,5 +1,5 @@
 import type { FleetRobot } from "../fleet_status";
-import { isOwnOrigin } from "../robot_links";
+import { isOwnOrigin } from "../robot_pages";
 import { giveSlots, THUMBNAIL_LIMIT, type SlotCandidate } from "../thumbnail_slots";
 import { AudioDevice } from "../../media/sound/audio_device";
 import { ConsoleApi } from "../../transport/signalling/console_api";

@@ -1,5 +1,5 @@
 import type { FleetRobot } from "../fleet_status";
-import { episodesPage, robotPage } from "../robot_links";
+import { episodesPage, robotPage } from "../robot_pages";
 import { gapLabel, pictureLabel } from "../tile_labels";
 import type { TileState } from "../tile_state";
 import { grouped, h, setData, setHidden, setText } from "../../ui/elements/dom";

@@ -99,9 +99,9 @@ def _export_dataset(
     if (append or follow) and out is None:
         raise usage_error("--append and --follow need --out")
     if follow:
-        _say(f"{escaped(out)} follows {escaped(', '.join(map(str, paths)) or 'the recordings')}")
+        begun = f"{escaped(out)} follows {escaped(', '.join(map(str, paths)) or 'the recordings')}"
         wanted = (lambda: paths) if paths else files
-        or_usage(lambda: following.follow(wanted, out, options, _say_printable, all_of=bool(paths)))
+        or_usage(lambda: following.follow(wanted, out, options, _say_printable, all_of=bool(paths), begun=begun))
         return
     if not paths:
         raise usage_error("name a recording")
@@ -109,7 +109,7 @@ def _export_dataset(
         or_usage(lambda: following.append_once(paths, out, options, _say_printable))
         _say(escaped(out))
         return
-    for each in or_usage(lambda: exporter.export_all(paths, out, options)):
+    for each in or_usage(lambda: exporter.export_all(paths, out, options, say=_say_printable)):
         _say(escaped(each))
 
 

@@ -10,8 +10,8 @@ from pathlib import Path
 from types import FrameType
 
 from lockstep.server.recording.dataset.appending import alone_with
-from lockstep.server.recording.dataset.follower import DatasetFollower, Say
-from lockstep.server.recording.export.export_lerobot import DatasetOptions
+from lockstep.server.recording.dataset.follower import DatasetFollower
+from lockstep.server.recording.export.export_lerobot import DatasetOptions, Say
 
 __all__ = ["append_once", "follow"]
 
@@ -25,12 +25,21 @@ def append_once(paths: Sequence[Path], root: Path, options: DatasetOptions, say:
         return DatasetFollower(root, options, say).look(paths)
 
 
-def follow(files: Callable[[], Sequence[Path]], root: Path, options: DatasetOptions, say: Say, *, all_of: bool) -> None:
+def follow(
+    files: Callable[[], Sequence[Path]],
+    root: Path,
+    options: DatasetOptions,
+    say: Say,
+    *,
+    all_of: bool,
+    begun: str = "",
+) -> None:
     """Append each kept episode when it is on the disk, until the process is told to end.
 
     Args:
         files: returns the recordings to follow, at each look
         all_of: also the episodes that were kept before the dataset was followed for the first time
+        begun: is said once the process may be told to end
 
     Raises:
         RecordingError: the dataset cannot be appended to, or another process does.
@@ -38,6 +47,8 @@ def follow(files: Callable[[], Sequence[Path]], root: Path, options: DatasetOpti
     """
     _give_way()
     with alone_with(root) as memory, _told_to_end() as ended:
+        if begun:
+            say(begun)
         since = 0 if all_of else _since(memory)
         follower = DatasetFollower(root, options, say)
         while True:

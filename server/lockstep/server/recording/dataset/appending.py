@@ -13,12 +13,12 @@ import pyarrow.parquet as pq
 
 from lockstep.server.recording.dataset.commit import commit, recover, stage_of
 from lockstep.server.recording.errors import DatasetRefused, RecordingDamaged
-from lockstep.server.recording.export.lerobot_batch import DatasetState, write_batch
+from lockstep.server.recording.export.lerobot_batch import DatasetState, noted_without_rows, write_batch, write_notes
 from lockstep.server.recording.export.lerobot_layout import DatasetLayout
 from lockstep.server.recording.export.lerobot_meta import DatasetNotes
 from lockstep.server.recording.export.lerobot_rows import EpisodeRows, Stretch
 
-__all__ = ["alone_with", "append", "is_dataset", "is_in", "read_state"]
+__all__ = ["alone_with", "append", "is_dataset", "is_in", "note_without_rows", "read_state"]
 
 _notes_decoder = msgspec.json.Decoder(DatasetNotes)
 _json_decoder = msgspec.json.Decoder(dict[str, Any])
@@ -83,6 +83,14 @@ def append(root: Path, state: DatasetState, layout: DatasetLayout, episodes: Seq
         RecordingError, OSError: they cannot be read or written; the dataset has none of them, or all.
     """
     commit(root, write_batch(stage_of(root), state, layout, episodes))
+
+
+def note_without_rows(root: Path, state: DatasetState, episode: EpisodeRows) -> None:
+    """Note in the dataset that a kept episode has no row; `alone_with` it. Raises OSError."""
+    notes = noted_without_rows(state.notes, [episode])
+    if notes != state.notes:
+        commit(root, [write_notes(stage_of(root), notes)])
+        state.notes = notes
 
 
 def is_in(state: DatasetState, stretch: Stretch) -> bool:

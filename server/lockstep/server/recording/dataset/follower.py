@@ -3,16 +3,23 @@
 It belongs into a process of its own, with a low priority: the console writes the recording and knows nothing of it.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 from lockstep.protocol.description import RobotDescription
-from lockstep.server.recording.dataset.appending import append, is_dataset, is_in, read_state
+from lockstep.server.recording.dataset.appending import append, is_dataset, is_in, note_without_rows, read_state
 from lockstep.server.recording.dataset.commit import recover
 from lockstep.server.recording.dataset.growing import GrowingRecording
 from lockstep.server.recording.episodes.edits import edited, read_edits
 from lockstep.server.recording.errors import DatasetRefused, RecordingError
-from lockstep.server.recording.export.export_lerobot import DatasetOptions, cameras_of, new_state
+from lockstep.server.recording.export.export_lerobot import (
+    DatasetOptions,
+    Say,
+    cameras_of,
+    left_out,
+    new_state,
+    no_rows,
+)
 from lockstep.server.recording.export.lerobot_batch import DatasetState
 from lockstep.server.recording.export.lerobot_layout import layout_of
 from lockstep.server.recording.export.lerobot_rows import (
@@ -25,8 +32,6 @@ from lockstep.server.recording.export.lerobot_rows import (
 from lockstep.server.recording.reading.reader import RecordingReader
 
 __all__ = ["DatasetFollower"]
-
-Say = Callable[[str], None]
 
 
 class DatasetFollower:
@@ -49,6 +54,7 @@ class DatasetFollower:
         self._robot: RobotDescription | None = None
         self._files: dict[Path, GrowingRecording] = {}
         self._passed: set[tuple[Path, str]] = set()  # episodes that have been said not to fit
+        self._without_rows: list[EpisodeRows] = []  # that the dataset is to note when it begins
         self._again: set[Path] = set()  # recordings with an episode that could not be written
 
     def look(self, paths: Sequence[Path], since: int = 0) -> int:
@@ -114,13 +120,14 @@ class DatasetFollower:
         topics = cameras_of(reader, self._options.cameras) if state is None else state.notes.topics
         tolerance = self._options.tolerance if state is None else state.notes.tolerance
         fps = self._options.fps if state is None else state.fps if state.notes.has_rate else None
-        (rows,) = rows_of(reader, layout, [stretch], topics, tolerance, fps, growing.roles)
+        (rows,) = rows_of(reader, layout, [stretch], topics, tolerance, fps)
         if not rows.frames:
-            raise DatasetRefused(
-                "no event has a feedback, a command that answers it, and a picture of every camera "
-                f"within {tolerance} events"
-            )
-        state = state or new_state(robot, layout, topics, self._options, [rows])
+            if state is not None:
+                note_without_rows(self._root, state, rows)
+            else:
+                self._without_rows.append(rows)
+            raise DatasetRefused(no_rows(tolerance))
+        state = state or new_state(robot, layout, topics, self._options, [rows], self._without_rows)
         append(self._root, state, layout, [rows])
         self._state, self._robot = state, robot
         return rows
@@ -128,4 +135,4 @@ class DatasetFollower:
     def _pass_over(self, path: Path, episode: str, why: str) -> None:
         if (path, episode) not in self._passed:
             self._passed.add((path, episode))
-            self._say(f"{'episode ' + episode + ' of ' if episode else ''}{path.name} is left out: {why}")
+            self._say(left_out(path, episode, why))

@@ -8,7 +8,6 @@ from lockstep.server.recording.format.info import RecordingInfo
 from lockstep.server.recording.reading.raw_records import BROKEN, MAGIC, raw_records
 from lockstep.server.recording.reading.reader import RecordingReader
 from lockstep.server.recording.reading.scan import Scan
-from lockstep.server.recording.reading.seat_roles import SeatRoles
 from lockstep.server.util.regular_file import open_regular
 
 __all__ = ["GrowingRecording"]
@@ -18,13 +17,11 @@ class GrowingRecording:
     """One file. It is never changed, and needs no index: a file that was interrupted is read as far as it is whole.
 
     Attributes:
-        roles: of the peers that held the seat, as far as somebody has read them
         ended: nothing follows any more
     """
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        self.roles = SeatRoles()
         self.ended = False
         self._scan: Scan | None = None
         self._looked: tuple[int, int] | None = None  # size and time of change at the last reading

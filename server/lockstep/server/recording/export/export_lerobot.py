@@ -6,7 +6,7 @@ as a whole. `lerobot_rows` says what a row is, `lerobot_layout` what is in it.
 
 import os
 import shutil
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +16,7 @@ import numpy as np
 from lockstep.protocol.description import RobotDescription
 from lockstep.server.recording.episodes.edits import edited, read_edits
 from lockstep.server.recording.errors import DatasetRefused, RecordingDamaged
-from lockstep.server.recording.export.lerobot_batch import DatasetState, write_batch
+from lockstep.server.recording.export.lerobot_batch import DatasetState, noted_without_rows, write_batch
 from lockstep.server.recording.export.lerobot_layout import DatasetLayout, LayoutChoice, layout_of
 from lockstep.server.recording.export.lerobot_meta import EVENTS, RATE, DatasetNotes
 from lockstep.server.recording.export.lerobot_rows import (
@@ -30,7 +30,20 @@ from lockstep.server.recording.export.lerobot_video import camera_key
 from lockstep.server.recording.format.topics import CAMERA
 from lockstep.server.recording.reading.reader import RecordingReader
 
-__all__ = ["TOLERANCE", "DatasetOptions", "cameras_of", "export", "export_all", "new_state", "options_of"]
+__all__ = [
+    "TOLERANCE",
+    "DatasetOptions",
+    "Say",
+    "cameras_of",
+    "export",
+    "export_all",
+    "left_out",
+    "new_state",
+    "no_rows",
+    "options_of",
+]
+
+Say = Callable[[str], None]
 
 TOLERANCE = 4  # events, as the page's own
 
@@ -60,6 +73,7 @@ def export_all(
     out: Path | None,
     options: DatasetOptions | str = "",
     tolerance: int | None = None,
+    say: Say = lambda text: None,
 ) -> list[Path]:
     """Write one dataset of the recordings, in their order. The directory appears when all of it is written.
 
@@ -67,6 +81,7 @@ def export_all(
         out: a new directory; None: one beside the first recording
         options: or the task alone
         tolerance: instead of that in the options
+        say: is told each kept episode that has no row
 
     Raises:
         RecordingError: a recording cannot be read, none has a row, they are of different robots, or the options do not
@@ -79,10 +94,17 @@ def export_all(
     chosen = options if isinstance(options, DatasetOptions) else DatasetOptions(task=options)
     if tolerance is not None:
         chosen = msgspec.structs.replace(chosen, tolerance=tolerance)
-    description, layout, topics, episodes = _read(paths, chosen)
+    description, layout, topics, read = _read(paths, chosen)
+    without = [each for each in read if not each.frames]
+    for each in without:
+        say(left_out(each.stretch.path, each.stretch.episode, no_rows(chosen.tolerance)))
+    if len(without) == len(read):
+        raise RecordingDamaged(f"no kept episode has a row: {no_rows(chosen.tolerance)}")
+    episodes = [each for each in read if each.frames]
+    state = new_state(description, layout, topics, chosen, episodes, without)
     partial = root.with_name(f".{root.name}.partial-{os.getpid()}")
     try:
-        write_batch(partial, new_state(description, layout, topics, chosen, episodes), layout, episodes)
+        write_batch(partial, state, layout, episodes)
         partial.rename(root)
     except BaseException:
         shutil.rmtree(partial, ignore_errors=True)
@@ -96,6 +118,7 @@ def new_state(
     topics: list[str],
     options: DatasetOptions,
     episodes: Sequence[EpisodeRows],
+    without_rows: Sequence[EpisodeRows] = (),
 ) -> DatasetState:
     """Return the state of a dataset that has nothing yet. Without a rate of its own it has that of these episodes."""
     notes = DatasetNotes(
@@ -108,7 +131,21 @@ def new_state(
         layout=layout.choice,
         episodes=[],
     )
+    notes = noted_without_rows(notes, without_rows)
     return DatasetState(robot=description.name, fps=options.fps or _rate(episodes), notes=notes)
+
+
+def no_rows(tolerance: int) -> str:
+    """Return why an episode has no row."""
+    return (
+        "no event has a feedback, a command that answers it, and a picture of every camera "
+        f"that is at most {tolerance} events older"
+    )
+
+
+def left_out(path: Path, episode: str, why: str) -> str:
+    """Return in words that an episode, or "" for the recording as a whole, is in no dataset."""
+    return f"{f'episode {episode} of ' if episode else ''}{path.name} is left out: {why}"
 
 
 def cameras_of(reader: RecordingReader, names: Sequence[str]) -> list[str]:
@@ -123,7 +160,7 @@ def cameras_of(reader: RecordingReader, names: Sequence[str]) -> list[str]:
 def _read(
     paths: Sequence[Path], options: DatasetOptions
 ) -> tuple[RobotDescription, DatasetLayout, list[str], list[EpisodeRows]]:
-    """Return the robot, its cameras' topics, and the rows of all episodes that have some."""
+    """Return the robot, its cameras' topics, and the rows of all kept episodes, which may have none."""
     description: RobotDescription | None = None
     layout: DatasetLayout | None = None
     cameras: list[str] = []
@@ -138,9 +175,8 @@ def _read(
                 raise RecordingDamaged(f"{path.name} has other cameras than {paths[0].name}")
             stretches = stretches_of(reader, edited(episodes_of(reader), read_edits(path)), options.task)
             episodes += rows_of(reader, layout, stretches, cameras, options.tolerance, options.fps)
-    episodes = [each for each in episodes if each.frames]
     if description is None or layout is None or not episodes:
-        raise RecordingDamaged("no kept event has a feedback, a command that answers it, and a picture of every camera")
+        raise RecordingDamaged("there is no kept episode")
     return description, layout, cameras, episodes
 
 

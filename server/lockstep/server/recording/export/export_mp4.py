@@ -16,7 +16,8 @@ from av.container import OutputContainer
 from lockstep.server.recording.errors import RecordingDamaged
 from lockstep.server.recording.export.export_sound import sound_writer
 from lockstep.server.recording.format.payload import SOUND, RecordedPicture, RecordedSound
-from lockstep.server.recording.format.topics import CAMERA
+from lockstep.server.recording.format.records import Degraded
+from lockstep.server.recording.format.topics import CAMERA, OWN_TOPICS
 from lockstep.server.recording.reading.pictures import RecordedPictures, picture_size
 from lockstep.server.recording.reading.reader import RecordingReader
 
@@ -25,6 +26,7 @@ __all__ = ["export"]
 VIDEO_BASE = Fraction(1, 90_000)
 SECOND = 1_000_000_000
 MILLISECOND = 1_000_000
+DEGRADED = OWN_TOPICS[Degraded]
 MAX_CAMERA = 60  # characters of the camera's name in a file name
 
 
@@ -148,14 +150,21 @@ class _Encoded:
 
 
 def _timed(reader: RecordingReader, *topics: str) -> Iterator[Timed]:
-    """Yield the media in order of arrival: pictures from the first keyframe on, times of each topic increasing."""
+    """Yield the media in order of arrival, times of each topic increasing: pictures that can be decoded, from a
+    keyframe on, also where the recorder has left something out."""
     newest: dict[str, int] = {}
-    for record in reader.records(topics=topics):
+    whole: set[str] = set()  # topics without a loss since their keyframe
+    for record in reader.records(topics={*topics, DEGRADED}):
+        if record.topic == DEGRADED:
+            whole.clear()
+            continue
         picture, sound = record.picture, record.sound
         medium = picture or sound
         if medium is None:
             continue
-        if record.topic not in newest and picture is not None and not picture.keyframe:
+        if picture is None or picture.keyframe:
+            whole.add(record.topic)
+        if record.topic not in whole:
             continue
         captured = max(record.captured, newest.get(record.topic, 0) + MILLISECOND)
         newest[record.topic] = captured

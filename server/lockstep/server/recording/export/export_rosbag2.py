@@ -27,7 +27,7 @@ from lockstep.protocol.description import RobotDescription
 from lockstep.server.recording.errors import RecordingDamaged
 from lockstep.server.recording.export.rosbag2.ros_messages import COMPRESSED_VIDEO, RosMessages, ros_types
 from lockstep.server.recording.format.payload import VIDEO, RecordedPicture, own_record
-from lockstep.server.recording.format.records import FeedbackRecord, RobotRecord
+from lockstep.server.recording.format.records import Degraded, FeedbackRecord, RobotRecord
 from lockstep.server.recording.format.stamp import STAMP_TOPIC, stamp_message
 from lockstep.server.recording.format.topics import CAMERA, OWN_TOPICS, SIGNATURE, WRENCH, has_frames, stream_of
 from lockstep.server.recording.reading.pictures import picture_size
@@ -37,6 +37,7 @@ from lockstep.server.recording.writing.writer import Entry
 __all__ = ["export"]
 
 FEEDBACK, ROBOT = OWN_TOPICS[FeedbackRecord], OWN_TOPICS[RobotRecord]
+DEGRADED = OWN_TOPICS[Degraded]
 TEXTS = set(OWN_TOPICS.values()) - {SIGNATURE, WRENCH}  # what signs the file signs no bag
 VERSION: Final = 8  # of metadata.yaml: ROS 2 from Iron on reads it
 CANNOT_BE_WRITTEN = (struct.error, OverflowError, ValueError)  # such as a time after 2038
@@ -83,7 +84,7 @@ class _Bag:
         self._cameras = {camera.name: camera for camera in description.cameras}
         self._names = _topic_names(stream_of(each.topic) for each in reader.index.topics if each.schema == VIDEO)
         self._sizes: dict[str, tuple[int, int]] = {}  # of the newest keyframe, by camera
-        self._seen: set[str] = set()  # cameras of which a keyframe has come
+        self._whole: set[str] = set()  # cameras without a loss since their keyframe
 
     def take(self, record: Record) -> None:
         """Write what becomes of a record. Raises RecordingDamaged."""
@@ -92,6 +93,8 @@ class _Bag:
             if picture is not None:
                 self._picture(record, picture)
         elif record.topic in TEXTS:
+            if record.topic == DEGRADED:
+                self._whole.clear()
             self._text(record.topic, record.arrived, record.data)
             if record.topic == FEEDBACK:
                 self._feedback(own_record(FeedbackRecord, record.data), record)
@@ -102,9 +105,9 @@ class _Bag:
     def _picture(self, record: Record, picture: RecordedPicture) -> None:
         camera = record.topic.removeprefix(CAMERA)
         if picture.keyframe:
-            self._seen.add(camera)
+            self._whole.add(camera)
             self._sizes[camera] = picture_size(picture) or self._sizes.get(camera, (0, 0))
-        if camera not in self._seen:
+        if camera not in self._whole:
             return  # it cannot be decoded
         topic = f"/camera/{self._names[camera]}"
         video = self._messages.video(camera, record.captured, picture.data, picture.format)

@@ -29,7 +29,7 @@ from lockstep.server.recording.export.lerobot_meta import (
 from lockstep.server.recording.export.lerobot_rows import EpisodeRows
 from lockstep.server.recording.export.lerobot_video import ExportedCamera, write_video
 
-__all__ = ["DatasetState", "write_batch"]
+__all__ = ["DatasetState", "noted_without_rows", "write_batch", "write_notes"]
 
 Array = npt.NDArray[Any]
 SUCCESS = {"success": 1, "failure": 0, "": -1}
@@ -79,19 +79,40 @@ def write_batch(stage: Path, state: DatasetState, layout: DatasetLayout, episode
     frames = state.info.get("total_frames", 0) + sum(len(each.frames) for each in episodes)
     state.statistics = _all_statistics(state, places)
     state.info = info_of(state.robot, features, frames, state.fps, count + len(episodes), len(state.tasks))
-    drivers = [frame.driver for each in episodes for frame in each.frames]
+    drivers = [frame.driver.name for each in episodes for frame in each.frames]
     state.notes = msgspec.structs.replace(
         state.notes,
         batches=batch + 1,
         drivers=list(dict.fromkeys([*state.notes.drivers, *drivers])),
         episodes=[*state.notes.episodes, *map(_noted, episodes)],
+        without_rows=_others(state.notes.without_rows, episodes),
     )
     _write_json(stage / "meta/stats.json", state.statistics)
-    (stage / "meta/lockstep.json").write_bytes(msgspec.json.format(msgspec.json.encode(state.notes)) + b"\n")
+    write_notes(stage, state.notes)
     _write_json(stage / "meta/info.json", state.info)
     videos = [f"videos/{key}/{file_of(batch)}.mp4" for key in keys]
     meta = ["meta/tasks.parquet", "meta/stats.json", "meta/lockstep.json", episodes_file, "meta/info.json"]
     return [*videos, data, *meta]
+
+
+def noted_without_rows(notes: DatasetNotes, episodes: Sequence[EpisodeRows]) -> DatasetNotes:
+    """Return the notes with these kept episodes, which have no row."""
+    found = [*_others(notes.without_rows, episodes), *map(_noted, episodes)]
+    return msgspec.structs.replace(notes, without_rows=found)
+
+
+def write_notes(stage: Path, notes: DatasetNotes) -> str:
+    """Write meta/lockstep.json under `stage`, and return its path in the dataset. Raises OSError."""
+    path = stage / "meta/lockstep.json"
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_bytes(msgspec.json.format(msgspec.json.encode(notes)) + b"\n")
+    return "meta/lockstep.json"
+
+
+def _others(noted: Sequence[DatasetEpisode], episodes: Sequence[EpisodeRows]) -> list[DatasetEpisode]:
+    """Return those that are none of the episodes, trimmed or not."""
+    own = {(each.recording, each.part, each.episode) for each in map(_noted, episodes)}
+    return [each for each in noted if (each.recording, each.part, each.episode) not in own]
 
 
 def _write_videos(
@@ -131,9 +152,9 @@ def _columns(rows: EpisodeRows, number: int, begin: int, fps: int, task: int) ->
     return columns | {
         "lockstep.time": np.array([frame.time - frames[0].time for frame in frames], np.float64),
         "lockstep.age": np.array(rows.ages, np.float64),
-        "lockstep.driver": np.array([frame.driver for frame in frames], object),
-        "lockstep.driver_kind": np.array([frame.kind for frame in frames], object),
-        "lockstep.intervention": np.array(_interventions(rows), np.int64),
+        "lockstep.driver": np.array([frame.driver.name for frame in frames], object),
+        "lockstep.driver_kind": np.array([frame.driver.kind for frame in frames], object),
+        "lockstep.intervention": np.array([frame.driver.intervention for frame in frames], np.int64),
         "lockstep.success": np.full(count, SUCCESS[rows.stretch.outcome], np.int64),
         "timestamp": (np.arange(count) / fps).astype(np.float32),
         "frame_index": np.arange(count, dtype=np.int64),
@@ -141,15 +162,6 @@ def _columns(rows: EpisodeRows, number: int, begin: int, fps: int, task: int) ->
         "index": np.arange(begin, begin + count, dtype=np.int64),
         "task_index": np.full(count, task, np.int64),
     }
-
-
-def _interventions(rows: EpisodeRows) -> list[int]:
-    """Return 1 for each row that a person drove after a policy had driven in the episode."""
-    found, has_policy = [], False
-    for frame in rows.frames:
-        has_policy = has_policy or frame.kind == "policy"
-        found.append(int(has_policy and frame.kind != "policy"))
-    return found
 
 
 def _features(

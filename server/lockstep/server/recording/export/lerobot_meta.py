@@ -80,6 +80,7 @@ class DatasetNotes(msgspec.Struct, frozen=True, kw_only=True):
         "lockstep.intervention: 1 where the driver was no policy, in an episode that a policy had driven before, else 0"
     )
     episodes: list[DatasetEpisode]
+    without_rows: list[DatasetEpisode] = []  # kept episodes that are not in the dataset, since none of them is a row
 
 
 class EpisodePlace(NamedTuple):

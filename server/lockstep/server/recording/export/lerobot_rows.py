@@ -18,13 +18,14 @@ from lockstep.protocol.serial import event_after, event_gap, is_newer
 from lockstep.server.recording.errors import RecordingDamaged
 from lockstep.server.recording.export.lerobot_layout import DatasetLayout
 from lockstep.server.recording.export.lerobot_sampling import sampled
+from lockstep.server.recording.format.drivers import EventDriver
 from lockstep.server.recording.format.episodes import EpisodeBook, EpisodeEntry
 from lockstep.server.recording.format.info import RecordingInfo
 from lockstep.server.recording.format.payload import own_record_of
 from lockstep.server.recording.format.records import CommandRecord, Degraded, EpisodeRecord, FeedbackRecord
 from lockstep.server.recording.format.topics import OWN_TOPICS
+from lockstep.server.recording.reading.drivers import DRIVER_TOPICS, RecordedDrivers
 from lockstep.server.recording.reading.reader import Record, RecordingReader
-from lockstep.server.recording.reading.seat_roles import DriverKind, SeatRoles
 
 __all__ = [
     "EpisodeRows",
@@ -40,7 +41,6 @@ __all__ = [
 ]
 
 DEGRADED = OWN_TOPICS[Degraded]
-READ = {OWN_TOPICS[kind] for kind in (FeedbackRecord, CommandRecord)}
 
 
 class Frame(NamedTuple):
@@ -50,8 +50,7 @@ class Frame(NamedTuple):
     time: float  # s, the bridge's clock
     state: dict[str, list[float]]  # by column
     action: list[float]
-    driver: str  # name of the peer that sent the command
-    kind: DriverKind  # of the peer
+    driver: EventDriver  # of the action: of the event that the command became
 
 
 class Stretch(NamedTuple):
@@ -118,17 +117,13 @@ def rows_of(
     cameras: list[str],
     tolerance: int,
     rate: int | None = None,
-    roles: SeatRoles | None = None,
 ) -> list[EpisodeRows]:
     """Return the rows of each stretch. Raises RecordingError.
 
     Args:
         rate: Hz, of the rows; None: each event is a row
-        roles: what is known of the recording's seat from before; None: nothing
     """
-    roles = roles or SeatRoles()
-    roles.read(reader)
-    return [_episode(reader, layout, stretch, cameras, tolerance, rate, roles) for stretch in stretches]
+    return [_episode(reader, layout, stretch, cameras, tolerance, rate) for stretch in stretches]
 
 
 def _episode(
@@ -138,9 +133,8 @@ def _episode(
     cameras: list[str],
     tolerance: int,
     rate: int | None,
-    roles: SeatRoles,
 ) -> EpisodeRows:
-    mine = [frame for frame in _frames(reader, layout, stretch, roles) if _is_within(frame.event, stretch)]
+    mine = [frame for frame in _frames(reader, layout, stretch) if _is_within(frame.event, stretch)]
     events = [frame.event for frame in mine]
     stamps = {topic: dict(_stamps(reader, topic, stretch, events)) for topic in cameras}
     kept = [
@@ -215,10 +209,10 @@ def _stamps(reader: RecordingReader, topic: str, stretch: Stretch, events: list[
             yield event, stamp
 
 
-def _frames(reader: RecordingReader, layout: DatasetLayout, stretch: Stretch, roles: SeatRoles) -> Iterator[Frame]:
+def _frames(reader: RecordingReader, layout: DatasetLayout, stretch: Stretch) -> Iterator[Frame]:
     """Yield a frame for each event, but for those without an answer, as the last one, or with an incomplete state."""
     events = list(_events(reader, stretch))
-    for place, (answer, command) in enumerate(events[1:], 1):
+    for place, (answer, command, driver) in enumerate(events[1:], 1):
         feedback = events[place - 1].feedback
         if command is None or answer.event != event_after(feedback.event):
             continue  # the recorder has left something out
@@ -227,25 +221,30 @@ def _frames(reader: RecordingReader, layout: DatasetLayout, stretch: Stretch, ro
             after = None
         state, action = layout.state(feedback), layout.action(command, answer, after)
         if state is not None and action is not None:
-            yield Frame(feedback.event, feedback.time, state, action, command.name, roles.kind(command.peer))
+            yield Frame(feedback.event, feedback.time, state, action, driver)
 
 
 class _Event(NamedTuple):
     feedback: FeedbackRecord  # the first of the event
     command: CommandRecord | None  # that became the event; None: not in the recording
+    driver: EventDriver
 
 
 def _events(reader: RecordingReader, stretch: Stretch) -> Iterator[_Event]:
     """Yield the events of the stretch."""
     event = 0
     command: CommandRecord | None = None
-    for record in reader.records(stretch.first_event, stretch.last_event, READ):
-        match own_record_of(record.schema, record.data):
+    drivers = RecordedDrivers()
+    for record in reader.records(stretch.first_event, stretch.last_event, DRIVER_TOPICS):
+        own = own_record_of(record.schema, record.data)
+        drivers.take(own)
+        match own:
             case CommandRecord(outcome="forwarded") as forwarded:
                 command = forwarded
             case FeedbackRecord() as feedback if feedback.event != event:
                 event = feedback.event
-                yield _Event(feedback, command if command is not None and command.event == event else None)
+                became = command if command is not None and command.event == event else None
+                yield _Event(feedback, became, drivers.of(feedback))
 
 
 def check_same_robot(first: RobotDescription, other: RobotDescription) -> None:

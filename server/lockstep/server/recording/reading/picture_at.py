@@ -60,13 +60,19 @@ def _needed(reader: RecordingReader, topic: str, event: int) -> tuple[list[int],
     start = reader.index.keyframe_before(topic, event)
     if start is None:
         return stamps, pictures
+    is_whole = False  # from a keyframe on nothing was left out
     for record in reader.records(start.event, event, {topic, DEGRADED}, decodable=True):
-        if record.topic == DEGRADED:  # what follows may build on a picture that is missing
-            stamps.clear()
-            pictures.clear()
+        if record.topic == DEGRADED:
+            is_whole = False
             continue
         picture = record.picture
-        if picture is None or is_newer(record.event, event) or not (pictures or picture.keyframe):
+        if picture is None or is_newer(record.event, event):
+            continue
+        if not is_whole:
+            stamps.clear()
+            pictures.clear()
+            is_whole = picture.keyframe
+        if not is_whole:
             continue
         stamps.append(record.event)
         pictures.append(picture)

@@ -28,7 +28,7 @@ from lockstep.server.recording.format.payload import (
     picture_of,
     sound_of,
 )
-from lockstep.server.recording.format.records import RobotRecord
+from lockstep.server.recording.format.records import Degraded, RobotRecord
 from lockstep.server.recording.format.topics import OWN_TOPICS
 from lockstep.server.recording.reading.raw_records import BROKEN, HEAD, MAGIC, MAX_RECORD, chunk_records
 from lockstep.server.recording.reading.scan import scan_file
@@ -37,6 +37,7 @@ from lockstep.server.util.regular_file import open_regular
 __all__ = ["Record", "RecordingReader"]
 
 FOOTER = HEAD + 20 + len(MAGIC)
+DEGRADED = OWN_TOPICS[Degraded]
 
 
 class Record(NamedTuple):
@@ -134,7 +135,8 @@ class RecordingReader:
         Args:
             first_event, last_event: None: from the beginning, to the end
             topics: None: all
-            decodable: pictures come from the last keyframe at or before `first_event` on
+            decodable: pictures come from the last keyframe at or before `first_event` on, and with them, if asked for,
+                each `Degraded` from there to the last chunk, of whatever event: later pictures may build on a lost one
         """
         index = self.index
         if first_event is None and last_event is None:
@@ -143,10 +145,16 @@ class RecordingReader:
             return
         first = index.first_event if first_event is None else first_event
         last = index.last_event if last_event is None else last_event
-        starts = self._picture_starts(first) if decodable else {}
+        starts = self._picture_starts(first, topics) if decodable else {}
         wanted = sorted({*index.chunks_with(first, last), *self._chunks_from(starts, first)})
+        if starts and wanted:
+            wanted = list(range(wanted[0], wanted[-1] + 1))  # what was lost may be told in a chunk between
+        begin = min((each.arrived for each in starts.values()), default=None)
         for number in wanted:
             for record in self.chunk(number, topics):
+                if record.topic == DEGRADED and begin is not None and record.arrived // 1000 >= begin:
+                    yield record
+                    continue
                 if is_newer(record.event, last):
                     continue
                 if not is_newer(first, record.event) or (
@@ -154,8 +162,9 @@ class RecordingReader:
                 ):
                     yield record
 
-    def _picture_starts(self, event: int) -> dict[str, EventEntry]:
-        found = {topic: self.index.keyframe_before(topic, event) for topic in self.index.keyframes}
+    def _picture_starts(self, event: int, topics: Collection[str] | None) -> dict[str, EventEntry]:
+        pictured = [topic for topic in self.index.keyframes if topics is None or topic in topics]
+        found = {topic: self.index.keyframe_before(topic, event) for topic in pictured}
         return {topic: entry for topic, entry in found.items() if entry is not None}
 
     def _chunks_from(self, starts: dict[str, EventEntry], event: int) -> Iterator[int]:

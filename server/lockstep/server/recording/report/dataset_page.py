@@ -1,19 +1,26 @@
 """The report of a LeRobot dataset that Lockstep has exported, as one HTML page. Needs pyarrow."""
 
 from collections import defaultdict
+from collections.abc import Sequence
+from itertools import accumulate, groupby, pairwise
 from pathlib import Path
-from typing import Any
+from typing import Any, cast, get_args
 
 import av
 import msgspec
 import pyarrow as pa
 import pyarrow.parquet as pq
 
+from lockstep.protocol.console import DriverKind
+from lockstep.protocol.episodes import EpisodeOutcome
 from lockstep.protocol.serial import event_gap, is_event
 from lockstep.server.recording.errors import RecordingDamaged
-from lockstep.server.recording.export.lerobot_meta import DatasetNotes
+from lockstep.server.recording.export.lerobot_meta import DatasetNotes, file_of
+from lockstep.server.recording.format.records import EpisodeRecord, FeedbackRecord
 from lockstep.server.recording.reading.picture_at import jpeg_of
 from lockstep.server.recording.report import page_parts as parts
+from lockstep.server.recording.report.driver_figures import DriverTally
+from lockstep.server.recording.report.policies import policies_section
 from lockstep.server.recording.verify.verify_dataset import DatasetVerdict, verify_dataset
 
 __all__ = ["dataset_page"]
@@ -22,6 +29,10 @@ MAX_EPISODES = 1000
 MAX_SHOWN = 12  # rows that are shown with their pictures
 MAX_DECODED = 20_000  # pictures of a camera
 WIDTH = 320  # pixels
+
+COLUMNS = ("index", "episode_index", "timestamp", "lockstep.event", "lockstep.stamp", "lockstep.gap", "lockstep.time")
+DRIVEN = ("lockstep.age", "lockstep.driver", "lockstep.driver_kind", "lockstep.intervention")
+OUTCOMES = get_args(EpisodeOutcome)
 
 Row = dict[str, Any]
 _notes = msgspec.json.Decoder(DatasetNotes)
@@ -39,9 +50,12 @@ def dataset_page(root: Path) -> str:
     try:
         notes = _notes.decode((root / "meta" / "lockstep.json").read_bytes())
         info = _info.decode((root / "meta" / "info.json").read_bytes())
-        rows = _rows(root)
-        widest = _widest(rows, notes)
-        pictures = {camera: _pictures(root, camera, {row["index"] for row in widest}) for camera in notes.cameras}
+        batches = [_rows(root, batch, notes) for batch in range(notes.batches)]
+        rows = [row for batch in batches for row in batch]
+        tally = _tally(rows, notes)
+        widest = _widest(rows)
+        wanted, sizes = {row["index"] for row in widest}, [len(batch) for batch in batches]
+        pictures = {camera: _pictures(root, camera, wanted, sizes) for camera in notes.cameras}
     except (msgspec.DecodeError, pa.ArrowException, KeyError, TypeError, IndexError, av.FFmpegError) as error:
         raise RecordingDamaged(f"{root.name}: {error}") from error
     fps = info.get("fps")
@@ -52,21 +66,26 @@ def dataset_page(root: Path) -> str:
     sections = [
         parts.section("checks", "Checks", _checks(verdict)),
         parts.section("tasks", "Tasks", _tasks(notes)),
-        parts.section("drivers", "Drivers", _drivers(rows, notes)),
+        parts.section("drivers", "Drivers", _drivers(rows, notes, tally)),
+        policies_section(tally),
         parts.section("cameras", "Cameras", _cameras(rows, notes)),
-        parts.section("episodes", "Episodes", _episodes(notes, fps)),
+        parts.section("episodes", "Episodes", _episodes(rows, notes)),
+        _without_rows(notes),
         parts.section("widest", "The rows with the largest gaps", _shown(widest, notes, pictures)),
     ]
     return parts.page(root.name, lead, sections)
 
 
-def _rows(root: Path) -> list[Row]:
-    wanted = ("index", "episode_index", "lockstep.event", "lockstep.stamp", "lockstep.gap", "lockstep.driver")
-    found: list[Row] = []
-    for file in sorted((root / "data").glob("*/*.parquet")):
-        with pq.ParquetFile(file) as table:
-            columns = [name for name in wanted if name in table.schema_arrow.names]
-            found += table.read(columns).to_pylist()
+def _rows(root: Path, batch: int, notes: DatasetNotes) -> list[Row]:
+    with pq.ParquetFile(root / "data" / f"{file_of(batch)}.parquet") as table:
+        columns = [name for name in (*COLUMNS, *DRIVEN) if name in table.schema_arrow.names]
+        found: list[Row] = table.read(columns).to_pylist()
+    for row in found:
+        row.setdefault("lockstep.time", row["timestamp"])
+        if isinstance(row["lockstep.driver"], int):  # of the first version: a place in the notes
+            row["lockstep.driver"] = notes.drivers[row["lockstep.driver"]]
+        row["lockstep.driver"] = str(row["lockstep.driver"])
+        row.setdefault("lockstep.driver_kind", "human")
     return found
 
 
@@ -99,49 +118,85 @@ def _tasks(notes: DatasetNotes) -> str:
     return parts.table(head, rows)
 
 
-def _drivers(rows: list[Row], notes: DatasetNotes) -> str:
-    """Who drove each row; a change of the driver within an episode is an intervention."""
-    counts: dict[int, int] = defaultdict(int)
-    episodes: dict[int, set[int]] = defaultdict(set)
-    taken: dict[int, int] = defaultdict(int)
-    before: tuple[int, int] | None = None
-    for row in rows:
-        driver, episode = row["lockstep.driver"], row["episode_index"]
-        counts[driver] += 1
-        episodes[driver].add(episode)
-        if before is not None and before[0] == episode and before[1] != driver:
-            taken[driver] += 1
-        before = episode, driver
-    table = []
-    for driver, count in sorted(counts.items()):
-        outcomes = [notes.episodes[each].outcome for each in episodes[driver]]
-        success, failure = outcomes.count("success"), outcomes.count("failure")
-        name = notes.drivers[driver] or "nobody"
-        table.append(
-            (name, count, len(outcomes), taken[driver], success, failure, parts.share(success, success + failure))
+def _tally(rows: list[Row], notes: DatasetNotes) -> DriverTally:
+    """Return who drove, from the rows, as a report of the recordings would say it of their events."""
+    tally = DriverTally()
+    for index, mine in groupby(rows, lambda row: int(row["episode_index"])):
+        episode = notes.episodes[index]
+        first, last = episode.first_event, episode.last_event
+        begin = EpisodeRecord(
+            epoch=str(index),  # no time passes from one episode of a dataset to the next
+            event=first,
+            episode=episode.episode,
+            number=index + 1,
+            kind="start",
+            task=episode.task,
+            first_event=first,
+            last_event=first,
         )
-    head = ("Driver", "Rows", "Episodes", "Interventions", "Success", "Failure", "Success of those that say")
-    return parts.table(head, table, "An intervention: another person drives from this row of an episode on.")
+        tally.take(begin)
+        for row in mine:
+            tally.take(_driven(row, begin.epoch))
+        outcome = cast(EpisodeOutcome, episode.outcome) if episode.outcome in OUTCOMES else ""
+        tally.take(msgspec.structs.replace(begin, event=last, kind="kept", last_event=last, outcome=outcome))
+    return tally
+
+
+def _driven(row: Row, epoch: str) -> FeedbackRecord:
+    return FeedbackRecord(
+        epoch=epoch,
+        event=row["lockstep.event"],
+        issue=1,
+        time=row["lockstep.time"],
+        axes=[],
+        driver=row["lockstep.driver"],
+        driver_kind=row["lockstep.driver_kind"],
+        intervention=bool(row.get("lockstep.intervention")),
+    )
+
+
+def _drivers(rows: list[Row], notes: DatasetNotes, tally: DriverTally) -> str:
+    counts: dict[tuple[str, DriverKind], int] = defaultdict(int)
+    episodes: dict[tuple[str, DriverKind], set[int]] = defaultdict(set)
+    for row in rows:
+        driver = row["lockstep.driver"], row["lockstep.driver_kind"]
+        counts[driver] += 1
+        episodes[driver].add(row["episode_index"])
+    table: list[tuple[parts.Cell, ...]] = []
+    for (name, kind), count in sorted(counts.items()):
+        outcomes = [notes.episodes[each].outcome for each in episodes[name, kind]]
+        success, failure = outcomes.count("success"), outcomes.count("failure")
+        driven = tally.drivers.get((name, kind))
+        interventions = None if driven is None else driven.interventions
+        shared = parts.share(success, success + failure)
+        table.append((name or "nobody", kind, count, len(outcomes), interventions, success, failure, shared))
+    head = ("Driver", "Kind", "Rows", "Episodes", "Interventions", "Success", "Failure", "Success of those that say")
+    return parts.table(head, table, "Of the episodes in which they drove, also for a part.", left=2)
 
 
 def _cameras(rows: list[Row], notes: DatasetNotes) -> str:
     table: list[tuple[parts.Cell, ...]] = []
     for at, camera in enumerate(notes.cameras):
-        stamps = [(row["lockstep.event"], _stamps(row)[at]) for row in rows if len(_stamps(row)) > at]
-        gaps = sorted(event_gap(event, stamp) for event, stamp in stamps if is_event(stamp))
+        stamps = [
+            (row["episode_index"], row["lockstep.event"], _stamps(row)[at]) for row in rows if len(_stamps(row)) > at
+        ]
+        gaps = sorted(event_gap(event, stamp) for _, event, stamp in stamps if is_event(stamp))
         if not gaps:
             table.append((camera, 0, None, None, None))
             continue
-        repeated = sum(one[1] == other[1] for one, other in zip(stamps, stamps[1:], strict=False))
+        repeated = sum(one[::2] == other[::2] for one, other in pairwise(stamps))
         exact = parts.share(sum(gap == 0 for gap in gaps), len(gaps))
         table.append((camera, len(gaps), exact, gaps[-1], repeated))
     head = ("Camera", "Rows", "Of their own event", "Largest gap, events", "Same picture as the row before")
     return parts.table(head, table)
 
 
-def _episodes(notes: DatasetNotes, fps: object) -> str:
-    rate = fps if isinstance(fps, int | float) and fps else None
-    rows = [
+def _episodes(rows: list[Row], notes: DatasetNotes) -> str:
+    lengths: dict[int, float] = defaultdict(float)
+    for row in rows:
+        at = row["lockstep.time"] + row.get("lockstep.age", 0.0)
+        lengths[row["episode_index"]] = max(lengths[row["episode_index"]], at)
+    table = [
         (
             f"{at} {each.task}",
             each.outcome,
@@ -149,16 +204,27 @@ def _episodes(notes: DatasetNotes, fps: object) -> str:
             f"{each.first_event} – {each.last_event}",
             each.rows,
             each.left_out,
-            parts.number(each.rows / rate if rate else None),
+            parts.number(lengths[at]),
         )
         for at, each in enumerate(notes.episodes[:MAX_EPISODES])
     ]
     head = ("Episode", "Outcome", "Recording", "Events", "Rows", "Left out", "Length, s")
-    words = "Left out: events without a picture within the tolerance, or whose action is not known."
-    return parts.table(head, rows, words, left=3)
+    words = "Left out: events without a picture within the tolerance. Length: from the first row to the last."
+    return parts.table(head, table, words, left=3)
 
 
-def _widest(rows: list[Row], notes: DatasetNotes) -> list[Row]:
+def _without_rows(notes: DatasetNotes) -> str:
+    if not notes.without_rows:
+        return ""
+    table = [
+        (f"{each.episode} {each.task}".strip(), each.outcome, f"{each.recording} part {each.part}", each.left_out)
+        for each in notes.without_rows[:MAX_EPISODES]
+    ]
+    head = ("Episode", "Outcome", "Recording", "Events left out")
+    return parts.section("without-rows", "Kept episodes without a row", parts.table(head, table, left=3))
+
+
+def _widest(rows: list[Row]) -> list[Row]:
     """Return the rows with the largest gaps, one of each episode."""
     best: dict[int, Row] = {}
     for row in rows:
@@ -169,18 +235,24 @@ def _widest(rows: list[Row], notes: DatasetNotes) -> list[Row]:
     return sorted(best.values(), key=lambda row: -int(row["lockstep.gap"]))[:MAX_SHOWN]
 
 
-def _pictures(root: Path, camera: str, wanted: set[int]) -> dict[int, bytes]:
-    """Return the pictures of these rows as JPEG, as far as they are within the first ones."""
+def _pictures(root: Path, camera: str, wanted: set[int], sizes: Sequence[int]) -> dict[int, bytes]:
+    """Return the pictures of these rows as JPEG, as far as few enough have to be decoded for them.
+
+    Args:
+        sizes: number of rows, by batch
+    """
     found: dict[int, bytes] = {}
-    at = 0
-    for file in sorted((root / "videos" / camera).glob("*/*.mp4")):
-        with av.open(str(file)) as video:
-            for frame in video.decode(video=0):
-                if len(found) == len(wanted) or at >= MAX_DECODED:
-                    return found
-                if at in wanted:
-                    found[at] = jpeg_of(frame, WIDTH)
-                at += 1
+    left = MAX_DECODED
+    for batch, end in enumerate(accumulate(sizes)):
+        begin = end - sizes[batch]
+        mine = {index - begin for index in wanted if begin <= index < end}
+        if not mine:
+            continue
+        with av.open(str(root / "videos" / camera / f"{file_of(batch)}.mp4")) as video:
+            for at, frame in zip(range(min(left, max(mine) + 1)), video.decode(video=0), strict=False):
+                left -= 1
+                if at in mine:
+                    found[begin + at] = jpeg_of(frame, WIDTH)
     return found
 
 

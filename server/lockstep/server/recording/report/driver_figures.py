@@ -7,9 +7,7 @@
 - A shadow agrees if each axis is within `AGREES` of its range of what a person did; out of limits never agrees.
 """
 
-import html
 from collections import Counter
-from collections.abc import Iterable
 from dataclasses import dataclass, field
 
 from lockstep.protocol.console import DriverKind
@@ -17,7 +15,7 @@ from lockstep.server.recording.format.drivers import NOBODY, EventDriver
 from lockstep.server.recording.format.records import EpisodeRecord, FeedbackRecord, OwnRecord, ShadowRecord
 from lockstep.server.recording.reading.drivers import RecordedDrivers
 
-__all__ = ["AGREES", "DriverTally", "Driven", "Outcomes", "Shadowed", "drivers_table"]
+__all__ = ["AGREES", "DriverTally", "Driven", "Outcomes", "Shadowed"]
 
 LONGEST = 2.0  # s: after a pause nobody has driven all the time
 AGREES = 0.05  # of an axis' range
@@ -83,6 +81,11 @@ class DriverTally:
         self._before = NOBODY  # the newest event's driver
         self._episode: list[EventDriver] = []  # drivers of the open one, each once
         self._episode_seconds = 0.0
+
+    @property
+    def has_policy(self) -> bool:
+        """Whether a policy drove or shadowed."""
+        return bool(self.shadows) or any(kind == "policy" for _, kind in self.drivers)
 
     @property
     def interventions(self) -> int:
@@ -151,55 +154,3 @@ class DriverTally:
         if record.difference is not None and record.driver_kind == "human":
             shadow.compared += 1
             shadow.agreed += record.judgement == "in_time" and record.difference <= AGREES
-
-
-def drivers_table(tally: DriverTally) -> str:
-    """Return the section of a report, as HTML; "" if only people drove and nothing was shadowed or kept."""
-    if not (tally.outcomes or tally.shadows or any(kind == "policy" for _, kind in tally.drivers)):
-        return ""
-    rate = tally.interventions_per_minute
-    words = (
-        "No policy drove in an episode."
-        if rate is None
-        else f"{tally.interventions} interventions in {tally.policy_seconds / 60:.1f} minutes of episodes in which a "
-        f"policy drove: {rate:.2f} a minute."
-    )
-    parts = [f"<section id='drivers'><h2>Drivers</h2><p>{words}</p>"]
-    parts.append(
-        _table(
-            ("driver", "kind", "events", "seconds", "interventions"),
-            (
-                (name, kind, each.events, f"{each.seconds:.1f}", each.interventions or "")
-                for (name, kind), each in tally.drivers.items()
-            ),
-        )
-    )
-    if tally.outcomes:
-        rows = (
-            (who, each.success, each.failure, each.unsaid, _percent(each.share))
-            for who, each in sorted(tally.outcomes.items())
-        )
-        parts.append(_table(("kept episodes of", "success", "failure", "not said", "success rate"), rows))
-    if tally.shadows:
-        shown = (
-            (
-                name,
-                each.judgements.total(),
-                ", ".join(f"{count} {what}" for what, count in each.judgements.most_common()),
-                each.compared,
-                _percent(each.agreement),
-            )
-            for name, each in sorted(tally.shadows.items())
-        )
-        head = ("shadow", "events", "judged", "beside a person", f"within {AGREES:.0%} of the range")
-        parts.append(_table(head, shown))
-    return "".join([*parts, "</section>"])
-
-
-def _table(head: Iterable[str], rows: Iterable[Iterable[object]]) -> str:
-    body = "".join(f"<tr>{''.join(f'<td>{html.escape(str(cell))}</td>' for cell in row)}</tr>" for row in rows)
-    return f"<table><thead><tr>{''.join(f'<th>{each}</th>' for each in head)}</tr></thead><tbody>{body}</tbody></table>"
-
-
-def _percent(share: float | None) -> str:
-    return "" if share is None else f"{share:.0%}"

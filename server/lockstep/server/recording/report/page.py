@@ -14,6 +14,8 @@ from lockstep.server.recording.reading.picture_at import picture_at
 from lockstep.server.recording.reading.reader import RecordingReader
 from lockstep.server.recording.recording_store import entry_of
 from lockstep.server.recording.report import page_parts as parts
+from lockstep.server.recording.report.driver_figures import DriverTally
+from lockstep.server.recording.report.policies import policies_section
 from lockstep.server.recording.report.timeline import timeline_svg
 from lockstep.server.recording.report.totals import Moment, Totals
 from lockstep.server.recording.verify.promises import Verdict
@@ -42,6 +44,7 @@ class SessionFacts(NamedTuple):
     began: int  # µs since 1970
     seconds: float
     totals: Totals
+    tally: DriverTally
     episodes: list[ListedEpisode]
     pictures: dict[int, list[str]]  # HTML, by the place of the moment
 
@@ -66,6 +69,7 @@ def session_page(recording: Path, figures: Sequence[Figure] = ()) -> str:
         ),
         _promises(verdict),
         parts.section("drivers", "Drivers", _drivers(totals)),
+        policies_section(facts.tally),
         parts.section("cameras", "Cameras", _cameras(totals)),
         parts.section("episodes", "Episodes", _episodes(facts.episodes)),
         parts.section("wrong", "What was wrong", _wrong(facts)),
@@ -80,7 +84,7 @@ def session_page(recording: Path, figures: Sequence[Figure] = ()) -> str:
 def _facts(path: Path) -> SessionFacts:
     with RecordingReader(path) as reader:
         index = reader.index
-        totals = Totals(reader.description())
+        totals, tally = Totals(reader.description()), DriverTally()
         for number in range(len(index.chunks)):
             try:
                 for record in reader.chunk(number):
@@ -92,6 +96,7 @@ def _facts(path: Path) -> SessionFacts:
                     own = own_record_of(record.schema, record.data)
                     if own is not None:
                         totals.own(own, arrived)
+                        tally.take(own)
             except RecordingError:
                 continue  # the check of what is promised says so
         totals.end(index.ended)
@@ -103,7 +108,7 @@ def _facts(path: Path) -> SessionFacts:
         pictures = {at: _pictures(reader, moment) for at, moment in enumerate(totals.moments[:MAX_SHOWN])}
         title = reader.info.name or path.stem
         seconds = (index.ended - index.started) / 1e6
-        return SessionFacts(title, reader.info.robot, index.started, seconds, totals, listed.episodes, pictures)
+        return SessionFacts(title, reader.info.robot, index.started, seconds, totals, tally, listed.episodes, pictures)
 
 
 def _pictures(reader: RecordingReader, moment: Moment) -> list[str]:
@@ -134,8 +139,8 @@ def _overview(facts: SessionFacts) -> str:
     rows = [
         ("Events a second, median", parts.number(1 / median if median else None, 1)),
         ("Refusals", sum(sum(each.refusals.values()) for each in totals.drivers.values())),
-        ("Interventions", sum(each.interventions for each in totals.drivers.values())),
-        ("Interventions a minute", parts.number(_rate(facts), 2)),
+        ("Take-overs", sum(each.take_overs for each in totals.drivers.values())),
+        ("Take-overs a minute", parts.number(_rate(facts), 2)),
         ("Stops that were pressed", totals.stops),
         ("Records that the recorder left out", totals.lost),
         ("Episodes kept", f"{len(kept)} of {len(facts.episodes)}"),
@@ -147,7 +152,7 @@ def _overview(facts: SessionFacts) -> str:
 
 def _rate(facts: SessionFacts) -> float | None:
     driven = sum(each.seconds for each in facts.totals.drivers.values())
-    count = sum(each.interventions for each in facts.totals.drivers.values())
+    count = sum(each.take_overs for each in facts.totals.drivers.values())
     return count * 60 / driven if driven else None
 
 
@@ -172,7 +177,7 @@ def _drivers(totals: Totals) -> str:
             each.events,
             each.commands,
             ", ".join(f"{reason} {count}" for reason, count in sorted(each.refusals.items())) or "0",
-            each.interventions,
+            each.take_overs,
             parts.number(each.answered.percentile(0.5)),
             parts.number(each.answered.percentile(0.95)),
             parts.number(each.pictures.percentile(0.5), 0),
@@ -181,10 +186,10 @@ def _drivers(totals: Totals) -> str:
         for each in totals.drivers.values()
         if each.name or each.events > 1 or each.refusals
     ]
-    head = ("Driver", "Role", "With the seat, s", "Events", "Commands", "Refusals", "Interventions")
+    head = ("Driver", "Role", "With the seat, s", "Events", "Commands", "Refusals", "Take-overs")
     delays = ("Command → feedback, ms", "95 %", "Command → picture, ms", "95 %")
     words = (
-        "An intervention: the seat went from one person directly to another, or a supervisor took it. Command to "
+        "A take-over: the seat went from one driver directly to another, or a supervisor took it. Command to "
         "feedback is measured at the console, command to picture by the driver's own page."
     )
     return parts.table((*head, *delays), rows, words, left=2)

@@ -12,7 +12,6 @@ from lockstep.server.recording.format.topics import stream_of
 from lockstep.server.recording.reading.bookmarks import Mark
 from lockstep.server.recording.reading.event_rows import EventRow, event_rows
 from lockstep.server.recording.reading.reader import RecordingReader
-from lockstep.server.recording.report.driver_figures import DriverTally
 from lockstep.server.recording.report.traced_events import MOST_STREAMS, TracedEvents
 
 __all__ = ["Series", "Session", "Shown", "read_session"]
@@ -61,7 +60,6 @@ class Session:
     measured: dict[str, Series] = field(default_factory=dict)
     applied: dict[str, Series] = field(default_factory=dict)  # by goal axis: where it was commanded to be then
     traced: TracedEvents = field(default_factory=TracedEvents)  # where the time of each event went
-    drivers: DriverTally = field(default_factory=DriverTally)
 
 
 def read_session(path: Path) -> Session:
@@ -91,7 +89,6 @@ def read_session(path: Path) -> Session:
                 continue
             at = (record.arrived - origin) / SECOND
             own = own_record_of(record.schema, record.data)
-            session.drivers.take(own)
             match own:
                 case CommandRecord(outcome="forwarded", event=event):
                     sent = {event: record.arrived}  # never more than one is on its way

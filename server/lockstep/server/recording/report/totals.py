@@ -75,7 +75,7 @@ class DriverTotals:
     commands: int = 0  # that reached the robot
     events: int = 0  # executed
     refusals: dict[str, int] = field(default_factory=dict)  # by reason
-    interventions: int = 0  # the seat was taken from whoever had it
+    take_overs: int = 0  # the seat was taken from whoever had it
     answered: Samples = field(default_factory=Samples)  # ms from a command to its feedback, at the console
     pictures: Samples = field(default_factory=Samples)  # ms from a command to its picture, by the page's own clock
 
@@ -189,7 +189,7 @@ class Totals:
         self._leave(arrived)
         if name and name != self._holder:
             if self._holder or record.why == "taken":
-                self._driver(name).interventions += 1
+                self._driver(name).take_overs += 1
             self.handovers += 1
         self._holder, self._since = name, arrived
         if name:

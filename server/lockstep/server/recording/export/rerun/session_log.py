@@ -9,7 +9,7 @@ from lockstep.protocol.description import RobotDescription
 from lockstep.protocol.serial import event_gap
 from lockstep.server.recording.export.rerun.bodies import BodyPaths, entity, log_bodies, log_cameras, moving
 from lockstep.server.recording.export.rerun.columns import Columns, Moment
-from lockstep.server.recording.format.records import CommandRecord, FeedbackRecord, OwnRecord
+from lockstep.server.recording.format.records import CommandRecord, Degraded, FeedbackRecord, OwnRecord
 from lockstep.server.recording.format.records_in_words import in_words
 from lockstep.server.scene.kinematics import body_pose
 
@@ -49,6 +49,7 @@ class SessionLog:
         self._paths = BodyPaths(self._description)
         self._event = 0  # of the newest feedback
         self._begun: set[str] = set()  # entities of the cameras that have given a picture
+        self._whole: set[str] = set()  # cameras without a loss since their keyframe
 
     def begin(self, description: RobotDescription) -> None:
         """Log what is fixed of a robot: bodies, cameras, and the names of axes and joints."""
@@ -76,6 +77,8 @@ class SessionLog:
         match record:
             case FeedbackRecord():
                 self._feedback(record, at, self._description, self._paths)
+            case Degraded():
+                self._whole.clear()
             case CommandRecord(outcome="forwarded"):
                 self.columns.scalars(COMMANDED, at, _filled(record.values, len(self._description.axes)))
         words = in_words(record)
@@ -84,10 +87,17 @@ class SessionLog:
         self._make_room()
 
     def picture(self, camera: str, picture_format: str, picture: bytes, at: Moment, *, keyframe: bool) -> None:
-        """Take a picture. H.264: an access unit in Annex B, with parameter sets before each keyframe."""
+        """Take a picture; it is left out where one that it builds on is missing.
+
+        H.264: an access unit in Annex B, with parameter sets before each keyframe.
+        """
         codec = CODECS.get(picture_format)
         if codec is None:
             return
+        if keyframe:
+            self._whole.add(camera)
+        if camera not in self._whole:
+            return  # it cannot be decoded
         path = self._paths.camera(camera)
         if picture_format != "h264":
             path += entity(picture_format)  # a stream of Rerun has one codec
