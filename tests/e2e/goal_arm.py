@@ -118,6 +118,7 @@ class GoalArm(PlanarRobot):
             geofences=(),
             body_twists=(),
             actions=(HOLD,),
+            map=None,
         )
 
     def apply(self, values: Sequence[float]) -> None:

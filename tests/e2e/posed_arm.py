@@ -70,6 +70,7 @@ class PosedArm(PlanarRobot):
             cameras=EYES,
             microphones=(),
             actions=(),
+            map=None,
             poses=(
                 Pose(
                     name="tool",

@@ -9,9 +9,9 @@ const LAYERS: readonly (readonly string[])[] = [
   ["drive", "force_feedback", "gamepad", "robot", "session", "stop", "xr"],
   ["haptics", "input", "media", "sfu", "talkback", "transport"],
   ["engine", "fleet", "replay"],
-    ["episodes"],
-    ["charts", "headset", "map", "scene", "ui"],
-    ["app", "episodes/view", "fleet/view", "replay/view"],
+  ["episodes"],
+  ["charts", "headset", "map", "scene", "ui"],
+  ["app", "episodes/view", "fleet/view", "replay/view"],
   [""], // the pages' first files
 ];
 const ROOT = join(import.meta.dirname, "../src");

@@ -7,7 +7,6 @@ import { TouchSticks } from "../input/touch_sticks";
 import type { ConsoleApi } from "../transport/signalling/console_api";
 import type { Preconnection } from "../transport/webrtc/preconnection";
 import type { PeerOptions } from "../transport/peer";
-import { createAnnouncer } from "../ui/status/announcer";
 import { createAlarmStrip } from "../ui/status/alarm_strip";
 import { createArmPanel } from "../ui/driving/arm_panel";
 import { createAxisPanel } from "../ui/driving/axis_panel";
@@ -19,6 +18,7 @@ import { createOverlay, overlayLabels } from "../ui/views/overlay";
 import { createSeatBar } from "../ui/session/seat_bar";
 import { createStatusBar } from "../ui/status/status_bar";
 import type { RobotStrip } from "../ui/robot/robot_strip";
+import { takeResetWords } from "../stop/reset_labels";
 import { createStopPanel } from "../ui/driving/stop_panel";
 import { watchTouch } from "../ui/elements/touch_detection";
 import { ViewGrid } from "../ui/views/view_grid";
@@ -62,6 +62,7 @@ export class Page {
     this.engine = new ConsoleEngine(api, options, name, new TouchSticks(left, right), events, first);
     this.panels = this.build(left, right, api);
     this.later.use(({ installHook }) => installHook(this));
+    this.later.use(({ RESET_WORDS }) => takeResetWords(RESET_WORDS));
     this.later.use(({ watchPictureClicks }) => watchPictureClicks(this.engine, this.grid.element));
     this.later.use(({ ToolOverlay }) => {
       this.engine.streams.overlay = new ToolOverlay(() => this.engine.state.robot?.description ?? null);
@@ -129,7 +130,10 @@ export class Page {
       later.panel((parts) => parts.createAxisBars(engine)),
     );
     const stop = createStopPanel(engine);
-    const announcer = createAnnouncer(engine);
+    // Screen readers tell only what changes in a region that was there before.
+    const polite = h("div", "unseen", { "aria-live": "polite" });
+    const urgent = h("div", "unseen", { "aria-live": "assertive" });
+    const announcer = later.panel((parts) => parts.createAnnouncer(engine, polite, urgent));
     grid.gauges.append(places.element, force.element, radar.element);
     grid.element.append(
       h("div", "stage", {}, scale.element, contact.element, limits.element, overlay.element),
@@ -140,7 +144,7 @@ export class Page {
       ...[bar.element, seat.element],
       h("div", "strips", {}, alarm.element, banner.element, policies.element, episodes.element),
       ...[grid.element, rail],
-      ...[charts.element, sheets.element, deck, announcer.element],
+      ...[charts.element, sheets.element, deck, polite, urgent],
     );
     return [
       bar,

@@ -67,6 +67,8 @@ export interface ConsoleEngineEvents {
 
 /** An input that is told so late waited behind a page that was held up. */
 const HELD_UP_MS = 50;
+/** Messages whose schema comes with later code. */
+const LATE = /^(episode|episode_answer|navigation|shadow_verdict)$/;
 
 /** What is called at every tick. */
 interface Stepped {
@@ -103,10 +105,9 @@ export class ConsoleEngine {
   private readonly disposal = new Disposal();
   peer: Peer | null = null;
   measuredMs: number | null = null; // when the newest feedback came
-  episode: unknown = null; // the newest message of episodes, whose schema comes with the bar that shows it
-  navigation: { readonly value: unknown; readonly atMs: number } | null = null; // the newest, whose schema comes with the map
-  takeShadow: (message: unknown) => void = () => undefined; // the policy bar replaces it
-  takeEpisode = (message: unknown): void => void (this.episode = message); // the bar replaces it
+  /** The newest message of each kind whose schema comes with later code, and what that code does with one. */
+  readonly late = new Map<string, { readonly value: unknown; readonly atMs: number }>();
+  readonly takeLate: Record<string, (message: unknown) => void> = {};
   statusMs = 0; // when the robot's newest status came
   actionMs = -Infinity; // when the newest news of an action came
   private heardMs = 0;
@@ -329,23 +330,16 @@ export class ConsoleEngine {
     this.streams.close();
     this.heartbeat.end();
     forgetConnection(this.state);
-    this.navigation = null;
+    this.late.clear();
     this.measuredMs = null;
   }
 
   private received(channel: ChannelName, data: unknown, at: number): void {
     const parsed = parseServerMessage(data);
     if (parsed.kind !== "message") {
-      if (parsed.kind === "unknown" && parsed.type.startsWith("episode")) {
-        this.takeEpisode(parsed.value);
-        return;
-      }
-      if (parsed.kind === "unknown" && parsed.type === "navigation") {
-        this.navigation = { value: parsed.value, atMs: at };
-        return;
-      }
-      if (parsed.kind === "unknown" && parsed.type === "shadow_verdict") {
-        this.takeShadow(parsed.value);
+      if (parsed.kind === "unknown" && LATE.test(parsed.type)) {
+        this.late.set(parsed.type, { value: parsed.value, atMs: at });
+        this.takeLate[parsed.type]?.(parsed.value);
         return;
       }
       this.state.badMessages += 1;

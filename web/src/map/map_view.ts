@@ -104,7 +104,7 @@ export class MapView {
       this.showVeil("Not connected");
       return;
     }
-    const sinceMs = engine.navigation === null ? Infinity : now - engine.navigation.atMs;
+    const sinceMs = now - (engine.late.get("navigation")?.atMs ?? -Infinity);
     const isSilent = sinceMs > SILENT_MS || feedbackAge(engine.measuredMs, now) !== null;
     this.place = placeOf(description, engine.state.feedback, this.navigation, isSilent);
     const map = this.loader.map(this.navigation?.map ?? "", now);
@@ -139,8 +139,8 @@ export class MapView {
   }
 
   private readNavigation(): void {
-    const { navigation } = this.engine;
-    if (navigation === null) this.navigation = null;
+    const navigation = this.engine.late.get("navigation");
+    if (navigation === undefined) this.navigation = null;
     else if (navigation.value !== this.read) this.navigation = readNavigation(navigation.value);
     this.read = navigation?.value ?? null;
   }

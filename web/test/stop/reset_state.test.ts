@@ -11,10 +11,13 @@ import {
   tookResetRefusal,
   whoResets,
 } from "../../src/stop/reset_state";
-import { resetRefusalLabel } from "../../src/stop/reset_labels";
+import { resetRefusalLabel, takeResetWords } from "../../src/stop/reset_labels";
+import { RESET_WORDS } from "../../src/stop/reset_words";
 import { refusalOf, seatOf, stopOf, welcomeOf } from "../messages";
 
 const stopped = (number: number) => stopOf({ stopped: true, number });
+
+takeResetWords(RESET_WORDS);
 
 describe("the offer to reset", () => {
   it("is none while no stop is on screen", () => {

@@ -12,7 +12,6 @@ from typer.testing import CliRunner, Result
 from lockstep.server.cli.main import app
 from lockstep.server.evidence.signer import Signer
 from lockstep.server.recording.format.signature import RecordingSigning
-from lockstep.server.recording.reading.reader import RecordingReader
 from tests.server.recording.makers import Story
 
 EVENTS = 60

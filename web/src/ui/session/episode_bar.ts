@@ -109,8 +109,8 @@ export function createEpisodeBar(engine: ConsoleEngine): Panel {
     }
   }
 
-  if (engine.episode !== null) take(engine.episode);
-  engine.takeEpisode = take;
+  take(engine.late.get("episode")?.value);
+  engine.takeLate["episode"] = engine.takeLate["episode_answer"] = take;
   form.addEventListener("submit", (event) => {
     event.preventDefault();
     task.blur(); // keys drive again

@@ -47,7 +47,7 @@ export function createPolicyBar(engine: ConsoleEngine): Panel {
     offer(wanted.peer, true);
   }
 
-  engine.takeShadow = (value: unknown): void => {
+  engine.takeLate["shadow_verdict"] = (value: unknown): void => {
     if (!isRecord(value) || misfit(definitions, "ShadowVerdict", value) !== null) return;
     // The schema is generated together with the types.
     const verdict = value as unknown as ShadowVerdict;

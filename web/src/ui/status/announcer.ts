@@ -1,16 +1,14 @@
 import { robotName } from "../../fleet/robot_links";
 import { disarmLabel } from "../../drive/labels";
 import type { ConsoleEngine } from "../../engine/console_engine";
-import { h, setText, type Panel } from "../elements/dom";
+import { setText, type Panel } from "../elements/dom";
 import { overlayLabels } from "../views/overlay";
 
-/** Tells screen readers, and the window's title, what changed. */
-export function createAnnouncer(engine: ConsoleEngine): Panel {
-  const polite = h("div", "", { "aria-live": "polite" });
+/** Tells screen readers, by live regions that the page has from its start, and the window's title what changed. */
+export function createAnnouncer(engine: ConsoleEngine, polite: HTMLElement, urgent: HTMLElement): Panel {
   const page = robotName(location.href) === "" ? "Lockstep" : `${robotName(location.href)} · Lockstep`;
-  const urgent = h("div", "", { "aria-live": "assertive" });
   return {
-    element: h("div", "unseen", {}, polite, urgent),
+    element: polite,
     update(now) {
       const overlay = overlayLabels(engine, now);
       const { state, reason } = engine.arming;
