@@ -8,6 +8,8 @@ import {
   note,
   robotIsUp,
 } from "../../src/session/console_state";
+import { takeResetWords } from "../../src/stop/reset_labels";
+import { RESET_WORDS } from "../../src/stop/reset_words";
 import { feedbackOf, refusalOf, robotOf, seatOf, stopOf, welcomeOf } from "../messages";
 
 describe("the console's state", () => {
@@ -103,6 +105,7 @@ describe("the console's state", () => {
   });
 
   it("logs what to do about a refused reset", () => {
+    takeResetWords(RESET_WORDS);
     const state = createConsoleState();
     applyMessage(state, { ...refusalOf(0, "stale_reset"), stop: 5 }, 1);
     expect(state.log[0]?.text).toMatch(/^Not reset: somebody pressed STOP again/);
