@@ -21,7 +21,7 @@ from lockstep.server.auth.tokens import Identity
 from lockstep.server.http.ending_response import EndingResponse
 from lockstep.server.recording.reading.reader import RecordingReader
 from lockstep.server.recording.recording_store import RecordingEntry
-from lockstep.server.recording.service import READERS, STARTS
+from lockstep.server.recording.service import READERS, STARTS, RecordingService
 from lockstep.server.recording.settings import RecordingSettings
 from lockstep.server.recording.writing import recorder
 from lockstep.server.settings import Settings
@@ -153,6 +153,34 @@ async def test_nothing_of_a_recording_is_kept_by_a_browser_whose_link_may_end(pa
     async with running_rig(recording=RecordingSettings(directory=tmp_path, free_bytes=0)) as rig:
         answer = await rig.http.get(f"/api/recordings{path}", headers=rig.token("supervisor"))
         assert (answer.status_code, answer.headers["cache-control"]) == (200, "no-store")
+
+
+@pytest.mark.parametrize(
+    ("verb", "path"),
+    [("GET", ""), ("GET", "/one"), ("GET", "/one/chunks/0"), ("POST", "/one/ticket"), ("DELETE", "/one")],
+)
+async def test_a_link_that_ends_while_it_waits_for_a_thread_gets_and_deletes_nothing(
+    verb: str, path: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    Story(events=20).write(tmp_path / "one.mcap")
+    async with running_rig(recording=RecordingSettings(directory=tmp_path, free_bytes=0)) as rig:
+        now = time.time()
+        ends = now + 1.0
+        late = Identity("supervisor", "late", "late", ends, issued=now)
+        token = {"Authorization": f"Bearer {rig.access.sign(late, now)}"}
+        in_thread = RecordingService.in_thread
+
+        async def slowly(service: RecordingService, work: Any) -> Any:
+            def after_others() -> Any:
+                time.sleep(max(0.0, ends - time.time()) + 0.01)  # the work of others comes first
+                return work()
+
+            return await in_thread(service, after_others)
+
+        monkeypatch.setattr(RecordingService, "in_thread", slowly)
+        answer = await rig.http.request(verb, f"/api/recordings{path}", headers=token)
+        assert answer.status_code == 401
+        assert (tmp_path / "one.mcap").exists()
 
 
 async def test_what_is_sent_for_long_ends_with_its_link(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -2,15 +2,14 @@
 
 import hashlib
 import time
-from typing import Annotated, get_args
+from typing import Annotated
 
 import msgspec
 from fastapi import APIRouter, Query, Request, Response
 
-from lockstep.protocol.console import Role
 from lockstep.protocol.episodes import EpisodeOutcome, Task
 from lockstep.protocol.serial import MAX_EVENT
-from lockstep.server.auth.tokens import Right, require_role
+from lockstep.server.auth.tokens import require_role
 from lockstep.server.errors import BadParameter, TooManyRequests
 from lockstep.server.http.json_response import json_answer
 from lockstep.server.http.request_body import read_json
@@ -22,6 +21,7 @@ from lockstep.server.recording.format.records import Whole
 from lockstep.server.routes.recordings import (
     Caller,
     RecordingService,
+    check_still,
     reader_right,
     recording_error,
     recording_service,
@@ -78,18 +78,13 @@ async def episodes(
         raise recording_error(error) from error
     # It may have many megabytes, and whoever drives waits for the loop.
     body = await service.in_thread(lambda: _list_body(page, known))
-    _check_still(caller)
+    check_still(caller)
     return Response(body, media_type="application/json", headers={"Cache-Control": "no-store"})
 
 
 def _spend_list(service: RecordingService, link: str) -> None:
     if not service.lists.spend(link, time.monotonic()):
         raise TooManyRequests("the episodes are asked for too often with this link")
-
-
-def _check_still(caller: Right) -> None:
-    """Check the right again before the answer: a job may have waited for minutes. Raises ConsoleError: it has ended."""
-    require_role(caller, *get_args(Role))
 
 
 def _list_body(page: CatalogPage, known: str) -> bytes:
@@ -119,7 +114,7 @@ async def of_recording(request: Request, caller: Caller, recording_id: str) -> R
         found = await service.catalog.one(recording_id, reader_right(request, caller))
     except (RecordingError, OSError) as error:
         raise recording_error(error) from error
-    _check_still(caller)
+    check_still(caller)
     return json_answer(found)
 
 
@@ -148,7 +143,7 @@ async def change(request: Request, caller: Caller, recording_id: str) -> Respons
     actor = caller.actor
     try:
         right = reader_right(request, caller)
-        found = await service.catalog.change(recording_id, edit, body.revision, right, lambda: _check_still(caller))
+        found = await service.catalog.change(recording_id, edit, body.revision, right, lambda: check_still(caller))
     except (RecordingError, OSError) as error:
         raise recording_error(error) from error
     service.audit.record("recording", actor, "episode changed", f"{recording_id} change {body.revision + 1}")
@@ -175,7 +170,7 @@ async def picture(
         found = await service.catalog.picture(recording_id, camera, event, width, right)
     except (RecordingError, OSError) as error:
         raise recording_error(error) from error
-    _check_still(caller)
+    check_still(caller)
     service.audit.again("reading", actor, recording_id)
     headers = {"Cache-Control": "no-store", "Lockstep-Event": str(found.stamp)}
     return Response(found.jpeg, media_type="image/jpeg", headers=headers)
@@ -193,7 +188,7 @@ async def report(request: Request, caller: Caller, recording_id: str) -> Respons
         page = await service.catalog.report(recording_id, right)
     except (RecordingError, OSError) as error:
         raise recording_error(error) from error
-    _check_still(caller)
+    check_still(caller)
     service.audit.record("recording", actor, "report", recording_id)
     headers = {"Cache-Control": "no-store", "Content-Disposition": 'attachment; filename="report.html"'}
     return Response(page, media_type="text/html; charset=utf-8", headers=headers)

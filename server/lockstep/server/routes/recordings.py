@@ -4,13 +4,13 @@ import gzip
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Annotated, TypeVar
+from typing import Annotated, TypeVar, get_args
 
 import msgspec
 from fastapi import APIRouter, Depends, Query, Request, Response
 from fastapi.responses import FileResponse, StreamingResponse
 
-from lockstep.protocol.console import RecordingState
+from lockstep.protocol.console import RecordingState, Role
 from lockstep.protocol.description import RobotDescription
 from lockstep.protocol.serial import MAX_EVENT, event_gap
 from lockstep.server.auth.tokens import Right, require_role
@@ -173,6 +173,7 @@ async def details(
         return gzip.compress(body, compresslevel=1) if packed else body
 
     body = await _with_reader(request, recording_id, read)
+    check_still(caller)
     recording_service(request).audit.again("reading", actor, recording_id)
     headers = {"Cache-Control": "no-store", "Vary": "Accept-Encoding"} | (
         {"Content-Encoding": "gzip"} if packed else {}
@@ -193,6 +194,7 @@ async def chunk(request: Request, caller: Caller, recording_id: str, number: int
         return b"".join(map(_framed, reader.chunk(number)))
 
     body = await _with_reader(request, recording_id, read)
+    check_still(caller)
     recording_service(request).audit.again("reading", actor, recording_id)
     headers = {"Cache-Control": "no-store"}
     return Response(body, media_type="application/octet-stream", headers=headers)
@@ -234,6 +236,7 @@ async def ticket(request: Request, caller: Caller, recording_id: str) -> Respons
     right = reader_right(request, caller)
     actor = caller.actor
     await _with_reader(request, recording_id, lambda reader, entry: right.check_reads(entry.started))
+    check_still(caller)
     recording_service(request).audit.record("recording", actor, "downloaded", recording_id)
     root = request.scope.get("root_path", "")
     permission = recording_service(request).access.issue_file_ticket(recording_id, caller.identity)
@@ -272,12 +275,22 @@ async def delete(request: Request, caller: Caller, recording_id: str) -> Respons
     actor = caller.actor  # also for the audit, should the link end meanwhile
     service = recording_service(request)
     library = service.library
+
+    def delete_it() -> None:
+        require_role(caller, "supervisor")  # again: the threads may have been busy for long
+        library.delete(recording_id)
+
     try:
-        await service.in_thread(lambda: library.delete(recording_id))
+        await service.in_thread(delete_it)
     except OSError as error:
         raise RecordingFailed(error.strerror or str(error)) from error
     service.audit.record("recording", actor, "deleted", recording_id)
     return _json(await _list(request, library, caller))
+
+
+def check_still(caller: Right) -> None:
+    """Check the right again before the answer: its work may have waited. Raises ConsoleError: it has ended."""
+    require_role(caller, *get_args(Role))
 
 
 async def _list(
@@ -288,6 +301,7 @@ async def _list(
         entries = await recording_service(request).in_thread(library.entries)
     except (RecordingError, OSError) as error:
         raise recording_error(error) from error
+    check_still(caller)
     found = [each for each in entries if right.sees(each.ended) and (not before or each.started < before)]
     return RecordingList(state=library.state(), recordings=found[:limit], older=max(0, len(found) - limit))
 
