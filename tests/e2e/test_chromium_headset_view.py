@@ -111,8 +111,11 @@ async def test_the_view_says_where_the_time_goes(stack: Stack, chromium: Browser
     async with open_headset(chromium, stack.operator) as headset:
         await headset.enter()
         await headset.drive()
-        await headset.drive_until("['Capture', 'Encode', 'Gate', 'Headset'].every((name) => name in s.headset.way)")
+        # The network's part is the remainder by event: it follows some driven events after the others.
+        await headset.drive_until(
+            "['Capture', 'Encode', 'Gate', 'Headset'].every((name) => name in s.headset.way)"
+            " && ('Network' in s.headset.way || 'Network, decode' in s.headset.way)"
+        )
         statistics = (await headset.console.stats())["headset"]
         assert statistics["way"]["Headset"] > 0
-        assert {"Network", "Network, decode"} & set(statistics["way"])
         assert statistics["frame_ms"] > 0
