@@ -145,7 +145,7 @@ async def test_a_restart_that_finds_no_path_leaves_the_old_one_as_it_was(monkeyp
 @pytest.fixture
 def hasty_consent(monkeypatch: pytest.MonkeyPatch) -> None:
     hasty = PeerSettings(ice=IceSettings(consent_seconds=1.0, consent_interval=(0.05, 0.1), connect_seconds=5.0))
-    monkeypatch.setattr("lockstep.server.routes.whep.OF_DRIVERS", hasty)
+    monkeypatch.setattr("lockstep.server.routes.webrtc.whep.OF_DRIVERS", hasty)
 
 
 async def _lapse(rig: Rig, paths: Paths) -> None:

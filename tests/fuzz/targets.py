@@ -33,7 +33,9 @@ TARGETS = {
             "lockstep.protocol",
         ),
     ),
-    "sdp": Target("tests.fuzz.sdp", ("lockstep.server.webrtc.sdp_offer", "lockstep.server.routes.whep", "aiortc.sdp")),
+    "sdp": Target(
+        "tests.fuzz.sdp", ("lockstep.server.webrtc.sdp_offer", "lockstep.server.routes.webrtc.whep", "aiortc.sdp")
+    ),
     "rtc_dtls": Target("tests.fuzz.rtc_dtls", ("lockstep.rtc.dtls",)),
     "rtc_sdp": Target("tests.fuzz.rtc_sdp", ("lockstep.rtc.sdp",)),
     "ice": Target("tests.fuzz.ice", ("lockstep.rtc.stun", "lockstep.rtc.ice", "lockstep.rtc.demux")),

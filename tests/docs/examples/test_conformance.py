@@ -5,8 +5,8 @@ from pathlib import Path
 
 from lockstep.protocol.messages import Feedback
 from lockstep.robot_bridge.conformance import CASES, Outcome, Subject, play_all
-from lockstep.robot_bridge.conformance.action_cases import ACTION_CASES
-from lockstep.robot_bridge.conformance.goal_cases import GOAL_CASES
+from lockstep.robot_bridge.conformance.cases.action_cases import ACTION_CASES
+from lockstep.robot_bridge.conformance.cases.goal_cases import GOAL_CASES
 from lockstep.robot_bridge.conformance.place import Place
 from lockstep.robot_bridge.link.link_client import RobotLink
 from tests.docs.examples.robots import Robot, in_python, moving

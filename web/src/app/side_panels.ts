@@ -18,7 +18,7 @@ import { watchPageKeys } from "./shortcut_listener";
 import type { ConsoleApi } from "../transport/signalling/console_api";
 import { SessionApi } from "../transport/signalling/session_api";
 import { RobotLinkApi } from "../transport/signalling/robot_link_api";
-import { createAuditSheet } from "../ui/session/audit_sheet";
+import { createAuditSheet } from "../ui/session/audit/audit_sheet";
 import { createDelayPanel } from "../ui/status/delay_panel";
 import type { Panel } from "../ui/elements/dom";
 import { createInviteSheet } from "../ui/session/invite_sheet";

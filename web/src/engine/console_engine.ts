@@ -17,7 +17,7 @@ import { CALM_INTERVAL_MS, noteHeard, noteShown, setPacing } from "../drive/comm
 import { restartInterlock, snapshotOf } from "../drive/restart_interlock";
 import { createRateMeter, noteOccurrence } from "../util/samples";
 import { parseServerMessage } from "../protocol/wire_parser";
-import { ARM_REFUSAL_LABELS } from "../drive/labels";
+import { ARM_REFUSAL_LABELS } from "../drive/labels/labels";
 import { Controls, type ControlSample } from "../input/controls";
 import { Display } from "../input/display";
 import { Disposal } from "../input/disposal";

@@ -1,11 +1,11 @@
 import { gateState, type GateState, type Pacing } from "../drive/command_gate";
 import { holdsSeat } from "../session/console_state";
-import { gateReason, type GateReason } from "../drive/gate_reason";
+import { gateReason, type GateReason } from "../drive/labels/gate_reason";
 import type { GateMode } from "../gate/media_gate";
 import { meanGap, type GateCounters } from "../gate/gate_counters";
 import { quantile, rateOf } from "../util/samples";
 import type { StopFate } from "../stop/stop_press";
-import { GATE_REASON_LABELS, GATE_LABELS } from "../drive/labels";
+import { GATE_REASON_LABELS, GATE_LABELS } from "../drive/labels/labels";
 import type { ConsoleEngine } from "./console_engine";
 import type { HeadsetStatistics } from "./headset_statistics";
 import { stalenessOf } from "./report";

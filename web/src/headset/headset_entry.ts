@@ -1,4 +1,4 @@
-import { addDisarmLabels } from "../drive/labels";
+import { addDisarmLabels } from "../drive/labels/labels";
 import { note } from "../session/console_state";
 import { button, setHidden, type Panel } from "../ui/elements/dom";
 import { HEADSET_DISARM_LABELS } from "./disarm_labels";

@@ -1,9 +1,9 @@
 import { pictureSummary } from "../charts/way_summary";
 import { armRefusal } from "../drive/arming";
 import { ageLabel, feedbackAge } from "../drive/feedback_age";
-import { ARM_REFUSAL_LABELS, disarmLabel } from "../drive/labels";
+import { ARM_REFUSAL_LABELS, disarmLabel } from "../drive/labels/labels";
 import { HEADSET_DISARM_LABELS } from "./disarm_labels";
-import { warningSeconds } from "../drive/start_warning";
+import { warningSeconds } from "../drive/labels/start_warning";
 import type { ConsoleEngine } from "../engine/console_engine";
 import { forceOf } from "../haptics/contact_force";
 import { holdsSeat } from "../session/console_state";

@@ -18,8 +18,8 @@ import type {
   Welcome,
 } from "../protocol/wire";
 import type { Pacing } from "../drive/command_gate";
-import { requestAnswer, type SeatNotice } from "./seat_notices";
-import { seatHandover, type SeatHandover } from "./seat_handover";
+import { requestAnswer, type SeatNotice } from "./seat/seat_notices";
+import { seatHandover, type SeatHandover } from "./seat/seat_handover";
 import type { GateMode } from "../gate/media_gate";
 import { isNewer } from "../gate/serial";
 import { resetRefusalLabel } from "../stop/reset_labels";

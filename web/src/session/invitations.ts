@@ -1,5 +1,5 @@
 import { isRecord } from "../protocol/schema_check";
-import type { Role } from "./seat_status";
+import type { Role } from "./seat/seat_status";
 
 /** A link that somebody was given. */
 export interface Invitation {

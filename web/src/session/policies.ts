@@ -1,5 +1,5 @@
 import type { Participant, RobotDescription, Seat, ShadowVerdict } from "../protocol/wire";
-import type { Role } from "./seat_status";
+import type { Role } from "./seat/seat_status";
 
 /** What the bar of policies says, and what one press does. */
 export interface PolicyView {

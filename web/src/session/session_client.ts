@@ -1,5 +1,5 @@
 import { holdsSeat, mayDrive, policyDrives, type ConsoleState } from "./console_state";
-import { claimsAfter, idleSecondsAfter, type Claim, type Role } from "./seat_status";
+import { claimsAfter, idleSecondsAfter, type Claim, type Role } from "./seat/seat_status";
 import type { ClientMessage, Welcome } from "../protocol/wire";
 
 const NAME_LIMIT = 60; // characters, as the console takes them

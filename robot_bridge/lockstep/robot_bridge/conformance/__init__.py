@@ -1,6 +1,6 @@
 """`lockstep check`: checks that a bridge in any language does what docs/robot-link.md asks.
 
-The cases are in the `*_cases.py` files; each opens its own links by a `Subject` and reports by a `Violation`. The same
+The cases are in `cases/`; each opens its own links by a `Subject` and reports by a `Violation`. The same
 cases run in the tests, against the bridge of this package and others.
 """
 

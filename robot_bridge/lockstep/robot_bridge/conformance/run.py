@@ -5,15 +5,15 @@ import contextlib
 from collections.abc import Callable, Sequence
 
 from lockstep.protocol.errors import LinkLost, LinkRefused
-from lockstep.robot_bridge.conformance.action_cases import ACTION_CASES
 from lockstep.robot_bridge.conformance.case import Case, Outcome, Result
+from lockstep.robot_bridge.conformance.cases.action_cases import ACTION_CASES
+from lockstep.robot_bridge.conformance.cases.event_cases import EVENT_CASES
+from lockstep.robot_bridge.conformance.cases.goal_cases import GOAL_CASES
+from lockstep.robot_bridge.conformance.cases.link_cases import LINK_CASES
+from lockstep.robot_bridge.conformance.cases.media_cases import MEDIA_CASES
+from lockstep.robot_bridge.conformance.cases.rest_cases import REST_CASES
+from lockstep.robot_bridge.conformance.cases.stop_cases import STOP_CASES
 from lockstep.robot_bridge.conformance.errors import NotApplicable, StoppedByOther, Violation
-from lockstep.robot_bridge.conformance.event_cases import EVENT_CASES
-from lockstep.robot_bridge.conformance.goal_cases import GOAL_CASES
-from lockstep.robot_bridge.conformance.link_cases import LINK_CASES
-from lockstep.robot_bridge.conformance.media_cases import MEDIA_CASES
-from lockstep.robot_bridge.conformance.rest_cases import REST_CASES
-from lockstep.robot_bridge.conformance.stop_cases import STOP_CASES
 from lockstep.robot_bridge.conformance.subject import Subject
 
 __all__ = ["CASES", "play", "play_all"]

@@ -16,7 +16,7 @@ from lockstep.server.http.static_files import page_router
 from lockstep.server.http.trusted_host import HostNames, TrustedHost
 from lockstep.server.recording.library import FileLibrary
 from lockstep.server.recording.service import RecordingService
-from lockstep.server.routes import recorded_episodes, recordings
+from lockstep.server.routes.recorded import recorded_episodes, recordings
 from lockstep.server.util.rate_limits import RateLimits
 
 __all__ = ["create_replay_app"]

@@ -18,19 +18,15 @@ from lockstep.server.routes import (
     actions,
     dial_in,
     episodes,
-    ice,
     maps,
     observer_websocket,
-    recorded_episodes,
-    recordings,
     seat,
     session,
-    sfu,
-    whep,
-    whip,
 )
 from lockstep.server.routes import scene_proxy as proxy
 from lockstep.server.routes.openapi import openapi_document
+from lockstep.server.routes.recorded import recorded_episodes, recordings
+from lockstep.server.routes.webrtc import ice, sfu, whep, whip
 from lockstep.server.settings import Settings
 from lockstep.server.state.dependencies import Dependencies
 from lockstep.server.state.persistent_state import ConsoleState

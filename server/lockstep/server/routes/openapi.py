@@ -82,8 +82,8 @@ from lockstep.server.routes.dial_in import NewPairingCode, RobotDialInfo
 from lockstep.server.routes.episodes import EpisodeBody
 from lockstep.server.routes.maps import NewestMap
 from lockstep.server.routes.observer_websocket import WatchTicket
-from lockstep.server.routes.recorded_episodes import EpisodeChangeBody, EpisodeList
-from lockstep.server.routes.recordings import (
+from lockstep.server.routes.recorded.recorded_episodes import EpisodeChangeBody, EpisodeList
+from lockstep.server.routes.recorded.recordings import (
     MAX_LISTED,
     FileTicket,
     RecordingDetails,

@@ -1,6 +1,6 @@
 import { parseFleetAudit, type FleetAuditEntry } from "../fleet_audit";
 import type { ConsoleApi } from "../../transport/signalling/console_api";
-import { createAuditView, type AuditAnswer } from "../../ui/session/audit_view";
+import { createAuditView, type AuditAnswer } from "../../ui/session/audit/audit_view";
 import { h } from "../../ui/elements/dom";
 import type { SheetContent } from "../../ui/elements/sheet";
 

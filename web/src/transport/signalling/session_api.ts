@@ -5,7 +5,7 @@ import {
   type Invitation,
   type NewInvitation,
 } from "../../session/invitations";
-import type { Role } from "../../session/seat_status";
+import type { Role } from "../../session/seat/seat_status";
 import { ConsoleError, type ConsoleApi } from "./console_api";
 
 const LIMIT_MS = 8000;

@@ -1,8 +1,8 @@
 import { gateState } from "../../drive/command_gate";
 import { holdsSeat, isOperator } from "../../session/console_state";
-import { gateReason } from "../../drive/gate_reason";
+import { gateReason } from "../../drive/labels/gate_reason";
 import { rateOf } from "../../util/samples";
-import { GATE_REASON_LABELS, GATE_LABELS } from "../../drive/labels";
+import { GATE_REASON_LABELS, GATE_LABELS } from "../../drive/labels/labels";
 import type { ConsoleEngine } from "../../engine/console_engine";
 import { grouped, h, setData, setText, type Panel } from "../elements/dom";
 

@@ -1,5 +1,5 @@
 import { holdsSeat } from "../../session/console_state";
-import { limitLabels } from "../../drive/limit_labels";
+import { limitLabels } from "../../drive/labels/limit_labels";
 import { goalRefusalWords, shownRefusal } from "../../drive/goals/goal_refusal";
 import type { ConsoleEngine } from "../../engine/console_engine";
 import { h, setHidden, type Panel } from "../elements/dom";

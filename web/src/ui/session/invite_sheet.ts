@@ -1,5 +1,5 @@
 import { EXPIRIES, invitableRoles, type NewInvitation } from "../../session/invitations";
-import type { Role } from "../../session/seat_status";
+import type { Role } from "../../session/seat/seat_status";
 import type { ConsoleEngine } from "../../engine/console_engine";
 import { requestErrorLabel, type SessionApi } from "../../transport/signalling/session_api";
 import { createCopyField } from "../elements/copy_field";

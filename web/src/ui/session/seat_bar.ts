@@ -1,7 +1,7 @@
-import { isMeant, seatAction, seatStatus, type SeatAction } from "../../session/seat_status";
+import { isMeant, seatAction, seatStatus, type SeatAction } from "../../session/seat/seat_status";
 import { policyDrives, robotIsUp } from "../../session/console_state";
-import { seatLabels, type Obstacle } from "../../session/seat_labels";
-import type { SeatNotice } from "../../session/seat_notices";
+import { seatLabels, type Obstacle } from "../../session/seat/seat_labels";
+import type { SeatNotice } from "../../session/seat/seat_notices";
 import type { ConsoleEngine } from "../../engine/console_engine";
 import { button, h, setData, setHidden, setText, type Panel } from "../elements/dom";
 

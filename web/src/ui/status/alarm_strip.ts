@@ -1,6 +1,6 @@
 import { isSilenced } from "../../session/silenced";
 import { stopAdvice } from "../../stop/stop_labels";
-import { warningSeconds, warningLabel } from "../../drive/start_warning";
+import { warningSeconds, warningLabel } from "../../drive/labels/start_warning";
 import type { ConsoleEngine } from "../../engine/console_engine";
 import { h, setData, setHidden, setText, type Panel } from "../elements/dom";
 

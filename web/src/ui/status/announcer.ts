@@ -1,5 +1,5 @@
 import { robotName } from "../../fleet/robot_links";
-import { disarmLabel } from "../../drive/labels";
+import { disarmLabel } from "../../drive/labels/labels";
 import type { ConsoleEngine } from "../../engine/console_engine";
 import { setText, type Panel } from "../elements/dom";
 import { overlayLabels } from "../views/overlay";

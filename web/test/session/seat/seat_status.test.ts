@@ -5,9 +5,9 @@ import {
   isMeant,
   seatAction,
   seatStatus,
-} from "../../src/session/seat_status";
-import type { Seat } from "../../src/protocol/wire";
-import { seatOf } from "../messages";
+} from "../../../src/session/seat/seat_status";
+import type { Seat } from "../../../src/protocol/wire";
+import { seatOf } from "../../messages";
 
 const CLAIMED: Seat = {
   ...seatOf("ann", "Ann"),

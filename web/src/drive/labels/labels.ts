@@ -1,5 +1,5 @@
-import type { ArmRefusal, DisarmReason, HeadsetDisarmReason } from "./arming";
-import type { GateState } from "./command_gate";
+import type { ArmRefusal, DisarmReason, HeadsetDisarmReason } from "../arming";
+import type { GateState } from "../command_gate";
 import type { GateReason } from "./gate_reason";
 
 export const GATE_LABELS: Readonly<Record<GateState, string>> = {

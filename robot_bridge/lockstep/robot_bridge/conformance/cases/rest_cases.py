@@ -3,8 +3,8 @@
 from lockstep.protocol.messages import Rest
 from lockstep.protocol.serial import MAX_EVENT, event_after
 from lockstep.robot_bridge.conformance.case import Case
+from lockstep.robot_bridge.conformance.cases.event_cases import SETTLE
 from lockstep.robot_bridge.conformance.errors import expect
-from lockstep.robot_bridge.conformance.event_cases import SETTLE
 from lockstep.robot_bridge.conformance.subject import Subject, needs
 from lockstep.robot_bridge.conformance.waiting import PATIENCE
 

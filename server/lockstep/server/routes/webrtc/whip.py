@@ -25,8 +25,8 @@ from lockstep.server.http.request_body import read_text
 from lockstep.server.media.published.depacketise import PictureCodec
 from lockstep.server.media.published.published_camera import PublishedCamera
 from lockstep.server.publishing.publisher import Publisher
-from lockstep.server.routes.ice import servers_for
-from lockstep.server.routes.whep import FRAGMENT, NEGOTIATION_TIMEOUT, SDP, patched
+from lockstep.server.routes.webrtc.ice import servers_for
+from lockstep.server.routes.webrtc.whep import FRAGMENT, NEGOTIATION_TIMEOUT, SDP, patched
 from lockstep.server.state.dependencies import Dependencies, authorized, dependencies
 from lockstep.server.webrtc.ice_servers import link_headers
 from lockstep.server.webrtc.sdp_offer import parse_offer

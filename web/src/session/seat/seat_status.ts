@@ -1,4 +1,4 @@
-import type { Seat, Welcome } from "../protocol/wire";
+import type { Seat, Welcome } from "../../protocol/wire";
 
 export type Role = Welcome["role"];
 

@@ -1,4 +1,4 @@
-import type { Refusal } from "../protocol/wire";
+import type { Refusal } from "../../protocol/wire";
 
 /** Something to tell about the seat. */
 export interface SeatNotice {

@@ -30,7 +30,7 @@ from lockstep.server.http.request_body import read_text
 from lockstep.server.http.static_files import takes_coding
 from lockstep.server.peers.agreed_channels import agreed_channels
 from lockstep.server.peers.webrtc_peer import WebRtcPeer
-from lockstep.server.routes.ice import servers_for
+from lockstep.server.routes.webrtc.ice import servers_for
 from lockstep.server.state.dependencies import Dependencies, authorized, dependencies
 from lockstep.server.webrtc.ice_servers import link_headers
 from lockstep.server.webrtc.ice_session import IceSession

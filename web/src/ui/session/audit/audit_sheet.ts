@@ -1,7 +1,7 @@
-import { mergeAudit, type AuditEntry, type AuditPage } from "../../session/audit_trail";
-import { AUDIT_LINES, type SessionApi } from "../../transport/signalling/session_api";
+import { mergeAudit, type AuditEntry, type AuditPage } from "../../../session/audit_trail";
+import { AUDIT_LINES, type SessionApi } from "../../../transport/signalling/session_api";
 import { createAuditView, type AuditAnswer } from "./audit_view";
-import type { SheetContent } from "../elements/sheet";
+import type { SheetContent } from "../../elements/sheet";
 
 /** What happened at this robot. */
 export function createAuditSheet(api: SessionApi): SheetContent {

@@ -1,5 +1,5 @@
-import { auditLabel, type AuditEntry } from "../../session/audit_trail";
-import { grouped, h } from "../elements/dom";
+import { auditLabel, type AuditEntry } from "../../../session/audit_trail";
+import { grouped, h } from "../../elements/dom";
 
 export function auditHead(names: readonly string[]): HTMLElement {
   const cells = names.map((name) => h("th", "", { scope: "col" }, name));

@@ -191,7 +191,7 @@ async def test_what_is_sent_for_long_ends_with_its_link(tmp_path: Path, monkeypa
             ends.append((scope["path"].rpartition("/")[2], self.right.token_id))
             await super().__call__(scope, receive, send)
 
-    monkeypatch.setattr("lockstep.server.routes.recordings.EndingResponse", Watched)
+    monkeypatch.setattr("lockstep.server.routes.recorded.recordings.EndingResponse", Watched)
     Story(events=20).write(tmp_path / "one.mcap")
     async with running_rig(recording=RecordingSettings(directory=tmp_path, free_bytes=0)) as rig:
         headers, base = _issued(rig, "operator", START // SECOND - 1000), "/api/recordings/one"

@@ -1,6 +1,6 @@
 import { expect, it } from "vitest";
-import { warningSeconds, warningLabel } from "../../src/drive/start_warning";
-import { feedbackOf } from "../messages";
+import { warningSeconds, warningLabel } from "../../../src/drive/labels/start_warning";
+import { feedbackOf } from "../../messages";
 
 it("the warning before motion counts down between two feedbacks and ends", () => {
   const feedback = feedbackOf(1, { warning: 3 });

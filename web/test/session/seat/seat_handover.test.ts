@@ -1,6 +1,6 @@
 import { describe, expect, it } from "vitest";
-import { seatHandover } from "../../src/session/seat_handover";
-import { seatOf } from "../messages";
+import { seatHandover } from "../../../src/session/seat/seat_handover";
+import { seatOf } from "../../messages";
 
 const FREE = seatOf("", "");
 const ANN = seatOf("ann", "Ann");

@@ -1,4 +1,4 @@
-import type { Feedback, RobotDescription, SpeedCapState } from "../protocol/wire";
+import type { Feedback, RobotDescription, SpeedCapState } from "../../protocol/wire";
 
 /** One thing that keeps the robot from doing all that is asked of it. */
 export interface LimitLabel {

@@ -1,7 +1,7 @@
 import { describe, expect, it } from "vitest";
-import { applyMessage, createConsoleState } from "../../src/session/console_state";
-import { requestAnswer } from "../../src/session/seat_notices";
-import { refusalOf, seatOf } from "../messages";
+import { applyMessage, createConsoleState } from "../../../src/session/console_state";
+import { requestAnswer } from "../../../src/session/seat/seat_notices";
+import { refusalOf, seatOf } from "../../messages";
 
 describe("the answer to a request for the seat", () => {
   it.each([

@@ -1,5 +1,5 @@
 import { describe, expect, it } from "vitest";
-import { seatLabels, type SeatView } from "../../src/session/seat_labels";
+import { seatLabels, type SeatView } from "../../../src/session/seat/seat_labels";
 
 const VIEW: SeatView = {
   role: "operator",

@@ -1,7 +1,7 @@
 import { describe, expect, it } from "vitest";
-import { applyMessage, createConsoleState, forgetConnection } from "../../src/session/console_state";
-import { gateReason } from "../../src/drive/gate_reason";
-import { feedbackOf, robotOf, seatOf, stopOf, welcomeOf } from "../messages";
+import { applyMessage, createConsoleState, forgetConnection } from "../../../src/session/console_state";
+import { gateReason } from "../../../src/drive/labels/gate_reason";
+import { feedbackOf, robotOf, seatOf, stopOf, welcomeOf } from "../../messages";
 
 function driving(): ReturnType<typeof createConsoleState> {
   const state = createConsoleState();

@@ -1,4 +1,4 @@
-import type { Feedback } from "../protocol/wire";
+import type { Feedback } from "../../protocol/wire";
 
 /** Whole seconds that the robot still warns before it may move, counted on between two feedbacks; 0: it does not. */
 export function warningSeconds(feedback: Feedback | null, measuredMs: number | null, now: number): number {

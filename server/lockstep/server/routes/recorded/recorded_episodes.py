@@ -18,7 +18,7 @@ from lockstep.server.recording.episodes.edits import EpisodeEdit
 from lockstep.server.recording.episodes.listed import RecordingEpisodes
 from lockstep.server.recording.errors import RecordingError
 from lockstep.server.recording.format.records import Whole
-from lockstep.server.routes.recordings import (
+from lockstep.server.routes.recorded.recordings import (
     Caller,
     RecordingService,
     check_still,

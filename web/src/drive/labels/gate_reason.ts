@@ -1,4 +1,4 @@
-import { holdsSeat, robotIsUp, type ConsoleState } from "../session/console_state";
+import { holdsSeat, robotIsUp, type ConsoleState } from "../../session/console_state";
 
 /** What shuts the gate before its own rule is asked. */
 export type GateReason =

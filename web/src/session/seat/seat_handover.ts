@@ -1,4 +1,4 @@
-import type { Seat } from "../protocol/wire";
+import type { Seat } from "../../protocol/wire";
 
 /** One change of who drives, in words for everybody's screen. */
 export interface SeatHandover {

@@ -1,7 +1,7 @@
 import { expect, it } from "vitest";
-import { limitLabels } from "../../src/drive/limit_labels";
-import type { RobotDescription, SpeedCapState } from "../../src/protocol/wire";
-import { descriptionOf, feedbackOf } from "../messages";
+import { limitLabels } from "../../../src/drive/labels/limit_labels";
+import type { RobotDescription, SpeedCapState } from "../../../src/protocol/wire";
+import { descriptionOf, feedbackOf } from "../../messages";
 
 const DESCRIPTION: RobotDescription = {
   ...descriptionOf([]),

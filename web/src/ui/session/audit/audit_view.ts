@@ -4,11 +4,11 @@ import {
   filterAudit,
   type AuditEntry,
   type AuditGroup,
-} from "../../session/audit_trail";
-import { requestErrorLabel } from "../../transport/signalling/session_api";
+} from "../../../session/audit_trail";
+import { requestErrorLabel } from "../../../transport/signalling/session_api";
 import { auditHead, auditRow } from "./audit_table";
-import { button, h, setHidden, setPressed, setText } from "../elements/dom";
-import type { SheetContent } from "../elements/sheet";
+import { button, h, setHidden, setPressed, setText } from "../../elements/dom";
+import type { SheetContent } from "../../elements/sheet";
 
 const REFRESH_MS = 2000;
 const SHOWN = 200; // rows at first, and more at each asking

@@ -1,0 +1,1 @@
+"""WebRTC over HTTP: WHEP, WHIP, ICE servers and the SFU."""
