@@ -30,6 +30,7 @@ def _no_violation(statistics: dict[str, object]) -> None:
 async def test_every_stream_arrives_with_the_capture_time_carrier_and_advances(stack: Stack, chromium: Browser) -> None:
     async with open_console(chromium, stack.operator) as console:
         await console.until_live()
+        await console.until("s.streams.microphone?.received > 0")  # sound comes when its device is open
         streams = (await console.stats())["streams"]
         assert {name: stream["carrier"] for name, stream in streams.items()} == {
             "overview": "capture-time",
@@ -83,10 +84,10 @@ async def test_the_trailer_carries_sound_and_pictures_when_it_is_asked_for(stack
     async with open_console(chromium, stack.operator + "&stamp=trailer") as console:
         await console.until_live()
         await _driven(console, 40)
+        await console.until("s.streams.microphone.rendered > 10")
         statistics = await console.stats()
         assert {stream["carrier"] for stream in statistics["streams"].values()} == {"trailer"}
         _no_violation(statistics)
-        await console.until("s.streams.microphone.rendered > 10")
 
 
 async def test_media_pacing_shows_a_picture_for_every_few_events(stack: Stack, chromium: Browser) -> None:

@@ -161,7 +161,7 @@ async def test_the_settings_of_a_stick_hold_at_once_and_it_is_remembered(own_sta
         await expect(section.get_by_label("Spring")).to_have_value("40")
         await section.get_by_role("button", name="Forget").click()
         await expect(section).to_contain_text("No stick")
-        assert not await page.evaluate("testStick.opened")
+        await console.until("!testStick.opened")
 
 
 async def test_a_page_may_ask_for_devices_only_where_the_console_was_told_so(

@@ -21,10 +21,16 @@ REACH_SHARE = 0.8  # that a goal of the page uses
 
 
 @pytest_asyncio.fixture(loop_scope="session")
-async def arm(half_rate: None, tmp_path_factory: pytest.TempPathFactory) -> AsyncIterator[Stack]:
+async def file_arm(half_rate: None, tmp_path_factory: pytest.TempPathFactory) -> AsyncIterator[Stack]:
     directory = tmp_path_factory.mktemp("arm")
     async with running_stack(directory, robot="tests.e2e.goal_arm:GoalArm") as stack:
         yield stack
+
+
+@pytest_asyncio.fixture(loop_scope="session")
+async def arm(file_arm: Stack) -> Stack:
+    """Without what other tests have done; where their last page has left the joints."""
+    return await file_arm.from_here()
 
 
 def slider(page: Page, label: str) -> Locator:
@@ -33,6 +39,7 @@ def slider(page: Page, label: str) -> Locator:
 
 async def _arm(console: ConsolePage) -> None:
     """Press Enter; again where the page had not yet seen that everything was let go."""
+    await console.until("s.seat && s.seat.mine && !s.stop.stopped")
     for _ in range(ARM_TRIES - 1):
         await console.page.keyboard.press("Enter")
         with suppress(AssertionError):
