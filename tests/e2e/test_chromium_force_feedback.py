@@ -79,7 +79,6 @@ async def _let_go(console: ConsolePage) -> None:
     """Seen by the page, on a busy machine too: arming needs it."""
     await console.press(RB, False)
     await console.until("!s.driving")
-    await console.page.evaluate("new Promise((done) => setTimeout(done, 200))")
 
 
 async def test_a_stick_is_chosen_pushes_back_at_a_wall_and_is_free_with_everything_that_ends_driving(
