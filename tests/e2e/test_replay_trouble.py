@@ -18,7 +18,7 @@ from lockstep.server.recording.reading.reader import RecordingReader
 from tests.support.stack import Stack
 from tests.waiting import PATIENCE
 
-pytestmark = [pytest.mark.browser, pytest.mark.full_rate]
+pytestmark = pytest.mark.browser
 
 EVENTS = 100  # to drive for: about five chunks
 DRAWN = {"/camera/overview", "/camera/front", "/lockstep/feedback"}  # each in a figure of its own
