@@ -8,7 +8,7 @@ import httpx
 
 from tests.support.stack import Stack
 
-__all__ = ["as_new"]
+__all__ = ["as_new", "emptied"]
 
 NEAR = 1.5  # m from where the robot starts; a test drives no further than the 2 m to the wall that are left
 AHEAD = 0.3  # rad, and m to either side: else a zone that it keeps out of may be before it, and no wall
@@ -17,9 +17,18 @@ AGAIN = 0.1  # s
 
 
 async def as_new(stack: Stack) -> bool:
-    """Release a stop and wait until everybody has left; false when a new console is needed."""
-    if stack.process.returncode is not None:
+    """`emptied`, and the planar robot is near where it starts; false when a new console is needed."""
+    session = await emptied(stack)
+    if session is None:
         return False
+    x, y, heading = session["feedback"]["joints"]
+    return hypot(x, y) < NEAR and max(abs(y), abs(remainder(heading, tau))) < AHEAD
+
+
+async def emptied(stack: Stack) -> dict[str, Any] | None:
+    """Release a stop and wait until everybody has left; what the console then says; None when a new one is needed."""
+    if stack.process.returncode is not None:
+        return None
     headers = {"Authorization": f"Bearer {stack.supervisor.partition('#token=')[2]}"}
     try:
         async with (
@@ -31,9 +40,9 @@ async def as_new(stack: Stack) -> bool:
                     await http.post("/api/reset", json={"number": session["stop"]["number"]})
                 await asyncio.sleep(AGAIN)
     except (TimeoutError, httpx.TransportError):
-        return False
-    x, y, heading = session["feedback"]["joints"]
-    return hypot(x, y) < NEAR and max(abs(y), abs(remainder(heading, tau))) < AHEAD
+        return None
+    found: dict[str, Any] = session
+    return found
 
 
 def _is_left(session: dict[str, Any]) -> bool:

@@ -6,7 +6,7 @@ because the browser belongs to the loop that started it.
 """
 
 import os
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Mapping
 from contextlib import AsyncExitStack, asynccontextmanager
 from pathlib import Path
 
@@ -17,7 +17,8 @@ from playwright.async_api import Browser, expect
 from lockstep.bench.browsers.chromium import running_chromium
 from lockstep.bench.browsers.firefox import Firefox, running_firefox
 from lockstep.bench.browsers.sound_card import SoundCard, running_sound_card
-from tests.e2e.as_new import as_new
+from tests.e2e.as_new import as_new, emptied
+from tests.e2e.so101 import SO101
 from tests.support.stack import Stack, running_stack
 
 HERE = Path(__file__).parent
@@ -58,6 +59,36 @@ async def own_stack(half_rate: None, tmp_path: Path) -> AsyncIterator[Stack]:
 
 def _wants_all(request: pytest.FixtureRequest) -> bool:
     return request.node.get_closest_marker("full_rate") is not None
+
+
+class RobotKeeper:
+    """One console with another robot than the planar one for all tests of a file; the robot stays where it was left."""
+
+    def __init__(self, directories: pytest.TempPathFactory, settings: Mapping[str, str]) -> None:
+        self._directories = directories
+        self._settings = settings
+        self._running = AsyncExitStack()
+        self._stack: Stack | None = None
+
+    async def stack(self, robot: str) -> Stack:
+        """Nobody is there, and the robot is at rest and not stopped. Always the same `robot`."""
+        if self._stack is None or await emptied(self._stack) is None:
+            await self.close()
+            started = running_stack(self._directories.mktemp("file"), robot=robot, settings=self._settings)
+            self._stack = await self._running.enter_async_context(started)
+        return await self._stack.from_here()
+
+    async def close(self) -> None:
+        self._stack = None
+        await self._running.aclose()
+
+
+@pytest_asyncio.fixture(scope="module", loop_scope="session")
+async def robot_keeper(tmp_path_factory: pytest.TempPathFactory) -> AsyncIterator[RobotKeeper]:
+    """Takes half of the pictures."""
+    keeper = RobotKeeper(tmp_path_factory, SO101 | {RATE: HALF})
+    yield keeper
+    await keeper.close()
 
 
 class StackKeeper:

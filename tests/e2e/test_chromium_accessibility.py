@@ -11,6 +11,7 @@ from playwright.async_api import Browser, Page
 from lockstep.bench.browsers.chromium import open_page
 from lockstep.bench.browsers.console_page import ConsolePage
 from tests.e2e.accessibility import findings
+from tests.e2e.machine import until_drawn
 from tests.e2e.overview import in_view, until
 from tests.e2e.tamper import alter, open_tampered, say
 from tests.support.stack import Stack, running_fleet
@@ -88,7 +89,7 @@ async def _notes(console: ConsolePage) -> None:
 
 async def _scene(console: ConsolePage) -> None:
     await console.page.get_by_role("button", name="3D scene", exact=True).click()
-    await console.until("window.lockstep.scene().state === 'drawn'", 30)
+    await until_drawn(console)
 
 
 async def _charts(console: ConsolePage) -> None:

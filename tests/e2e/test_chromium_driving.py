@@ -6,7 +6,7 @@ from playwright.async_api import Browser
 from lockstep.bench.browsers.console_page import FORWARD, LEFT_Y, RB, START, ConsolePage, open_console
 from tests.support.stack import Stack
 
-pytestmark = [pytest.mark.browser, pytest.mark.full_rate]
+pytestmark = pytest.mark.browser
 
 
 async def _driven(console: ConsolePage, events: int) -> None:
@@ -27,9 +27,11 @@ def _no_violation(statistics: dict[str, object]) -> None:
         assert stream["max_gap"] <= tolerance[stream["kind"]], name
 
 
+@pytest.mark.full_rate
 async def test_every_stream_arrives_with_the_capture_time_carrier_and_advances(stack: Stack, chromium: Browser) -> None:
     async with open_console(chromium, stack.operator) as console:
         await console.until_live()
+        await console.until("s.streams.microphone?.received > 0")  # sound comes when its device is open
         streams = (await console.stats())["streams"]
         assert {name: stream["carrier"] for name, stream in streams.items()} == {
             "overview": "capture-time",
@@ -41,6 +43,7 @@ async def test_every_stream_arrives_with_the_capture_time_carrier_and_advances(s
             await console.until(f"s.streams['{name}'].rendered > {count + 10}")
 
 
+@pytest.mark.full_rate
 async def test_driving_moves_the_robot_and_nothing_outside_the_tolerance_is_rendered(
     stack: Stack, loud_chromium: Browser
 ) -> None:
@@ -58,6 +61,7 @@ async def test_driving_moves_the_robot_and_nothing_outside_the_tolerance_is_rend
     assert executed == sorted(executed)
 
 
+@pytest.mark.full_rate
 @pytest.mark.parametrize("carrier", ["capture-time", "trailer"])
 async def test_the_event_drawn_into_a_picture_is_the_stamp_it_was_rendered_by(
     stack: Stack, chromium: Browser, carrier: str
@@ -79,16 +83,18 @@ async def test_the_event_drawn_into_a_picture_is_the_stamp_it_was_rendered_by(
         _no_violation(await console.stats())
 
 
+@pytest.mark.full_rate
 async def test_the_trailer_carries_sound_and_pictures_when_it_is_asked_for(stack: Stack, chromium: Browser) -> None:
     async with open_console(chromium, stack.operator + "&stamp=trailer") as console:
         await console.until_live()
         await _driven(console, 40)
+        await console.until("s.streams.microphone.rendered > 10")
         statistics = await console.stats()
         assert {stream["carrier"] for stream in statistics["streams"].values()} == {"trailer"}
         _no_violation(statistics)
-        await console.until("s.streams.microphone.rendered > 10")
 
 
+@pytest.mark.full_rate
 async def test_media_pacing_shows_a_picture_for_every_few_events(stack: Stack, chromium: Browser) -> None:
     async with open_console(chromium, stack.operator) as console:
         await console.until_live()

@@ -1,5 +1,6 @@
 """The page of one robot of a fleet, below /robots/NAME/: all that it does works there as it does at /."""
 
+import re
 from pathlib import Path
 
 import pytest
@@ -37,8 +38,9 @@ async def test_a_robots_page_drives_shows_the_scene_invites_records_and_replays_
             await page.get_by_role("button", name="Invite…").click()
             dialogue = page.get_by_role("dialog")
             await dialogue.get_by_role("button", name="Create link").click()
-            link = await dialogue.get_by_role("textbox", name="Link").input_value()
-            assert link.startswith(f"{base}/robots/left/#token=")
+            made = dialogue.get_by_role("textbox", name="Link")
+            await expect(made).to_have_value(re.compile(f"^{re.escape(base)}/robots/left/#token="))
+            link = await made.input_value()
 
             await page.goto(f"{base}/robots/left/recordings#{fragment}")
             await page.get_by_text("planar").first.wait_for()

@@ -1,13 +1,13 @@
 """Controllers and tracked hands of an emulated headset drive a tool's pose through the clutch."""
 
 import itertools
-from collections.abc import AsyncIterator
 from pathlib import Path
 
 import pytest
 import pytest_asyncio
 from playwright.async_api import Browser
 
+from tests.e2e.conftest import RobotKeeper
 from tests.e2e.headset import TRIES, Headset, open_headset
 from tests.e2e.posed_arm import PosedArm
 from tests.support.stack import Stack, running_stack
@@ -19,9 +19,8 @@ GRIP = [0.2, 1.3, -0.4]
 
 
 @pytest_asyncio.fixture(loop_scope="session")
-async def posed(half_rate: None, tmp_path_factory: pytest.TempPathFactory) -> AsyncIterator[Stack]:
-    async with running_stack(tmp_path_factory.mktemp("posed"), robot="tests.e2e.posed_arm:PosedArm") as stack:
-        yield stack
+async def posed(robot_keeper: RobotKeeper) -> Stack:
+    return await robot_keeper.stack("tests.e2e.posed_arm:PosedArm")
 
 
 def _moved(position: list[float], by: tuple[float, float, float]) -> list[float]:

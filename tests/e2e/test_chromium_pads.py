@@ -67,8 +67,7 @@ class Hand:
 
     async def seen(self) -> None:
         """The page has read the pad since."""
-        frames = "new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(() => setTimeout(done, 30))))"
-        await self.console.page.evaluate(frames)
+        await self.console.page.evaluate("testPad.seen()")
 
     async def asked(self, words: str) -> None:
         await self.console.page.locator(".pad-ask", has_text=words).wait_for()

@@ -113,8 +113,7 @@ async def test_an_invited_person_comes_in_by_link_or_qr_code_and_leaves_when_it_
         assert box is not None
         assert box["width"] > 150
         async with open_console(chromium, link, pad=False) as guest:
-            await guest.until("s.connected")
-            assert (await guest.stats())["role"] == "observer"
+            await guest.until("s.connected && s.role === 'observer'")
             line = _dialogue(sue).get_by_role("listitem").filter(has_text="Guest")
             await line.get_by_text("1 connected").wait_for()
             await line.get_by_role("button", name="Revoke").click()

@@ -9,13 +9,12 @@ from PIL import Image
 from playwright.async_api import Browser, Locator, expect
 
 from lockstep.bench.browsers.console_page import ConsolePage
-from tests.e2e.machine import open_on_machine
+from tests.e2e.machine import open_on_machine, until_drawn
 from tests.e2e.tamper import TAMPER
 from tests.support.stack import Stack
 
 pytestmark = pytest.mark.browser
 
-DRAWN = "window.lockstep.scene().state === 'drawn'"
 # Later than this after the first picture the page has decided; two answers of its rule have passed since.
 DECIDED = "performance.now() - window.lockstep.rendered('overview')[0].at > 3500"
 FIGURES = "[...document.querySelectorAll('.view')].map((each) => each.dataset.view)"
@@ -52,7 +51,7 @@ async def test_the_robot_stands_in_the_scene_by_itself_where_the_machine_has_gra
     async with open_on_machine(chromium, stack.operator) as console:
         console.page.on("request", lambda request: asked.append(request.url))
         await console.until_live()
-        await console.until(DRAWN, 30)
+        await until_drawn(console)
         assert await _colours(console) > 30
         await expect(_toggle(console)).to_have_attribute("aria-pressed", "true")
         assert not [url for url in asked if "/scene" in url and "scene_renderer" not in url], (
@@ -70,7 +69,7 @@ async def test_the_scene_drawn_by_the_page_shows_no_newer_event_than_the_picture
 ) -> None:
     async with open_on_machine(chromium, stack.operator) as console:
         await console.until_live()
-        await console.until(DRAWN, 30)
+        await until_drawn(console)
         await console.page.evaluate(WATCH)
         async with console.driving():
             start = (await console.stats())["event"]
@@ -92,7 +91,7 @@ async def test_the_scene_drawn_by_the_page_shows_no_newer_event_than_the_picture
 async def test_the_scene_is_veiled_while_nothing_is_heard_of_the_robot(stack: Stack, chromium: Browser) -> None:
     async with open_on_machine(chromium, stack.observer) as console:
         await console.until_live()
-        await console.until(DRAWN, 30)
+        await until_drawn(console)
         with stack.frozen_console():
             await console.page.locator('[data-view="3D scene"] .veil-words').get_by_text("No feedback for").wait_for()
 
@@ -127,9 +126,9 @@ async def test_what_the_person_decides_is_remembered_either_way(stack: Stack, ch
     async with open_on_machine(chromium, stack.observer, renderer=None) as console:
         await console.until_live()
         await _toggle(console).click()
-        await console.until(DRAWN)
+        await until_drawn(console)
         await console.page.reload()
-        await console.until(DRAWN, 60)
+        await until_drawn(console)
         await _toggle(console).click()
         await console.until(f"{FIGURES}.join() === 'overview,front'")
         await console.page.reload()
@@ -137,7 +136,7 @@ async def test_what_the_person_decides_is_remembered_either_way(stack: Stack, ch
         await console.until(DECIDED)
         assert await console.page.evaluate("window.lockstep.scene().state") == "away"
     async with open_on_machine(chromium, stack.observer) as console:
-        await console.until(DRAWN, 60)
+        await until_drawn(console)
         await _toggle(console).click()
         await console.page.reload()
         await console.until_live()
@@ -164,7 +163,7 @@ async def test_while_the_full_scene_opens_and_when_it_cannot_the_robot_stays_in_
     async with open_on_machine(chromium, stack.observer) as console:
         await console.page.route("**/api/scene", lambda route: route.fulfill(status=503, body="{}"))
         await console.until_live()
-        await console.until(DRAWN, 30)
+        await until_drawn(console)
         await console.open_full_scene()
         view = console.page.locator('[data-view="3D scene"][data-place="main"]')
         await view.get_by_text("The full 3D scene is not available now").wait_for()

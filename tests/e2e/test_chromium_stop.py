@@ -228,5 +228,4 @@ async def test_reset_moves_nothing_and_driving_needs_arming_again(stack: Stack, 
         assert moving == []
         await console.press(RB, False)
         await console.arm()
-        await console.press(RB)
-        await console.until("s.driving && s.at_rest === false")
+        await console.drive_forward()

@@ -11,6 +11,7 @@ import pytest
 from playwright.async_api import Browser, Locator, expect
 
 from lockstep.bench.browsers.console_page import ConsolePage, open_console
+from tests.e2e.heard import hears, listen, said
 from tests.e2e.tamper import open_tampered
 from tests.support.stack import Stack, running_stack
 
@@ -42,12 +43,7 @@ SAY_AGAIN = """(press) => fetch("/api/stop", {
   },
   body: JSON.stringify({ reason: "late", press }),
 }).then((answer) => answer.json())"""
-# All that the page says in words from here on, looked at more often than it draws.
-LISTEN = """() => {
-  window.said = new Set();
-  setInterval(() => document.body.innerText.split("\\n").forEach((line) => window.said.add(line)), 10);
-}"""
-SAID = "[...window.said].join(' | ')"
+TRIES = 3  # on a busy machine
 COMMANDS = "window.sent.filter((m) => m.type === 'command').length"
 
 
@@ -97,27 +93,41 @@ async def test_a_hand_that_is_on_reset_does_not_release_the_stop_that_another_pa
         for page in (operator, supervisor, observer):
             await page.until("s.connected && s.event !== null")
         await operator.until("s.seat.mine")
-        await operator.page.keyboard.press("Escape")
-        await operator.until("s.stop.stopped && s.stop_press === 'confirmed'")
-        first = (await operator.stats())["stop"]["number"]
-        await observer.page.locator(".plate").get_by_text("who has control, or a supervisor can reset it").wait_for()
-        await expect(_hold_button(observer)).to_have_count(0)
-        await _hold_button(operator).wait_for()
-        async with asyncio.TaskGroup() as tasks:
-            tasks.create_task(operator.page.get_by_text("Look first").wait_for())  # it says so for a second
-            await _press_down(operator, _hold_button(operator))
-            await observer.page.keyboard.press("Escape")
-            await observer.page.keyboard.press("Escape")
-            await operator.until(f"s.stop.number === {first + 2}")
-        await operator.page.mouse.up()
+        await listen(operator)
+        for _ in range(TRIES):
+            first = await _held_while_another_presses(operator, observer)
+            if not [each for each in await stack.events("reset") if each["number"] == first]:
+                break  # else a busy machine held the other's press up for the second that a reset takes
+            await operator.until("s.stop.stopped")
+        else:
+            raise AssertionError("the other's press never comes while the hand is on the button")
+        await hears(operator, "Look first")  # it says so for a second
         assert (await operator.stats())["stop"]["stopped"]
         await supervisor.until(f"s.stop.number === {first + 2}")
         await supervisor.reset()
         await operator.until("!s.stop.stopped && s.stop_press === null")
         await observer.until("!s.stop.stopped && s.stop_press === null")
         assert not (await operator.stats())["armed"]
-    assert [each["number"] for each in await _stops(stack)] == [first, first + 1, first + 2]
-    assert [each["number"] for each in await stack.events("reset")] == [first + 2]
+    assert [each["number"] for each in await _stops(stack)][-3:] == [first, first + 1, first + 2]
+    released = [each["number"] for each in await stack.events("reset") if each["number"] >= first]
+    assert released == [first + 2]
+
+
+async def _held_while_another_presses(operator: ConsolePage, observer: ConsolePage) -> int:
+    """Return the number of the operator's stop, for whose reset their hand is on the button meanwhile."""
+    await operator.page.keyboard.press("Escape")
+    await operator.until("s.stop.stopped && s.stop_press === 'confirmed'")
+    first: int = (await operator.stats())["stop"]["number"]
+    await observer.until(f"s.stop.number === {first}")
+    await observer.page.locator(".plate").get_by_text("who has control, or a supervisor can reset it").wait_for()
+    await expect(_hold_button(observer)).to_have_count(0)
+    await _hold_button(operator).wait_for()
+    await _press_down(operator, _hold_button(operator))
+    await observer.page.keyboard.press("Escape")
+    await observer.page.keyboard.press("Escape")
+    await operator.until(f"s.stop.number === {first + 2}")
+    await operator.page.mouse.up()
+    return first
 
 
 async def test_a_stop_is_one_stop_on_all_ways_and_does_not_come_again_after_its_reset(
@@ -160,13 +170,12 @@ async def test_before_the_robot_shows_a_stop_the_page_says_that_it_was_pressed_a
 ) -> None:
     async with open_console(chromium, own_stack.operator) as console:
         await console.until("s.seat && s.seat.mine && s.event !== null")
-        await console.page.evaluate(LISTEN)
+        await listen(console)
         with own_stack.frozen_bridge():
             await console.page.keyboard.press("Escape")
             await console.until("s.stop_press === 'waiting'")
-            said = await console.page.evaluate(SAID)
-            assert "You pressed STOP" in said
-            assert "is stopped" not in said
+            await hears(console, "You pressed STOP")
+            assert "is stopped" not in await said(console)
         await console.until("s.stop.stopped && s.stop_press === 'confirmed'", 60)
 
 
@@ -177,15 +186,15 @@ async def test_a_stop_that_the_robot_writes_to_its_disk_is_not_said_to_be_lost(s
     ):
         for page in (operator, observer):
             await page.until("s.connected && s.event !== null")
-            await page.page.evaluate(LISTEN)
+            await listen(page)
         for _ in range(10):
             await observer.page.keyboard.press("Escape")
             await observer.until("s.stop.stopped && s.stop_press === 'confirmed' && s.stop.kept")
         for page in (operator, observer):
-            said = await page.page.evaluate(SAID)
-            assert "STOPPED" in said
-            assert "save" not in said
-            assert "not kept" not in said
+            await hears(page, "STOPPED")
+            told = await said(page)
+            assert "save" not in told
+            assert "not kept" not in told
 
 
 async def test_a_stop_while_all_of_lockstep_restarts_holds_when_it_is_back(tmp_path: Path, chromium: Browser) -> None:

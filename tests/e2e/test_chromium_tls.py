@@ -1,5 +1,6 @@
 """The page from another machine: only an encrypted console gives it a gamepad."""
 
+import asyncio
 from pathlib import Path
 
 import pytest
@@ -9,6 +10,7 @@ from lockstep.bench.browsers.chromium import PAD
 from lockstep.bench.browsers.console_page import RB, ConsolePage
 from lockstep.rtc.interfaces import own_addresses
 from tests.support.stack import running_stack
+from tests.waiting import PATIENCE
 
 pytestmark = pytest.mark.browser
 
@@ -48,11 +50,13 @@ async def test_a_self_signed_console_can_be_driven_with_a_pad_and_shows_the_3d_s
                 token,
             )
             assert f"websocket=wss://{address}" in path
+            heard = asyncio.Event()  # it may have sent all that it has before the page is loaded
+            tab.on("websocket", lambda socket: socket.on("framereceived", lambda _: heard.set()))
             async with tab.expect_websocket() as opening:
                 await tab.goto(f"{stack.console}{path}")
-            socket = await opening.value
-            assert socket.url.startswith(f"wss://{address}")
-            await socket.wait_for_event("framereceived")
+            assert (await opening.value).url.startswith(f"wss://{address}")
+            async with asyncio.timeout(PATIENCE):
+                await heard.wait()
         finally:
             await context.close()
 

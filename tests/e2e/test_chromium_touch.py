@@ -19,7 +19,6 @@ async def _let_go(console: ConsolePage) -> None:
     """Seen by the page, on a busy machine too: arming needs it."""
     await console.press(RB, False)
     await console.until("!s.driving")
-    await console.page.evaluate("new Promise((done) => setTimeout(done, 200))")
 
 
 async def _is_still(console: ConsolePage) -> None:

@@ -7,7 +7,7 @@ import pytest
 from playwright.async_api import Browser
 
 from lockstep.bench.browsers.console_page import ConsolePage
-from tests.e2e.machine import open_on_machine
+from tests.e2e.machine import open_on_machine, until_drawn
 from tests.server.media.sources.media_files import film
 from tests.support.stack import Stack, running_stack
 
@@ -85,7 +85,7 @@ async def test_on_large_screens_pictures_take_the_room_and_nothing_lies_over_ano
         await console.until_live()
         if scene:
             await console.page.get_by_role("button", name="3D scene", exact=True).click()
-            await console.until("window.lockstep.scene().state === 'drawn'", 30)
+            await until_drawn(console)
         for charts in ("without charts", "with charts"):
             for size in (LAPTOP, FULL_HD, NARROW, UPRIGHT):
                 what = f"{size} {charts}"
@@ -176,7 +176,7 @@ async def test_on_a_phone_the_scene_that_somebody_asked_for_has_a_place_beside_t
     async with open_on_machine(
         chromium, stack.operator, renderer=None, touch=True, width=390, height=844, scripts=(chosen,)
     ) as console:
-        await console.until("window.lockstep.scene().state === 'drawn'", 60)
+        await until_drawn(console)
         phone = await _look(console, PHONE)
         _check(phone, "phone")
         assert [view["name"] for view in phone["views"]] == ["overview", "front", "3D scene"]
@@ -186,7 +186,7 @@ async def test_on_a_phone_the_scene_that_somebody_asked_for_has_a_place_beside_t
 async def test_a_view_taken_large_changes_places_with_the_large_one(stack: Stack, chromium: Browser) -> None:
     async with open_on_machine(chromium, stack.operator) as console:
         await console.until_live()
-        await console.until("window.lockstep.scene().state === 'drawn'", 30)
+        await until_drawn(console)
         await console.page.get_by_role("button", name="Show Front large").click()
         looked = await _look(console, LAPTOP)
         _check(looked, "front large")

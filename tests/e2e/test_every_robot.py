@@ -22,7 +22,7 @@ STICKS = {"left_x": 0, "left_y": 1, "right_x": 2, "right_y": 3}
 # What the pad calls negative and positive: buttons of the W3C standard mapping.
 BUTTONS = {"dpad_x": (14, 15), "dpad_y": (12, 13), "triggers": (6, 7)}
 MOVED = 0.1  # of the axis' limit
-TRIES = 3  # where a busy machine holds the robot up
+TRIES = 6  # where a busy machine holds the robot up
 
 
 def registered(name: str) -> Starting:
@@ -118,6 +118,7 @@ async def _drive(console: ConsolePage, robot: Any, binding: Any) -> None:
         if not await console.was_held_up():
             break
         await _let_go(console, binding, direction)
+        await console.until("s.connected && s.at_rest === true")
         await console.arm()
     await console.until(moved)
     for name, count in rendered.items():

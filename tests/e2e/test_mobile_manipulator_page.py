@@ -1,14 +1,12 @@
 """The default robot, as `make run` shows it: MuJoCo's pictures and sound, and the 3D scene."""
 
-from collections.abc import AsyncIterator
-from pathlib import Path
-
 import pytest
 import pytest_asyncio
 from playwright.async_api import Browser
 
 from lockstep.bench.browsers.console_page import open_console
-from tests.support.stack import Stack, running_stack
+from tests.e2e.conftest import RobotKeeper
+from tests.support.stack import Stack
 
 pytestmark = pytest.mark.browser
 
@@ -23,9 +21,8 @@ SPREAD = """(name) => {
 
 
 @pytest_asyncio.fixture(loop_scope="session")
-async def manipulator(tmp_path: Path) -> AsyncIterator[Stack]:
-    async with running_stack(tmp_path, robot="mobile-manipulator") as running:
-        yield running
+async def manipulator(robot_keeper: RobotKeeper) -> Stack:
+    return await robot_keeper.stack("mobile-manipulator")
 
 
 async def test_the_default_robot_is_seen_heard_and_driven(manipulator: Stack, chromium: Browser) -> None:

@@ -108,8 +108,7 @@ class ConsolePage:
     async def press(self, button: int, pressed: bool = True) -> None:
         """Press as a finger does: no shorter than the page's sampling can see."""
         await self.page.evaluate(
-            "([button, pressed]) => { window.testPad.press(button, pressed);"
-            " return new Promise((resolve) => setTimeout(resolve, 60)); }",
+            "([button, pressed]) => { window.testPad.press(button, pressed); return window.testPad.seen(); }",
             [button, pressed],
         )
 
