@@ -15,7 +15,7 @@ from lockstep.client import ActionCancelled, ActionRefused, Console, NotArmed
 from lockstep.protocol.actions import ActionUpdate
 from lockstep.server.recording.reading.reader import RecordingReader
 from lockstep.server.recording.verify.verify_file import verify_file
-from tests.client.held_up import ATTEMPTS, HELD_UP, act_on
+from tests.client.held_up import ATTEMPTS, HELD_UP, act_on, arm_on
 from tests.client.truth import until_logged
 from tests.support.stack import Stack
 from tests.waiting import PATIENCE
@@ -36,7 +36,7 @@ async def _go_away(console: Console) -> None:
     while console.feedback is None or abs(console.feedback.joints[0]) < 0.4:
         await drive_on(console, AWAY)
     await console.rest()
-    await console.arm()
+    await arm_on(console)
 
 
 async def _until(console: Console, condition: Any) -> None:
@@ -53,7 +53,7 @@ async def _has_begun(console: Console, task: "asyncio.Task[ActionUpdate]") -> bo
     with pytest.raises(ActionCancelled) as cancelled:
         await task
     assert cancelled.value.reason in HELD_UP
-    await console.arm()
+    await arm_on(console)
     return False
 
 
@@ -133,7 +133,7 @@ async def test_a_stop_from_an_observer_cancels_and_after_the_reset_arming_comes_
             await console.reset()
             with pytest.raises(NotArmed):
                 await console.act("home")
-            await console.arm()
+            await arm_on(console)
             assert (await act_on(console, "home")).state == "done"
 
 

@@ -23,6 +23,7 @@ from lockstep.server.recording.format.episodes import EpisodeEntry
 from lockstep.server.recording.reading.reader import RecordingReader
 from lockstep.server.recording.verify.verify_dataset import verify_dataset
 from lockstep.server.recording.verify.verify_file import verify_file
+from tests.client.held_up import act_on, arm_on
 from tests.support.stack import Stack, running_stack
 from tests.waiting import PATIENCE
 
@@ -147,7 +148,7 @@ async def test_a_stop_in_an_episode_is_marked_and_does_not_end_it(tmp_path: Path
     async with _in_an_episode(tmp_path, recordings) as (_, console):
         await console.stop("a look")
         await console.reset()
-        await console.arm()
+        await arm_on(console)
         await _drive(console)
         await console.episodes.keep()
     (path,) = recordings.glob("*.mcap")
@@ -251,8 +252,8 @@ async def test_the_reset_action_runs_between_episodes_and_the_next_one_waits_for
         state = await _until_state(console, "resetting")
         assert (state.reset_action, state.discarded) == ("home", 1)
         await console.rest()
-        await console.arm()
-        assert (await console.act("home")).state == "done"
+        await arm_on(console)
+        assert (await act_on(console, "home")).state == "done"
         async with asyncio.timeout(PATIENCE):
             assert await redone == console.episodes.state.episode
         await _drive(console)

@@ -2,6 +2,7 @@
 
 import asyncio
 import ssl
+import time
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 from dataclasses import dataclass
@@ -9,6 +10,7 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 import httpx
+import pytest
 from aiortc import RTCConfiguration, RTCDataChannel, RTCPeerConnection, RTCSessionDescription
 from fastapi import FastAPI
 
@@ -19,7 +21,8 @@ from lockstep.protocol.serial import event_after
 from lockstep.robot_bridge.bridge import Bridge
 from lockstep.robot_bridge.robots.registry import create_robot
 from lockstep.robot_bridge.settings import BridgeSettings
-from lockstep.server.auth.tokens import Access
+from lockstep.server.auth.invitation_store import InvitationStore
+from lockstep.server.auth.tokens import Access, Identity
 from lockstep.server.composition.robot_app import create_app
 from lockstep.server.http.transport.serve import bind, running
 from lockstep.server.http.transport.tls import Certificate
@@ -35,6 +38,7 @@ __all__ = [
     "Rig",
     "TestPeer",
     "eventually",
+    "links_that_expire",
     "reset_by_http",
     "running_bridge",
     "running_console",
@@ -43,6 +47,7 @@ __all__ = [
 ]
 
 HELD_UP = ("late", "not_neutral", "unseen")  # refusals that follow when a busy machine held the robot or us up
+HOUR = 3600.0  # s
 
 
 @dataclass
@@ -70,6 +75,11 @@ class Rig:
 
     def token(self, role: Role) -> dict[str, str]:
         return {"Authorization": f"Bearer {self.access.issue(role, role)}"}
+
+    def token_for_an_hour(self, role: Role) -> dict[str, str]:
+        """With `links_that_expire` it ends when the test wants it to, however busy the machine is."""
+        token = self.access.sign(Identity(role, "x", "id", time.time() + HOUR), time.time())
+        return {"Authorization": f"Bearer {token}"}
 
     async def session(self) -> dict[str, Any]:
         answer = await self.http.get("/api/session", headers=self.token("observer"))
@@ -188,6 +198,13 @@ class TestPeer:
             opened = asyncio.Event()
             channel.on("open", opened.set)
             await opened.wait()
+
+
+def links_that_expire(monkeypatch: pytest.MonkeyPatch) -> Callable[[], None]:
+    """For consoles that start afterwards: return a function that lets more than an hour pass for links at once."""
+    now, passed = InvitationStore.now, [0.0]
+    monkeypatch.setattr(InvitationStore, "now", lambda store: now(store) + passed[-1])
+    return lambda: passed.append(1.1 * HOUR)
 
 
 def stop_words(stop: StopState) -> tuple[str, str] | None:

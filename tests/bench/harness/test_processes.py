@@ -88,4 +88,4 @@ async def test_a_process_that_does_not_end_by_itself_is_told(monkeypatch: pytest
         assert not await process.end()
     async with running_process(sys.executable, "-c", "print('{}', flush=True); input()") as (process, _):
         assert await process.end()
-        assert await asyncio.wait_for(process.wait(), 1) == -15
+        assert await asyncio.wait_for(process.wait(), 30) == -15

@@ -242,6 +242,21 @@ def test_after_a_stop_or_whatever_else_asks_for_it_nothing_leaves_by_itself_that
     assert [each.values for each in commands(sender.due(6.0))] == [NEUTRAL]
 
 
+def test_what_is_wanted_while_the_robot_may_still_move_is_given_up_when_it_asks_for_a_neutral_command() -> None:
+    """The neutral command that was under way when the robot asked does not let an intention of before it pass."""
+    sender = new_sender()
+    sender.arm()
+    [neutral] = commands(sender.due(0.0))
+    ticket = sender.intend(FAST, 0.01)
+    sender.feedback(_again("asked"), 0.02)
+    assert [(each.ticket, each.refusal.reason) for each in sender.outcomes() if each.refusal] == [
+        (ticket, "not_neutral")
+    ]
+    sender.feedback(feedback(neutral.event), 0.03)  # it is executed after the robot asked
+    assert not sender.ready
+    assert commands(sender.due(1.0)) == []
+
+
 def test_a_refusal_for_want_of_a_neutral_command_is_an_outcome_and_no_reason_to_send_one() -> None:
     sender = new_sender()
     flying(sender)

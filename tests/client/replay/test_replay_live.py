@@ -37,7 +37,7 @@ async def test_the_arm_makes_the_recorded_motion_again_and_refuses_from_afar_or_
         async with Console(stack.operator, video=False, audio=False, name="Ada") as console:
             await console.take_seat()
             await console.episodes.start("swing the arm")
-            await drive(console, so101_joints, 4.0)
+            await drive(console, so101_joints, 2.0)
             await console.episodes.success()
         (recording,) = recordings.glob("*.mcap")
         (dataset,) = export_lerobot.export(recording, tmp_path / "dataset", "")

@@ -12,6 +12,7 @@ from pathlib import Path
 
 import pytest
 
+from lockstep.bench.harness.free_port import free_port
 from lockstep.protocol.console import SeatRequest
 from tests.server.recording.rrd import entities, recording_ids
 from tests.server.rig import PATIENCE, Rig, TestPeer, eventually, running_rig
@@ -33,12 +34,6 @@ async def take_seat(peer: TestPeer) -> None:
     await peer.feedback()
     peer.send("session", SeatRequest())
     await peer.drive([0.0, 0.0, 0.0])
-
-
-def free_port() -> int:
-    with socket.create_server(("127.0.0.1", 0)) as taken:
-        port: int = taken.getsockname()[1]
-        return port
 
 
 async def test_a_driven_session_is_in_the_file_by_event_with_pictures(

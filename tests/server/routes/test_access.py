@@ -20,10 +20,9 @@ from lockstep.robot_bridge.robots.registry import create_robot
 from lockstep.robot_bridge.settings import BridgeSettings
 from lockstep.server.auth.invitation_store import InvitationStore
 from lockstep.server.auth.invitations import MAX_LIVE, MIN_SECONDS, Invitations
-from lockstep.server.auth.tokens import Identity
 from lockstep.server.routes import access
 from lockstep.server.util.state_dir import StateDir, StateDirUnusable
-from tests.server.rig import PATIENCE, Rig, TestPeer, eventually, running_console, running_rig
+from tests.server.rig import PATIENCE, Rig, TestPeer, eventually, links_that_expire, running_console, running_rig
 
 NOWHERE = 1  # a port where no robot bridge is
 
@@ -317,22 +316,19 @@ async def test_a_link_that_another_process_has_just_revoked_invites_and_revokes_
         assert [each.id for each in beside.known.all if each.is_good(time.time())] == [bob["id"]]
 
 
-async def test_an_expired_link_invites_nobody_though_its_request_began_before() -> None:
+async def test_an_expired_link_invites_nobody_though_its_request_began_before(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    expire = links_that_expire(monkeypatch)
     async with running_console(NOWHERE) as rig:
-        token = rig.access.sign(Identity("operator", "x", "id", time.time() + 1.5), time.time())
-        late = _LateBody(rig, {"Authorization": f"Bearer {token}"}, *LATE[0])
+        late = _LateBody(rig, rig.token_for_an_hour("operator"), *LATE[0])
         async with asyncio.TaskGroup() as tasks:
             asked = tasks.create_task(late.answer())
             await late.begun.wait()
-            await eventually(lambda: rig.dependencies.state.invitations.now() > jwt_end(token))
+            expire()
             late.go_on.set()
         assert asked.result().json()["error"] == "link_expired"
         assert rig.dependencies.state.invitations.known.all == []
-
-
-def jwt_end(token: str) -> float:
-    end: float = jwt.decode(token, options={"verify_signature": False})["exp"]
-    return end
 
 
 async def test_a_console_writes_down_that_a_link_has_expired(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -397,22 +393,25 @@ async def test_what_another_process_revokes_ends_here_within_seconds_and_is_reco
         ]
 
 
-async def test_a_link_that_expires_ends_its_peers_and_says_so_by_name() -> None:
+async def test_a_link_that_expires_ends_its_peers_and_says_so_by_name(monkeypatch: pytest.MonkeyPatch) -> None:
+    expire = links_that_expire(monkeypatch)
     async with running_rig() as rig:
-        token = rig.access.sign(Identity("observer", "x", "id", time.time() + 2.5), time.time())
+        token = rig.token_for_an_hour("observer")
         peer = TestPeer()
         try:
-            await peer.join(rig, {"Authorization": f"Bearer {token}"}, ("control", "session", "stop"))
+            await peer.join(rig, token, ("control", "session", "stop"))
+            expire()
             async with asyncio.timeout(PATIENCE):
                 await peer.closed.wait()
         finally:
             await peer.close()
         assert rig.count("lockstep_peers_ended_total", why="link expired") == 1
-        answer = await rig.http.get("/api/session", headers={"Authorization": f"Bearer {token}"})
+        answer = await rig.http.get("/api/session", headers=token)
         assert (answer.status_code, answer.json()["error"]) == (401, "link_expired")
 
 
 async def test_a_disk_that_hangs_holds_up_the_end_of_no_link(monkeypatch: pytest.MonkeyPatch) -> None:
+    expire = links_that_expire(monkeypatch)
     hangs, ends = threading.Event(), threading.Event()
 
     def hang(store: InvitationStore) -> None:
@@ -425,10 +424,10 @@ async def test_a_disk_that_hangs_holds_up_the_end_of_no_link(monkeypatch: pytest
             async with asyncio.timeout(PATIENCE):
                 while not hangs.is_set():  # noqa: ASYNC110
                     await asyncio.sleep(0.01)
-            token = rig.access.sign(Identity("observer", "x", "id", time.time() + 2.5), time.time())
             peer = TestPeer()
             try:
-                await peer.join(rig, {"Authorization": f"Bearer {token}"}, ("control", "session", "stop"))
+                await peer.join(rig, rig.token_for_an_hour("observer"), ("control", "session", "stop"))
+                expire()
                 async with asyncio.timeout(PATIENCE):
                     await peer.closed.wait()
                 assert not ends.is_set()

@@ -4,7 +4,6 @@ import asyncio
 import json
 import subprocess
 import sys
-import time
 from contextlib import AsyncExitStack
 from pathlib import Path
 
@@ -17,12 +16,11 @@ from hypothesis import strategies as st
 from websockets.asyncio.client import connect
 from websockets.typing import Subprotocol
 
-from lockstep.server.auth.tokens import Identity
 from lockstep.server.routes import scene_proxy as proxy
 from lockstep.server.routes.scene_proxy import is_allowed
 from lockstep.server.scene import server, view
 from lockstep.server.scene.page import HOOK, ScenePage
-from tests.server.rig import PATIENCE, Rig, eventually, running_rig
+from tests.server.rig import PATIENCE, Rig, eventually, links_that_expire, running_rig
 
 VERSION = Subprotocol(f"viser-v{viser.__version__}")
 
@@ -172,13 +170,15 @@ async def _scene_with(rig: Rig, token: dict[str, str]) -> str:
     return path.split("websocket=")[1].split("&")[0]
 
 
-async def test_a_scene_that_is_open_ends_when_its_link_expires_and_no_other_opens(tmp_path: Path) -> None:
+async def test_a_scene_that_is_open_ends_when_its_link_expires_and_no_other_opens(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    expire = links_that_expire(monkeypatch)
     async with running_rig(scene=True, state_dir=tmp_path) as rig:
-        token = rig.access.sign(Identity("observer", "x", "id", time.time() + 2.5), time.time())
-        headers = {"Authorization": f"Bearer {token}"}
-        path = (await rig.http.post("/api/scene", headers=headers)).json()["path"]
+        path = (await rig.http.post("/api/scene", headers=rig.token_for_an_hour("observer"))).json()["path"]
         address = path.split("websocket=")[1].split("&")[0]
         async with connect(address, subprotocols=[VERSION], proxy=None, max_size=None) as websocket:
+            expire()
             async with asyncio.timeout(PATIENCE):
                 await websocket.wait_closed()
             assert websocket.close_code == 1008

@@ -9,6 +9,7 @@ from lockstep.server.sfu import janus_publishing
 from lockstep.server.sfu.errors import RelaySilent
 from lockstep.server.sfu.janus_publishing import _connected, _Line
 from lockstep.server.sfu.publication import NEW_EPOCH, Publication
+from tests.waiting import PATIENCE
 
 NOTHING = cast(Any, None)
 
@@ -17,7 +18,7 @@ async def test_an_epoch_that_begins_during_the_negotiation_ends_the_publication_
     publication = Publication(7, [], lambda _: None)
     line = _Line(NOTHING, NOTHING, NOTHING, publication)
     line.streams_ended()
-    async with asyncio.timeout(5):
+    async with asyncio.timeout(PATIENCE):
         await _connected(line, publication)
     assert publication.ended.is_set()
     assert publication.why == NEW_EPOCH

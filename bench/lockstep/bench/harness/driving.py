@@ -5,6 +5,7 @@ import math
 import random
 import time
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from typing import NamedTuple
 
 from lockstep.client import Console, NotArmed
@@ -29,7 +30,7 @@ SPEEDS = {"base.vx": 0.15, "base.wz": 0.6, "tool.vz": 0.03}  # the base drives a
 TICK = 0.004  # s, the robot's control tick
 RATE = 25.0  # events a second at most; above, the gate may also wait for pictures
 TIMER = 0.0015  # s, accuracy of a sleep
-ARMINGS = 5  # attempts in a row to arm a robot that a busy machine holds up
+ARMINGS = 20  # attempts in a row to arm a robot that a busy machine holds up
 MARGIN = 0.0005  # s on top of the shortest interval between two events
 
 
@@ -99,7 +100,7 @@ class Pause:
 async def drive_on(console: Console, values: Mapping[str, float | None] | Sequence[float | None]) -> Feedback:
     """Drive, and arm first whenever the robot asks for it: a simulated robot endangers no person.
 
-    A busy machine may hold the robot up again between the two.
+    A busy machine may hold the robot up again between the two, or while it is being armed.
 
     Raises:
         NotArmed: the robot asked for it every time.
@@ -110,7 +111,8 @@ async def drive_on(console: Console, values: Mapping[str, float | None] | Sequen
         try:
             return await console.drive(values)
         except NotArmed:
-            await console.arm()
+            with suppress(NotArmed):
+                await console.arm()
     return await console.drive(values)
 
 

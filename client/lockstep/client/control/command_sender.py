@@ -144,8 +144,8 @@ class CommandSender:
     def hold_back(self, reason: RefusalReason) -> None:
         """Give up the wanted values and the flight for `reason`; the robot may not move until the next `arm`."""
         self.ready = False
-        if self._arming and reason == "not_neutral":
-            return  # arming cures this
+        if self._arming and reason == "not_neutral" and self._values == self._neutral:
+            return  # arming cures this; values that were wanted since then are of before the loss
         self.armed = self._arming = False
         self._want = _Want.NOTHING
         if self._flight is not None:
