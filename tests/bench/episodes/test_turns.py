@@ -1,3 +1,5 @@
+from typing import Any
+
 from lockstep.bench.episodes.turns import Span, Turn, differences
 
 TURNS = (Turn("Ada", "human", 11, 20), Turn("net", "policy", 22, 30), Turn("Ada", "human", 33, 40))
@@ -8,7 +10,7 @@ SPANS = [
 ]
 
 
-def _changed(number: int, **fields: object) -> list[Span]:
+def _changed(number: int, **fields: Any) -> list[Span]:
     return [each._replace(**fields) if place == number else each for place, each in enumerate(SPANS)]
 
 

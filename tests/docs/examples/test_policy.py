@@ -1,6 +1,7 @@
 """The example of a policy: in short, with one episode to learn from and one that is corrected, and as a whole."""
 
 import asyncio
+import json
 import re
 import sys
 from pathlib import Path
@@ -8,7 +9,9 @@ from pathlib import Path
 import pytest
 
 from lockstep.bench.pick_place.judge import judge
+from lockstep.server.recording.export import export_lerobot
 from lockstep.server.recording.report.page import session_page
+from lockstep.server.recording.verify.verify_dataset import verify_dataset
 from tests.client.test_policies import policy_link
 from tests.robot_bridge.robots.so101.driver import MODEL_FOLDER
 from tests.support.stack import running_stack
@@ -44,6 +47,11 @@ async def test_a_policy_learns_drives_is_corrected_and_learns_of_the_correction(
     assert "it learns again, from 2 episodes" in said
     recordings = sorted(await asyncio.to_thread(lambda: list(tmp_path.rglob("*.mcap"))))
     assert len(recordings) == 2
+    roots = await asyncio.to_thread(export_lerobot.export_all, recordings, tmp_path / "dataset", "")
+    verdict = await asyncio.to_thread(verify_dataset, roots[0])
+    assert verdict.ok, "the demonstration and the corrected episode are one dataset"
+    notes = json.loads((roots[0] / "meta" / "lockstep.json").read_text())
+    assert [each["outcome"] for each in notes["episodes"]] == ["success", "success"]
     judged = judge(recordings[1])
     assert judged.verdict.ok
     assert 0 < judged.step <= 1, "no joint jumps, not where the robot changes hands either"
