@@ -1,4 +1,4 @@
-"""A policy learns from ten episodes, drives the SO-101, and is corrected twice by a person.
+"""A policy learns from ten episodes, drives the SO-101, is corrected twice by a person, and learns again.
 
     lockstep up --robot so101 --state-dir /tmp/policy
     python docs/examples/policy/learn_and_drive.py OPERATOR_LINK POLICY_LINK --recordings /tmp/policy
@@ -9,7 +9,7 @@ All three drivers are scripts here: Ada demonstrates, the policy learns, Grace c
 import argparse
 import asyncio
 import sys
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Callable, Mapping
 from contextlib import AsyncExitStack, asynccontextmanager
 from pathlib import Path
 from typing import Final
@@ -17,9 +17,9 @@ from typing import Final
 import httpx
 from nearest_neighbour import NearestNeighbour, read_demonstrations
 
-from lockstep.bench.pick_place.hands import JOINTS, LEADER_SCALES, PolicyHand
+from lockstep.bench.pick_place.hands import JOINTS, LEADER_SCALES, LeaderHand, PolicyHand
 from lockstep.bench.pick_place.script import PickAndPlace
-from lockstep.client import CommandRefused, Console, ConsoleError
+from lockstep.client import ActionCancelled, ActionFailed, CommandRefused, Console, ConsoleError, GoalNotReached
 from lockstep.client.console_url import parse_link
 from lockstep.protocol.messages import Feedback
 
@@ -28,8 +28,12 @@ TASK: Final = "put the red block into the bowl"
 PASSING: Final = ("late", "link_down", "not_neutral", "out_of_order", "rested")  # a busy machine held somebody up
 LANDS_SECONDS: Final = 15.0
 DRIVE_SECONDS: Final = 240.0
-CORRECTED_AT: Final = (0.15, 0.85)  # of the demonstration: with empty fingers, since a robot that rests may let go
-CORRECTION: Final = 0.08  # rad, by which Grace turns the arm and back
+ALL_MOTIONS: Final = 9
+TRIAL_SECONDS: Final = 40.0  # of the robot's clock, in which the policy has to get to the end
+CORRECTED_AFTER: Final = 2.0  # s of the robot's clock: Grace sees where the policy goes
+APPROACH: Final = 2  # motions that she does: opens the fingers, and goes above the block
+# rad: where the arm begins. Ada demonstrates from the first place alone.
+BEGINS: Final = ({"shoulder_pan": 0.0}, {"shoulder_pan": 0.8, "shoulder_lift": 0.2}, {"shoulder_pan": -0.9})
 
 
 async def armed(console: Console) -> Feedback:
@@ -55,29 +59,41 @@ async def blocks_in_bowl(console: Console, count: int) -> bool:
     return False
 
 
-async def reset(ada: Console) -> None:
-    """Bring the arm and the blocks to where every episode begins: a policy may not, so a person does."""
-    await armed(ada)
-    await ada.act("home")
+async def reset(ada: Console, begins: Mapping[str, float]) -> None:
+    """Bring the arm and the blocks to where an episode begins: a policy may not, so a person does."""
+    await ada.take_over()
+    while True:
+        try:
+            await armed(ada)
+            await ada.act("home")
+            await ada.move_to(begins)
+            break
+        except (ActionCancelled, ActionFailed, CommandRefused, GoalNotReached) as held_up:
+            print(f"once more to where the episode begins: {held_up}")
     await ada.act("reset_scene")
     await blocks_in_bowl(ada, 0)
     await ada.rest()
 
 
-async def demonstrate(ada: Console) -> bool:
-    """Drive one episode as a person; keep it, and return whether the block is in the bowl."""
-    await reset(ada)
-    await ada.episodes.start(TASK)
-    task = PickAndPlace(ada.description, BLOCK, PolicyHand(ada.description))
-    feedback = await armed(ada)
-    while not task.done and not task.failed:
+async def operate(person: Console, task: PickAndPlace, motions: int) -> None:
+    """Drive as a person until so many motions of the task are done."""
+    feedback = await armed(person)
+    while not task.done and not task.failed and task.motions_done < motions:
         try:
             values = await asyncio.to_thread(task.values, feedback)  # it solves a posture now and then
-            feedback = await ada.drive(values)
+            feedback = await person.drive(values)
         except CommandRefused as refused:
             if refused.reason not in PASSING:
                 raise
-            feedback = await armed(ada)
+            feedback = await armed(person)
+
+
+async def demonstrate(ada: Console) -> bool:
+    """Drive one episode as a person; keep it, and return whether the block is in the bowl."""
+    await reset(ada, BEGINS[0])
+    await ada.episodes.start(TASK)
+    task = PickAndPlace(ada.description, BLOCK, PolicyHand(ada.description))
+    await operate(ada, task, ALL_MOTIONS)
     placed = task.done and await blocks_in_bowl(ada, 1)
     await ada.episodes.keep("success" if placed else "failure")
     return placed
@@ -108,26 +124,26 @@ async def shadow(net: Console, policy: NearestNeighbour) -> None:
 
 
 async def correct(grace: Console) -> None:
-    """Take the robot from the policy, turn it a little and back through a clutch, and give it back."""
+    """Take the robot from the policy, bring it above the block with a leader arm's clutch, and give it back."""
     await grace.take_over()
-    feedback = await armed(grace)
-    clutch = grace.clutch(LEADER_SCALES)
-    device = [0.4] * len(LEADER_SCALES)  # rad, wherever the leader arm is: engaging moves nothing
-    clutch.observe(feedback)
-    clutch.engage(device)
-    for step in [CORRECTION / 10] * 10 + [-CORRECTION / 10] * 5:
-        device[0] += step
-        await grace.drive(clutch.values(device))
-    clutch.release()
+    hand = LeaderHand(grace.description, grace.clutch(LEADER_SCALES))
+    await operate(grace, PickAndPlace(grace.description, BLOCK, hand), APPROACH)
+    hand.clutch.release()
     await grace.policies.offer()
 
 
-async def until_progress(giver: Console, net: Console, policy: NearestNeighbour, share: float) -> None:
-    """Wait until the policy drives, and is so far; the person gives it another turn when it has released the seat."""
+async def until(giver: Console, net: Console, enough: Callable[[float], bool]) -> None:
+    """Wait until it is enough; offer another turn when the policy has released the seat after a refusal.
+
+    `enough`: of the s of the robot's clock since the policy drives.
+    """
+    began: float | None = None
     async with asyncio.timeout(DRIVE_SECONDS):
-        async for _ in net.feedbacks():
-            if net.seat.kind == "policy" and policy.progress >= share:
-                return
+        async for feedback in net.feedbacks():
+            if net.seat.kind == "policy":
+                began = feedback.time if began is None else began
+                if enough(feedback.time - began):
+                    return
             if giver.seat.kind == "none" and not giver.seat.offered:
                 if giver.seat.why == "released":
                     await giver.policies.offer(net.peer)
@@ -135,26 +151,38 @@ async def until_progress(giver: Console, net: Console, policy: NearestNeighbour,
                 raise ConsoleError(f"the policy's turn has ended: {net.seat.why}")
 
 
-async def drive_corrected(ada: Console, grace: Console, net: Console, policy: NearestNeighbour) -> bool:
-    """Let the policy drive one episode, corrected twice; keep it, and return whether the block is in the bowl."""
-    await reset(ada)
+async def let_drive(
+    ada: Console, net: Console, policy: NearestNeighbour, begins: Mapping[str, float], grace: Console | None = None
+) -> bool:
+    """Let the policy drive one episode, corrected by Grace if she is there; return whether the block is in the bowl."""
+    await reset(ada, begins)
     await ada.episodes.start(TASK)
+    policy.progress = 0.0
     thinking = NearestNeighbour(policy.demonstrations)  # a shadow has a place of its own
     async with asyncio.TaskGroup() as tasks:
         running = [tasks.create_task(drive_when_let(net, policy)), tasks.create_task(shadow(net, thinking))]
         await ada.policies.offer(net.peer)
         giver = ada
-        for share in CORRECTED_AT:
-            await until_progress(giver, net, policy, share)
+        if grace is not None:
+            await until(ada, net, lambda seconds: seconds > CORRECTED_AFTER)
             await correct(grace)
             giver = grace
-        await until_progress(giver, net, policy, 1.0)
-        placed = await blocks_in_bowl(grace, 1)
-        await grace.episodes.keep("success" if placed else "failure")
-        grace.policies.withdraw()
+        await until(giver, net, lambda seconds: policy.progress >= 1.0 or seconds > TRIAL_SECONDS)
+        placed = await blocks_in_bowl(giver, 1)
+        await giver.episodes.keep("success" if placed else "failure")
+        giver.policies.withdraw()
         for task in running:
             task.cancel()
     return placed
+
+
+async def tried(ada: Console, net: Console, policy: NearestNeighbour, trials: int) -> str:
+    """Let the policy drive alone so often from each place; return its successes in words."""
+    found = []
+    for begins in BEGINS:
+        placed = [await let_drive(ada, net, policy, begins) for _ in range(trials)]
+        found.append(f"{sum(placed)} of {trials} from {begins}")
+    return ", ".join(found)
 
 
 @asynccontextmanager
@@ -169,7 +197,7 @@ async def recording(console: httpx.AsyncClient, folder: Path, name: str) -> Asyn
         found += await asyncio.to_thread(lambda: list(folder.rglob(f"*{begun}*.mcap")))
 
 
-async def main(operator: str, policy_link: str, folder: Path, episodes: int) -> bool:
+async def main(operator: str, policy_link: str, folder: Path, episodes: int, trials: int, corrections: int) -> bool:
     link = parse_link(operator)
     async with AsyncExitStack() as stack:
         http = await stack.enter_async_context(
@@ -185,11 +213,19 @@ async def main(operator: str, policy_link: str, folder: Path, episodes: int) -> 
             for number in range(episodes):
                 print(f"episode {number + 1}: {'in the bowl' if await demonstrate(ada) else 'not in the bowl'}")
         policy = NearestNeighbour(read_demonstrations(demonstrated[0], len(JOINTS)))
+        if trials:
+            async with recording(http, folder, "policy, alone"):
+                print(f"alone, before any correction: {await tried(ada, net, policy, trials)}")
         async with recording(http, folder, "policy, corrected") as driven:
-            placed = await drive_corrected(ada, grace, net, policy)
-        print(f"the policy, corrected {len(CORRECTED_AT)} times: {'in the bowl' if placed else 'not in the bowl'}")
+            placed = [await let_drive(ada, net, policy, begins, grace) for begins in BEGINS[1 : 1 + corrections]]
+        print(f"corrected once in each of {len(placed)} episodes: {sum(placed)} in the bowl")
+        policy = NearestNeighbour([*policy.demonstrations, *read_demonstrations(driven[0], len(JOINTS))])
+        print(f"it learns again, from {len(policy.demonstrations)} episodes")
+        if trials:
+            async with recording(http, folder, "policy, alone again"):
+                print(f"alone, after the corrections: {await tried(ada, net, policy, trials)}")
         print(f"lockstep report {driven[0]}")
-    return placed
+    return all(placed)
 
 
 if __name__ == "__main__":
@@ -198,8 +234,11 @@ if __name__ == "__main__":
     parser.add_argument("policy", help="a link of the role policy: lockstep invite --role policy")
     parser.add_argument("--recordings", type=Path, required=True, help="the folder in which the console records")
     parser.add_argument("--episodes", type=int, default=10, help="demonstrations to learn from")
+    parser.add_argument("--trials", type=int, default=2, help="before and after the corrections, from each place")
+    parser.add_argument("--corrections", type=int, default=2, help="episodes in which Grace takes over, 1 or 2")
     wanted = parser.parse_args()
+    given = (wanted.operator, wanted.policy, wanted.recordings, wanted.episodes, wanted.trials, wanted.corrections)
     try:
-        sys.exit(0 if asyncio.run(main(wanted.operator, wanted.policy, wanted.recordings, wanted.episodes)) else 1)
+        sys.exit(0 if asyncio.run(main(*given)) else 1)
     except ConsoleError as error:
         sys.exit(str(error))

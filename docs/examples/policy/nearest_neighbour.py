@@ -16,13 +16,16 @@ Array = npt.NDArray[np.float64]
 BEHIND, AHEAD = 3, 12  # moments of the same demonstration in which it looks first
 ORDER: Final = 1e-5  # rad² for each moment² away from the next one: where nothing moves, time goes on
 LOST: Final = 0.15  # rad: further from its moment than this, it looks everywhere anew
+STEP: Final = 0.35  # rad, of an arm's joint from where it is measured: half of what the robot takes in one command
+PREFERRED: Final = 0.25  # a correction counts as half as far away as it is: squared
 
 
 class Demonstration(NamedTuple):
     """One kept episode: in the state of a row its action was commanded."""
 
     states: Array  # (n, 2 x joints), rad: measured, and where they were commanded to be
-    actions: Array  # (n, joints), rad
+    actions: Array  # (n, joints), rad; the last one is the gripper
+    corrects: bool  # a person took over from a policy: what followed
 
 
 def state_of(feedback: Feedback, joints: int) -> Array:
@@ -35,6 +38,8 @@ def state_of(feedback: Feedback, joints: int) -> Array:
 def read_demonstrations(path: Path, joints: int) -> list[Demonstration]:
     """Read the kept, successful episodes of a recording; the joints are the robot's first axes.
 
+    Of an episode in which a policy drove, only what followed the first correction is read; without one, nothing.
+
     Raises:
         RecordingError, OSError: it cannot be read.
     """
@@ -44,15 +49,19 @@ def read_demonstrations(path: Path, joints: int) -> list[Demonstration]:
         for episode in reader.index.episodes:
             if episode.state != "kept" or episode.outcome != "success":
                 continue
+            of_it = [row for row in rows if episode.first_event < row.feedback.event <= episode.last_event]
+            with_policy = any(row.driven_by.kind == "policy" for row in of_it)
+            begins = [row.feedback.event for row in of_it if row.driven_by.intervention or not with_policy]
+            first = min(begins, default=episode.last_event)
             states, actions = [], []
             for before, after in zip(rows, rows[1:], strict=False):
-                if not episode.first_event <= before.feedback.event < episode.last_event or after.command is None:
+                if not first <= after.feedback.event <= episode.last_event or after.command is None:
                     continue
                 action = after.command.values[:joints]
                 if None not in action:  # else some joint was to stay: nobody drove
                     states.append(state_of(before.feedback, joints))
                     actions.append(action)
-            found.append(Demonstration(np.array(states), np.array(actions, dtype=np.float64)))
+            found.append(Demonstration(np.array(states), np.array(actions, dtype=np.float64), with_policy))
     return [each for each in found if len(each.states)]
 
 
@@ -85,7 +94,9 @@ class NearestNeighbour:
             self._look_nearby(state)
         demonstration = self.demonstrations[self._which]
         self.progress = (self._at + 1) / len(demonstration.states)
-        return [float(value) for value in demonstration.actions[self._at]]
+        there = demonstration.actions[self._at]
+        near = np.clip(there, state[: self._joints] - STEP, state[: self._joints] + STEP)
+        return [*near[:-1].tolist(), float(there[-1])]  # a block keeps the fingers from their goal, which is the grip
 
     def _distances(self, which: int, state: Array) -> Array:
         """Return for each moment the square of the largest difference of a joint."""
@@ -93,8 +104,11 @@ class NearestNeighbour:
         return largest
 
     def _look_everywhere(self, state: Array) -> None:
-        nearest = [(self._distances(which, state).min(), which) for which in range(len(self.demonstrations))]
-        self._which = min(nearest)[1]
+        costs = [
+            self._distances(which, state).min() * (PREFERRED if each.corrects else 1.0)
+            for which, each in enumerate(self.demonstrations)
+        ]
+        self._which = int(np.argmin(costs))
         self._at = int(self._distances(self._which, state).argmin())
 
     def _look_nearby(self, state: Array) -> None:

@@ -1,4 +1,4 @@
-"""A few short episodes through everything real: MuJoCo, bridge, console, two drivers, recording, dataset, pixels."""
+"""A few short episodes through everything real: MuJoCo, bridge, console, people and a policy, dataset, pixels."""
 
 import json
 from pathlib import Path
@@ -25,17 +25,21 @@ def arm(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.mark.timeout(600)
 @pytest.mark.usefixtures("arm")
-def test_a_dataset_of_two_drivers_has_the_kept_episodes_alone_and_each_picture_shows_its_rows_event(
+def test_a_dataset_of_people_and_a_policy_has_the_kept_episodes_alone_and_each_picture_shows_its_rows_event(
     tmp_path: Path,
 ) -> None:
     done = CliRunner().invoke(app, [*FEW, "--keep", str(tmp_path), "--json", "-"])
     assert done.exit_code == 0, done.output
     figures = json.loads(done.stdout)
     assert (figures["episodes"], figures["kept"], figures["discarded"], figures["redone"]) == (3, 2, 1, 1)
+    assert [each["drivers"] for each in figures["runs"] if each["kept"]] == [["Grace"], ["net", "Grace", "net"]]
+    assert (figures["with_policy"], figures["corrections"]) == (1, 1)
     dataset = figures["dataset"]
     assert len(dataset["rows"]) == 2
     assert min(dataset["rows"]) > 5
     assert dataset["pictures"] == 2 * sum(dataset["rows"])
+    assert dataset["policy"] > 10
+    assert dataset["interventions"] > 5
     assert (dataset["unreadable"], dataset["outside"], dataset["mislabelled"]) == (0, 0, 0)
     root = tmp_path / "dataset"
     assert look(root).ok

@@ -1,6 +1,7 @@
-"""The example of a policy, in short: one episode to learn from, one that it drives, corrected twice."""
+"""The example of a policy: in short, with one episode to learn from and one that is corrected, and as a whole."""
 
 import asyncio
+import json
 import re
 import sys
 from pathlib import Path
@@ -8,7 +9,9 @@ from pathlib import Path
 import pytest
 
 from lockstep.bench.pick_place.judge import judge
+from lockstep.server.recording.export import export_lerobot
 from lockstep.server.recording.report.page import session_page
+from lockstep.server.recording.verify.verify_dataset import verify_dataset
 from tests.client.test_policies import policy_link
 from tests.robot_bridge.robots.so101.driver import MODEL_FOLDER
 from tests.support.stack import running_stack
@@ -22,30 +25,54 @@ SETTINGS = {
 }
 
 
-@pytest.mark.timeout(240)
-async def test_a_policy_learns_drives_and_is_corrected_twice(tmp_path: Path) -> None:
+async def said_by(folder: Path, *options: str) -> str:
+    """Run the script beside a console and an arm; return what it printed."""
     if not (MODEL_FOLDER / ".installed").is_file():
         pytest.skip("the model of the SO-101 is not here; `make test` fetches it")
-    async with running_stack(tmp_path, robot="so101", settings=SETTINGS) as stack:
+    async with running_stack(folder, robot="so101", settings=SETTINGS) as stack:
         command = [sys.executable, str(SCRIPT), stack.operator, await policy_link(stack, "net")]
-        command += ["--recordings", str(tmp_path), "--episodes", "1"]
+        command += ["--recordings", str(folder), *options]
         script = await asyncio.create_subprocess_exec(
             *command, stdout=asyncio.subprocess.PIPE, stderr=asyncio.subprocess.STDOUT
         )
         said, _ = await script.communicate()
     assert script.returncode == 0, said.decode()
+    return said.decode()
+
+
+@pytest.mark.timeout(300)
+async def test_a_policy_learns_drives_is_corrected_and_learns_of_the_correction(tmp_path: Path) -> None:
+    said = await said_by(tmp_path, "--episodes", "1", "--trials", "0", "--corrections", "1")
+    assert "corrected once in each of 1 episodes: 1 in the bowl" in said
+    assert "it learns again, from 2 episodes" in said
     recordings = sorted(await asyncio.to_thread(lambda: list(tmp_path.rglob("*.mcap"))))
     assert len(recordings) == 2
+    roots = await asyncio.to_thread(export_lerobot.export_all, recordings, tmp_path / "dataset", "")
+    verdict = await asyncio.to_thread(verify_dataset, roots[0])
+    assert verdict.ok, "the demonstration and the corrected episode are one dataset"
+    notes = json.loads((roots[0] / "meta" / "lockstep.json").read_text())
+    assert [each["outcome"] for each in notes["episodes"]] == ["success", "success"]
     judged = judge(recordings[1])
     assert judged.verdict.ok
     assert 0 < judged.step <= 1, "no joint jumps, not where the robot changes hands either"
     learned, driven = [await asyncio.to_thread(told_of_policies, each) for each in recordings]
     assert learned == ""
-    assert re.search(r"2 interventions in [\d.]+ minutes of .* policy drove: [\d.]+ a minute", driven)
+    assert re.search(r"1 interventions in [\d.]+ minutes of .* policy drove: [\d.]+ a minute", driven)
     assert re.search(r"nearest neighbour policy \d+ [\d.]+ 0 0 ", driven)
-    assert re.search(r"Grace human \d+ [\d.]+ 2 \d+ ", driven)
+    assert re.search(r"Grace human \d+ [\d.]+ 1 \d+ ", driven)
     assert "policy nearest neighbour corrected 1 0 0 100 %" in driven
     assert re.search(r"nearest neighbour \d+ (in time|\w).* [1-9]\d* \d+ %", driven), "the shadow beside a person"
+
+
+@pytest.mark.long
+@pytest.mark.timeout(3000)
+async def test_a_policy_learns_from_ten_episodes_and_again_from_two_corrected_ones(tmp_path: Path) -> None:
+    said = await said_by(tmp_path, "--trials", "1")
+    assert said.count(": in the bowl") == 10
+    assert "corrected once in each of 2 episodes: 2 in the bowl" in said
+    assert "it learns again, from 12 episodes" in said
+    assert re.search(r"before any correction: 1 of 1 from", said), "from where it was shown"
+    assert re.search(r"after the corrections: 1 of 1 from", said)
 
 
 def told_of_policies(recording: Path) -> str:

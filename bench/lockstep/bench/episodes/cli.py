@@ -1,4 +1,4 @@
-"""`python -m lockstep.bench.episodes`: episodes of the SO-101 by two drivers, and a look at their dataset's pixels.
+"""`python -m lockstep.bench.episodes`: episodes of the SO-101 by two people and a policy, and their dataset's pixels.
 
 Needs the arm's model: lockstep robot fetch so101.
 """
@@ -74,19 +74,23 @@ def _faults(names: list[str]) -> list[FaultName]:
 def _table(figures: dict[str, Any]) -> str:
     lines = [
         "",
-        "| no. | driver | became | s | rows | left out | problems |",
-        "|--:|---|---|--:|--:|--:|---|",
+        "| no. | drivers | became | s | offers | corrections | rows | left out | problems |",
+        "|--:|---|---|--:|--:|--:|--:|--:|---|",
     ]
     for each in figures["runs"]:
         lines.append(
             f"| {each['number']} | {', '.join(each['drivers'])} | {each['fate']} | {each['seconds']} | "
-            f"{each['rows']} | {each['left_out']} | {'; '.join(each['problems'])} |"
+            f"{each['offers']} | {each['corrections']} | {each['rows']} | {each['left_out']} | "
+            f"{'; '.join(each['problems'])} |"
         )
     dataset = figures["dataset"]
     lines.append(
         f"{figures['network'] or 'no network'}: {figures['episodes']} episodes, {figures['discarded']} discarded, "
-        f"{figures['redone']} redone, {figures['kept']} kept; dataset: {len(dataset.get('rows', []))} episodes, "
-        f"{sum(dataset.get('rows', []))} rows, {dataset.get('pictures', 0)} pictures, "
+        f"{figures['redone']} redone, {figures['kept']} kept, a policy drove in "
+        f"{figures['with_policy']} and was corrected {figures['corrections']} times; "
+        f"dataset: {len(dataset.get('rows', []))} episodes, "
+        f"{sum(dataset.get('rows', []))} rows ({dataset.get('policy', 0)} of the policy, "
+        f"{dataset.get('interventions', 0)} interventions), {dataset.get('pictures', 0)} pictures, "
         f"{dataset.get('unreadable', 0)} unreadable, {dataset.get('outside', 0)} outside of the tolerance of "
         f"{dataset.get('tolerance', 0)} events, pictures by gap {dataset.get('gaps', {})}"
     )

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
+from lockstep.bench.episodes.turns import Span, Turn, differences
 from lockstep.bench.harness.stack import LOCKSTEP
 
 __all__ = ["Kept", "export", "judged", "verify"]
@@ -17,13 +18,14 @@ SUCCESS: Final = {"success": 1, "failure": 0, "": -1}
 
 
 class Kept(NamedTuple):
-    """An episode that has to be in the dataset, as its driver saw it."""
+    """An episode that has to be in the dataset, as its drivers saw it."""
 
     episode: str  # id
     outcome: str
     first_event: int  # in the console's state when it began
     last_event: int  # of the last command in it that was answered
-    drivers: frozenset[str]
+    turns: tuple[Turn, ...]
+    person: str  # who began it
 
 
 async def export(recordings: Sequence[Path], root: Path) -> str:
@@ -56,12 +58,8 @@ async def judged(root: Path, kept: Sequence[Kept]) -> dict[str, Any]:
     pixels["left_out"] = [each["left_out"] for each in notes["episodes"]]
     pixels["wrong"] += [] if pixels["verified"] else ["lockstep verify finds something"]
     pixels["wrong"] += list(_differences(notes["episodes"], pixels, kept))
-    pixels["expected"] = [asdict_of(each) for each in kept]
+    pixels["expected"] = [each._asdict() for each in kept]
     return pixels
-
-
-def asdict_of(kept: Kept) -> dict[str, Any]:
-    return kept._asdict() | {"drivers": sorted(kept.drivers)}
 
 
 def _differences(found: list[dict[str, Any]], pixels: dict[str, Any], kept: Sequence[Kept]) -> list[str]:
@@ -80,6 +78,6 @@ def _differences(found: list[dict[str, Any]], pixels: dict[str, Any], kept: Sequ
             wrong.append(f"episode {index} begins at {each['first_event']} and {first}, not at {own.first_event}")
         if last > each["last_event"] or each["last_event"] < own.last_event:
             wrong.append(f"episode {index} ends at {each['last_event']}, its rows at {last}, not at {own.last_event}")
-        if not pixels["rows"][index] or set(pixels["drivers"][index]) != own.drivers:
-            wrong.append(f"episode {index}: {pixels['rows'][index]} rows, driven by {pixels['drivers'][index]}")
+        spans = [Span(*each) for each in pixels["spans"][index]]
+        wrong += [f"episode {index}: {said}" for said in differences(spans, own.turns, own.person)]
     return wrong

@@ -18,6 +18,7 @@ from typing import Any, Final, Literal, get_args
 
 from lockstep.bench.episodes.dataset import Kept, export, judged
 from lockstep.bench.episodes.session import drivers, visit
+from lockstep.bench.episodes.turns import Turn
 from lockstep.bench.episodes.visits import places_near
 from lockstep.bench.harness.processes import Running, started
 from lockstep.bench.harness.stack import LOCKSTEP, Bridge, running_bridge, running_console
@@ -77,7 +78,8 @@ class _Run:
         """Begin an episode and drive in it; return it as it will have to be in the dataset."""
         episode = await self.driver.episodes.start(TASK)
         first = self.state.first_event
-        return Kept(episode, "success", first, await self.drive(), frozenset({"Ada"}))
+        last = await self.drive()
+        return Kept(episode, "success", first, last, (Turn("Ada", "human", first + 1, last),), "Ada")
 
     async def keep_one(self) -> None:
         episode = await self.begun()
@@ -161,7 +163,7 @@ async def _running(fault: FaultName) -> AsyncIterator[_Run]:
             **(COUNTDOWN if fault == "kill-countdown" else NO_COUNTDOWN),
         }
         console, links = await stack.enter_async_context(running_console(bridge.address, environment=settings))
-        [driver] = await stack.enter_async_context(drivers(links["operator"], names=("Ada",), pictures=False))
+        [driver] = await stack.enter_async_context(drivers([("Ada", links["operator"])], pictures=False))
         yield _Run(fault, folder, bridge, console, driver)
 
 

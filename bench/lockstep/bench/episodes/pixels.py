@@ -15,6 +15,7 @@ from typing import Any, Final
 import av
 import pyarrow.parquet as pq
 
+from lockstep.bench.episodes.turns import Span
 from lockstep.robot_bridge.robots.event_strip import read_event_strip
 
 __all__ = ["Pixels", "look"]
@@ -36,7 +37,9 @@ class Pixels:
         gaps: pictures by their distance from the row's event
         rows: by episode of the dataset
         events: of the rows, by episode
-        drivers: names, by episode
+        policy: rows that a policy drove
+        interventions: rows that a person drove after a policy
+        spans: rows by who drove them, by episode
         wrong: what is wrong, in words; the first ones
     """
 
@@ -48,7 +51,9 @@ class Pixels:
     gaps: dict[int, int] = field(default_factory=dict)
     rows: list[int] = field(default_factory=list)
     events: list[tuple[int, int]] = field(default_factory=list)
-    drivers: list[list[str]] = field(default_factory=list)
+    policy: int = 0
+    interventions: int = 0
+    spans: list[list[Span]] = field(default_factory=list)
     wrong: list[str] = field(default_factory=list)
 
     @property
@@ -70,13 +75,15 @@ def look(root: Path) -> Pixels:
         for row, event in zip(rows, drawn, strict=False):
             found.pictures += 1
             _judge(found, gaps, camera, row, event, _stamp(row, number))
+    found.policy = sum(row["lockstep.driver_kind"] == "policy" for row in rows)
+    found.interventions = sum(bool(row["lockstep.intervention"]) for row in rows)
     found.gaps = dict(sorted(gaps.items()))
     for index in range(len(notes["episodes"])):
         mine = [row for row in rows if row["episode_index"] == index]
         events = [row["lockstep.event"] for row in mine]
         found.rows.append(len(mine))
         found.events.append((min(events), max(events)) if events else (0, 0))
-        found.drivers.append(sorted({row["lockstep.driver"] for row in mine}))
+        found.spans.append(_spans(mine))
     del found.wrong[LISTED:]
     return found
 
@@ -103,6 +110,19 @@ def _drawn(root: Path, camera: str) -> Iterator[int | None]:
         with av.open(str(path)) as video:
             for picture in video.decode(video=0):
                 yield read_event_strip(picture.to_ndarray(format="gray"))
+
+
+def _spans(rows: list[dict[str, Any]]) -> list[Span]:
+    """Return who drove the rows of an episode. A row's action is the command that answered its event."""
+    found: list[Span] = []
+    for row in rows:
+        who = row["lockstep.driver"], row["lockstep.driver_kind"], bool(row["lockstep.intervention"])
+        event = row["lockstep.event"] + 1
+        if found and found[-1][:3] == who:
+            found[-1] = found[-1]._replace(last_event=event)
+        else:
+            found.append(Span(*who, event, event))
+    return found
 
 
 def _stamp(row: dict[str, Any], camera: int) -> int:

@@ -3,11 +3,12 @@
 import random
 from typing import Final, Literal, NamedTuple
 
-__all__ = ["DRIVERS", "Fate", "Planned", "plan"]
+__all__ = ["DRIVERS", "POLICY", "Fate", "Planned", "plan"]
 
 Fate = Literal["success", "failure", "discard", "redo"]
-DRIVERS: Final = ("Ada", "Grace")
-SHARED: Final = 5  # of so many episodes one changes hands in its middle
+DRIVERS: Final = ("Ada", "Grace", "net")  # two people and a policy
+POLICY: Final = 2  # place in DRIVERS
+SHARED: Final = 2  # of so many episodes of a person one changes hands in its middle
 FAILED: Final = 4  # of so many kept ones one is a failure
 
 
@@ -16,14 +17,14 @@ class Planned(NamedTuple):
 
     Attributes:
         fate: redo: its first take is discarded, and its second one is kept as a success
-        driver: place in DRIVERS of the one who begins it
-        shared: the other one drives its second half
+        person: place in DRIVERS of who begins it
+        turns: places in DRIVERS of those who drive it, in their order; a person after the policy takes over from it
     """
 
     number: int
     fate: Fate
-    driver: int
-    shared: bool
+    person: int
+    turns: tuple[int, ...]
 
 
 def plan(times: int, discard: int, redo: int, seed: int) -> list[Planned]:
@@ -34,5 +35,22 @@ def plan(times: int, discard: int, redo: int, seed: int) -> list[Planned]:
     for number in range(times):
         kept: Fate = "failure" if number % FAILED == FAILED - 1 else "success"
         fate: Fate = "discard" if number in discarded else "redo" if number in redone else kept
-        planned.append(Planned(number, fate, number % len(DRIVERS), number % SHARED == SHARED - 1))
+        planned.append(Planned(number, fate, *_drivers(number)))
     return planned
+
+
+def _drivers(number: int) -> tuple[int, tuple[int, ...]]:
+    """Return who begins the episode of this number, and its turns: the policy drives in each third one."""
+    third, driver = divmod(number, len(DRIVERS))
+    if driver != POLICY:
+        shared = number % (SHARED * len(DRIVERS)) == driver * (len(DRIVERS) + 1)
+        return driver, (driver, 1 - driver) if shared else (driver,)
+    person = third % POLICY
+    other = 1 - person
+    ways: tuple[tuple[int, ...], ...] = (
+        (POLICY, other, POLICY),  # is corrected by somebody who did not let it drive, and gets the robot back
+        (POLICY,),
+        (person, POLICY, person, POLICY),  # follows a demonstration, and is corrected
+        (POLICY, person),  # is taken over for good
+    )
+    return person, ways[third % len(ways)]

@@ -1,4 +1,4 @@
-"""Runs it through everything real: the arm in MuJoCo, a bridge, a console that records, a network, two drivers."""
+"""Runs it through everything real: the arm in MuJoCo, a bridge, a console that records, a network, three drivers."""
 
 import asyncio
 import shutil
@@ -7,11 +7,13 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Final
 
+import httpx
+
 from lockstep.bench.episodes.dataset import export, judged
-from lockstep.bench.episodes.plan import plan
+from lockstep.bench.episodes.plan import DRIVERS, POLICY, plan
 from lockstep.bench.episodes.session import Done, Session, drivers
 from lockstep.bench.experiment.choices import media_of
-from lockstep.bench.experiment.stage import running_stage
+from lockstep.bench.experiment.stage import Stage, running_stage
 from lockstep.bench.pick_place.run import recorder_of
 from lockstep.emulator.impairment.profile import load_profile
 
@@ -20,6 +22,7 @@ __all__ = ["ROBOT", "Choices", "record_episodes"]
 ROBOT: Final = "so101"
 NO_NETWORK: Final = "perfect"
 COUNTDOWN: Final = "0.5"  # s
+LINK_SECONDS: Final = 86_400
 
 
 @dataclass(frozen=True)
@@ -51,12 +54,15 @@ async def record_episodes(choices: Choices, say: Callable[[str], None]) -> dict[
     media, through = media_of(profile), bool(choices.network)
     async with running_stage(ROBOT, profile, media, choices.seed, robot_link=through, settings=settings) as stage:
         link = stage.link if through else stage.near_link
-        async with recorder_of(stage.near_link) as recorder, drivers(link, pictures=choices.pictures) as consoles:
-            (await recorder.post("/api/recordings", json={"name": "episodes"})).raise_for_status()
-            stage.network.begin()
-            session = Session(consoles, say)
-            done = [await session.run(each) for each in planned]
-            (await recorder.post("/api/recordings/stop")).raise_for_status()
+        async with recorder_of(stage.near_link) as recorder:
+            links = [link, link, await _policy_link(recorder, stage, through=through)]
+            named = list(zip(DRIVERS, links, strict=True))
+            async with drivers(named, pictures=choices.pictures) as consoles:
+                (await recorder.post("/api/recordings", json={"name": "episodes"})).raise_for_status()
+                stage.network.begin()
+                session = Session(consoles, say)
+                done = [await session.run(each) for each in planned]
+                (await recorder.post("/api/recordings/stop")).raise_for_status()
         state = stage.event_log.parent
         recordings = sorted((state / "recordings").glob("*.mcap"))
         root = state / "dataset"
@@ -70,6 +76,13 @@ async def record_episodes(choices: Choices, say: Callable[[str], None]) -> dict[
             if root.exists():
                 await asyncio.to_thread(shutil.copytree, root, choices.keep / "dataset", dirs_exist_ok=True)
     return _figures(choices, done, dataset)
+
+
+async def _policy_link(console: httpx.AsyncClient, stage: Stage, *, through: bool) -> str:
+    """Invite the policy, as a person does on the page."""
+    asked = {"role": "policy", "name": DRIVERS[POLICY], "seconds": LINK_SECONDS}
+    link: str = (await console.post("/api/invitations", json=asked)).raise_for_status().json()["link"]
+    return stage.network.link(link) if through else link
 
 
 def _figures(choices: Choices, done: Sequence[Done], dataset: dict[str, Any]) -> dict[str, Any]:
@@ -86,6 +99,8 @@ def _figures(choices: Choices, done: Sequence[Done], dataset: dict[str, Any]) ->
         "discarded": sum(each.fate == "discard" for each in done),
         "redone": sum(each.fate == "redo" for each in done),
         "shared": sum(len(each.drivers) > 1 for each in done),
+        "with_policy": sum(DRIVERS[POLICY] in each.drivers for each in done),
+        "corrections": sum(each.corrections for each in done),
         "runs": episodes,
         "dataset": dataset,
         "ok": not dataset["wrong"],

@@ -70,6 +70,7 @@ class PickAndPlace:
 
     Attributes:
         done: the script is at its end
+        motions_done: of the nine
         failed: what went wrong; "" as long as nothing did
     """
 
@@ -82,6 +83,7 @@ class PickAndPlace:
         self._motion = next(self._motions, None)  # the present one
         self._begun: float | None = None  # s, of the robot's clock
         self._there: float | None = None
+        self.motions_done = 0
         self.failed = ""
 
     @property
@@ -109,6 +111,7 @@ class PickAndPlace:
         self._there = feedback.time if self._there is None else self._there
         if feedback.time - self._there >= PAUSE:
             self._motion = next(self._motions, None)
+            self.motions_done += 1
             self._begun = self._there = None
 
     def _where(self, motion: Motion, feedback: Feedback) -> str:
