@@ -97,7 +97,8 @@ async def test_a_list_that_took_too_long_is_tried_again_later_and_less_and_less_
                     await catalog.one("long", right)
             waits.append(now[0] - before)
         assert waits == [min(RETRY_SECONDS * 2**tries, MOST_RETRY_SECONDS) for tries in range(8)]
-        worker.answer = msgspec.json.encode(RecordingEpisodes(info=INFO, cameras=[], revision=0, changes=[], episodes=[]))
+        listed = RecordingEpisodes(info=INFO, cameras=[], revision=0, changes=[], episodes=[])
+        worker.answer = msgspec.json.encode(listed)
         now[0] += MOST_RETRY_SECONDS
         assert (await catalog.one("long", right)).info == INFO
         asked = worker.asked

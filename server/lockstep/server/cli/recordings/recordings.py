@@ -18,6 +18,7 @@ from lockstep.server.cli.options import RobotOption, StateDirOption
 from lockstep.server.evidence.anchors import parse_anchor
 from lockstep.server.evidence.signer import is_public_key
 from lockstep.server.recording.errors import RecordingError
+from lockstep.server.recording.export.unfinished import remove_stale, stale_folders
 from lockstep.server.recording.recording_store import RecordingEntry, RecordingStore
 from lockstep.server.recording.settings import recordings_directory
 from lockstep.server.recording.verify.promises import Verdict
@@ -95,10 +96,21 @@ def add_recording_commands(app: typer.Typer, make_settings: MakeSettings) -> Non
         directory: DirectoryOption = None,
         robot: RobotOption = "",
         state_dir: StateDirOption = None,
+        clean: Annotated[
+            bool, typer.Option("--clean", help="Remove what killed exports have left in the directory instead.")
+        ] = False,
         as_json: Json = False,
     ) -> None:
         """List the recordings that are complete."""
-        found = recording_store(make_settings(state_dir=state_dir), robot, directory).entries()
+        store = recording_store(make_settings(state_dir=state_dir), robot, directory)
+        if clean:
+            for path in or_usage(lambda: remove_stale(store.directory)):
+                sys.stdout.write(f"{escaped(path)}\n")
+            return
+        found = store.entries()
+        left = len(stale_folders(store.directory)) if store.directory.is_dir() else 0
+        if left:
+            _say(f"{left} exports were killed and left folders here: lockstep recordings --clean removes them")
         if as_json:
             sys.stdout.write(msgspec.json.encode(found).decode() + "\n")
             return
