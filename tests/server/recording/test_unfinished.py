@@ -60,9 +60,13 @@ def test_the_next_export_of_the_name_removes_what_a_killed_one_left_and_nothing_
 
 
 def test_an_export_that_fails_leaves_nothing(tmp_path: Path) -> None:
-    with pytest.raises(RuntimeError), unfinished(tmp_path / "data") as partial:
-        partial.mkdir()
-        raise RuntimeError
+    def fails() -> None:
+        with unfinished(tmp_path / "data") as partial:
+            partial.mkdir()
+            raise RuntimeError
+
+    with pytest.raises(RuntimeError):
+        fails()
     assert list(tmp_path.iterdir()) == []
 
 

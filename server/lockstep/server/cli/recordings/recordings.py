@@ -11,8 +11,9 @@ from typing import Annotated, Any
 import msgspec
 import typer
 
+from lockstep.protocol.console import RecordingState
 from lockstep.server.cli.access.access import MakeSettings
-from lockstep.server.cli.console_request import ask_console
+from lockstep.server.cli.console_request import ask_console, read_answer
 from lockstep.server.cli.extras import load_extra
 from lockstep.server.cli.options import RobotOption, StateDirOption
 from lockstep.server.evidence.anchors import parse_anchor
@@ -49,6 +50,12 @@ File = Annotated[Path, typer.Argument(help="A recording: its file, or its id in 
 DirectoryOption = Annotated[
     Path | None, typer.Option("--dir", help="The recordings' directory. Unset: the one in the console's settings.")
 ]
+
+
+class _Recordings(msgspec.Struct):
+    """The part of the answer of GET /api/recordings that is needed here."""
+
+    state: dict[str, Any]
 
 
 class ExportFormat(StrEnum):
@@ -89,7 +96,8 @@ def add_recording_commands(app: typer.Typer, make_settings: MakeSettings) -> Non
     @record.command("status")
     def record_status(robot: RobotOption = "", state_dir: StateDirOption = None, as_json: Json = False) -> None:
         """Say whether the session is recorded."""
-        _say_state(ask_console(make_settings(state_dir=state_dir), robot, "GET", "/api/recordings")["state"], as_json)
+        found = ask_console(make_settings(state_dir=state_dir), robot, "GET", "/api/recordings")
+        _say_state(read_answer(_Recordings, found).state, as_json)
 
     @app.command()
     def recordings(
@@ -215,13 +223,14 @@ def _verify_dataset(root: Path, as_json: bool, pixels: bool) -> None:
         raise typer.Exit(EXIT_BROKEN)
 
 
-def _say_state(state: dict[str, Any], as_json: bool) -> None:
+def _say_state(answer: dict[str, Any], as_json: bool) -> None:
+    state = read_answer(RecordingState, answer)
     if as_json:
-        sys.stdout.write(msgspec.json.encode(state).decode() + "\n")
+        sys.stdout.write(msgspec.json.encode(answer).decode() + "\n")
         return
-    words = {"off": "not recording", "failed": f"failed: {state['detail']}"}
-    running = f"recording {state['recording']}, {state['bytes'] / 1e6:.1f} MB"
-    sys.stdout.write(words.get(state["state"], running) + "\n")
+    words = {"off": "not recording", "failed": f"failed: {printable(state.detail)}"}
+    running = f"recording {printable(state.recording)}, {state.bytes / 1e6:.1f} MB"
+    sys.stdout.write(words.get(state.state, running) + "\n")
 
 
 def _state(settings: Settings) -> ConsoleState:
