@@ -65,7 +65,7 @@ class FoxgloveService:
         self._on_fault = on_fault
         self._records = SessionRecords(clock, media)
         self._takes_media = False
-        self._keyframe_wanted = False  # somebody waits for one
+        self._keyframe_wanted = False  # somebody waits for one, or pictures were dropped
         self._keyframe_at = 0.0  # s, monotonic: of the last one that was asked for
 
     def subscribe(self, events: SessionEvents) -> None:
@@ -117,6 +117,7 @@ class FoxgloveService:
                 repeated_at = now
                 server.yield_to_the_operator()
                 self._repeat(thread, times)
+            self._keyframe_wanted |= thread.lost_pictures()
             self._take_media(wanted)
             self._on_dropped(thread.dropped - told)
             told = thread.dropped
