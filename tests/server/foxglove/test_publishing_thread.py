@@ -3,9 +3,10 @@
 import threading
 from collections.abc import Iterable
 
-from lockstep.server.foxglove.publishing_thread import MAX_WAITING, PublishingThread
+from lockstep.server.foxglove.publishing_thread import PublishingThread
 from lockstep.server.recording.format.records import NoteRecord, RobotRecord
 from lockstep.server.recording.format.topics import OWN_TOPICS, Topic
+from lockstep.server.recording.writing.live_queue import MAX_ITEMS
 from lockstep.server.recording.writing.queue_items import MediaItem, OwnItem, RobotItem
 from tests.server.recording.makers import CODECS, DESCRIPTION, EPOCH, START
 from tests.waiting import PATIENCE
@@ -61,7 +62,7 @@ def test_a_server_that_holds_the_thread_up_costs_the_oldest_items_and_never_the_
         server.go.clear()
         thread.put(note("held up"))
         assert server.entered.wait(PATIENCE)
-        for number in range(MAX_WAITING):
+        for number in range(MAX_ITEMS):
             thread.put(note(f"note {number}"))
         for _ in range(10):
             thread.put(note("newer"))
@@ -74,7 +75,7 @@ def test_a_server_that_holds_the_thread_up_costs_the_oldest_items_and_never_the_
         thread.close()
     texts = b"".join(server.of(NOTE))
     assert b"note 0" not in texts
-    assert f"note {MAX_WAITING - 1}".encode() in texts
+    assert f"note {MAX_ITEMS - 1}".encode() in texts
     assert texts.count(b"newer") == 10
 
 

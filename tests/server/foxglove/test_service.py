@@ -2,6 +2,7 @@
 
 import asyncio
 import json
+from pathlib import Path
 from typing import Any
 
 import av
@@ -10,8 +11,10 @@ import pytest
 from foxglove.websocket import WebSocketServer
 from foxglove_schemas_protobuf.CompressedVideo_pb2 import CompressedVideo
 
+from lockstep.protocol.console import Seat, SeatOffer, SeatRequest, SeatTake
+from lockstep.protocol.episodes import EpisodeRequest
 from tests.server.foxglove.viewer import viewing
-from tests.server.rig import PATIENCE, Rig, running_rig
+from tests.server.rig import PATIENCE, Rig, eventually, running_rig
 
 
 async def listening(rig: Rig) -> int:
@@ -120,6 +123,45 @@ async def test_who_subscribes_to_what_another_watches_gets_the_state_too(monkeyp
             await one.next_of("/lockstep/seat")
             await other.subscribe("/lockstep/seat")
             await other.next_of("/lockstep/seat")
+
+
+async def test_a_viewer_is_told_who_drives_and_what_is_an_intervention_and_of_episodes(tmp_path: Path) -> None:
+    wanted = {
+        "foxglove": {"port": 0},
+        "recording": {"directory": tmp_path},
+        "episodes": {"countdown_seconds": 0.0},
+        "seat_timeout": 60.0,  # test peers have no heartbeat
+    }
+    async with (
+        running_rig(**wanted) as rig,
+        viewing(await listening(rig)) as viewer,
+        rig.peer("operator") as person,
+        rig.peer("policy") as policy,
+    ):
+        await viewer.subscribe("/lockstep/feedback", "/lockstep/episode")
+        await viewer.next_of("/lockstep/feedback")
+        rig.dependencies.recorder.start("", "")
+        person.send("session", SeatRequest())
+        await person.until(lambda each: isinstance(each, Seat) and each.kind == "human")
+        await eventually(lambda: rig.dependencies.recorder.state().id)
+        person.send("session", EpisodeRequest(id="1", do="start", task="push"))
+        await viewer.next_of("/lockstep/episode", lambda each: each["kind"] == "start")
+        await person.feedback()
+        await person.drive([0.0, 0.1, 0.0])
+        person.send("session", SeatOffer())
+        await policy.until(lambda each: isinstance(each, Seat) and each.offered)
+        policy.send("session", SeatRequest(only_if_free=True))
+        await policy.until(lambda each: isinstance(each, Seat) and each.kind == "policy")
+        await policy.drive([0.2, 0.0, 0.0])
+        person.send("session", SeatTake())
+        await policy.until(lambda each: isinstance(each, Seat) and each.why == "taken")
+        await person.drive([0.0, 0.1, 0.0])
+        await viewer.next_of("/lockstep/feedback", lambda each: each["intervention"])
+        person.send("session", EpisodeRequest(id="2", do="discard"))
+        await viewer.next_of("/lockstep/episode", lambda each: each["kind"] == "discarded")
+        driven = [each for each in viewer.of("/lockstep/feedback") if each["driver_kind"] != "none"]
+    spells = [(each["driver_kind"], each["intervention"]) for each in driven]
+    assert list(dict.fromkeys(spells)) == [("human", False), ("policy", False), ("human", True)]
 
 
 async def test_a_port_that_is_taken_takes_nothing_but_the_viewers_from_the_console() -> None:

@@ -1,5 +1,6 @@
 """Episodes in datasets: exactly the kept ones, each row with the picture of its own event."""
 
+import csv
 import json
 import subprocess
 import sys
@@ -15,7 +16,7 @@ import pytest
 from lockstep.protocol.serial import MAX_EVENT, event_after
 from lockstep.server.recording.episodes.edits import EpisodeEdit, EpisodeEditRefused, add_edit, edits_path
 from lockstep.server.recording.errors import RecordingDamaged
-from lockstep.server.recording.export import export_lerobot
+from lockstep.server.recording.export import export_csv, export_lerobot, export_mp4, export_parquet
 from lockstep.server.recording.export.lerobot_rows import aligned_stamps, episodes_of
 from lockstep.server.recording.format.episodes import EpisodeEntry
 from lockstep.server.recording.format.records import Degraded, EpisodeRecord
@@ -279,3 +280,34 @@ def test_a_file_of_changes_that_somebody_wrote_makes_no_discarded_episode_count(
     edits_path(path).write_text("\n".join(lines))
     (root,) = export_lerobot.export(path, tmp_path / "dataset", "")
     assert [row["lockstep.event"] for row in rows(root)] == [*range(10, 20), *range(45, 60)]
+
+
+def test_tables_and_films_say_of_each_event_which_episode_it_was_driven_in(tmp_path: Path) -> None:
+    path = recording(tmp_path / "a.mcap", *KEPT_AND_NOT)
+    with RecordingReader(path) as reader:
+        add_edit(path, episodes_of(reader), EpisodeEdit(at=1.0, by="x", episode="c", task="mop"))
+    (table,) = export_parquet.export(path, tmp_path / "a.parquet", "")
+    rows = {row["event"]: row for row in pq.read_table(table).to_pylist()}
+    names = ("episode", "episode_state", "task", "outcome")
+    said = {event: tuple(row[name] for name in names) for event, row in rows.items()}
+    a, c = ("a", "kept", "push", "success"), ("c", "kept", "mop", "failure")
+    assert [said[event] for event in (10, 11, 20, 21)] == [("", "", "", ""), a, a, ("", "", "", "")]
+    assert [said[event] for event in (26, 46, 60, 61)] == [("b", "discarded", "push", ""), c, c, ("", "", "", "")]
+    (text,) = export_csv.export(path, tmp_path / "a.csv", "")
+    with text.open(encoding="utf-8") as file:
+        assert [tuple(row[name] for name in names) for row in csv.DictReader(file)] == list(said.values())
+    (film,) = export_mp4.export(path, tmp_path / "a.mp4", "")
+    with av.open(str(film)) as shown:
+        chapters = {each["metadata"]["title"]: each for each in shown.chapters()}
+        assert next(iter(shown.decode(video=0)))
+    assert list(chapters)[0] == "no episode"
+    assert list(chapters)[1:4] == ["1: push (kept, success)", "1: push (discarded)", "1: mop (kept, failure)"]
+    first = chapters["1: push (kept, success)"]
+    seconds = [float(first[name] * first["time_base"]) for name in ("start", "end")]
+    assert seconds == pytest.approx([10 * INTERVAL / 1e9, 19 * INTERVAL / 1e9], abs=INTERVAL / 1e9)
+
+
+def test_a_recording_without_episodes_has_no_columns_of_them(tmp_path: Path) -> None:
+    path = recording(tmp_path / "a.mcap")
+    (table,) = export_parquet.export(path, tmp_path / "a.parquet", "")
+    assert "episode" not in pq.read_schema(table).names

@@ -8,8 +8,9 @@ from contextlib import suppress
 import pytest
 
 from lockstep.server.recording.format.records import NoteRecord, RobotRecord
+from lockstep.server.recording.writing.live_queue import MAX_ITEMS
 from lockstep.server.recording.writing.queue_items import Item, MediaItem, OwnItem, RobotItem
-from lockstep.server.rerun.feed import MAX_WAITING, Feed
+from lockstep.server.rerun.feed import Feed
 from tests.server.recording.makers import CODECS, DESCRIPTION, EPOCH, START
 from tests.waiting import PATIENCE
 
@@ -63,16 +64,16 @@ def test_a_process_that_does_not_read_costs_the_oldest_items_but_never_the_robot
         pass
     feed.put(ROBOT)
     feed.put(picture(1))
-    for number in range(2 * MAX_WAITING):
+    for number in range(2 * MAX_ITEMS):
         feed.put(note(f"{number}"))
-    assert feed.dropped == MAX_WAITING + 2
-    assert feed.dropped_media
+    assert feed.dropped == MAX_ITEMS + 2
+    assert feed.lost_pictures()
     feed.close()
     first, robot, *rest = taken(reading)
     feed.join()
     assert isinstance(first, MediaItem)
     assert robot == ROBOT
-    assert rest == [note(f"{number}") for number in range(MAX_WAITING, 2 * MAX_WAITING)]
+    assert rest == [note(f"{number}") for number in range(MAX_ITEMS, 2 * MAX_ITEMS)]
     assert feed.blocked_for(1e9) == 0
 
 

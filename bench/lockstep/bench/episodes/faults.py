@@ -232,9 +232,8 @@ async def _kill_export(run: _Run) -> None:
     run.said.append("export killed")
     if root.exists():
         run.wrong.append("a killed export has left a dataset")
-    for half in run.folder.glob(".dataset.partial-*"):
-        run.said.append("its unfinished files stay in a hidden folder")
-        await asyncio.to_thread(shutil.rmtree, half)
+    if list(run.folder.glob(".dataset.partial-*")):
+        run.said.append("its unfinished files stay in a hidden folder, which the next export removes")
 
 
 async def _disk(run: _Run) -> None:

@@ -2,9 +2,10 @@
 
 import ssl
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 from urllib.parse import parse_qs, urlsplit
 
+import msgspec
 import typer
 
 from lockstep.server.cli.console_address import read_address
@@ -15,10 +16,12 @@ from lockstep.server.state.persistent_state import open_state
 from lockstep.server.util.display_names import escaped
 from lockstep.server.util.state_dir import StateDirUnusable
 
-__all__ = ["ask_by_link", "ask_console"]
+__all__ = ["ask_by_link", "ask_console", "read_answer"]
 
 EXIT_USAGE = 2
 HTTP_SECONDS = 30.0
+
+Answer = TypeVar("Answer", bound=msgspec.Struct)
 
 
 def ask_console(
@@ -69,6 +72,18 @@ def ask_by_link(link: str, tls_ca: Path | None, robot: str, method: str, path: s
     except (OSError, ssl.SSLError) as error:
         raise _usage(f"{tls_ca} is no certificate: {error}") from error
     return _ask(f"{base}{ROBOTS}/{robot}" if robot else base, token, verify, method, path, None)
+
+
+def read_answer(kind: type[Answer], answer: dict[str, Any]) -> Answer:
+    """Return the fields of an answer: every command reads answers by this, and indexes none.
+
+    Raises:
+        typer.Exit: it is not the answer of a console; it has been said why.
+    """
+    try:
+        return msgspec.convert(answer, kind)
+    except msgspec.ValidationError as error:
+        raise _usage(f"the answer is not one of a console: {error}") from error
 
 
 def _ask(

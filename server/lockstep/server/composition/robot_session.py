@@ -148,18 +148,18 @@ async def _session(
         further_news=notices.for_newcomers,
     )
     has_ended = context.state.invitations.has_ended
-    episodes = _episodes(settings, clock, recorder, media, console, seat, has_ended, peers, trail)
+    episodes = _episodes(settings, clock, events, recorder, media, console, seat, has_ended, peers, trail)
     states.append(episodes.state)
     media.robot_encoding.ask_by(console.robot.ask_for_encoding)
     SessionMetrics(metrics).subscribe(events)
     SessionAudit(trail).subscribe(events)
     notices.subscribe(events)
     recorder.subscribe(events)
-    episodes.subscribe(events)
     if foxglove is not None:
         foxglove.subscribe(events)
     if rerun is not None:
         rerun.subscribe(events)
+    episodes.subscribe(events)  # behind those who write: what an event does to an episode follows that event
     if scene is not None:
         scene.subscribe(events)
     revocation = TokenRevocation(context.state.invitations, peers, trail, silence, robot)
@@ -238,6 +238,7 @@ def _dial_in(settings: Settings, context: ConsoleContext, directory: StateDir) -
 def _episodes(
     settings: Settings,
     clock: EventClock,
+    events: SessionEvents,
     recorder: Recorder,
     media: MediaHub,
     console: Console,
@@ -262,6 +263,7 @@ def _episodes(
         settings.episodes,
         settings.recording,
         clock,
+        events,
         recorder,
         media.recorded_codecs,
         console.robot,

@@ -2,17 +2,16 @@
 
 import threading
 import time
-from collections import deque
 from collections.abc import Callable, Iterable
 from typing import Protocol
 
 from lockstep.server.recording.format.stamp import STAMP_TOPIC, stamp_message
 from lockstep.server.recording.format.topics import LOG, Topic, topics_of
+from lockstep.server.recording.writing.live_queue import LiveQueue
 from lockstep.server.recording.writing.queue_items import FeedbackItem, Item, MediaItem, RobotItem, entries_of
 
 __all__ = ["PublishingThread", "TopicServer"]
 
-MAX_WAITING = 512  # items, about 2 s
 DRAIN_SECONDS = 0.02  # between two looks at the queue: nobody is woken for each item
 
 
@@ -26,23 +25,21 @@ class TopicServer(Protocol):
 class PublishingThread:
     """Publishes items as the records that a recording has, and stamps. `put` from the loop at any rate.
 
-    A full queue drops its oldest item, and counts it: viewers want the newest. An item that cannot be encoded is left
-    out.
+    A full queue drops its oldest items, and counts them: viewers want the newest. An item that cannot be encoded is
+    left out.
 
     Attributes:
         watched: whether anybody subscribed; if not, the topics are offered, and nothing is encoded
-        dropped: number of dropped items
         repeats: whether the items that are put now are no news: then /log has no line of them
     """
 
     def __init__(self, server: TopicServer, on_fault: Callable[[Exception], None]) -> None:
         """`on_fault` is called from the thread."""
         self.watched = False
-        self.dropped = 0
         self.repeats = False
         self._server = server
         self._on_fault = on_fault
-        self._waiting: deque[tuple[Item, bool]] = deque(maxlen=MAX_WAITING)
+        self._waiting = LiveQueue()
         self._robot: RobotItem | None = None  # the newest, which no full queue drops
         self._offered: RobotItem | None = None  # the one whose topics are offered
         self._news = threading.Event()
@@ -58,10 +55,18 @@ class PublishingThread:
             self._robot = item
         elif not self.watched:
             return
-        if len(self._waiting) == MAX_WAITING:
-            self.dropped += 1
-        self._waiting.append((item, self.repeats))
+        self._waiting.put(item, repeats=self.repeats)
         self._news.set()
+
+    @property
+    def dropped(self) -> int:
+        """The number of items that were dropped."""
+        return self._waiting.dropped
+
+    def lost_pictures(self) -> bool:
+        """Return whether a picture or sound was dropped since the last call."""
+        lost, self._waiting.dropped_media = self._waiting.dropped_media, False
+        return lost
 
     def close(self) -> None:
         """End, without the waiting items. Blocks; idempotent."""
@@ -75,8 +80,11 @@ class PublishingThread:
             self._news.wait()
             self._news.clear()
             for _ in range(len(self._waiting)):
+                taken = self._waiting.take()
+                if taken is None:
+                    break
                 try:
-                    self._publish(*self._waiting.popleft())
+                    self._publish(*taken)
                 except Exception as error:
                     self._on_fault(error)
                 time.sleep(0)  # the loop goes first

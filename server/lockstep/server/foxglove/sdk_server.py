@@ -45,7 +45,6 @@ class SdkServer:
             message_backlog_size=BACKLOG,
         )
         self.port = self._server.port
-        _yield_to_the_operator()
 
     def advertise(self, topics: Iterable[Topic]) -> None:
         """Offer exactly these topics. Channels of topics that stay are kept, with their subscriptions."""
@@ -70,19 +69,20 @@ class SdkServer:
         """Return the topics that somebody is subscribed to. May be called from any thread."""
         return frozenset(name for name, (_, channel) in list(self._channels.items()) if channel.has_sinks())
 
+    def yield_to_the_operator(self) -> None:
+        """Lower the priority of the SDK's own threads, where the system has one for each: a viewer that floods the
+        server takes the time that others leave.
+
+        Call it again while somebody subscribes: a thread is known by its name, which it gets only when it first runs.
+        """
+        for task in Path("/proc/self/task").glob("*"):
+            with suppress(OSError, AttributeError):  # it has just ended; or the system has no such priorities
+                if (task / "comm").read_text().startswith(SDK_THREADS):
+                    os.setpriority(os.PRIO_PROCESS, int(task.name), NICE)
+
     def stop(self) -> None:
         """Close the connections and the socket. Blocks for a moment; idempotent."""
         self._server.stop()
         for _, channel in self._channels.values():
             channel.close()
         self._channels.clear()
-
-
-def _yield_to_the_operator() -> None:
-    """Lower the priority of the SDK's own threads, where the system has one for each: a viewer that floods the server
-    takes the time that others leave.
-    """
-    for task in Path("/proc/self/task").glob("*"):
-        with suppress(OSError, AttributeError):  # it has just ended; or the system has no such priorities
-            if (task / "comm").read_text().startswith(SDK_THREADS):
-                os.setpriority(os.PRIO_PROCESS, int(task.name), NICE)

@@ -4,6 +4,7 @@ import asyncio
 import time
 from collections.abc import Callable
 from contextlib import suppress
+from typing import TYPE_CHECKING
 
 import structlog
 
@@ -15,6 +16,9 @@ from lockstep.server.media.frame_takers import TakenMedia
 from lockstep.server.recording.times import RecordClock
 from lockstep.server.recording.writing.session_records import SessionRecords
 from lockstep.server.session_events import SessionEvents
+
+if TYPE_CHECKING:
+    from lockstep.server.foxglove.sdk_server import SdkServer
 
 __all__ = ["FoxgloveService"]
 
@@ -61,7 +65,7 @@ class FoxgloveService:
         self._on_fault = on_fault
         self._records = SessionRecords(clock, media)
         self._takes_media = False
-        self._keyframe_wanted = False  # somebody waits for one
+        self._keyframe_wanted = False  # somebody waits for one, or pictures were dropped
         self._keyframe_at = 0.0  # s, monotonic: of the last one that was asked for
 
     def subscribe(self, events: SessionEvents) -> None:
@@ -91,7 +95,7 @@ class FoxgloveService:
             self.port = server.port
             self.listening.set()
             log.info("Foxglove server", address=f"ws://{self._settings.host}:{server.port}")
-            await self._serve(thread, server.subscribed)
+            await self._serve(thread, server)
         finally:
             self._records.end()
             self._media.record(None, self._keyframe_seconds)
@@ -100,18 +104,20 @@ class FoxgloveService:
             self.port = 0
             await asyncio.shield(asyncio.to_thread(_close, thread, server.stop))
 
-    async def _serve(self, thread: PublishingThread, subscribed: Callable[[], frozenset[str]]) -> None:
+    async def _serve(self, thread: PublishingThread, server: "SdkServer") -> None:
         times = RecordClock(time.time_ns(), time.monotonic_ns())
         subscriptions = Subscriptions()
         self._repeat(thread, times)  # the topics are offered before anybody comes
         repeated_at, told = time.monotonic(), 0
         while True:
             await asyncio.sleep(LOOK_SECONDS)
-            wanted, now = subscriptions.look(subscribed()), time.monotonic()
+            wanted, now = subscriptions.look(server.subscribed()), time.monotonic()
             thread.watched = wanted.any
             if wanted.newcomer or (wanted.any and now - repeated_at >= REPEAT_SECONDS):
                 repeated_at = now
+                server.yield_to_the_operator()
                 self._repeat(thread, times)
+            self._keyframe_wanted |= thread.lost_pictures()
             self._take_media(wanted)
             self._on_dropped(thread.dropped - told)
             told = thread.dropped

@@ -4,13 +4,12 @@ import os
 import pickle
 import threading
 import time
-from collections import deque
 
-from lockstep.server.recording.writing.queue_items import Item, MediaItem, RobotItem
+from lockstep.server.recording.writing.live_queue import LiveQueue
+from lockstep.server.recording.writing.queue_items import Item, RobotItem
 
 __all__ = ["LENGTH", "Feed"]
 
-MAX_WAITING = 512  # items, about 2 s
 DRAIN_SECONDS = 0.02  # between two looks at the queue: nobody is woken for each item
 LENGTH = 4  # bytes, big-endian, before each item
 
@@ -18,23 +17,18 @@ LENGTH = 4  # bytes, big-endian, before each item
 class Feed:
     """Writes items to a pipe. `put` from the loop at any rate.
 
-    A full queue drops its oldest item, and counts it. A process that does not read blocks this thread alone.
+    A full queue drops its oldest items, and counts them. A process that does not read blocks this thread alone.
 
     Attributes:
-        dropped: number of dropped items
-        dropped_media: whether a picture or sound was dropped since somebody last set this to False
         broken: set when the process has closed its end
     """
 
     def __init__(self, pipe: int) -> None:
         """`pipe`: the descriptor to write to, which the feed closes."""
-        self.dropped = 0
-        self.dropped_media = False
         self.broken = threading.Event()
         self._pipe = pipe
-        self._waiting: deque[Item] = deque(maxlen=MAX_WAITING)
+        self._waiting = LiveQueue()
         self._robot: RobotItem | None = None  # the newest: without it nothing can be logged
-        self._robot_dropped = False
         self._since: float | None = None  # s, monotonic: of the write that goes on
         self._news = threading.Event()
         self._closing = threading.Event()
@@ -45,15 +39,20 @@ class Feed:
 
     def put(self, item: Item) -> None:
         """Queue an item without blocking."""
-        if len(self._waiting) == MAX_WAITING:
-            self.dropped += 1
-            oldest = self._waiting.popleft()
-            self.dropped_media |= isinstance(oldest, MediaItem)
-            self._robot_dropped |= isinstance(oldest, RobotItem)
+        self._waiting.put(item)
         if isinstance(item, RobotItem):
-            self._robot, self._robot_dropped = item, False
-        self._waiting.append(item)
+            self._robot, self._waiting.dropped_robot = item, False
         self._news.set()
+
+    @property
+    def dropped(self) -> int:
+        """The number of items that were dropped."""
+        return self._waiting.dropped
+
+    def lost_pictures(self) -> bool:
+        """Return whether a picture or sound was dropped since the last call."""
+        lost, self._waiting.dropped_media = self._waiting.dropped_media, False
+        return lost
 
     def blocked_for(self, now: float) -> float:
         """Return for how many seconds the process has taken nothing of a write."""
@@ -79,10 +78,13 @@ class Feed:
                 self._news.clear()
                 ending = self._closing.is_set()
                 for _ in range(len(self._waiting)):
-                    if self._robot_dropped and self._robot is not None:
-                        self._robot_dropped = False
+                    if self._waiting.dropped_robot and self._robot is not None:
+                        self._waiting.dropped_robot = False
                         self._write(self._robot)
-                    self._write(self._waiting.popleft())
+                    taken = self._waiting.take()
+                    if taken is None:
+                        break
+                    self._write(taken[0])
                     time.sleep(0)  # the loop goes first
                 if ending:
                     break

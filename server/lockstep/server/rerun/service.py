@@ -84,8 +84,8 @@ class RerunService:
                 now = time.monotonic()
                 self._on_dropped(feed.dropped - told)
                 told = feed.dropped
-                if feed.dropped_media and now - keyframe_at >= KEYFRAME_SECONDS:
-                    feed.dropped_media, keyframe_at = False, now
+                if now - keyframe_at >= KEYFRAME_SECONDS and feed.lost_pictures():
+                    keyframe_at = now
                     self._media.request_keyframes()
                 if feed.blocked_for(now) > BLOCKED_SECONDS:
                     log.warning("Rerun takes nothing", seconds=BLOCKED_SECONDS)

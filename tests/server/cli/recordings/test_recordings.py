@@ -11,6 +11,7 @@ from typer.testing import CliRunner, Result
 
 from lockstep.server.cli.main import app
 from lockstep.server.evidence.signer import Signer
+from lockstep.server.recording.export.unfinished import LOCK
 from lockstep.server.recording.format.signature import RecordingSigning
 from tests.server.recording.makers import Story
 
@@ -158,3 +159,13 @@ def test_the_name_of_a_file_writes_no_line_of_its_own_and_commands_no_terminal(
         bad = good
     assert "\x1b" not in bad.output
     assert not any(line.startswith("ok    forged") for line in bad.output.splitlines())
+
+
+def test_what_killed_exports_left_is_named_and_removed_on_demand(directory: Path) -> None:
+    left = directory / ".one.lerobot.partial-ab12"
+    left.mkdir()
+    (left / LOCK).touch()
+    assert "--clean" in _lockstep(directory, "recordings").output
+    assert _lockstep(directory, "recordings", "--clean").stdout == f"{left}\n"
+    assert not left.exists()
+    assert _lockstep(directory, "recordings").output.startswith("one ")

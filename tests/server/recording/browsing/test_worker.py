@@ -106,11 +106,11 @@ async def test_a_process_that_dies_or_hangs_costs_one_job_and_the_next_gets_anot
     pid = worker.pid
     assert pid is not None
     os.kill(pid, signal.SIGKILL)
-    with pytest.raises(RecordingUnreadable, match="has failed"):
+    with pytest.raises(RecordingFailed, match="has failed"):
         await worker.ask(picture(path), SECONDS)
     assert await worker.ask(picture(path), SECONDS)
     assert worker.pid != pid
-    with pytest.raises(RecordingUnreadable, match="too long"):
+    with pytest.raises(RecordingFailed, match="too long"):
         await worker.ask(picture(path), 0.0)
     assert worker.pid is None
     assert await worker.ask(picture(path), SECONDS)
@@ -139,6 +139,6 @@ async def test_only_so_many_jobs_wait_and_closing_ends_the_process() -> None:
         await worker.ask(ListEpisodes("x"), SECONDS)
     await worker.close()
     first, second = await asyncio.gather(*waiting, return_exceptions=True)
-    assert isinstance(first, RecordingUnreadable)
+    assert isinstance(first, RecordingFailed)
     assert isinstance(second, ShuttingDown)
     assert worker.pid is None

@@ -143,6 +143,23 @@ def test_nothing_waits_for_a_disk_that_is_too_slow_and_what_is_missing_is_told(
         assert b'"lost":21' in next(iter(reader.records(topics={"/lockstep/degraded"}))).data
 
 
+def test_large_pictures_fill_the_queue_before_their_number_does(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(writer_thread, "MAX_BYTES", 1_000_000)
+    made = Made(tmp_path)
+    made.robot()
+    for event in range(1, 21):
+        made.picture(event, 100_000)
+    assert made.thread.lost == 11
+    assert 0.9 < made.thread.waiting <= 1.0
+    made.thread.start()
+    made.thread.close()
+    assert made.thread.waiting == 0.0
+    with RecordingReader(tmp_path / "r.mcap") as reader:
+        assert reader.index.lost == 11
+
+
 def test_a_disk_that_is_too_slow_loses_marks_and_neither_begin_nor_end_of_an_episode(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -5,24 +5,22 @@ import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated, Any, TypeVar
+from typing import Annotated, Any
 
 import msgspec
 import typer
 
 from lockstep.server.cli.access.access import MakeSettings
-from lockstep.server.cli.console_request import ask_by_link, ask_console
+from lockstep.server.cli.console_request import ask_by_link, ask_console, read_answer
 from lockstep.server.cli.options import RobotOption, StateDirOption
 from lockstep.server.util.display_names import escaped, printable
 
 __all__ = ["add_pairing_commands"]
 
 EXIT_UNPAIRED = 1
-EXIT_USAGE = 2
 LOOK_SECONDS = 1.0
 
 Ask = Callable[[str, str], dict[str, Any]]
-Answer = TypeVar("Answer", bound=msgspec.Struct)
 Link = Annotated[
     str,
     typer.Option(
@@ -51,7 +49,7 @@ class _Pairing(msgspec.Struct):
 
 
 class _DialIn(msgspec.Struct):
-    """The answer of GET /api/dial-in."""
+    """The answer of GET /api/dial-in, and of what changes it."""
 
     key: str
     pairing: _Pairing
@@ -82,10 +80,12 @@ def add_pairing_commands(app: typer.Typer, make_settings: MakeSettings) -> None:
         """Open a code by which one robot pairs with the console, and print the command for the robot's computer."""
         ask = asking(link, tls_ca, robot, state_dir)
         if withdraw:
-            _print(ask("DELETE", "/api/dial-in/code"), as_json, "the code is withdrawn")
+            found = ask("DELETE", "/api/dial-in/code")
+            read_answer(_DialIn, found)
+            _print(found, as_json, "the code is withdrawn")
             return
         answer = ask("POST", "/api/dial-in/code")
-        made = _as(_Code, answer)
+        made = read_answer(_Code, answer)
         _print(answer, as_json, printable(made.command))
         typer.echo(f"lockstep: the code is good once, for {made.seconds:.0f} s and {made.tries} tries", err=True)
         if wait and not _is_paired(ask):
@@ -101,6 +101,7 @@ def add_pairing_commands(app: typer.Typer, make_settings: MakeSettings) -> None:
     ) -> None:
         """Forget the paired robot: its links end at once, and it does not come in again."""
         found = asking(link, tls_ca, robot, state_dir)("DELETE", "/api/dial-in/robot")
+        read_answer(_DialIn, found)
         _print(found, as_json, "the robot is forgotten")
 
 
@@ -108,7 +109,7 @@ def _is_paired(ask: Ask) -> bool:
     """Wait until a robot has used the code, or the code has ended. Says of robots that are refused meanwhile."""
     said = ""
     while True:
-        found = _as(_DialIn, ask("GET", "/api/dial-in"))
+        found = read_answer(_DialIn, ask("GET", "/api/dial-in"))
         if found.key == "paired":
             typer.echo(f"lockstep: {escaped(found.robot)} is paired", err=True)
             return True
@@ -119,15 +120,6 @@ def _is_paired(ask: Ask) -> bool:
             typer.echo("lockstep: no robot was paired: the code has ended", err=True)
             return False
         time.sleep(LOOK_SECONDS)
-
-
-def _as(kind: type[Answer], answer: dict[str, Any]) -> Answer:
-    """Return the answer's fields. Raises typer.Exit: it is not one of a console."""
-    try:
-        return msgspec.convert(answer, kind)
-    except msgspec.ValidationError as error:
-        typer.echo(f"lockstep: the answer is not one of a console: {escaped(str(error))}", err=True)
-        raise typer.Exit(EXIT_USAGE) from error
 
 
 def _print(answer: dict[str, Any], as_json: bool, words: str) -> None:

@@ -11,13 +11,15 @@ from typing import Annotated, Any
 import msgspec
 import typer
 
+from lockstep.protocol.console import RecordingState
 from lockstep.server.cli.access.access import MakeSettings
-from lockstep.server.cli.console_request import ask_console
+from lockstep.server.cli.console_request import ask_console, read_answer
 from lockstep.server.cli.extras import load_extra
 from lockstep.server.cli.options import RobotOption, StateDirOption
 from lockstep.server.evidence.anchors import parse_anchor
 from lockstep.server.evidence.signer import is_public_key
 from lockstep.server.recording.errors import RecordingError
+from lockstep.server.recording.export.unfinished import remove_stale, stale_folders
 from lockstep.server.recording.recording_store import RecordingEntry, RecordingStore
 from lockstep.server.recording.settings import recordings_directory
 from lockstep.server.recording.verify.promises import Verdict
@@ -48,6 +50,12 @@ File = Annotated[Path, typer.Argument(help="A recording: its file, or its id in 
 DirectoryOption = Annotated[
     Path | None, typer.Option("--dir", help="The recordings' directory. Unset: the one in the console's settings.")
 ]
+
+
+class _Recordings(msgspec.Struct):
+    """The part of the answer of GET /api/recordings that is needed here."""
+
+    state: dict[str, Any]
 
 
 class ExportFormat(StrEnum):
@@ -88,17 +96,29 @@ def add_recording_commands(app: typer.Typer, make_settings: MakeSettings) -> Non
     @record.command("status")
     def record_status(robot: RobotOption = "", state_dir: StateDirOption = None, as_json: Json = False) -> None:
         """Say whether the session is recorded."""
-        _say_state(ask_console(make_settings(state_dir=state_dir), robot, "GET", "/api/recordings")["state"], as_json)
+        found = ask_console(make_settings(state_dir=state_dir), robot, "GET", "/api/recordings")
+        _say_state(read_answer(_Recordings, found).state, as_json)
 
     @app.command()
     def recordings(
         directory: DirectoryOption = None,
         robot: RobotOption = "",
         state_dir: StateDirOption = None,
+        clean: Annotated[
+            bool, typer.Option("--clean", help="Remove what killed exports have left in the directory instead.")
+        ] = False,
         as_json: Json = False,
     ) -> None:
         """List the recordings that are complete."""
-        found = recording_store(make_settings(state_dir=state_dir), robot, directory).entries()
+        store = recording_store(make_settings(state_dir=state_dir), robot, directory)
+        if clean:
+            for path in or_usage(lambda: remove_stale(store.directory)):
+                sys.stdout.write(f"{escaped(path)}\n")
+            return
+        found = store.entries()
+        left = len(stale_folders(store.directory)) if store.directory.is_dir() else 0
+        if left:
+            _say(f"{left} exports were killed and left folders here: lockstep recordings --clean removes them")
         if as_json:
             sys.stdout.write(msgspec.json.encode(found).decode() + "\n")
             return
@@ -203,13 +223,14 @@ def _verify_dataset(root: Path, as_json: bool, pixels: bool) -> None:
         raise typer.Exit(EXIT_BROKEN)
 
 
-def _say_state(state: dict[str, Any], as_json: bool) -> None:
+def _say_state(answer: dict[str, Any], as_json: bool) -> None:
+    state = read_answer(RecordingState, answer)
     if as_json:
-        sys.stdout.write(msgspec.json.encode(state).decode() + "\n")
+        sys.stdout.write(msgspec.json.encode(answer).decode() + "\n")
         return
-    words = {"off": "not recording", "failed": f"failed: {state['detail']}"}
-    running = f"recording {state['recording']}, {state['bytes'] / 1e6:.1f} MB"
-    sys.stdout.write(words.get(state["state"], running) + "\n")
+    words = {"off": "not recording", "failed": f"failed: {printable(state.detail)}"}
+    running = f"recording {printable(state.recording)}, {state.bytes / 1e6:.1f} MB"
+    sys.stdout.write(words.get(state.state, running) + "\n")
 
 
 def _state(settings: Settings) -> ConsoleState:

@@ -4,6 +4,7 @@ Closed files are read by the worker process; the answers are kept, up to a bound
 Of the file that is being written this process has the index. Nothing here waits for a slow file longer than a bound.
 """
 
+import math
 import time
 from collections import OrderedDict
 from collections.abc import Awaitable, Callable
@@ -19,6 +20,7 @@ from lockstep.server.errors import (
     EditRefused,
     NotAllowed,
     NotFound,
+    RecordingFailed,
     RecordingUnreadable,
     StaleEdit,
     TooManyRequests,
@@ -46,6 +48,7 @@ MAX_PICTURE_BYTES = 24 * 1024 * 1024
 LIST_SECONDS = 20.0  # for one file; an interrupted one is read as a whole
 PICTURE_SECONDS = 10.0
 REPORT_SECONDS = 120.0
+RETRY_SECONDS, MOST_RETRY_SECONDS = 30.0, 960.0  # until a list that failed is tried again; doubled each time
 MAX_REPORT_BYTES = 1_000_000_000  # of a recording; the command line makes reports of larger ones
 PATIENCE = 1.5  # s of one answer for files that were not read yet; the next answer goes on
 
@@ -60,6 +63,12 @@ class _Known(NamedTuple):
     version: FileVersion
     listed: RecordingEpisodes | None  # None: it cannot be read
     text: bytes  # JSON
+    tries: int = 0  # failures in a row of what may do later
+    again_at: float = math.inf  # s, monotonic: when it is read again although it has not changed
+
+    def holds(self, version: FileVersion, now: float) -> bool:
+        """Return whether this is what is known of that version of the file."""
+        return self.version == version and now < self.again_at
 
 
 class CatalogPage(NamedTuple):
@@ -80,8 +89,15 @@ class CatalogPage(NamedTuple):
 class EpisodeCatalog:
     """`close` it. All methods are called on the loop."""
 
-    def __init__(self, library: Library, in_thread: InThread, worker: RecordingWorker | None = None) -> None:
-        """`in_thread`: runs what blocks."""
+    def __init__(
+        self,
+        library: Library,
+        in_thread: InThread,
+        worker: RecordingWorker | None = None,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        """`in_thread`: runs what blocks. `clock`: s, monotonic."""
+        self._clock = clock
         self._library = library
         self._in_thread = in_thread
         self._worker = worker or RecordingWorker()
@@ -106,7 +122,7 @@ class EpisodeCatalog:
         """Return the recordings that changed last, but for the first `skip`. Raises ConsoleError, OSError."""
         found, unreadable, pending, episodes = [], 0, 0, 0
         running, files = await self._in_thread(self._files)
-        until = time.monotonic() + PATIENCE
+        until = self._clock() + PATIENCE
         wanted = files[skip : skip + MAX_FILES]
         if running is not None and not skip:
             listed = await self._in_thread(lambda: self._list_running(running))
@@ -119,8 +135,8 @@ class EpisodeCatalog:
                 break
             taken += 1
             known = self._known.get(path)
-            if known is None or known.version != version:
-                if time.monotonic() > until:
+            if known is None or not known.holds(version, self._clock()):
+                if self._clock() > until:
                     pending += 1
                     continue
                 try:
@@ -145,7 +161,7 @@ class EpisodeCatalog:
         else:
             version = await self._in_thread(lambda: file_version(path))
             known = self._known.get(path)
-            if known is None or known.version != version:
+            if known is None or not known.holds(version, self._clock()):
                 known = await self._list(path, version)
             listed = known.listed
         if listed is None:
@@ -169,7 +185,7 @@ class EpisodeCatalog:
         return running, found
 
     async def _list(self, path: Path, version: FileVersion) -> _Known:
-        """Have a file read. One that cannot be read is not read again before it has changed."""
+        """Have a file read. One that is damaged is not read again before it has changed; a failure is tried again."""
         try:
             text = await self._worker.ask(ListEpisodes(str(path)), LIST_SECONDS)
             if len(text) > MAX_LIST_BYTES:
@@ -177,6 +193,11 @@ class EpisodeCatalog:
             known = _Known(version, _decoder.decode(text), text)
         except (TooManyRequests, NotFound):
             raise
+        except RecordingFailed:
+            before = self._known.get(path)
+            tries = before.tries if before is not None and before.version == version else 0
+            wait = min(RETRY_SECONDS * 2.0 ** min(tries, 10), MOST_RETRY_SECONDS)
+            known = _Known(version, None, b"", tries + 1, self._clock() + wait)
         except (ConsoleError, msgspec.DecodeError):
             known = _Known(version, None, b"")
         self._forget(path)

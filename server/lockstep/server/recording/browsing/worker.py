@@ -48,7 +48,8 @@ class RecordingWorker:
 
         Raises:
             TooManyRequests: too many jobs wait.
-            NotFound, NotAllowed, RecordingUnreadable, RecordingFailed: the job cannot be done.
+            RecordingFailed: it cannot be done now: it took too long, its process ended, or the disk fails.
+            NotFound, NotAllowed, RecordingUnreadable: it cannot be done.
         """
         if self._waiting >= self._max_waiting:
             raise TooManyRequests("too much of recordings is asked for at once")
@@ -77,10 +78,10 @@ class RecordingWorker:
                 return await self._answer(await self._running(), job)
         except TimeoutError:
             self._end()
-            return "damaged", b"reading it takes too long"
+            return "unreadable", b"reading it takes too long"
         except (OSError, EOFError):  # it crashed, or was killed
             self._end()
-            return "damaged", b"the process that reads it has failed"
+            return "unreadable", b"the process that reads it has failed"
         except BaseException:  # an answer that nobody awaits would be taken for that of the next job
             self._end()
             raise

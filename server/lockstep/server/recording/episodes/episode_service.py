@@ -36,6 +36,7 @@ from lockstep.server.recording.writing.recorder import Recorder
 from lockstep.server.session_events import (
     ActionUpdated,
     EpisodeAsked,
+    EpisodeWritten,
     EpochBegan,
     FeedbackReceived,
     LinkDown,
@@ -72,6 +73,7 @@ class EpisodeService:
         settings: EpisodeSettings,
         recording: RecordingSettings,
         clock: EventClock,
+        events: SessionEvents,
         recorder: Recorder,
         recorded: Callable[[], Mapping[str, str]],
         robot: EpisodeRobot,
@@ -84,11 +86,13 @@ class EpisodeService:
         """Create the service.
 
         Args:
+            events: get the records of episodes
             recorded: returns codec by stream of what is recorded
             may_ask: returns whether a person may begin and end episodes
             has_ended: returns whether the link with this id and expiry is no longer good
         """
         self._clock = clock
+        self._events = events
         self._recorder = recorder
         self._robot = robot
         self._reset = reset
@@ -291,7 +295,7 @@ class EpisodeService:
             self._tell()
 
     def _write(self, record: EpisodeRecord) -> None:
-        self._recorder.put_episode(record)
+        self._events.publish(EpisodeWritten(record))
         if record.kind != "start":
             return
         self._since = round(time.time(), 3)

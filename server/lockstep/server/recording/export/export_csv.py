@@ -3,6 +3,8 @@
 import csv
 from pathlib import Path
 
+from lockstep.server.recording.episodes.edits import edited, read_edits
+from lockstep.server.recording.export.lerobot_rows import episodes_of
 from lockstep.server.recording.format.topics import stream_of
 from lockstep.server.recording.reading.event_rows import columns_of, event_rows, values_of
 from lockstep.server.recording.reading.reader import RecordingReader
@@ -16,11 +18,13 @@ def export(path: Path, out: Path | None, task: str) -> list[Path]:
     target.parent.mkdir(parents=True, exist_ok=True)
     with RecordingReader(path) as reader, target.open("w", newline="", encoding="utf-8") as file:
         description = reader.description()
+        episodes = edited(episodes_of(reader), read_edits(path))
+        has_episodes = bool(episodes)
         streams = [stream for each in reader.index.topics if (stream := stream_of(each.topic))]
         writer = csv.writer(file)
-        writer.writerow(columns_of(description, streams))
-        for row in event_rows(reader):
-            writer.writerow([_cell(value) for value in values_of(row, description, streams)])
+        writer.writerow(columns_of(description, streams, has_episodes=has_episodes))
+        for row in event_rows(reader, episodes):
+            writer.writerow([_cell(value) for value in values_of(row, description, streams, has_episodes=has_episodes)])
     return [target]
 
 

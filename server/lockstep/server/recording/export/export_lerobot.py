@@ -4,8 +4,6 @@ The kept episodes of one or several recordings are its episodes; a recording in 
 as a whole. `lerobot_rows` says what a row is, `lerobot_layout` what is in it.
 """
 
-import os
-import shutil
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -27,6 +25,7 @@ from lockstep.server.recording.export.lerobot_rows import (
     stretches_of,
 )
 from lockstep.server.recording.export.lerobot_video import camera_key
+from lockstep.server.recording.export.unfinished import unfinished
 from lockstep.server.recording.format.topics import CAMERA
 from lockstep.server.recording.reading.reader import RecordingReader
 
@@ -102,13 +101,8 @@ def export_all(
         raise RecordingDamaged(f"no kept episode has a row: {no_rows(chosen.tolerance)}")
     episodes = [each for each in read if each.frames]
     state = new_state(description, layout, topics, chosen, episodes, without)
-    partial = root.with_name(f".{root.name}.partial-{os.getpid()}")
-    try:
+    with unfinished(root) as partial:
         write_batch(partial, state, layout, episodes)
-        partial.rename(root)
-    except BaseException:
-        shutil.rmtree(partial, ignore_errors=True)
-        raise
     return [root]
 
 

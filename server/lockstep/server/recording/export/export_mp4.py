@@ -4,22 +4,31 @@ Pictures are encoded anew, all in the largest size, only if their size changed o
 """
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from fractions import Fraction
 from io import BytesIO
 from pathlib import Path
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import av
 from av.container import OutputContainer
 
+from lockstep.protocol.serial import is_newer
+from lockstep.server.recording.episodes.edits import edited, read_edits
 from lockstep.server.recording.errors import RecordingDamaged
 from lockstep.server.recording.export.export_sound import sound_writer
+from lockstep.server.recording.export.lerobot_rows import episodes_of
+from lockstep.server.recording.format.episodes import EpisodeEntry
 from lockstep.server.recording.format.payload import SOUND, RecordedPicture, RecordedSound
 from lockstep.server.recording.format.records import Degraded
 from lockstep.server.recording.format.topics import CAMERA, OWN_TOPICS
+from lockstep.server.recording.reading.episode_of_event import EpisodeOfEvent
 from lockstep.server.recording.reading.pictures import RecordedPictures, picture_size
 from lockstep.server.recording.reading.reader import RecordingReader
+from lockstep.server.util.display_names import printable
+
+if TYPE_CHECKING:
+    from av.container.core import Chapter  # it is nowhere but in their types
 
 __all__ = ["export"]
 
@@ -27,6 +36,7 @@ VIDEO_BASE = Fraction(1, 90_000)
 SECOND = 1_000_000_000
 MILLISECOND = 1_000_000
 DEGRADED = OWN_TOPICS[Degraded]
+MAX_TITLE = 250  # characters
 MAX_CAMERA = 60  # characters of the camera's name in a file name
 
 
@@ -36,6 +46,7 @@ class Timed(NamedTuple):
     data: bytes
     picture: RecordedPicture | None
     sound: RecordedSound | None
+    event: int  # its stamp
 
 
 def export(path: Path, out: Path | None, task: str) -> list[Path]:
@@ -54,13 +65,14 @@ def export(path: Path, out: Path | None, task: str) -> list[Path]:
         if not cameras:
             raise RecordingDamaged("the recording has no pictures")
         sound = _first_sound(reader)
+        episodes = edited(episodes_of(reader), read_edits(path))
         written = []
         for topic in cameras:
             target = _target(path, out, topic.removeprefix(CAMERA), len(cameras) == 1)
             while target in written:  # names that differ only in characters that file names lack
                 target = target.with_stem(f"{target.stem}_")
             target.parent.mkdir(parents=True, exist_ok=True)
-            _write(reader, topic, sound, target)
+            _write(reader, topic, sound, target, episodes)
             written.append(target)
         return written
 
@@ -79,7 +91,9 @@ def _target(path: Path, out: Path | None, camera: str, only: bool) -> Path:
     return (out or path.parent) / f"{path.stem}-{name}.mp4"
 
 
-def _write(reader: RecordingReader, topic: str, sound: str | None, target: Path) -> None:
+def _write(
+    reader: RecordingReader, topic: str, sound: str | None, target: Path, episodes: Sequence[EpisodeEntry]
+) -> None:
     keyframes = (each.picture for each in _timed(reader, topic) if each.picture is not None and each.picture.keyframe)
     kinds = {(each.format, size) for each in keyframes if (size := picture_size(each)) is not None}
     sizes = {size for _, size in kinds}
@@ -93,6 +107,7 @@ def _write(reader: RecordingReader, topic: str, sound: str | None, target: Path)
         copied = kinds == {("h264", *sizes)}
         video = _Copied(output, first.data) if copied else _Encoded(output, max(sizes))
         audio = sound_writer(output, heard)
+        output.set_chapters(_chapters(reader, topic, episodes, began) if episodes else [])
         for each in _timed(reader, topic, *([] if sound is None else [sound])):
             if each.topic == topic:
                 video.take(each, began)
@@ -101,6 +116,37 @@ def _write(reader: RecordingReader, topic: str, sound: str | None, target: Path)
         video.close()
         if audio is not None:
             audio.close()
+
+
+def _chapters(reader: RecordingReader, topic: str, episodes: Sequence[EpisodeEntry], began: int) -> "list[Chapter]":
+    """Return a chapter for each episode that has a picture, and for what is between them: players know no gaps."""
+    places = EpisodeOfEvent(episodes)
+    begins: list[tuple[int, EpisodeEntry | None]] = []  # ns
+    newest, ended = 0, began
+    for each in _timed(reader, topic):
+        newest = each.event if not newest or is_newer(each.event, newest) else newest
+        episode = places.of(newest)
+        if not begins or begins[-1][1] is not episode:
+            begins.append((each.captured, episode))
+        ended = each.captured
+    times = [(begin - began) // MILLISECOND for begin, _ in begins]
+    return [
+        {
+            "id": number,
+            "start": times[number],
+            "end": end,
+            "time_base": Fraction(1, 1000),
+            "metadata": {"title": "no episode" if episode is None else _title(episode)},
+        }
+        for number, ((_, episode), end) in enumerate(
+            zip(begins, [*times[1:], (ended - began) // MILLISECOND + 1], strict=True)
+        )
+    ]
+
+
+def _title(episode: EpisodeEntry) -> str:
+    said = ", ".join(filter(None, (episode.state, episode.outcome, *episode.drivers)))
+    return printable(f"{episode.number}: {episode.task} ({said})")[:MAX_TITLE]
 
 
 class _Copied:
@@ -168,4 +214,4 @@ def _timed(reader: RecordingReader, *topics: str) -> Iterator[Timed]:
             continue
         captured = max(record.captured, newest.get(record.topic, 0) + MILLISECOND)
         newest[record.topic] = captured
-        yield Timed(record.topic, captured, medium.data, picture, sound)
+        yield Timed(record.topic, captured, medium.data, picture, sound, record.event)

@@ -6,6 +6,8 @@ from pathlib import Path
 import pyarrow as pa
 import pyarrow.parquet as pq
 
+from lockstep.server.recording.episodes.edits import edited, read_edits
+from lockstep.server.recording.export.lerobot_rows import episodes_of
 from lockstep.server.recording.format.topics import stream_of
 from lockstep.server.recording.reading.event_rows import columns_of, event_rows, values_of
 from lockstep.server.recording.reading.reader import RecordingReader
@@ -22,11 +24,15 @@ def export(path: Path, out: Path | None, task: str) -> list[Path]:
     target.parent.mkdir(parents=True, exist_ok=True)
     with RecordingReader(path) as reader:
         description = reader.description()
+        episodes = edited(episodes_of(reader), read_edits(path))
+        has_episodes = bool(episodes)
         streams = [stream for each in reader.index.topics if (stream := stream_of(each.topic))]
         metadata = {f"lockstep.{key}": value for key, value in reader.info.metadata().items()}
-        fields = [(name, TYPES[kind]) for name, kind in columns_of(description, streams).items()]
+        fields = [
+            (name, TYPES[kind]) for name, kind in columns_of(description, streams, has_episodes=has_episodes).items()
+        ]
         schema = pa.schema(fields, metadata=metadata)
-        rows = (values_of(row, description, streams) for row in event_rows(reader))
+        rows = (values_of(row, description, streams, has_episodes=has_episodes) for row in event_rows(reader, episodes))
         with pq.ParquetWriter(target, schema) as writer:
             while group := list(islice(rows, ROWS)):
                 columns = [list(column) for column in zip(*group, strict=True)]

@@ -6,7 +6,6 @@ ROS has no message for is std_msgs/String with the JSON of Lockstep's own record
 """
 
 import re
-import shutil
 import struct
 from collections.abc import Iterable
 from pathlib import Path
@@ -26,6 +25,7 @@ from rosbags.rosbag2 import StoragePlugin, Writer
 from lockstep.protocol.description import RobotDescription
 from lockstep.server.recording.errors import RecordingDamaged
 from lockstep.server.recording.export.rosbag2.ros_messages import COMPRESSED_VIDEO, RosMessages, ros_types
+from lockstep.server.recording.export.unfinished import unfinished
 from lockstep.server.recording.format.payload import VIDEO, RecordedPicture, own_record
 from lockstep.server.recording.format.records import Degraded, FeedbackRecord, RobotRecord
 from lockstep.server.recording.format.stamp import STAMP_TOPIC, stamp_message
@@ -55,18 +55,18 @@ def export(path: Path, out: Path | None, task: str) -> list[Path]:
     target = out or path.with_name(f"{path.stem}-rosbag2")
     with RecordingReader(path) as reader:
         description = reader.description()
-        target.mkdir(parents=True)  # raises FileExistsError: nothing is overwritten
+        if target.exists():
+            raise FileExistsError(17, "it is there already", str(target))
         try:
-            target.rmdir()  # the writer wants to make it itself
-            with Writer(target, version=VERSION, storage_plugin=StoragePlugin.MCAP) as writer:
+            with (
+                unfinished(target) as partial,  # half a bag would be taken for a whole one
+                Writer(partial, version=VERSION, storage_plugin=StoragePlugin.MCAP) as writer,
+            ):
                 bag = _Bag(writer, reader, description)
                 for record in reader.records():
                     bag.take(record)
-        except BaseException as error:
-            shutil.rmtree(target, ignore_errors=True)  # half a bag would be taken for a whole one
-            if isinstance(error, CANNOT_BE_WRITTEN):
-                raise RecordingDamaged(f"{path.name}: ROS 2 has no such value: {error}") from error
-            raise
+        except CANNOT_BE_WRITTEN as error:
+            raise RecordingDamaged(f"{path.name}: ROS 2 has no such value: {error}") from error
     return [target]
 
 

@@ -6,16 +6,19 @@ from typing import NamedTuple
 from lockstep.protocol.description import RobotDescription
 from lockstep.protocol.serial import event_gap
 from lockstep.server.recording.format.drivers import NOBODY, EventDriver
+from lockstep.server.recording.format.episodes import EpisodeEntry
 from lockstep.server.recording.format.payload import own_record_of
 from lockstep.server.recording.format.records import CommandRecord, FeedbackRecord, SeatRecord
 from lockstep.server.recording.format.topics import CAMERA, MICROPHONE, OWN_TOPICS
 from lockstep.server.recording.reading.drivers import DRIVER_TOPICS, RecordedDrivers
+from lockstep.server.recording.reading.episode_of_event import EpisodeOfEvent
 from lockstep.server.recording.reading.reader import RecordingReader
 
 __all__ = ["EventRow", "columns_of", "event_rows", "values_of"]
 
 Value = str | int | float | bool | None
 WRENCH = ("fx", "fy", "fz", "tx", "ty", "tz")
+EPISODE = {"episode": "id", "episode_state": "state", "task": "task", "outcome": "outcome"}  # fields by column
 READ = {*DRIVER_TOPICS, OWN_TOPICS[SeatRecord]}
 
 
@@ -29,10 +32,12 @@ class EventRow(NamedTuple):
     driver: str  # name of the seat's holder
     stamps: dict[str, int]  # of the newest picture and sound that had arrived, by stream
     driven_by: EventDriver = NOBODY  # sender of the command that became the event
+    episode: EpisodeEntry | None = None  # the episode that it was driven in
 
 
-def event_rows(reader: RecordingReader) -> Iterator[EventRow]:
-    """Yield the rows in the order of their events. Raises RecordingError."""
+def event_rows(reader: RecordingReader, episodes: Sequence[EpisodeEntry] = ()) -> Iterator[EventRow]:
+    """Yield the rows in the order of their events. `episodes`: those of the recording. Raises RecordingError."""
+    places = EpisodeOfEvent(episodes)
     event = 0
     command: CommandRecord | None = None
     driver = ""
@@ -55,11 +60,18 @@ def event_rows(reader: RecordingReader) -> Iterator[EventRow]:
                 event = feedback.event
                 became = command if command is not None and command.event == event else None
                 yield EventRow(
-                    feedback, record.arrived, record.captured, became, driver, dict(stamps), drivers.of(feedback)
+                    feedback,
+                    record.arrived,
+                    record.captured,
+                    became,
+                    driver,
+                    dict(stamps),
+                    drivers.of(feedback),
+                    places.of(event),
                 )
 
 
-def columns_of(description: RobotDescription, streams: list[str]) -> dict[str, type]:
+def columns_of(description: RobotDescription, streams: list[str], *, has_episodes: bool = False) -> dict[str, type]:
     """Return the names and types of the columns, in order. Units are SI; names of times say theirs."""
     columns: dict[str, type] = {
         "event": int,
@@ -72,6 +84,8 @@ def columns_of(description: RobotDescription, streams: list[str]) -> dict[str, t
         "command_peer": str,
         "command_issue": int,
     }
+    if has_episodes:
+        columns |= dict.fromkeys(EPISODE, str)
     columns |= {f"command.{axis.name}": float for axis in description.axes}
     columns |= {f"axis.{axis.name}": float for axis in description.axes}
     columns |= {f"goal.{axis.name}": float for axis in description.axes if axis.kind == "goal"}
@@ -86,7 +100,9 @@ def columns_of(description: RobotDescription, streams: list[str]) -> dict[str, t
     return columns
 
 
-def values_of(row: EventRow, description: RobotDescription, streams: list[str]) -> list[Value]:
+def values_of(
+    row: EventRow, description: RobotDescription, streams: list[str], *, has_episodes: bool = False
+) -> list[Value]:
     """Return the values in the order of `columns_of`; None: not known, or a command for a goal axis to stay."""
     feedback, command = row.feedback, row.command
     values: list[Value] = [
@@ -100,6 +116,9 @@ def values_of(row: EventRow, description: RobotDescription, streams: list[str]) 
         "" if command is None else command.peer,
         None if command is None else command.issue,
     ]
+    if has_episodes:
+        episode = row.episode
+        values += [""] * len(EPISODE) if episode is None else [getattr(episode, name) for name in EPISODE.values()]
     values += _filled([] if command is None else command.values, len(description.axes))
     values += _filled(feedback.axes, len(description.axes))
     goals = _filled(feedback.goals, len(description.axes))

@@ -16,7 +16,6 @@ from lockstep.server.event_clock import EventClock
 from lockstep.server.media.pipeline.frame import EncodedFrame
 from lockstep.server.media.pipeline.recorded_encoding import FrameTaker
 from lockstep.server.recording.format.info import RecordingInfo
-from lockstep.server.recording.format.records import EpisodeRecord
 from lockstep.server.recording.format.signature import RecordingSigning
 from lockstep.server.recording.format.topics import PICTURE_FORMATS
 from lockstep.server.recording.recording_store import RecordingStore
@@ -96,10 +95,6 @@ class Recorder:
 
     def watched_by(self, watcher: RecordingWatcher) -> None:
         self._watcher = watcher
-
-    def put_episode(self, record: EpisodeRecord) -> None:
-        """Put a record of an episode into the recording, if one is written."""
-        self._records.put_episode(record)
 
     async def run(self) -> None:
         """Run until cancelled; the file is closed then."""

@@ -14,7 +14,6 @@ from lockstep.server.recording.format.records import (
     ActionRecord,
     CommandOutcome,
     CommandRecord,
-    EpisodeRecord,
     NoteRecord,
     OwnRecord,
     ParticipantsRecord,
@@ -37,6 +36,7 @@ from lockstep.server.session_events import (
     CommandForwarded,
     CommandRefused,
     CommandRepeated,
+    EpisodeWritten,
     FeedbackReceived,
     LinkDown,
     LinkUp,
@@ -130,6 +130,7 @@ class SessionRecords:
         events.subscribe(ActionUpdated, self._action_updated)
         events.subscribe(StatusReceived, self._status_received)
         events.subscribe(ShadowJudged, self._shadow_judged)
+        events.subscribe(EpisodeWritten, self._episode_written)
         self._traces.subscribe(events)
 
     def _link_changed(self, event: LinkUp | LinkDown) -> None:
@@ -310,7 +311,8 @@ class SessionRecords:
         status = event.status
         self._put_own(StatusRecord(epoch=self._clock.epoch, event=status.event, items=status.items))
 
-    def put_episode(self, record: EpisodeRecord) -> None:
+    def _episode_written(self, event: EpisodeWritten) -> None:
+        record = event.record
         if record.kind != "mark":
             self._drivers.episode(begins=record.kind == "start")
         self._put_own(record)

@@ -20,6 +20,7 @@ from lockstep.server.recording.format.signature import RecordingSigning
 from lockstep.server.recording.reading.scan import complete_file
 from lockstep.server.recording.settings import RecordingSettings
 from lockstep.server.recording.writing.episode_guard import EpisodeGuard
+from lockstep.server.recording.writing.live_queue import size_of
 from lockstep.server.recording.writing.queue_items import FeedbackItem, Item, MediaItem, OwnItem, RobotItem, entries_of
 from lockstep.server.recording.writing.writer import RecordingWriter
 
@@ -28,6 +29,7 @@ __all__ = ["RecordingThread"]
 log = structlog.get_logger(__name__)
 
 MAX_WAITING = 4096  # items, 15 s and more
+MAX_BYTES = 128_000_000  # of the waiting items, about: 15 s at 68 Mbit/s
 DRAIN_SECONDS = 0.05  # between two looks at the queue: nobody is woken for each item
 REMEMBERED = (SeatRecord, ParticipantsRecord)  # every part begins with these, besides robot and feedback
 
@@ -78,6 +80,8 @@ class RecordingThread:
         self.free_bytes = 0  # on the disk, when it was looked at last; 0: not yet
         self._head = ""  # of the previous part's signed chain
         self._waiting: deque[Item | Lost] = deque()
+        self._put_bytes = 0  # by the loop alone
+        self._taken_bytes = 0  # by the thread alone
         self._lost = 0  # not in the file yet; the loop adds, the thread takes
         self._lost_ever = 0
         self._closing = threading.Event()
@@ -100,13 +104,16 @@ class RecordingThread:
         They come a few times a second at most. Marks do not: stops and changes of the seat cause them too.
         """
         decides = isinstance(item, OwnItem) and isinstance(item.record, EpisodeRecord) and item.record.kind != "mark"
-        if len(self._waiting) >= MAX_WAITING and not decides:
+        size = size_of(item)
+        is_full = len(self._waiting) >= MAX_WAITING or (self._waiting and self._waiting_bytes + size > MAX_BYTES)
+        if is_full and not decides:
             self._lost += 1
             self._lost_ever += 1
             return
         if self._lost:  # what was left out has its place in front of what follows
             lost, self._lost = self._lost, 0
             self._waiting.append(Lost(lost))
+        self._put_bytes += size
         self._waiting.append(item)
 
     def close(self) -> None:
@@ -127,7 +134,11 @@ class RecordingThread:
     @property
     def waiting(self) -> float:
         """The share of the queue that is taken, 0 to 1."""
-        return min(1.0, len(self._waiting) / MAX_WAITING)
+        return min(1.0, max(len(self._waiting) / MAX_WAITING, self._waiting_bytes / MAX_BYTES))
+
+    @property
+    def _waiting_bytes(self) -> int:
+        return self._put_bytes - self._taken_bytes
 
     @property
     def bytes_written(self) -> int:
@@ -165,6 +176,7 @@ class RecordingThread:
                     self._tell_lost(self._writer, item.items)
             else:
                 self._take(item)
+                self._taken_bytes += size_of(item)
             time.sleep(0)  # the loop goes first
         writer = self._writer
         if writer is None:

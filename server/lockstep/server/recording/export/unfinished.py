@@ -1,0 +1,84 @@
+"""Folders of exports that are not finished. Each is held by a lock: what a killed export leaves is known by that.
+
+`.NAME.partial-XXXXXXXX/` beside the export's place has the file `lockstep-export.lock` and the export itself. The lock
+of a process ends with it, however it ends, so a folder whose lock is free has no owner. A folder without that file is
+somebody else's.
+"""
+
+import fcntl
+import os
+import re
+import shutil
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+__all__ = ["LOCK", "remove_stale", "stale_folders", "unfinished"]
+
+LOCK = "lockstep-export.lock"
+FOLDER = re.compile(r"\.(?P<name>.+)\.partial-\w+")
+
+
+@contextmanager
+def unfinished(target: Path) -> Iterator[Path]:
+    """Give a path to write to, which is not there yet, and move what was written to `target` at the end.
+
+    After an error nothing is left. What killed exports to the same place have left is removed first.
+
+    Raises:
+        OSError: the folder cannot be made, or the target cannot take its place.
+    """
+    target.parent.mkdir(parents=True, exist_ok=True)
+    remove_stale(target.parent, target.name)
+    folder = Path(tempfile.mkdtemp(prefix=f".{target.name}.partial-", dir=target.parent))
+    try:
+        # It gets its name when it is locked: nobody finds it without an owner.
+        with tempfile.NamedTemporaryFile(dir=folder, delete=False) as lock:
+            fcntl.flock(lock, fcntl.LOCK_EX)
+            os.rename(lock.name, folder / LOCK)
+            yield folder / target.name
+            (folder / target.name).rename(target)
+            shutil.rmtree(folder, ignore_errors=True)
+    except BaseException:
+        shutil.rmtree(folder, ignore_errors=True)
+        raise
+
+
+def stale_folders(directory: Path, name: str | None = None) -> list[Path]:
+    """Return the unfinished folders in a directory that no process owns. `name`: of the export; None: of any.
+
+    Raises:
+        OSError: the directory cannot be read.
+    """
+    found = []
+    for path in directory.iterdir():
+        known = FOLDER.fullmatch(path.name)
+        if known is not None and name in (None, known["name"]) and not path.is_symlink() and _is_free(path / LOCK):
+            found.append(path)
+    return sorted(found)
+
+
+def remove_stale(directory: Path, name: str | None = None) -> list[Path]:
+    """Remove the unfinished folders that no process owns, and return those that were removed. Raises OSError."""
+    removed = []
+    for path in stale_folders(directory, name):
+        shutil.rmtree(path, ignore_errors=True)
+        if not path.exists():
+            removed.append(path)
+    return removed
+
+
+def _is_free(lock: Path) -> bool:
+    """Return whether the lock is there, and no process holds it."""
+    with suppress(OSError):
+        number = os.open(lock, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC)
+        try:
+            fcntl.flock(number, fcntl.LOCK_SH | fcntl.LOCK_NB)
+        except BlockingIOError:
+            return False
+        else:
+            return True
+        finally:
+            os.close(number)
+    return False
