@@ -56,7 +56,7 @@ class ActingRobot(RobotNode):  # type: ignore[misc]
         self._late = LateAction(self, "/late", self.note)
         self.create_timer(0.1, self._place)
         self._mounts = self.create_publisher(TFMessage, "/tf_static", kept)
-        mount = TransformStamped()
+        self.mount = mount = TransformStamped()
         mount.header.frame_id, mount.child_frame_id = "base_link", "laser"
         mount.transform.rotation.z = 1.0  # it looks back
         mount.transform.rotation.w = 0.0
