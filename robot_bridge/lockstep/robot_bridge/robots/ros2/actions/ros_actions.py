@@ -22,7 +22,7 @@ __all__ = ["GRIPPER_TYPE", "RosActions", "parameter_name"]
 
 GRIPPER_TYPE = "control_msgs/GripperCommand"
 SETTLE_SECONDS = 0.5  # for cancelled goals to end when the bridge ends
-UNANSWERED_SECONDS = 3.0  # for a server to accept a cancelled goal then, after which it is cancelled
+UNANSWERED_SECONDS = 2.0  # for a server to accept a cancelled goal then, after which it is cancelled
 SETTLE_STEP = 0.01  # s
 SOME_POSE = (0.0, 0.0, 0.0)
 
