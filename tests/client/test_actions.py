@@ -13,6 +13,9 @@ import pytest
 from lockstep.bench.harness.driving import drive_on
 from lockstep.client import ActionCancelled, ActionRefused, Console, NotArmed
 from lockstep.protocol.actions import ActionUpdate
+from lockstep.protocol.maps import map_cells
+from lockstep.server.recording.format.payload import own_record
+from lockstep.server.recording.format.records import MapRecord, NavigationRecord
 from lockstep.server.recording.reading.reader import RecordingReader
 from lockstep.server.recording.verify.verify_file import verify_file
 from tests.client.held_up import ATTEMPTS, HELD_UP, act_on, arm_on
@@ -161,6 +164,31 @@ async def test_a_client_that_ends_leaves_no_motion_behind(stack: Stack) -> None:
             assert ended["reason"] == "cancelled"
 
 
+async def test_a_goal_on_the_map_is_driven_to_and_the_map_is_told(stack: Stack) -> None:
+    async with _console(stack.operator) as console:
+        await _until(console, lambda: console.navigation is not None and console.navigation.map != "")
+        grid = await console.map()
+        assert grid is not None
+        assert console.navigation is not None
+        assert grid.id == console.navigation.map
+        assert len(map_cells(grid)) == grid.width * grid.height
+        with pytest.raises(ActionRefused) as refused:
+            await console.go_to(0.5, 0.0)
+        assert refused.value.reason == "no_seat"
+        await console.take_seat()
+        for _ in range(ATTEMPTS):
+            try:
+                final = await console.go_to(0.5, 0.0)
+                break
+            except ActionCancelled as cancelled:
+                if cancelled.reason not in HELD_UP:
+                    raise
+                await console.arm()
+        assert final.state == "done"
+        assert console.feedback is not None
+        assert console.feedback.joints[:2] == pytest.approx([0.5, 0.0], abs=0.1)
+
+
 async def test_the_status_is_told_with_units_and_age(stack: Stack) -> None:
     async with _console(stack.observer) as console:
         await _until(console, lambda: bool(console.status))
@@ -175,6 +203,9 @@ async def test_a_recording_has_who_asked_what_and_how_it_went(stack: Stack, tmp_
     headers = {"Authorization": f"Bearer {token}"}
     async with httpx.AsyncClient(base_url=stack.console, headers=headers) as http, _console(stack.operator) as console:
         await _go_away(console)
+        await _until(console, lambda: console.navigation is not None and console.navigation.map != "")
+        grid = await console.map()
+        assert grid is not None
         recording = (await http.post("/api/recordings", json={})).json()["recording"]
         final = await act_on(console, "home")
         assert (await http.post("/api/recordings/stop")).status_code == 200
@@ -183,11 +214,17 @@ async def test_a_recording_has_who_asked_what_and_how_it_went(stack: Stack, tmp_
     assert verdict.ok
     assert verdict.checks["actions"].looked > 2
     with RecordingReader(tmp_path / "a.mcap") as reader:
+        (recorded,) = (own_record(MapRecord, each.data) for each in reader.records(topics={"/lockstep/map"}))
+        places = [own_record(NavigationRecord, each.data) for each in reader.records(topics={"/lockstep/navigation"})]
+        grids = list(reader.records(topics={"/map"}))
         found = [json.loads(each.data) for each in reader.records(topics={"/lockstep/action"})]
         items = [json.loads(each.data)["items"] for each in reader.records(topics={"/lockstep/status"})]
     assert [each["state"] for each in found][:2] == ["asked", "running"]
     assert (found[-1]["state"], found[-1]["id"], found[-1]["event"]) == ("done", final.id, final.event)
     assert "battery" in [item["name"] for item in items[0]]
+    assert recorded.map == grid
+    assert places[0].map == grid.id
+    assert len(grids) == 1
 
 
 async def test_over_http_only_what_moves_nothing_and_only_with_the_seat(stack: Stack) -> None:

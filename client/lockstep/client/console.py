@@ -17,7 +17,7 @@ from lockstep.client.control.clutch import Clutch
 from lockstep.client.control.command_gate import GateState, Pacing
 from lockstep.client.control.goal_move import GoalMove
 from lockstep.client.episodes import Episodes
-from lockstep.client.errors import CommandError, CommandRefused, ConsoleError, ConsoleLost, NotArmed
+from lockstep.client.errors import ActionRefused, CommandError, CommandRefused, ConsoleError, ConsoleLost, NotArmed
 from lockstep.client.media.media_gate import GateMode
 from lockstep.client.media.newest_queue import NewestQueue, QueueClosed
 from lockstep.client.media.render_log import FeedbackArrival, Rendering
@@ -29,6 +29,7 @@ from lockstep.protocol.actions import ActionUpdate, ParameterValue, StatusItem
 from lockstep.protocol.carriers import Carrier
 from lockstep.protocol.console import Participant, Role, Seat, SharedNote
 from lockstep.protocol.description import RobotDescription
+from lockstep.protocol.maps import Navigation, OccupancyMap
 from lockstep.protocol.messages import Feedback, StopState
 from lockstep.protocol.neutral import neutral_value, neutral_values
 from lockstep.protocol.traces.trace_messages import Traces
@@ -229,6 +230,30 @@ class Console:
         since = asyncio.get_running_loop().time() - news.status_at
         items = [] if news.status is None else news.status.items
         return [replace(item, age=item.age + since) for item in items]
+
+    @property
+    def navigation(self) -> Navigation | None:
+        """Where the robot is on its map, and where it is going; None before the robot has said so.
+
+        `map_age` and `path_age` (s) are those of now.
+        """
+        news = self._live().news
+        if news.navigation is None:
+            return None
+        since = asyncio.get_running_loop().time() - news.navigation_at
+        told = news.navigation
+        return replace(told, map_age=told.map_age + since, path_age=told.path_age + since)
+
+    async def map(self) -> OccupancyMap | None:
+        """Fetch the robot's newest map; None if it has sent none. `lockstep.protocol.maps.map_cells` gives its cells.
+
+        `navigation.map` is the `id` of the newest one: fetch a map again when that has changed.
+
+        Raises:
+            SignallingRefused: the console answered with an error.
+            ConnectFailed: it did not answer.
+        """
+        return await self._live().transport.whep.map()
 
     def stats(self) -> ConsoleStatistics:
         """Return the figures since the connection began."""
@@ -489,6 +514,27 @@ class Console:
             ConsoleLost: the connection ended; the robot has ended every action that moves it.
         """
         return await self._live().actions.act(name, parameters or {}, progress)
+
+    async def go_to(
+        self, x: float, y: float, yaw: float | None = None, *, progress: Callable[[ActionUpdate], None] | None = None
+    ) -> ActionUpdate:
+        """Send the robot to a place on its map, by the action that its description names; return its last update.
+
+        The robot drives by itself while this call renews the action, as `act` says; it raises the same errors.
+
+        Args:
+            x, y: m, in the map's frame
+            yaw: rad, the heading at the end, where the robot takes one; None: the action's own default
+            progress: as for `act`
+
+        Raises:
+            ActionRefused: besides the reasons of `act`, `unknown_action`: this robot has no goals on a map.
+        """
+        view = self._live().driving.robot.description.map
+        if view is None or not view.goal:
+            raise ActionRefused("unknown_action", "the robot has no goals on a map")
+        heading: dict[str, ParameterValue] = {} if yaw is None else {"yaw": float(yaw)}
+        return await self.act(view.goal, {"x": float(x), "y": float(y), **heading}, progress=progress)
 
     async def rest(self) -> None:
         """Send a rest at once, past the gate, and repeat it until the robot is proven to be at rest. Disarms."""

@@ -23,6 +23,7 @@ from lockstep.protocol.console import (
 )
 from lockstep.protocol.episodes import EpisodeAnswer, EpisodeState
 from lockstep.protocol.errors import MessageError
+from lockstep.protocol.maps import Navigation
 from lockstep.protocol.messages import Feedback, Pong, Refusal, StopTaken
 from lockstep.protocol.traces.trace_messages import Traces
 
@@ -34,7 +35,7 @@ class MessageDispatcher:
 
     Attributes:
         lost: why no more messages come; None while they do
-        news: of the robot's actions and status
+        news: of the robot's actions, status and place
         episodes: what the console has said of episodes
         malformed: messages from the console that could not be read
     """
@@ -97,7 +98,7 @@ class MessageDispatcher:
                 self._session.stop_shown(message.stop)
             case StopTaken():
                 self._session.stop_taken(message)
-            case ActionUpdate() | Status():
+            case ActionUpdate() | Status() | Navigation():
                 self.news.hear(message, asyncio.get_running_loop().time())
             case EpisodeState() | EpisodeAnswer():
                 self.episodes.hear(message)

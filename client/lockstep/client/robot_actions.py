@@ -1,4 +1,4 @@
-"""The actions and the status of the robot, as the console reports them, and requests for actions."""
+"""The actions, the status and the place of the robot, as the console reports them, and requests for actions."""
 
 import asyncio
 import secrets
@@ -20,6 +20,7 @@ from lockstep.client.session import Session
 from lockstep.client.transport.transport import Transport
 from lockstep.protocol.actions import Act, ActionCancel, ActionUpdate, ParameterValue, Status
 from lockstep.protocol.description import Action
+from lockstep.protocol.maps import Navigation
 from lockstep.protocol.neutral import neutral_values
 
 __all__ = ["RobotActions", "RobotNews"]
@@ -29,19 +30,26 @@ ANSWER_SECONDS = 5.0  # for the robot to answer a request, or to end an action t
 
 
 class RobotNews:
-    """The actions and the status that the console has reported. No I/O.
+    """What the console has reported of actions, status and the map. No I/O.
 
     Attributes:
         status: the newest status; None before the first
         status_at: the arrival of `status`, s on the loop's clock
+        navigation: the newest navigation; None before the first
+        navigation_at: the arrival of `navigation`, s on the loop's clock
     """
 
     def __init__(self) -> None:
         self.updates: OrderedDict[str, ActionUpdate] = OrderedDict()  # by id of the request, oldest first
         self.status: Status | None = None
         self.status_at = 0.0
+        self.navigation: Navigation | None = None
+        self.navigation_at = 0.0
 
-    def hear(self, message: ActionUpdate | Status, now: float) -> None:
+    def hear(self, message: ActionUpdate | Status | Navigation, now: float) -> None:
+        if isinstance(message, Navigation):
+            self.navigation, self.navigation_at = message, now
+            return
         if isinstance(message, Status):
             self.status, self.status_at = message, now
             return

@@ -20,9 +20,11 @@ __all__ = [
     "MAX_RESOLUTION",
     "OCCUPIED",
     "UNKNOWN",
+    "Coordinate",
     "MapId",
     "Navigation",
     "OccupancyMap",
+    "PlanarPose",
     "map_cells",
     "map_id",
 ]

@@ -12,7 +12,7 @@ from lockstep.protocol.actions import Act, ActionUpdate, Status
 from lockstep.protocol.console import Participants, Report, RobotState, Seat, ShadowVerdict, SharedNote, SpeedCapState
 from lockstep.protocol.description import RobotDescription
 from lockstep.protocol.episodes import EpisodeRequest
-from lockstep.protocol.maps import Navigation
+from lockstep.protocol.maps import Navigation, OccupancyMap
 from lockstep.protocol.messages import Command, Feedback, Refusal, RefusalReason, Rest, StopState, StopTaken
 from lockstep.protocol.traces.trace import CommandSpans
 from lockstep.protocol.traces.trace_messages import EventTrace
@@ -37,6 +37,7 @@ __all__ = [
     "InputRefused",
     "LinkDown",
     "LinkUp",
+    "MapReceived",
     "NavigationReceived",
     "NoteWritten",
     "ParticipantsChanged",
@@ -219,6 +220,10 @@ class ActionUpdated(SessionEvent, frozen=True):
 
 class StatusReceived(SessionEvent, frozen=True):
     status: Status
+
+
+class MapReceived(SessionEvent, frozen=True):
+    map: OccupancyMap
 
 
 class NavigationReceived(SessionEvent, frozen=True):

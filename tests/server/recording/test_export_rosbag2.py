@@ -2,6 +2,7 @@
 
 import json
 import subprocess
+import zlib
 from pathlib import Path
 from typing import Any
 
@@ -12,10 +13,11 @@ import yaml
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
 
+from lockstep.protocol.maps import OccupancyMap
 from lockstep.protocol.messages import Feedback
 from lockstep.robot_bridge.robots.registry import create_robot
 from lockstep.server.recording.errors import RecordingDamaged
-from lockstep.server.recording.format.records import Degraded, FeedbackRecord, RobotRecord
+from lockstep.server.recording.format.records import Degraded, FeedbackRecord, MapRecord, NavigationRecord, RobotRecord
 from lockstep.server.recording.format.robot_frames import WORLD
 from lockstep.server.recording.format.topics import CAMERA, OWN_TOPICS
 from lockstep.server.recording.reading.reader import RecordingReader
@@ -240,3 +242,32 @@ def test_a_time_that_ros_cannot_hold_is_told_and_leaves_no_half_bag(tmp_path: Pa
     with pytest.raises(RecordingDamaged, match="ROS 2 has no such value"):
         export_rosbag2.export(path, tmp_path / "bag", "")
     assert not (tmp_path / "bag").exists()
+
+
+def test_the_map_is_an_occupancy_grid_whose_frame_is_placed_in_the_world(tmp_path: Path) -> None:
+    planar = create_robot("planar").describe()
+    cells = bytes([0, 100, 255, 50, 0, 0])
+    map = OccupancyMap(id="a", width=3, height=2, resolution=0.5, origin=(1.0, -2.0, 0.0), cells=zlib.compress(cells))
+    false = msgspec.structs.replace(map, width=4)
+    at = START + SECOND
+    entries = [
+        own_entry(RobotRecord(epoch=EPOCH, event=1, link="up", description=planar), START),
+        own_entry(MapRecord(epoch=EPOCH, event=5, map=map), at),
+        own_entry(NavigationRecord(epoch=EPOCH, event=5, frame=(1.0, 0.5, 0.0)), at),
+        own_entry(NavigationRecord(epoch=EPOCH, event=6, located=False), at),
+        own_entry(MapRecord(epoch=EPOCH, event=7, map=false), at),
+    ]
+    path = rewritten(tmp_path / "a.mcap", entries, lambda each: [each], planar)
+    (target,) = export_rosbag2.export(path, None, "")
+    messages = read(target)
+    (grid,) = messages["/map"]
+    assert grid.decoded.data.tolist() == [0, 100, -1, 50, 0, 0]
+    assert (grid.decoded.info.width, grid.decoded.info.origin.position.y, grid.decoded.header.frame_id) == (
+        3,
+        -2.0,
+        "map",
+    )
+    (frames,) = messages["/tf"]
+    (transform,) = frames.decoded.transforms
+    assert (transform.header.frame_id, transform.child_frame_id) == (WORLD, "map")
+    assert (transform.transform.translation.x, transform.transform.translation.y) == (-1.0, -0.5)

@@ -24,6 +24,7 @@ from tests.support.event_logs import whole_lines, written
 
 __all__ = [
     "ACTIONS",
+    "EVERYTHING",
     "EXAMPLES",
     "PATIENCE",
     "STAY",
@@ -44,6 +45,7 @@ ROOT = Path(__file__).parents[3]
 EXAMPLES = ROOT / "docs" / "examples" / "ros2"
 NODE = Path(__file__).with_name("robot_node.py")
 ACTIONS = Path(__file__).with_name("actions_node.py")
+EVERYTHING = Path(__file__).with_name("everything_node.py")
 BUILD = Path(__file__).with_name("build_interfaces.py")
 INTERFACES = Path(__file__).with_name("interfaces")
 SERVICES = Path(__file__).with_name("services_node.py")

@@ -1,7 +1,8 @@
 """The robot of robot_node.py with action servers, a map and a planner. Run with ROS' Python, and the built interfaces.
 
 More lines on standard input: `lost` and `found` (the transform from map to odom), `stubborn` (cancels are refused),
-`slow` (goals are accepted a second late), `wall` (another map), `spoil_map` (a map that contradicts itself).
+`slow` (goals are accepted a second late), `wall` (another map), `spoil_map` (a map that contradicts itself), `hide`,
+`show` and `accept` (see late_action.py).
 """
 
 import array
@@ -13,6 +14,7 @@ from typing import Any
 from control_msgs.action import GripperCommand
 from example_interfaces.action import Fibonacci
 from geometry_msgs.msg import PoseStamped, TransformStamped, TwistStamped
+from late_action import LateAction  # type: ignore[import-not-found]  # beside this file, which is run as a script
 from nav2_msgs.action import NavigateToPose
 from nav_msgs.msg import OccupancyGrid
 from nav_msgs.msg import Path as PathMessage
@@ -20,7 +22,7 @@ from rclpy.action import ActionServer, CancelResponse, GoalResponse
 from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.executors import MultiThreadedExecutor
 from rclpy.qos import DurabilityPolicy, QoSProfile
-from robot_node import RobotNode, main  # type: ignore[import-not-found]  # beside this file, which is run as a script
+from robot_node import RobotNode, main  # type: ignore[import-not-found]
 from tf2_msgs.msg import TFMessage
 
 STEP = 0.05  # s
@@ -51,9 +53,10 @@ class ActingRobot(RobotNode):  # type: ignore[misc]
                 goal_callback=self._goal,
                 cancel_callback=self._cancel,
             )
+        self._late = LateAction(self, "/late", self.note)
         self.create_timer(0.1, self._place)
         self._mounts = self.create_publisher(TFMessage, "/tf_static", kept)
-        mount = TransformStamped()
+        self.mount = mount = TransformStamped()
         mount.header.frame_id, mount.child_frame_id = "base_link", "laser"
         mount.transform.rotation.z = 1.0  # it looks back
         mount.transform.rotation.w = 0.0
@@ -68,6 +71,12 @@ class ActingRobot(RobotNode):  # type: ignore[misc]
                 self._stubborn = True
             case "slow":
                 self._slow = True
+            case "hide":
+                self._late.hide()
+            case "show":
+                self._late.show()
+            case "accept":
+                self._late.accept()
             case "wall":
                 self._publish_map(column=20)
             case "spoil_map":

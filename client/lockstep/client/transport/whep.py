@@ -12,6 +12,7 @@ import msgspec
 from lockstep.client.console_url import ConsoleLink
 from lockstep.client.errors import ConnectFailed, SignallingRefused
 from lockstep.client.transport.sfu_media import RelayTicket
+from lockstep.protocol.maps import OccupancyMap
 from lockstep.protocol.messages import StopTaken
 from lockstep.rtc.turn.servers import IceServer
 
@@ -57,7 +58,14 @@ _ice_servers = msgspec.json.Decoder(_IceServers)
 _watch_ticket = msgspec.json.Decoder(_WatchTicket)
 _stop_answer = msgspec.json.Decoder(_StopAnswer)
 _relay_answer = msgspec.json.Decoder(_RelayAnswer)
+
+
+class _NewestMap(msgspec.Struct):
+    map: OccupancyMap
+
+
 _problem = msgspec.json.Decoder(_Problem)
+_newest_map = msgspec.json.Decoder(_NewestMap)
 
 
 class Whep:
@@ -149,6 +157,19 @@ class Whep:
             return StopTaken(press=press, number=said.number, kept=said.kept)
         except msgspec.DecodeError as error:
             raise SignallingRefused(answer.status_code, "", "the answer does not confirm a stop") from error
+
+    async def map(self) -> OccupancyMap | None:
+        """Return the robot's newest map; None: it has sent none. Raises like `offer`."""
+        try:
+            answer = await self._request("GET", self._base + "/api/map")
+        except SignallingRefused as refused:
+            if refused.status == 404:
+                return None
+            raise
+        try:
+            return _newest_map.decode(answer.content).map
+        except msgspec.DecodeError as error:
+            raise SignallingRefused(answer.status_code, "", "the answer is not a map") from error
 
     async def _request(self, method: str, url: str, **arguments: object) -> httpx.Response:
         try:

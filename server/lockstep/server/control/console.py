@@ -86,6 +86,7 @@ from lockstep.server.session_events import (
     InputRefused,
     LinkDown,
     LinkUp,
+    MapReceived,
     NavigationReceived,
     Refused,
     RestForwarded,
@@ -403,6 +404,7 @@ class Console:
 
     def map_received(self, map: OccupancyMap) -> None:
         self.navigation.take_map(map)
+        self._events.publish(MapReceived(map))
 
     def link_failed(self, role: LinkRole, error: Exception) -> None:
         self._faults.caught(f"robot link {role}", error)

@@ -96,6 +96,7 @@ def describe(settings: Ros2Settings) -> RobotDescription:
                 width=camera.width,
                 height=camera.height,
                 frame_rate=camera.frame_rate,
+                calibration=camera.calibration,
             )
             for camera in settings.cameras
         ),

@@ -4,7 +4,7 @@ from typing import Annotated, Literal
 
 from msgspec import Meta, Struct, field
 
-from lockstep.protocol.description import Body, ControlLayer, Geofence, Vector3
+from lockstep.protocol.description import Body, CameraCalibration, ControlLayer, Geofence, Vector3
 
 __all__ = [
     "ActionField",
@@ -186,6 +186,7 @@ class CameraTopic(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
     captured: Literal["header", "arrival"] = "header"  # source of the time of capture
     latency: Annotated[float, Meta(ge=0, le=5)] = 0.0  # s, taken off that time besides
     timeout: Timeout = 2.0
+    calibration: CameraCalibration | None = None  # None: not known, nothing is drawn on the pictures
 
 
 class Battery(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):

@@ -23,11 +23,13 @@ from rosbags.interfaces import (
 from rosbags.rosbag2 import StoragePlugin, Writer
 
 from lockstep.protocol.description import RobotDescription
+from lockstep.protocol.errors import MessageError
 from lockstep.server.recording.errors import RecordingDamaged
 from lockstep.server.recording.export.rosbag2.ros_messages import COMPRESSED_VIDEO, RosMessages, ros_types
 from lockstep.server.recording.export.unfinished import unfinished
+from lockstep.server.recording.format.map_messages import MAP_FRAME
 from lockstep.server.recording.format.payload import VIDEO, RecordedPicture, own_record
-from lockstep.server.recording.format.records import Degraded, FeedbackRecord, RobotRecord
+from lockstep.server.recording.format.records import Degraded, FeedbackRecord, MapRecord, NavigationRecord, RobotRecord
 from lockstep.server.recording.format.stamp import STAMP_TOPIC, stamp_message
 from lockstep.server.recording.format.topics import CAMERA, OWN_TOPICS, SIGNATURE, WRENCH, has_frames, stream_of
 from lockstep.server.recording.reading.pictures import picture_size
@@ -38,6 +40,8 @@ __all__ = ["export"]
 
 FEEDBACK, ROBOT = OWN_TOPICS[FeedbackRecord], OWN_TOPICS[RobotRecord]
 DEGRADED = OWN_TOPICS[Degraded]
+MAPS, NAVIGATION = OWN_TOPICS[MapRecord], OWN_TOPICS[NavigationRecord]
+LATCHED = ("/tf_static", "/map")
 TEXTS = set(OWN_TOPICS.values()) - {SIGNATURE, WRENCH}  # what signs the file signs no bag
 VERSION: Final = 8  # of metadata.yaml: ROS 2 from Iron on reads it
 CANNOT_BE_WRITTEN = (struct.error, OverflowError, ValueError)  # such as a time after 2038
@@ -98,6 +102,8 @@ class _Bag:
             self._text(record.topic, record.arrived, record.data)
             if record.topic == FEEDBACK:
                 self._feedback(own_record(FeedbackRecord, record.data), record)
+            elif record.topic in (MAPS, NAVIGATION):
+                self._map(record)
             elif record.topic == ROBOT and has_frames(self._description):
                 message = self._messages.fixed_transforms(self._description, record.captured)
                 self._write("/tf_static", "tf2_msgs/msg/TFMessage", record.arrived, message)
@@ -139,13 +145,29 @@ class _Bag:
             scan = messages.scan(description.ranges, feedback.ranges, time)
             self._write("/scan", "sensor_msgs/msg/LaserScan", record.arrived, scan)
 
+    def _map(self, record: Record) -> None:
+        """Write the grid, or where its frame is; a body may have the name of that frame."""
+        if self._description.map is None or any(body.name == MAP_FRAME for body in self._description.bodies):
+            return
+        if record.topic == NAVIGATION:
+            navigation = own_record(NavigationRecord, record.data)
+            if navigation.located:
+                message = self._messages.map_frame(navigation.frame, record.captured)
+                self._write("/tf", "tf2_msgs/msg/TFMessage", record.arrived, message)
+            return
+        try:
+            grid = self._messages.grid(own_record(MapRecord, record.data).map, record.captured)
+        except MessageError:
+            return  # its cells are not what it says
+        self._write("/map", "nav_msgs/msg/OccupancyGrid", record.arrived, grid)
+
     def _text(self, topic: str, arrived: int, data: bytes) -> None:
         self._write(topic, "std_msgs/msg/String", arrived, self._messages.text(data.decode(errors="replace")))
 
     def _write(self, topic: str, kind: str, arrived: int, message: Any) -> None:
         connection = self._connections.get(topic)
         if connection is None:
-            qos = _qos(latched=topic == "/tf_static")
+            qos = _qos(latched=topic in LATCHED)
             connection = self._writer.add_connection(topic, kind, typestore=self._store, offered_qos_profiles=[qos])
             self._connections[topic] = connection
         self._writer.write(connection, arrived, self._store.serialize_cdr(message, kind))
@@ -164,7 +186,7 @@ def _topic_names(cameras: Iterable[str]) -> dict[str, str]:
 
 
 def _qos(*, latched: bool) -> Qos:
-    """Return what a publisher of this topic would offer: /tf_static is kept for those who come later."""
+    """Return what a publisher of this topic would offer: /tf_static and /map are kept for those who come later."""
     return Qos(
         history=QosHistory.KEEP_LAST,
         depth=1 if latched else 10,

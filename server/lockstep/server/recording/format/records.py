@@ -12,6 +12,7 @@ from lockstep.protocol.actions import ActionReason, ActionState, ParameterValue,
 from lockstep.protocol.console import DriverKind, Participant, Report, ShadowJudgement
 from lockstep.protocol.description import RobotDescription
 from lockstep.protocol.episodes import EpisodeOutcome
+from lockstep.protocol.maps import Coordinate, MapId, OccupancyMap, PlanarPose
 from lockstep.protocol.messages import EventReference, RefusalReason, StopState
 from lockstep.protocol.traces.trace import CommandSpans, PictureSpans
 
@@ -23,6 +24,8 @@ __all__ = [
     "Degraded",
     "EpisodeRecord",
     "FeedbackRecord",
+    "MapRecord",
+    "NavigationRecord",
     "NoteRecord",
     "OwnRecord",
     "ParticipantsRecord",
@@ -174,6 +177,22 @@ class StatusRecord(OwnRecord, frozen=True, kw_only=True):
     items: list[StatusItem]
 
 
+class MapRecord(OwnRecord, frozen=True, kw_only=True):
+    """The robot's map from this event on; its `cells` are in base64. Repeated once a minute."""
+
+    map: OccupancyMap
+
+
+class NavigationRecord(OwnRecord, frozen=True, kw_only=True):
+    """Where the robot is on its map, and where it is going; whenever one of these has changed."""
+
+    map: MapId = ""  # of the newest map
+    located: bool = True  # False: the robot does not know where it is on the map
+    frame: PlanarPose = (0.0, 0.0, 0.0)  # pose, in the map's frame, of the frame of the robot's measured pose
+    goal: list[Coordinate] = []  # x, y and yaw in the map's frame; empty: none
+    path: list[Coordinate] = []  # x and y in turn
+
+
 class ParticipantsRecord(OwnRecord, frozen=True, kw_only=True):
     """Who is there, at the start of every file and whenever it changes."""
 
@@ -270,6 +289,8 @@ OWN_RECORDS: dict[str, type[OwnRecord]] = {
     "lockstep.Stop": StopRecord,
     "lockstep.Action": ActionRecord,
     "lockstep.Status": StatusRecord,
+    "lockstep.Map": MapRecord,
+    "lockstep.Navigation": NavigationRecord,
     "lockstep.Participants": ParticipantsRecord,
     "lockstep.Report": ReportRecord,
     "lockstep.Trace": TraceRecord,

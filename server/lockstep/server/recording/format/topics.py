@@ -10,6 +10,7 @@ from foxglove_schemas_protobuf.CameraCalibration_pb2 import CameraCalibration
 from foxglove_schemas_protobuf.CompressedAudio_pb2 import CompressedAudio
 from foxglove_schemas_protobuf.CompressedVideo_pb2 import CompressedVideo
 from foxglove_schemas_protobuf.FrameTransforms_pb2 import FrameTransforms
+from foxglove_schemas_protobuf.Grid_pb2 import Grid
 from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 from foxglove_schemas_protobuf.LaserScan_pb2 import LaserScan
 from foxglove_schemas_protobuf.Log_pb2 import Log
@@ -28,6 +29,8 @@ from lockstep.server.recording.format.records import (
     Degraded,
     EpisodeRecord,
     FeedbackRecord,
+    MapRecord,
+    NavigationRecord,
     NoteRecord,
     OwnRecord,
     ParticipantsRecord,
@@ -52,6 +55,7 @@ __all__ = [
     "FIXED_TRANSFORMS",
     "JOINTS",
     "LOG",
+    "MAP",
     "MICROPHONE",
     "ODOMETRY",
     "OWN_TOPICS",
@@ -75,6 +79,7 @@ CAMERA, MICROPHONE = "/camera/", "/microphone/"  # and the stream's name
 JOINTS, SCAN, POSE, LOG = "/joint_states", "/scan", "/pose", "/log"
 AXIS_COMMANDS, AXIS_STATES, WRENCH = "/axis_commands", "/axis_states", "/wrench"
 CALIBRATION = "/camera_calibration/"  # and the camera's name
+MAP = "/map"
 TRANSFORMS, FIXED_TRANSFORMS, ODOMETRY, SHAPES = "/tf", "/tf_static", "/odom", "/robot_shapes"
 
 # The names of formats in messages, by codec. One topic can have several.
@@ -92,6 +97,8 @@ OWN_TOPICS: dict[type[OwnRecord], str] = {
     StopRecord: "/lockstep/stop",
     ActionRecord: "/lockstep/action",
     StatusRecord: "/lockstep/status",
+    MapRecord: "/lockstep/map",
+    NavigationRecord: "/lockstep/navigation",
     ParticipantsRecord: "/lockstep/participants",
     ReportRecord: "/lockstep/report",
     TraceRecord: "/lockstep/trace",
@@ -131,8 +138,12 @@ def topics_of(description: RobotDescription, codecs: Mapping[str, str], *, signe
     if description.planar_base is not None:
         found.append(_protobuf(POSE, PoseInFrame))
         found.append(_protobuf(ODOMETRY, Odometry))
+    if has_frames(description) or description.map is not None:
+        found.append(_protobuf(TRANSFORMS, FrameTransforms))
     if has_frames(description):
-        found.extend(_protobuf(topic, FrameTransforms) for topic in (TRANSFORMS, FIXED_TRANSFORMS))
+        found.append(_protobuf(FIXED_TRANSFORMS, FrameTransforms))
+    if description.map is not None:
+        found.append(_protobuf(MAP, Grid))
     if description.bodies:
         found.append(_protobuf(SHAPES, SceneUpdate))
     for camera in description.cameras:

@@ -16,7 +16,15 @@ from lockstep.server.recording.format.foxglove import (
     robot_messages,
     sound_message,
 )
-from lockstep.server.recording.format.records import CommandRecord, FeedbackRecord, OwnRecord, RobotRecord
+from lockstep.server.recording.format.map_messages import map_messages
+from lockstep.server.recording.format.records import (
+    CommandRecord,
+    FeedbackRecord,
+    MapRecord,
+    NavigationRecord,
+    OwnRecord,
+    RobotRecord,
+)
 from lockstep.server.recording.format.records_in_words import in_words
 from lockstep.server.recording.format.topics import LOG, OWN_TOPICS, PICTURE_FORMATS, SOUND_FORMATS, media_topic
 from lockstep.server.recording.writing.writer import Entry
@@ -82,6 +90,8 @@ def entries_of(item: Item, description: RobotDescription) -> Iterator[Entry]:
                 yield Entry(LOG, record.event, arrived, arrived, data)
             if isinstance(record, CommandRecord):
                 yield from command_messages(description, record, arrived, arrived)
+            if isinstance(record, MapRecord | NavigationRecord):
+                yield from map_messages(description, record, arrived)
             if isinstance(item, RobotItem):
                 yield from robot_messages(description, record.event, arrived)
 

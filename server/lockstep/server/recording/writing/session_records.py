@@ -27,6 +27,7 @@ from lockstep.server.recording.format.records import (
     StopRecord,
 )
 from lockstep.server.recording.times import LinkTimes, RecordClock
+from lockstep.server.recording.writing.map_records import MapRecords
 from lockstep.server.recording.writing.queue_items import FeedbackItem, Item, MediaItem, OwnItem, RobotItem
 from lockstep.server.recording.writing.trace_records import TraceRecords
 from lockstep.server.session_events import (
@@ -40,6 +41,8 @@ from lockstep.server.session_events import (
     FeedbackReceived,
     LinkDown,
     LinkUp,
+    MapReceived,
+    NavigationReceived,
     NoteWritten,
     ParticipantsChanged,
     Refused,
@@ -93,6 +96,7 @@ class SessionRecords:
         self._participants = Participants(participants=[])
         self._queue: ItemQueue | None = None  # None: nothing is recorded
         self._traces = TraceRecords(clock, self._put_own)
+        self._maps = MapRecords()
 
     def begin(self, queue: ItemQueue, times: RecordClock) -> None:
         """Put everything into `queue` from now on, first the state that holds."""
@@ -104,6 +108,8 @@ class SessionRecords:
             self._put_feedback(self._clock.feedback, time.monotonic())
         if self._robot is not None:
             self._put_robot(self._robot)
+        self._maps.begin()
+        self._put_maps()
 
     def end(self) -> None:
         self._queue = None
@@ -129,6 +135,8 @@ class SessionRecords:
         events.subscribe(ActionCancelled, self._action_cancelled)
         events.subscribe(ActionUpdated, self._action_updated)
         events.subscribe(StatusReceived, self._status_received)
+        events.subscribe(MapReceived, self._map_received)
+        events.subscribe(NavigationReceived, self._navigation_received)
         events.subscribe(ShadowJudged, self._shadow_judged)
         events.subscribe(EpisodeWritten, self._episode_written)
         self._traces.subscribe(events)
@@ -141,6 +149,7 @@ class SessionRecords:
         if state.epoch != self._link_epoch:
             self._link_epoch = state.epoch
             self._link_times = LinkTimes()
+            self._maps.forget()
         self._put_robot(state)
 
     def _seat_changed(self, event: SeatChanged) -> None:
@@ -310,6 +319,19 @@ class SessionRecords:
     def _status_received(self, event: StatusReceived) -> None:
         status = event.status
         self._put_own(StatusRecord(epoch=self._clock.epoch, event=status.event, items=status.items))
+
+    def _map_received(self, event: MapReceived) -> None:
+        self._maps.take_map(event.map)
+        self._put_maps()
+
+    def _navigation_received(self, event: NavigationReceived) -> None:
+        self._maps.take(event.navigation)
+        self._put_maps()
+
+    def _put_maps(self) -> None:
+        if self._queue is not None:
+            for record in self._maps.due(self._clock.epoch, self._clock.event, time.monotonic()):
+                self._put_own(record)
 
     def _episode_written(self, event: EpisodeWritten) -> None:
         record = event.record

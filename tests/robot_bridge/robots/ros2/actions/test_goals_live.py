@@ -46,6 +46,7 @@ actions:
     text: sequence
     result: sequence
     timeout: 10
+  - {name: late, action: /late, type: example_interfaces/Fibonacci, timeout: 2}
 grippers:
   - {open: 0.08, effort: 5}
 map:
@@ -223,6 +224,35 @@ async def test_a_goal_that_is_accepted_after_its_cancel_is_cancelled_then(armed:
     await armed.ask("count", order=90.0)
     armed.link.send(ActionCancel(id=armed.id))
     assert (await armed.ended()).reason in ("cancelled", "interrupted")
+    ends = await node.noted("ended", lambda notes: len(notes) > 0)
+    assert ends[0]["how"] == "canceled"
+
+
+async def test_a_goal_whose_server_was_lost_before_it_accepted_is_cancelled_when_it_accepts_late(
+    armed: Armed, node: RosRobot
+) -> None:
+    """Its server is lost for longer than a running goal waits, is found again, does not know it, and then accepts."""
+    await armed.ask("late")
+    await node.noted("late_asked", lambda notes: len(notes) == 1)
+    await node.tell("hide")
+    ended = await armed.ended()
+    assert (ended.state, ended.text) == ("failed", "nobody offers the action /late any more")
+    fault = "/late: the cancelled goal has not ended"
+    await armed.until(lambda: armed.feedback is not None and any(f.startswith(fault) for f in armed.feedback.faults))
+    await node.tell("show")
+    await armed.until(lambda: armed.feedback is not None and not armed.feedback.faults)
+    assert list(node.notes("late_unknown")), "it is asked by the goal's id before it is given up"
+    assert not list(node.notes("late_accepted"))
+    await node.tell("accept")
+    await node.noted("late_cancelled", lambda notes: len(notes) > 0)
+
+
+async def test_a_goal_that_is_accepted_while_its_bridge_ends_is_cancelled(
+    armed: Armed, node: RosRobot, bridge: RosBridge
+) -> None:
+    await node.tell("slow")
+    await armed.ask("count", order=90.0)
+    await bridge.process.end()
     ends = await node.noted("ended", lambda notes: len(notes) > 0)
     assert ends[0]["how"] == "canceled"
 

@@ -7,14 +7,18 @@ from pathlib import Path
 
 import pytest
 
+from lockstep.protocol.actions import Act, ActionUpdate
 from lockstep.protocol.messages import Feedback
 from lockstep.robot_bridge.link.link_client import RobotLink
 from lockstep.robot_bridge.robots.ros2 import read_settings
 from tests.robot_bridge.bridge_helpers import Operator
 from tests.support.ros2 import (
+    EVERYTHING,
     PATIENCE,
     STAY,
     TWO_BASES,
+    built_interfaces,
+    have_compiler,
     have_ros,
     ros_environment,
     ros_python,
@@ -30,7 +34,9 @@ JOINTS = ("shoulder_pan_joint", "shoulder_lift_joint", "elbow_joint", "wrist_1_j
 COMMANDS = ("twist", "trajectory", "joints", "velocities")
 
 
-async def discover(out: Path, environment: dict[str, str], *options: str) -> tuple[int, str]:
+async def discover(
+    out: Path, environment: dict[str, str], *options: str, interfaces: Path | None = None
+) -> tuple[int, str]:
     """Run the command as a user without ROS in their own Python does; its exit status, and all that it printed."""
     process = await asyncio.create_subprocess_exec(
         *(sys.executable, "-m", "lockstep.robot_bridge.robots.ros2.discovery", "discover"),
@@ -38,7 +44,9 @@ async def discover(out: Path, environment: dict[str, str], *options: str) -> tup
         stdin=asyncio.subprocess.DEVNULL,
         stdout=asyncio.subprocess.PIPE,
         stderr=asyncio.subprocess.STDOUT,
-        env=os.environ | {name: value for name, value in environment.items() if name != "PYTHONPATH"},
+        env=os.environ
+        | {name: value for name, value in environment.items() if name != "PYTHONPATH"}
+        | ({} if interfaces is None else {"PYTHONPATH": str(interfaces)}),
     )
     async with asyncio.timeout(2 * PATIENCE):
         output, _ = await process.communicate()
@@ -95,6 +103,64 @@ async def test_the_file_drives_the_graph_that_it_was_written_from_without_an_edi
         code, printed = await discover(out, node.environment)
         assert (code, "is there already" in printed) == (2, True)
         assert out.read_text() == text
+
+
+@pytest.mark.skipif(not have_compiler(), reason="there is no compiler for the interfaces that no wheel has")
+@pytest.mark.timeout(180)
+async def test_what_moves_the_robot_stands_in_the_file_switched_off_and_works_when_it_is_switched_on(
+    tmp_path: Path,
+) -> None:
+    out, interfaces = tmp_path / "robot.yaml", built_interfaces()
+    async with running_ros_robot(tmp_path, EVERYTHING, interfaces=interfaces) as node:
+        code, printed = await discover(out, node.environment, "--yes", interfaces=interfaces)
+        assert code == 0, printed
+        settings, description = read_settings(out)
+        assert (settings.services, settings.actions, settings.grippers) == ((), (), ()), "nobody was asked"
+        assert description.actions == ()
+        assert "switched off: beep, calibrate, light" in printed
+        assert settings.map is not None
+        assert (settings.map.topic, settings.map.durable, settings.map.frame) == ("/map", True, "map")
+        assert (settings.map.place.source, settings.map.place.odometry, settings.map.path) == ("tf", "odom", "/plan")
+        assert settings.map.goal is None
+        assert [battery.topic for battery in settings.batteries] == ["/battery_state"]
+        assert settings.diagnostics is not None
+        front = next(camera for camera in settings.cameras if camera.topic == "/camera/image_raw")
+        assert front.calibration is not None
+        assert (front.calibration.fx, front.calibration.fy, front.calibration.cx) == (250.0, 255.0, 160.0)
+        assert (front.calibration.body, front.calibration.position) == ("base_link", (0.25, 0.0, 0.3))
+        assert description.cameras[0].calibration == front.calibration
+
+        written = "\n".join(line.removeprefix("# ") if _is_off(line) else line for line in out.read_text().splitlines())
+        out.write_text(written)
+        settings, description = read_settings(out)
+        assert {each.name: each.moves for each in description.actions} == {
+            **{"beep": False, "calibrate": False, "light": False},
+            **{"count": True, "late": True, "gripper": True, "go_to": True},
+        }
+        async with (
+            running_ros_bridge(tmp_path, node, out) as bridge,
+            RobotLink(*bridge.address, "operator", name="test") as link,
+        ):
+            driver = Operator(link)
+            await driver.next(Feedback)
+            async with asyncio.timeout(2 * PATIENCE):
+                await driver.heard(lambda feedback: feedback.faults == [] and feedback.unknown == [])
+                await driver.arm()
+                said, tries = "nobody offers", 0
+                while said.startswith("nobody offers"):  # the service has not been found yet
+                    tries += 1
+                    link.send(Act(id=f"{tries:016x}", name="beep", nonce=driver.feedback.nonce))
+                    update = await driver.next(ActionUpdate)
+                    while update.state == "running":
+                        update = await driver.next(ActionUpdate)
+                    said = update.text
+                assert list(node.notes("beep")), said
+
+
+def _is_off(line: str) -> bool:
+    """Whether a line of the file is a setting that stands in it as a comment."""
+    words = ("# services:", "# actions:", "# grippers:", "#   - {", "#   goal:")
+    return line.startswith(words)
 
 
 async def test_one_of_several_robots_is_named_and_only_that_one_is_driven(tmp_path: Path) -> None:

@@ -2,7 +2,8 @@
 
 A goal goes on in its server until that ends it. So a cancelled goal is cancelled again and again, also when its server
 accepts it only after the cancel, and a fault says so while it has not ended. A server that cannot be found has not
-ended its goal: it may be behind a network that is down, and drives on. It is asked when it is found again.
+ended its goal: it may be behind a network that is down, and drives on. It is asked when it is found again. So is one
+that was not found any more before it accepted the goal.
 """
 
 import math
@@ -11,15 +12,15 @@ from typing import Any
 
 from lockstep.robot_bridge.control import clock
 from lockstep.robot_bridge.robots.actions import ActionFailed, ActionNotPossible, ActionRun, ActionStep
+from lockstep.robot_bridge.robots.ros2.actions.id_cancel import CANCEL_AGAIN, IdCancels
 from lockstep.robot_bridge.robots.ros2.ros_side import RosSide
 from lockstep.robot_bridge.robots.ros2.sensing.words import words_of
 
 __all__ = ["GoalClient", "GoalRun", "Reading"]
 
 SUCCEEDED, CANCELED = 4, 5  # action_msgs/GoalStatus
-CANCEL_AGAIN = 0.2  # s between two tries to cancel
 GONE = 1.0  # s without the server, after which its goal has failed
-MOST_FORGOTTEN = 64  # cancelled goals that are followed at once
+MOST_FORGOTTEN = 64  # cancelled goals that are followed at once, and those that no server knew
 
 
 class Reading:
@@ -51,8 +52,10 @@ class GoalClient:
         self.action = action
         self.full_name = ros.full_name(action)
         self.timeout = timeout
+        self.cancels = IdCancels(ros, self.full_name)
         self._client = ros.action_client(self.kind, action)
         self._ending: list[GoalRun] = []  # cancelled, and not known to have ended
+        self._unknown: list[GoalRun] = []  # cancelled, never accepted, and not known to the server when it was asked
 
     def begin(self, goal: Any, reading: Reading) -> "GoalRun":
         """Send a goal, once.
@@ -72,8 +75,16 @@ class GoalClient:
 
     def tick(self, now: float) -> None:
         """Cancel again what was cancelled and has not ended."""
+        late = [run for run in self._unknown if run.answered]
+        if late:  # its server accepted it after all
+            self._unknown = [run for run in self._unknown if run not in late]
+            for run in late:
+                run.leave_again(now)
         if self._ending:
-            self._ending = [run for run in self._ending if not run.ended_after_cancel(now)]
+            ended = [run for run in self._ending if run.ended_after_cancel(now)]
+            self._ending = [run for run in self._ending if run not in ended]
+            self._unknown += [run for run in ended if not run.answered]
+            del self._unknown[:-MOST_FORGOTTEN]
 
     def faults(self, now: float) -> list[str]:
         """Return what a person has to know: the server goes on with a goal that was cancelled."""
@@ -85,6 +96,11 @@ class GoalClient:
     def has_ending(self) -> bool:
         """True while a goal was cancelled and is not known to have ended."""
         return bool(self._ending)
+
+    @property
+    def has_unanswered(self) -> bool:
+        """True while such a goal may still be accepted."""
+        return any(not run.answered for run in self._ending)
 
     def is_there(self) -> bool:
         return bool(self._client.server_is_ready())
@@ -105,12 +121,19 @@ class GoalRun(ActionRun):
         self._cancel_tried_at = -math.inf
         self._is_lost = False  # the server was not there at the last look after the cancel
         self._over = False  # its end was told
-        self._accepting = client.send_goal_async(goal, feedback_callback=self._take)
+        id = owner.cancels.new_id()
+        self._by_id = owner.cancels.of(id, owner.timeout)
+        self._accepting = client.send_goal_async(goal, feedback_callback=self._take, goal_uuid=id)
 
     @property
     def over(self) -> bool:
         """True when it was cancelled, has failed or is done."""
         return self._cancelled_at is not None or self._over
+
+    @property
+    def answered(self) -> bool:
+        """True when its server has accepted or refused it."""
+        return bool(self._accepting.done())
 
     def _take(self, message: Any) -> None:
         self._feedback = message.feedback
@@ -145,14 +168,18 @@ class GoalRun(ActionRun):
         if self._cancelled_at is None:
             self._cancelled_at = now
             self._owner.ending(self)
-            self.ended_after_cancel(now)
+            self.ended_after_cancel(now)  # the owner looks again at its next tick
+
+    def leave_again(self, now: float) -> None:
+        """Cancel a goal that was accepted after it had been given up."""
+        self._cancelled_at = None
+        self._leave(now)
 
     def ended_after_cancel(self, now: float) -> bool:
-        """Cancel what the server has accepted, again at intervals. True when there is nothing left to cancel."""
+        """Cancel the goal, again at intervals. True when there is nothing left to cancel."""
         try:
             if not self._accepted():
-                # An answer that does not come before the server has gone is none: it forgets its goals when it ends.
-                return not self._owner.is_there() and now - self._seen_at > GONE
+                return self._by_id.ended(now, self._owner.is_there())
         except ActionFailed:
             return True
         if self._result.done():

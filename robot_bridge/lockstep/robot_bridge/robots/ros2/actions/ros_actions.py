@@ -22,6 +22,7 @@ __all__ = ["GRIPPER_TYPE", "RosActions", "parameter_name"]
 
 GRIPPER_TYPE = "control_msgs/GripperCommand"
 SETTLE_SECONDS = 0.5  # for cancelled goals to end when the bridge ends
+UNANSWERED_SECONDS = 2.0  # for a server to accept a cancelled goal then, after which it is cancelled
 SETTLE_STEP = 0.01  # s
 SOME_POSE = (0.0, 0.0, 0.0)
 
@@ -81,8 +82,12 @@ class RosActions:
 
     def settle(self) -> None:
         """Wait shortly until cancelled goals have ended: later nobody cancels them. Blocks; the node still runs."""
-        deadline = time.monotonic() + SETTLE_SECONDS
+        began = time.monotonic()
+        deadline = began + SETTLE_SECONDS
         while any(goals.has_ending for goals in self._goals) and time.monotonic() < deadline:
+            if any(goals.has_unanswered for goals in self._goals):
+                # A goal that is accepted on the last instant still needs its time to end.
+                deadline = min(time.monotonic(), began + UNANSWERED_SECONDS) + SETTLE_SECONDS
             self.tick()
             time.sleep(SETTLE_STEP)
 

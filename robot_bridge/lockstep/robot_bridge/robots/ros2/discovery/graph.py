@@ -4,7 +4,21 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
-__all__ = ["Endpoint", "Graph", "Heard", "ParameterValue", "Topic", "namespace_of", "parts_of_name"]
+from lockstep.robot_bridge.robots.ros2.discovery.pose import Pose
+
+__all__ = [
+    "ActionFields",
+    "ActionServer",
+    "Endpoint",
+    "Graph",
+    "Heard",
+    "ParameterValue",
+    "Pinhole",
+    "ServiceServer",
+    "Topic",
+    "namespace_of",
+    "parts_of_name",
+]
 
 ParameterValue = bool | int | float | str | list[str]
 
@@ -33,6 +47,39 @@ class Topic(NamedTuple):
         return any(each.kind == kind for each in self.subscribers)
 
 
+class ServiceServer(NamedTuple):
+    name: str  # "/light"
+    kind: str  # "std_srvs/srv/SetBool"
+    node: str
+
+
+class ActionFields(NamedTuple):
+    """The fields of an action's messages with their types: "order" is an "int32"."""
+
+    goal: Mapping[str, str]
+    result: Mapping[str, str]
+    feedback: Mapping[str, str]
+
+
+class ActionServer(NamedTuple):
+    name: str  # "/dock_robot"
+    kind: str  # "nav2_msgs/action/DockRobot"
+    node: str
+    fields: ActionFields | None = None  # None: the action is not installed where the look was taken
+
+
+class Pinhole(NamedTuple):
+    """What a sensor_msgs/CameraInfo says: of the raw picture, and of the rectified one."""
+
+    width: int
+    height: int
+    frame: str
+    raw: tuple[float, float, float, float]  # fx, fy, cx, cy, pixels
+    rectified: tuple[float, float, float, float]
+    distortion_model: str
+    distortion: tuple[float, ...]
+
+
 @dataclass(frozen=True)
 class Heard:
     """What the messages of one topic said; a field that its kind of message does not have keeps its default."""
@@ -48,6 +95,7 @@ class Heard:
     height: int = 0
     encoding: str = ""
     stamped: bool = False  # every header's stamp was near this machine's clock
+    pinhole: Pinhole | None = None  # of CameraInfo
 
 
 @dataclass(frozen=True)
@@ -57,6 +105,12 @@ class Graph:
     parameters: Mapping[str, Mapping[str, ParameterValue]] = field(default_factory=dict)  # by node
     descriptions: Mapping[str, str] = field(default_factory=dict)  # URDF by topic; "" while none came
     seconds: float = 0.0  # for which topics were listened to
+    services: tuple[ServiceServer, ...] = ()
+    actions: tuple[ActionServer, ...] = ()
+    frames: Mapping[str, str] = field(default_factory=dict)  # of TF: the parent of each frame
+    mounts: Mapping[str, tuple[str, Pose]] = field(
+        default_factory=dict
+    )  # those that never move: parent, and pose in it
 
     def published(self, kind: str) -> list[Topic]:
         """Return the topics on which messages of a kind are published."""
@@ -86,6 +140,10 @@ class Graph:
             self.parameters,
             {name: text for name, text in self.descriptions.items() if name.startswith(prefix)},
             self.seconds,
+            tuple(each for each in self.services if each.name.startswith(prefix)),
+            tuple(each for each in self.actions if each.name.startswith(prefix)),
+            self.frames,
+            self.mounts,
         )
 
 

@@ -6,7 +6,16 @@ from contextlib import suppress
 from importlib import import_module
 from typing import Any
 
-from lockstep.robot_bridge.robots.ros2.discovery.graph import Endpoint, ParameterValue, Topic
+from lockstep.robot_bridge.errors import RobotUnavailable
+from lockstep.robot_bridge.robots.ros2.discovery.graph import (
+    ActionFields,
+    ActionServer,
+    Endpoint,
+    ParameterValue,
+    ServiceServer,
+    Topic,
+)
+from lockstep.robot_bridge.robots.ros2.discovery.kinds import SERVICES
 from lockstep.robot_bridge.robots.ros2.ros_side import RosSide
 from lockstep.robot_bridge.robots.ros2.settings import Ros2Settings
 
@@ -16,6 +25,9 @@ NODE = "lockstep_discover"
 DEPTH = 20  # messages that wait for the callback, so that rates are counted
 OWN_TOPICS = ("/parameter_events", "/rosout")  # every node has them
 SERVICE_SECONDS = 2.0
+MAX_NODES = 200
+MAX_SERVERS = 200  # services, and actions
+MAX_FIELDS = 40  # of a message
 
 # rcl_interfaces/ParameterType -> the field that holds the value
 _FIELDS = {1: "bool_value", 2: "integer_value", 3: "double_value", 4: "string_value", 9: "string_array_value"}
@@ -32,6 +44,7 @@ class GraphSide(RosSide):
         """
         super().__init__(Ros2Settings(name=NODE, node=NODE, domain=domain))
         self._services = import_module("rcl_interfaces.srv")
+        self._action_graph = import_module("rclpy.action")
 
     def topics(self) -> list[Topic]:
         """Return the topics of other nodes, as far as they are known by now."""
@@ -45,10 +58,39 @@ class GraphSide(RosSide):
                 found.append(Topic(str(name), publishers, subscribers))
         return found
 
+    def servers(self) -> tuple[tuple[ServiceServer, ...], tuple[ActionServer, ...]]:
+        """Return the services that an action of the robot may be, and the action servers, of other nodes."""
+        services: dict[str, ServiceServer] = {}
+        actions: dict[str, ActionServer] = {}
+        for node, namespace in sorted(self._node.get_node_names_and_namespaces())[:MAX_NODES]:
+            if node == NODE:
+                continue
+            full = f"{namespace.rstrip('/')}/{node}"
+            offered: list[tuple[str, list[str]]] = []
+            acts: list[tuple[str, list[str]]] = []
+            with suppress(Exception):  # the node has ended meanwhile
+                offered = self._node.get_service_names_and_types_by_node(node, namespace)
+                acts = self._action_graph.get_action_server_names_and_types_by_node(self._node, node, namespace)
+            for name, kinds in offered:
+                if len(services) < MAX_SERVERS and kinds and kinds[0] in SERVICES:
+                    services.setdefault(name, ServiceServer(name, kinds[0], full))
+            for name, kinds in acts:
+                if len(actions) < MAX_SERVERS and kinds and name not in actions:
+                    actions[name] = ActionServer(name, kinds[0], full, self._action_fields(kinds[0]))
+        return tuple(services.values()), tuple(actions.values())
+
+    def _action_fields(self, kind: str) -> ActionFields | None:
+        try:
+            found = self.action(kind)
+        except RobotUnavailable:
+            return None
+        parts = (found.Goal, found.Result, found.Feedback)
+        return ActionFields(*(dict(list(part.get_fields_and_field_types().items())[:MAX_FIELDS]) for part in parts))
+
     def listen(self, kind: Any, topic: str, callback: Callable[[Any], None], kept: bool = False) -> None:
-        """Subscribe. `kept`: also to the message that was published before."""
+        """Subscribe. `kept`: also to the messages that were published before."""
         profile = self._qos.QoSProfile(
-            depth=1 if kept else DEPTH,
+            depth=DEPTH,
             reliability=self._qos.ReliabilityPolicy["RELIABLE" if kept else "BEST_EFFORT"],
             durability=self._qos.DurabilityPolicy["TRANSIENT_LOCAL" if kept else "VOLATILE"],
             history=self._qos.HistoryPolicy.KEEP_LAST,

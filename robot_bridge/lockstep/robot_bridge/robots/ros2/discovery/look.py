@@ -3,15 +3,26 @@
 Bounded in everything: topics, listeners, the time that it takes.
 """
 
+import math
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from functools import partial
 from typing import Any
 
 from lockstep.robot_bridge.errors import BridgeError, RobotUnavailable
 from lockstep.robot_bridge.robots.ros2.discovery.graph import Graph, ParameterValue, Topic
 from lockstep.robot_bridge.robots.ros2.discovery.graph_side import GraphSide
-from lockstep.robot_bridge.robots.ros2.discovery.kinds import COMMANDS, DESCRIPTION, SENSORS, SERVO_COMMAND_TYPE
+from lockstep.robot_bridge.robots.ros2.discovery.kinds import (
+    COMMANDS,
+    DESCRIPTION,
+    FRAMES,
+    GRIPPER,
+    KEPT,
+    SENSORS,
+    SERVO_COMMAND_TYPE,
+)
+from lockstep.robot_bridge.robots.ros2.discovery.pose import Pose
 from lockstep.robot_bridge.robots.ros2.discovery.tally import Tally
 from lockstep.robot_bridge.robots.ros2.ros_side import header_ns
 
@@ -22,9 +33,10 @@ FIRST_TOPIC = 10.0  # s to wait for any topic at all
 MAX_TOPICS = 1000
 MAX_LISTENERS = 60
 MAX_ASKED = 20  # nodes whose parameters are read
+MAX_FRAMES = 1024
 WANTED = (
     SERVO_COMMAND_TYPE,
-    *("joints", "interface_name", "cmd_vel_timeout", "base_frame_id"),
+    *("joints", "joint", "interface_name", "cmd_vel_timeout", "base_frame_id"),
     *("linear.x.max_velocity", "linear.x.min_velocity", "linear.y.max_velocity", "angular.z.max_velocity"),
 )
 
@@ -40,6 +52,9 @@ class _Listening:
         self._ros = ros
         self.tallies: dict[str, Tally] = {}
         self.descriptions: dict[str, str] = {}
+        self.frames: dict[str, str] = {}
+        self.mounts: dict[str, tuple[str, Pose]] = {}
+        self._follows_frames: set[str] = set()
 
     def follow(self, topics: dict[str, Topic]) -> None:
         """Listen to sensors that came since the last call."""
@@ -47,7 +62,10 @@ class _Listening:
             for kind in SENSORS:
                 if topic.publishes(kind) and topic.name not in self.tallies and len(self.tallies) < MAX_LISTENERS:
                     self.tallies[topic.name] = Tally()
-                    self._listen(kind, topic.name, partial(self._take, self.tallies[topic.name]))
+                    kept = kind in KEPT and any(each.kept for each in topic.publishers)
+                    self._listen(kind, topic.name, partial(self._take, self.tallies[topic.name]), kept)
+            if topic.name in ("/tf", "/tf_static") and topic.publishes(FRAMES):
+                self._follow_frames(topic.name)
             is_new = topic.name not in self.descriptions and len(self.descriptions) < MAX_LISTENERS
             if topic.name.endswith("/robot_description") and topic.publishes(DESCRIPTION) and is_new:
                 self.descriptions[topic.name] = ""
@@ -56,6 +74,25 @@ class _Listening:
     def _listen(self, kind: str, topic: str, callback: Callable[[Any], None], kept: bool = False) -> None:
         package, _, name = kind.partition("/msg/")
         self._ros.listen(self._ros.message(package, name), topic, callback, kept)
+
+    def _follow_frames(self, topic: str) -> None:
+        if topic in self._follows_frames:
+            return
+        self._follows_frames.add(topic)
+        static = topic == "/tf_static"
+        with suppress(RobotUnavailable):  # without tf2_msgs the bridge cannot read them either
+            self._listen(FRAMES, topic, partial(self._take_frames, static), kept=static)
+
+    def _take_frames(self, static: bool, message: Any) -> None:
+        for each in message.transforms:
+            parent, child = str(each.header.frame_id).lstrip("/"), str(each.child_frame_id).lstrip("/")
+            if not parent or not child or (child not in self.frames and len(self.frames) >= MAX_FRAMES):
+                continue
+            self.frames[child] = parent
+            move, turn = each.transform.translation, each.transform.rotation
+            numbers = (move.x, move.y, move.z, turn.w, turn.x, turn.y, turn.z)
+            if static and all(map(math.isfinite, numbers)) and any(numbers[3:]):
+                self.mounts[child] = parent, Pose((move.x, move.y, move.z), (turn.w, turn.x, turn.y, turn.z))
 
     def _take(self, tally: Tally, message: Any) -> None:
         header = header_ns(message.header)
@@ -95,15 +132,22 @@ def look(ros: GraphSide, seconds: float) -> Graph:
         if topics and now - began > seconds and (now - changed > 1.0 or now - began > 3 * seconds):
             break
         time.sleep(EVERY)
+    services, actions = ros.servers()
+    grippers = [each.node for each in actions if each.kind == GRIPPER]
     return Graph(
         topics=topics,
         heard={name: tally.heard() for name, tally in listening.tallies.items()},
-        parameters=_parameters(ros, topics),
+        parameters=_parameters(ros, topics, grippers),
         descriptions=dict(listening.descriptions),
         seconds=time.monotonic() - began,
+        services=services,
+        actions=actions,
+        frames=dict(listening.frames),
+        mounts=dict(listening.mounts),
     )
 
 
-def _parameters(ros: GraphSide, topics: dict[str, Topic]) -> dict[str, dict[str, ParameterValue]]:
+def _parameters(ros: GraphSide, topics: dict[str, Topic], more: list[str]) -> dict[str, dict[str, ParameterValue]]:
     nodes = {each.node: None for topic in topics.values() for each in topic.subscribers if each.kind in COMMANDS}
+    nodes |= dict.fromkeys(more)
     return {node: ros.parameters(node, WANTED) for node in list(nodes)[:MAX_ASKED]}

@@ -10,6 +10,8 @@ from rosbags.typesys.store import Typestore
 
 from lockstep.protocol.description import Body, Camera, PlanarBase, RangeRing, RobotDescription, WrenchSensor
 from lockstep.protocol.description import CameraCalibration as Calibration
+from lockstep.protocol.maps import OccupancyMap, PlanarPose, map_cells
+from lockstep.server.recording.format.map_messages import MAP_FRAME, in_world
 from lockstep.server.recording.format.records import FeedbackRecord
 from lockstep.server.recording.format.robot_frames import WORLD, base_body, camera_frames
 from lockstep.server.scene.kinematics import body_pose
@@ -114,6 +116,43 @@ class RosMessages:
         wrench = self._make("geometry_msgs/Wrench", force=self._vector(values[:3]), torque=self._vector(values[3:]))
         return self._make("geometry_msgs/WrenchStamped", header=self._header(time, sensor.body or WORLD), wrench=wrench)
 
+    def grid(self, map: OccupancyMap, time: int) -> Any:
+        """Return the map as a nav_msgs/OccupancyGrid, in MAP_FRAME. Raises MessageError: its cells make no sense."""
+        x, y, yaw = map.origin
+        info = self._make(
+            "nav_msgs/MapMetaData",
+            map_load_time=self._stamp(time),
+            resolution=map.resolution,
+            width=map.width,
+            height=map.height,
+            origin=self._planar_pose(x, y, yaw),
+        )
+        cells = np.frombuffer(map_cells(map), np.int8)  # 255, not known, is -1 there
+        return self._make("nav_msgs/OccupancyGrid", header=self._header(time, MAP_FRAME), info=info, data=cells)
+
+    def map_frame(self, frame: PlanarPose, time: int) -> Any:
+        """Return where MAP_FRAME is in WORLD. `frame`: the pose of the other in the one."""
+        x, y, yaw = in_world(frame)
+        transform = self._make(
+            "geometry_msgs/Transform",
+            translation=self._vector((x, y, 0.0)),
+            rotation=self._quaternion((math.cos(yaw / 2), 0.0, 0.0, math.sin(yaw / 2))),
+        )
+        stamped = self._make(
+            "geometry_msgs/TransformStamped",
+            header=self._header(time, WORLD),
+            child_frame_id=MAP_FRAME,
+            transform=transform,
+        )
+        return self._make("tf2_msgs/TFMessage", transforms=[stamped])
+
+    def _planar_pose(self, x: float, y: float, yaw: float) -> Any:
+        return self._make(
+            "geometry_msgs/Pose",
+            position=self._make("geometry_msgs/Point", x=x, y=y, z=0.0),
+            orientation=self._quaternion((math.cos(yaw / 2), 0.0, 0.0, math.sin(yaw / 2))),
+        )
+
     def odometry(
         self,
         description: RobotDescription,
@@ -125,11 +164,7 @@ class RosMessages:
         """Return the pose of the base in WORLD, and its measured twist in its own frame; covariances are zero."""
         axes = dict(zip((axis.name for axis in description.axes), feedback.axes, strict=False))
         yaw = joints[base.yaw]
-        pose = self._make(
-            "geometry_msgs/Pose",
-            position=self._make("geometry_msgs/Point", x=joints[base.x], y=joints[base.y], z=0.0),
-            orientation=self._quaternion((math.cos(yaw / 2), 0.0, 0.0, math.sin(yaw / 2))),
-        )
+        pose = self._planar_pose(joints[base.x], joints[base.y], yaw)
         twist = self._make(
             "geometry_msgs/Twist",
             linear=self._vector((axes.get(base.forward, 0.0), axes.get(base.left, 0.0), 0.0)),

@@ -9,8 +9,21 @@ from lockstep.robot_bridge.robots.ros2.discovery.ask import Ask
 from lockstep.robot_bridge.robots.ros2.discovery.drafting.choice import choose_robot
 from lockstep.robot_bridge.robots.ros2.discovery.drafting.draft_arm import draft_arm
 from lockstep.robot_bridge.robots.ros2.discovery.drafting.draft_base import draft_base
-from lockstep.robot_bridge.robots.ros2.discovery.drafting.draft_bodies import FindBox, draft_bodies
+from lockstep.robot_bridge.robots.ros2.discovery.drafting.draft_bodies import (
+    BASE_BODY,
+    LINK_PREFIX,
+    FindBox,
+    draft_bodies,
+)
+from lockstep.robot_bridge.robots.ros2.discovery.drafting.draft_calibration import Places
+from lockstep.robot_bridge.robots.ros2.discovery.drafting.draft_map import draft_map
 from lockstep.robot_bridge.robots.ros2.discovery.drafting.draft_sensors import draft_cameras, draft_ranges, draft_wrench
+from lockstep.robot_bridge.robots.ros2.discovery.drafting.draft_servers import (
+    draft_actions,
+    draft_grippers,
+    draft_services,
+)
+from lockstep.robot_bridge.robots.ros2.discovery.drafting.draft_status import draft_batteries, draft_diagnostics
 from lockstep.robot_bridge.robots.ros2.discovery.drafting.yaml_text import CHECK, Section, Value, comment, render
 from lockstep.robot_bridge.robots.ros2.discovery.graph import Graph, parts_of_name
 from lockstep.robot_bridge.robots.ros2.discovery.urdf import BadUrdf, Urdf, parse_urdf
@@ -54,7 +67,8 @@ def draft(
     if base is None and not arm:
         raise NothingToDrive(_nothing(graph, namespace, remarks))
     simulated = bool(graph.topics.get("/clock") and graph.topics["/clock"].publishers)
-    cameras, camera_remarks = draft_cameras(graph, simulated)
+    bodies = None if urdf is None else draft_bodies(urdf, _names(arm), find_box, has_base=base is not None)
+    cameras, camera_remarks = draft_cameras(graph, simulated, _places(graph, urdf, bodies, arm, base))
     remarks += camera_remarks
     ranges, scanner = draft_ranges(graph, ask, urdf, has_base=base is not None)
     top = _top(graph, ask, namespace, domain, urdf, base, simulated)
@@ -62,15 +76,57 @@ def draft(
     if scanner is not None:
         parts["bodies"] = Section(items=[scanner])
     top.values |= {key: section for key, section in parts.items() if section is not None}
+    remarks += _draft_more(top, graph, ask, urdf, base)
     head, end = _head(graph, namespace), _end(graph, remarks)
-    plain = head + render(top) + end
-    bodies = None if urdf is None else draft_bodies(urdf, _names(arm), find_box, has_base=base is not None)
     if bodies is None:
-        return Draft(plain, "", remarks, _guesses(plain))
+        text = head + render(top) + end
+        return Draft(text, "", remarks, _guesses(text))
+    top.values.pop("cameras", None)
+    without, _ = draft_cameras(graph, simulated)  # no calibration: it names a body
+    plain = head + render(Section(values=top.values | ({} if without is None else {"cameras": without}))) + end
+    if cameras is not None:
+        top.values["cameras"] = cameras
     bodies.items += [] if scanner is None else [scanner]
     top.values["bodies"] = bodies
     text = head + render(top) + end
     return Draft(text, plain, remarks, _guesses(text))
+
+
+def _places(
+    graph: Graph, urdf: Urdf | None, bodies: Section | None, arm: dict[str, Section], base: Section | None
+) -> Places:
+    """Return what says where the frames of cameras are."""
+    named = [] if bodies is None else [str(row.value["name"]) for row in bodies.items if isinstance(row.value, dict)]
+    root = BASE_BODY if base is not None else ""
+    links = {name: name for name in named}
+    if root and f"{LINK_PREFIX}{root}" in named:
+        links = {name.removeprefix(LINK_PREFIX): name for name in named}
+    return Places(graph, urdf, links, _names(arm), root)
+
+
+def _draft_more(top: Section, graph: Graph, ask: Ask, urdf: Urdf | None, base: Section | None) -> list[str]:
+    """Add the map, the actions and the status; return remarks."""
+    drafted = {
+        "map": (None, []) if base is None else draft_map(graph, ask, _odometry(base)),
+        "services": draft_services(graph, ask),
+        "actions": draft_actions(graph, ask),
+        "grippers": draft_grippers(graph, ask, urdf),
+        "batteries": (draft_batteries(graph), []),
+        "diagnostics": (draft_diagnostics(graph, ask), []),
+    }
+    remarks = list[str]()
+    for key, (section, said) in drafted.items():
+        remarks += said
+        if section is not None:
+            top.values[key] = section
+    return remarks
+
+
+def _odometry(base: Section) -> str:
+    """Return the topic of the drafted base's odometry."""
+    odometry = base.values["odometry"]
+    topic = odometry.values["topic"] if isinstance(odometry, Section) else odometry
+    return str(topic.value) if isinstance(topic, Value) else ""
 
 
 def _guesses(text: str) -> int:

@@ -10,9 +10,10 @@ from lockstep.robot_bridge.robots.ros2.discovery.drafting.yaml_text import Plain
 from lockstep.robot_bridge.robots.ros2.discovery.pose import Pose
 from lockstep.robot_bridge.robots.ros2.discovery.urdf import Box, Shape, Urdf, UrdfJoint, UrdfLink
 
-__all__ = ["BASE_BODY", "FindBox", "draft_bodies"]
+__all__ = ["BASE_BODY", "LINK_PREFIX", "FindBox", "draft_bodies"]
 
 BASE_BODY = "base"  # the body at the pose of the odometry
+LINK_PREFIX = "link."  # of all links, where one of them has the name of that body
 MAX_BODIES = 200
 THINNEST = 0.001  # m, half of it: a mesh may be flat
 
@@ -35,7 +36,7 @@ def draft_bodies(urdf: Urdf, joints: set[str], find_box: FindBox, *, has_base: b
             needed |= {name, *(joint.parent for joint in urdf.chain(name))}
     if not needed or len(needed) > MAX_BODIES:
         return None
-    prefix = "link." if has_base and BASE_BODY in needed else ""
+    prefix = LINK_PREFIX if has_base and BASE_BODY in needed else ""
     above = {joint.child: joint for joint in urdf.joints.values()}
     order = sorted(needed, key=lambda name: (len(urdf.chain(name)), name))  # parents first
     section = Section(head=["From the URDF, for the 3D scene: links with boxes, cylinders and spheres."])

@@ -5,6 +5,7 @@ import math
 from lockstep.robot_bridge.robots.ros2.discovery.ask import Ask
 from lockstep.robot_bridge.robots.ros2.discovery.drafting.choice import choose_topic
 from lockstep.robot_bridge.robots.ros2.discovery.drafting.draft_bodies import BASE_BODY
+from lockstep.robot_bridge.robots.ros2.discovery.drafting.draft_calibration import Places, calibration
 from lockstep.robot_bridge.robots.ros2.discovery.drafting.notes import others, rate_of, timeout_for
 from lockstep.robot_bridge.robots.ros2.discovery.drafting.yaml_text import Plain, Section, Value
 from lockstep.robot_bridge.robots.ros2.discovery.graph import Graph, Heard, Topic
@@ -76,8 +77,11 @@ def draft_wrench(graph: Graph, ask: Ask) -> Section | None:
     )
 
 
-def draft_cameras(graph: Graph, simulated: bool) -> tuple[Section | None, list[str]]:
-    """Return the cameras whose pictures the bridge can read, and remarks on those that it cannot."""
+def draft_cameras(graph: Graph, simulated: bool, places: Places | None = None) -> tuple[Section | None, list[str]]:
+    """Return the cameras whose pictures the bridge can read, and remarks on those that it cannot.
+
+    `places`: where frames are on the bodies; None: no calibration is written.
+    """
     remarks = list[str]()
     items = list[Value]()
     names = set[str]()
@@ -93,7 +97,7 @@ def draft_cameras(graph: Graph, simulated: bool) -> tuple[Section | None, list[s
         if not (MIN_SIDE <= heard.width <= MAX_SIDE and MIN_SIDE <= heard.height <= MAX_SIDE):
             remarks.append(f"{topic.name}: pictures in {heard.encoding!r} of a size that cannot be shown")
         elif len(items) < MAX_CAMERAS:
-            items.append(_camera(graph, topic, names, simulated))
+            items.append(_camera(graph, topic, names, simulated, places, remarks))
         else:
             remarks.append(f"{topic.name}: more than {MAX_CAMERAS} cameras")
     remarks += [
@@ -104,7 +108,9 @@ def draft_cameras(graph: Graph, simulated: bool) -> tuple[Section | None, list[s
     return (Section(items=items) if items else None), remarks
 
 
-def _camera(graph: Graph, topic: Topic, names: set[str], simulated: bool) -> Value:
+def _camera(
+    graph: Graph, topic: Topic, names: set[str], simulated: bool, places: Places | None, remarks: list[str]
+) -> Value:
     heard = graph.said(topic.name)
     parts = [part for part in topic.name.split("/") if part not in ("", "compressed", "image_raw", "image", "color")]
     stem = "-".join(parts[-2:])[:80] or "camera"
@@ -119,6 +125,12 @@ def _camera(graph: Graph, topic: Topic, names: set[str], simulated: bool) -> Val
         "height": heard.height,
         "frame_rate": float(round(rate)) if rate >= 1 else rate,
     }
+    if places is not None:
+        found = calibration(graph, topic, heard.width, heard.height, places)
+        if isinstance(found, dict):
+            row["calibration"] = found
+        elif found:
+            remarks.append(found)
     note = f"{rate_of(heard, graph.seconds)}, {heard.encoding}"
     if simulated or not heard.stamped:
         row["captured"] = "arrival"

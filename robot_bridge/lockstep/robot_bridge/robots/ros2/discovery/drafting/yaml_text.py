@@ -25,11 +25,15 @@ class Value:
     value: Plain
     note: str = ""
     guess: bool = False
+    off: bool = False  # stands in the file as a comment, for a person to switch on
 
 
 @dataclass
 class Section:
-    """A map of settings, in order; comments stand above it. `items` are a list instead."""
+    """A map of settings, in order; comments stand above it. `items` are a list instead.
+
+    A list whose items are all off is off itself.
+    """
 
     head: list[str] = field(default_factory=list)
     values: dict[str, "Value | Section"] = field(default_factory=dict)
@@ -50,15 +54,20 @@ def _lines(section: Section, depth: int) -> Iterator[str]:
     indent = "  " * depth
     for key, value in section.values.items():
         if isinstance(value, Value):
-            yield _noted(f"{indent}{key}: {plain(value.value)}", value)
+            yield _noted(f"{_off(value)}{indent}{key}: {plain(value.value)}", value)
             continue
         if depth == 0:
             yield ""
         yield from (indent + comment(line) for line in value.head)
-        yield f"{indent}{key}:"
+        is_off = bool(value.items) and not value.values and all(item.off for item in value.items)
+        yield f"{'# ' if is_off else ''}{indent}{key}:"
         yield from _lines(value, depth + 1)
     for item in section.items:
-        yield _noted(f"{indent}- {plain(item.value)}", item)
+        yield _noted(f"{_off(item)}{indent}- {plain(item.value)}", item)
+
+
+def _off(value: Value) -> str:
+    return "# " if value.off else ""
 
 
 def _noted(line: str, value: Value) -> str:

@@ -1,0 +1,61 @@
+"""Records of the robot's map and of its navigation: what has changed, and the map again once in a while."""
+
+import math
+
+import msgspec
+
+from lockstep.protocol.maps import Navigation, OccupancyMap
+from lockstep.server.recording.format.records import MapRecord, NavigationRecord
+
+__all__ = ["MapRecords"]
+
+INTERVAL = 1.0  # s at least between two records of maps, 32 KiB each at most; the newest map waits
+REPEAT = 60.0  # s after which a map is recorded again: a recording is cut into files
+
+
+class MapRecords:
+    """Keeps the newest of both, whether something is recorded or not. Call `take_map` and `take`, then `due`."""
+
+    def __init__(self) -> None:
+        self._map: OccupancyMap | None = None
+        self._navigation: Navigation | None = None
+        self._recorded: tuple[str, float] = ("", -math.inf)  # id of the recorded map, and when
+        self._told: NavigationRecord | None = None
+
+    def take_map(self, map: OccupancyMap) -> None:
+        self._map = map
+
+    def take(self, navigation: Navigation) -> None:
+        self._navigation = navigation
+
+    def begin(self) -> None:
+        """A recording begins: it has nothing yet."""
+        self._recorded, self._told = ("", -math.inf), None
+
+    def forget(self) -> None:
+        """Another bridge has another map."""
+        self._map = self._navigation = None
+        self.begin()
+
+    def due(self, epoch: str, event: int, now: float) -> list[MapRecord | NavigationRecord]:
+        """Return what has to be recorded now, with the current event."""
+        found: list[MapRecord | NavigationRecord] = []
+        known, at = self._recorded
+        if self._map is not None and now - at >= (REPEAT if self._map.id == known else INTERVAL):
+            self._recorded = (self._map.id, now)
+            found.append(MapRecord(epoch=epoch, event=event, map=self._map))
+        if (said := self._navigation) is not None:
+            record = NavigationRecord(
+                epoch=epoch,
+                event=said.event,
+                map=said.map,
+                located=said.located,
+                frame=said.frame,
+                goal=said.goal,
+                path=said.path,
+            )
+            told = self._told
+            if told is None or msgspec.structs.replace(record, event=told.event) != told:
+                self._told = record
+                found.append(record)
+        return found
