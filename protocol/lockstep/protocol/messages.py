@@ -127,6 +127,7 @@ class Hello(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", tag="he
     nonce: Proof = b""  # 32 random bytes of a client that knows the secret; else empty
     proof: Proof = b""  # that the sender knows the secret, for the nonces of both sides; else empty
     encodes: Annotated[list[Text], msgspec.Meta(max_length=8)] = []  # codecs that the bridge encodes and is asked for
+    encodings: Annotated[int, msgspec.Meta(ge=1, le=16)] = 1  # of a camera, that the bridge makes at most
 
 
 class Challenge(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", tag="challenge"):
@@ -204,7 +205,8 @@ class Media(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", tag="me
     height: Annotated[int, msgspec.Meta(ge=0, le=8192)] = 0
     sample_rate: Annotated[int, msgspec.Meta(ge=0, le=192000)] = 0  # Hz; 0 for pictures
     channels: Annotated[int, msgspec.Meta(ge=0, le=8)] = 0
-    keyframe: bool = True  # decodable without earlier ones
+    keyframe: bool = True  # decodable without earlier ones of the same encoding
+    second: bool = False  # a picture of the camera's second encoding, only for links that have asked for it
     spans: PictureSpans | msgspec.UnsetType = msgspec.UNSET  # the bridge's own, of a picture; optional
 
 
@@ -222,6 +224,8 @@ class EncodeRequest(msgspec.Struct, frozen=True, kw_only=True, tag_field="type",
     """What a client of role `media` asks of a bridge that encodes. The newest message on a link replaces all before."""
 
     streams: Annotated[list[StreamRequest], msgspec.Meta(max_length=MAX_STREAMS)]
+    # cameras of which the link takes a second encoding, for others than the operator, while the request names them
+    second: Annotated[list[StreamRequest], msgspec.Meta(max_length=MAX_STREAMS)] = []
 
 
 class Rest(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", tag="rest"):

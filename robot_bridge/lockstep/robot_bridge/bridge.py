@@ -97,6 +97,9 @@ class Bridge:
         self._stops = StopHandler(robot, self._core, shaper, self._keeper, self._lockout, refusals, self._log, now)
         self._feedback = FeedbackIssuer(robot, description, self._core, shaper, counters, self._log, now)
         actions = ActionRunner(robot, description, self._core, shaper, counters, self._log, now)
+        encoding = None
+        if settings.encode is not None:
+            encoding = MediaEncoding(settings.encode, description, counters.left_out)
         executor = CommandExecutor(
             *(robot, description, self._core, shaper, limits, self._watchdogs, self._stops),
             feedback=self._feedback,
@@ -107,10 +110,8 @@ class Bridge:
             counters=counters,
             log=self._log,
             now=now,
+            own_status=tuple if encoding is None else encoding.status,
         )
-        encoding = None
-        if settings.encode is not None:
-            encoding = MediaEncoding(settings.encode, description, counters.left_out)
         self._links = LinkServer(
             executor,
             description,

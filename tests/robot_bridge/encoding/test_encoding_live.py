@@ -10,6 +10,7 @@ import av
 import msgspec
 import pytest
 
+from lockstep.protocol.actions import Status, StatusItem
 from lockstep.protocol.framing import MAX_MEDIA_FRAME, FrameReader, frame
 from lockstep.protocol.messages import EncodeRequest, Hello, Media, Ping, StreamRequest, decode_message, encode_message
 from lockstep.protocol.traces.trace import known_spans
@@ -44,6 +45,11 @@ async def pictures(link: RobotLink, count: int, stream: str = CAMERA) -> list[Me
                 if len(found) == count:
                     break
     return found
+
+
+def ask_second(link: RobotLink, **fields: float) -> None:
+    first, second = StreamRequest(stream=CAMERA), StreamRequest(stream=CAMERA, **fields)  # type: ignore[arg-type]
+    link.send(EncodeRequest(streams=[first], second=[second]))
 
 
 def ask(link: RobotLink, **fields: float) -> None:
@@ -203,3 +209,50 @@ def test_the_extra_is_named_where_pyav_is_missing(monkeypatch: pytest.MonkeyPatc
 def test_an_encoder_that_does_not_exist_is_refused_by_name() -> None:
     with pytest.raises(SettingsError, match="h265"):
         encode_settings("h265")
+
+
+async def second_pictures(link: RobotLink, count: int) -> list[Media]:
+    found: list[Media] = []
+    async with asyncio.timeout(PATIENCE):
+        async for message in link:
+            if isinstance(message, Media) and message.second:
+                found.append(message)
+                if len(found) == count:
+                    break
+    return found
+
+
+async def test_a_link_that_asks_gets_a_second_encoding_of_its_own_size_with_true_stamps_and_others_get_none() -> None:
+    async with (
+        encoding_bridge() as bridge,
+        RobotLink(*bridge.address, "media") as link,
+        RobotLink(*bridge.address, "media") as other,
+    ):
+        assert link.hello.encodings == 2
+        assert not any(medium.second for medium in await pictures(link, 5))
+        ask_second(link, bitrate=900_000, scale=0.75)
+        found, others = await asyncio.gather(second_pictures(link, 10), pictures(other, 20))
+        assert found[0].keyframe
+        decoder = Decoder()
+        assert all(decoder.event_in(medium) == medium.stamp for medium in found)
+        assert {medium.stream for medium in found} == {CAMERA}
+        firsts = await pictures(link, 4)
+        assert {each.width for each in found} == {round(0.75 * max(each.width for each in firsts))}
+        assert not any(medium.second for medium in others)
+
+
+async def status_item(link: RobotLink, name: str) -> StatusItem:
+    async with asyncio.timeout(PATIENCE):
+        async for message in link:
+            for item in message.items if isinstance(message, Status) else ():
+                if item.name == name:
+                    return item
+    raise AssertionError("the link ended")
+
+
+async def test_an_encoder_that_is_not_there_is_said_in_the_status_before_any_picture_was_taken() -> None:
+    settings = replace(SETTINGS, encode=EncodeSettings("h264_of_nobody"))
+    async with encoding_bridge(settings) as bridge, RobotLink(*bridge.address, "operator") as link:
+        item = await status_item(link, "encoder_fallback")
+        assert (item.name, item.value, item.level) == ("encoder_fallback", "libx264", "warning")
+        assert item.text.startswith("h264_of_nobody cannot be opened")

@@ -2,6 +2,7 @@
 
 import logging
 import math
+from collections.abc import Callable, Sequence
 
 import msgspec
 
@@ -26,8 +27,10 @@ _logger = logging.getLogger(__name__)
 class StatusIssuer:
     """Call `look` once a tick; it returns a status when one is due."""
 
-    def __init__(self, robot: Robot) -> None:
+    def __init__(self, robot: Robot, own: Callable[[], Sequence[StatusItem]] = tuple) -> None:
+        """`own`: the bridge's own items, which come before the robot's."""
         self._robot = robot
+        self._own = own
         self._issued_at = -math.inf
         self._pressed: bool | None = None
         self._has_any = False  # a status was issued before: an empty one is news then
@@ -51,7 +54,7 @@ class StatusIssuer:
         items = [] if pressed is None else [_hardware_stop(pressed)]
         names = {item.name for item in items}
         room = MAX_STATUS_BYTES - sum(map(status_item_bytes, items))
-        for item in self._robot.status():
+        for item in (*self._own(), *self._robot.status()):
             if item.name in names or not self._fits(item):
                 continue
             size = status_item_bytes(item)

@@ -1,8 +1,9 @@
 """Executes commands: takes the messages of the links, and moves the robot at each tick."""
 
 import logging
+from collections.abc import Callable, Sequence
 
-from lockstep.protocol.actions import Act, ActionCancel, Status
+from lockstep.protocol.actions import Act, ActionCancel, Status, StatusItem
 from lockstep.protocol.description import RobotDescription
 from lockstep.protocol.messages import Command, Feedback, Reset, Rest, Stop
 from lockstep.robot_bridge.actions.action_runner import ActionRunner
@@ -49,7 +50,9 @@ class CommandExecutor:
         counters: BridgeCounters,
         log: EventLog,
         now: Clock,
+        own_status: Callable[[], Sequence[StatusItem]] = tuple,
     ) -> None:
+        """`own_status`: the bridge's own items of the status."""
         self._robot = robot
         self._alarm = alarm
         self._core = core
@@ -64,7 +67,7 @@ class CommandExecutor:
         self._counters = counters
         self._log = log
         self._now = now
-        self._status = StatusIssuer(robot)
+        self._status = StatusIssuer(robot, own_status)
         self._signal = StartSignal(description)
         self._axes = len(description.axes)
         self._blind: frozenset[str] = frozenset()  # limits that slowed the robot because its position was unknown

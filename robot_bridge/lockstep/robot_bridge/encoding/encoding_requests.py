@@ -67,6 +67,14 @@ class EncodingRequests(Generic[Link]):
                 served[name] = each.keyframes
                 self._wanted.add(name)
 
+    def takes(self, link: Link, stream: str) -> bool:
+        """Return whether a link's newest request names a stream."""
+        return stream in self._requests.get(link, {})
+
+    def is_asked(self, stream: str) -> bool:
+        """Return whether some link's newest request names a stream."""
+        return any(stream in requests for requests in self._requests.values())
+
     def lost(self, stream: str) -> None:
         """A link had to drop pictures of a stream: without a keyframe it gets no more of them."""
         self._wanted.add(stream)

@@ -1,7 +1,8 @@
 """Encodes a camera's pictures to H.264 with PyAV. Used from one thread."""
 
 import logging
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from contextlib import suppress
 from fractions import Fraction
 from typing import NoReturn
 
@@ -17,7 +18,7 @@ from lockstep.robot_bridge.encoding.encoding_requests import EncodingGoal
 from lockstep.robot_bridge.encoding.picture_encoding import EncodedPicture
 from lockstep.robot_bridge.errors import EncodingFailed
 
-__all__ = ["H264Encoder"]
+__all__ = ["H264Encoder", "try_encoder"]
 
 CLOCK = 90_000  # Hz
 NEVER = 1_000_000  # pictures between keyframes that nobody asked for
@@ -32,6 +33,7 @@ MAX_PIXELS = 4096 * 2304
 MIN_SIDE = 16
 CONSTRAINED_BASELINE = 66 | 1 << 9  # FFmpeg's number
 MOST_WRONG = 3  # pictures in a row for which another encoder gives no packet of theirs; then SOFTWARE takes its place
+TRIED_SIZE, TRIED_BITRATE = (640, 480), 500_000  # of pictures with which an encoder is tried
 PIXELS = {"h264_qsv": "nv12"}  # of encoders that do not take yuv420p
 
 _logger = logging.getLogger(__name__)
@@ -44,9 +46,24 @@ class H264Encoder:
     the named encoder cannot be used, the software encoder takes its place, and the log says why.
     """
 
-    def __init__(self, encoder: str = SOFTWARE, frame_rate: float = ASSUMED_RATE) -> None:
-        """`frame_rate`: the camera's, in Hz."""
+    def __init__(
+        self,
+        encoder: str = SOFTWARE,
+        frame_rate: float = ASSUMED_RATE,
+        *,
+        keyframe_seconds: float = KEYFRAME_SECONDS,
+        fell_back: Callable[[str], None] = lambda why: None,
+    ) -> None:
+        """`encoder`: FFmpeg's name.
+
+        Args:
+            frame_rate: the camera's, in Hz
+            keyframe_seconds: of the bitrate that a keyframe may take at once
+            fell_back: called in the encoder's thread with the reason when the software encoder takes its place
+        """
         self._name = encoder
+        self._keyframe_seconds = keyframe_seconds
+        self._fell_back = fell_back
         self._frame_rate = frame_rate
         self._context: VideoCodecContext | None = None
         self._opened = 0.0  # bit/s
@@ -90,12 +107,14 @@ class H264Encoder:
         why = "it gave a packet of another picture" if packets else "it held the picture back"
         self._wrong += 1
         if self._wrong >= MOST_WRONG and self._name != SOFTWARE:
-            self._fall_back(f"{self._name} cannot be used: {why}, {self._wrong} times in a row")
+            self.fall_back(f"{self._name} cannot be used: {why}, {self._wrong} times in a row")
         raise EncodingFailed(f"no picture of the encoder: {why}")
 
-    def _fall_back(self, why: str) -> None:
+    def fall_back(self, why: str) -> None:
+        """Go on with the software encoder, from the next picture on."""
         _logger.warning("encoder_fallback: %s; %s takes its place", why, SOFTWARE)
         self._name, self._wrong = SOFTWARE, 0
+        self._fell_back(why)
 
     def _frame(self, media: Media) -> av.VideoFrame:
         if media.codec == "mjpeg":
@@ -131,13 +150,17 @@ class H264Encoder:
     def _open(self, size: tuple[int, int], bitrate: int, rate: float) -> VideoCodecContext:
         if self._name != SOFTWARE:
             try:
-                context = self._open_as(self._name, size, bitrate, rate, _hardware_options(self._name, bitrate))
+                context = self._open_as(
+                    self._name, size, bitrate, rate, _hardware_options(self._name, bitrate, self._keyframe_seconds)
+                )
                 self._opened = bitrate / HARDWARE[1]
                 return context
             except (FFmpegError, ValueError) as error:
-                self._fall_back(f"{self._name} cannot be opened: {error}")
+                self.fall_back(f"{self._name} cannot be opened: {error}")
         self._opened = bitrate * HEADROOM
-        return self._open_as(SOFTWARE, size, int(self._opened), rate, _software_options(bitrate))
+        return self._open_as(
+            SOFTWARE, size, int(self._opened), rate, _software_options(bitrate, self._keyframe_seconds)
+        )
 
     def _open_as(
         self, name: str, size: tuple[int, int], bitrate: int, rate: float, options: dict[str, str]
@@ -160,24 +183,39 @@ class H264Encoder:
         return context
 
 
-def _software_options(bitrate: int) -> dict[str, str]:
+def try_encoder(name: str) -> str:
+    """Encode grey pictures with an encoder; return why it cannot be used, or "". May take seconds: needs a thread."""
+    reasons: list[str] = []
+    encoder = H264Encoder(name, fell_back=reasons.append)
+    width, height = TRIED_SIZE
+    payload = bytes([128]) * (width * height * 3 // 2)
+    for number in range(MOST_WRONG):
+        media = Media(
+            stream="", codec="yuv420p", stamp=1, time=number / ASSUMED_RATE, payload=payload, width=width, height=height
+        )
+        with suppress(EncodingFailed):
+            encoder.encode(media, EncodingGoal(TRIED_BITRATE, 0.0, 1.0), keyframe=number == 0)
+    return reasons[0] if reasons else ""
+
+
+def _software_options(bitrate: int, keyframe_seconds: float) -> dict[str, str]:
     return {
         "preset": "ultrafast",
         "tune": "zerolatency",
         "profile": "baseline",
         "forced-idr": "1",
         "maxrate": str(int(bitrate * HEADROOM)),
-        "bufsize": str(int(bitrate * KEYFRAME_SECONDS)),
+        "bufsize": str(int(bitrate * keyframe_seconds)),
         "x264-params": "scenecut=0:keyint=infinite:repeat-headers=1",
     }
 
 
-def _hardware_options(name: str, bitrate: int) -> dict[str, str]:
+def _hardware_options(name: str, bitrate: int, keyframe_seconds: float) -> dict[str, str]:
     """Return what an encoder needs to give each picture at once; one that does not know an option ignores it.
 
     h264_v4l2m2m has no option for that: it waits for its picture by itself.
     """
-    options = {"maxrate": str(bitrate), "bufsize": str(int(bitrate * KEYFRAME_SECONDS)), "profile": "baseline"}
+    options = {"maxrate": str(bitrate), "bufsize": str(int(bitrate * keyframe_seconds)), "profile": "baseline"}
     if name == "h264_nvenc":
         options |= {"delay": "0", "zerolatency": "1", "forced-idr": "1"}
     elif name == "h264_qsv":

@@ -58,14 +58,22 @@ class PictureEncoding:
         has_room: Callable[[], bool],
         emit: Callable[[Media], None],
         count: Callable[[str], None],
+        then: Callable[[Media], None] = lambda media: None,
     ) -> None:
-        """`has_room`: whether a link takes a picture now. `count` counts pictures that are left out, by reason."""
+        """The parts around it, all called on the event loop.
+
+        Args:
+            has_room: whether a link takes a picture now
+            count: counts pictures that are left out, by reason
+            then: takes each picture, as the camera made it, when this encoding is through with it
+        """
         self._stream = stream
         self._encoder = encoder
         self._requests = requests
         self._has_room = has_room
         self._emit = emit
         self._count = count
+        self._then = then
         self._gate = FrameRateGate()
         self._spacing = KeyframeSpacing()
         self._waiting: Media | None = None  # the newest picture, while the encoder is busy
@@ -98,6 +106,7 @@ class PictureEncoding:
         self._waiting = None
         goal = self._requests.goal(self._stream)
         if not self._gate.takes(media.time, goal.frame_rate):
+            self._then(media)
             return
         if not self._has_room():
             self._count("link_busy")
@@ -144,3 +153,4 @@ class PictureEncoding:
             )
             self._emit(encoded)
         self._begin_next()
+        self._then(media)

@@ -74,6 +74,7 @@ class EncodingSide(Protocol):
     """The part of a bridge that encodes media and is asked how. All methods return at once."""
 
     codecs: tuple[str, ...]
+    encodings: int  # of a camera, at most
 
     def joined(self, link: object) -> None:
         """A media link was admitted."""
@@ -81,8 +82,11 @@ class EncodingSide(Protocol):
     def asked(self, link: object, request: EncodeRequest) -> None:
         """A media link says what it wants."""
 
-    def lost(self, stream: str) -> None:
-        """A media link could not take pictures of a stream, and needs a keyframe."""
+    def lost(self, stream: str, *, second: bool = False) -> None:
+        """A media link could not take pictures of a stream, or of its second encoding, and needs a keyframe."""
+
+    def takes_second(self, link: object, stream: str) -> bool:
+        """Whether a link has asked for the second encoding of a stream."""
 
     def left(self, link: object) -> None:
         """A link ended, admitted or not."""
@@ -162,6 +166,7 @@ class LinkServer:
             epoch=epoch,
             description=description,
             encodes=[] if encoding is None else list(encoding.codecs),
+            encodings=1 if encoding is None else encoding.encodings,
         )
         self._counters = counters
         self._max_strangers = max_strangers
@@ -261,15 +266,27 @@ class LinkServer:
             peer.send_encoded("map", self._map)
 
     def publish_media(self, media: Media) -> None:
-        """Send a medium to every media link, newest wins per stream."""
+        """Send a medium to every media link, of a second encoding to those that take it; newest wins per stream."""
         encoded = encode_once(media) if media.spans is msgspec.UNSET else encode_waited(media, time.monotonic)
-        complete = [peer.send_media(media, encoded) for peer in self._admitted.media]
+        peers = self._takers_of_second(media.stream) if media.second else self._admitted.media
+        complete = [peer.send_media(media, encoded) for peer in peers]
         if self._encoding is not None and not all(complete):
-            self._encoding.lost(media.stream)
+            self._encoding.lost(media.stream, second=media.second)
 
     def media_have_room(self) -> bool:
         """Return whether some media link takes a picture at once. Others that do not miss pictures up to a keyframe."""
         return any(peer.has_room for peer in self._admitted.media)
+
+    def second_has_room(self, stream: str) -> bool:
+        """Return whether each media link that takes the second encoding of a stream takes a picture of it at once."""
+        takers = self._takers_of_second(stream)
+        return bool(takers) and all(peer.has_room for peer in takers)
+
+    def _takers_of_second(self, stream: str) -> list[LinkPeer]:
+        encoding = self._encoding
+        if encoding is None:
+            return []
+        return [peer for peer in self._admitted.media if encoding.takes_second(peer, stream)]
 
     def drops(self) -> Counter[str]:
         """Return the messages that slow links have missed, ended links included."""

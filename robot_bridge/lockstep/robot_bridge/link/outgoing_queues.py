@@ -88,7 +88,9 @@ class MediaOutbox(Generic[Item]):
     """Waiting media of one peer. `Item` is the message or its bytes."""
 
     def __init__(self) -> None:
-        self._streams: dict[str, StreamQueue[Item]] = {}
+        self._streams: dict[
+            tuple[str, bool], StreamQueue[Item]
+        ] = {}  # by stream, and whether it is its second encoding
 
     def __len__(self) -> int:
         return sum(map(len, self._streams.values()))
@@ -96,19 +98,24 @@ class MediaOutbox(Generic[Item]):
     @property
     def drops(self) -> Counter[str]:
         """How many media of each stream were dropped."""
-        return Counter({stream: queue.dropped for stream, queue in self._streams.items() if queue.dropped})
+        found: Counter[str] = Counter()
+        for (stream, _), queue in self._streams.items():
+            if queue.dropped:
+                found[stream] += queue.dropped
+        return found
 
     def put(self, media: Media, make: Callable[[], Item]) -> bool:
         """Add a medium; `make` builds the item unless it is dropped at once. False: the stream needs a keyframe."""
         depth = 1 if media.keyframe and media.codec not in SOUND else ORDERED_DEPTH
-        return self._streams.setdefault(media.stream, StreamQueue()).put(
+        return self._streams.setdefault((media.stream, media.second), StreamQueue()).put(
             keyframe=media.keyframe, depth=depth, make=make
         )
 
     def pop(self) -> Item | None:
-        """Return the next item, streams in turn; None if the outbox is empty."""
-        for stream, queue in self._streams.items():
-            if queue:
-                self._streams[stream] = self._streams.pop(stream)  # to the end of the turn
-                return queue.pop()
-        return None
+        """Return the next item, streams in turn, second encodings last; None if the outbox is empty."""
+        waiting = [key for key, queue in self._streams.items() if queue]
+        if not waiting:
+            return None
+        key = next((key for key in waiting if not key[1]), waiting[0])
+        queue = self._streams[key] = self._streams.pop(key)  # to the end of the turn
+        return queue.pop()

@@ -74,7 +74,12 @@ class MediaHub:
         )
         self.subscribers = Subscribers(settings, self._metrics, fan_out, self._quality, wall_clock)
         self.datagrams = DatagramQueues(turns, time.monotonic)
-        self.robot_encoding = RobotEncoding(settings, self._quality.planned_bps, self._metrics)
+        self.robot_encoding = RobotEncoding(
+            settings,
+            self._quality.planned_bps,
+            self._metrics,
+            operator_limited=self._quality.operator_limited,
+        )
         self._streams: dict[str, Stream] = {}
         self._configured = asyncio.Event()  # set when there are other streams
         self._recorder: FrameTaker | None = None

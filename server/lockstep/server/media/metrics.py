@@ -42,6 +42,11 @@ class MediaMetrics:
             "What a robot that encodes is asked for, all media together; 0 for others",
             registry=registry,
         )
+        self.second_rate = Gauge(
+            "lockstep_robot_second_encoding_bits_per_second",
+            "What a robot is asked for second encodings of its cameras, for observers; 0 for none",
+            registry=registry,
+        )
         self.uplink_wait = Gauge(
             "lockstep_robot_uplink_wait_seconds",
             "Time that its media waited on their way, the least of half a second",

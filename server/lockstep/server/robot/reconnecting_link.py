@@ -80,6 +80,11 @@ class ReconnectingLink:
         """True if the link is up and its bridge encodes media as it is asked to."""
         return self._link is not None and bool(self._link.hello.encodes)
 
+    @property
+    def makes_second(self) -> bool:
+        """True if the link is up and its bridge makes a second encoding of a camera for those who ask."""
+        return self._link is not None and self._link.hello.encodings >= 2
+
     def bad_input(self) -> Counter[str]:
         """Return the counts of messages that could not be read, by name of the error, on all links so far."""
         return self._bad_input + (self._link.bad_input if self._link is not None else Counter())

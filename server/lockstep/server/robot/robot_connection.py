@@ -7,6 +7,7 @@ from collections import Counter
 from pathlib import Path
 from typing import Protocol
 
+import msgspec
 import structlog
 
 from lockstep.protocol.actions import Act, ActionCancel, ActionUpdate, Status
@@ -142,6 +143,8 @@ class RobotConnection:
     def ask_for_encoding(self, request: EncodeRequest) -> bool:
         """Tell a bridge that encodes how to. Return whether its link took the message; False for other bridges."""
         media = self._keepers["media"]
+        if not media.makes_second:
+            request = msgspec.structs.replace(request, second=[])
         return media.encodes and media.send(request)
 
     def bad_input(self) -> Counter[str]:

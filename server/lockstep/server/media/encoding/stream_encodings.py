@@ -9,8 +9,9 @@ from lockstep.server.media.quality.encoding_target import EncodingTarget, Pictur
 from lockstep.server.media.settings import MediaSettings
 from lockstep.server.media.subscription import Subscription
 
-__all__ = ["PASSED", "StreamEncodings"]
+__all__ = ["PASSED", "SECOND_TIERS", "StreamEncodings"]
 
+SECOND_TIERS: tuple[PictureTier, ...] = ("high", "crowd")  # due more than a narrow operator's pictures
 PASSED = "H264-passed"  # the codec in metrics of pictures that are passed on as the camera encoded them
 
 
@@ -21,6 +22,7 @@ class StreamEncodings:
         codecs: what the console can encode, the best first
         full: the best encoding target that a tier can get
         passed: the encoding that the camera itself makes; None for a microphone
+        second: the second encoding that a robot makes of it for observers; None for a microphone
         passes: True while the camera makes it
         follows: True while the camera makes it as it is asked to, with keyframes on request: a robot that encodes
     """
@@ -47,10 +49,13 @@ class StreamEncodings:
         self._subscriptions: dict[Subscription, None] = {}  # an ordered set
         self._peers = metrics.peers.labels(stream)
         self.passed: TierEncoding | None = None
+        self.second: TierEncoding | None = None
 
     def __iter__(self) -> Iterator[TierEncoding]:
         if self.passed is not None:
             yield self.passed
+        if self.second is not None:
+            yield self.second
         yield from self._own.values()
 
     @property
@@ -67,6 +72,15 @@ class StreamEncodings:
         """Create the encoding of pictures that are passed on as the camera encoded them."""
         self.passed = self._create(PASSED, "operator")
         return self.passed
+
+    def add_second(self) -> TierEncoding:
+        """Create the encoding of pictures that a robot encodes a second time, for observers."""
+        self.second = self._create(PASSED, "high")
+        return self.second
+
+    def is_passed_to(self, target: Subscription) -> bool:
+        """Return whether `target` gets what the camera or its robot encoded."""
+        return any(each is not None and target in each.targets for each in (self.passed, self.second))
 
     def find(self, codec: str, tier: PictureTier) -> TierEncoding | None:
         """Return an encoding of the console if it exists."""
@@ -108,6 +122,10 @@ class StreamEncodings:
         source = next((each for each in self if target in each.targets), None)
         if source is None or source is self.passed:
             return
+        if source is self.second:
+            if tier not in SECOND_TIERS:
+                self.return_to_own(target)
+            return
         for each in self._own.values():
             each.arriving.pop(target, None)
         if source.tier != tier:
@@ -136,8 +154,9 @@ class StreamEncodings:
 
     def return_to_own(self, target: Subscription) -> None:
         """Move `target` from the camera's encoding to the console's with its next keyframe; it misses nothing."""
-        if self.passed is not None:
-            self.get("H264", target.tier).expect(target, self.passed)
+        source = self.second if self.second is not None and target in self.second.targets else self.passed
+        if source is not None and target not in self.get("H264", target.tier).arriving:
+            self.get("H264", target.tier).expect(target, source)
 
     def leave(self, target: Subscription) -> None:
         """Remove a target. Idempotent."""

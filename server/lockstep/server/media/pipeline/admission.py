@@ -30,9 +30,11 @@ class Admission(FrameStage):
         arrived: Counter,
         dropped: DropCounter,
         on_lost: Callable[[], None] = lambda: None,
+        second: FrameStage | None = None,
     ) -> None:
         """`choose` chooses what is recorded of the next frame, and returns whether somebody takes the stream. It is
-        called for each frame. `on_lost` is called when a picture is dropped on which others may build."""
+        called for each frame. `on_lost` is called when a picture is dropped on which others may build. `second` takes
+        the pictures of a robot's second encoding; None: nobody does."""
         super().__init__(following)
         self.newest: SourceFrame | None = None
         self.size: tuple[int, int] | None = None
@@ -42,14 +44,19 @@ class Admission(FrameStage):
         self._dropped = dropped
         self._rate = TokenBucket(MAX_RATE, MAX_AT_ONCE)
         self._last_stamp: int | None = None
+        self._second = second
 
     def source(self, frame: SourceFrame) -> None:
         media = frame.media
         self._arrived.inc()
         if not self._rate.take(frame.arrived_at):
             self._dropped.count("too_often")
-            if media.codec == "h264":
+            if media.codec == "h264" and not media.second:
                 self._on_lost()
+            return
+        if media.second:
+            if self._second is not None:
+                self._second.source(frame)
             return
         # Without an H.264 picture, none that builds on it could be decoded; a stamp older than the last is still true.
         in_order = media.codec == "h264" or self._last_stamp is None

@@ -22,6 +22,10 @@ class PictureClock:
         self._last = max(self._last + 1, round((link_time - self._origin) * VIDEO_RATE))
         return self._last
 
+    def place(self, link_time: float) -> int:
+        """Return the timestamp of a time, without a step of the clock; 0 before the first."""
+        return 0 if self._origin is None else max(0, round((link_time - self._origin) * VIDEO_RATE))
+
 
 class SoundClock:
     """Places sound on the link's time line: sample-exact while it is continuous, moved on where some is missing."""

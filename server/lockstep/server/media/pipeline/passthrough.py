@@ -23,6 +23,7 @@ from lockstep.server.media.encoding.stream_encodings import StreamEncodings
 from lockstep.server.media.encoding.tier_encoding import TierEncoding
 from lockstep.server.media.errors import PayloadError
 from lockstep.server.media.metrics import DropCounter
+from lockstep.server.media.pipeline.access_unit import is_access_unit
 from lockstep.server.media.pipeline.frame import EncodedFrame
 from lockstep.server.media.pipeline.media_clock import PictureClock
 from lockstep.server.media.pipeline.picture_timing import PictureTiming
@@ -32,10 +33,8 @@ from lockstep.server.media.subscription import Subscription
 __all__ = ["Passthrough"]
 
 MEASURED_SECONDS, MOST_MEASURED = 2.0, 240
-MAX_BYTES = 4 << 20  # of one picture; far more than any that can be watched
 ANSWER_SECONDS = 3.0  # for a keyframe that was asked for; without it the camera counts as one that takes no requests
 DISTRUST_SECONDS = 30.0  # for which it then counts so
-NAL_TYPES = range(1, 24)  # of an access unit (ITU-T H.264, table 7-1)
 
 
 class Passthrough(FrameStage):
@@ -127,7 +126,7 @@ class Passthrough(FrameStage):
 
     def _is_whole(self, media: Media) -> bool:
         """Return whether the picture can be decoded, as far as its bytes and those before it show."""
-        if not _is_access_unit(media.payload):
+        if not is_access_unit(media.payload):
             self._dropped.count(PayloadError.name)
             self.lost()
             return False
@@ -193,7 +192,7 @@ class Passthrough(FrameStage):
 
     def hold_back(self, target: Subscription, wanted: bool) -> None:
         """Set whether `target` must get the console's encoding, because its path has no room."""
-        if wanted and not target.held_back and target in self._passed.targets:
+        if wanted and not target.held_back and self._encodings.is_passed_to(target):
             self._encodings.return_to_own(target)
         target.held_back = wanted
 
@@ -209,7 +208,8 @@ class Passthrough(FrameStage):
         for encoding in [each for each in self._encodings.own if each.codec == "H264"]:
             for target in [*encoding.targets, *encoding.arriving]:
                 if self._may_pass_to(target):
-                    encoding.leave(target)
+                    for each in self._encodings:
+                        each.leave(target)
                     self._passed.targets[target] = None
 
     def _end(self) -> None:
@@ -224,12 +224,3 @@ class Passthrough(FrameStage):
         if negotiated is None or self._profile is None or target.held_back:
             return False
         return accepts(negotiated, self._profile)
-
-
-def _is_access_unit(payload: bytes) -> bool:
-    """Return whether this may be a picture in Annex B form: it begins with a NAL unit of a known type."""
-    start = payload.find(b"\x00\x00\x01", 0, 8)
-    if not 0 <= start < len(payload) - 4 or len(payload) > MAX_BYTES:
-        return False
-    head = payload[start + 3]
-    return head & 0x80 == 0 and head & 0x1F in NAL_TYPES

@@ -16,6 +16,7 @@ from lockstep.server.media.pipeline.media_clock import PictureClock
 from lockstep.server.media.pipeline.passthrough import Passthrough
 from lockstep.server.media.pipeline.picture_thinning import PictureThinning
 from lockstep.server.media.pipeline.recorded_encoding import RecordedEncoding
+from lockstep.server.media.pipeline.second_passthrough import SecondPassthrough
 from lockstep.server.media.pipeline.sound_rate_limiter import SoundRateLimiter
 from lockstep.server.media.pipeline.stage import FrameStage
 from lockstep.server.media.quality.encoding_target import EncodingTarget
@@ -49,6 +50,7 @@ class VideoStream(Stream):
     """Takes yuv420p, mjpeg and h264; encoded to H.264 and VP8, h264 also passed on unchanged."""
 
     passthrough: Passthrough
+    second: SecondPassthrough
     frame_rate: float  # pictures per second, at most
     first_size: tuple[int, int]  # width and height, as far as they are known before the first picture
     expects_h264: bool  # the camera may encode H.264 itself, as far as is known before its first picture
@@ -111,7 +113,8 @@ class StreamMaker:
             thinned = PictureThinning(worker, settings.video_frames_per_second, dropped)
         passthrough = Passthrough(thinned, encodings, passed, clock, group, dropped)
         arrived = metrics.frames_in.labels(name)
-        admission = Admission(passthrough, recording.choose_for_next, arrived, dropped, passthrough.lost)
+        second = SecondPassthrough(recording, encodings, encodings.add_second(), clock, dropped)
+        admission = Admission(passthrough, recording.choose_for_next, arrived, dropped, passthrough.lost, second)
         return VideoStream(
             name,
             camera.label,
@@ -120,6 +123,7 @@ class StreamMaker:
             recording,
             worker,
             passthrough,
+            second,
             frame_rate,
             (camera.width, camera.height),
             expects_h264,

@@ -149,6 +149,10 @@ class QualityController:
             else (stream.encodings.full.bitrate_bps)
         )
 
+    def operator_limited(self) -> bool:
+        """Return whether an operator's path has shown a limit within the last minute."""
+        return any(peer.path.limited for peer in self.leaders())
+
     def _look_at_load(self, now: float) -> None:
         (since, before), busy = self._load_at, self._busy_seconds()
         if now - since >= LOAD_SECONDS:

@@ -12,6 +12,7 @@ from lockstep.server.media.quality.adaptation import Adaptation
 from lockstep.server.media.quality.budget import CameraNeed, share_out
 from lockstep.server.media.quality.encoding_target import EncodingTarget
 from lockstep.server.media.settings import MediaSettings
+from lockstep.server.media.uplink.second_requests import SecondRequests
 from lockstep.server.media.uplink.uplink_estimator import UplinkEstimator
 
 __all__ = ["RobotEncoding"]
@@ -40,8 +41,15 @@ class RobotEncoding:
         planned_bps: Callable[[VideoStream], int],
         metrics: MediaMetrics,
         clock: Callable[[], float] = time.monotonic,
+        operator_limited: Callable[[], bool] = lambda: False,
     ) -> None:
-        """`planned_bps`: bits per second of a camera that the operator's path carries."""
+        """What the requests depend on.
+
+        Args:
+            planned_bps: bits per second of a camera that the operator's path carries
+            operator_limited: whether that path has shown a limit
+        """
+        self._operator_limited = operator_limited
         self._settings = settings
         self._planned_bps = planned_bps
         self._metrics = metrics
@@ -49,6 +57,7 @@ class RobotEncoding:
         self._ask: Callable[[EncodeRequest], bool] = lambda request: False
         self._cameras: list[_Camera] = []
         self._sounds = 0  # microphones
+        self._second = SecondRequests(settings, ())
         self._uplink = self._new_uplink()
         self._told_at = float("-inf")
 
@@ -61,6 +70,7 @@ class RobotEncoding:
         given = list(streams)
         self._cameras = [_Camera(stream) for stream in given if isinstance(stream, VideoStream)]
         self._sounds = len(given) - len(self._cameras)
+        self._second = SecondRequests(self._settings, [each.stream for each in self._cameras])
         self._uplink = self._new_uplink()
         for camera in self._cameras:
             camera.stream.passthrough.ask_by(self._keyframe_asker(camera))
@@ -84,9 +94,17 @@ class RobotEncoding:
         targets = self._targets(now)
         for camera in self._cameras:
             if camera.stream.encodings.passed is not None:
-                camera.stream.encodings.passed.keyframes.sparing = limited
+                # The operator pays for each, on both paths.
+                camera.stream.encodings.passed.keyframes.sparing = limited or self._operator_limited()
             camera.stream.passthrough.serve_requests(now)
         changed = any(_differs(camera.asked, target) for camera, target in zip(self._cameras, targets, strict=True))
+        sounds = self._sounds * SOUND_BPS
+        changed |= self._second.tick(
+            now,
+            first_bps=float(sum(target.bitrate_bps for target in targets)),
+            rate_bps=self._uplink.carried(now) - sounds,
+            limited=limited,
+        )
         if changed or now - self._told_at >= REPEAT:
             for camera, target in zip(self._cameras, targets, strict=True):
                 camera.asked = target
@@ -124,8 +142,9 @@ class RobotEncoding:
             for camera in self._cameras
             if (target := camera.asked) is not None
         ]
-        follows = self._ask(EncodeRequest(streams=streams))
+        follows = self._ask(EncodeRequest(streams=streams, second=self._second.requests()))
         self._metrics.uplink_rate.set(self._uplink.rate if follows else 0.0)
+        self._metrics.second_rate.set(self._second.bps if follows else 0.0)
         self._metrics.uplink_wait.set((self._uplink.waits(now) or 0.0) if follows else 0.0)
         for camera in self._cameras:
             camera.stream.passthrough.follow(follows, now)
@@ -144,7 +163,7 @@ class RobotEncoding:
 
     def _new_uplink(self) -> UplinkEstimator:
         settings, cameras = self._settings, max(1, len(self._cameras))
-        most = float(cameras * settings.video_bitrate_bps)
+        most = float(2 * cameras * settings.video_bitrate_bps)  # of both encodings
         return UplinkEstimator(
             min(most, float(settings.quality_start_bps)), min(most, float(settings.quality_min_bps)), most
         )

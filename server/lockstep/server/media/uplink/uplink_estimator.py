@@ -62,6 +62,10 @@ class UplinkEstimator:
         """Return whether media waited on the path within the last minute."""
         return self._limited_at is not None and now - self._limited_at < LIMITED_SECONDS
 
+    def carried(self, now: float) -> float:
+        """Return the rate; while the path counts as limited, no more than it has carried."""
+        return min(self.rate, self._limit) if self.limited(now) else self.rate
+
     def waits(self, now: float) -> float | None:
         """Return the wait of the medium that waited least of the last half second, s; None without two media."""
         waits = [wait for time, wait, _ in self._arrivals if now - time <= LOOK_SECONDS]
