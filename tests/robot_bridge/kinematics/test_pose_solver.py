@@ -141,7 +141,7 @@ def test_parts_of_the_arm_come_no_nearer_to_each_other_than_allowed(
     assume(nearest(start) > 0.04)
     begun = ARM.at(start)
     position = begun.position + np.array(direction) / math.hypot(*direction) * far
-    way = run(PoseSolver(ARM, BOUNDS, clearance=APART), start, position, begun.rotation)
+    way = run(PoseSolver(ARM, BOUNDS, keeps_off=(APART,)), start, position, begun.rotation)
     assert min(map(nearest, way[::10])) > 0.0
 
 

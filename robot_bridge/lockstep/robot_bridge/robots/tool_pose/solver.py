@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from typing import Final
 
 from lockstep.robot_bridge.kinematics.chain import Chain
-from lockstep.robot_bridge.kinematics.clearance import Clearance
+from lockstep.robot_bridge.kinematics.clearance import GapSource
 from lockstep.robot_bridge.kinematics.pose_solver import JointBounds, PoseSolver, Tuning
 from lockstep.robot_bridge.robots.tool_pose.axes import ToolAxes
 
@@ -22,7 +22,7 @@ def tool_solver(
     bounds: JointBounds,
     axes: ToolAxes,
     *,
-    clearance: Clearance | None = None,
+    keeps_off: Sequence[GapSource] = (),
     posture: Sequence[float] | None = None,
 ) -> PoseSolver:
     """Return a solver whose bounds fit the arm's length.
@@ -46,6 +46,6 @@ def tool_solver(
         chain,
         bounds,
         posture=posture if len(chain.joints) > 6 else None,
-        clearance=clearance,
+        keeps_off=keeps_off,
         tuning=tuning,
     )
