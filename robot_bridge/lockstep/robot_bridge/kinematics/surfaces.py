@@ -45,7 +45,7 @@ def joined(surfaces: Iterable[Surface]) -> Surface:
 def box_points(half: Sequence[float]) -> Array:
     """Return points on a box around the origin, n x 3; `half`: m, half of its sizes."""
     grid = [each for each in itertools.product(ALONG, repeat=3) if max(map(abs, each)) == 1.0]
-    return np.array(grid) * np.array(half)
+    return np.array(grid) * np.array(half)  # type: ignore[no-any-return]
 
 
 def rod(half: float) -> Array:

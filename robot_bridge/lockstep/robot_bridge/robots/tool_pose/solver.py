@@ -24,10 +24,12 @@ def tool_solver(
     *,
     keeps_off: Sequence[GapSource] = (),
     posture: Sequence[float] | None = None,
+    turns_first: bool = False,
 ) -> PoseSolver:
     """Return a solver whose bounds fit the arm's length.
 
     `posture`: rad or m, that joints tend to which the pose leaves free, of an arm with more than six joints.
+    `turns_first`: the rotation is kept where the arm cannot have both it and the position.
     """
     length = chain.length
     safe = min(SAFE * length, SAFEST)
@@ -41,6 +43,7 @@ def tool_solver(
         quickest=CATCHES_UP * math.hypot(*(axis.slew for axis in axes.rotation)),
         safe=safe,
         close=0.2 * safe,
+        turns_first=turns_first,
     )
     return PoseSolver(
         chain,
