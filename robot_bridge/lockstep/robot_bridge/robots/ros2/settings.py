@@ -106,6 +106,7 @@ class ArmJoint(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     margin: NotNegative = 0.0
     latency: Annotated[float, Meta(ge=0, le=1)] = 0.1
     reach: Positive | None = None  # rad or m that a goal may be ahead of the joint; None: 0.5 rad, 0.1 m
+    grips: bool = False  # a gripper: what it holds keeps it from its goal
 
 
 class ToolObstacle(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
