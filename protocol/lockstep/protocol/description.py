@@ -63,6 +63,7 @@ class Axis(msgspec.Struct, frozen=True, kw_only=True):
     acceleration: float = 0.0  # unit/s^2, of a goal axis that is driven; 0: as `brake`
     reach: float = 0.0  # unit, of a goal axis: how far from the measured value a goal may be
     wrap: float | None = None  # unit, of a goal axis that turns on and on: its period; None: it does not
+    grips: bool = False  # a goal axis that squeezes: what it holds keeps it from its goal
 
 
 class Joint(msgspec.Struct, frozen=True, kw_only=True):

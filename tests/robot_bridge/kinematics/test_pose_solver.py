@@ -8,6 +8,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from lockstep.robot_bridge.kinematics.chain import Chain
+from lockstep.robot_bridge.kinematics.obstacles import Obstacles, Surface, plane
 from lockstep.robot_bridge.kinematics.pose_solver import JointBounds, PoseSolver, Tuning
 from lockstep.robot_bridge.kinematics.rotations import from_rotation_vector, rotation_vector
 from tests.robot_bridge.kinematics.arms import BOUNDS, LIFT, clearance, desk_arm
@@ -141,7 +142,7 @@ def test_parts_of_the_arm_come_no_nearer_to_each_other_than_allowed(
     assume(nearest(start) > 0.04)
     begun = ARM.at(start)
     position = begun.position + np.array(direction) / math.hypot(*direction) * far
-    way = run(PoseSolver(ARM, BOUNDS, clearance=APART), start, position, begun.rotation)
+    way = run(PoseSolver(ARM, BOUNDS, keeps_off=(APART,)), start, position, begun.rotation)
     assert min(map(nearest, way[::10])) > 0.0
 
 
@@ -219,3 +220,43 @@ def test_a_solver_serves_a_slide_too() -> None:
         joints = solver.step(joints, wanted.position, np.eye(3), TICK).joints
     assert chain.at(joints).position == pytest.approx(wanted.position, abs=1e-3)
     assert rotation_vector(chain.at(joints).rotation)[2] == pytest.approx(rotation_vector(wanted.rotation)[2], abs=0.01)
+
+
+HAND = {"hand": Surface(np.array([(x, 0.0, 0.0) for x in (0.0, 0.04, 0.08, 0.12, 0.16)]), np.full(5, 0.025))}
+TABLE = Obstacles(ARM, HAND, (plane("the table", (0.0, 0.0, 0.06), (0.0, 0.0, 1.0)),))
+
+
+def lowest(joints: tuple[float, ...]) -> float:
+    (gap,) = TABLE.gaps(ARM.at(joints), 9.0)
+    return gap.distance
+
+
+@pytest.mark.parametrize("first", [False, True])
+def test_for_an_obstacle_the_rotation_is_given_up_before_the_position_unless_it_comes_first(first: bool) -> None:
+    """The tool is wanted just above the table, pointing up: the hand behind it would be in the table."""
+    start = (0.0, -0.3, 0.5, 0.2, 0.0)
+    position, rotation = np.array((0.36, 0.0, 0.10)), from_rotation_vector((0.0, -0.2, 0.0))
+    solver = PoseSolver(ARM, BOUNDS, keeps_off=(TABLE,), tuning=Tuning(turns_first=first))
+    way = run(solver, start, position, rotation)
+    end = ARM.at(way[-1])
+    missing, askew = np.linalg.norm(end.position - position), np.linalg.norm(rotation_vector(rotation @ end.rotation.T))
+    assert min(map(lowest, way)) > 0.004
+    assert swings(way, 100) < 0.02
+    assert (missing < 2e-3) == (not first)
+    assert (askew < 0.02) == first
+    near = solver.step(way[-1], position, rotation, TICK).near
+    assert near == ("the table",)
+
+
+@few
+@given(reachable, directions, st.floats(0.05, 0.4), turns)
+def test_whatever_is_wanted_the_arm_stays_off_the_table(
+    start: tuple[float, ...], direction: tuple[float, float, float], far: float, turn: tuple[float, float, float]
+) -> None:
+    assume(lowest(start) > 0.03)
+    begun = ARM.at(start)
+    position = begun.position + np.array(direction) / math.hypot(*direction) * far
+    solver = PoseSolver(ARM, BOUNDS, keeps_off=(APART, TABLE))
+    way = run(solver, start, position, from_rotation_vector(turn) @ begun.rotation)
+    assert min(map(lowest, way[::5])) > 0.0
+    assert swings(way, 100) < 0.05

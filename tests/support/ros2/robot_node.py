@@ -48,6 +48,7 @@ class RobotNode(Node):  # type: ignore[misc]
         self._positions = [0.0, -1.0, 1.0, 0.0, 0.0, 0.0]
         self._setpoints = list(self._positions)
         self._velocities = [0.0] * len(JOINTS)
+        self._takes_positions = False  # the controller of a Float64MultiArray
         self._commanded: list[float] = []  # velocities; empty: the joints go to their setpoints
         self._ticks = 0
         self.ticked = threading.Event()
@@ -94,6 +95,8 @@ class RobotNode(Node):  # type: ignore[misc]
             self._frozen[topic] = None
         elif verb == "status":
             self._status_code = int(topic)
+        elif verb == "positions":
+            self._takes_positions = True
         elif verb == "spoil":
             self._spoilt.add(topic)
 
@@ -124,7 +127,11 @@ class RobotNode(Node):  # type: ignore[misc]
         self.note("joints", positions=self._setpoints, velocities=list(message.velocity), measured=self._positions)
 
     def _take_velocities(self, message: Float64MultiArray) -> None:
-        """A velocity controller without a timeout: it goes on with what it was told last."""
+        """A velocity controller without a timeout: it goes on with what it was told last; or one of positions."""
+        if self._takes_positions:
+            self._setpoints, self._commanded = list(message.data), []
+            self.note("positions", positions=self._setpoints)
+            return
         self._commanded = list(message.data)
         self.note("velocities", values=self._commanded)
 

@@ -66,6 +66,7 @@ export interface Axis {
   readonly acceleration: number;
   readonly reach: number;
   readonly wrap: number | null;
+  readonly grips: boolean;
 }
 
 /** An axis that moves a joint: the joint's velocity is `gain` x (the axis' value - its rest value). None: the gain changes with the posture, and the robot adapter computes the axes' effect on the joint. */

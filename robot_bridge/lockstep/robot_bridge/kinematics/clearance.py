@@ -2,14 +2,14 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 import numpy as np
 import numpy.typing as npt
 
 from lockstep.robot_bridge.kinematics.chain import Chain, ChainPoint, ChainState
 
-__all__ = ["Capsule", "Clearance", "Gap", "nearest_places"]
+__all__ = ["Capsule", "Clearance", "Gap", "GapSource", "nearest_places"]
 
 Array = npt.NDArray[np.float64]
 Vector = tuple[float, float, float]
@@ -27,6 +27,14 @@ class Capsule(NamedTuple):
 class Gap(NamedTuple):
     distance: float  # m, negative if they overlap
     gradient: Array  # m per rad (or m) of each joint
+    what: str = "itself"  # that the arm is close to, "the table"
+
+
+class GapSource(Protocol):
+    """Knows what the robot must keep off."""
+
+    def gaps(self, state: ChainState, within: float) -> list[Gap]:
+        """Return the gaps that are narrower than `within` (m)."""
 
 
 class Clearance:

@@ -1,27 +1,35 @@
 """One step of the joints towards a pose of the tool, by damped least squares.
 
 The order of priority where not everything is possible: the joints' ranges and rates, the distance between the robot's
-own parts, the position, the rotation as far as the joints that are left can turn it, and last the posture.
+own parts and to obstacles, the position, the rotation as far as the joints that are left can turn it, and last the
+posture. A part that may come no nearer is a task before the position, so the rotation is given up for it first.
 
 Sources: Nakamura and Hanafusa 1986 (damping near singularities), Sugihara 2011 (damping by the error), Chiaverini 1997
 (the later task in the null space of the earlier one, each damped by itself), Faverjon and Tournassoud 1987 (velocity
-dampers before limits), Flacco, De Luca and Khatib 2012 (a joint at its bound is taken out, and the others solve anew).
+dampers before limits), Flacco, De Luca and Khatib 2012 (a joint at its bound is taken out, and the others solve anew),
+Kanoun, Lamiraux and Wieber 2011 (inequalities before the tasks, by the set of those that bind).
 """
 
 import math
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from lockstep.robot_bridge.kinematics.chain import Chain, ChainState
-from lockstep.robot_bridge.kinematics.clearance import Clearance
+from lockstep.robot_bridge.kinematics.clearance import GapSource
 from lockstep.robot_bridge.kinematics.rotations import rotation_vector
 
 __all__ = ["JointBounds", "PoseSolver", "Solution", "Tuning"]
 
 Array = npt.NDArray[np.float64]
+
+MOST_GAPS: Final = 4  # that bind at once in the order of priority; of more, each is kept by itself
+SMALL_GAP: Final = 0.05  # of the lengths of the gaps' gradients: those that bind together are damped below it
+DAMPING_GAP: Final = 0.02
+FLAT: Final = 1e-4  # m per rad (or m), of a gap that the joints do not change
+KEPT: Final = 1e-6  # m/s, above what a gap allows
 
 
 class JointBounds(NamedTuple):
@@ -53,15 +61,23 @@ class Tuning(NamedTuple):
     quickest: float = math.inf  # rad/s, the same for its turning
     safe: float = 0.03  # m, from which on parts that come nearer to each other are slowed
     close: float = 0.008  # m, at which they come no nearer
+    turns_first: bool = False  # the rotation comes before the position
 
 
 class Solution(NamedTuple):
     joints: tuple[float, ...]  # rad or m, the next goals
     rates: tuple[float, ...]  # rad/s or m/s, that bring them there
     limited: tuple[int, ...]  # joints that are at the end of their range and would go on
-    near: bool  # parts of the robot are so close to each other that they slow it
+    near: tuple[str, ...]  # what the robot is so close to that it is slowed: "itself", or obstacles
     missing: float  # m, of the position before this step
     askew: float  # rad, of the rotation before this step, at most pi
+
+
+class _Near(NamedTuple):
+    gradient: Array  # m per rad (or m) of each joint
+    steep: float  # its length
+    most: float  # m/s, at which the gap may become narrower
+    what: str  # that is near
 
 
 class PoseSolver:
@@ -73,7 +89,7 @@ class PoseSolver:
         bounds: JointBounds,
         *,
         posture: Sequence[float] | None = None,
-        clearance: Clearance | None = None,
+        keeps_off: Sequence[GapSource] = (),
         turns: bool = True,
         tuning: Tuning | None = None,
     ) -> None:
@@ -84,7 +100,7 @@ class PoseSolver:
         self._ramp = bounds.ramp
         self._accelerations = self._rates / bounds.ramp
         self._posture = None if posture is None else np.array(posture)
-        self._clearance = clearance
+        self._keeps_off = tuple(keeps_off)
         self._turns = turns
         self._tuning = tuning or Tuning()
 
@@ -128,8 +144,10 @@ class PoseSolver:
         part = tuning.gain * (seconds + self._ramp / 2)  # the time in which a rate follows what is solved here
         residual = (part * tuning.bend * min(float(np.sqrt(error @ error)), tuning.longest), part * angle)
         slowest, fastest = self._speeds(here, share)
-        rates, limited = self._within(state, here, (wanted, turn), residual, slowest, fastest)
-        rates, near = self._apart(state, rates)
+        gaps = self._near(state)
+        rates, limited, bind = self._within(state, here, (wanted, turn), residual, (slowest, fastest), gaps)
+        rates, near = _apart(gaps, rates)
+        near = tuple(dict.fromkeys((*(gap.what for gap in bind), *near)))
         ratio = float(np.max(np.abs(rates) / self._rates)) if share > 0.0 else math.inf
         rates = rates * (min(1.0, share / ratio) if ratio > 0.0 else 1.0)
         if before is not None:
@@ -147,34 +165,54 @@ class PoseSolver:
         fastest = np.clip(gain * (self._upper - here), 0.0, self._rates)
         return slowest, fastest
 
+    def _near(self, state: ChainState) -> list[_Near]:
+        """Return what is near, the nearest last."""
+        tuning = self._tuning
+        found = [gap for source in self._keeps_off for gap in source.gaps(state, tuning.safe)]
+        near = []
+        for gap in sorted(found, key=lambda gap: -gap.distance):
+            steep = float(np.sqrt(gap.gradient @ gap.gradient))
+            if steep > FLAT:
+                most = max(0.0, tuning.limit_gain * (gap.distance - tuning.close))
+                near.append(_Near(gap.gradient, steep, most, gap.what))
+        return near
+
     def _within(
         self,
         state: ChainState,
         here: Array,
         wanted: tuple[Array, Array],
         residual: tuple[float, float],
-        slowest: Array,
-        fastest: Array,
-    ) -> tuple[Array, tuple[int, ...]]:
-        """Solve; joints that would pass a bound set by their range keep to it, and the others solve anew."""
+        speeds: tuple[Array, Array],
+        gaps: list[_Near],
+    ) -> tuple[Array, tuple[int, ...], list[_Near]]:
+        """Solve; what would pass a bound set by a range or a gap keeps to it, and the other joints solve anew.
+
+        Return the rates, the joints at the ends of their ranges, and the gaps that bind.
+        """
+        slowest, fastest = speeds
         free = np.ones(len(here), dtype=bool)
         held = np.zeros(len(here))
         limited: list[int] = []
+        bind: list[_Near] = []
         rates = held
-        for _ in range(len(here)):
-            rates = held + self._solve(state, here, wanted, residual, free, held)
+        for _ in range(len(here) + MOST_GAPS):
+            rates = held + self._solve(state, here, wanted, residual, free, held, bind)
             beyond = free & (
                 ((rates > fastest) & (fastest < self._rates)) | ((rates < slowest) & (slowest > -self._rates))
             )
-            if not beyond.any():
+            if beyond.any():
+                excess = np.where(beyond, np.maximum(rates - fastest, slowest - rates) / self._rates, 0.0)
+                worst = int(np.argmax(excess))
+                held[worst] = fastest[worst] if rates[worst] > 0.0 else slowest[worst]
+                free[worst] = False
+                limited.append(worst)
+            elif len(bind) < min(MOST_GAPS, int(free.sum())) and (gap := _narrowed(gaps, rates)) is not None:
+                bind.append(gap)
+            else:
                 break
-            excess = np.where(beyond, np.maximum(rates - fastest, slowest - rates) / self._rates, 0.0)
-            worst = int(np.argmax(excess))
-            held[worst] = fastest[worst] if rates[worst] > 0.0 else slowest[worst]
-            free[worst] = False
-            limited.append(worst)
         ended = np.minimum(here - self._lower, self._upper - here) < self._tuning.end
-        return rates, tuple(number for number in limited if ended[number])
+        return rates, tuple(number for number in limited if ended[number]), bind
 
     def _solve(
         self,
@@ -184,39 +222,53 @@ class PoseSolver:
         residual: tuple[float, float],
         free: Array,
         held: Array,
+        bind: list[_Near],
     ) -> Array:
         """Return the rates of the free joints.
 
-        `wanted`: m/s and rad/s of the tool. `residual`: additional damping of position and rotation.
+        `wanted`: m/s and rad/s of the tool. `residual`: additional damping of position and rotation. `bind`: gaps that
+        become narrower as fast as they may.
         """
         tuning = self._tuning
-        linear = state.linear * free
-        inverse, basis = _damped_inverse(linear, tuning.small_linear, tuning.damping_linear, residual[0])
-        rates = inverse @ (wanted[0] - state.linear @ held)
-        left = np.diag(free.astype(float)) - basis @ basis.T  # the null space of the position, of the free joints
+        rates, left = np.zeros(len(here)), np.diag(free.astype(float))  # the joints that are left for the next task
+        if bind:
+            rows = np.array([gap.gradient / gap.steep for gap in bind])
+            most = np.array([-gap.most / gap.steep for gap in bind])
+            inverse, basis = _damped_inverse(rows * free, SMALL_GAP, DAMPING_GAP, 0.0)
+            rates = inverse @ (most - rows @ held)
+            left = left - basis @ basis.T
+        tasks = [(state.linear, wanted[0], (tuning.small_linear, tuning.damping_linear, residual[0]))]
         if self._turns:
-            angular = state.angular @ left
-            inverse, basis = _damped_inverse(angular, tuning.small_angular, tuning.damping_angular, residual[1])
-            rates = rates + left @ inverse @ (wanted[1] - state.angular @ (rates + held))
+            turn = (state.angular, wanted[1], (tuning.small_angular, tuning.damping_angular, residual[1]))
+            tasks.insert(0 if tuning.turns_first else 1, turn)
+        for jacobian, speed, damping in tasks:
+            inverse, basis = _damped_inverse(jacobian @ left, *damping)
+            rates = rates + left @ inverse @ (speed - jacobian @ (rates + held))
             left = left - basis @ basis.T
         if self._posture is not None:
             rates = rates + left @ (tuning.posture * (self._posture - here))
         return rates * free
 
-    def _apart(self, state: ChainState, rates: Array) -> tuple[Array, bool]:
-        """Slow what brings parts of the robot nearer to each other than is safe."""
-        if self._clearance is None:
-            return rates, False
-        tuning = self._tuning
-        slowed = False
-        for gap in sorted(self._clearance.gaps(state, tuning.safe), key=lambda gap: -gap.distance):
-            most = max(0.0, tuning.limit_gain * (gap.distance - tuning.close))  # m/s, of coming nearer
-            coming = -float(gap.gradient @ rates)
-            steep = float(gap.gradient @ gap.gradient)
-            if coming > most and steep > 1e-9:
-                rates = rates + gap.gradient * ((coming - most) / steep)
-                slowed = True
-        return rates, slowed
+
+def _narrowed(gaps: Sequence[_Near], rates: Array) -> _Near | None:
+    """Return the gap that these rates narrow the most above what it allows; None if they keep to all."""
+    worst, found = KEPT, None
+    for gap in gaps:
+        above = -float(gap.gradient @ rates) - gap.most
+        if above > worst:
+            worst, found = above, gap
+    return found
+
+
+def _apart(gaps: Sequence[_Near], rates: Array) -> tuple[Array, tuple[str, ...]]:
+    """Take from the rates what still narrows a gap faster than it allows: more gaps bind than there are joints."""
+    near = []
+    for gap in gaps:
+        above = -float(gap.gradient @ rates) - gap.most
+        if above > KEPT:
+            rates = rates + gap.gradient * (above / gap.steep**2)
+            near.append(gap.what)
+    return rates, tuple(near)
 
 
 def _shortened(vector: Array, longest: float) -> Array:

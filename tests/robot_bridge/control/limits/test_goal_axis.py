@@ -214,6 +214,42 @@ def test_it_begins_at_the_goal_that_the_robot_pursues_or_where_it_is_if_that_is_
     assert shaper.goals == [goal]
 
 
+@given(st.floats(-2.0, 2.0), st.floats(-1.0, 1.0), st.floats(-2.0, 2.0), st.floats(-1.0, 1.0))
+def test_a_gripper_goes_on_squeezing_whatever_has_become_of_the_arm(
+    place: float, lag: float, width: float, squeeze: float
+) -> None:
+    gripper = msgspec.structs.replace(SHOULDER, name="gripper", grips=True)
+    shaper = AxisShaper([SHOULDER, gripper], hold=HOLD)
+    shaper.begin([place, width], [place + 3.0 * lag, width + 0.9 * squeeze])
+    arm, grip = shaper.goals
+    assert grip == width + 0.9 * squeeze
+    assert arm == (place + 3.0 * lag if abs(place + 3.0 * lag - place) <= SHOULDER.reach else place)
+
+
+def test_a_gripper_beyond_its_reach_begins_where_it_is_and_the_arm_keeps_its_goal() -> None:
+    gripper = msgspec.structs.replace(SHOULDER, name="gripper", grips=True)
+    shaper = AxisShaper([SHOULDER, gripper], hold=HOLD)
+    shaper.begin([0.3, 0.0], [0.4, 1.5])
+    assert shaper.goals == [0.4, 0.0]
+
+
+@given(st.lists(st.sampled_from(["stay", "rest", "hold"]), min_size=1, max_size=6))
+def test_a_gripper_that_rests_keeps_its_goal_though_it_is_measured_elsewhere(ways: list[str]) -> None:
+    """Its goal is inside of what it holds; nothing but a command changes it."""
+    gripper = msgspec.structs.replace(SHOULDER, name="gripper", grips=True)
+    shaper, now = AxisShaper([gripper], hold=HOLD), 0.0
+    shaper.begin([0.4], [0.0])
+    for way in ways:
+        if way == "rest":
+            shaper.rest()
+        elif way == "stay":
+            shaper.drive([None], now)
+        for _ in range(40):
+            shaper.step(now, 0.01)
+            now += 0.01
+    assert shaper.goals == [0.0]
+
+
 def test_where_the_axis_is_not_measured_a_pursued_goal_is_not_enough() -> None:
     shaper = AxisShaper([SHOULDER], hold=HOLD)
     shaper.begin([math.nan], [0.5])

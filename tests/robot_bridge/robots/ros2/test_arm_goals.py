@@ -97,6 +97,30 @@ def test_an_arm_that_something_else_moved_goes_on_from_where_it_is(place: Path) 
     assert world.way[1] == pytest.approx(away)
 
 
+@pytest.mark.parametrize("fallen", [False, True])
+def test_a_gripper_goes_on_squeezing_when_the_arm_is_driven_on(tmp_path: Path, fallen: bool) -> None:
+    rows = "".join(f"    - {{name: {name}, maximum: 1.0}}\n" for name in JOINTS[:5])
+    rows += f"    - {{name: {JOINTS[5]}, maximum: 1.0, grips: true}}\n"
+    found, description = read_settings(written(tmp_path, "  goals: true\n", rows=rows))
+    assert found.arm is not None
+    assert [axis.grips for axis in description.axes] == [False] * 5 + [True]
+    goals = ArmGoals(found.arm, description, START)
+    values = [*START[:5], -0.3]  # it closes, and a block keeps it open
+    goals.drive(START, TICK, TICK, START, False)
+    for _ in range(100):
+        goals.drive(values, TICK, TICK, START, False)
+    held = list(START)
+    goals.take_up(held)
+    assert goals.goals[5] == -0.3
+    if fallen:
+        held[1] -= 0.4
+        goals.take_up(held)
+        assert goals.goals == [*held[:5], -0.3]
+    held[5] += 0.2  # somebody opens it by hand
+    goals.take_up(held)
+    assert goals.goals[5] == held[5]
+
+
 def test_after_a_restart_the_next_values_move_nothing(place: Path) -> None:
     world = World(place)
     world.command({NAMES[0]: 0.4}, 5)

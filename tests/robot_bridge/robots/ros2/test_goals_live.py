@@ -13,7 +13,7 @@ from lockstep.robot_bridge.conformance import CASES, Outcome, Subject, play
 from lockstep.robot_bridge.conformance.place import Place
 from lockstep.robot_bridge.link.link_client import RobotLink
 from tests.robot_bridge.bridge_helpers import Operator
-from tests.robot_bridge.robots.ros2.test_tool_settings import JOINTS
+from tests.robot_bridge.robots.ros2.test_tool_settings import JOINTS, ROWS
 from tests.robot_bridge.robots.ros2.test_tool_settings import settings as written
 from tests.support.ros2 import PATIENCE, RosBridge, RosRobot, have_ros, running_ros_bridge, running_ros_robot
 
@@ -70,6 +70,29 @@ def assert_smooth(notes: list[dict[str, Any]]) -> None:
     for before, after in itertools.pairwise(notes):
         for old, new in zip(before["positions"], after["positions"], strict=True):
             assert abs(new - old) <= FASTEST * (JITTER + HORIZON)
+
+
+async def test_a_controller_of_positions_gets_the_numbers_of_the_places(tmp_path: Path, node: RosRobot) -> None:
+    arm = (
+        "  goals: true\n  command: {topic: /arm_velocity_controller/commands, message: Float64MultiArray, "
+        "interface: position}\n"
+    )
+    rows = ROWS.replace("maximum: 1.0", "maximum: 1.0, lower: -3.0, upper: 0.3", 1)
+    await node.tell("positions")
+    path = written(tmp_path, arm, more="watchdog: 0.4\n", rows=rows)
+    async with running_ros_bridge(tmp_path, node, path) as running:
+        async with RobotLink(*running.address, "operator", name="test") as link:
+            driver = await ready(link)
+            begun, goal = list(driver.feedback.axes), 0.3  # the end of its range
+            async with asyncio.timeout(PATIENCE):
+                while abs(driver.feedback.axes[0] - goal) > 3e-3:
+                    await driver.drive([goal, *[None] * (len(JOINTS) - 1)])
+                await driver.heard(lambda feedback: feedback.at_rest)
+        notes = await node.noted("positions", lambda notes: bool(notes) and notes[-1]["positions"][0] == goal)
+    assert_smooth(notes)
+    assert notes[-1]["positions"] == pytest.approx([goal, *begun[1:]], abs=1e-6)
+    assert max(note["positions"][0] for note in notes) <= goal  # though they are ahead by the horizon
+    assert not list(node.notes("trajectory"))
 
 
 async def test_the_tool_goes_where_it_is_told_and_the_last_word_is_where_it_stays(

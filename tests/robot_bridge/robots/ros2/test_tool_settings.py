@@ -9,6 +9,7 @@ from lockstep.robot_bridge.errors import SettingsError
 from lockstep.robot_bridge.kinematics.chain import Chain
 from lockstep.robot_bridge.kinematics.rotations import rotation_vector
 from lockstep.robot_bridge.robots.ros2 import read_settings
+from lockstep.robot_bridge.robots.ros2.tool import arm_tool
 
 URDF = Path(__file__).parents[3] / "support" / "ros2" / "robot.urdf"
 JOINTS = ("shoulder_pan_joint", "shoulder_lift_joint", "elbow_joint", "wrist_1_joint", "wrist_2_joint", "wrist_3_joint")
@@ -59,6 +60,7 @@ def test_an_arm_on_a_base_has_its_pose_in_the_bases_frame(tmp_path: Path) -> Non
         ("  tool: {tip: upper_arm}\n", "", "between upper_arm and the world are 2 joints of the arm; a pose needs 3"),
         ("  tool: {tip: wrist_3, posture: [0, 1]}\n", "", "needs one value for each of the 6 joints"),
         ("  tool: {tip: wrist_3}\n", "hold: 0.2\n", "a tool needs a hold of 0.27 s at least, not 0.2 s"),
+        ("  tool: {tip: wrist_3, obstacles: [{name: the wall, normal: [0, 0, 0]}]}\n", "", "normal: has no direction"),
         ("  goals: true\n  command: {message: Float64MultiArray}\n", "", "goals need positions"),
         ("  goals: true\n", "bodies: [{name: a, parent: ''}]\n", "leave out one of the two"),
     ],
@@ -104,3 +106,24 @@ def test_a_urdf_that_cannot_be_read_is_named(tmp_path: Path, text: str | None, w
         (tmp_path / "own.urdf").write_text(text)
     with pytest.raises(SettingsError, match=words):
         read_settings(path)
+
+
+def test_an_arm_keeps_off_the_planes_and_boxes_of_its_settings(tmp_path: Path) -> None:
+    ceiling = "{name: the ceiling, position: [0, 0, 1.62], normal: [0, 0, -1]}"
+    obstacles = f"[{ceiling}, {{name: the post, position: [9, 0, 0], size: [1, 1, 1]}}]"
+    path = settings(
+        tmp_path, f"  tool: {{tip: wrist_3, posture: {POSTURE}, keeps: rotation, obstacles: {obstacles}}}\n"
+    )
+    found, description = read_settings(path)
+    assert found.arm is not None
+    tool = arm_tool(found.arm, description, (0, -1, 1, 0, 0.5, 0))
+    values = [*tool.goals, *tool.pose_at(tool.goals)]
+    height = 6 + 2  # z of the tool
+    tool.drive(values, 0.01, 0.01)
+    faults: set[str] = set()
+    for _ in range(300):
+        values[height] += 0.002
+        tool.drive(values, 0.01, 0.01, pursues=True)
+        faults.update(tool.faults)
+    assert "the arm is close to the ceiling" in faults
+    assert 1.6 < tool.pose_at(tool.goals)[2] < 1.62

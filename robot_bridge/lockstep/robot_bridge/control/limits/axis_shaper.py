@@ -52,6 +52,7 @@ class AxisShaper:
         self._axes = tuple(
             GoalAxis(axis, settling.get(axis.name, 0.0)) if axis.kind == "goal" else RateAxis(axis) for axis in axes
         )
+        self._grips = tuple(axis.grips for axis in axes)
         self._hold = hold
         self._limiter = limiter
         self._turns = None if pursued is None or not poses else PoseTurns(axes, poses, self._axes, pursued)
@@ -94,11 +95,13 @@ class AxisShaper:
 
         `places`: measured, one per axis; NaN: not known. If one of the goals is further than its axis' reach from its
         place, the robot is not where it says, and the places count: all, since a pose and its joints belong together.
+        A gripper counts by itself: an arm that has fallen does not open the hand that holds something.
         """
         self._released = True
-        holds = all(axis.reaches(place, goal) for axis, place, goal in zip(self._axes, places, pursued, strict=True))
-        for axis, place in zip(self._axes, pursued if holds else places, strict=True):
-            axis.begin(place)
+        holds = [axis.reaches(place, goal) for axis, place, goal in zip(self._axes, places, pursued, strict=True)]
+        whole = all(each or grips for each, grips in zip(holds, self._grips, strict=True))
+        for axis, grips, held, place, goal in zip(self._axes, self._grips, holds, places, pursued, strict=True):
+            axis.begin(goal if (held if grips else whole) else place)
         self.is_known = all(axis.is_known for axis in self._axes)
         if self._turns is not None:
             self._turns.begin()

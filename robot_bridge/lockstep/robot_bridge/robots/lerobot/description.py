@@ -104,6 +104,7 @@ def _axis(facts: AxisFacts, given: AxisSettings, hold: float) -> Axis:
         kind=kind,
         reach=reach,
         wrap=given.wrap,
+        grips=kind == "goal" and facts.norm == "range_0_100",
     )
 
 

@@ -32,6 +32,8 @@ class ArmGoals:
         others = [number for number in range(len(settings.joints)) if number not in posed]
         rates = [settings.joints[number].maximum for number in others]
         self._others = JointFollower(others, rates, [measured[number] for number in others])
+        self._grips = [number for number in others if settings.joints[number].grips]
+        self._rested: list[float] | None = None  # rad or m, where the joints came to rest; None: not since they moved
         self._size = len(settings.joints) + (0 if self._tool is None else len(self._tool.place.pose))
         self.goals = list(measured)
 
@@ -53,6 +55,8 @@ class ArmGoals:
             places = [measured[number] for number in own]
             rates[own] = self._tool.drive(values, seconds, since, places, pursues=pursues)
         self._note_goals()
+        if rates.any():
+            self._rested = None
         found: list[float] = rates.tolist()
         return found
 
@@ -69,12 +73,26 @@ class ArmGoals:
             self._tool.restart()
 
     def take_up(self, measured: Sequence[float]) -> None:
-        """Begin anew where an arm at rest is, if something else has moved it away from its goals."""
-        if max(abs(goal - place) for goal, place in zip(self.goals, measured, strict=True)) <= MOVED:
+        """Begin anew where an arm at rest is, if something else has moved it away from its goals.
+
+        What a gripper holds keeps it from its goal. It begins anew only if it was moved since it came to rest, and
+        goes on squeezing when the rest of the arm was moved.
+        """
+        if self._rested is None:
+            self._rested = list(measured)
+        moved = {
+            number
+            for number, (place, goal) in enumerate(zip(measured, self.goals, strict=True))
+            if abs(place - (self._rested[number] if number in self._grips else goal)) > MOVED
+        }
+        if not moved:
             return
-        self._others.hold([measured[number] for number in self._others.joints])
-        if self._tool is not None:
-            self._tool.hold([measured[number] for number in self._tool.place.joints])
+        if not moved.issubset(self._grips):
+            moved |= set(range(len(self.goals))).difference(self._grips)
+            if self._tool is not None:
+                self._tool.hold([measured[number] for number in self._tool.place.joints])
+        self._others.hold([measured[n] if n in moved else self.goals[n] for n in self._others.joints])
+        self._rested = list(measured)
         self._note_goals()
 
     def pursued(self) -> list[float]:

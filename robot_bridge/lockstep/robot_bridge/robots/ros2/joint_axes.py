@@ -82,4 +82,5 @@ def _goal_axis(joint: ArmJoint, number: int, hold: float) -> Axis:
         acceleration=joint.slew or fastest / SLEW_TIME,
         reach=reach if wrap is None else min(reach, math.pi),
         wrap=wrap,
+        grips=joint.grips,
     )

@@ -29,6 +29,7 @@ __all__ = [
     "Servo",
     "ServoStatus",
     "Tool",
+    "ToolObstacle",
     "TwistCommand",
     "Wrench",
 ]
@@ -105,6 +106,16 @@ class ArmJoint(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     margin: NotNegative = 0.0
     latency: Annotated[float, Meta(ge=0, le=1)] = 0.1
     reach: Positive | None = None  # rad or m that a goal may be ahead of the joint; None: 0.5 rad, 0.1 m
+    grips: bool = False  # a gripper: what it holds keeps it from its goal
+
+
+class ToolObstacle(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """What the arm keeps off: a plane, or a box if it has a size. In the frame of the tool's pose."""
+
+    name: Name  # as in "the arm is close to …"
+    position: Vector3 = (0.0, 0.0, 0.0)  # m, of a place on the plane, or of the box' middle
+    normal: Vector3 = (0.0, 0.0, 1.0)  # from the plane to the arm
+    size: tuple[Positive, Positive, Positive] | None = None  # m, along x, y and z
 
 
 class Tool(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -114,6 +125,8 @@ class Tool(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     point: Vector3 = (0.0, 0.0, 0.0)  # m, of the tool in the tip's frame
     linear: Positive | None = None  # m/s, the fastest along x, y and z; None: by the arm's length, at most 0.25
     posture: Annotated[tuple[float, ...], Meta(max_length=64)] = ()  # of the joints, where the tool's rotation is zero
+    obstacles: Annotated[tuple[ToolObstacle, ...], Meta(max_length=8)] = ()
+    keeps: Literal["position", "rotation"] = "position"  # where it cannot have both
 
 
 class Arm(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):

@@ -11,9 +11,11 @@ from lockstep.robot_bridge.kinematics.body_capsules import body_capsules
 from lockstep.robot_bridge.kinematics.capsules import separate_pairs
 from lockstep.robot_bridge.kinematics.chain import Chain, NoChain
 from lockstep.robot_bridge.kinematics.clearance import Clearance
+from lockstep.robot_bridge.kinematics.obstacles import Obstacle, Obstacles, plane
 from lockstep.robot_bridge.kinematics.pose_solver import JointBounds
 from lockstep.robot_bridge.kinematics.rotations import quaternion
-from lockstep.robot_bridge.robots.ros2.settings import Arm
+from lockstep.robot_bridge.kinematics.surfaces import body_surfaces
+from lockstep.robot_bridge.robots.ros2.settings import Arm, ToolObstacle
 from lockstep.robot_bridge.robots.tool_pose.axes import ToolAxes, shortest_hold, tool_axes, tool_layer
 from lockstep.robot_bridge.robots.tool_pose.posed_tool import PosedTool, ToolPlace, tool_pose
 from lockstep.robot_bridge.robots.tool_pose.solver import tool_solver
@@ -60,6 +62,9 @@ def describe_tool(arm: Arm, bodies: Sequence[Body], hold: float) -> ToolDescript
         )
     if tool.posture and len(tool.posture) != len(arm.joints):
         raise SettingsPlace((*KEYS, "posture"), f"needs one value for each of the {len(arm.joints)} joints of the arm")
+    for number, each in enumerate(tool.obstacles):
+        if not any(each.normal):
+            raise SettingsPlace((*KEYS, "obstacles", number, "normal"), "has no direction")
     turn = np.eye(3)
     if tool.posture:
         turn = chain.at([tool.posture[joints[name]] for name in chain.joints]).rotation.T
@@ -89,6 +94,8 @@ def arm_tool(arm: Arm, description: RobotDescription, measured: Sequence[float])
     home = [given[number] for number in places] if given else None
     capsules = body_capsules([body for body in description.bodies if chain.has(body.name)])
     pairs = separate_pairs(chain, capsules, home or posture)
+    obstacles = tuple(map(_obstacle, arm.tool.obstacles if arm.tool is not None else ()))
+    stands = Obstacles(chain, body_surfaces(description.bodies, chain) if obstacles else {}, obstacles)
     return PosedTool(
         pose.name,
         ToolPlace(places, tuple(range(len(arm.joints), len(arm.joints) + 6))),
@@ -97,12 +104,19 @@ def arm_tool(arm: Arm, description: RobotDescription, measured: Sequence[float])
             chain,
             bounds,
             ToolAxes(tuple(axes[name] for name in pose.position), tuple(axes[name] for name in pose.rotation)),
-            clearance=Clearance(chain, capsules, pairs) if pairs else None,
+            keeps_off=(Clearance(chain, capsules, pairs), stands),
             posture=home,
+            turns_first=arm.tool is not None and arm.tool.keeps == "rotation",
         ),
         bounds.rates,
         posture,
     )
+
+
+def _obstacle(given: ToolObstacle) -> Obstacle:
+    if given.size is None:
+        return plane(given.name, given.position, given.normal)
+    return Obstacle(given.name, np.array(given.position), np.eye(3), np.array(given.size) / 2.0)
 
 
 def _base(bodies: Sequence[Body], tip: str, joints: set[str]) -> str:

@@ -173,8 +173,7 @@ class ArmDrive:
         self._turns = solution.askew < (TURNED_AWAY if self._turns else TURNED_BACK)
         self._goals, self._solved = solution.joints, solution.rates
         self.faults = [f"joint limit: {self._chain.joints[number]}" for number in solution.limited]
-        if solution.near:
-            self.faults.append("the arm is close to itself")
+        self.faults += [f"the arm is close to {what}" for what in solution.near]
         if not self._turns:
             self.faults.append("the tool's goal is turned too far away from it: turn it back, or let go")
 

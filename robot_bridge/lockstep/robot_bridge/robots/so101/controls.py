@@ -16,7 +16,9 @@ HALF_A_TURN: Final = round(math.pi, 5)
 RATES: Final[tuple[float, ...]] = (2.0, 1.6, 2.0, 2.5, 3.0, 3.0)  # rad/s, of each joint, always; the servos make 5
 
 
-def goal(name: str, label: str, unit: str, bounds: tuple[float, float], speed: float, reach: float) -> Axis:
+def goal(
+    name: str, label: str, unit: str, bounds: tuple[float, float], speed: float, reach: float, *, grips: bool = False
+) -> Axis:
     return Axis(
         name=name,
         label=label,
@@ -28,6 +30,7 @@ def goal(name: str, label: str, unit: str, bounds: tuple[float, float], speed: f
         acceleration=round(speed / SPEEDS_UP_IN, 5),
         brake=round(speed / STOPS_IN, 5),
         reach=reach,
+        grips=grips,
     )
 
 
@@ -39,7 +42,7 @@ JOINT_AXES: Final[tuple[Axis, ...]] = (
     goal("wrist_flex", "Wrist down", "rad", (-1.658, 1.658), 1.8, JOINT_REACH),
     goal("wrist_roll", "Wrist roll", "rad", (-2.743, 2.841), 2.0, JOINT_REACH),
     # A block between the fingertips keeps them from a goal that squeezes it: that goal may be as far as the range.
-    goal("gripper", "Gripper open", "rad", (-0.174, 1.745), 2.5, 2.0),
+    goal("gripper", "Gripper open", "rad", (-0.174, 1.745), 2.5, 2.0, grips=True),
 )
 POSITION_AXES: Final = (
     goal("tool.x", "Tool forward", "m", (-0.40, 0.46), 0.20, TOOL_REACH),

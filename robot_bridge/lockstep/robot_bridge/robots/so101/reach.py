@@ -1,4 +1,4 @@
-"""The arm's inverse kinematics: its chain of joints, and the solver that keeps it within its ranges and off itself."""
+"""The arm's inverse kinematics: its chain of joints, and what keeps it in its ranges, off itself and off the table."""
 
 import math
 from collections.abc import Mapping
@@ -7,7 +7,9 @@ from typing import Final
 from lockstep.protocol.description import RobotDescription
 from lockstep.robot_bridge.kinematics.chain import Chain
 from lockstep.robot_bridge.kinematics.clearance import Capsule, Clearance
+from lockstep.robot_bridge.kinematics.obstacles import Obstacles, plane
 from lockstep.robot_bridge.kinematics.pose_solver import JointBounds, PoseSolver, Tuning
+from lockstep.robot_bridge.kinematics.surfaces import body_surfaces
 from lockstep.robot_bridge.robots.so101.controls import JOINT_AXES, POSITION_AXES, RATES, ROTATION_AXES
 from lockstep.robot_bridge.robots.so101.description import TOOL_BODY
 from lockstep.robot_bridge.robots.so101.model import ARM
@@ -33,6 +35,8 @@ PAIRS: Final = (
     ("arm.upper_arm", "arm.gripper"),
 )
 
+TABLE: Final = plane("the table", (0.0, 0.0, 0.0), (0.0, 0.0, 1.0))
+
 # Faster than its goals together, so that a tool that lags arrives; far slower than its joints could throw it.
 TUNING: Final = Tuning(
     safe=0.02,
@@ -53,4 +57,6 @@ def arm_solver(description: RobotDescription, chain: Chain) -> PoseSolver:
     bounds = JointBounds(
         lower=tuple(axis.minimum for axis in axes), upper=tuple(axis.maximum for axis in axes), rates=RATES[ARM]
     )
-    return PoseSolver(chain, bounds, clearance=Clearance(chain, CAPSULES, PAIRS), tuning=TUNING)
+    table = Obstacles(chain, body_surfaces(description.bodies, chain), (TABLE,))
+    keeps_off = (Clearance(chain, CAPSULES, PAIRS), table)
+    return PoseSolver(chain, bounds, keeps_off=keeps_off, tuning=TUNING)

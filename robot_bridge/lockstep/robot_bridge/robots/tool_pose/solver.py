@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from typing import Final
 
 from lockstep.robot_bridge.kinematics.chain import Chain
-from lockstep.robot_bridge.kinematics.clearance import Clearance
+from lockstep.robot_bridge.kinematics.clearance import GapSource
 from lockstep.robot_bridge.kinematics.pose_solver import JointBounds, PoseSolver, Tuning
 from lockstep.robot_bridge.robots.tool_pose.axes import ToolAxes
 
@@ -22,12 +22,14 @@ def tool_solver(
     bounds: JointBounds,
     axes: ToolAxes,
     *,
-    clearance: Clearance | None = None,
+    keeps_off: Sequence[GapSource] = (),
     posture: Sequence[float] | None = None,
+    turns_first: bool = False,
 ) -> PoseSolver:
     """Return a solver whose bounds fit the arm's length.
 
     `posture`: rad or m, that joints tend to which the pose leaves free, of an arm with more than six joints.
+    `turns_first`: the rotation is kept where the arm cannot have both it and the position.
     """
     length = chain.length
     safe = min(SAFE * length, SAFEST)
@@ -41,11 +43,12 @@ def tool_solver(
         quickest=CATCHES_UP * math.hypot(*(axis.slew for axis in axes.rotation)),
         safe=safe,
         close=0.2 * safe,
+        turns_first=turns_first,
     )
     return PoseSolver(
         chain,
         bounds,
         posture=posture if len(chain.joints) > 6 else None,
-        clearance=clearance,
+        keeps_off=keeps_off,
         tuning=tuning,
     )

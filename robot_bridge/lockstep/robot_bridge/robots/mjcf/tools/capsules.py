@@ -11,9 +11,10 @@ import numpy.typing as npt
 
 from lockstep.robot_bridge.kinematics.capsules import capsule_around
 from lockstep.robot_bridge.kinematics.clearance import Capsule
+from lockstep.robot_bridge.kinematics.surfaces import box_points, rod
 from lockstep.robot_bridge.robots.mjcf.names import name_of
 
-__all__ = ["capsules_of", "may_touch"]
+__all__ = ["capsules_of", "may_touch", "surface_points"]
 
 Array = npt.NDArray[np.float64]
 SPHERE, CAPSULE, CYLINDER, BOX, ELLIPSOID, MESH = (
@@ -21,6 +22,7 @@ SPHERE, CAPSULE, CYLINDER, BOX, ELLIPSOID, MESH = (
     for shape in ("SPHERE", "CAPSULE", "CYLINDER", "BOX", "ELLIPSOID", "MESH")
 )
 RIM: Final = 12  # points around a cylinder's rim
+CORNERS: Final = np.array(list(itertools.product((-1.0, 1.0), repeat=3)))
 MOST_POINTS: Final = 400  # of a mesh
 
 
@@ -42,6 +44,21 @@ def may_touch(model: Any, one: str, other: str) -> bool:
         [_bits(model, body, flags) for body in bodies] for flags in (model.geom_contype, model.geom_conaffinity)
     )
     return bool(types[0] & affinities[1] or types[1] & affinities[0])
+
+
+def surface_points(model: Any, geom: int) -> tuple[Array, float]:
+    """Return places on a shape, n x 3, m in the geom's frame, and how far around them it reaches, m."""
+    kind, size = int(model.geom_type[geom]), model.geom_size[geom]
+    if kind == CAPSULE:
+        return rod(float(size[1])), float(size[0])
+    if kind == CYLINDER:
+        rim, _ = _hull(model, geom)
+        return np.concatenate([rim[:RIM] * (1.0, 1.0, height) for height in (-1.0, -0.5, 0.0, 0.5, 1.0)]), 0.0
+    points, radius = _hull(model, geom)
+    if len(points) == len(CORNERS):  # a box, or what is taken as one
+        middle = (points.min(axis=0) + points.max(axis=0)) / 2.0
+        return middle + box_points((points.max(axis=0) - middle).tolist()), radius
+    return points, radius
 
 
 def _spheres(model: Any, body: int) -> Iterator[tuple[Array, float]]:
@@ -74,7 +91,7 @@ def _hull(model: Any, geom: int) -> tuple[Array, float]:
         if count <= MOST_POINTS:
             return np.array(model.mesh_vert[begin : begin + count], dtype=np.float64), 0.0
     box = model.geom_aabb[geom]  # of a box, an ellipsoid, or a mesh with many points
-    return box[:3] + np.array(list(itertools.product((-1.0, 1.0), repeat=3))) * box[3:], 0.0
+    return box[:3] + CORNERS * box[3:], 0.0
 
 
 def _bits(model: Any, body: int, flags: Any) -> int:

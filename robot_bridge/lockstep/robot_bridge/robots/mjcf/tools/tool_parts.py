@@ -7,14 +7,17 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from lockstep.protocol.description import Axis, Binding, Body, ControlLayer, Pose
+from lockstep.robot_bridge.errors import ModelError
 from lockstep.robot_bridge.kinematics.capsules import separate_pairs
 from lockstep.robot_bridge.kinematics.chain import Chain
-from lockstep.robot_bridge.kinematics.clearance import Clearance
+from lockstep.robot_bridge.kinematics.clearance import Clearance, GapSource
+from lockstep.robot_bridge.kinematics.obstacles import Obstacles
 from lockstep.robot_bridge.kinematics.pose_solver import JointBounds
 from lockstep.robot_bridge.kinematics.rotations import quaternion
 from lockstep.robot_bridge.robots.mjcf.drives import Drive
 from lockstep.robot_bridge.robots.mjcf.names import label_of, name_of
 from lockstep.robot_bridge.robots.mjcf.tools.capsules import capsules_of, may_touch
+from lockstep.robot_bridge.robots.mjcf.tools.obstacles import OBSTACLES, obstacles_of, surfaces_of
 from lockstep.robot_bridge.robots.mjcf.tools.tool_setting import ModelTool
 from lockstep.robot_bridge.robots.tool_pose.axes import tool_axes, tool_layer
 from lockstep.robot_bridge.robots.tool_pose.posed_tool import PosedTool, ToolPlace, tool_pose
@@ -40,7 +43,11 @@ class ToolParts(NamedTuple):
 def tool_parts(
     model: Any, data: Any, tool: ModelTool, drives: Sequence[Drive], bodies: Sequence[Body], first: int
 ) -> ToolParts:
-    """Return the parts of one tool. `first`: number of its first axis. `data` has the model's first posture."""
+    """Return the parts of one tool. `first`: number of its first axis. `data` has the model's first posture.
+
+    Raises:
+        ModelError: the model names obstacles that it has not, or for an arm that does not stand still.
+    """
     numbers = {drive.actuator.number: number for number, drive in enumerate(drives)}
     places = tuple(numbers[servo.number] for servo in tool.servos)
     own = [drives[number] for number in places]
@@ -59,8 +66,12 @@ def tool_parts(
     )
     capsules = capsules_of(model, tool.path)
     pairs = separate_pairs(chain, capsules, posture, partial(may_touch, model))
-    clearance = Clearance(chain, capsules, pairs) if pairs else None
-    solver = tool_solver(chain, bounds, axes, clearance=clearance, posture=posture)
+    keeps_off: list[GapSource] = [Clearance(chain, capsules, pairs)]
+    if obstacles := obstacles_of(model, data):
+        if base:
+            raise ModelError(f"{OBSTACLES} needs an arm that stands still, and {tool.name!r} stands on {base!r}")
+        keeps_off.append(Obstacles(chain, surfaces_of(model, data, tool.path), obstacles))
+    solver = tool_solver(chain, bounds, axes, keeps_off=keeps_off, posture=posture)
     pose = tool_pose(tool.name, label, body.name, axes, [drive.axis.name for drive in own], base)
     place = ToolPlace(places, tuple(range(first, first + len(axes.all))))
     return ToolParts(

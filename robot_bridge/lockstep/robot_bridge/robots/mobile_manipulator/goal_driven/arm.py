@@ -50,9 +50,9 @@ class GoalArm:
         )
         capsules = body_capsules([body for body in description.bodies if chain.has(body.name)])
         pairs = separate_pairs(chain, capsules, self._home)
-        clearance = Clearance(chain, capsules, pairs) if pairs else None
+        keeps_off = (Clearance(chain, capsules, pairs),)
         place = ToolPlace(tuple(range(COUNT)), tuple(range(COUNT, COUNT + len(arm.axes.all))))
-        solver = tool_solver(chain, bounds, arm.axes, clearance=clearance)
+        solver = tool_solver(chain, bounds, arm.axes, keeps_off=keeps_off)
         self._tool = PosedTool(arm.pose.name, place, chain, solver, RATES, self._home)
         self._size = COUNT + len(arm.axes.all)
         self._rest = [None if axis.kind == "goal" else axis.rest for axis in description.axes]

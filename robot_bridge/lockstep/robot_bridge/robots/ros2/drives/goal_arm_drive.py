@@ -1,5 +1,6 @@
 """Drives an arm to the goals of its joints, or its tool to a pose, by the positions that its controller takes."""
 
+import math
 from collections.abc import Sequence
 from typing import Any, Final
 
@@ -36,6 +37,11 @@ class GoalArmDrive(Drive):
         self._described = description
         self._joints = count
         self._leads = [joint.maximum * command.lead for joint in settings.joints]
+        axes = {axis.name: axis for axis in description.axes}
+        self._ranges = [
+            (-math.inf, math.inf) if axis.wrap else (axis.minimum, axis.maximum)
+            for axis in (axes[f"arm.{joint.name}"] for joint in settings.joints)
+        ]
         self._feedback = JointFeedback(ros, settings.states, [joint.name for joint in settings.joints])
         self._messages = PositionMessages(ros, command, [joint.name for joint in settings.joints], kind)
         self._goals: ArmGoals | None = None  # until the arm was measured
@@ -128,11 +134,18 @@ class GoalArmDrive(Drive):
         return still
 
     def _points(self, rates: Sequence[float]) -> list[float]:
-        """Return the positions to publish, which never run far ahead of a joint that is blocked."""
+        """Return the positions to publish, which never run far ahead of a joint that is blocked, nor out of its range.
+
+        A goal that is outside already is published as it is.
+        """
         goals = [] if self._goals is None else self._goals.goals
         measured = self.joints(clock.now())
         horizon = self._settings.command.horizon
+        ahead = [
+            min(max(goal + rate * horizon, min(lower, goal)), max(upper, goal))
+            for goal, rate, (lower, upper) in zip(goals, rates, self._ranges, strict=True)
+        ]
         return [
-            goal + rate * horizon if place != place else min(max(goal + rate * horizon, place - lead), place + lead)
-            for goal, rate, place, lead in zip(goals, rates, measured, self._leads, strict=True)
+            point if place != place else min(max(point, place - lead), place + lead)
+            for point, place, lead in zip(ahead, measured, self._leads, strict=True)
         ]
