@@ -29,6 +29,7 @@ __all__ = [
     "CommandRefused",
     "CommandRepeated",
     "EpisodeAsked",
+    "EpisodeChanged",
     "EpochBegan",
     "EventsTraced",
     "FeedbackReceived",
@@ -311,6 +312,12 @@ class SeatChanged(SessionEvent, frozen=True):
     seat: Seat
     holder: Actor  # Actor(): nobody
     by: Actor
+
+
+class EpisodeChanged(SessionEvent, frozen=True):
+    """A record of an episode was given to the recorder."""
+
+    kind: str  # as in EpisodeRecord: "start", "mark", "kept", "discarded", "cut"
 
 
 class PeerJoined(SessionEvent, frozen=True):

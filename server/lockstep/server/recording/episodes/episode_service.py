@@ -36,6 +36,7 @@ from lockstep.server.recording.writing.recorder import Recorder
 from lockstep.server.session_events import (
     ActionUpdated,
     EpisodeAsked,
+    EpisodeChanged,
     EpochBegan,
     FeedbackReceived,
     LinkDown,
@@ -108,11 +109,13 @@ class EpisodeService:
         self._stop_number, self._is_stopped = 0, False
         self._since = 0.0  # s since 1970
         self._asks = RateLimits(ASK_RATE, ASKS)
+        self._publish: Callable[[EpisodeChanged], None] = lambda event: None  # until `subscribe`
         self._newest_event = 0  # also after the epoch's end
         self._waiting: list[tuple[str, Answer]] = []  # for an episode to be on the disk
         recorder.watched_by(self)
 
     def subscribe(self, events: SessionEvents) -> None:
+        self._publish = events.publish
         events.subscribe(EpisodeAsked, self._asked)
         events.subscribe(SeatChanged, self._seat_changed)
         events.subscribe(StopShown, self._stop_shown)
@@ -292,6 +295,7 @@ class EpisodeService:
 
     def _write(self, record: EpisodeRecord) -> None:
         self._recorder.put_episode(record)
+        self._publish(EpisodeChanged(record.kind))
         if record.kind != "start":
             return
         self._since = round(time.time(), 3)
