@@ -8,6 +8,7 @@ import pytest
 from prometheus_client import generate_latest
 from prometheus_client.parser import text_string_to_metric_families
 
+from lockstep.server.federation.metrics import BoardMetrics
 from lockstep.server.media.metrics import MediaMetrics
 from lockstep.server.telemetry.metrics import Metrics
 from scripts.generate_dashboard import PATH as DASHBOARD
@@ -21,6 +22,7 @@ def _known() -> set[str]:
     """Every series that /metrics can hold. A counter without labels set yet is listed by its family."""
     metrics = Metrics()
     MediaMetrics(metrics.registry)
+    BoardMetrics(metrics.registry)
     names: set[str] = set()
     for family in text_string_to_metric_families(generate_latest(metrics.registry).decode()):
         suffixes = {"counter": ["_total"], "histogram": ["_bucket", "_sum", "_count"]}.get(family.type, [""])
@@ -42,6 +44,18 @@ def test_every_alert_watches_a_measurement_that_exists() -> None:
     used = _used((PROMETHEUS / "alerts.yml").read_text())
     assert used
     assert used - _known() == set()
+
+
+def test_what_keeps_everybody_out_or_loses_what_is_kept_has_an_alert() -> None:
+    watched = _used((PROMETHEUS / "alerts.yml").read_text())
+    assert {
+        "lockstep_audit_failing",
+        "lockstep_board_up",
+        "lockstep_links_unreadable",
+        "lockstep_recording_failed",
+        "lockstep_recording_free_bytes",
+        "lockstep_tls_certificate_end_seconds",
+    } <= watched
 
 
 def test_prometheus_accepts_its_configuration_and_the_rules() -> None:

@@ -361,6 +361,8 @@ async def test_while_the_list_of_links_cannot_be_read_nobody_gets_in_and_everybo
         assert (refused.status_code, refused.json()["error"]) == (503, "state_unavailable")
         assert "lockstep_links_unreadable 1.0" in (await rig.http.get("/metrics")).text
         assert (await rig.http.get("/healthz")).json()["status"] == "degraded"
+        unready = await rig.http.get("/readyz")
+        assert (unready.status_code, unready.json()) == (503, {"ready": False})
         stopped = await rig.http.post("/api/stop", headers=rig.token("observer"))
         assert stopped.status_code == 200
         async with asyncio.timeout(PATIENCE):

@@ -108,7 +108,9 @@ def test_the_description_names_every_route_and_no_other() -> None:
         for method in getattr(route, "methods", None) or ()
         if method != "HEAD"
         and route.include_in_schema
-        and getattr(route, "path", "").startswith(("/api", "/whep", "/whip", "/watch", "/healthz", "/metrics"))
+        and getattr(route, "path", "").startswith(
+            ("/api", "/whep", "/whip", "/watch", "/healthz", "/readyz", "/metrics")
+        )
     }
     assert routes == {(each.method, each.path) for each in OPERATIONS}
 

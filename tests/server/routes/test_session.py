@@ -239,6 +239,7 @@ async def test_pages_may_use_hid_devices_only_where_force_feedback_is_switched_o
 async def test_health_and_metrics_need_no_token() -> None:
     async with running_rig() as rig:
         assert (await rig.http.get("/healthz")).json() == {"status": "ok", "robot_link": "up", "links": "ok"}
+        assert (await rig.http.get("/readyz")).json() == {"ready": True}
         text = (await rig.http.get("/metrics")).text
         assert "lockstep_robot_link_up 1.0" in text
         assert "lockstep_event 1.0" in text
@@ -248,6 +249,7 @@ async def test_without_a_robot_the_console_runs_and_says_so() -> None:
     async with running_console(1) as rig:
         health = (await rig.http.get("/healthz")).json()
         assert health == {"status": "degraded", "robot_link": "down", "links": "ok"}, "no address and no reason"
+        assert (await rig.http.get("/readyz")).status_code == 200, "it serves all the same"
         session = await rig.session()
         assert (session["epoch"], session["description"]) == ("", None)
         for path in ("/api/stop", "/api/reset"):

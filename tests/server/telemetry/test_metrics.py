@@ -3,9 +3,12 @@ from collections import Counter
 from importlib.metadata import version
 
 from lockstep.protocol.actions import Status, StatusItem
+from lockstep.protocol.console import Seat
 from lockstep.robot_bridge.robots.planar.description import DESCRIPTION
+from lockstep.server.audit.records import Actor
 from lockstep.server.control.session_metrics import SessionMetrics
-from lockstep.server.session_events import EpochBegan, SessionEvents, StatusReceived
+from lockstep.server.recording.format.records import EpisodeRecord
+from lockstep.server.session_events import EpisodeWritten, EpochBegan, SeatChanged, SessionEvents, StatusReceived
 from lockstep.server.telemetry.metrics import MAX_LIMITS, MAX_STATUS_NAMES, Metrics
 
 
@@ -78,3 +81,22 @@ def test_a_new_epoch_takes_the_status_of_the_last_one_with_it() -> None:
     events.publish(EpochBegan(DESCRIPTION))
     assert value("lockstep_status_value", {"item": "battery"}) is None
     assert value("lockstep_status_items", {"level": "ok"}) == 0
+
+
+def test_the_seats_holders_are_counted_by_kind_and_episodes_by_their_end() -> None:
+    metrics = Metrics()
+    events = SessionEvents(metrics.faults)
+    SessionMetrics(metrics).subscribe(events)
+    ada, net = Seat(holder="p1", name="Ada", kind="human"), Seat(holder="p2", name="net", kind="policy")
+    for seat in (Seat(), ada, ada, net, ada, Seat()):
+        events.publish(SeatChanged(seat, Actor(), Actor()))
+    value = metrics.registry.get_sample_value
+    counted = {kind: value("lockstep_seat_changes_total", {"kind": kind}) for kind in ("human", "policy", "none")}
+    assert counted == {"human": 2, "policy": 1, "none": 1}
+    for kind in ("start", "mark", "kept", "start", "discarded", "start", "kept"):
+        record = EpisodeRecord(
+            epoch=1, event=1, episode="e", number=1, task="t", kind=kind, first_event=1, last_event=1
+        )
+        events.publish(EpisodeWritten(record))
+    ends = {end: value("lockstep_episodes_total", {"end": end}) for end in ("kept", "discarded", "cut", "start")}
+    assert ends == {"kept": 2, "discarded": 1, "cut": None, "start": None}

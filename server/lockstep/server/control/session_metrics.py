@@ -12,6 +12,7 @@ from lockstep.server.session_events import (
     CommandForwarded,
     CommandRefused,
     CommandRepeated,
+    EpisodeWritten,
     EpochBegan,
     FeedbackReceived,
     InputRefused,
@@ -20,6 +21,7 @@ from lockstep.server.session_events import (
     Refused,
     ResetDone,
     RestForwarded,
+    SeatChanged,
     SessionEvents,
     SpeedCapChanged,
     StatusReceived,
@@ -30,11 +32,15 @@ from lockstep.server.telemetry.metrics import Metrics
 __all__ = ["SessionMetrics"]
 
 
+EPISODE_ENDS = ("kept", "discarded", "cut")
+
+
 class SessionMetrics:
     """A subscriber to the events of a session."""
 
     def __init__(self, metrics: Metrics) -> None:
         self._metrics = metrics
+        self._holder = ""  # of the seat, a peer id
 
     def subscribe(self, events: SessionEvents) -> None:
         events.subscribe(CommandForwarded, self._command_forwarded)
@@ -53,6 +59,8 @@ class SessionMetrics:
         events.subscribe(LinkDown, self._link_down)
         events.subscribe(StopAsked, self._stop_asked)
         events.subscribe(ResetDone, self._reset_done)
+        events.subscribe(SeatChanged, self._seat_changed)
+        events.subscribe(EpisodeWritten, self._episode_written)
         events.subscribe(AuditTrouble, self._audit_trouble)
 
     @cached_property
@@ -117,6 +125,15 @@ class SessionMetrics:
 
     def _reset_done(self, event: ResetDone) -> None:
         self._metrics.resets.inc()
+
+    def _seat_changed(self, event: SeatChanged) -> None:
+        if event.seat.holder != self._holder:
+            self._holder = event.seat.holder
+            self._metrics.seat_changes.labels(event.seat.kind).inc()
+
+    def _episode_written(self, event: EpisodeWritten) -> None:
+        if event.record.kind in EPISODE_ENDS:
+            self._metrics.episodes.labels(event.record.kind).inc()
 
     def _audit_trouble(self, event: AuditTrouble) -> None:
         self._metrics.audit_failing.set(bool(event.trouble))

@@ -91,7 +91,15 @@ from lockstep.server.routes.recorded.recordings import (
     RecordingRequest,
 )
 from lockstep.server.routes.seat import OfferRequest
-from lockstep.server.routes.session import Delivered, Health, Released, ResetRequest, ScenePath, SessionInfo
+from lockstep.server.routes.session import (
+    Delivered,
+    Health,
+    Readiness,
+    Released,
+    ResetRequest,
+    ScenePath,
+    SessionInfo,
+)
 from lockstep.server.routes.stop_body import StopRequest
 from lockstep.server.sfu.tickets import RelayAnswer
 from lockstep.server.webrtc.ice_servers import IceServers
@@ -394,6 +402,7 @@ OPERATIONS: tuple[Operation, ...] = (
         parameters=(RECORDING,),
     ),
     Operation("get", "/healthz", "Whether the console runs, and reaches its robot.", 200, Health, token=False),
+    Operation("get", "/readyz", "Whether the console serves.", 200, Readiness, token=False, also=(503,)),
     Operation("get", "/metrics", "Prometheus.", 200, "text/plain", token=False),
 )
 

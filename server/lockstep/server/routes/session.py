@@ -17,7 +17,7 @@ from lockstep.server.routes.stop_body import read_stop
 from lockstep.server.state.dependencies import authorized, dependencies, takes_stops
 from lockstep.server.stop.stop_presses import new_press, told_id
 
-__all__ = ["Delivered", "Health", "Released", "ResetRequest", "ScenePath", "SessionInfo", "router"]
+__all__ = ["Delivered", "Health", "Readiness", "Released", "ResetRequest", "ScenePath", "SessionInfo", "router"]
 
 router = APIRouter()
 Caller = Annotated[Right, Depends(authorized)]
@@ -58,6 +58,12 @@ class Health(msgspec.Struct, frozen=True, kw_only=True):
     status: str
     robot_link: str
     links: str  # "ok"; "unreadable": which links are revoked is unknown, so nobody gets in
+
+
+class Readiness(msgspec.Struct, frozen=True, kw_only=True):
+    """Answer of GET /readyz, 503 unless ready. A robot that is away does not make a console unready."""
+
+    ready: bool
 
 
 class ScenePath(msgspec.Struct, frozen=True):
@@ -153,6 +159,13 @@ async def healthz(request: Request) -> Response:
         links="ok" if readable else "unreadable",
     )
     return json_answer(health)
+
+
+@router.get("/readyz")
+async def readyz(request: Request) -> Response:
+    """For anyone: whether requests may be sent here. /healthz says whether the robot can be reached too."""
+    readable = not dependencies(request).state.invitations.trouble
+    return json_answer(Readiness(ready=readable), 200 if readable else 503)
 
 
 @router.get("/metrics")

@@ -84,6 +84,13 @@ class Metrics:
         self.actions = Counter(
             "lockstep_actions", "Actions of the robot, by new state and reason", ["state", "reason"], registry=registry
         )
+        self.seat_changes = Counter(
+            "lockstep_seat_changes",
+            "Changes of the seat's holder, by the new one: human, policy, or none when it became free",
+            ["kind"],
+            registry=registry,
+        )
+        self.episodes = Counter("lockstep_episodes", "Episodes that ended", ["end"], registry=registry)
         self.status_items = Gauge(
             "lockstep_status_items", "Items of the robot's newest status, by level", ["level"], registry=registry
         )

@@ -13,6 +13,11 @@ except RobotUnavailable as error:
     print("UNAVAILABLE", error)
 """
 
+NO_MUJOCO = """
+import sys
+sys.modules["mujoco"] = None
+"""
+
 NO_EGL = """
 import ctypes.util
 import ctypes
@@ -55,3 +60,10 @@ def test_egl_is_chosen_unless_the_environment_chooses() -> None:
     program = "import os, lockstep.robot_bridge.robots.mobile_manipulator; print(os.environ['MUJOCO_GL'])"
     assert run(f"import os; os.environ.pop('MUJOCO_GL', None); {program}").strip() == "egl"
     assert run(program, MUJOCO_GL="osmesa").strip() == "osmesa"
+
+
+def test_without_mujoco_the_package_is_named_and_not_opengl() -> None:
+    said = run(NO_MUJOCO + PROGRAM)
+    assert "this robot needs mujoco, which is not installed" in said
+    assert "lockstep-bridge[sim]" in said
+    assert "libegl1" not in said

@@ -299,12 +299,10 @@ async def test_what_may_be_posted_is_said_and_there_is_nothing_to_get() -> None:
     async with running_rig() as rig:
         asked = await rig.http.options("/whep")
         assert (asked.status_code, asked.headers["accept-post"]) == (204, "application/sdp")
-        got = await rig.http.get("/whep")
-        assert (got.status_code, got.json()["error"], got.headers["allow"]) == (
-            405,
-            "method_not_allowed",
-            "OPTIONS, POST",
-        )
+        for method in ("GET", "HEAD", "PUT", "PATCH", "DELETE"):
+            got = await rig.http.request(method, "/whep")
+            assert (got.status_code, got.headers["allow"]) == (405, "OPTIONS, POST"), method
+            assert method == "HEAD" or got.json()["error"] == "method_not_allowed", method
 
 
 async def test_a_section_with_an_unknown_codec_is_rejected_and_the_peer_connects_all_the_same() -> None:

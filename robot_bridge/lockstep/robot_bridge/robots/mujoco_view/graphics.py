@@ -24,6 +24,12 @@ def choose_graphics() -> None:
 
 
 def graphics_unavailable(cause: BaseException) -> RobotUnavailable:
-    """Return the error for an OpenGL that failed with `cause`."""
+    """Return the error for an OpenGL that failed with `cause`, or for a package that is not installed."""
+    if isinstance(cause, ModuleNotFoundError):
+        return RobotUnavailable(
+            f"this robot needs {cause.name}, which is not installed. In a checkout: "
+            ".venv/bin/python -m pip install -e './robot_bridge[sim]'; elsewhere install lockstep-bridge[sim]. "
+            "`--robot planar` runs without it"
+        )
     choice = os.environ.get("MUJOCO_GL", "")
     return RobotUnavailable(f"OpenGL is not available (MUJOCO_GL={choice}: {type(cause).__name__}: {cause}). {ADVICE}")

@@ -11,6 +11,7 @@ from typing import Any
 import msgspec
 import typer
 
+from lockstep.server.cli.extras import load_extra
 from lockstep.server.recording.dataset.recorded_episode import (
     RecordedEpisode,
     episode_of_dataset,
@@ -36,6 +37,8 @@ def replay_to(
     """
     if find_spec(CLIENT) is None:
         raise _failed("lockstep-client is not installed", EXIT_USAGE)
+    if path.is_dir():
+        load_extra("pyarrow.parquet", "export")
     try:
         found = episode_of_dataset(path, episode) if path.is_dir() else episode_of_recording(path, episode)
     except (RecordingError, OSError, ImportError) as error:

@@ -112,7 +112,7 @@ async def options() -> Response:
     return Response(status_code=204, headers={"Accept-Post": SDP, "Allow": "OPTIONS, POST"})
 
 
-@router.get("/whep", include_in_schema=False)
+@router.api_route("/whep", methods=["GET", "HEAD", "PUT", "PATCH", "DELETE"], include_in_schema=False)
 async def nothing_to_get() -> Response:
     raise HTTPException(405, "send an offer to this URL by POST", {"Allow": "OPTIONS, POST"})
 
