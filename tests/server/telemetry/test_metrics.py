@@ -95,7 +95,7 @@ def test_the_seats_holders_are_counted_by_kind_and_episodes_by_their_end() -> No
     assert counted == {"human": 2, "policy": 1, "none": 1}
     for kind in ("start", "mark", "kept", "start", "discarded", "start", "kept"):
         record = EpisodeRecord(
-            epoch=1, event=1, episode="e", number=1, task="t", kind=kind, first_event=1, last_event=1
+            epoch="aa", event=1, episode="e", number=1, task="t", kind=kind, first_event=1, last_event=1
         )
         events.publish(EpisodeWritten(record))
     ends = {end: value("lockstep_episodes_total", {"end": end}) for end in ("kept", "discarded", "cut", "start")}
