@@ -6,7 +6,7 @@ because the browser belongs to the loop that started it.
 """
 
 import os
-from collections.abc import AsyncIterator, Mapping
+from collections.abc import AsyncIterator
 from contextlib import AsyncExitStack, asynccontextmanager
 from pathlib import Path
 
@@ -18,7 +18,6 @@ from lockstep.bench.browsers.chromium import running_chromium
 from lockstep.bench.browsers.firefox import Firefox, running_firefox
 from lockstep.bench.browsers.sound_card import SoundCard, running_sound_card
 from tests.e2e.as_new import as_new, emptied
-from tests.e2e.so101 import SO101
 from tests.support.stack import Stack, running_stack
 
 HERE = Path(__file__).parent
@@ -64,9 +63,8 @@ def _wants_all(request: pytest.FixtureRequest) -> bool:
 class RobotKeeper:
     """One console with another robot than the planar one for all tests of a file; the robot stays where it was left."""
 
-    def __init__(self, directories: pytest.TempPathFactory, settings: Mapping[str, str]) -> None:
+    def __init__(self, directories: pytest.TempPathFactory) -> None:
         self._directories = directories
-        self._settings = settings
         self._running = AsyncExitStack()
         self._stack: Stack | None = None
 
@@ -74,7 +72,7 @@ class RobotKeeper:
         """Nobody is there, and the robot is at rest and not stopped. Always the same `robot`."""
         if self._stack is None or await emptied(self._stack) is None:
             await self.close()
-            started = running_stack(self._directories.mktemp("file"), robot=robot, settings=self._settings)
+            started = running_stack(self._directories.mktemp("file"), robot=robot, settings={RATE: HALF})
             self._stack = await self._running.enter_async_context(started)
         return await self._stack.from_here()
 
@@ -86,7 +84,7 @@ class RobotKeeper:
 @pytest_asyncio.fixture(scope="module", loop_scope="session")
 async def robot_keeper(tmp_path_factory: pytest.TempPathFactory) -> AsyncIterator[RobotKeeper]:
     """Takes half of the pictures."""
-    keeper = RobotKeeper(tmp_path_factory, SO101 | {RATE: HALF})
+    keeper = RobotKeeper(tmp_path_factory)
     yield keeper
     await keeper.close()
 

@@ -1,5 +1,7 @@
 """The SO-101 on the page: both layers from the keyboard, STOP, and a hand in an emulated headset."""
 
+from collections.abc import AsyncIterator
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -7,10 +9,9 @@ import pytest_asyncio
 from playwright.async_api import Browser, expect
 
 from lockstep.bench.browsers.console_page import ConsolePage, open_console
-from tests.e2e.conftest import RobotKeeper
 from tests.e2e.headset import TRIES, Headset, open_headset
-from tests.e2e.so101 import needs_so101
-from tests.support.stack import Stack
+from tests.e2e.so101 import SO101, needs_so101
+from tests.support.stack import Stack, running_stack
 
 pytestmark = [pytest.mark.browser, pytest.mark.timeout(240), needs_so101]
 
@@ -20,8 +21,10 @@ GRIP = [0.2, 1.3, -0.4]  # m, where the hand is
 
 
 @pytest_asyncio.fixture(loop_scope="session")
-async def so101(robot_keeper: RobotKeeper) -> Stack:
-    return await robot_keeper.stack("so101")
+async def so101(half_rate: None, tmp_path: Path) -> AsyncIterator[Stack]:
+    """Each test's own: from where one leaves the arm, the other cannot lead its tool everywhere."""
+    async with running_stack(tmp_path, robot="so101", settings=SO101) as stack:
+        yield stack
 
 
 async def _hold(console: ConsolePage, key: str, reached: str) -> None:
