@@ -16,6 +16,8 @@ from lockstep.client.transport.observer_websocket import ObserverWebSocket
 from lockstep.client.transport.whep import Whep
 from tests.waiting import PATIENCE
 
+pytestmark = pytest.mark.slow  # real connections that are flooded
+
 PIECE = b"\x81\x02{}" * 10_000  # so many text messages "{}", unmasked, as a server sends them
 FEW = 5 * MOST  # messages that are looked at
 

@@ -12,6 +12,8 @@ from lockstep.robot_bridge.kinematics.rotations import rotation_vector
 from tests.robot_bridge.kinematics.arms import desk_arm
 from tests.robot_bridge.robots.so101.arm_world import AXES, EVENT, HOLD, SLOW, START, TICK, World
 
+pytestmark = pytest.mark.slow
+
 joint_ways = st.floats(-0.6, 0.6)
 lulls = st.lists(st.just(TICK) | st.floats(TICK / 4, 4 * TICK) | st.floats(0.0, 0.25), min_size=1, max_size=80)
 
