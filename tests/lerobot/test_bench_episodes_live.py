@@ -9,14 +9,14 @@ from pathlib import Path
 import pytest
 
 from tests.lerobot.commands import ROOT, run_lerobot
-from tests.lerobot.test_datasets_live import SMALL_ACT, used
+from tests.lerobot.test_datasets_live import SMALL_ACT
 
 pytestmark = [pytest.mark.long, pytest.mark.timeout(1500)]
 
-FEW = ("--times", "6", "--discard", "1", "--redo", "1", "--no-pictures")
+FEW = ("--times", "3", "--discard", "1", "--redo", "1", "--no-pictures")
 
 
-async def test_lerobot_loads_and_trains_on_episodes_of_two_people_and_a_policy(tmp_path: Path) -> None:
+async def test_lerobot_trains_on_episodes_of_two_people_and_a_policy(tmp_path: Path) -> None:
     figures, kept = tmp_path / "figures.json", tmp_path / "kept"
     bench = await asyncio.create_subprocess_exec(
         *(sys.executable, "-m", "lockstep.bench.episodes", *FEW, "--keep", str(kept), "--json", str(figures)),
@@ -25,9 +25,6 @@ async def test_lerobot_loads_and_trains_on_episodes_of_two_people_and_a_policy(t
     assert await bench.wait() == 0
     told = json.loads(await asyncio.to_thread(figures.read_text))
     root = kept / "dataset"
-    seen = await used(tmp_path, "load", root)
-    assert (seen["episodes"], seen["frames"]) == (told["kept"], sum(told["dataset"]["rows"]))
-    assert seen["drawn"] == seen["stamps"]  # by LeRobot's own reading of the pictures
     assert told["dataset"]["policy"] > 0
     said = await run_lerobot(
         *(tmp_path, "lerobot-train", "--dataset.repo_id=tests/episodes", f"--dataset.root={root}"),
@@ -35,4 +32,5 @@ async def test_lerobot_loads_and_trains_on_episodes_of_two_people_and_a_policy(t
         patience=900,
     )
     assert "step:3" in said
+    assert f"dataset.num_episodes={told['kept']}" in said
     assert "End of training" in said

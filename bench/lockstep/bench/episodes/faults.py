@@ -1,7 +1,7 @@
-"""Faults in each phase of an episode: a killed console, a full disk, a camera that hangs. Each has parts of its own.
+"""Faults in each phase of an episode: a killed console or robot, a full disk, a camera that hangs.
 
-Every one keeps a first episode, so that there is a dataset, then meets its fault in or after the second one. The
-dataset is made afterwards, and must have the kept episodes alone, whole.
+Each has parts of its own. It keeps a first episode, so that there is a dataset, then meets its fault in or after the
+second one. The dataset is made afterwards, and must have the kept episodes alone, whole.
 """
 
 import asyncio
@@ -28,7 +28,7 @@ from lockstep.protocol.episodes import EpisodeState
 __all__ = ["FAULTS", "FaultName", "run_fault"]
 
 FaultName = Literal[
-    "kill-countdown", "kill-open", "kill-keeping", "kill-export", "disk-low", "disk-full", "camera-hangs"
+    "kill-countdown", "kill-open", "kill-keeping", "kill-robot", "kill-export", "disk-low", "disk-full", "camera-hangs"
 ]
 FAULTS: Final[tuple[FaultName, ...]] = get_args(FaultName)
 
@@ -38,6 +38,7 @@ TASK: Final = "visit a place"
 COUNTDOWN: Final = {"LOCKSTEP_EPISODES__COUNTDOWN_SECONDS": "4"}
 NO_COUNTDOWN: Final = {"LOCKSTEP_EPISODES__COUNTDOWN_SECONDS": "0"}
 SECONDS: Final = 60.0  # for anything that is waited for
+REST_SECONDS: Final = 5.0
 DISK_BYTES: Final = 64 << 20  # of the small disk
 LOW_BYTES: Final = 8 << 20  # that are to stay free on it
 
@@ -115,8 +116,9 @@ async def run_fault(fault: FaultName, say: Callable[[str], None]) -> dict[str, A
     async with _running(fault) as run:
         await run.keep_one()
         await _FAULTS[fault](run)
-        with suppress(ConsoleLost):
-            await run.driver.rest()
+        with suppress(ConsoleLost, TimeoutError):
+            async with asyncio.timeout(REST_SECONDS):  # a robot that was killed proves no rest
+                await run.driver.rest()
         recordings = run.folder / "recordings"
         root = run.folder / "dataset"
         await run.console.end()  # a console that still lives ends its recording
@@ -215,6 +217,14 @@ async def _kill_keeping(run: _Run) -> None:
         await _kill(run)
 
 
+async def _kill_robot(run: _Run) -> None:
+    """Kill the robot's bridge in an open episode."""
+    await run.begun()
+    await run.bridge.process.kill()
+    await run.until(lambda state: state.phase == "idle", "the end of the episode")
+    await _refuses_to_keep(run)
+
+
 async def _kill_export(run: _Run) -> None:
     """Kill the export when its files begin to appear, and export again."""
     await run.keep_one()
@@ -256,7 +266,7 @@ async def _refuses_to_keep(run: _Run) -> None:
         run.wrong.append(f"the console said {run.state.last!r}, and {run.state.cut} lost")
     try:
         await run.driver.episodes.success()
-        run.wrong.append("an episode was kept after its recording had ended")
+        run.wrong.append("an episode was kept after it was lost")
     except EpisodeRefused:
         pass
 
@@ -297,6 +307,7 @@ _FAULTS: Final[Mapping[FaultName, Callable[[_Run], Awaitable[None]]]] = {
     "kill-countdown": _kill_countdown,
     "kill-open": _kill_open,
     "kill-keeping": _kill_keeping,
+    "kill-robot": _kill_robot,
     "kill-export": _kill_export,
     "disk-low": _disk,
     "disk-full": _disk,
