@@ -27,6 +27,7 @@ from lockstep.server.recording.format.records import (
     StopRecord,
 )
 from lockstep.server.recording.times import LinkTimes, RecordClock
+from lockstep.server.recording.writing.episode_written import EpisodeWritten
 from lockstep.server.recording.writing.queue_items import FeedbackItem, Item, MediaItem, OwnItem, RobotItem
 from lockstep.server.recording.writing.trace_records import TraceRecords
 from lockstep.server.session_events import (
@@ -36,7 +37,6 @@ from lockstep.server.session_events import (
     CommandForwarded,
     CommandRefused,
     CommandRepeated,
-    EpisodeWritten,
     FeedbackReceived,
     LinkDown,
     LinkUp,
