@@ -17,7 +17,6 @@ from lockstep.protocol.messages import Command, Feedback, Refusal, RefusalReason
 from lockstep.protocol.traces.trace import CommandSpans
 from lockstep.protocol.traces.trace_messages import EventTrace
 from lockstep.server.audit.records import Actor
-from lockstep.server.recording.format.records import EpisodeRecord
 from lockstep.server.stop.stop_presses import Press
 from lockstep.server.telemetry.faults import Faults
 
@@ -30,7 +29,6 @@ __all__ = [
     "CommandRefused",
     "CommandRepeated",
     "EpisodeAsked",
-    "EpisodeWritten",
     "EpochBegan",
     "EventsTraced",
     "FeedbackReceived",
@@ -240,12 +238,6 @@ class EpisodeAsked(SessionEvent, frozen=True):
 
     by: Actor
     request: EpisodeRequest
-
-
-class EpisodeWritten(SessionEvent, frozen=True):
-    """An episode begins, ends or gets a mark. The recording and live viewers take the record."""
-
-    record: EpisodeRecord
 
 
 # stops and resets

@@ -303,7 +303,9 @@ def test_tables_and_films_say_of_each_event_which_episode_it_was_driven_in(tmp_p
     assert list(chapters)[0] == "no episode"
     assert list(chapters)[1:4] == ["1: push (kept, success)", "1: push (discarded)", "1: mop (kept, failure)"]
     first = chapters["1: push (kept, success)"]
-    seconds = [float(first[name] * first["time_base"]) for name in ("start", "end")]
+    base = first["time_base"]
+    assert base is not None
+    seconds = [float(each * base) for each in (first["start"], first["end"])]
     assert seconds == pytest.approx([10 * INTERVAL / 1e9, 19 * INTERVAL / 1e9], abs=INTERVAL / 1e9)
 
 

@@ -9,6 +9,7 @@ import socket
 import sys
 from collections.abc import AsyncIterator, Mapping
 from contextlib import AsyncExitStack, asynccontextmanager, suppress
+from importlib.util import find_spec
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -22,7 +23,7 @@ from lockstep.bench.harness.stack import running_stack
 from lockstep.bench.viewers.idle_crowd import IDLE
 from lockstep.client import Console, NotArmed
 
-__all__ = ["run"]
+__all__ = ["run", "viewer_program"]
 
 SECTION = "live_tools"
 ROBOT = "planar"
@@ -94,8 +95,16 @@ async def _taker(taking: AsyncExitStack, kind: str) -> tuple[Mapping[str, str], 
         case "file":
             return {"LOCKSTEP_RERUN__TO": str(folder / "a.rrd")}, 0
         case "reads":
-            program = str(Path(sys.executable).with_name("rerun"))
-            command = (*IDLE, program, "--save", str(folder / "b.rrd"), "--port", str(port), "--bind", "127.0.0.1")
+            command = (
+                *IDLE,
+                str(viewer_program()),
+                "--save",
+                str(folder / "b.rrd"),
+                "--port",
+                str(port),
+                "--bind",
+                "127.0.0.1",
+            )
             await taking.enter_async_context(_listening(command, port, folder))
             return {"LOCKSTEP_RERUN__TO": f"127.0.0.1:{port}"}, port
         case "reads_nothing":
@@ -104,6 +113,14 @@ async def _taker(taking: AsyncExitStack, kind: str) -> tuple[Mapping[str, str], 
         case "floods":
             return {"LOCKSTEP_RERUN__TO": str(port), "LOCKSTEP_RERUN__PUBLIC": "true"}, port
     return {}, 0
+
+
+def viewer_program() -> Path:
+    """Return Rerun's viewer itself: the script `rerun` only starts it, and leaves it running when it is ended."""
+    found = find_spec("rerun_cli")
+    if found is None or found.origin is None:
+        raise ModuleNotFoundError("rerun-sdk is not installed")
+    return Path(found.origin).with_name("rerun")
 
 
 @asynccontextmanager

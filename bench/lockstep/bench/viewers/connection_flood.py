@@ -21,10 +21,12 @@ async def _flood(port: int) -> None:
     while True:
         with suppress(OSError, TimeoutError):
             reader, writer = await asyncio.open_connection("127.0.0.1", port)
-            writer.write(PREFACE + os.urandom(1000))
-            async with asyncio.timeout(READ_SECONDS):
-                await reader.read(100)
-            writer.close()
+            try:
+                writer.write(PREFACE + os.urandom(1000))
+                async with asyncio.timeout(READ_SECONDS):
+                    await reader.read(100)
+            finally:
+                writer.close()  # also at the end: an open one would be closed by the collector, without a loop
         await asyncio.sleep(0)
 
 

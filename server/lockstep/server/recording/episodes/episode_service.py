@@ -32,11 +32,11 @@ from lockstep.server.recording.episodes.session_checks import CheckedRobot, Sess
 from lockstep.server.recording.episodes.settings import EpisodeSettings
 from lockstep.server.recording.format.records import EpisodeRecord
 from lockstep.server.recording.settings import RecordingSettings
+from lockstep.server.recording.writing.episode_written import EpisodeWritten
 from lockstep.server.recording.writing.recorder import Recorder
 from lockstep.server.session_events import (
     ActionUpdated,
     EpisodeAsked,
-    EpisodeWritten,
     EpochBegan,
     FeedbackReceived,
     LinkDown,

@@ -27,6 +27,7 @@ from lockstep.server.recording.format.records import (
     StopRecord,
 )
 from lockstep.server.recording.times import LinkTimes, RecordClock
+from lockstep.server.recording.writing.episode_written import EpisodeWritten
 from lockstep.server.recording.writing.map_records import MapRecords
 from lockstep.server.recording.writing.queue_items import FeedbackItem, Item, MediaItem, OwnItem, RobotItem
 from lockstep.server.recording.writing.trace_records import TraceRecords
@@ -37,7 +38,6 @@ from lockstep.server.session_events import (
     CommandForwarded,
     CommandRefused,
     CommandRepeated,
-    EpisodeWritten,
     FeedbackReceived,
     LinkDown,
     LinkUp,
