@@ -23,7 +23,7 @@ def test_the_backup_holds_the_files_behind_the_link_that_a_dynamic_user_gets(tmp
     assert "./audit.jsonl" in listed.splitlines()
 
     (private / "audit.jsonl").unlink()
-    (restore,) = re.findall(r"`sudo (tar -C /var/lib/lockstep -xzf) FILE`", DEPLOY.read_text())
-    command = f"{restore} {archive}".replace("/var/lib", str(tmp_path / "var"))
+    (restore,) = re.findall(r"`sudo (tar -xzf FILE -C /var/lib/lockstep)`", DEPLOY.read_text())
+    command = restore.replace("FILE", str(archive)).replace("/var/lib", str(tmp_path / "var"))
     subprocess.run(command, shell=True, check=True, cwd=tmp_path)
     assert (private / "audit.jsonl").read_text() == "{}\n"

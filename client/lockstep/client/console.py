@@ -523,7 +523,8 @@ class Console:
         The robot drives by itself while this call renews the action, as `act` says; it raises the same errors.
 
         Args:
-            x, y: m, in the map's frame
+            x: m, in the map's frame
+            y: m
             yaw: rad, the heading at the end, where the robot takes one; None: the action's own default
             progress: as for `act`
 

@@ -56,7 +56,7 @@ class OccupancyMap(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", 
     resolution: Resolution  # m, the side of a cell
     origin: PlanarPose = (0.0, 0.0, 0.0)  # pose of the outer corner of cell (0, 0) in the map's frame
     # zlib (RFC 1950) of one byte per cell, along x and then along y: 0 (free) to 100 (occupied); 255: not known
-    cells: Annotated[bytes, msgspec.Meta(max_length=MAX_MAP_BYTES)]
+    cells: Annotated[bytes, msgspec.Meta(max_length=MAX_MAP_BYTES)]  # b"x\x9c…"
 
 
 class Navigation(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", tag="navigation"):

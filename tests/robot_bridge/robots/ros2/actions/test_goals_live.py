@@ -16,6 +16,7 @@ from lockstep.protocol.maps import Navigation, map_cells
 from lockstep.protocol.messages import Command, Feedback, Rest, Stop
 from lockstep.protocol.serial import event_after
 from lockstep.robot_bridge.link.link_client import RobotLink
+from tests.client.held_up import ATTEMPTS, HELD_UP
 from tests.robot_bridge.bridge_helpers import next_map
 from tests.support.ros2 import (
     ACTIONS,
@@ -140,8 +141,12 @@ class Armed:
         assert self.update is not None
         return self.update
 
+    @property
+    def has_ended(self) -> bool:
+        return self.update is not None and self.update.state != "running"
+
     async def ended(self) -> ActionUpdate:
-        await self.until(lambda: self.update is not None and self.update.state != "running")
+        await self.until(lambda: self.has_ended)
         assert self.update is not None
         return self.update
 
@@ -291,17 +296,23 @@ async def test_a_goal_on_the_map_drives_the_base_there_with_path_and_place(
     assert (message.width, message.height) == (80, 60)
     cells = map_cells(message)
     assert (cells[0], cells[60], cells[79]) == (0, 100, 255)
-    await armed.ask("go_to", x=2.0, y=0.0, yaw=1.5)
-    await armed.until(lambda: armed.navigation is not None and len(armed.navigation.path) == 22)
-    assert armed.navigation.goal == [2.0, 0.0, 1.5]
-    assert armed.navigation.path[-2:] == pytest.approx([2.0, 0.0])
-    done = await armed.ended()
+    for _ in range(ATTEMPTS):
+        await armed.ask("go_to", x=2.0, y=0.0, yaw=1.5)
+        await armed.until(
+            lambda: armed.has_ended or (armed.navigation is not None and len(armed.navigation.path) == 22)
+        )
+        shown = armed.navigation
+        done = await armed.ended()
+        if done.reason not in HELD_UP:  # a busy machine ends what moves, and a person asks again
+            break
     assert done.state == "done"
+    assert shown.goal == [2.0, 0.0, 1.5]
+    assert shown.path[-2:] == pytest.approx([2.0, 0.0])
     assert armed.feedback is not None
     x, y, yaw = armed.feedback.joints
     assert math.hypot(x - 1.0, y - 0.5) < 0.15
     assert abs(yaw - 1.5) < 0.15
-    (asked,) = node.notes("navigate")
+    *_, asked = node.notes("navigate")
     assert (asked["frame"], asked["x"], asked["y"]) == ("map", 2.0, 0.0)
     await armed.until(lambda: armed.navigation is not None and not armed.navigation.goal)
 
