@@ -5,6 +5,7 @@ import datetime
 import json
 import subprocess
 import sys
+from collections import Counter
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
@@ -16,7 +17,7 @@ from lockstep.bench.harness.event_log import records
 from lockstep.bench.harness.processes import started
 from lockstep.bench.harness.stack import LOCKSTEP
 from lockstep.emulator import load_profile
-from lockstep.emulator.namespace.three_sites import CONSOLE, ThreeSites
+from lockstep.emulator.namespace.three_sites import CONSOLE, Site, ThreeSites
 from lockstep.server.http.transport.tls import self_signed
 
 __all__ = ["PORT", "run"]
@@ -75,7 +76,7 @@ async def run(robot: str, page: str, seconds: float, seed: int, say: Callable[[s
                         seen = json.loads(await _output(sites, "page", driving))
                     say("the page has driven")
             found = list(records(log))
-        return _figures(seen, found, dict(sites.router.refused))
+        return _figures(seen, found, sites.router.refused)
 
 
 def _outside(link: str) -> str:
@@ -83,15 +84,13 @@ def _outside(link: str) -> str:
     return urlsplit(link)._replace(scheme="https", netloc=f"{CONSOLE}:{PORT}").geturl()
 
 
-async def _output(sites: ThreeSites, site: Any, command: list[str]) -> bytes:
+async def _output(sites: ThreeSites, site: Site, command: list[str]) -> bytes:
     process = await sites.start(site, command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE)
     assert process.stdout is not None
     return await process.stdout.read()
 
 
-def _figures(seen: dict[str, Any], log: list[Any], refused: dict[str, int]) -> dict[str, Any]:
-    return {
-        "seen": seen,
-        "moved": sum(each["kind"] == "executed" and any(each["values"]) for each in log),
-        "refused": refused,
-    }
+def _figures(seen: dict[str, Any], log: list[Any], refused: Counter[Site]) -> dict[str, Any]:
+    """Return what the page's statistics say, what the bridge executed, and what the routers did not let in."""
+    moved = sum(each["kind"] == "executed" and any(each["values"]) for each in log)
+    return {"moving_commands_executed": moved, "refused_packets": dict(refused), **seen}
