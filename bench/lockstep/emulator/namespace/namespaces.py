@@ -26,7 +26,7 @@ from lockstep.emulator.namespace.tun import Tun, open_tun
 from lockstep.emulator.network_statistics import NetworkStatistics, count_queue
 from lockstep.emulator.transport.address_translation import Firewall, OneToOneNat
 
-__all__ = ["OPERATOR_ADDRESS", "ROBOT_ADDRESS", "Namespaces", "Side"]
+__all__ = ["OPERATOR_ADDRESS", "ROBOT_ADDRESS", "Namespaces", "Side", "end_process", "write_packet"]
 
 # From the block for tests of networks (RFC 2544).
 ROBOT_ADDRESS = "198.18.0.1"
@@ -120,7 +120,7 @@ class Namespaces:
             start_new_session=True,
             **options,
         )
-        self._stack.push_async_callback(_end, process)
+        self._stack.push_async_callback(end_process, process)
         return process
 
     def outage(self, seconds: float, *, hold: bool = False, robot: bool = False) -> None:
@@ -160,7 +160,7 @@ class Namespaces:
                     outages.start(now)
             arrives = self._paths[kind, direction].admit(now, len(packet))
             if arrives is not None:
-                self._deliveries.at(arrives, _write, other.packets, packet)
+                self._deliveries.at(arrives, write_packet, other.packets, packet)
 
     def _translated(self, side: Side, packet: bytes) -> bytes:
         """Return the packet as it arrives at the other side; b"" if it does not."""
@@ -173,7 +173,8 @@ class Namespaces:
         return outer if outer is not None and self._firewall.admits(outer) else b""
 
 
-def _write(descriptor: int, packet: bytes) -> None:
+def write_packet(descriptor: int, packet: bytes) -> None:
+    """Write a packet to a TUN device that may be gone."""
     with suppress(OSError):  # the queue is full, or the device is closed
         os.write(descriptor, packet)
 
@@ -182,7 +183,7 @@ def _packed(address: str) -> bytes:
     return bytes(int(part) for part in address.split("."))
 
 
-async def _end(process: asyncio.subprocess.Process) -> None:
+async def end_process(process: asyncio.subprocess.Process) -> None:
     """End the process and all that it started."""
     for number in (signal.SIGTERM, signal.SIGKILL):
         with suppress(ProcessLookupError):

@@ -1,0 +1,3 @@
+from lockstep.bench.three_networks.cli import app
+
+app()

@@ -1,0 +1,96 @@
+"""One drive of a robot behind NAT, through a console behind another with one open port, by a page behind a third."""
+
+import asyncio
+import datetime
+import json
+import subprocess
+import sys
+from collections import Counter
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+from urllib.parse import urlsplit
+
+from lockstep.bench.harness.event_log import records
+from lockstep.bench.harness.processes import started
+from lockstep.bench.harness.stack import LOCKSTEP
+from lockstep.emulator import load_profile
+from lockstep.emulator.namespace.three_sites import CONSOLE, Site, ThreeSites
+from lockstep.server.http.transport.tls import self_signed
+
+__all__ = ["PORT", "run"]
+
+PORT = 8000  # the console's only open one: TCP for HTTP and the robot link, UDP for media and data channels
+PAGE_SECONDS = 240.0  # for the page to open, to drive and to say what it saw, besides the drive itself
+
+
+async def run(robot: str, page: str, seconds: float, seed: int, say: Callable[[str], None]) -> dict[str, Any]:
+    """Pair, open the page and drive for `seconds`; return what was seen. `robot`, `page`: profiles of their networks.
+
+    Raises:
+        NamespacesUnavailable: this machine or user cannot have network namespaces.
+        ProcessFailed: something did not start.
+        TimeoutError: the page did not drive.
+    """
+    with TemporaryDirectory(prefix="lockstep-three-networks-") as name:
+        folder = Path(name)
+        made = self_signed(folder, {CONSOLE}, datetime.datetime.now(datetime.UTC))
+        async with ThreeSites(load_profile(robot), load_profile(page), PORT, seed=seed) as sites:
+            console = [
+                *(LOCKSTEP, "serve", "--json", "--quiet", "--robot", "dial-in", "--host", "0.0.0.0"),
+                *("--port", str(PORT), "--media-port", str(PORT), "--advertise", CONSOLE),
+                *("--public-url", f"https://{CONSOLE}:{PORT}"),
+                *("--tls-cert", str(made.chain), "--tls-key", str(made.key), "--state-dir", str(folder / "state")),
+            ]
+            async with started(console, spawn=partial(sites.start, "console")) as serving:
+                links = json.loads(await serving.line(r'^\{"console"'))
+                # A supervisor at the page's site asks for the code: the console's router does not lead back to it.
+                pairing = [
+                    LOCKSTEP,
+                    "pair",
+                    "--json",
+                    "--tls-ca",
+                    str(made.chain),
+                    "--link",
+                    _outside(links["supervisor"]),
+                ]
+                code = json.loads(await _output(sites, "page", pairing))["code"]
+                say("the console has given a code")
+                log = folder / "events.jsonl"
+                bridge = [
+                    *(sys.executable, "-m", "lockstep.robot_bridge", "planar", "--json", "--encode", "h264"),
+                    *("--console", f"wss://{CONSOLE}:{PORT}", "--pair", code),
+                    *("--event-log", str(log), "--state-dir", str(folder / "bridge")),
+                ]
+                async with started(bridge, spawn=partial(sites.start, "robot")):
+                    driving = [
+                        sys.executable,
+                        "-m",
+                        "lockstep.bench.three_networks.page",
+                        _outside(links["operator"]),
+                        str(seconds),
+                    ]
+                    async with asyncio.timeout(PAGE_SECONDS + seconds):
+                        seen = json.loads(await _output(sites, "page", driving))
+                    say("the page has driven")
+            found = list(records(log))
+        return _figures(seen, found, sites.router.refused)
+
+
+def _outside(link: str) -> str:
+    """Return a link of the console with its outer address."""
+    return urlsplit(link)._replace(scheme="https", netloc=f"{CONSOLE}:{PORT}").geturl()
+
+
+async def _output(sites: ThreeSites, site: Site, command: list[str]) -> bytes:
+    process = await sites.start(site, command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE)
+    assert process.stdout is not None
+    return await process.stdout.read()
+
+
+def _figures(seen: dict[str, Any], log: list[Any], refused: Counter[Site]) -> dict[str, Any]:
+    """Return what the page's statistics say, what the bridge executed, and what the routers did not let in."""
+    moved = sum(each["kind"] == "executed" and any(each["values"]) for each in log)
+    return {"moving_commands_executed": moved, "refused_packets": dict(refused), **seen}

@@ -1,0 +1,173 @@
+"""Three namespaces, each behind a router of its own: a robot, a console with one open port, and a page.
+
+Linux and root only. Each router translates its machine's inner address into an outer one and lets in answers alone
+(RFC 4787 5), but for the console's open port. The robot's path to the console is one profile's robot link, the page's
+is another's network of a client; between robot and page there is no path.
+"""
+
+import asyncio
+import os
+import socket
+import struct
+import sys
+import time
+from collections import Counter
+from collections.abc import Sequence
+from contextlib import AsyncExitStack
+from dataclasses import dataclass
+from types import TracebackType
+from typing import Any, Literal, Self
+
+from lockstep.emulator.impairment.bottleneck import Bottleneck
+from lockstep.emulator.impairment.deliveries import Deliveries
+from lockstep.emulator.impairment.outages import Outages
+from lockstep.emulator.impairment.path import ImpairedPath
+from lockstep.emulator.impairment.profile import DIRECTIONS, Direction, Profile
+from lockstep.emulator.namespace.namespaces import ENTER, end_process, write_packet
+from lockstep.emulator.namespace.tun import Tun, open_tun
+from lockstep.emulator.transport.address_translation import Firewall, OneToOneNat
+
+__all__ = ["CONSOLE", "SITES", "Router", "Site", "ThreeSites"]
+
+Site = Literal["robot", "console", "page"]
+INNER: dict[Site, str] = {"robot": "10.0.1.2", "console": "10.0.2.2", "page": "10.0.3.2"}  # private (RFC 1918)
+OUTER: dict[Site, str] = {"robot": "198.18.0.1", "console": "198.18.0.2", "page": "198.18.0.3"}  # RFC 2544
+SITES: tuple[Site, ...] = ("robot", "console", "page")
+CONSOLE = OUTER["console"]
+MAX_PACKET, BATCH = 65536, 64
+
+
+class Router:
+    """What a packet of one site becomes at another. No I/O.
+
+    Attributes:
+        refused: packets that a site's router has not let in, by site
+    """
+
+    def __init__(self, open_port: int) -> None:
+        """`open_port`: of the console, for TCP and UDP."""
+        self.refused: Counter[Site] = Counter()
+        self._open_port = open_port
+        self._nats = {site: OneToOneNat(INNER[site], OUTER[site]) for site in SITES}
+        self._firewalls = {site: Firewall() for site in SITES}
+        self._by_address = {socket.inet_aton(address): site for site, address in OUTER.items()}
+
+    def passes(self, site: Site, packet: bytes) -> tuple[Site, bytes] | None:
+        """Return the site that gets an IPv4 packet, and the packet as it arrives there; None if nobody gets it."""
+        if len(packet) < 24 or packet[0] >> 4 != 4:
+            return None
+        outer = self._nats[site].outward(packet)
+        other = self._by_address.get(packet[16:20])
+        if outer is None or other is None or other == site or "console" not in (site, other):
+            return None
+        self._firewalls[site].leaving(outer)
+        if not (self._firewalls[other].admits(outer) or (other == "console" and self._is_for_open_port(outer))):
+            self.refused[other] += 1
+            return None
+        inner = self._nats[other].inward(outer)
+        return None if inner is None else (other, inner)
+
+    def _is_for_open_port(self, packet: bytes) -> bool:
+        port: int = struct.unpack_from("!H", packet, (packet[0] & 15) * 4 + 2)[0]
+        return packet[9] in (socket.IPPROTO_TCP, socket.IPPROTO_UDP) and port == self._open_port
+
+
+@dataclass(frozen=True)
+class _Leg:
+    """The paths between one site and the console."""
+
+    paths: dict[Direction, ImpairedPath]
+    outages: Outages
+
+
+class ThreeSites:
+    """Enter it, then `start` processes at its sites; leaving ends them.
+
+    Raises:
+        NamespacesUnavailable: on entering; names the missing part.
+    """
+
+    def __init__(self, robot: Profile, page: Profile, open_port: int, *, seed: int = 1) -> None:
+        """`robot` and `page`: the networks between these sites and the console."""
+        self.router = Router(open_port)
+        self._legs: dict[Site, _Leg] = {"robot": _robot_leg(robot, seed), "page": _page_leg(page, seed)}
+        self._tuns: dict[Site, Tun] = {}
+        self._stack = AsyncExitStack()
+
+    async def __aenter__(self) -> Self:
+        async with AsyncExitStack() as stack:
+            loop = asyncio.get_running_loop()
+            self._deliveries = Deliveries()
+            stack.callback(self._deliveries.close)
+            for site in SITES:
+                tun = await asyncio.to_thread(open_tun, INNER[site])
+                stack.callback(tun.close)
+                self._tuns[site] = tun
+            for site, tun in self._tuns.items():
+                loop.add_reader(tun.packets, self._from, site)
+                stack.callback(loop.remove_reader, tun.packets)
+            self._stack = stack.pop_all()
+        return self
+
+    async def __aexit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        await self._stack.aclose()
+
+    async def start(self, site: Site, command: Sequence[str], **options: Any) -> asyncio.subprocess.Process:
+        """Start a process that only knows its site's network; `options` are those of `create_subprocess_exec`."""
+        descriptor = self._tuns[site].namespace
+        process = await asyncio.create_subprocess_exec(
+            *(sys.executable, "-I", str(ENTER), str(descriptor), *command),
+            pass_fds=(descriptor,),
+            start_new_session=True,
+            **options,
+        )
+        self._stack.push_async_callback(end_process, process)
+        return process
+
+    def sent_bytes(self, site: Site, direction: Direction) -> int:
+        """Return the bytes that a site's path to the console has taken in one direction."""
+        return self._legs[site].paths[direction].statistics.bytes
+
+    def _from(self, site: Site) -> None:
+        for _ in range(BATCH):
+            try:
+                packet = os.read(self._tuns[site].packets, MAX_PACKET)
+            except OSError:
+                return
+            passed = self.router.passes(site, packet)
+            if passed is None:
+                continue
+            other, arriving = passed
+            leg = self._legs[other if site == "console" else site]
+            now = time.monotonic()
+            if not leg.outages.started:
+                leg.outages.start(now)
+            towards_person: Direction = "to_operator" if (site == "robot" or other == "page") else "to_robot"
+            arrives = leg.paths[towards_person].admit(now, len(packet))
+            if arrives is not None:
+                self._deliveries.at(arrives, write_packet, self._tuns[other].packets, arriving)
+
+
+def _robot_leg(profile: Profile, seed: int) -> _Leg:
+    outages = Outages(profile.robot_outages)
+    paths: dict[Direction, ImpairedPath] = {}
+    for direction in DIRECTIONS:
+        settings = profile.robot_bottleneck(direction)
+        bottleneck = None if settings is None else Bottleneck(settings.rate, settings.queue)
+        name = f"{seed} robot {direction}"
+        paths[direction] = ImpairedPath(profile.robot_media.towards(direction), name, bottleneck, outages)
+    return _Leg(paths, outages)
+
+
+def _page_leg(profile: Profile, seed: int) -> _Leg:
+    outages = Outages(profile.client_outages)
+    paths: dict[Direction, ImpairedPath] = {}
+    for direction in DIRECTIONS:
+        settings = profile.bottleneck(direction)
+        bottleneck = None if settings is None else Bottleneck(settings.rate, settings.queue)
+        paths[direction] = ImpairedPath(
+            profile.media.towards(direction), f"{seed} page {direction}", bottleneck, outages
+        )
+    return _Leg(paths, outages)
