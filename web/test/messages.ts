@@ -43,7 +43,7 @@ export function refusalOf(event: number, reason: Refusal["reason"]): Refusal {
 export function axisOf(name: string, rest: Partial<Axis> = {}): Axis {
   return {
     ...{ name, label: name, unit: "m/s", minimum: -1, maximum: 2, slew: 1, brake: 1, rest: 0 },
-    ...{ kind: "rate", acceleration: 0, reach: 0, wrap: null },
+    ...{ kind: "rate", acceleration: 0, reach: 0, wrap: null, grips: false },
     ...rest,
   };
 }

@@ -272,3 +272,31 @@ def test_a_command_without_the_feedback_s_goals_says_nothing_of_where_goal_axes_
     path.command(2, [0.5, None, *NULLS])
     _fed(path, 2, 1.0, [0.0, 0.0], axes=[0.0] * 8)
     assert path.poses() is None
+
+
+def test_what_a_shadow_wants_is_shown_by_its_goals_also_while_the_robot_rests() -> None:
+    arm = RobotDescription(
+        name="r",
+        label="R",
+        axes=(goal_axis("turn", most=3.0, reach=1.0), _axis("vx")),
+        joints=(Joint(name="turn", unit="rad"),),
+        bodies=(Body(name="arm", parent="", joints=(BodyJoint(joint="turn", kind="revolute", axis=Z),)),),
+    )
+    path = CommandedPath(arm)
+    assert path.wanted([0.5, None]) is None, "no feedback yet"
+    path.feedback(
+        Feedback(
+            event=1,
+            issue=1,
+            time=1.0,
+            axes=[0.1, 0.0],
+            joints=[0.1],
+            goals=[0.1, None],
+            at_rest=True,
+            stop=StopState(stopped=False),
+        )
+    )
+    wanted = path.wanted([0.5, None])
+    assert wanted is not None
+    assert wanted["arm"].orientation == pytest.approx((math.cos(0.25), 0.0, 0.0, math.sin(0.25)))
+    assert path.wanted([None, 1.0]) is None, "a rate says no place"

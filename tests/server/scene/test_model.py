@@ -223,3 +223,22 @@ def test_a_tool_has_its_frame_as_measured_and_its_goal_while_that_is_somewhere_e
     assert (measured.visible, goal.visible) == (True, False)
     model.pose(_feedback(joints=[0.0, 0.5], goals=[0.3, 0.2, 0.1], unknown=["turn"]))
     assert (measured.visible, goal.visible) == (False, False)
+
+
+def test_a_shadow_has_its_tool_where_it_wants_it_and_a_pale_arm_with_its_name(server: viser.ViserServer) -> None:
+    model = SceneModel(server, TOOL_ROBOT)
+    model.pose(_feedback(joints=[0.0, 0.5]))
+    assert model.shadows.drawn == []
+    wanted = world_poses(TOOL_ROBOT, {"turn": math.pi / 2, "lift": 0.7})
+    model.pose(_feedback(joints=[0.0, 0.5]), None, [("act 3", wanted)] * 5)
+    first = model.shadows.drawn[0]
+    ((_, frame, name),) = first.tools
+    assert len(model.shadows.drawn) == 3
+    assert (first.root.visible, frame.visible, first.arm.visible) == (True, True, True)
+    assert tuple(frame.position) == pytest.approx((0.0, 0.1, 0.7))
+    assert name.text == "act 3 (shadow)"
+    model.pose(_feedback(joints=[math.pi / 2, 0.7]), None, [("act 3", wanted)])
+    assert not first.arm.visible, "it would cover the arm"
+    assert [each.root.visible for each in model.shadows.drawn] == [True, False, False]
+    model.pose(_feedback(joints=[0.0, 0.5]))
+    assert not first.root.visible

@@ -113,6 +113,25 @@ class CommandedPath:
                 poses[pose.body] = _body_at(pose, poses, goals)
         return poses
 
+    def wanted(self, values: Sequence[float | None]) -> dict[str, Pose] | None:
+        """Return the poses of all bodies where the goals among these values would bring them after the last feedback.
+
+        None: there are none, or the description does not tell. A tool that is led by its pose is there, its arm is
+        where it is.
+        """
+        axes = self._description.axes
+        asked = any(value is not None and axis.kind == "goal" for axis, value in zip(axes, values, strict=False))
+        if not self._records or not asked or not self.known:
+            return None
+        newest = self._records[-1]
+        goals = self._goals_of(newest, values)
+        joints = dict(zip(self._joints, newest.joints, strict=False))
+        poses = world_poses(self._description, joints | self._joints_at(goals, joints))
+        for pose in self._poses:
+            if any(name in goals for name in (*pose.position, *pose.rotation)):
+                poses[pose.body] = _body_at(pose, poses, goals)
+        return poses
+
     def _spans(self) -> list[_Span]:
         """Return the commands between each feedback and the next."""
         records = list(self._records)
@@ -135,8 +154,12 @@ class CommandedPath:
         """Return the goals of the newest command, and where the other goal axes stay; none at rest."""
         if not self._records or self._records[-1].at_rest:
             return {}
-        newest, axes = self._records[-1], self._description.axes
-        asked = self._commands.get(newest.event, (None,) * len(axes))
+        newest = self._records[-1]
+        return self._goals_of(newest, self._commands.get(newest.event, (None,) * len(self._axes)))
+
+    def _goals_of(self, newest: _Record, asked: Sequence[float | None]) -> dict[str, _Goal]:
+        """Return the goals of a command after this feedback."""
+        axes = self._description.axes
         goals = {
             axis.name: _goal(axis, stays if value is None else value, measured)
             for axis, value, stays, measured in zip(axes, asked, newest.goals, newest.axes, strict=False)

@@ -11,7 +11,8 @@ from lockstep.server.scene.shapes import add_geom
 
 __all__ = ["SceneGhost"]
 
-COLOR = (1.0, 0.76, 0.30, 0.32)
+Color = tuple[float, float, float, float]
+COLOR: Color = (1.0, 0.76, 0.30, 0.32)
 LARGER = 1.02  # so that it covers the parts that it agrees with
 SOLID = 0.5  # geoms more transparent than this have no ghost
 SAME_WAY = math.cos(math.radians(3) / 2)
@@ -21,8 +22,18 @@ LIFT = 0.2  # m, of the label above the lowest moving body
 class SceneGhost:
     """A translucent robot, shown only while the commands alone would have led elsewhere."""
 
-    def __init__(self, server: viser.ViserServer, description: RobotDescription, seconds: float, least: float) -> None:
-        self._least = least  # m
+    def __init__(
+        self,
+        server: viser.ViserServer,
+        description: RobotDescription,
+        least: float,
+        *,
+        label: str,
+        root: str = "/ghost",
+        color: Color = COLOR,
+    ) -> None:
+        """`least`: m, by which a part is elsewhere at least. `root`: of its names in the scene."""
+        self._least = least
         paths = scene_paths(description)
         moving = {path for body in description.bodies if body.joints and (path := paths.get(body.name))}
         chosen = [
@@ -30,16 +41,16 @@ class SceneGhost:
             for body in description.bodies
             if body.name in paths and any(f"{paths[body.name]}/".startswith(f"{path}/") for path in moving)
         ]
-        self._root = server.scene.add_frame("/ghost", show_axes=False, visible=False)
+        self._root = server.scene.add_frame(root, show_axes=False, visible=False)
         self._frames = {}
         for number, body in enumerate(chosen):
-            self._frames[body.name] = server.scene.add_frame(f"/ghost/{number}", show_axes=False)
+            self._frames[body.name] = server.scene.add_frame(f"{root}/{number}", show_axes=False)
             for index, geom in enumerate(body.geoms):
                 if geom.rgba[3] >= SOLID:
-                    add_geom(server, f"/ghost/{number}/geom{index}", _ghostly(geom))
+                    add_geom(server, f"{root}/{number}/geom{index}", _ghostly(geom, color))
         self.label = server.scene.add_label(
-            "/ghost/0/label" if chosen else "/ghost/label",
-            f"commanded, last {seconds:.2g} s",
+            f"{root}/0/label" if chosen else f"{root}/label",
+            label,
             position=(0.0, 0.0, -LIFT),
             anchor="top-center",
             font_screen_scale=0.9,
@@ -64,12 +75,12 @@ class SceneGhost:
         return agreement < SAME_WAY or math.dist(pose.position, measured.position) > self._least
 
 
-def _ghostly(geom: Geom) -> Geom:
+def _ghostly(geom: Geom, color: Color) -> Geom:
     x, y, z = geom.size
     return Geom(
         shape=geom.shape,
         size=(x * LARGER, y * LARGER, z * LARGER),
         position=geom.position,
         orientation=geom.orientation,
-        rgba=COLOR,
+        rgba=color,
     )

@@ -1,7 +1,7 @@
 """Builds a robot in viser from its description, and poses it from feedback. Runs in the scene's own thread."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 import viser
@@ -20,6 +20,7 @@ from lockstep.server.scene.kinematics import (
     world_positions,
 )
 from lockstep.server.scene.path_trace import SceneTrails
+from lockstep.server.scene.shadows.ghosts import SceneShadows
 from lockstep.server.scene.shapes import add_geom
 from lockstep.server.scene.tool_frames import SceneTools
 
@@ -72,13 +73,24 @@ class SceneModel:
         self.arrow = self._add_arrow()
         self.points = self._add_points()
         self.rays = self._add_rays()
-        self.ghost = SceneGhost(server, description, description.hold, self._radius() * GHOST_APART)
+        self.ghost = SceneGhost(
+            server, description, self._radius() * GHOST_APART, label=f"commanded, last {description.hold:.2g} s"
+        )
         self.trails = SceneTrails(server, description, self._radius() * TRAIL_STEP)
         self.fences = SceneFences(server, description)
         self.tools = SceneTools(server, description, self._radius(), factor)
+        self.shadows = SceneShadows(server, description, self._radius(), self._radius() * GHOST_APART)
 
-    def pose(self, feedback: Feedback, commanded: Mapping[str, Pose] | None = None) -> None:
-        """Show a feedback. `commanded`: poses of the bodies by the commands alone; None: nothing is commanded."""
+    def pose(
+        self,
+        feedback: Feedback,
+        commanded: Mapping[str, Pose] | None = None,
+        shadows: Sequence[tuple[str, Mapping[str, Pose]]] = (),
+    ) -> None:
+        """Show a feedback. `commanded`: poses of the bodies by the commands alone; None: nothing is commanded.
+
+        `shadows`: the policies that do not drive, by name, and where each wants the bodies.
+        """
         joints = dict(zip(self._joint_names, feedback.joints, strict=False))
         with self._server.atomic():
             # First: viewers hold back all that follows until they show a picture of this event (web's scene_gate.ts).
@@ -93,6 +105,7 @@ class SceneModel:
             self.ghost.show(commanded, measured)
             self.trails.follow(measured)
             self.tools.show(feedback, measured)
+            self.shadows.show(shadows, measured)
 
     def _build_surroundings(self, factor: float) -> None:
         scene, camera = self._server.scene, self._server.initial_camera

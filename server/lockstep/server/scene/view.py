@@ -3,13 +3,14 @@
 import asyncio
 import time
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import partial
 from typing import TYPE_CHECKING, TypeVar
 
 import structlog
 
+from lockstep.protocol.console import ShadowVerdict
 from lockstep.protocol.description import RobotDescription
 from lockstep.protocol.messages import Feedback
 from lockstep.server.auth.tokens import SceneTicket
@@ -17,7 +18,8 @@ from lockstep.server.errors import SceneUnavailable
 from lockstep.server.scene.commanded_path import CommandedPath
 from lockstep.server.scene.page import ScenePage
 from lockstep.server.scene.scale import SceneScale
-from lockstep.server.session_events import CommandForwarded, EpochBegan, FeedbackReceived, SessionEvents
+from lockstep.server.scene.shadows.wishes import ShadowWishes
+from lockstep.server.session_events import CommandForwarded, EpochBegan, FeedbackReceived, SessionEvents, ShadowJudged
 from lockstep.server.telemetry.metrics import Metrics
 from lockstep.server.util.rate_limits import RateLimits
 from lockstep.server.util.uncancelled import to_the_end
@@ -61,6 +63,7 @@ class SceneView:
         self._description: RobotDescription | None = None  # not built yet
         self._feedback: Feedback | None = None  # not shown yet
         self._path: CommandedPath | None = None
+        self._shadows = ShadowWishes()
         self._viewers = 0
         self._worked = 0.0  # s of thread time for the picture that is being made
         self._of_link: Counter[str] = Counter()
@@ -72,15 +75,20 @@ class SceneView:
         events.subscribe(EpochBegan, self._epoch_began)
         events.subscribe(CommandForwarded, self._command_forwarded)
         events.subscribe(FeedbackReceived, self._feedback_received)
+        events.subscribe(ShadowJudged, self._shadow_judged)
 
     def _epoch_began(self, event: EpochBegan) -> None:
         self._description = event.description
         self._path = CommandedPath(event.description)
+        self._shadows = ShadowWishes()
         self._news.set()
 
     def _command_forwarded(self, event: CommandForwarded) -> None:
         if self._path is not None:
             self._path.command(event.command.event, event.command.values)
+
+    def _shadow_judged(self, event: ShadowJudged) -> None:
+        self._shadows.take(event.verdict, time.monotonic())
 
     def _feedback_received(self, event: FeedbackReceived) -> None:
         self._feedback = event.feedback
@@ -158,7 +166,8 @@ class SceneView:
             if self._viewers and self._feedback is not None and self._model is not None and self._scale is not None:
                 feedback, self._feedback = self._feedback, None
                 path = None if self._path is None else self._path.as_of_now()
-                await self._pose(partial(_pose, self._model, self._scale, feedback, path))
+                wishes = self._shadows.of_now(feedback.event, time.monotonic())
+                await self._pose(partial(_pose, self._model, self._scale, feedback, path, wishes))
             await asyncio.sleep(pause(self._worked, self._interval))
 
     async def _start(self) -> None:
@@ -208,8 +217,19 @@ def pause(worked: float, interval: float) -> float:
     return max(interval, worked * (1 / SHARE - 1))
 
 
-def _pose(model: "SceneModel", scale: SceneScale, feedback: Feedback, path: CommandedPath | None) -> None:
-    model.pose(scale.feedback(feedback), None if path is None else scale.poses(path.poses()))
+def _pose(
+    model: "SceneModel",
+    scale: SceneScale,
+    feedback: Feedback,
+    path: CommandedPath | None,
+    wishes: Sequence[ShadowVerdict],
+) -> None:
+    if path is None:
+        model.pose(scale.feedback(feedback))
+        return
+    wanted = ((wish.name, scale.poses(path.wanted(wish.values))) for wish in wishes)
+    shadows = [(name, poses) for name, poses in wanted if poses is not None]
+    model.pose(scale.feedback(feedback), scale.poses(path.poses()), shadows)
 
 
 def _start_viser() -> "tuple[viser.ViserServer, ScenePage]":

@@ -1,0 +1,1 @@
+"""What shadow policies want, in the 3D scene."""
