@@ -10,6 +10,7 @@ from lockstep.bench.browsers.console_page import open_console
 from lockstep.bench.harness.driving import drive_on
 from lockstep.client import Console
 from lockstep.server.recording.reading.reader import RecordingReader
+from tests.e2e.accessibility import findings
 from tests.support.stack import running_stack
 
 pytestmark = pytest.mark.browser
@@ -39,12 +40,14 @@ async def test_a_supervisor_begins_and_keeps_episodes_with_the_keyboard_while_an
         await expect(bar.locator(".episode-words")).to_have_text("No episode yet")
         await expect(bar.get_by_role("button", name="Keep")).to_be_disabled()
         await _shot(page, "idle")
+        assert await findings(page) == []
         await page.keyboard.press("b")
         await expect(bar.locator(".episode-words")).to_have_text("Not done: say in words what is to be done")
         await bar.locator(".episode-task").fill("push the box b k l")  # letters in the field are no keys
         await bar.locator(".episode-task").press("Enter")
         await expect(bar.locator(".episode-words")).to_contain_text("Take 1")
         await _shot(page, "open")
+        assert await findings(page) == []
         for _ in range(5):
             await drive_on(driver, [0.2, 0.0, 0.0])
         await page.keyboard.press("y")
@@ -61,6 +64,7 @@ async def test_a_supervisor_begins_and_keeps_episodes_with_the_keyboard_while_an
         await page.keyboard.press("b")
         await expect(bar.locator(".episode-words")).to_contain_text("Take 4")
         await _shot(page, "phone-open")
+        assert await findings(page) == []
         assert await page.evaluate("document.documentElement.scrollWidth <= innerWidth")
         assert (await page_console.stats())["bad_messages"] == 0
     (path,) = recordings.glob("*.mcap")

@@ -11,6 +11,7 @@ from playwright.async_api import Browser, Locator, expect
 
 from lockstep.bench.browsers.console_page import RB, ConsolePage, open_console
 from tests.client.truth import until_logged
+from tests.e2e.accessibility import findings
 from tests.support.stack import Stack
 
 pytestmark = pytest.mark.browser
@@ -106,6 +107,7 @@ async def test_a_place_without_room_is_refused_by_name_and_without_arming_nothin
     async with open_console(chromium, stack.operator, width=1366, height=768) as console:
         await console.until_live()
         canvas = await _open_map(console)
+        assert await findings(console.page) == []
         await canvas.click(position={"x": 200, "y": 200})
         await expect(console.page.get_by_text("Go to: Arm first: this moves the robot").first).to_be_attached()
         assert not await stack.events("action")
@@ -113,6 +115,7 @@ async def test_a_place_without_room_is_refused_by_name_and_without_arming_nothin
         x, y = await _place(canvas, -1.8, -1.0)  # a pillar
         await console.page.mouse.click(x, y)
         await expect(_words(console)).to_contain_text("refused · not possible now · there is no room at that place")
+        assert await findings(console.page) == []
 
 
 @pytest.mark.parametrize("how", ["cancel", "stick", "stop", "close"])
@@ -166,6 +169,7 @@ async def test_a_finger_that_rests_sets_a_goal_and_one_that_moves_moves_the_map(
         canvas = await _open_map(console)  # in the details, which disarm
         await _armed(console)
         await _picture(console, "map-phone")
+        assert await findings(console.page) == []
         client = await console.page.context.new_cdp_session(console.page)
 
         async def touch(kind: str, *points: tuple[float, float]) -> None:

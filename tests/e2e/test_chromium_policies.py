@@ -11,6 +11,7 @@ from playwright.async_api import Browser, Locator, expect
 from lockstep.bench.browsers.console_page import ConsolePage, open_console
 from lockstep.client import CommandRefused, Console
 from tests.client.test_policies import policy_link
+from tests.e2e.accessibility import findings
 from tests.support.stack import Stack
 
 pytestmark = pytest.mark.browser
@@ -67,8 +68,10 @@ async def test_a_person_lets_a_policy_drive_and_takes_over_by_button_key_and_pad
         give = _bar(ada).get_by_role("button", name="Give to net")
         await expect(give).to_be_visible()
         await ada.page.screenshot(path=tmp_path / "ready.png")
+        assert await findings(ada.page) == []
         await give.click()
         await _policy_drives(ada)
+        assert await findings(ada.page) == []
         await ada.page.screenshot(path=tmp_path / "drives.png")
         await _bar(ada).get_by_role("button", name="Take over").click()
         await ada.until("s.seat.mine && !s.armed && s.at_rest === true")
@@ -81,3 +84,4 @@ async def test_a_person_lets_a_policy_drive_and_takes_over_by_button_key_and_pad
         await ada.drive_forward()
         await expect(ada.page.get_by_label("What shadow policies want")).to_contain_text("net")
         await ada.page.screenshot(path=tmp_path / "shadow.png")
+        assert await findings(ada.page) == []

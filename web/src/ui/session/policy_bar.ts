@@ -29,7 +29,7 @@ export function createPolicyBar(engine: ConsoleEngine): Panel {
   const takeOver = press("Take over", "policy-take", "F8", () => engine.session.takeOver());
   const withdraw = press("Withdraw the offer", "policy-withdraw", "", () => offer("", false));
   const offers = h("span", "policy-offers");
-  const bars = h("div", "policy-shadows", { "aria-label": "What shadow policies want" });
+  const bars = h("div", "policy-shadows", { role: "group", "aria-label": "What shadow policies want" });
   const element = h("section", "policy-bar", { "aria-label": "Policies" });
   const line = h("div", "policy-line");
   line.append(h("span", "policy-lamp", { "aria-hidden": "true" }), title, text, withdraw, offers, takeOver);

@@ -35,8 +35,8 @@ export function createRecordButton(engine: ConsoleEngine, api: SessionApi): Pane
       setData(element, "tone", words.tone);
       setPressed(element, recording?.state === "recording");
       setText(text, words.text);
+      // The title describes the button; its name is the visible text (WCAG 2.5.3).
       if (element.title !== words.title) element.title = words.title;
-      if (element.getAttribute("aria-label") !== words.title) element.setAttribute("aria-label", words.title);
       element.disabled = asking || !may;
     },
   };
