@@ -8,7 +8,8 @@ from lockstep.robot_bridge.robots.planar.description import DESCRIPTION
 from lockstep.server.audit.records import Actor
 from lockstep.server.control.session_metrics import SessionMetrics
 from lockstep.server.recording.format.records import EpisodeRecord
-from lockstep.server.session_events import EpisodeWritten, EpochBegan, SeatChanged, SessionEvents, StatusReceived
+from lockstep.server.recording.writing.episode_written import EpisodeWritten
+from lockstep.server.session_events import EpochBegan, SeatChanged, SessionEvents, StatusReceived
 from lockstep.server.telemetry.metrics import MAX_LIMITS, MAX_STATUS_NAMES, Metrics
 
 

@@ -6,13 +6,13 @@ from prometheus_client import Counter
 
 from lockstep.protocol.actions import Status
 from lockstep.server.audit.records import AuditTrouble
+from lockstep.server.recording.writing.episode_written import EpisodeWritten
 from lockstep.server.session_events import (
     ActionRefused,
     ActionUpdated,
     CommandForwarded,
     CommandRefused,
     CommandRepeated,
-    EpisodeWritten,
     EpochBegan,
     FeedbackReceived,
     InputRefused,
