@@ -17,7 +17,6 @@ BEHIND, AHEAD = 3, 12  # moments of the same demonstration in which it looks fir
 ORDER: Final = 1e-5  # rad² for each moment² away from the next one: where nothing moves, time goes on
 LOST: Final = 0.15  # rad: further from its moment than this, it looks everywhere anew
 STEP: Final = 0.35  # rad, of an arm's joint from where it is measured: half of what the robot takes in one command
-PREFERRED: Final = 0.25  # a correction counts as half as far away as it is: squared
 
 
 class Demonstration(NamedTuple):
@@ -25,7 +24,6 @@ class Demonstration(NamedTuple):
 
     states: Array  # (n, 2 x joints), rad: measured, and where they were commanded to be
     actions: Array  # (n, joints), rad; the last one is the gripper
-    corrects: bool  # a person took over from a policy: what followed
 
 
 def state_of(feedback: Feedback, joints: int) -> Array:
@@ -61,7 +59,7 @@ def read_demonstrations(path: Path, joints: int) -> list[Demonstration]:
                 if None not in action:  # else some joint was to stay: nobody drove
                     states.append(state_of(before.feedback, joints))
                     actions.append(action)
-            found.append(Demonstration(np.array(states), np.array(actions, dtype=np.float64), with_policy))
+            found.append(Demonstration(np.array(states), np.array(actions, dtype=np.float64)))
     return [each for each in found if len(each.states)]
 
 
@@ -104,11 +102,8 @@ class NearestNeighbour:
         return largest
 
     def _look_everywhere(self, state: Array) -> None:
-        costs = [
-            self._distances(which, state).min() * (PREFERRED if each.corrects else 1.0)
-            for which, each in enumerate(self.demonstrations)
-        ]
-        self._which = int(np.argmin(costs))
+        nearest = [self._distances(which, state).min() for which in range(len(self.demonstrations))]
+        self._which = int(np.argmin(nearest))
         self._at = int(self._distances(self._which, state).argmin())
 
     def _look_nearby(self, state: Array) -> None:
