@@ -7,6 +7,7 @@ from lockstep.protocol.console import Seat
 from lockstep.robot_bridge.robots.planar.description import DESCRIPTION
 from lockstep.server.audit.records import Actor
 from lockstep.server.control.session_metrics import SessionMetrics
+from lockstep.server.recording.episodes.metrics import count_episodes
 from lockstep.server.recording.format.records import EpisodeRecord
 from lockstep.server.recording.writing.episode_written import EpisodeWritten
 from lockstep.server.session_events import EpochBegan, SeatChanged, SessionEvents, StatusReceived
@@ -88,6 +89,7 @@ def test_the_seats_holders_are_counted_by_kind_and_episodes_by_their_end() -> No
     metrics = Metrics()
     events = SessionEvents(metrics.faults)
     SessionMetrics(metrics).subscribe(events)
+    count_episodes(events, metrics)
     ada, net = Seat(holder="p1", name="Ada", kind="human"), Seat(holder="p2", name="net", kind="policy")
     for seat in (Seat(), ada, ada, net, ada, Seat()):
         events.publish(SeatChanged(seat, Actor(), Actor()))

@@ -25,6 +25,7 @@ from lockstep.server.peers.peer_registry import PeerRegistry
 from lockstep.server.peers.token_revocation import TokenRevocation
 from lockstep.server.publishing.publishers import Publishers
 from lockstep.server.recording.episodes.episode_service import EpisodeService
+from lockstep.server.recording.episodes.metrics import count_episodes
 from lockstep.server.recording.episodes.reset_action import ResetAction
 from lockstep.server.recording.format.signature import RecordingSigning
 from lockstep.server.recording.library import ConsoleLibrary
@@ -152,6 +153,7 @@ async def _session(
     states.append(episodes.state)
     media.robot_encoding.ask_by(console.robot.ask_for_encoding)
     SessionMetrics(metrics).subscribe(events)
+    count_episodes(events, metrics)
     SessionAudit(trail).subscribe(events)
     notices.subscribe(events)
     recorder.subscribe(events)

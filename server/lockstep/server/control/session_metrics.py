@@ -6,7 +6,6 @@ from prometheus_client import Counter
 
 from lockstep.protocol.actions import Status
 from lockstep.server.audit.records import AuditTrouble
-from lockstep.server.recording.writing.episode_written import EpisodeWritten
 from lockstep.server.session_events import (
     ActionRefused,
     ActionUpdated,
@@ -30,9 +29,6 @@ from lockstep.server.session_events import (
 from lockstep.server.telemetry.metrics import Metrics
 
 __all__ = ["SessionMetrics"]
-
-
-EPISODE_ENDS = ("kept", "discarded", "cut")
 
 
 class SessionMetrics:
@@ -60,7 +56,6 @@ class SessionMetrics:
         events.subscribe(StopAsked, self._stop_asked)
         events.subscribe(ResetDone, self._reset_done)
         events.subscribe(SeatChanged, self._seat_changed)
-        events.subscribe(EpisodeWritten, self._episode_written)
         events.subscribe(AuditTrouble, self._audit_trouble)
 
     @cached_property
@@ -130,10 +125,6 @@ class SessionMetrics:
         if event.seat.holder != self._holder:
             self._holder = event.seat.holder
             self._metrics.seat_changes.labels(event.seat.kind).inc()
-
-    def _episode_written(self, event: EpisodeWritten) -> None:
-        if event.record.kind in EPISODE_ENDS:
-            self._metrics.episodes.labels(event.record.kind).inc()
 
     def _audit_trouble(self, event: AuditTrouble) -> None:
         self._metrics.audit_failing.set(bool(event.trouble))
