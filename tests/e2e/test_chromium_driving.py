@@ -8,6 +8,8 @@ from tests.support.stack import Stack
 
 pytestmark = pytest.mark.browser
 
+KEY_TRIES = 3  # a busy machine may hold up the robot or the page, which disarms it
+
 
 async def _driven(console: ConsolePage, events: int) -> None:
     """Arm and drive for that many events."""
@@ -132,16 +134,21 @@ async def test_an_unplugged_pad_disarms_and_the_robot_comes_to_rest(stack: Stack
 async def test_the_keyboard_drives_while_the_space_bar_is_held(stack: Stack, chromium: Browser) -> None:
     async with open_console(chromium, stack.operator, pad=False) as console:
         await console.until_live()
-        await console.until("s.seat && s.seat.mine")
-        await console.page.keyboard.press("Enter")
-        await console.until("s.armed")
-        await console.page.keyboard.down("KeyW")
-        event = (await console.stats())["event"]
-        await console.until(f"s.event > {event} && s.at_rest === true")
-        await console.page.keyboard.down("Space")
-        await console.until("s.driving && s.at_rest === false")
-        await console.page.keyboard.up("Space")
-        await console.until("!s.driving && s.at_rest === true")
+        keyboard = console.page.keyboard
+        for _ in range(KEY_TRIES):
+            await console.arm_by_key()
+            await keyboard.down("KeyW")
+            event = (await console.stats())["event"]
+            await console.until(f"!s.armed || (s.event > {event} && s.at_rest === true)")
+            await keyboard.down("Space")
+            await console.until("!s.armed || (s.driving && s.at_rest === false)")
+            drives = (await console.stats())["driving"]
+            await keyboard.up("Space")
+            await console.until("!s.driving && s.at_rest === true")
+            await keyboard.up("KeyW")
+            if drives:
+                return
+        raise AssertionError("the keyboard does not drive")
 
 
 async def test_contact_is_felt_as_rumble(own_stack: Stack, chromium: Browser) -> None:

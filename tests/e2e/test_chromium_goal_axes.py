@@ -3,7 +3,6 @@
 import itertools
 import re
 from collections.abc import Sequence
-from contextlib import suppress
 
 import pytest
 import pytest_asyncio
@@ -17,7 +16,6 @@ from tests.support.stack import Stack
 
 pytestmark = [pytest.mark.browser, pytest.mark.timeout(240)]
 
-ARM_TRIES = 3
 Y = 3  # W3C standard mapping: the next layer
 REACH_SHARE = 0.8  # that a goal of the page uses
 
@@ -33,15 +31,8 @@ def slider(page: Page, label: str) -> Locator:
 
 
 async def _arm(console: ConsolePage) -> None:
-    """Press Enter; again where the page had not yet seen that everything was let go."""
     await console.until("s.seat && s.seat.mine && !s.stop.stopped")
-    for _ in range(ARM_TRIES - 1):
-        await console.page.keyboard.press("Enter")
-        with suppress(AssertionError):
-            await console.until("s.armed", 3)
-            return
-    await console.page.keyboard.press("Enter")
-    await console.until("s.armed")
+    await console.arm_by_key()
 
 
 async def _drag(page: Page, label: str, share: float) -> None:

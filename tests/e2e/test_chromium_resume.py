@@ -12,6 +12,7 @@ import pytest
 from playwright.async_api import Browser, expect
 
 from lockstep.bench.browsers.console_page import ConsolePage, open_console
+from tests.client.truth import until_logged
 from tests.support.movable_path import movable_path
 from tests.support.stack import Stack
 
@@ -105,10 +106,17 @@ async def test_a_page_that_was_suspended_while_the_deadman_is_held_moves_nothing
             await console.drive_forward()
             with _suspended_pages():
                 await asyncio.sleep(SUSPENDED)
+                await _rests(stack)
                 before = await _moved(stack)
             await console.until("!s.armed && s.connected && s.at_rest === true && s.seat && s.seat.mine")
             assert await _moved(stack) == before, "the robot moved on when the page woke up"
             await console.let_go()
+
+
+async def _rests(stack: Stack) -> None:
+    """Until the bridge has answered the last event that moved something with a robot at rest."""
+    moved = await _moved(stack)
+    await until_logged(stack, "feedback", lambda record: record["at_rest"] and record["event"] >= moved)
 
 
 async def _moved(stack: Stack) -> int:

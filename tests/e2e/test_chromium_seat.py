@@ -5,12 +5,14 @@ The robot rests in between.
 
 import asyncio
 import re
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
 from playwright.async_api import Browser, Locator, expect
+from playwright.async_api import TimeoutError as PlaywrightTimeoutError
 
-from lockstep.bench.browsers.console_page import RB, ConsolePage, open_console
+from lockstep.bench.browsers.console_page import RB, START, ConsolePage, open_console
 from tests.e2e.tamper import open_tampered
 from tests.support.stack import Stack, running_stack
 
@@ -116,19 +118,49 @@ async def test_a_supervisor_takes_control_with_one_click_and_drives_after_arming
         await sue.until("s.at_rest === true")
 
 
+IDLE_TRIES = 5  # a machine that takes all of the 8 s of a try has given the seat back meanwhile
+WATCH_SEAT = """() => {
+  const seat = document.querySelector(".seat");
+  window.seatSaid = [];
+  const note = () => window.seatSaid.push(seat.textContent);
+  new MutationObserver(note).observe(seat, { childList: true, characterData: true, subtree: true });
+}"""
+COUNTED = "window.seatSaid.map((said) => Number(/given back in (\\d+) s/.exec(said)?.[1] ?? 9))"
+WARNED = f"{COUNTED}.some((left) => left <= 5)"
+STAYS = f"{COUNTED}.some((left, at, all) => left <= 8 && left > Math.min(...all.slice(0, at)) + 1)"
+
+
+async def _stays(console: ConsolePage) -> bool:
+    """Arm, be warned and keep control; false where a busy machine was too slow for that."""
+    if not (await console.stats())["seat"]["mine"]:
+        await _button(console, "Request control").click()
+        await console.until("s.seat.mine")
+    await console.press(START)
+    await console.until("s.armed || !s.seat.mine")
+    await console.press(START, False)
+    await console.page.evaluate("window.seatSaid.length = 0")
+    await console.until(f"!s.seat.mine || {WARNED}")
+    await console.page.evaluate("window.seatSaid.splice(0, window.seatSaid.length - 1)")
+    with suppress(PlaywrightTimeoutError):
+        await _button(console, "Keep control").click(timeout=5_000)
+    await console.until(f"!s.seat.mine || {STAYS}")
+    return bool((await console.stats())["seat"]["mine"])
+
+
 async def test_an_idle_operator_is_warned_can_stay_and_loses_the_seat_otherwise(
     tmp_path: Path, chromium: Browser, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setenv("LOCKSTEP_SEAT_IDLE_SECONDS", "10")
+    monkeypatch.setenv("LOCKSTEP_SEAT_IDLE_SECONDS", "8")
     async with running_stack(tmp_path) as stack, open_console(chromium, stack.operator) as console:
-        await console.until("s.connected && s.seat.mine")
-        await console.arm()
-        await _says(console, re.compile("Control is given back in [1-6] s"))
-        await _button(console, "Keep control").click()
-        await _says(console, re.compile("Control is given back in ([789]|10) s"))
-        assert (await console.stats())["seat"]["mine"]
+        await console.until("s.connected && s.seat.mine && document.querySelector('.seat')")
+        await console.page.evaluate(WATCH_SEAT)
+        for _ in range(IDLE_TRIES):
+            if await _stays(console):
+                break
+        else:
+            raise AssertionError("it does not stay")
         await console.until("!s.armed && s.seat.holder === ''")
-        await _says(console, "You were idle: the control seat is free")
+        await console.until("window.seatSaid.some((said) => said.includes('You were idle: the control seat is free'))")
         await _button(console, "Request control").click()
         await console.until("s.seat.mine")
         assert not (await console.stats())["armed"]

@@ -2,6 +2,8 @@
 
 import asyncio
 from collections.abc import AsyncIterator, Callable
+from contextlib import asynccontextmanager
+from itertools import count
 
 import pytest
 from playwright.async_api import Page
@@ -23,9 +25,12 @@ VP8 = Codec(96, "VP8", 90_000, feedback=("nack", "nack pli", "goog-remb"))
 RTX = Codec(97, "rtx", 90_000, parameters={"apt": "96"})
 OPUS = Codec(111, "opus", 48_000, 2)
 URIS = (MID_URI, ABS_SEND_TIME_URI)
-FRAMES_DECODED = """async () => {
-    const found = [...(await pc.getStats()).values()].filter(each => each.type === "inbound-rtp");
-    return found.reduce((sum, each) => sum + (each.framesDecoded ?? 0), 0);
+DECODES = """async () => {
+    for (;;) {
+        const found = [...(await pc.getStats()).values()].filter(each => each.type === "inbound-rtp");
+        if (found.reduce((sum, each) => sum + (each.framesDecoded ?? 0), 0) >= 5) return;
+        await new Promise(resolve => setTimeout(resolve, 50));
+    }
 }"""
 PREPARE = """() => {
     globalThis.pc = new RTCPeerConnection();
@@ -84,13 +89,23 @@ def tells(kind: type) -> Callable[[PeerEvent], bool]:
 
 async def show(connection: Connection, page: Page, mid: str) -> None:
     """Send pictures until the page has decoded some."""
-    pictures = list(packetise(200))
-    for number, payloads in enumerate(pictures):
-        connection.send_frame(mid, payloads, number * 3000)
-        await asyncio.sleep(1 / 30)  # the pictures' own pace
-        if number % 10 == 9 and await page.evaluate(FRAMES_DECODED) >= 5:
-            return
-    raise AssertionError("Chromium decoded no pictures")
+    async with sending(connection, mid, list(packetise(30))):
+        await page.evaluate(DECODES)
+
+
+@asynccontextmanager
+async def sending(connection: Connection, mid: str, pictures: list[list[bytes]]) -> AsyncIterator[None]:
+    """Inside the block, send these pictures over and over at their own pace: the first may come before it listens."""
+
+    async def send() -> None:
+        for number in count():
+            connection.send_frame(mid, pictures[number % len(pictures)], number * 3000)
+            await asyncio.sleep(1 / 30)
+
+    async with asyncio.TaskGroup() as group:
+        task = group.create_task(send())
+        yield
+        task.cancel()
 
 
 async def check_media_and_messages(connection: Connection, page: Page, video: str, channel: int) -> None:
@@ -169,9 +184,8 @@ async def test_chromium_asks_for_a_keyframe_when_the_first_is_lost(endpoint: End
     )
     connection.accept(parse_description(answer))
     await until(connection, is_a(Connected))
-    for number, payloads in enumerate(list(packetise(20))[1:]):  # without the keyframe
-        connection.send_frame("camera", payloads, number * 3000)
-    await until(connection, tells(KeyframeRequested))
+    async with sending(connection, "camera", list(packetise(20))[1:]):  # without the keyframe
+        await until(connection, tells(KeyframeRequested))
 
 
 async def test_chromium_connects_by_tcp_where_no_udp_gets_out(page: Page) -> None:

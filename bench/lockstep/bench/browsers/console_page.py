@@ -128,6 +128,16 @@ class ConsolePage:
         await self.until("s.armed", 20)
         await self.press(START, False)
 
+    async def arm_by_key(self) -> None:
+        """Press Enter where the keyboard is the robot's; again if nothing happens."""
+        await self.until("s.seat && s.seat.mine")
+        for _ in range(ARM_TRIES - 1):
+            await self.page.keyboard.press("Enter")
+            if await self._missed("s.armed", ARM_SECONDS) is None:
+                return
+        await self.page.keyboard.press("Enter")
+        await self.until("s.armed", 20)
+
     async def drive_forward(self, tilts: Mapping[int, float] = FORWARD) -> None:
         """Hold the deadman and tilt the sticks; arm again if a busy machine ended that."""
         for _ in range(ARM_TRIES):
