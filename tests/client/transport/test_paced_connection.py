@@ -88,12 +88,11 @@ async def test_messages_that_wait_for_the_reader_keep_further_ones_unparsed_unti
     connection.data_received(EMPTY * PIECE + LAST)
     parsed = protocol.count
     assert MAX_UNREAD * len(EMPTY) < parsed <= PIECE
-    assert socket.paused
+    assert socket.paused is True
     async with asyncio.timeout(20):
         while await connection.recv() != "last":
             pass
-    assert protocol.count == PIECE * len(EMPTY) + len(LAST)
-    assert not socket.paused
+    assert (protocol.count, socket.paused) == (PIECE * len(EMPTY) + len(LAST), False)
     connection.connection_lost(None)
 
 
