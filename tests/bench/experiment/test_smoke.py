@@ -78,7 +78,6 @@ def test_the_robots_of_the_thesis_kind_draw_the_event_that_is_looked_for_in_thei
     assert done.exit_code == 0, done.output
     result = json.loads(done.stdout)
     assert result["robot"] == robot
-    assert result["clients"]["operator"]["drawn"]["right"] > 5
     assert (result["verdicts"]["no_violation"], result["verdicts"]["pixels_agree"]) == (True, True)
 
 

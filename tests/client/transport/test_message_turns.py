@@ -13,6 +13,7 @@ from websockets.asyncio.server import ServerConnection, serve
 from lockstep.client.console_url import parse_link
 from lockstep.client.transport.message_turns import MAX_UNREAD, MOST, MessageTurns, in_turns
 from lockstep.client.transport.observer_websocket import ObserverWebSocket
+from lockstep.client.transport.paced_connection import PacedConnection
 from lockstep.client.transport.whep import Whep
 from tests.waiting import PATIENCE
 
@@ -91,13 +92,17 @@ async def test_a_console_that_sends_an_observer_messages_without_end_leaves_the_
 
 async def test_a_relay_that_sends_messages_without_end_leaves_the_loop_to_others() -> None:
     flooded = _Flooded()
-    async with _flooding() as port, connect(f"ws://127.0.0.1:{port}", max_queue=MAX_UNREAD) as socket:
+    async with (
+        _flooding() as port,
+        connect(f"ws://127.0.0.1:{port}", max_queue=MAX_UNREAD, create_connection=PacedConnection) as socket,
+    ):
 
         async def read() -> None:
             async for data in in_turns(socket.recv):
                 flooded.take(data)
 
         await _watch(flooded, read)
+        socket.transport.abort()  # the flood lets no close frame through
 
 
 @given(st.lists(st.tuples(st.floats(0, 0.02), st.floats(0, 0.02)), min_size=1, max_size=300))

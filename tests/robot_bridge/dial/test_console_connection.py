@@ -7,8 +7,8 @@ from websockets.client import ClientProtocol
 from websockets.protocol import State
 from websockets.uri import parse_uri
 
+from lockstep.protocol.pacing.paced_reader import PIECE
 from lockstep.robot_bridge.dial.console_connection import ConsoleConnection
-from lockstep.robot_bridge.link.pacing.paced_reader import PIECE
 
 EMPTY = b"\x82\x00"  # a binary frame without data, as a console sends it
 
@@ -44,7 +44,7 @@ class Link(asyncio.Protocol):
 async def test_a_console_that_floods_its_robot_with_empty_frames_has_a_piece_read_in_a_turn(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr("lockstep.robot_bridge.link.pacing.paced_reader.READ_TURN", 1e-9)
+    monkeypatch.setattr("lockstep.protocol.pacing.paced_reader.READ_TURN", 1e-9)
     connection = ConsoleConnection(ClientProtocol(parse_uri("ws://a/"), state=State.OPEN), for_link=True)
     connection.response = object()  # type: ignore[assignment]
     socket, link = Socket(), Link()

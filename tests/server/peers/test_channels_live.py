@@ -1,6 +1,7 @@
 """The data channels, over real WebRTC, against a real bridge."""
 
 import asyncio
+from collections.abc import Iterator
 
 import pytest
 
@@ -19,8 +20,9 @@ from lockstep.protocol.console import (
 )
 from lockstep.protocol.messages import Command, Feedback, Ping, Pong, Refusal, Reset, Rest, Stop
 from lockstep.protocol.serial import event_after
+from lockstep.server.control.seat import ControlSeat, SeatOutcome
 from lockstep.server.peers.channels import MAX_MESSAGE
-from tests.server.rig import PATIENCE, TestPeer, running_rig
+from tests.server.rig import PATIENCE, TestPeer, eventually, running_rig
 
 
 async def _id(peer: TestPeer) -> str:
@@ -214,13 +216,42 @@ async def test_malformed_messages_do_not_keep_the_seat() -> None:
                 await asyncio.sleep(0.1)
 
 
-async def test_reports_keep_the_seat() -> None:
+class _SeatClock:
+    """Time of the control seat, which passes when the test says so. Notes when silent holders were looked for."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        self.now = 1000.0
+        self.looked_at = 0.0
+        expire = ControlSeat.expire
+
+        def look(rules: ControlSeat, now: float) -> Iterator[SeatOutcome]:
+            yield from expire(rules, now)
+            self.looked_at = now
+
+        monkeypatch.setattr(ControlSeat, "expire", look)
+        monkeypatch.setattr("lockstep.server.control.seat_keeper.time", self)
+
+    def monotonic(self) -> float:
+        return self.now
+
+    async def passes(self, seconds: float) -> None:
+        self.now += seconds
+        await eventually(lambda: self.looked_at == self.now)
+
+
+async def test_reports_keep_the_seat(monkeypatch: pytest.MonkeyPatch) -> None:
+    clock = _SeatClock(monkeypatch)
     async with running_rig(seat_timeout=1.0) as rig, rig.peer("operator") as driver:
         await _take_seat(driver)
-        for _ in range(20):
-            driver.send("control", Report(event=1))
-            await asyncio.sleep(0.1)
-        assert (await rig.session())["seat"]["holder"] == await _id(driver)
+        [peer] = rig.webrtc_peers
+        for number in range(1, 6):
+            await clock.passes(0.9)
+            driver.send("control", Report(event=number))
+            await eventually(lambda wanted=number: peer.report.event == wanted)  # type: ignore[misc]
+        await clock.passes(0.9)
+        assert (await rig.session())["seat"]["holder"] == peer.id
+        await clock.passes(10.0)
+        await driver.until(lambda each: isinstance(each, Seat) and each.why == "heartbeat lost")
 
 
 async def test_bad_input_is_answered_and_counted_by_name_and_disturbs_nobody() -> None:

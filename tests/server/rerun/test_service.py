@@ -111,7 +111,6 @@ async def test_a_viewer_that_starts_later_gets_the_session(tmp_path: Path, monke
                 while last.event not in seen_so_far(path):
                     await operator.drive([0.1, 0.0, 0.0])
     assert before.event < last.event
-    assert last.event in entities(path)["/axes/measured"].column("event")
 
 
 async def driven_until_another_process_runs(rig: Rig, operator: TestPeer, ended: int) -> None:

@@ -3,10 +3,10 @@ from collections.abc import Callable
 
 import pytest
 
-from lockstep.robot_bridge.link.pacing.paced_reader import PacedReader
-from lockstep.robot_bridge.link.pacing.paced_socket import PacedSocket
+from lockstep.protocol.pacing.paced_reader import PacedReader
+from lockstep.protocol.pacing.paced_socket import PacedSocket
 from lockstep.server.util.read_turns import ReadTurns
-from tests.robot_bridge.link.pacing.tcp_socket import Socket
+from tests.protocol.pacing.tcp_socket import Socket
 
 
 class Time:

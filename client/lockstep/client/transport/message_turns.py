@@ -1,7 +1,8 @@
 """Reads the messages of a WebSocket in turns, so that a peer that sends without end holds up nobody else on the loop.
 
 Messages are handled for half of the loop's time at most, and at most `MOST` in a row. What is not read waits: at most
-`MAX_UNREAD` messages and one read of the socket here, then TCP lets the peer send no more.
+`MAX_UNREAD` messages, those of one more piece that `PacedConnection` parses, and one read of the socket; then TCP lets
+the peer send no more.
 """
 
 import asyncio

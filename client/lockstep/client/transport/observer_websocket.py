@@ -12,6 +12,7 @@ from websockets.exceptions import ConnectionClosed, WebSocketException
 from lockstep.client.console_url import ConsoleLink
 from lockstep.client.errors import ConnectFailed, ConsoleError, SignallingRefused
 from lockstep.client.transport.message_turns import MAX_UNREAD, in_turns
+from lockstep.client.transport.paced_connection import PacedConnection
 from lockstep.client.transport.packets import Packets
 from lockstep.client.transport.sdp import Section
 from lockstep.client.transport.transport import ChannelName
@@ -85,6 +86,7 @@ class ObserverWebSocket:
                 ping_interval=None,  # the reports serve as pings, and the console pings too
                 compression=None,
                 proxy=None if self._link.loopback else True,
+                create_connection=PacedConnection,
             )
         except (OSError, TimeoutError, ImportError, WebSocketException) as error:
             # ImportError: this kind of proxy needs a package that is not installed.

@@ -15,6 +15,7 @@ from lockstep.client.errors import ConnectFailed
 from lockstep.client.transport.endpoints import open_endpoint
 from lockstep.client.transport.media_sections import receiving
 from lockstep.client.transport.message_turns import MAX_UNREAD, in_turns
+from lockstep.client.transport.paced_connection import PacedConnection
 from lockstep.client.transport.packets import Packets
 from lockstep.client.transport.sdp import Section, read_sections
 from lockstep.protocol.console import StreamInfo
@@ -31,6 +32,7 @@ from lockstep.rtc.sdp import SdpError, SessionDescription, parse_description, wr
 __all__ = ["RelayMedia", "RelayTicket"]
 
 ANSWER_SECONDS = 10.0
+CLOSE_SECONDS = 1.0  # for the relay's own close frame
 KEEPALIVE_SECONDS = 25.0  # Janus forgets a session after 60 s
 SILENCE_SECONDS = 1.5  # without a message on the feedback channel; the console sends one there every 0.4 s
 HELD_UP_SECONDS, MOST_HELD_UP = 0.1, 3  # late by so much, this process was held up; forgiven so many times in a row
@@ -85,8 +87,11 @@ class RelayMedia:
                 open_timeout=ANSWER_SECONDS,
                 max_size=MAX_MESSAGE,
                 max_queue=MAX_UNREAD,
+                close_timeout=CLOSE_SECONDS,
                 ping_interval=None,
+                compression=None,  # a few short messages
                 proxy=None,
+                create_connection=PacedConnection,
             )
         except (OSError, TimeoutError, InvalidHandshake) as error:
             raise ConnectFailed(f"no relay at {self._ticket.url} ({error or type(error).__name__})") from error

@@ -18,10 +18,10 @@ from websockets.uri import parse_uri
 
 from lockstep.protocol.dial_in import TRUSTED, certificate_pin
 from lockstep.protocol.errors import SecretError
+from lockstep.protocol.pacing.paced_reader import PacedReader
+from lockstep.protocol.pacing.paced_socket import PacedSocket
 from lockstep.robot_bridge.dial.tcp_race import connect_first
 from lockstep.robot_bridge.errors import ConsoleRefused, ConsoleUnreachable, WrongConsole
-from lockstep.robot_bridge.link.pacing.paced_reader import PacedReader
-from lockstep.robot_bridge.link.pacing.paced_socket import PacedSocket
 from lockstep.robot_bridge.link.websocket_transport import WebSocketTransport
 
 __all__ = ["ConsoleConnection", "console_context", "open_connection"]

@@ -4,7 +4,7 @@ import asyncio
 import time
 from collections.abc import Callable
 
-from lockstep.robot_bridge.link.pacing.paced_reader import ReadBudget
+from lockstep.protocol.pacing.paced_reader import ReadBudget
 
 __all__ = ["ReadTurns"]
 

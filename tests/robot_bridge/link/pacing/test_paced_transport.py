@@ -4,11 +4,11 @@ import asyncio
 
 from lockstep.protocol.framing import frame
 from lockstep.protocol.messages import Feedback, Hello, LinkMessage, encode_message
+from lockstep.protocol.pacing.paced_reader import PIECE, READ_BURST, READ_TURN
 from lockstep.robot_bridge.link.link_session import BadInput, ClientSession
-from lockstep.robot_bridge.link.pacing.paced_reader import PIECE, READ_BURST, READ_TURN
 from lockstep.robot_bridge.link.pacing.paced_transport import PacedTransport
 from lockstep.robot_bridge.robots.planar.description import DESCRIPTION
-from tests.robot_bridge.link.pacing.tcp_socket import Socket
+from tests.protocol.pacing.tcp_socket import Socket
 
 HELLO = frame(encode_message(Hello(role="robot", epoch="e1", description=DESCRIPTION)))
 GARBAGE = b"\x00\x00\x00\x01\xc1"

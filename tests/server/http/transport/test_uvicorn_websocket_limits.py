@@ -11,7 +11,7 @@ from websockets.asyncio.client import connect
 from websockets.exceptions import ConnectionClosedError
 from websockets.frames import Frame, Opcode
 
-from lockstep.robot_bridge.link.pacing.paced_reader import PIECE
+from lockstep.protocol.pacing.paced_reader import PIECE
 from lockstep.server.http.transport import uvicorn_websocket_limits
 from lockstep.server.http.transport.uvicorn_websocket_limits import (
     FRAME_BURST,
@@ -193,7 +193,7 @@ async def test_whoever_may_say_little_is_refused_with_the_first_that_is_too_much
 async def test_a_link_gets_the_empty_frames_of_one_piece_in_a_turn_and_the_next_turn_comes_later(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr("lockstep.robot_bridge.link.pacing.paced_reader.READ_TURN", 1e-9)
+    monkeypatch.setattr("lockstep.protocol.pacing.paced_reader.READ_TURN", 1e-9)
     server, link = Server(), Link()
     (await server.accepted()).carry(link)
     server.connection.data_received(EMPTY * (READ // len(EMPTY)))

@@ -2,7 +2,6 @@
 
 import asyncio
 import socket
-import time
 from contextlib import AsyncExitStack
 from typing import Any
 
@@ -294,9 +293,8 @@ async def test_a_revoked_link_publishes_nothing_a_moment_later() -> None:
         assert (await publisher.post(rig.http, token)).status_code == 201
         await state(peer, "live", "published by Ada")
         await rig.http.delete(f"/api/invitations/{made.json()['id']}", headers=rig.token("supervisor"))
-        revoked = time.monotonic()
+        # It goes on publishing and has its consent, so nothing but the look at the links ends it.
         await state(peer, "waiting", "its publisher's link has ended")
-        assert time.monotonic() - revoked < 10  # it takes a look at the links, not an expiry of consent
         await eventually(lambda: not publishers(rig))
         assert rig.count("lockstep_whip_ended_total", why="link ended") == 1
         assert name(await post(rig, token)) == (401, "link_revoked")

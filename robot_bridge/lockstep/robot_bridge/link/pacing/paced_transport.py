@@ -5,9 +5,9 @@ import time
 from collections.abc import Callable
 from typing import cast
 
+from lockstep.protocol.pacing.paced_reader import PacedReader
 from lockstep.robot_bridge.link.link_session import LinkSession
 from lockstep.robot_bridge.link.link_transport import LinkTransport
-from lockstep.robot_bridge.link.pacing.paced_reader import PacedReader
 
 __all__ = ["PacedTransport"]
 

@@ -14,9 +14,9 @@ from websockets.frames import Frame
 from websockets.http11 import Request
 
 from lockstep.protocol.dial_in import DIAL
+from lockstep.protocol.pacing.paced_reader import READ_BURST, READ_SHARE, PacedReader
+from lockstep.protocol.pacing.paced_socket import PacedSocket
 from lockstep.robot_bridge.link.link_transport import LinkTransport
-from lockstep.robot_bridge.link.pacing.paced_reader import READ_BURST, READ_SHARE, PacedReader
-from lockstep.robot_bridge.link.pacing.paced_socket import PacedSocket
 from lockstep.robot_bridge.link.websocket_transport import WebSocketTransport
 from lockstep.rtc.token_bucket import TokenBucket
 from lockstep.server.http.robot_paths import below_robot

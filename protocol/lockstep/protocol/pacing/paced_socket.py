@@ -4,7 +4,7 @@ import asyncio
 from collections.abc import Iterable
 from typing import Any
 
-from lockstep.robot_bridge.link.pacing.paced_reader import PacedReader
+from lockstep.protocol.pacing.paced_reader import PacedReader
 
 __all__ = ["PacedSocket"]
 

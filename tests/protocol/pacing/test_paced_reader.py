@@ -5,7 +5,7 @@ import asyncio
 import pytest
 from websockets.protocol import Protocol, Side
 
-from lockstep.robot_bridge.link.pacing.paced_reader import (
+from lockstep.protocol.pacing.paced_reader import (
     PIECE,
     READ_BURST,
     READ_SHARE,
@@ -13,8 +13,8 @@ from lockstep.robot_bridge.link.pacing.paced_reader import (
     PacedReader,
     ReadBudget,
 )
-from lockstep.robot_bridge.link.pacing.paced_socket import PacedSocket
-from tests.robot_bridge.link.pacing.tcp_socket import Socket
+from lockstep.protocol.pacing.paced_socket import PacedSocket
+from tests.protocol.pacing.tcp_socket import Socket
 
 
 @pytest.mark.parametrize("seconds", [1.0, 10.0])

@@ -1,0 +1,1 @@
+"""Bounds the thread's time that a connection's data may take."""
