@@ -167,6 +167,7 @@ class DemonstratedPaths:
     The fingers say which: when they hold something, that to the bowl, else that to the block.
 
     Attributes:
+        phase: whose path it follows; None: it has to look
         done: it has opened the fingers over the bowl and gone up
     """
 
@@ -184,7 +185,7 @@ class DemonstratedPaths:
     def begin(self) -> None:
         """Look where things are, as after a correction."""
         self.done = False
-        self._phase: Phase | None = None
+        self.phase: Phase | None = None
         self._path: Array | None = None  # None: the fingers close or open first, and the tool stays
         self._block = Block(0.0, 0.0, 0.0)  # that the path leads to
         self._at, self._since = 0, 0.0  # the point that the tool is led to; s of the robot's clock
@@ -192,17 +193,17 @@ class DemonstratedPaths:
     def action(self, feedback: Feedback, block: Block) -> dict[str, float]:
         """Return where the fingers and the tool are to be, by axis; an axis that is not named stays."""
         pose = np.array(feedback.axes[TOOL])
-        if self._phase is None:
+        if self.phase is None:
             self._enter(self._phase_of(feedback, block), feedback)
         elif self._path is not None:
             self._follow(self._path, pose, feedback, block)
-        assert self._phase is not None
-        fingers = self._fingers[self._phase]
+        assert self.phase is not None
+        fingers = self._fingers[self.phase]
         if self._path is None:
             if abs((feedback.goals[GRIPPER] or 0.0) - fingers) > CLOSE:
                 self._since = feedback.time
             elif feedback.time - self._since >= SETTLES:
-                self._plan(self._phase, pose, block, feedback.time)
+                self._plan(self.phase, pose, block, feedback.time)
         if self._path is None:
             return {"gripper": fingers}
         return {"gripper": fingers} | dict(zip(POSE, self._path[self._at].tolist(), strict=True))
@@ -218,7 +219,7 @@ class DemonstratedPaths:
         return shut and feedback.axes[GRIPPER] > self._empty
 
     def _enter(self, phase: Phase, feedback: Feedback) -> None:
-        self._phase, self._path, self._since = phase, None, feedback.time
+        self.phase, self._path, self._since = phase, None, feedback.time
 
     def _plan(self, phase: Phase, pose: Array, block: Block, now: float) -> None:
         paths = [
@@ -236,11 +237,11 @@ class DemonstratedPaths:
             self._at, self._since = self._at + 1, feedback.time
         there = self._at == last and distance[last] < THERE
         waited = feedback.time - self._since
-        if self._phase == "carry" and not self._holds(feedback) or not there and waited > STUCK:
+        if self.phase == "carry" and not self._holds(feedback) or not there and waited > STUCK:
             self._enter("approach", feedback)
-        elif self._phase == "approach" and np.abs(np.subtract(block, self._block)).max() > MOVED:
-            self._plan(self._phase, pose, block, feedback.time)
-        elif there and waited >= SETTLES and self._phase == "leave":
+        elif self.phase == "approach" and np.abs(np.subtract(block, self._block)).max() > MOVED:
+            self._plan(self.phase, pose, block, feedback.time)
+        elif there and waited >= SETTLES and self.phase == "leave":
             self.done = True
         elif there and waited >= SETTLES:
-            self._enter("carry" if self._phase == "approach" else "leave", feedback)
+            self._enter("carry" if self.phase == "approach" else "leave", feedback)

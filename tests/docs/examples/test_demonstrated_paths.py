@@ -61,8 +61,8 @@ def followed(paths: ModuleType, block: object, place: tuple[float, float, float]
         held = max(fingers, HOLDS) if place[2] < 0.03 or fingers == SHUT else fingers
         action = policy.action(feedback(number * 0.04, place, held, fingers), block)
         fingers = action["gripper"]
-        place = tuple(action.get(f"tool.{name}", here) for name, here in zip("xyz", place, strict=True))  # type: ignore[assignment]
-        seen[policy._phase] = tuple(f"{each:.3f}" for each in place)
+        place = tuple(action.get(f"tool.{name}", here) for name, here in zip("xyz", place, strict=True))
+        seen[policy.phase] = tuple(f"{each:.3f}" for each in place)
         if policy.done:
             break
     return [(phase, *at) for phase, at in seen.items()], policy.done
