@@ -20,7 +20,16 @@ from demonstrated_paths import Block, DemonstratedPaths, block_of, read_demonstr
 from lockstep.bench.pick_place.hands import LEADER_SCALES, LeaderHand, PolicyHand
 from lockstep.bench.pick_place.motions import Place
 from lockstep.bench.pick_place.script import Hand, PickAndPlace
-from lockstep.client import ActionCancelled, ActionFailed, CommandRefused, Console, ConsoleError, EpisodeRefused
+from lockstep.client import (
+    ActionCancelled,
+    ActionFailed,
+    ActionRefused,
+    CommandRefused,
+    Console,
+    ConsoleError,
+    EpisodeRefused,
+    NotArmed,
+)
 from lockstep.client.console_url import parse_link
 from lockstep.protocol.messages import Feedback
 
@@ -77,8 +86,9 @@ async def reset(ada: Console) -> None:
             await armed(ada)
             await ada.act("home")
             break
-        except (ActionCancelled, ActionFailed, CommandRefused) as held_up:
-            print(f"once more to where the episode begins: {held_up}")
+        except (ActionCancelled, ActionFailed, ActionRefused, CommandRefused, NotArmed) as held_up:
+            print(f"once more to where the episode begins: {held_up}")  # it may not be at rest yet
+            await anext(aiter(ada.feedbacks()))
     before = said(ada, "scene")
     await ada.act("reset_scene")
     async for _ in ada.feedbacks():
