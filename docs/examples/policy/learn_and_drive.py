@@ -28,7 +28,6 @@ from lockstep.client import (
     Console,
     ConsoleError,
     EpisodeRefused,
-    NotArmed,
 )
 from lockstep.client.console_url import parse_link
 from lockstep.protocol.messages import Feedback
@@ -86,7 +85,7 @@ async def reset(ada: Console) -> None:
             await armed(ada)
             await ada.act("home")
             break
-        except (ActionCancelled, ActionFailed, ActionRefused, CommandRefused, NotArmed) as held_up:
+        except (ActionCancelled, ActionFailed, ActionRefused, CommandRefused) as held_up:
             print(f"once more to where the episode begins: {held_up}")  # it may not be at rest yet
             await anext(aiter(ada.feedbacks()))
     before = said(ada, "scene")
