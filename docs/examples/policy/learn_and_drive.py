@@ -1,6 +1,6 @@
-"""A policy learns from ten episodes, drives the SO-101, is corrected twice by a person, and learns again.
+"""A policy learns from ten recorded episodes, drives the SO-101, is corrected twice by a person, and learns again.
 
-    lockstep up --robot so101 --state-dir /tmp/policy
+    PYTHONPATH=docs/examples/policy lockstep up --robot varied_blocks:VariedBlocks --state-dir /tmp/policy
     python docs/examples/policy/learn_and_drive.py OPERATOR_LINK POLICY_LINK --recordings /tmp/policy
 
 All three drivers are scripts here: Ada demonstrates, the policy learns, Grace corrects (docs/policies.md).
@@ -9,31 +9,37 @@ All three drivers are scripts here: Ada demonstrates, the policy learns, Grace c
 import argparse
 import asyncio
 import sys
-from collections.abc import AsyncIterator, Callable, Mapping
+from collections.abc import AsyncIterator, Callable
 from contextlib import AsyncExitStack, asynccontextmanager
 from pathlib import Path
 from typing import Final
 
 import httpx
-from nearest_neighbour import NearestNeighbour, read_demonstrations
+from demonstrated_paths import Block, DemonstratedPaths, block_of, read_demonstrations
 
-from lockstep.bench.pick_place.hands import JOINTS, LEADER_SCALES, LeaderHand, PolicyHand
-from lockstep.bench.pick_place.script import PickAndPlace
-from lockstep.client import ActionCancelled, ActionFailed, CommandRefused, Console, ConsoleError, GoalNotReached
+from lockstep.bench.pick_place.hands import LEADER_SCALES, LeaderHand, PolicyHand
+from lockstep.bench.pick_place.motions import Place
+from lockstep.bench.pick_place.script import Hand, PickAndPlace
+from lockstep.client import (
+    ActionCancelled,
+    ActionFailed,
+    ActionRefused,
+    CommandRefused,
+    Console,
+    ConsoleError,
+    EpisodeRefused,
+)
 from lockstep.client.console_url import parse_link
 from lockstep.protocol.messages import Feedback
 
-BLOCK: Final = "red"
 TASK: Final = "put the red block into the bowl"
 PASSING: Final = ("late", "link_down", "not_neutral", "out_of_order", "rested")  # a busy machine held somebody up
 LANDS_SECONDS: Final = 15.0
 DRIVE_SECONDS: Final = 240.0
 ALL_MOTIONS: Final = 9
 TRIAL_SECONDS: Final = 60.0  # of the robot's clock, in which the policy has to get to the end
-CORRECTED_AFTER: Final = 2.0  # s of the robot's clock: Grace sees where the policy goes
+CORRECTED_AFTER: Final = 1.0  # s of the robot's clock: Grace sees where the policy goes
 APPROACH: Final = 2  # motions that she does: opens the fingers, and goes above the block
-# rad: where the arm begins. Ada demonstrates from the first place alone.
-BEGINS: Final = ({"shoulder_pan": 0.0}, {"shoulder_pan": 0.8, "shoulder_lift": 0.2}, {"shoulder_pan": -0.9})
 
 
 async def armed(console: Console) -> Feedback:
@@ -47,32 +53,52 @@ async def armed(console: Console) -> Feedback:
         await anext(aiter(console.feedbacks()))
 
 
-async def blocks_in_bowl(console: Console, count: int) -> bool:
-    """Wait until the robot says that so many blocks lie in the bowl."""
+def said(console: Console, name: str) -> float | None:
+    """Return what the robot says of itself under this name."""
+    return next((float(item.value) for item in console.status if item.name == name), None)
+
+
+def block_at(console: Console) -> Block:
+    """Return where the robot says that the block lies."""
+    if (block := block_of(console.status)) is None:
+        raise ConsoleError("this robot does not say where the block is: start varied_blocks:VariedBlocks")
+    return block
+
+
+async def block_in_bowl(console: Console) -> bool:
+    """Wait until the robot says that a block lies in the bowl."""
     try:
         async with asyncio.timeout(LANDS_SECONDS):
             async for _ in console.feedbacks():
-                if any(item.name == "bowl" and item.value == count for item in console.status):
+                if said(console, "bowl") == 1:
                     return True
     except TimeoutError:
         pass
     return False
 
 
-async def reset(ada: Console, begins: Mapping[str, float]) -> None:
-    """Bring the arm and the blocks to where an episode begins: a policy may not, so a person does."""
+async def reset(ada: Console) -> None:
+    """Bring the arm home and the block to another place: a policy may not, so a person does."""
     await ada.take_over()
     while True:
         try:
             await armed(ada)
             await ada.act("home")
-            await ada.move_to(begins)
             break
-        except (ActionCancelled, ActionFailed, CommandRefused, GoalNotReached) as held_up:
-            print(f"once more to where the episode begins: {held_up}")
+        except (ActionCancelled, ActionFailed, ActionRefused, CommandRefused) as held_up:
+            print(f"once more to where the episode begins: {held_up}")  # it may not be at rest yet
+            await anext(aiter(ada.feedbacks()))
+    before = said(ada, "scene")
     await ada.act("reset_scene")
-    await blocks_in_bowl(ada, 0)
+    async for _ in ada.feedbacks():
+        if said(ada, "scene") != before:
+            break
     await ada.rest()
+
+
+def task_of(person: Console, hand: Hand) -> PickAndPlace:
+    """Return what a person does, who sees the block."""
+    return PickAndPlace(person.description, "red", hand, Place(*block_at(person)))
 
 
 async def operate(person: Console, task: PickAndPlace, motions: int) -> None:
@@ -90,16 +116,25 @@ async def operate(person: Console, task: PickAndPlace, motions: int) -> None:
 
 async def demonstrate(ada: Console) -> bool:
     """Drive one episode as a person; keep it, and return whether the block is in the bowl."""
-    await reset(ada, BEGINS[0])
+    await reset(ada)
     await ada.episodes.start(TASK)
-    task = PickAndPlace(ada.description, BLOCK, PolicyHand(ada.description))
+    task = task_of(ada, PolicyHand(ada.description))
     await operate(ada, task, ALL_MOTIONS)
-    placed = task.done and await blocks_in_bowl(ada, 1)
-    await ada.episodes.keep("success" if placed else "failure")
+    placed = task.done and await block_in_bowl(ada)
+    return await kept(ada, placed)
+
+
+async def kept(person: Console, placed: bool) -> bool:
+    """Keep the episode; return whether it is a success that was kept."""
+    try:
+        await person.episodes.keep("success" if placed else "failure")
+    except EpisodeRefused as refused:  # a busy machine has lost it, with the robot's link
+        print(f"the episode was lost: {refused}; {person.episodes.state.last}")
+        return False
     return placed
 
 
-async def drive_when_let(net: Console, policy: NearestNeighbour) -> None:
+async def drive_when_let(net: Console, policy: DemonstratedPaths) -> None:
     """Drive in each turn that a person gives, until cancelled; a policy arms as anybody does."""
     while True:
         await net.policies.seat()
@@ -107,8 +142,7 @@ async def drive_when_let(net: Console, policy: NearestNeighbour) -> None:
         try:
             feedback = await net.arm()
             while True:
-                action = policy.action(feedback)
-                feedback = await net.drive(dict(zip(JOINTS, action, strict=True)))
+                feedback = await net.drive(policy.action(feedback, block_at(net)))
         except CommandRefused as refused:
             if refused.reason not in ("no_seat", *PASSING):
                 raise
@@ -116,18 +150,18 @@ async def drive_when_let(net: Console, policy: NearestNeighbour) -> None:
             net.release_seat()  # the robot needs a person's eye: a new turn is theirs to give
 
 
-async def shadow(net: Console, policy: NearestNeighbour) -> None:
+async def shadow(net: Console, policy: DemonstratedPaths) -> None:
     """Say what the policy would do while a person drives, until cancelled. Nothing of it is executed."""
     async for feedback in net.feedbacks():
         if net.seat.kind == "human":
-            net.policies.shadow(dict(zip(JOINTS, policy.action(feedback), strict=True)), feedback)
+            net.policies.shadow(policy.action(feedback, block_at(net)), feedback)
 
 
 async def correct(grace: Console) -> None:
     """Take the robot from the policy, bring it above the block with a leader arm's clutch, and give it back."""
     await grace.take_over()
     hand = LeaderHand(grace.description, grace.clutch(LEADER_SCALES))
-    await operate(grace, PickAndPlace(grace.description, BLOCK, hand), APPROACH)
+    await operate(grace, task_of(grace, hand), APPROACH)
     hand.clutch.release()
     await grace.policies.offer()
 
@@ -151,14 +185,12 @@ async def until(giver: Console, net: Console, enough: Callable[[float], bool]) -
                 raise ConsoleError(f"the policy's turn has ended: {net.seat.why}")
 
 
-async def let_drive(
-    ada: Console, net: Console, policy: NearestNeighbour, begins: Mapping[str, float], grace: Console | None = None
-) -> bool:
+async def let_drive(ada: Console, net: Console, policy: DemonstratedPaths, grace: Console | None = None) -> bool:
     """Let the policy drive one episode, corrected by Grace if she is there; return whether the block is in the bowl."""
-    await reset(ada, begins)
+    await reset(ada)
     await ada.episodes.start(TASK)
-    policy.progress = 0.0
-    thinking = NearestNeighbour(policy.demonstrations)  # a shadow has a place of its own
+    policy.begin()
+    thinking = DemonstratedPaths(policy.demonstrations)  # a shadow has a place of its own
     async with asyncio.TaskGroup() as tasks:
         running = [tasks.create_task(drive_when_let(net, policy)), tasks.create_task(shadow(net, thinking))]
         await ada.policies.offer(net.peer)
@@ -167,22 +199,21 @@ async def let_drive(
             await until(ada, net, lambda seconds: seconds > CORRECTED_AFTER)
             await correct(grace)
             giver = grace
-        await until(giver, net, lambda seconds: policy.progress >= 1.0 or seconds > TRIAL_SECONDS)
-        placed = await blocks_in_bowl(giver, 1)
-        await giver.episodes.keep("success" if placed else "failure")
+        await until(giver, net, lambda seconds: policy.done or seconds > TRIAL_SECONDS)
+        placed = await kept(giver, await block_in_bowl(giver))
         giver.policies.withdraw()
         for task in running:
             task.cancel()
     return placed
 
 
-async def tried(ada: Console, net: Console, policy: NearestNeighbour, trials: int) -> str:
-    """Let the policy drive alone so often from each place; return its successes in words."""
-    found = []
-    for begins in BEGINS:
-        placed = [await let_drive(ada, net, policy, begins) for _ in range(trials)]
-        found.append(f"{sum(placed)} of {trials} from {begins}")
-    return ", ".join(found)
+async def tried(ada: Console, net: Console, policy: DemonstratedPaths, trials: int) -> str:
+    """Let the policy drive alone so often; return its successes in words."""
+    placed = []
+    for _ in range(trials):
+        placed.append(await let_drive(ada, net, policy))
+        print(f"alone: {'in the bowl' if placed[-1] else 'not in the bowl'}")
+    return f"{sum(placed)} of {trials}"
 
 
 @asynccontextmanager
@@ -206,20 +237,20 @@ async def main(operator: str, policy_link: str, folder: Path, episodes: int, tri
         http.headers["Authorization"] = f"Bearer {link.token}"
         ada, grace, net = [
             await stack.enter_async_context(Console(each, video=False, audio=False, name=name, connect_seconds=60.0))
-            for each, name in ((operator, "Ada"), (operator, "Grace"), (policy_link, "nearest neighbour"))
+            for each, name in ((operator, "Ada"), (operator, "Grace"), (policy_link, "demonstrated paths"))
         ]
         await ada.take_seat()
         async with recording(http, folder, "demonstrations") as demonstrated:
             for number in range(episodes):
                 print(f"episode {number + 1}: {'in the bowl' if await demonstrate(ada) else 'not in the bowl'}")
-        policy = NearestNeighbour(read_demonstrations(demonstrated[0], len(JOINTS)))
+        policy = DemonstratedPaths(read_demonstrations(demonstrated[0]))
         if trials:
             async with recording(http, folder, "policy, alone"):
                 print(f"alone, before any correction: {await tried(ada, net, policy, trials)}")
         async with recording(http, folder, "policy, corrected") as driven:
-            placed = [await let_drive(ada, net, policy, begins, grace) for begins in BEGINS[1 : 1 + corrections]]
+            placed = [await let_drive(ada, net, policy, grace) for _ in range(corrections)]
         print(f"corrected once in each of {len(placed)} episodes: {sum(placed)} in the bowl")
-        policy = NearestNeighbour([*policy.demonstrations, *read_demonstrations(driven[0], len(JOINTS))])
+        policy = DemonstratedPaths([*policy.demonstrations, *read_demonstrations(driven[0])])
         print(f"it learns again, from {len(policy.demonstrations)} episodes")
         if trials:
             async with recording(http, folder, "policy, alone again"):
@@ -233,8 +264,8 @@ if __name__ == "__main__":
     parser.add_argument("policy", help="a link of the role policy: lockstep invite --role policy")
     parser.add_argument("--recordings", type=Path, required=True, help="the folder in which the console records")
     parser.add_argument("--episodes", type=int, default=10, help="demonstrations to learn from")
-    parser.add_argument("--trials", type=int, default=2, help="before and after the corrections, from each place")
-    parser.add_argument("--corrections", type=int, default=2, help="episodes in which Grace takes over, 1 or 2")
+    parser.add_argument("--trials", type=int, default=10, help="before and after the corrections")
+    parser.add_argument("--corrections", type=int, default=2, help="episodes in which Grace takes over")
     wanted = parser.parse_args()
     given = (wanted.operator, wanted.policy, wanted.recordings, wanted.episodes, wanted.trials, wanted.corrections)
     try:

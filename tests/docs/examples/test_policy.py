@@ -19,6 +19,7 @@ from tests.support.stack import running_stack
 SCRIPT = Path(__file__).parents[3] / "docs/examples/policy/learn_and_drive.py"
 SETTINGS = {
     "SO101_MODEL_FOLDER": str(MODEL_FOLDER),
+    "PYTHONPATH": str(SCRIPT.parent),
     "LOCKSTEP_SCENE": "false",
     "LOCKSTEP_EPISODES__COUNTDOWN_SECONDS": "0",
     "LOCKSTEP_SEAT_TIMEOUT": "30",  # a busy machine may hold the script up
@@ -29,7 +30,7 @@ async def said_by(folder: Path, *options: str) -> str:
     """Run the script beside a console and an arm; return what it printed."""
     if not (MODEL_FOLDER / ".installed").is_file():
         pytest.skip("the model of the SO-101 is not here; `make test` fetches it")
-    async with running_stack(folder, robot="so101", settings=SETTINGS) as stack:
+    async with running_stack(folder, robot="varied_blocks:VariedBlocks", settings=SETTINGS) as stack:
         command = [sys.executable, str(SCRIPT), stack.operator, await policy_link(stack, "net")]
         command += ["--recordings", str(folder), *options]
         script = await asyncio.create_subprocess_exec(
@@ -58,22 +59,24 @@ async def test_a_policy_learns_drives_is_corrected_and_learns_of_the_correction(
     learned, driven = [await asyncio.to_thread(told_of_policies, each) for each in recordings]
     assert learned == ""
     assert re.search(r"1 interventions in [\d.]+ minutes of .* policy drove: [\d.]+ a minute", driven)
-    assert re.search(r"nearest neighbour policy \d+ [\d.]+ 0 0 ", driven)
+    assert re.search(r"demonstrated paths policy \d+ [\d.]+ 0 0 ", driven)
     assert re.search(r"Grace human \d+ [\d.]+ 1 \d+ ", driven)
-    assert "policy nearest neighbour corrected 1 0 0 100 %" in driven
-    assert re.search(r"nearest neighbour \d+ (in time|\w).* [1-9]\d* \d+ %", driven), "the shadow beside a person"
+    assert "policy demonstrated paths corrected 1 0 0 100 %" in driven
+    assert re.search(r"demonstrated paths \d+ (in time|\w).* [1-9]\d* \d+ %", driven), "the shadow beside a person"
 
 
 @pytest.mark.long
 @pytest.mark.timeout(3000)
 async def test_a_policy_learns_from_ten_episodes_and_again_from_two_corrected_ones(tmp_path: Path) -> None:
-    said = await said_by(tmp_path, "--trials", "1")
+    said = await said_by(tmp_path, "--trials", "3")
     assert len(re.findall(r"^episode \d+: ", said, re.MULTILINE)) == 10
-    told = r"\d of 1 from .*, \d of 1 from .*, \d of 1 from .*"  # a busy machine lets the arm rest, and the block fall
-    assert re.search(rf"alone, before any correction: {told}", said)
+    before = re.search(r"alone, before any correction: (\d) of 3", said)
+    after = re.search(r"alone, after the corrections: (\d) of 3", said)
+    assert before is not None
+    assert after is not None
+    assert int(before[1]) + int(after[1]) >= 4, said  # a busy machine may lose an episode
     assert re.search(r"corrected once in each of 2 episodes: \d in the bowl", said)
     assert re.search(r"it learns again, from \d+ episodes", said)
-    assert re.search(rf"alone, after the corrections: {told}", said)
 
 
 def told_of_policies(recording: Path) -> str:

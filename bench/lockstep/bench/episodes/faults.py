@@ -9,7 +9,6 @@ import os
 import secrets
 import shutil
 import signal
-import subprocess
 from collections.abc import AsyncIterator, Awaitable, Callable, Mapping
 from contextlib import AsyncExitStack, asynccontextmanager, suppress
 from dataclasses import dataclass, field
@@ -18,6 +17,7 @@ from typing import Any, Final, Literal, get_args
 
 from lockstep.bench.episodes.dataset import Kept, export, judged
 from lockstep.bench.episodes.session import drivers, visit
+from lockstep.bench.episodes.small_disk import small_disk
 from lockstep.bench.episodes.turns import Turn
 from lockstep.bench.episodes.visits import places_near
 from lockstep.bench.harness.processes import Running, started
@@ -125,12 +125,10 @@ async def run_fault(fault: FaultName, say: Callable[[str], None]) -> dict[str, A
         if not root.exists():
             said = await export(sorted(recordings.glob("*.mcap")), root)
             run.wrong += [f"export: {said}"] if said else []
-        found: dict[str, Any] = {}
-        if root.exists():
-            found = await judged(root, run.kept)
-            if found["wrong"] and run.perhaps:
-                found = await judged(root, [*run.kept, *run.perhaps])
-            run.wrong += found["wrong"]
+        found: dict[str, Any] = await judged(root, run.kept) if root.exists() else {}
+        if found.get("wrong") and run.perhaps:
+            found = await judged(root, [*run.kept, *run.perhaps])
+        run.wrong += found.get("wrong", [])
         halves = [each.name for each in run.folder.glob("**/meta/info.json") if each.parent.parent != root]
         run.wrong += [f"a half-written dataset at {each}" for each in halves]
     figures = {
@@ -155,7 +153,7 @@ async def _running(fault: FaultName) -> AsyncIterator[_Run]:
         folder = bridge.event_log.parent
         if fault in ("disk-low", "disk-full"):
             (folder / "recordings").mkdir()
-            stack.enter_context(_small_disk(folder / "recordings"))
+            stack.enter_context(small_disk(folder / "recordings", DISK_BYTES))
         settings = {
             "LOCKSTEP_STATE_DIR": str(folder),
             "LOCKSTEP_SECRET": secrets.token_urlsafe(32),
@@ -167,20 +165,6 @@ async def _running(fault: FaultName) -> AsyncIterator[_Run]:
         console, links = await stack.enter_async_context(running_console(bridge.address, environment=settings))
         [driver] = await stack.enter_async_context(drivers([("Ada", links["operator"])], pictures=False))
         yield _Run(fault, folder, bridge, console, driver)
-
-
-class _small_disk:
-    """A tmpfs on a folder. Needs the right to mount."""
-
-    def __init__(self, folder: Path) -> None:
-        self._folder = folder
-
-    def __enter__(self) -> None:
-        size = f"size={DISK_BYTES}"
-        subprocess.run(("mount", "-t", "tmpfs", "-o", size, "lockstep-bench", str(self._folder)), check=True)
-
-    def __exit__(self, *_: object) -> None:
-        subprocess.run(("umount", "-l", str(self._folder)), check=True)
 
 
 async def _kill_countdown(run: _Run) -> None:

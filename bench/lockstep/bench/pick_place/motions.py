@@ -4,7 +4,7 @@ import math
 from collections.abc import Iterator, Mapping
 from typing import Final, NamedTuple
 
-__all__ = ["BLOCKS", "POSITION", "ROTATION", "Motion", "motions"]
+__all__ = ["BLOCKS", "POSITION", "ROTATION", "Motion", "Place", "motions"]
 
 
 class Place(NamedTuple):
@@ -35,9 +35,9 @@ class Motion(NamedTuple):
     must_arrive: bool  # the tool, measured
 
 
-def motions(name: str) -> Iterator[Motion]:
-    """Yield the motions for the block of this name, one of BLOCKS."""
-    block, bowl = BLOCKS[name], IN_BOWL[name]
+def motions(name: str, place: Place | None = None) -> Iterator[Motion]:
+    """Yield the motions for the block of this name, one of BLOCKS. `place`: None: where the scene begins."""
+    block, bowl = place or BLOCKS[name], IN_BOWL[name]
     facing = math.atan2(block.y, block.x - AXIS)
     quarter = math.pi / 2
     aligned = (block.yaw - facing + quarter / 2) % quarter - quarter / 2 + facing

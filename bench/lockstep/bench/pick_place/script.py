@@ -10,7 +10,7 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Final, Protocol, TypeVar
 
-from lockstep.bench.pick_place.motions import POSITION, ROTATION, Motion, motions
+from lockstep.bench.pick_place.motions import POSITION, ROTATION, Motion, Place, motions
 from lockstep.protocol.description import RobotDescription
 from lockstep.protocol.messages import Feedback
 
@@ -74,12 +74,14 @@ class PickAndPlace:
         failed: what went wrong; "" as long as nothing did
     """
 
-    def __init__(self, description: RobotDescription, block: str, hand: Hand | None = None) -> None:
-        """`block`: one of BLOCKS. `hand`: None: the tool's pose is driven."""
+    def __init__(
+        self, description: RobotDescription, block: str, hand: Hand | None = None, place: Place | None = None
+    ) -> None:
+        """`block`: one of BLOCKS. `hand`: None: the tool's pose is driven. `place`: None: where the scene begins."""
         self._description = description
         self._index = {axis.name: number for number, axis in enumerate(description.axes)}
         self._hand = ToolHand(description) if hand is None else hand
-        self._motions = motions(block)
+        self._motions = motions(block, place)
         self._motion = next(self._motions, None)  # the present one
         self._begun: float | None = None  # s, of the robot's clock
         self._there: float | None = None

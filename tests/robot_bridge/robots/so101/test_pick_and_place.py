@@ -5,13 +5,14 @@ import math
 import pytest
 
 from lockstep.bench.pick_place import BLOCKS, PickAndPlace
+from lockstep.bench.pick_place.motions import Place
 from tests.robot_bridge.robots.so101.driver import ArmDriver
 
 EVENTS = 2000
 
 
-def play(arm: ArmDriver, block: str) -> PickAndPlace:
-    task = PickAndPlace(arm.description, block)
+def play(arm: ArmDriver, block: str, place: Place | None = None) -> PickAndPlace:
+    task = PickAndPlace(arm.description, block, place=place)
     feedback = arm.feedback
     for _ in range(EVENTS):
         if task.done or task.failed:
@@ -26,6 +27,16 @@ def test_a_block_is_put_into_the_bowl_within_the_axes_reach(arm: ArmDriver, bloc
     assert task.done, task.failed
     assert arm.reached
     assert arm.robot.simulation.blocks_in_bowl() == 1
+
+
+def test_a_block_that_was_put_elsewhere_is_put_into_the_bowl_from_there(arm: ArmDriver) -> None:
+    simulation = arm.robot.simulation
+    simulation.put("red_block", (0.19, -0.11, 0.014), -0.6)
+    assert simulation.turn("red_block") == pytest.approx(-0.6)
+    assert simulation.place("red_block") == pytest.approx((0.19, -0.11, 0.014))
+    task = play(arm, "red", Place(0.19, -0.11, -0.6))
+    assert task.done, task.failed
+    assert simulation.blocks_in_bowl() == 1
 
 
 def test_ten_of_ten_blocks_end_in_the_bowl_three_of_them_beside_each_other(arm: ArmDriver) -> None:

@@ -1,6 +1,7 @@
 """The physics: the model, its state, and the places of the arm's parts in MuJoCo's arrays."""
 
 import logging
+import math
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Final
@@ -65,6 +66,14 @@ class Simulation:
             self.data.qvel[speed : speed + 6] = 0.0
         mujoco.mj_forward(self.model, self.data)
 
+    def put(self, body: str, position: Sequence[float], turn: float) -> None:
+        """Put a block or the bowl there (m), turned about the vertical (rad), at rest."""
+        joint = self.model.body_jntadr[self._things[body]]
+        place, speed = self.model.jnt_qposadr[joint], self.model.jnt_dofadr[joint]
+        self.data.qpos[place : place + 7] = (*position, math.cos(turn / 2), 0.0, 0.0, math.sin(turn / 2))
+        self.data.qvel[speed : speed + 6] = 0.0
+        mujoco.mj_forward(self.model, self.data)
+
     def aim(self, goals: Sequence[float] | Array, rates: Array) -> None:
         """Give the servos their goals (rad), which move by `rates` (rad/s).
 
@@ -99,6 +108,11 @@ class Simulation:
     def place(self, body: str) -> Array:
         """Return where a block or the bowl is, m."""
         return self.data.xpos[self._things[body]].copy()  # type: ignore[no-any-return]
+
+    def turn(self, body: str) -> float:
+        """Return how a block or the bowl is turned about the vertical, rad."""
+        matrix = self.data.xmat[self._things[body]].tolist()
+        return math.atan2(matrix[3], matrix[0])
 
     def blocks_in_bowl(self) -> int:
         """Return how many blocks lie in the bowl."""
