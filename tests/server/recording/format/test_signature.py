@@ -28,6 +28,7 @@ from lockstep.server.recording.reading.scan import complete_file
 from lockstep.server.recording.verify.promises import Verdict
 from lockstep.server.recording.verify.verify_file import verify_file
 from tests.server.recording.makers import INFO, Story
+from tests.server.recording.verify.forging import remade
 
 EVENTS = 150
 KEY = Signer(Ed25519PrivateKey.generate())
@@ -267,35 +268,6 @@ def _raw(opcode: Opcode, record: McapRecord) -> RawRecord:
     builder = RecordBuilder()
     record.write(builder)
     return RawRecord(opcode, 0, builder.end()[9:])
-
-
-def remade(path: Path, further: list[RawRecord], change: Callable[[RawRecord], RawRecord] = lambda raw: raw) -> None:
-    """Other records of the same length, and `further` ones at the end of the data.
-
-    Offsets and checksum of the summary are made to fit by who has no key.
-    """
-
-    def written(records: list[RawRecord]) -> bytes:
-        return b"".join(bytes([raw.opcode]) + len(raw.content).to_bytes(8, "little") + raw.content for raw in records)
-
-    def moved(offset: bytes) -> bytes:
-        return (int.from_bytes(offset, "little") + len(written(further))).to_bytes(8, "little")
-
-    with path.open("rb") as file:
-        file.seek(len(MAGIC))
-        *records, footer = raw_records(file)
-    records = [change(raw) for raw in records]
-    end = next(number for number, raw in enumerate(records) if raw.opcode == Opcode.DATA_END)
-    summary = [
-        raw._replace(content=raw.content[:1] + moved(raw.content[1:9]) + raw.content[9:])
-        if raw.opcode == Opcode.SUMMARY_OFFSET
-        else raw
-        for raw in records[end + 1 :]
-    ]
-    last = footer._replace(content=moved(footer.content[:8]) + moved(footer.content[8:16]) + footer.content[16:])
-    checked = written([*summary, last])[:-4]
-    front = written([*records[:end], *further, records[end]])
-    path.write_bytes(MAGIC + front + checked + zlib.crc32(checked).to_bytes(4, "little") + MAGIC)
 
 
 def _message(block: Block) -> Message:

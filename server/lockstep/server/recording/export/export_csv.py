@@ -5,6 +5,7 @@ from pathlib import Path
 
 from lockstep.server.recording.episodes.edits import edited, read_edits
 from lockstep.server.recording.export.lerobot_rows import episodes_of
+from lockstep.server.recording.export.unfinished import unfinished_file
 from lockstep.server.recording.format.topics import stream_of
 from lockstep.server.recording.reading.event_rows import columns_of, event_rows, values_of
 from lockstep.server.recording.reading.reader import RecordingReader
@@ -15,8 +16,11 @@ __all__ = ["export"]
 def export(path: Path, out: Path | None, task: str) -> list[Path]:
     """Write and return the file: `out`, or one beside `path`. Raises RecordingError, OSError."""
     target = out or path.with_suffix(".csv")
-    target.parent.mkdir(parents=True, exist_ok=True)
-    with RecordingReader(path) as reader, target.open("w", newline="", encoding="utf-8") as file:
+    with (
+        RecordingReader(path) as reader,
+        unfinished_file(target) as partial,
+        partial.open("w", newline="", encoding="utf-8") as file,
+    ):
         description = reader.description()
         episodes = edited(episodes_of(reader), read_edits(path))
         has_episodes = bool(episodes)

@@ -18,6 +18,7 @@ from lockstep.server.recording.episodes.edits import edited, read_edits
 from lockstep.server.recording.errors import RecordingDamaged
 from lockstep.server.recording.export.export_sound import sound_writer
 from lockstep.server.recording.export.lerobot_rows import episodes_of
+from lockstep.server.recording.export.unfinished import unfinished_file
 from lockstep.server.recording.format.episodes import EpisodeEntry
 from lockstep.server.recording.format.payload import SOUND, RecordedPicture, RecordedSound
 from lockstep.server.recording.format.records import Degraded
@@ -71,8 +72,8 @@ def export(path: Path, out: Path | None, task: str) -> list[Path]:
             target = _target(path, out, topic.removeprefix(CAMERA), len(cameras) == 1)
             while target in written:  # names that differ only in characters that file names lack
                 target = target.with_stem(f"{target.stem}_")
-            target.parent.mkdir(parents=True, exist_ok=True)
-            _write(reader, topic, sound, target, episodes)
+            with unfinished_file(target) as partial:
+                _write(reader, topic, sound, partial, episodes)
             written.append(target)
         return written
 

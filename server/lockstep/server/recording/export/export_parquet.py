@@ -8,6 +8,7 @@ import pyarrow.parquet as pq
 
 from lockstep.server.recording.episodes.edits import edited, read_edits
 from lockstep.server.recording.export.lerobot_rows import episodes_of
+from lockstep.server.recording.export.unfinished import unfinished_file
 from lockstep.server.recording.format.topics import stream_of
 from lockstep.server.recording.reading.event_rows import columns_of, event_rows, values_of
 from lockstep.server.recording.reading.reader import RecordingReader
@@ -21,7 +22,6 @@ TYPES = {int: pa.int64(), float: pa.float64(), bool: pa.bool_(), str: pa.string(
 def export(path: Path, out: Path | None, task: str) -> list[Path]:
     """Write and return the file: `out`, or one beside `path`. Raises RecordingError, OSError."""
     target = out or path.with_suffix(".parquet")
-    target.parent.mkdir(parents=True, exist_ok=True)
     with RecordingReader(path) as reader:
         description = reader.description()
         episodes = edited(episodes_of(reader), read_edits(path))
@@ -33,7 +33,7 @@ def export(path: Path, out: Path | None, task: str) -> list[Path]:
         ]
         schema = pa.schema(fields, metadata=metadata)
         rows = (values_of(row, description, streams, has_episodes=has_episodes) for row in event_rows(reader, episodes))
-        with pq.ParquetWriter(target, schema) as writer:
+        with unfinished_file(target) as partial, pq.ParquetWriter(partial, schema) as writer:
             while group := list(islice(rows, ROWS)):
                 columns = [list(column) for column in zip(*group, strict=True)]
                 writer.write_table(pa.table(columns, schema=schema))

@@ -4,6 +4,7 @@ from pathlib import Path
 
 from lockstep.server.recording.errors import RecordingDamaged
 from lockstep.server.recording.export.rerun.session_log import Moment, SessionLog, new_stream
+from lockstep.server.recording.export.unfinished import unfinished_file
 from lockstep.server.recording.format.payload import own_record_of
 from lockstep.server.recording.format.records import ReportRecord, TraceRecord
 from lockstep.server.recording.format.topics import CAMERA, OWN_TOPICS, SIGNATURE, WRENCH
@@ -18,10 +19,13 @@ READ = set(OWN_TOPICS.values()) - UNUSED
 def export(path: Path, out: Path | None, task: str) -> list[Path]:
     """Write and return the file: `out`, or one beside `path`. Raises RecordingError, OSError."""
     target = out or path.with_suffix(".rrd")
-    target.parent.mkdir(parents=True, exist_ok=True)
-    with RecordingReader(path) as reader, target.open("wb"):  # an OSError here says what Rerun would only log
+    with (
+        RecordingReader(path) as reader,
+        unfinished_file(target) as partial,
+        partial.open("wb"),  # an OSError here says what Rerun would only log
+    ):
         stream = new_stream(reader.info.recording, reader.info.epoch)
-        stream.save(str(target))
+        stream.save(str(partial))
         try:
             _write(reader, SessionLog(stream))
             stream.flush()

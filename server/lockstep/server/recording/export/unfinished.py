@@ -1,4 +1,4 @@
-"""Folders of exports that are not finished. Each is held by a lock: what a killed export leaves is known by that.
+"""Exports that are not finished. A folder of each is held by a lock: what a killed export leaves is known by that.
 
 `.NAME.partial-XXXXXXXX/` beside the export's place has the file `lockstep-export.lock` and the export itself. The lock
 of a process ends with it, however it ends, so a folder whose lock is free has no owner. A folder without that file is
@@ -14,7 +14,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-__all__ = ["LOCK", "remove_stale", "stale_folders", "unfinished"]
+__all__ = ["LOCK", "remove_stale", "stale_folders", "unfinished", "unfinished_file"]
 
 LOCK = "lockstep-export.lock"
 FOLDER = re.compile(r"\.(?P<name>.+)\.partial-\w+")
@@ -43,6 +43,20 @@ def unfinished(target: Path) -> Iterator[Path]:
     except BaseException:
         shutil.rmtree(folder, ignore_errors=True)
         raise
+
+
+@contextmanager
+def unfinished_file(target: Path) -> Iterator[Path]:
+    """As `unfinished`, for one file: it takes the place of a file of its name, and of none before it is whole.
+
+    A link stays, and the file that it leads to is replaced. What is no file, such as `/dev/stdout`, is written itself.
+    """
+    place = target.resolve() if target.is_symlink() else target
+    if place.exists() and not (place.is_file() or place.is_dir()):
+        yield place
+        return
+    with unfinished(place) as partial:
+        yield partial
 
 
 def stale_folders(directory: Path, name: str | None = None) -> list[Path]:

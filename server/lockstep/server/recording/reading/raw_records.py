@@ -6,8 +6,9 @@ from collections.abc import Iterator
 from typing import BinaryIO, NamedTuple
 
 from mcap.exceptions import McapError
-from mcap.records import Chunk, McapRecord
-from mcap.stream_reader import CRCValidationError, breakup_chunk
+from mcap.opcode import Opcode
+from mcap.records import Chunk, McapRecord, Message, MessageIndex
+from mcap.stream_reader import CRCValidationError, breakup_chunk, get_chunk_data_stream
 from zstandard import ZstdError, frame_content_size
 
 from lockstep.server.recording.errors import RecordingDamaged
@@ -21,6 +22,7 @@ __all__ = [
     "RawRecord",
     "check_packed",
     "chunk_records",
+    "message_indexes",
     "raw_records",
 ]
 
@@ -73,3 +75,21 @@ def chunk_records(chunk: Chunk) -> list[McapRecord]:
     """Return the records in a chunk. Raises one of BROKEN."""
     check_packed(chunk)
     return breakup_chunk(chunk, validate_crc=True)
+
+
+def message_indexes(chunk: Chunk) -> list[MessageIndex]:
+    """Return what stands behind a chunk (MCAP specification, "Message Index"). Raises one of BROKEN."""
+    check_packed(chunk)
+    stream, length = get_chunk_data_stream(chunk, validate_crc=True)
+    found: dict[int, MessageIndex] = {}
+    while stream.count < length:
+        at = stream.count
+        opcode, size = stream.read1(), stream.read8()
+        if opcode != Opcode.MESSAGE:
+            stream.read(size)
+            continue
+        message = Message.read(stream, size)
+        found.setdefault(message.channel_id, MessageIndex(message.channel_id, [])).records.append(
+            (message.log_time, at)
+        )
+    return list(found.values())

@@ -32,10 +32,18 @@ from lockstep.server.recording.format.info import METADATA_NAME, RecordingInfo
 from lockstep.server.recording.format.payload import VIDEO, own_record_of, picture_of
 from lockstep.server.recording.format.records import Degraded, EpisodeRecord, FeedbackRecord
 from lockstep.server.recording.reading.bookmarks import BookmarkFinder
-from lockstep.server.recording.reading.raw_records import BROKEN, HEAD, MAGIC, RawRecord, chunk_records, raw_records
+from lockstep.server.recording.reading.raw_records import (
+    BROKEN,
+    HEAD,
+    MAGIC,
+    RawRecord,
+    chunk_records,
+    message_indexes,
+    raw_records,
+)
 from lockstep.server.util.regular_file import open_regular
 
-__all__ = ["Scan", "complete_file", "scan_file"]
+__all__ = ["Scan", "complete_file", "scan_file", "statistics_of"]
 
 
 class Scan:
@@ -44,6 +52,8 @@ class Scan:
     def __init__(self, info: RecordingInfo) -> None:
         self.index = EventIndex(epoch=info.epoch, recording=info.recording, part=info.part)
         self.whole = len(MAGIC)  # bytes that are whole
+        self.ended = False  # a record followed that stands behind the data alone
+        self.last_chunk: Chunk | None = None
         self.schemas: dict[int, Schema] = {}
         self.channels: dict[int, Channel] = {}
         self.chunks: list[ChunkIndex] = []
@@ -62,12 +72,14 @@ class Scan:
         elif raw.opcode == Opcode.METADATA:
             self.metadata.append(MetadataIndex(raw.offset, HEAD + len(raw.content), METADATA_NAME))
         elif raw.opcode != Opcode.HEADER:
+            self.ended = True
             return False  # the file was about to be closed
         self.whole = raw.end
         return True
 
     def _chunk(self, raw: RawRecord, chunk: Chunk) -> None:
         parts = chunk_records(chunk)
+        self.last_chunk = chunk
         self.chunks.append(
             ChunkIndex(
                 chunk_length=HEAD + len(raw.content),
@@ -147,14 +159,39 @@ def complete_file(path: Path, info: RecordingInfo) -> EventIndex:
         raise RecordingDamaged(f"{path.name} has no records")
     try:
         with path.open("r+b") as file:
+            indexes = _indexes_of_last_chunk(scan)
             file.truncate(scan.whole)
             file.seek(scan.whole)
-            file.write(_ending(scan))
+            scan.whole += len(indexes)
+            file.write(indexes + _ending(scan))
             file.flush()
             os.fsync(file.fileno())
     except OSError as error:
         raise DiskTrouble(error.strerror or str(error)) from error
     return scan.index
+
+
+def _indexes_of_last_chunk(scan: Scan) -> bytes:
+    """Return the message indexes of the last chunk if the file was cut within them, and leave them out of the scan.
+
+    Other programs find no message that is in none.
+    """
+    entry, chunk = scan.chunks[-1], scan.last_chunk
+    end = entry.chunk_start_offset + entry.chunk_length
+    if chunk is None or scan.whole != end + entry.message_index_length:
+        return b""
+    indexes = message_indexes(chunk)
+    if set(entry.message_index_offsets) == {each.channel_id for each in indexes}:
+        return b""
+    scan.whole = end
+    entry.message_index_offsets = {}
+    builder = RecordBuilder()
+    for each in indexes:
+        entry.message_index_offsets[each.channel_id] = end + builder.count
+        each.write(builder)
+    entry.message_index_length = builder.count
+    found: bytes = builder.end()
+    return found
 
 
 def _ending(scan: Scan) -> bytes:
@@ -179,7 +216,7 @@ def _ending(scan: Scan) -> bytes:
     groups: list[tuple[Opcode, list[McapRecord]]] = [
         (Opcode.SCHEMA, list(scan.schemas.values())),
         (Opcode.CHANNEL, list(scan.channels.values())),
-        (Opcode.STATISTICS, [_statistics(scan)]),
+        (Opcode.STATISTICS, [statistics_of(scan)]),
         (Opcode.CHUNK_INDEX, list(scan.chunks)),
         (Opcode.ATTACHMENT_INDEX, [index]),
         (Opcode.METADATA_INDEX, list(scan.metadata)),
@@ -202,7 +239,8 @@ def _ending(scan: Scan) -> bytes:
     return ending
 
 
-def _statistics(scan: Scan) -> Statistics:
+def statistics_of(scan: Scan) -> Statistics:
+    """Return the statistics that the summary has to have."""
     return Statistics(
         attachment_count=1,
         channel_count=len(scan.channels),

@@ -1,4 +1,7 @@
-"""Checks a recording file: `lockstep verify`."""
+"""Checks a recording file: `lockstep verify`.
+
+It goes by the records. An index only finds them for readers: where one says something else, the file fails.
+"""
 
 import os
 import struct
@@ -6,13 +9,15 @@ import zlib
 from pathlib import Path
 
 from lockstep.server.recording.errors import RecordingError
+from lockstep.server.recording.format.event_index import EventIndex
 from lockstep.server.recording.format.payload import own_record_of
 from lockstep.server.recording.format.records import RobotRecord
 from lockstep.server.recording.format.topics import stream_of
 from lockstep.server.recording.reading.raw_records import MAGIC, MAX_RECORD, raw_records
 from lockstep.server.recording.reading.reader import Record, RecordingReader
-from lockstep.server.recording.reading.scan import scan_file
+from lockstep.server.recording.reading.scan import Scan, scan_file
 from lockstep.server.recording.verify.promises import Verdict, Verifier
+from lockstep.server.recording.verify.verify_indexes import IndexChecker
 from lockstep.server.recording.verify.verify_signature import SignatureChecker
 from lockstep.server.util.regular_file import open_regular
 
@@ -37,20 +42,32 @@ def verify_file(path: Path, key: str = "") -> Verdict:
             verifier.fail("readable", "the recording was interrupted and has no end")
         elif not _is_summary_whole(path):
             verifier.fail("readable", "the summary does not match its checksum")
-        robots: set[str] = set()
-        counts: dict[str, int] = {}
-        ended = reader.index.started
-        for number in range(len(reader.index.chunks)):
-            try:
-                for record in reader.chunk(number):
-                    ended = max(ended, record.arrived // 1000)
-                    counts[record.topic] = counts.get(record.topic, 0) + 1
-                    _show(verifier, record, robots)
-            except RecordingError as error:
-                verifier.fail("readable", error.detail)
-        _compare(verifier, reader, counts)
-        _show_signatures(verifier, path, reader, key)
+        scan = scan_file(path, reader.info)
+        # Behind a record that is broken only the file's own index leads to chunks.
+        with RecordingReader(path, scan.index if scan.ended else reader.index) as judged:
+            ended = _show_records(verifier, judged, reader.index)
+        _show_signatures(verifier, path, reader, scan, key)
         return verifier.verdict(ended)
+
+
+def _show_records(verifier: Verifier, reader: RecordingReader, index: EventIndex) -> int:
+    """Show all records, compare their number with the file's own index, and return the arrival of the last one, µs."""
+    robots: set[str] = set()
+    counts: dict[str, int] = {}
+    ended = index.started
+    for number in range(len(reader.index.chunks)):
+        try:
+            for record in reader.chunk(number):
+                ended = max(ended, record.arrived // 1000)
+                counts[record.topic] = counts.get(record.topic, 0) + 1
+                _show(verifier, record, robots)
+        except RecordingError as error:
+            verifier.fail("readable", error.detail)
+    for topic in sorted({*index.counts, *counts}):
+        said, found = index.counts.get(topic, 0), counts.get(topic, 0)
+        if said != found:
+            verifier.fail("complete", f"{topic}: the index counts {said} records, but the file has {found}")
+    return ended
 
 
 def _is_summary_whole(path: Path) -> bool:
@@ -65,9 +82,9 @@ def _is_summary_whole(path: Path) -> bool:
         return zlib.crc32(file.read(at + _footer.size - 4 - start)) == int(checksum)
 
 
-def _show_signatures(verifier: Verifier, path: Path, reader: RecordingReader, key: str) -> None:
-    """Check the signatures, and show `verifier` the report."""
-    checker = SignatureChecker(reader.info, None if reader.interrupted else reader.index, key)
+def _show_signatures(verifier: Verifier, path: Path, reader: RecordingReader, scan: Scan, key: str) -> None:
+    """Check indexes and signatures, and show `verifier` the report."""
+    checker = SignatureChecker(reader.info, IndexChecker(None if reader.interrupted else reader.index), key)
     with open_regular(path) as file:
         file.seek(len(MAGIC))
         try:
@@ -75,8 +92,14 @@ def _show_signatures(verifier: Verifier, path: Path, reader: RecordingReader, ke
                 checker.take(raw)
         except RecordingError as error:
             verifier.fail("readable", error.detail)
-    checker.compare(scan_file(path, reader.info).index)
-    verifier.signed(checker.report())
+    checker.compare(scan)
+    report = checker.report()
+    verifier.signed(report)
+    if report.state == "unsigned":
+        for text in checker.index_faults:
+            verifier.fail("readable", text)
+    if not (scan.ended or reader.interrupted):
+        verifier.fail("readable", f"the record at byte {scan.whole} cannot be read")
 
 
 def _show(verifier: Verifier, record: Record, robots: set[str]) -> None:
@@ -95,11 +118,3 @@ def _show(verifier: Verifier, record: Record, robots: set[str]) -> None:
         robots.update(camera.name for camera in own.description.cameras)
         robots.update(microphone.name for microphone in own.description.microphones)
     verifier.record(own, record.arrived, record.captured)
-
-
-def _compare(verifier: Verifier, reader: RecordingReader, counts: dict[str, int]) -> None:
-    """Compare the counts with the index, which was written with the file and shows later losses."""
-    for topic in sorted({*reader.index.counts, *counts}):
-        said, found = reader.index.counts.get(topic, 0), counts.get(topic, 0)
-        if said != found:
-            verifier.fail("complete", f"{topic}: the index counts {said} records, but the file has {found}")

@@ -10,17 +10,19 @@ from typing import Literal, NamedTuple
 import msgspec
 from mcap.data_stream import ReadDataStream
 from mcap.opcode import Opcode
-from mcap.records import Channel, Chunk, ChunkIndex, Message, MessageIndex, Schema
+from mcap.records import Channel, Chunk, Message, Schema
 from mcap.stream_reader import get_chunk_data_stream
 
 from lockstep.server.recording.errors import RecordingError
-from lockstep.server.recording.format.event_index import INDEX_NAME, EventIndex
+from lockstep.server.recording.format.event_index import INDEX_NAME
 from lockstep.server.recording.format.info import RecordingInfo
 from lockstep.server.recording.format.payload import own_record
 from lockstep.server.recording.format.records import SignatureRecord
 from lockstep.server.recording.format.signature import RecordingChain, TopicText, is_valid
 from lockstep.server.recording.format.topics import SIGNATURE
 from lockstep.server.recording.reading.raw_records import BROKEN, RawRecord, check_packed
+from lockstep.server.recording.reading.scan import Scan
+from lockstep.server.recording.verify.verify_indexes import IndexChecker
 
 __all__ = ["SignatureChecker", "SignatureFault", "SignatureReport"]
 
@@ -51,32 +53,32 @@ class SignatureChecker:
     """Checks the signatures of a file: `take` each raw record in the order of the file, then `report`.
 
     Args:
-        index: of the file, to be compared with its chunks; None: it was interrupted and has none
+        indexes: checks the indexes of the same file
         key: public key that has to have signed it; "": any
+
+    Attributes:
+        index_faults: what an index says and the records do not, whether the file is signed or not
     """
 
-    def __init__(self, info: RecordingInfo, index: EventIndex | None, key: str = "") -> None:
+    def __init__(self, info: RecordingInfo, indexes: IndexChecker, key: str = "") -> None:
         self._info = info
-        self._index = index
+        self._indexes = indexes
+        self.index_faults: list[str] = []
         self._key = key
         self._report = SignatureReport()
         self._schemas: dict[int, Schema] = {}
         self._channels: dict[int, Channel] = {}
         self._chain: RecordingChain | None = None
         self._last: SignatureRecord | None = None
-        self._chunks: list[int] = []  # offsets
-        self._index_chunks: list[int] = []  # as the summary has them
-        # Times of the first and last message, as each chunk says; None: it cannot be read.
-        self._spans: list[tuple[int, int] | None] = []
-        self._index_spans: list[tuple[int, int]] = []  # as the summary has them
-        # Messages of the last chunk, by channel, that no index has named yet; None: it could not be read.
-        self._positions: dict[int, list[tuple[int, int]]] | None = {}
+        self._chunks = 0
         self._metadata = 0
         self._behind_data = False
         self._summary = bytearray()
 
     def take(self, raw: RawRecord) -> None:
         try:
+            for text in self._indexes.take(raw):
+                self._index_fault(text)
             self._take(raw)
         except (*BROKEN, RecordingError) as error:
             self._fault(f"the record at byte {raw.offset} cannot be read: {error or type(error).__name__}")
@@ -86,19 +88,12 @@ class SignatureChecker:
             self._summary += bytes([raw.opcode]) + len(raw.content).to_bytes(8, "little") + raw.content
         stream = ReadDataStream(BytesIO(raw.content))
         if raw.opcode == Opcode.CHUNK:
-            self._chunks.append(raw.offset)
-            self._spans.append(None)
-            self._chunk(Chunk.read(stream), len(self._chunks) - 1)
-        elif raw.opcode == Opcode.MESSAGE_INDEX:
-            self._message_index(MessageIndex.read(stream))
+            self._chunks += 1
+            self._chunk(Chunk.read(stream), self._chunks - 1)
         elif raw.opcode == Opcode.SCHEMA:
             self._schema(Schema.read(stream))
         elif raw.opcode == Opcode.CHANNEL:
             self._channel(Channel.read(stream))
-        elif raw.opcode == Opcode.CHUNK_INDEX:
-            entry = ChunkIndex.read(stream)
-            self._index_chunks.append(entry.chunk_start_offset)
-            self._index_spans.append((entry.message_start_time, entry.message_end_time))
         elif raw.opcode == Opcode.DATA_END:
             self._behind_data = True
             if raw.content != NO_CHECKSUM:
@@ -138,42 +133,27 @@ class SignatureChecker:
             self._fault(f"the topic {channel.topic} is not signed")
 
     def _chunk(self, chunk: Chunk, number: int) -> None:
-        if self._positions:
-            self._fault(f"chunk {number - 1} has no message index")
-        self._positions = None
-        self._spans[number] = chunk.message_start_time, chunk.message_end_time
         try:
             check_packed(chunk)
             stream, length = get_chunk_data_stream(chunk, validate_crc=True)
         except BROKEN as error:
             self._fault(f"chunk {number} was changed after it was written: {type(error).__name__}")
             return
-        self._positions = {}
         while stream.count < length:
-            at = stream.count
             opcode, size = stream.read1(), stream.read8()
             if opcode == Opcode.SCHEMA:
                 self._schema(Schema.read(stream))
             elif opcode == Opcode.CHANNEL:
                 self._channel(Channel.read(stream))
             elif opcode == Opcode.MESSAGE:
-                self._message(Message.read(stream, size), at)
+                self._message(Message.read(stream, size))
             else:
                 stream.read(size)
                 self._fault(f"chunk {number} holds a record of kind {opcode} that is not signed")
-        self._check_span(number)
         self._end_chunk(number)
 
-    def _check_span(self, number: int) -> None:
-        """Check a chunk's stated times: a reader that looks for a time passes over chunks by them."""
-        times = [time for found in (self._positions or {}).values() for time, _ in found]
-        if times and self._spans[number] != (min(times), max(times)):
-            self._fault(f"chunk {number} gives another time than its messages have")
-
-    def _message(self, message: Message, at: int) -> None:
+    def _message(self, message: Message) -> None:
         channel = self._channels[message.channel_id]
-        if self._positions is not None:
-            self._positions.setdefault(channel.id, []).append((message.log_time, at))
         if self._chain is None:
             self._chain = RecordingChain(self._info, map(self._text, self._channels.values()))
         if channel.topic == SIGNATURE:
@@ -225,25 +205,20 @@ class SignatureChecker:
             self._chain.drop_waiting()
             self._fault(f"the end of chunk {number} is not signed")
 
-    def _message_index(self, found: MessageIndex) -> None:
-        if self._positions is None:
-            return
-        expected = self._positions.pop(found.channel_id, [])
-        if expected != [(time, at) for time, at in found.records]:
-            self._fault(f"the message index of chunk {len(self._chunks) - 1} points to other messages")
+    def _index_fault(self, text: str) -> None:
+        if len(self.index_faults) < MOST:
+            self.index_faults.append(text)
+        self._fault(text)
 
     def _fault(self, text: str) -> None:
         report = self._report
         if len(report.faults) < MOST:
             report.faults.append(SignatureFault(max(1, report.until_event), report.until_time, text))
 
-    def compare(self, records: EventIndex) -> None:
-        """Compare the file's index, which lists and timelines show, with `records`, the one built from the records."""
-        if self._index is None or not self._report.signatures:
-            return
-        for name in ("first_event", "last_event", "started", "ended", "marks"):
-            if getattr(self._index, name) != getattr(records, name):
-                self._fault(f"the index has other {name.replace('_', ' ')} than the records")
+    def compare(self, scan: Scan) -> None:
+        """Compare the indexes with the records, behind the last one. `scan`: of the same file."""
+        for text in self._indexes.compare(scan):
+            self._index_fault(text)
 
     def report(self) -> SignatureReport:
         """Return the report, after the last record."""
@@ -253,8 +228,6 @@ class SignatureChecker:
             return SignatureReport(faults=faults)
         if self._key and report.signer != self._key:
             self._fault(f"signed by {report.signer or 'nobody'}, not by {self._key}")
-        if self._behind_data:
-            self._compare_indexes()
         report.state = "signed"
         if report.faults:
             report.state = "broken"
@@ -262,11 +235,3 @@ class SignatureChecker:
             report.state = "open"
             self._fault("the closing signature is missing: the console was interrupted, or the end was cut off")
         return report
-
-    def _compare_indexes(self) -> None:
-        if self._index_chunks != self._chunks:
-            self._fault("the summary names other chunks than the file has")
-        elif any(span not in (None, said) for span, said in zip(self._spans, self._index_spans, strict=True)):
-            self._fault("the summary gives chunks another time than their messages have")
-        if self._index is not None and [chunk.offset for chunk in self._index.chunks] != self._chunks:
-            self._fault("the index names other chunks than the file has")
