@@ -227,8 +227,7 @@ TABLE = Obstacles(ARM, HAND, (plane("the table", (0.0, 0.0, 0.06), (0.0, 0.0, 1.
 
 
 def lowest(joints: tuple[float, ...]) -> float:
-    (gap,) = TABLE.gaps(ARM.at(joints), 9.0)
-    return gap.distance
+    return min(gap.distance for gap in TABLE.gaps(ARM.at(joints), 9.0))
 
 
 @pytest.mark.parametrize("first", [False, True])
@@ -260,3 +259,26 @@ def test_whatever_is_wanted_the_arm_stays_off_the_table(
     way = run(solver, start, position, from_rotation_vector(turn) @ begun.rotation)
     assert min(map(lowest, way[::5])) > 0.0
     assert swings(way, 100) < 0.05
+
+
+@pytest.mark.parametrize(
+    ("start", "way", "turn"),
+    [
+        ((-1.5, 1.1, -0.9, -0.6, -0.5), (-0.1, 0.1, -0.2), (-0.2, -0.2, 1.0)),
+        ((-1.4, 0.9, -0.6, -1.4, 0.4), (-0.1, 0.0, -0.3), (-1.4, 0.7, 0.0)),
+        ((0.8, 1.0, -0.8, -0.4, -0.2), (0.1, -0.2, -0.3), (1.3, 0.8, -0.3)),
+    ],
+)
+def test_the_far_end_of_a_hand_does_not_come_down_about_the_end_that_is_near(
+    start: tuple[float, ...], way: tuple[float, float, float], turn: tuple[float, float, float]
+) -> None:
+    begun = ARM.at(start)
+    assert 0.02 < lowest(start) < 0.05
+    solver = PoseSolver(ARM, BOUNDS, keeps_off=(TABLE,))
+    position, rotation = begun.position + np.array(way), from_rotation_vector(turn) @ begun.rotation
+    joints, before, least = start, None, math.inf
+    for _ in range(200):
+        solution = solver.step(joints, position, rotation, 0.005, before=before)
+        joints, before = solution.joints, solution.rates
+        least = min(least, lowest(joints))
+    assert least > 0.007

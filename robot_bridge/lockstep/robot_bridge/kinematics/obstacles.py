@@ -4,7 +4,7 @@ The surface is a set of spheres for each body, most of them points. That is exac
 may come as near to a table as it needs to. Against the edges of a box it is as exact as the spheres are dense.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -17,6 +17,8 @@ __all__ = ["Obstacle", "Obstacles", "Surface", "plane"]
 
 Array = npt.NDArray[np.float64]
 DEEP: Final = 1e3  # m, half of what is behind a plane: nothing of an arm is nearer to its other side
+MOST_PLACES: Final = 4  # of a body that are kept off one obstacle at once: the corners of a hand
+APART: Final = 0.4  # of a body's radius, at least, between two of these places
 
 
 class Surface(NamedTuple):
@@ -75,7 +77,10 @@ class Obstacles:
         self._obstacles = tuple(obstacles)
 
     def gaps(self, state: ChainState, within: float) -> list[Gap]:
-        """Return the gaps that are narrower than `within` (m): one for each body and obstacle, the narrowest."""
+        """Return the gaps that are narrower than `within` (m): the narrowest of each body and obstacle, and others.
+
+        If the nearest place alone were kept off, the far end of a hand could come down fast about it.
+        """
         found = []
         for (moving, points, radii), (middle, reach) in zip(self._bodies, self._balls, strict=True):
             turn, origin = state.turns[moving], state.places[moving]
@@ -86,12 +91,23 @@ class Obstacles:
             places = origin + points @ turn.T
             for obstacle in near:
                 distances = _distances(obstacle, places) - radii
-                number = int(np.argmin(distances))
-                if distances[number] < within:
+                for number in _spread(places, distances, within, APART * reach):
                     place = places[number]
                     motion = self._chain.motion(state, moving, place)
                     found.append(Gap(float(distances[number]), _outward(obstacle, place) @ motion, obstacle.name))
         return found
+
+
+def _spread(places: Array, distances: Array, within: float, apart: float) -> Iterator[int]:
+    """Yield the numbers of the nearest places that are `apart` (m) from each other."""
+    left = np.where(distances < within, distances, np.inf)
+    for _ in range(MOST_PLACES):
+        number = int(np.argmin(left))
+        if not left[number] < within:
+            return
+        yield number
+        away = places - places[number]
+        left = np.where((away * away).sum(axis=1) < apart * apart, np.inf, left)
 
 
 def _distances(obstacle: Obstacle, places: Array) -> Array:

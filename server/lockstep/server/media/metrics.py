@@ -10,7 +10,7 @@ ENCODE_BUCKETS = (0.0005, 0.001, 0.002, 0.004, 0.008, 0.016, 0.033, 0.066, 0.13,
 class MediaMetrics:
     """The counters of one media hub. Stages of `dropped`, in the order of the path:
 
-    unknown_stream, bad_time, too_often, stale_stamp, no_reference, unsupported_codec, bad_payload, thinned,
+    unknown_stream, bad_time, too_often, not_asked, stale_stamp, no_reference, unsupported_codec, bad_payload, thinned,
     encoder_busy, path_busy, encode_failed, worker_failed, peer_busy
     """
 

@@ -4,7 +4,7 @@ import asyncio
 import time
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from functools import partial
 from typing import TYPE_CHECKING, TypeVar
 
@@ -227,8 +227,12 @@ def _pose(
     if path is None:
         model.pose(scale.feedback(feedback))
         return
-    wanted = ((wish.name, scale.poses(path.wanted(wish.values))) for wish in wishes)
-    shadows = [(name, poses) for name, poses in wanted if poses is not None]
+    shadows = []
+    for wish in wishes:
+        # What one policy wants cannot end the picture for all: a turn may be too large for a sine, say.
+        with suppress(ArithmeticError, ValueError):
+            if (poses := scale.poses(path.wanted(wish.values))) is not None:
+                shadows.append((wish.name, poses))
     model.pose(scale.feedback(feedback), scale.poses(path.poses()), shadows)
 
 

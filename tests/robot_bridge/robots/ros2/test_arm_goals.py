@@ -121,6 +121,42 @@ def test_a_gripper_goes_on_squeezing_when_the_arm_is_driven_on(tmp_path: Path, f
     assert goals.goals[5] == held[5]
 
 
+def closing(directory: Path) -> tuple[ArmGoals, list[float]]:
+    """An arm whose gripper has just been told to close, and where it is."""
+    rows = "".join(f"    - {{name: {name}, maximum: 1.0}}\n" for name in JOINTS[:5])
+    rows += f"    - {{name: {JOINTS[5]}, maximum: 1.0, grips: true}}\n"
+    found, description = read_settings(written(directory, "  goals: true\n", rows=rows))
+    assert found.arm is not None
+    goals = ArmGoals(found.arm, description, START)
+    goals.drive(START, TICK, TICK, START, False)
+    for _ in range(100):
+        if not any(goals.drive([*START[:5], -0.3], TICK, TICK, START, False)):
+            break
+    return goals, list(START)
+
+
+def test_a_gripper_that_was_opened_by_hand_in_a_stop_pressed_while_it_closed_does_not_close_again(
+    tmp_path: Path,
+) -> None:
+    goals, measured = closing(tmp_path)
+    goals.hold()
+    measured[5] += 0.2  # somebody frees a hand from it before anything else has looked at the arm
+    goals.restart()
+    goals.take_up(measured)
+    assert goals.goals[5] == measured[5]
+
+
+def test_a_gripper_that_goes_on_closing_slowly_at_rest_keeps_its_goal(tmp_path: Path) -> None:
+    goals, measured = closing(tmp_path)
+    for _ in range(20):
+        measured[5] += (goals.goals[5] - measured[5]) / 4
+        goals.take_up(measured)
+    assert goals.goals[5] == -0.3
+    measured[5] += 0.1  # and is opened by hand then
+    goals.take_up(measured)
+    assert goals.goals[5] == measured[5]
+
+
 def test_after_a_restart_the_next_values_move_nothing(place: Path) -> None:
     world = World(place)
     world.command({NAMES[0]: 0.4}, 5)

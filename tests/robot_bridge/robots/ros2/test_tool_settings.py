@@ -61,6 +61,8 @@ def test_an_arm_on_a_base_has_its_pose_in_the_bases_frame(tmp_path: Path) -> Non
         ("  tool: {tip: wrist_3, posture: [0, 1]}\n", "", "needs one value for each of the 6 joints"),
         ("  tool: {tip: wrist_3}\n", "hold: 0.2\n", "a tool needs a hold of 0.27 s at least, not 0.2 s"),
         ("  tool: {tip: wrist_3, obstacles: [{name: the wall, normal: [0, 0, 0]}]}\n", "", "normal: has no direction"),
+        ("  tool: {tip: wrist_3, obstacles: [{name: the wall, normal: [0, .nan, 1]}]}\n", "", "normal: needs numbers"),
+        ("  tool: {tip: wrist_3, obstacles: [{name: a, position: [.inf, 0, 0]}]}\n", "", "position: needs numbers"),
         ("  goals: true\n  command: {message: Float64MultiArray}\n", "", "goals need positions"),
         ("  goals: true\n", "bodies: [{name: a, parent: ''}]\n", "leave out one of the two"),
     ],

@@ -61,3 +61,32 @@ def test_the_size_is_that_of_the_newest_picture_that_says_it_and_was_not_dropped
     newest = world.stage.newest
     assert newest is not None
     assert newest.media.stamp == 6
+
+
+def test_a_flood_of_second_pictures_takes_nothing_from_the_first_and_breaks_the_second_alone() -> None:
+    world = World()
+    second, lost = Collector(), []
+    arrived = world.metrics.frames_in.labels("camera0")
+
+    class Second:
+        source = second.source
+
+        def lost(self) -> None:
+            lost.append("second")
+
+    stage = Admission(
+        world.end, lambda: True, arrived, world.dropped, on_lost=lambda: lost.append("first"), second=Second()
+    )
+    flood = int(MAX_AT_ONCE) + 2
+    arrive(stage, *[picture(1, 0.0, codec="h264", second=True)] * flood, picture(2, 0.0, codec="h264"))
+    assert world.end.stamps == [2]
+    assert len(second.sources) == MAX_AT_ONCE
+    assert lost == ["second"] * 2
+    assert world.drops("too_often") == 2
+
+
+def test_a_second_encoding_of_sound_is_counted_and_goes_nowhere() -> None:
+    world = World()
+    arrive(world.stage, picture(1, 0.0, second=True))
+    assert world.end.sources == []
+    assert world.drops("not_asked") == 1

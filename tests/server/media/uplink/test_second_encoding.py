@@ -103,6 +103,29 @@ async def test_an_observer_who_is_due_no_more_gets_the_first_again_from_a_keyfra
             assert target in encodings.passed.targets
 
 
+async def test_after_a_second_picture_that_was_dropped_observers_get_none_that_builds_on_it() -> None:
+    async with running_plane(quality=False) as hub:
+        robot = Robot(hub)
+        narrow_operator(hub)
+        async with (
+            viewing(hub, ["video"], uris=NATIVE, priority=True) as operator,
+            viewing(hub, ["video"], uris=NATIVE) as observer,
+        ):
+            operator.media.drives(True)
+            observer.media.deliveries[0].target.tier = "high"
+            two = TwoEncodings(hub, robot)
+            await two.give(operator, 190)
+            stream = stream_of(operator)
+            assert stream.encodings.second is not None
+            flood = msgspec.structs.replace(PICTURES[190], second=True, keyframe=False)
+            for _ in range(300):  # more than any camera makes
+                hub.feed(flood, flood.time)
+            before = stream.encodings.second._encoded._value.get()  # type: ignore[attr-defined]
+            hub.feed(msgspec.structs.replace(flood, time=flood.time + 1.0), flood.time + 1.0)
+            assert stream.encodings.second._encoded._value.get() == before  # type: ignore[attr-defined]
+            await two.give(operator, 1)  # which is a keyframe
+
+
 async def test_second_pictures_that_nobody_asked_for_go_nowhere() -> None:
     async with running_plane(quality=False) as hub, viewing(hub, ["video"], uris=NATIVE) as viewer:
         robot = Robot(hub)

@@ -33,7 +33,7 @@ class ArmGoals:
         rates = [settings.joints[number].maximum for number in others]
         self._others = JointFollower(others, rates, [measured[number] for number in others])
         self._grips = [number for number in others if settings.joints[number].grips]
-        self._rested: list[float] | None = None  # rad or m, where the joints came to rest; None: not since they moved
+        self._rested = list(measured)  # rad or m, of the joints: nearest to their goals since the arm was driven last
         self._size = len(settings.joints) + (0 if self._tool is None else len(self._tool.place.pose))
         self.goals = list(measured)
 
@@ -56,7 +56,7 @@ class ArmGoals:
             rates[own] = self._tool.drive(values, seconds, since, places, pursues=pursues)
         self._note_goals()
         if rates.any():
-            self._rested = None
+            self._rested = list(measured)
         found: list[float] = rates.tolist()
         return found
 
@@ -75,16 +75,10 @@ class ArmGoals:
     def take_up(self, measured: Sequence[float]) -> None:
         """Begin anew where an arm at rest is, if something else has moved it away from its goals.
 
-        What a gripper holds keeps it from its goal. It begins anew only if it was moved since it came to rest, and
-        goes on squeezing when the rest of the arm was moved.
+        What a gripper holds keeps it from its goal. It begins anew only if it was moved away from its goal since it was
+        driven, also during a stop, and goes on squeezing when the rest of the arm was moved.
         """
-        if self._rested is None:
-            self._rested = list(measured)
-        moved = {
-            number
-            for number, (place, goal) in enumerate(zip(measured, self.goals, strict=True))
-            if abs(place - (self._rested[number] if number in self._grips else goal)) > MOVED
-        }
+        moved = {number for number in range(len(self.goals)) if self._was_moved(number, measured[number])}
         if not moved:
             return
         if not moved.issubset(self._grips):
@@ -94,6 +88,16 @@ class ArmGoals:
         self._others.hold([measured[n] if n in moved else self.goals[n] for n in self._others.joints])
         self._rested = list(measured)
         self._note_goals()
+
+    def _was_moved(self, number: int, place: float) -> bool:
+        goal, rested = self.goals[number], self._rested[number]
+        way = abs(place - goal)
+        if number not in self._grips:
+            return way > MOVED
+        if not abs(rested - goal) <= way:  # it goes on closing, or was not measured before
+            self._rested[number] = place
+            return False
+        return way - abs(rested - goal) > MOVED
 
     def pursued(self) -> list[float]:
         """Return the goal of each axis: the joints', and the tool's pose at them."""

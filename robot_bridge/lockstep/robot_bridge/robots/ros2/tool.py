@@ -25,6 +25,7 @@ __all__ = ["ToolDescription", "arm_tool", "describe_tool"]
 
 NAME: Final = "tool"
 FEWEST: Final = 3  # joints
+FARTHEST: Final = 1e6  # m, of an obstacle
 KEYS: Final = ("arm", "tool")
 
 
@@ -63,6 +64,9 @@ def describe_tool(arm: Arm, bodies: Sequence[Body], hold: float) -> ToolDescript
     if tool.posture and len(tool.posture) != len(arm.joints):
         raise SettingsPlace((*KEYS, "posture"), f"needs one value for each of the {len(arm.joints)} joints of the arm")
     for number, each in enumerate(tool.obstacles):
+        for key, vector in (("position", each.position), ("normal", each.normal)):
+            if not all(abs(value) <= FARTHEST for value in vector):  # of what is not a number nothing would be kept off
+                raise SettingsPlace((*KEYS, "obstacles", number, key), f"needs numbers up to {FARTHEST:g}")
         if not any(each.normal):
             raise SettingsPlace((*KEYS, "obstacles", number, "normal"), "has no direction")
     turn = np.eye(3)

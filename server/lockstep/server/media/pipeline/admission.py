@@ -1,6 +1,7 @@
 """The first stage bounds how often frames may come, and ends the way of frames that nobody takes."""
 
 from collections.abc import Callable
+from typing import Protocol
 
 from prometheus_client import Counter
 
@@ -13,6 +14,15 @@ __all__ = ["MAX_AT_ONCE", "Admission"]
 
 MAX_RATE = 240.0  # Hz, of frames of one stream; sending each of them costs the loop that all robots share
 MAX_AT_ONCE = 240.0  # frames, after a network that has held them back
+
+
+class SecondStage(Protocol):
+    """Takes the pictures of a robot's second encoding."""
+
+    def source(self, frame: SourceFrame) -> None: ...
+
+    def lost(self) -> None:
+        """A picture was dropped on which others may build."""
 
 
 class Admission(FrameStage):
@@ -30,11 +40,11 @@ class Admission(FrameStage):
         arrived: Counter,
         dropped: DropCounter,
         on_lost: Callable[[], None] = lambda: None,
-        second: FrameStage | None = None,
+        second: SecondStage | None = None,
     ) -> None:
         """`choose` chooses what is recorded of the next frame, and returns whether somebody takes the stream. It is
         called for each frame. `on_lost` is called when a picture is dropped on which others may build. `second` takes
-        the pictures of a robot's second encoding; None: nobody does."""
+        the pictures of a robot's second encoding, which have a bound of their own; None: nobody does."""
         super().__init__(following)
         self.newest: SourceFrame | None = None
         self.size: tuple[int, int] | None = None
@@ -43,20 +53,20 @@ class Admission(FrameStage):
         self._on_lost = on_lost
         self._dropped = dropped
         self._rate = TokenBucket(MAX_RATE, MAX_AT_ONCE)
+        self._second_rate = TokenBucket(MAX_RATE, MAX_AT_ONCE)  # the operator's pictures never pay for these
         self._last_stamp: int | None = None
         self._second = second
 
     def source(self, frame: SourceFrame) -> None:
         media = frame.media
         self._arrived.inc()
+        if media.second:
+            self._take_second(frame)
+            return
         if not self._rate.take(frame.arrived_at):
             self._dropped.count("too_often")
-            if media.codec == "h264" and not media.second:
+            if media.codec == "h264":
                 self._on_lost()
-            return
-        if media.second:
-            if self._second is not None:
-                self._second.source(frame)
             return
         # Without an H.264 picture, none that builds on it could be decoded; a stamp older than the last is still true.
         in_order = media.codec == "h264" or self._last_stamp is None
@@ -69,3 +79,13 @@ class Admission(FrameStage):
         is_taken = self._choose()
         if is_taken or media.codec == "h264":  # the camera's next keyframe may be far
             super().source(frame)
+
+    def _take_second(self, frame: SourceFrame) -> None:
+        second = self._second
+        if second is None:
+            self._dropped.count("not_asked")
+        elif self._second_rate.take(frame.arrived_at):
+            second.source(frame)
+        else:
+            self._dropped.count("too_often")
+            second.lost()

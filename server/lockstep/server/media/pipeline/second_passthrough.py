@@ -68,14 +68,20 @@ class SecondPassthrough(FrameStage):
         self._waiting = waiting
         return self._second.keyframes.take(now)
 
+    def lost(self) -> None:
+        """A picture was dropped: pass none on that may build on it."""
+        if self._on and not self._broken:
+            self._broken = True
+            self._second.request_keyframe("drop")
+
     def source(self, frame: SourceFrame) -> None:
         media = frame.media
         if not self._on or media.codec != "h264":
+            self._dropped.count("not_asked")
             return
         if not is_access_unit(media.payload):
             self._dropped.count(PayloadError.name)
-            self._broken = True
-            self._second.request_keyframe("drop")
+            self.lost()
             return
         if media.keyframe:
             self._begin_with(media)
