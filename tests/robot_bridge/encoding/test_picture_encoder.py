@@ -64,6 +64,17 @@ def test_sizes_whose_rows_are_padded_or_odd_come_out_right(width: int, height: i
     assert abs(float(luma[height - 4, : frame.width].mean()) - 100) < 20
 
 
+@pytest.mark.parametrize(("width", "height"), [(320, 240), (640, 480)])
+def test_a_keyframe_of_a_second_encoding_takes_no_more_than_the_time_to_the_next_picture(
+    width: int, height: int
+) -> None:
+    encoder, goal = H264Encoder(frame_rate=30.0, keyframe_seconds=1 / 30), EncodingGoal(600_000, 0.0, 1.0)
+    pictures = [encoder.encode(raw(n, width, height), goal, keyframe=n in (0, 20, 30)) for n in range(40)]
+    assert [n for n, each in enumerate(pictures) if each.keyframe] == [0, 20, 30]
+    most = 1.3 / 30 * goal.bitrate  # the encoder's highest rate is 1.3 times what is asked for
+    assert [n for n, each in enumerate(pictures) if 8 * len(each.data) > most] == []
+
+
 def test_a_smaller_size_begins_with_a_keyframe() -> None:
     encoder = H264Encoder()
     encoder.encode(raw(0), WHOLE, keyframe=False)

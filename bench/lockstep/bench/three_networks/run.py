@@ -93,4 +93,14 @@ async def _output(sites: ThreeSites, site: Site, command: list[str]) -> bytes:
 def _figures(seen: dict[str, Any], log: list[Any], refused: Counter[Site]) -> dict[str, Any]:
     """Return what the page's statistics say, what the bridge executed, and what the routers did not let in."""
     moved = sum(each["kind"] == "executed" and any(each["values"]) for each in log)
-    return {"moving_commands_executed": moved, "refused_packets": dict(refused), **seen}
+    kinds = Counter(each["kind"] for each in log)
+    # The robot comes to rest by itself when no command came within its hold; a page that disarms asks for rest.
+    return {
+        "moving_commands_executed": moved,
+        "came_to_rest": kinds["at_rest"],
+        "rests_asked_for": sum(each["kind"] == "rest" and bool(each["applied"]) for each in log),
+        "stalls": kinds["stall"],
+        "refused_commands": dict(Counter(each["reason"] for each in log if each["kind"] == "refused")),
+        "refused_packets": dict(refused),
+        **seen,
+    }

@@ -23,7 +23,8 @@ __all__ = ["MediaEncoding", "MediaLinks"]
 
 
 RAW = ("yuv420p", "mjpeg", "pcm_s16le")
-# s of the bitrate that a keyframe of a second encoding takes at once: the operator's next picture waits behind it.
+# s of the bitrate, at most, that a picture of a second encoding takes at once. It is the time until the operator's next
+# picture where that is less: a keyframe has then left an uplink with room for both before that picture comes.
 SECOND_KEYFRAME_SECONDS = 0.1
 MAX_REASON = 200  # characters
 
@@ -129,7 +130,8 @@ class MediaEncoding:
         for camera in self._description.cameras:
             name = camera.name
             encoder = partial(H264Encoder, self._settings.encoder, camera.frame_rate, fell_back=self._fell_back)
-            first, second = encoder(), encoder(keyframe_seconds=SECOND_KEYFRAME_SECONDS)
+            interval = 1 / camera.frame_rate if camera.frame_rate > 0 else SECOND_KEYFRAME_SECONDS
+            first, second = encoder(), encoder(keyframe_seconds=min(SECOND_KEYFRAME_SECONDS, interval))
             self._encoders += [first, second]
             self._second[name] = PictureEncoding(
                 name,

@@ -3,6 +3,7 @@
 from typing import Any, cast
 
 import msgspec
+import pytest
 
 from lockstep.protocol.carriers import EVENT_REFERENCE_URI
 from lockstep.protocol.messages import Media
@@ -46,13 +47,15 @@ class TwoEncodings:
         self._hub.feed(medium, medium.time + late)
 
 
-def narrow_operator(hub: MediaHub) -> None:
-    """Let the operator's path carry a quarter of what observers are due."""
-    cast(Any, hub.robot_encoding)._planned_bps = lambda stream: 200_000
+def narrow_operator(hub: MediaHub, *, shown: float = 2e6) -> None:
+    """Let the operator's path carry a quarter of what observers are due, and the uplink be known to carry `shown`."""
+    encoding = cast(Any, hub.robot_encoding)
+    encoding._planned_bps = lambda stream: 200_000
+    encoding._uplink.shown = lambda now: shown
 
 
 async def test_an_observer_gets_the_second_encoding_and_the_operator_the_first() -> None:
-    async with running_plane(quality=False) as hub:
+    async with running_plane(quality=False, second_encoding=True) as hub:
         robot = Robot(hub)
         narrow_operator(hub)
         async with (
@@ -79,8 +82,26 @@ async def test_an_observer_gets_the_second_encoding_and_the_operator_the_first()
             assert stamps == sorted(filter(None, stamps))
 
 
+@pytest.mark.parametrize(("is_set", "shown"), [(True, 500_000.0), (False, 2e6)])
+async def test_no_second_is_asked_for_unless_the_uplink_has_shown_room_for_both_and_it_is_set(
+    is_set: bool, shown: float
+) -> None:
+    settings: dict[str, bool] = {"second_encoding": True} if is_set else {}
+    async with running_plane(quality=False, **settings) as hub:
+        robot = Robot(hub)
+        narrow_operator(hub, shown=shown)
+        async with (
+            viewing(hub, ["video"], uris=NATIVE, priority=True) as operator,
+            viewing(hub, ["video"], uris=NATIVE) as observer,
+        ):
+            operator.media.drives(True)
+            observer.media.deliveries[0].target.tier = "high"
+            await TwoEncodings(hub, robot).give(operator, 195)
+            assert not any(request.second for request in robot.requests)
+
+
 async def test_an_observer_who_is_due_no_more_gets_the_first_again_from_a_keyframe_on() -> None:
-    async with running_plane(quality=False) as hub:
+    async with running_plane(quality=False, second_encoding=True) as hub:
         robot = Robot(hub)
         narrow_operator(hub)
         async with (

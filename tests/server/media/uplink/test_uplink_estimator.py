@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lockstep.server.media.uplink.uplink_estimator import UplinkEstimator
+from lockstep.server.media.uplink.uplink_estimator import HEADER, UplinkEstimator
 
 PICTURE = 1 / 30  # s
 
@@ -134,3 +134,37 @@ def test_whatever_a_robot_sends_the_rate_stays_between_its_bounds(
         if decides:
             uplink.decide(now)
         assert 80_000 <= uplink.rate <= 800_000
+
+
+def feed(uplink: UplinkEstimator, since: float, seconds: float, bps: float, *, wait: float = 0.0) -> float:
+    """Let so many bits arrive for `seconds`; return the time afterwards."""
+    count = round(seconds / PICTURE)
+    for number in range(count):
+        now = since + number * PICTURE
+        uplink.arrived(now - wait, now + 0.05, round(bps * PICTURE / 8) - HEADER)
+        uplink.decide(now + 0.05)
+    return since + count * PICTURE
+
+
+def test_it_knows_for_a_minute_what_came_without_a_queue() -> None:
+    uplink = UplinkEstimator(300_000, 80_000, 1_600_000)
+    now = feed(uplink, 0.0, 5.0, 900_000)
+    assert 850_000 < uplink.shown(now) < 950_000
+    later = feed(uplink, now, 50.0, 200_000)
+    assert uplink.shown(later) > 850_000
+    later = feed(uplink, later, 15.0, 200_000)
+    assert 190_000 < uplink.shown(later) < 210_000
+
+
+def test_a_limit_makes_it_forget_what_was_carried_before() -> None:
+    uplink = UplinkEstimator(300_000, 80_000, 1_600_000)
+    now = feed(uplink, 0.0, 5.0, 900_000)
+    now = feed(uplink, now, 2.0, 900_000, wait=0.3)
+    assert uplink.limited(now)
+    assert uplink.shown(now) == 0
+
+
+def test_a_burst_shows_nothing() -> None:
+    uplink = UplinkEstimator(300_000, 80_000, 1_600_000)
+    feed(uplink, 0.0, 0.5, 5_000_000)
+    assert uplink.shown(0.5) == 0

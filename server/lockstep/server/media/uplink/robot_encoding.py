@@ -102,7 +102,7 @@ class RobotEncoding:
         changed |= self._second.tick(
             now,
             first_bps=float(sum(target.bitrate_bps for target in targets)),
-            rate_bps=self._uplink.carried(now) - sounds,
+            shown_bps=self._uplink.shown(now) - sounds,
             limited=limited,
         )
         if changed or now - self._told_at >= REPEAT:
@@ -163,7 +163,8 @@ class RobotEncoding:
 
     def _new_uplink(self) -> UplinkEstimator:
         settings, cameras = self._settings, max(1, len(self._cameras))
-        most = float(2 * cameras * settings.video_bitrate_bps)  # of both encodings
+        encodings = 2 if settings.second_encoding else 1
+        most = float(encodings * cameras * settings.video_bitrate_bps)
         return UplinkEstimator(
             min(most, float(settings.quality_start_bps)), min(most, float(settings.quality_min_bps)), most
         )

@@ -39,12 +39,12 @@ class SecondRequests:
         for camera in self._cameras:
             camera.stream.second.came = self._share.came
 
-    def tick(self, now: float, *, first_bps: float, rate_bps: float, limited: bool) -> bool:
+    def tick(self, now: float, *, first_bps: float, shown_bps: float, limited: bool) -> bool:
         """Decide; return whether the robot has to be told. The arguments are those of `SecondShare.decide`."""
-        due = [each for each in self._cameras if each.stream.second.is_due]
+        due = [each for each in self._cameras if self._settings.second_encoding and each.stream.second.is_due]
         most = float(self._settings.video_bitrate_bps)
         self.bps = self._share.decide(
-            now, first_bps=first_bps, most_bps=most * len(due), rate_bps=rate_bps, limited=limited
+            now, first_bps=first_bps, most_bps=most * len(due), shown_bps=shown_bps, limited=limited
         )
         taken = due if self.bps > 0 else []
         needs = [CameraNeed(_pixels(each.stream), most) for each in taken]

@@ -25,6 +25,8 @@ USED = 0.75  # of the rate
 HOLD = 0.5  # s after a decrease, besides the time that media waited
 HEADER = 180  # bytes of a message besides its payload, TCP's and IP's share included
 LIMITED_SECONDS = 60.0  # a path that was once too full counts as limited for so long
+SHOWN_SECONDS = 60.0  # for which it is known what the path carried without a queue
+WHOLE_SPAN = 0.8  # s between arrivals from which a rate counts as carried: a burst alone shows nothing
 
 
 class UplinkEstimator:
@@ -45,6 +47,7 @@ class UplinkEstimator:
         self._decided_at: float | None = None
         self._limited_at: float | None = None  # time of the last decrease
         self._limit = float("inf")  # bits per second that the path carried then, and a margin off
+        self._shown: deque[tuple[float, float]] = deque()  # time, bits per second; later ones are lower
 
     def arrived(self, captured: float, now: float, size: int) -> None:
         """Take a medium of `size` bytes, captured at `captured` by the robot's clock."""
@@ -62,9 +65,11 @@ class UplinkEstimator:
         """Return whether media waited on the path within the last minute."""
         return self._limited_at is not None and now - self._limited_at < LIMITED_SECONDS
 
-    def carried(self, now: float) -> float:
-        """Return the rate; while the path counts as limited, no more than it has carried."""
-        return min(self.rate, self._limit) if self.limited(now) else self.rate
+    def shown(self, now: float) -> float:
+        """Return the most bits per second that arrived without a queue in the last minute, since the last limit."""
+        while self._shown and now - self._shown[0][0] > SHOWN_SECONDS:
+            self._shown.popleft()
+        return self._shown[0][1] if self._shown else 0.0
 
     def waits(self, now: float) -> float | None:
         """Return the wait of the medium that waited least of the last half second, s; None without two media."""
@@ -85,10 +90,21 @@ class UplinkEstimator:
             self.rate = max(self._least_bps, DEEPEST * self.rate, self._limit * (1 - min(DEEPEST, waits)))
             self._hold_until = now + HOLD + waits
             self._limited_at = now
-        elif waits < EMPTY and received is not None and received >= USED * self.rate:
-            growth = FAST if self.rate < self._limit else SLOW
-            self.rate *= growth**passed
+            self._shown.clear()
+        elif waits < EMPTY and received is not None:
+            self._show(now, received)
+            if received >= USED * self.rate:
+                growth = FAST if self.rate < self._limit else SLOW
+                self.rate *= growth**passed
         self.rate = min(self.rate, self._most_bps)
+
+    def _show(self, now: float, received: float) -> None:
+        """Note that the path carried so much with no queue at the end of it."""
+        if self._arrivals[-1][0] - self._arrivals[0][0] < WHOLE_SPAN:
+            return
+        while self._shown and self._shown[-1][1] <= received:
+            self._shown.pop()
+        self._shown.append((now, received))
 
     def _received(self) -> float | None:
         """Return the bits per second that arrived lately; None if too few came to tell."""
