@@ -13,7 +13,7 @@ from lockstep.robot_bridge.description.check_description import check_descriptio
 from lockstep.robot_bridge.errors import ModelError
 from lockstep.robot_bridge.robots.mjcf import create
 from lockstep.robot_bridge.robots.mjcf.robot import MjcfRobot
-from tests.robot_bridge.bridge_helpers import operator, running_bridge
+from tests.robot_bridge.bridge_helpers import PATIENCE, operator, running_bridge
 from tests.robot_bridge.robots.mjcf.models import model_file, one_joint
 from tests.robot_bridge.robots.mjcf.tools.arms import TOOL, arm_model
 
@@ -141,7 +141,7 @@ async def test_it_is_driven_to_a_goal_and_does_not_creep_down_under_its_load(arm
 
 async def test_the_bridges_of_models_pass_the_cases_about_goals(arm: MjcfRobot) -> None:
     async with running_bridge(arm) as bridge:
-        subject = Subject(Place(*bridge.address))
+        subject = Subject(Place(*bridge.address), settle=PATIENCE)
         results = {}
         for case in CASES:
             if case.name.startswith("goal") or case.name in (
