@@ -55,6 +55,27 @@ def test_the_gradient_of_a_gap_is_its_derivative(posture: tuple[float, ...]) -> 
             assert sides[0] - 1e-4 <= gap.gradient[joint] <= sides[1] + 1e-4
 
 
+@given(postures, st.floats(0.0, 0.5))
+def test_the_gaps_that_are_narrow_are_those_of_all_bodies_and_obstacles(
+    posture: tuple[float, ...], within: float
+) -> None:
+    rod = np.array([(0.0, 0.0, 0.04 * number) for number in range(6)])
+    surfaces = FINGER | {"upper": Surface(rod, np.full(6, 0.02)), "fore": Surface(rod, np.full(6, 0.03))}
+    table = plane("the table", (0.0, 0.0, 0.0), (0.1, 0.0, 1.0))
+    around = Obstacles(ARM, surfaces, (BOX, table, BOX._replace(name="another", position=np.array((-0.1, 0.2, 0.4)))))
+    state = ARM.at(posture)
+    every = around.gaps(state, FAR)
+    assert len(every) == 9
+    narrow = [(gap.what, gap.distance) for gap in around.gaps(state, within)]
+    assert narrow == [(gap.what, gap.distance) for gap in every if gap.distance < within]
+
+
+def test_without_obstacles_or_bodies_there_is_no_gap() -> None:
+    state = ARM.at((0.0,) * 5)
+    assert Obstacles(ARM, FINGER, ()).gaps(state, FAR) == []
+    assert Obstacles(ARM, {}, (BOX,)).gaps(state, FAR) == []
+
+
 def test_a_body_that_no_joint_moves_has_no_gap() -> None:
     foot = {"foot": Surface(np.zeros((1, 3)), np.zeros(1))}
     assert Obstacles(ARM, foot, (BOX,)).gaps(ARM.at((0.0,) * 5), FAR) == []

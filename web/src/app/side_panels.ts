@@ -133,6 +133,7 @@ export class SidePanels {
     else if (action === "pads") this.sheets.open(this.pads());
     else if (this.sheets.isOpen) return;
     else if (action === "charts") this.charts.toggle();
+    else if (action === "frames") this.engine.streams.overlay?.toggle();
     else if (action === "freeze") this.charts.freeze();
     else void this.charts.save();
   }

@@ -1,11 +1,12 @@
 import type { RobotDescription } from "../protocol/wire";
 
 /** What a key does to the page, wherever it is not one that drives. */
-export type PageAction = "charts" | "freeze" | "keys" | "pads" | "save";
+export type PageAction = "charts" | "frames" | "freeze" | "keys" | "pads" | "save";
 
 const ACTIONS: ReadonlyMap<string, PageAction> = new Map([
   ["KeyC", "charts"],
   ["KeyF", "freeze"],
+  ["KeyP", "frames"],
   ["KeyX", "save"],
   ["KeyH", "keys"],
   ["KeyG", "pads"],

@@ -5,6 +5,8 @@ import { toolFrames } from "../robot/tool_frames";
 import { difference, inverse, rotate, type RigidPose, type Vector } from "../xr/rigid";
 
 type View = NonNullable<Camera["calibration"]>;
+const KEY = "lockstep.tool_frames";
+
 type Spot = readonly [x: number, y: number];
 
 const LENGTH = 0.09; // of a frame's axis, for each metre that it is away
@@ -25,9 +27,25 @@ const GOAL = "#ffc24d";
 export class ToolOverlay {
   private readonly poses = createScenePoses();
   private shown: RobotDescription | null = null; // the robot whose feedbacks are kept
+  private hides = keptHidden(); // the person wants pictures without frames
 
   /** `description`: of the robot that is there now; null: none is. */
   constructor(private readonly description: () => RobotDescription | null) {}
+
+  /** Whether the pictures have frames, where there are any: the person's own decision. */
+  get isOn(): boolean {
+    return !this.hides;
+  }
+
+  /** Shows or hides the frames, from the next picture on. The decision is kept. */
+  toggle(): void {
+    this.hides = !this.hides;
+    try {
+      localStorage.setItem(KEY, this.hides ? "hidden" : "shown");
+    } catch {
+      // storage is switched off: it holds until the page closes
+    }
+  }
 
   take(feedback: Feedback): void {
     if ((this.robot()?.poses.length ?? 0) > 0) keepPose(this.poses, feedback);
@@ -36,7 +54,7 @@ export class ToolOverlay {
   /** Draws into the picture of `stream` with the stamp `event`; null: it has none. */
   paint(context: CanvasRenderingContext2D, stream: string, event: number | null): void {
     const description = this.robot();
-    if (description === null || event === null || description.poses.length === 0) return;
+    if (this.hides || description === null || event === null || description.poses.length === 0) return;
     const camera = description.cameras.find(({ name }) => name === stream);
     const state = this.poses.kept.findLast((each) => each.event === event);
     const view = camera?.calibration ?? null;
@@ -75,6 +93,14 @@ export class ToolOverlay {
     const from = spotOf(view, inCamera(place, measured.position));
     const to = spotOf(view, inCamera(place, goal.position));
     if (from !== null && to !== null) line(context, from, to, GOAL, [2, 6]);
+  }
+}
+
+function keptHidden(): boolean {
+  try {
+    return localStorage.getItem(KEY) === "hidden";
+  } catch {
+    return false;
   }
 }
 

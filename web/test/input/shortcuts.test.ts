@@ -29,6 +29,7 @@ it("a key works the page, unless it drives the robot and the page is armed", () 
   expect(pageAction("KeyC", true, description)).toBeNull();
   expect(pageAction("KeyX", true, description)).toBe("save");
   expect(pageAction("KeyF", true, null)).toBe("freeze");
+  expect(pageAction("KeyP", true, description)).toBe("frames");
   expect(pageAction("KeyW", false, null)).toBeNull();
 });
 

@@ -1,4 +1,4 @@
-import { describe, expect, it } from "vitest";
+import { afterEach, describe, expect, it, vi } from "vitest";
 import { ToolOverlay } from "../../src/media/tool_overlay";
 import type { Body, Camera, Pose, RobotDescription } from "../../src/protocol/wire";
 import { descriptionOf, feedbackOf, goalAxisOf } from "../messages";
@@ -80,6 +80,8 @@ function told(description: RobotDescription): ToolOverlay {
   return overlay;
 }
 
+afterEach(() => vi.unstubAllGlobals());
+
 describe("a picture", () => {
   it("has the tool's frame as it was at the picture's own event, where the camera sees it", () => {
     const overlay = told(robot());
@@ -121,6 +123,35 @@ describe("a picture", () => {
     expect(painted(overlay, 4)).toEqual([]);
     description = null;
     expect(painted(overlay, 4)).toEqual([]);
+  });
+
+  it("has none while the person has hidden them, and the decision is kept", () => {
+    const kept = new Map<string, string>();
+    vi.stubGlobal("localStorage", {
+      getItem: (key: string) => kept.get(key) ?? null,
+      setItem: (key: string, value: string) => void kept.set(key, value),
+    });
+    const overlay = told(robot());
+    expect(overlay.isOn).toBe(true);
+    overlay.toggle();
+    expect(painted(overlay, 5)).toEqual([]);
+    const later = told(robot());
+    expect(later.isOn).toBe(false);
+    later.toggle();
+    expect(painted(later, 5)).not.toEqual([]);
+    expect(told(robot()).isOn).toBe(true);
+  });
+
+  it("can be shown and hidden where storage is switched off", () => {
+    const refuse = (): never => {
+      throw new Error("switched off");
+    };
+    vi.stubGlobal("localStorage", { getItem: refuse, setItem: refuse });
+    const overlay = told(robot());
+    overlay.toggle();
+    expect(painted(overlay, 5)).toEqual([]);
+    overlay.toggle();
+    expect(painted(overlay, 5)).not.toEqual([]);
   });
 
   it("has the goal too while it is somewhere else", () => {

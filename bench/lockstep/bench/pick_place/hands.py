@@ -22,7 +22,8 @@ Array = npt.NDArray[np.float64]
 
 JOINTS: Final = tuple(axis.name for axis in JOINT_AXES)
 TICK: Final = 0.01  # s, of the solver's steps towards a posture
-STEPS: Final = 600
+STEPS: Final = 600  # at most; about a hundred are taken
+STANDS: Final = 1e-5  # rad of a step, from which on the posture is found; the last steps only creep
 POLICY_STEP: Final = 0.35  # rad, of the policy's output from the measured joints: half of their reach
 LEADER_STEP: Final = 0.25  # rad, of the arm's motion that the leader asks for with one event
 # The leader is another arm: its elbow is mounted the other way round, its gripper opens half as far.
@@ -55,10 +56,9 @@ class Postures:
         rotation = from_rotation_vector([goals[name] for name in ROTATION])
         arm = tuple(joints[ARM].tolist())
         for _ in range(STEPS):
-            step = self._solver.step(arm, position, rotation, TICK)
-            if step.joints == arm:
-                break
-            arm = step.joints
+            before, arm = arm, self._solver.step(arm, position, rotation, TICK).joints
+            if max(abs(new - old) for new, old in zip(arm, before, strict=True)) < STANDS:
+                break  # the console's loop waits for this, and a silent client loses the seat
         return np.array([*arm, joints[-1]])
 
 

@@ -11,7 +11,7 @@ from lockstep.robot_bridge.conformance.driver import Driver, first_motion, near_
 from lockstep.robot_bridge.conformance.errors import NotApplicable, NotReady, Violation
 from lockstep.robot_bridge.conformance.peer import Peer, opened
 from lockstep.robot_bridge.conformance.place import Place
-from lockstep.robot_bridge.conformance.waiting import PATIENCE
+from lockstep.robot_bridge.conformance.waiting import PATIENCE, SETTLE
 from lockstep.robot_bridge.description.check_description import check_description
 from lockstep.robot_bridge.errors import DescriptionError
 
@@ -24,8 +24,10 @@ TAKEN_AGAIN = 0.05  # s between two tries while the bridge has not yet seen that
 class Subject:
     """The bridge's place, and the state that the cases share."""
 
-    def __init__(self, place: Place, fraction: float = FRACTION) -> None:
+    def __init__(self, place: Place, fraction: float = FRACTION, *, settle: float = SETTLE) -> None:
+        """`settle`: s that the robot may take to stand still; more for a simulation that a busy machine holds up."""
         self.place = place
+        self.settle = settle
         self.presses: set[str] = set()  # STOP presses of the cases
         self._fraction = fraction
         self._direction = -1  # of the last motion

@@ -6,9 +6,10 @@ from contextlib import asynccontextmanager
 
 from lockstep.robot_bridge.conformance.errors import Violation
 
-__all__ = ["PATIENCE", "within"]
+__all__ = ["PATIENCE", "SETTLE", "within"]
 
 PATIENCE = 5.0  # s for an answer that has to come; waited for in full only if it does not come
+SETTLE = 0.5  # s that a robot may take to stand still after what is commanded is at rest
 
 
 @asynccontextmanager

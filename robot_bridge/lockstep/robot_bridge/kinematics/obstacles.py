@@ -65,16 +65,23 @@ class Obstacles:
         """
         self._chain = chain
         self._bodies: list[tuple[int, Array, Array]] = []  # joints that move it, points in their frame, radii
-        self._balls: list[tuple[Array, float]] = []  # that hold each: middle, in the same frame, and radius, m
+        middles, reaches = [], []  # of the balls that hold each: m, in the same frame; and their radii, m
         for name, surface in surfaces.items():
             places = [chain.point(name, point) for point in surface.points.tolist()]
             if places and places[0].moving:  # what no joint moves keeps its distance
                 points = np.array([place.position for place in places])
                 middle = (points.min(axis=0) + points.max(axis=0)) / 2.0
-                reach = float((np.linalg.norm(points - middle, axis=1) + surface.radii).max())
                 self._bodies.append((places[0].moving, points, surface.radii))
-                self._balls.append((middle, reach))
+                middles.append(middle)
+                reaches.append(float((np.linalg.norm(points - middle, axis=1) + surface.radii).max()))
         self._obstacles = tuple(obstacles)
+        self._moving = [moving for moving, _, _ in self._bodies]
+        self._middles = np.array(middles).reshape(-1, 3, 1)
+        self._reaches = np.array(reaches)
+        # Of all obstacles: the sides' directions in rows, and the middles seen along them.
+        self._sides = np.array([each.rotation.T for each in self._obstacles]).reshape(-1, 3)
+        self._offsets = np.array([each.position @ each.rotation for each in self._obstacles]).reshape(-1)
+        self._halves = np.array([each.half for each in self._obstacles]).reshape(-1)
 
     def gaps(self, state: ChainState, within: float) -> list[Gap]:
         """Return the gaps that are narrower than `within` (m): the narrowest of each body and obstacle, and others.
@@ -82,20 +89,31 @@ class Obstacles:
         If the nearest place alone were kept off, the far end of a hand could come down fast about it.
         """
         found = []
-        for (moving, points, radii), (middle, reach) in zip(self._bodies, self._balls, strict=True):
-            turn, origin = state.turns[moving], state.places[moving]
-            centre = (origin + turn @ middle)[None]
-            near = [each for each in self._obstacles if _distances(each, centre)[0] - reach < within]
-            if not near:
-                continue
-            places = origin + points @ turn.T
-            for obstacle in near:
+        for body, obstacles in self._near(state, within):
+            moving, points, radii = self._bodies[body]
+            places = state.places[moving] + points @ state.turns[moving].T
+            for obstacle in obstacles:
                 distances = _distances(obstacle, places) - radii
                 for number in _spread(places, distances, within, APART * reach):
                     place = places[number]
                     motion = self._chain.motion(state, moving, place)
                     found.append(Gap(float(distances[number]), _outward(obstacle, place) @ motion, obstacle.name))
         return found
+
+    def _near(self, state: ChainState, within: float) -> Iterator[tuple[int, list[Obstacle]]]:
+        """Yield each body whose ball is near obstacles, and these. One computation for all: most are far, every tick.
+
+        The distance of a ball's middle is taken along the sides alone, which is never more than it is.
+        """
+        if not self._bodies or not self._obstacles:
+            return
+        turns = np.array([state.turns[moving] for moving in self._moving])
+        middles = state.places[self._moving] + (turns @ self._middles)[:, :, 0]
+        beyond = np.abs(middles @ self._sides.T - self._offsets) - self._halves  # bodies x (obstacles, 3)
+        beyond = beyond.reshape(len(middles), -1, 3).max(axis=2)
+        near = beyond < (self._reaches + within)[:, None]
+        for body in np.flatnonzero(near.any(axis=1)).tolist():
+            yield body, [self._obstacles[number] for number in np.flatnonzero(near[body]).tolist()]
 
 
 def _spread(places: Array, distances: Array, within: float, apart: float) -> Iterator[int]:

@@ -161,7 +161,7 @@ async def test_an_arm_that_is_not_seen_is_held_and_moves_on_only_after_letting_g
 async def test_a_bridge_to_ros_2_passes_the_cases_about_goals(bridge: RosBridge) -> None:
     async with RobotLink(*bridge.address, "operator", name="test") as link:
         await ready(link)
-    subject = Subject(Place(*bridge.address))
+    subject = Subject(Place(*bridge.address), settle=PATIENCE)
     results = {}
     for case in CASES:
         if case.name.startswith("goal"):

@@ -22,6 +22,7 @@ const ALWAYS: readonly Line[] = [
   [["C"], "Live charts, open and close"],
   [["F"], "Freeze the charts"],
   [["X"], "Save the charts that are shown as CSV and PNG"],
+  [["P"], "Frames of tools on the pictures, show and hide"],
   [["G"], "Gamepads: which one drives, calibration, how it feels"],
   [["H"], "These keys"],
 ];

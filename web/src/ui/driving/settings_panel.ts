@@ -1,7 +1,7 @@
 import { capHolds, capIsChoice } from "../../drive/speed_cap";
 import type { Settings } from "../../session/console_state";
 import type { ConsoleEngine } from "../../engine/console_engine";
-import { button, h, setData, setPressed, setText, type Panel } from "../elements/dom";
+import { button, h, setData, setHidden, setPressed, setText, type Panel } from "../elements/dom";
 
 const MAX_TOLERANCE = 99;
 
@@ -16,6 +16,7 @@ export function createSettingsPanel(engine: ConsoleEngine): Panel {
     createCap(engine),
     createFlag(engine, "Rumble", "rumble", "The gamepad rumbles with the force, while armed"),
     createFlag(engine, "Contact tone", "contactTone", "A tone that rises with the force"),
+    createFrames(engine),
     createGate(engine),
   ];
   const head = h("div", "card-head", {}, h("h2", "", {}, "Gate and pacing"));
@@ -102,6 +103,30 @@ function createCap(engine: ConsoleEngine): Part {
       const isChoice = capIsChoice(engine.state.speedCap);
       if (control !== null) control.disabled = !isChoice;
       part.element.title = isChoice ? about : `${about}. The console has set this.`;
+    },
+  };
+}
+
+/** Of robots that have tools and a camera whose place is known. */
+function createFrames(engine: ConsoleEngine): Part {
+  const part = createSwitch(
+    engine,
+    "Tool frames",
+    "Frames of the tools on the pictures: as measured, and dashed where they are to be (key P)",
+    () => engine.streams.overlay?.isOn === true,
+    () => engine.streams.overlay?.toggle(),
+  );
+  part.element.querySelector("button")?.setAttribute("aria-keyshortcuts", "P");
+  return {
+    element: part.element,
+    update() {
+      const description = engine.state.robot?.description;
+      const canDraw =
+        description !== undefined &&
+        description.poses.length > 0 &&
+        description.cameras.some(({ calibration }) => calibration !== null);
+      setHidden(part.element, !canDraw);
+      part.update();
     },
   };
 }

@@ -9,11 +9,10 @@ from lockstep.protocol.description import Action
 from lockstep.protocol.messages import Rest
 from lockstep.protocol.serial import event_after
 from lockstep.robot_bridge.conformance.case import Case
-from lockstep.robot_bridge.conformance.cases.event_cases import SETTLE
 from lockstep.robot_bridge.conformance.driver import BY, Driver
 from lockstep.robot_bridge.conformance.errors import expect
 from lockstep.robot_bridge.conformance.subject import Subject, needs
-from lockstep.robot_bridge.conformance.waiting import PATIENCE, within
+from lockstep.robot_bridge.conformance.waiting import PATIENCE, SETTLE, within
 
 __all__ = ["ACTION_CASES"]
 

@@ -11,14 +11,13 @@ from lockstep.robot_bridge.conformance.errors import expect
 from lockstep.robot_bridge.conformance.subject import Subject
 from lockstep.robot_bridge.conformance.waiting import PATIENCE, within
 
-__all__ = ["EVENT_CASES", "SETTLE"]
+__all__ = ["EVENT_CASES"]
 
 COPIES = 5
 UNKNOWN = 1000  # issues beyond the newest
 REPEAT_EVERY = 0.02  # s
 REFRESH = 0.5  # s between issues while nothing is commanded
 REFRESH_LATE = 1.0  # s by which a busy robot may be late with it
-SETTLE = 0.5  # s that a robot may take to stand still after what is commanded is at rest
 AGED = 0.05  # s beyond max_event_age
 
 
@@ -62,7 +61,7 @@ async def _repeats_hold_nothing(subject: Subject) -> None:
         command = driver.command(driver.moving())
         driver.peer.send(command)
         moved = await driver.becomes(command)
-        longest = driver.description.hold + SETTLE
+        longest = driver.description.hold + subject.settle
         async with within(longest + PATIENCE, "the state is not measured again while a command is repeated"):
             while not (driver.feedback.at_rest and driver.feedback.issue > 1):
                 expect(driver.feedback.time - moved.time < longest, "the robot goes on while one command is repeated")

@@ -3,7 +3,6 @@
 from lockstep.protocol.messages import Rest
 from lockstep.protocol.serial import MAX_EVENT, event_after
 from lockstep.robot_bridge.conformance.case import Case
-from lockstep.robot_bridge.conformance.cases.event_cases import SETTLE
 from lockstep.robot_bridge.conformance.errors import expect
 from lockstep.robot_bridge.conformance.subject import Subject, needs
 from lockstep.robot_bridge.conformance.waiting import PATIENCE
@@ -28,7 +27,7 @@ async def _moves(subject: Subject) -> None:
 async def _hold(subject: Subject) -> None:
     async with subject.operator() as driver:
         moved = await driver.drive(driver.moving())
-        longest = driver.description.hold + SETTLE
+        longest = driver.description.hold + subject.settle
         stood = await driver.heard(
             lambda feedback: (feedback.at_rest and feedback.issue > 1) or feedback.time - moved.time > longest,
             "the passing of hold",
@@ -72,7 +71,7 @@ async def _lost_link(subject: Subject) -> None:
         driver.peer.cut()
     async with subject.operator(armed=False) as driver:
         expect(driver.feedback.event == event, f"event {driver.feedback.event} on a new link, and not {event}")
-        longest = driver.description.hold + SETTLE
+        longest = driver.description.hold + subject.settle
         await driver.heard(
             lambda feedback: feedback.at_rest, "at rest after the operator link broke", longest + PATIENCE
         )

@@ -165,8 +165,12 @@ class PlainDrive(Drive):
         return float(data.ctrl[self.actuator.number])
 
 
-def drives_of(model: Any, data: Any, actuators: list[Actuator], goals: Collection[int] = ()) -> list[Drive]:
-    """Return a drive for each actuator that gets an axis. `goals`: numbers of the servos that are goal axes.
+def drives_of(
+    model: Any, data: Any, actuators: list[Actuator], goals: Collection[int] = (), grippers: Collection[int] = ()
+) -> list[Drive]:
+    """Return a drive for each actuator that gets an axis.
+
+    `goals`: numbers of the servos that are goal axes. `grippers`: of the goal axes that grip.
 
     A velocity servo on a joint that also has a position servo only damps it, and gets none.
 
@@ -175,7 +179,9 @@ def drives_of(model: Any, data: Any, actuators: list[Actuator], goals: Collectio
     """
     servoed = {each.joint for each in actuators if each.kind is Kind.POSITION and each.joint is not None}
     return [
-        GoalDrive(model, each, _goal_axis(model, each)) if each.number in goals else _drive(model, data, each)
+        GoalDrive(model, each, _goal_axis(model, each, grips=each.number in grippers))
+        if each.number in goals
+        else _drive(model, data, each)
         for each in actuators
         if not (each.kind is Kind.VELOCITY and each.joint is not None and each.joint in servoed)
     ]
@@ -193,7 +199,7 @@ def _drive(model: Any, data: Any, actuator: Actuator) -> Drive:
     return PlainDrive(actuator, _axis(actuator, "", low, high, min(max(0.0, low), high)))
 
 
-def _goal_axis(model: Any, actuator: Actuator) -> Axis:
+def _goal_axis(model: Any, actuator: Actuator, *, grips: bool) -> Axis:
     low, high = _range(model, actuator)
     wrap = None
     if not (math.isfinite(low) and math.isfinite(high)):
@@ -213,6 +219,7 @@ def _goal_axis(model: Any, actuator: Actuator) -> Axis:
         acceleration=slew / SLEW_TIME,
         reach=FURTHEST_LEAD * (high - low),
         wrap=wrap,
+        grips=grips,
     )
 
 

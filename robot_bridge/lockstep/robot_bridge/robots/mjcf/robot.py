@@ -20,7 +20,7 @@ from lockstep.robot_bridge.robots.mjcf.bodies import DRAWN_GROUPS, bodies_of
 from lockstep.robot_bridge.robots.mjcf.cameras import cameras_of
 from lockstep.robot_bridge.robots.mjcf.controls import layers_of
 from lockstep.robot_bridge.robots.mjcf.drives import Drive, drives_of
-from lockstep.robot_bridge.robots.mjcf.goal_setting import goal_actuators
+from lockstep.robot_bridge.robots.mjcf.goal_setting import goal_actuators, gripper_actuators
 from lockstep.robot_bridge.robots.mjcf.joints import joints_of
 from lockstep.robot_bridge.robots.mjcf.model_file import load_model
 from lockstep.robot_bridge.robots.mjcf.names import label_of
@@ -68,8 +68,9 @@ class MjcfRobot(Robot):
         self._begin()
         actuators = actuators_of(model)
         found = tools_of(model, actuators)
-        goals = goal_actuators(model, actuators) | {servo.number for tool in found for servo in tool.servos}
-        self._drives = drives_of(model, data, actuators, goals)
+        arms = {servo.number for tool in found for servo in tool.servos}
+        grippers = gripper_actuators(model, actuators, arms)
+        self._drives = drives_of(model, data, actuators, goal_actuators(model, actuators) | grippers | arms, grippers)
         self._joints = joints_of(model)
         bodies = bodies_of(model, self._joints)
         self._tools = ToolSet(model, data, found, self._drives, bodies)

@@ -10,7 +10,7 @@ from lockstep.robot_bridge.conformance.place import Place
 from lockstep.robot_bridge.description.check_description import check_description
 from lockstep.robot_bridge.robots.mjcf import create
 from lockstep.robot_bridge.robots.mjcf.robot import MjcfRobot
-from tests.robot_bridge.bridge_helpers import operator, running_bridge
+from tests.robot_bridge.bridge_helpers import PATIENCE, operator, running_bridge
 from tests.robot_bridge.robots.mjcf.models import model_file
 from tests.robot_bridge.robots.mjcf.tools.arms import SEVEN_JOINTS, SIX_JOINTS, arm_model
 
@@ -53,7 +53,7 @@ async def test_the_tool_goes_where_it_is_told_and_stops_move_nothing(arm: MjcfRo
 
 async def test_the_bridges_of_arms_pass_the_cases_about_goals(arm: MjcfRobot) -> None:
     async with running_bridge(arm) as bridge:
-        subject = Subject(Place(*bridge.address))
+        subject = Subject(Place(*bridge.address), settle=PATIENCE)
         results = {}
         for case in CASES:
             if case.name.startswith("goal") or case.name in ("executes", "hold", "rest", "lost_link"):

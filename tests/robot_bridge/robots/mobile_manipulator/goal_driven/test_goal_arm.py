@@ -81,7 +81,7 @@ async def test_a_stop_holds_the_arm_and_the_reset_moves_nothing(robot: MobileMan
 
 async def test_its_bridge_passes_the_cases_about_goals(robot: MobileManipulator) -> None:
     async with running_bridge(robot) as bridge:
-        subject = Subject(Place(*bridge.address))
+        subject = Subject(Place(*bridge.address), settle=PATIENCE)
         results = {}
         for case in CASES:
             if case.name.startswith("goal") or case.name in ("executes", "hold", "rest"):
