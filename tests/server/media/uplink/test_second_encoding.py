@@ -86,7 +86,7 @@ async def test_an_observer_gets_the_second_encoding_and_the_operator_the_first()
 async def test_no_second_is_asked_for_unless_the_uplink_has_shown_room_for_both_and_it_is_set(
     is_set: bool, shown: float
 ) -> None:
-    settings: dict[str, bool] = {"second_encoding": True} if is_set else {}
+    settings: dict[str, Any] = {"second_encoding": True} if is_set else {}
     async with running_plane(quality=False, **settings) as hub:
         robot = Robot(hub)
         narrow_operator(hub, shown=shown)
@@ -122,6 +122,33 @@ async def test_an_observer_who_is_due_no_more_gets_the_first_again_from_a_keyfra
             assert encodings.passed is not None
             assert not encodings.second.targets
             assert target in encodings.passed.targets
+
+
+async def test_an_observer_changes_only_with_a_keyframe_that_is_as_new_as_the_picture_it_had_last() -> None:
+    async with running_plane(quality=False, second_encoding=True) as hub:
+        robot = Robot(hub)
+        narrow_operator(hub)
+        async with (
+            viewing(hub, ["video"], uris=NATIVE, priority=True) as operator,
+            viewing(hub, ["video"], uris=NATIVE) as observer,
+        ):
+            operator.media.drives(True)
+            target = observer.media.deliveries[0].target
+            target.tier = "high"
+            two = TwoEncodings(hub, robot)
+            while not two.asked():
+                await two.give(operator, 1)
+            encodings = stream_of(operator).encodings
+            assert encodings.second is not None
+            first, second = PICTURES[197:199]
+            before = robot.requests[-1].second[0].keyframes
+            robot.give(second)
+            hub.feed(msgspec.structs.replace(first, second=True), second.time)
+            assert target not in encodings.second.targets
+            hub.robot_encoding.tick(second.time + 1.0)
+            assert robot.requests[-1].second[0].keyframes > before
+            hub.feed(msgspec.structs.replace(second, second=True), second.time)
+            assert target in encodings.second.targets
 
 
 async def test_second_pictures_that_nobody_asked_for_go_nowhere() -> None:

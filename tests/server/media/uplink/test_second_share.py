@@ -40,7 +40,6 @@ def test_it_gets_what_the_operator_leaves_of_what_the_uplink_carried_before_it_b
     more = MARGIN * 700_000.0 - FIRST * KEEP
     assert share.decide(6.1, first_bps=FIRST * KEEP, most_bps=MOST, shown_bps=0.0, limited=False) == more
     assert share.decide(6.2, first_bps=400_000.0, most_bps=MOST, shown_bps=2e6, limited=False) == 0
-    assert not share.on
 
 
 def test_none_is_made_that_is_hardly_better_than_the_operators() -> None:
