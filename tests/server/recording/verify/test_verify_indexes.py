@@ -59,27 +59,27 @@ def changed(opcode: Opcode, change: Callable[[ReadDataStream], McapRecord | None
 
 
 def with_entries_swapped(stream: ReadDataStream) -> McapRecord | None:
-    found = MessageIndex.read(stream)
+    found: MessageIndex = MessageIndex.read(stream)
     times, places = zip(*found.records, strict=True)
     found.records = list(zip(times, reversed(places), strict=True))
     return found if len(places) > 1 else None
 
 
 def with_message_indexes_swapped(stream: ReadDataStream) -> McapRecord:
-    found = ChunkIndex.read(stream)
+    found: ChunkIndex = ChunkIndex.read(stream)
     offsets = found.message_index_offsets
     found.message_index_offsets = dict(zip(offsets, reversed(offsets.values()), strict=True))
     return found
 
 
 def with_fewer_messages(stream: ReadDataStream) -> McapRecord:
-    found = Statistics.read(stream)
+    found: Statistics = Statistics.read(stream)
     found.message_count -= 1
     return found
 
 
 def with_another_topic(stream: ReadDataStream) -> McapRecord | None:
-    found = Channel.read(stream)
+    found: Channel = Channel.read(stream)
     found.topic = found.topic[:-1] + "X"
     return found
 
