@@ -120,9 +120,9 @@ async def test_after_a_second_picture_that_was_dropped_observers_get_none_that_b
             flood = msgspec.structs.replace(PICTURES[190], second=True, keyframe=False)
             for _ in range(300):  # more than any camera makes
                 hub.feed(flood, flood.time)
-            before = stream.encodings.second._encoded._value.get()  # type: ignore[attr-defined]
+            before = stream.encodings.second._encoded._value.get()
             hub.feed(msgspec.structs.replace(flood, time=flood.time + 1.0), flood.time + 1.0)
-            assert stream.encodings.second._encoded._value.get() == before  # type: ignore[attr-defined]
+            assert stream.encodings.second._encoded._value.get() == before
             await two.give(operator, 1)  # which is a keyframe
 
 
