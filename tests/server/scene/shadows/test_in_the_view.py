@@ -76,12 +76,14 @@ async def test_a_turn_that_no_sine_takes_leaves_out_that_policy_alone() -> None:
     axes = (*ARM.axes, *(goal_axis(name, most=3.0, reach=1.0, wrap=math.tau) for name in turns))
     tool = Pose(name="tool", label="Tool", body="arm", position=("", "", ""), rotation=turns)
     robot = msgspec.structs.replace(ARM, axes=axes, poses=(tool,))
+    bad: list[float | None] = [0.0, 1.7e308, 1.7e308, 1.7e308]
+    good: list[float | None] = [0.8, None, None, None]
 
     def drawn() -> bool:
         for event in (1, 2):
             feedback = Feedback(event=event, issue=1, time=0.1, axes=[0.0] * 4, joints=[0.0], goals=[0.0] * 4)
             events.publish(FeedbackReceived(feedback, 0.0, None))
-        for name, values in (("bad", [0.0] + [1.7e308] * 3), ("good", [0.8, None, None, None])):
+        for name, values in (("bad", bad), ("good", good)):
             verdict = ShadowVerdict(peer=name, name=name, event=2, values=values, judgement="out_of_limits")
             events.publish(ShadowJudged(Actor(), verdict))
         shadows = [] if scene._model is None else scene._model.shadows.drawn
