@@ -80,6 +80,7 @@ def test_a_folder_that_is_a_link_or_whose_lock_is_one_is_left_alone(tmp_path: Pa
     (tmp_path / ".b.partial-1").symlink_to(elsewhere)
     linked.mkdir()
     (linked / LOCK).symlink_to(elsewhere / LOCK)
+    (tmp_path / ".c.partial-1" / LOCK).mkdir(parents=True)  # nor is this one of ours
     assert remove_stale(tmp_path) == []
 
 

@@ -9,6 +9,7 @@ import fcntl
 import os
 import re
 import shutil
+import stat
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -84,10 +85,12 @@ def remove_stale(directory: Path, name: str | None = None) -> list[Path]:
 
 
 def _is_free(lock: Path) -> bool:
-    """Return whether the lock is there, and no process holds it."""
+    """Return whether the lock is there, a file, and no process holds it."""
     with suppress(OSError):
         number = os.open(lock, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC)
         try:
+            if not stat.S_ISREG(os.fstat(number).st_mode):
+                return False
             fcntl.flock(number, fcntl.LOCK_SH | fcntl.LOCK_NB)
         except BlockingIOError:
             return False
