@@ -86,7 +86,7 @@ async def test_an_observer_gets_the_second_encoding_and_the_operator_the_first()
 async def test_no_second_is_asked_for_unless_the_uplink_has_shown_room_for_both_and_it_is_set(
     is_set: bool, shown: float
 ) -> None:
-    settings: dict[str, bool] = {"second_encoding": True} if is_set else {}
+    settings: dict[str, Any] = {"second_encoding": True} if is_set else {}
     async with running_plane(quality=False, **settings) as hub:
         robot = Robot(hub)
         narrow_operator(hub, shown=shown)
@@ -125,7 +125,7 @@ async def test_an_observer_who_is_due_no_more_gets_the_first_again_from_a_keyfra
 
 
 async def test_after_a_second_picture_that_was_dropped_observers_get_none_that_builds_on_it() -> None:
-    async with running_plane(quality=False) as hub:
+    async with running_plane(quality=False, second_encoding=True) as hub:
         robot = Robot(hub)
         narrow_operator(hub)
         async with (
@@ -141,9 +141,9 @@ async def test_after_a_second_picture_that_was_dropped_observers_get_none_that_b
             flood = msgspec.structs.replace(PICTURES[190], second=True, keyframe=False)
             for _ in range(300):  # more than any camera makes
                 hub.feed(flood, flood.time)
-            before = stream.encodings.second._encoded._value.get()  # type: ignore[attr-defined]
+            before = stream.encodings.second._encoded._value.get()
             hub.feed(msgspec.structs.replace(flood, time=flood.time + 1.0), flood.time + 1.0)
-            assert stream.encodings.second._encoded._value.get() == before  # type: ignore[attr-defined]
+            assert stream.encodings.second._encoded._value.get() == before
             await two.give(operator, 1)  # which is a keyframe
 
 

@@ -51,8 +51,7 @@ def test_none_is_made_that_is_hardly_better_than_the_operators() -> None:
 def test_a_limit_ends_it_at_once_and_it_is_tried_again_later_each_time() -> None:
     share, now, starts = begun(), 5.0, list[float]()
     for _ in range(3):
-        assert decide(share, now, limited=True) == 0
-        assert not share.on
+        assert (decide(share, now, limited=True), share.on) == (0, False)
         ended = now
         while not share.on:
             now += 0.1

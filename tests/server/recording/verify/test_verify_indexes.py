@@ -66,20 +66,20 @@ def with_entries_swapped(stream: ReadDataStream) -> McapRecord | None:
 
 
 def with_message_indexes_swapped(stream: ReadDataStream) -> McapRecord:
-    found = ChunkIndex.read(stream)
+    found: ChunkIndex = ChunkIndex.read(stream)
     offsets = found.message_index_offsets
     found.message_index_offsets = dict(zip(offsets, reversed(offsets.values()), strict=True))
     return found
 
 
 def with_fewer_messages(stream: ReadDataStream) -> McapRecord:
-    found = Statistics.read(stream)
+    found: Statistics = Statistics.read(stream)
     found.message_count -= 1
     return found
 
 
 def with_another_topic(stream: ReadDataStream) -> McapRecord | None:
-    found = Channel.read(stream)
+    found: Channel = Channel.read(stream)
     found.topic = found.topic[:-1] + "X"
     return found
 
