@@ -28,6 +28,7 @@ __all__ = ["ConsoleConnection", "console_context", "open_connection"]
 
 MAX_MESSAGE = 64 << 10  # bytes of one WebSocket message from the console
 MAX_EARLY = 16  # messages before the link takes them; a console sends one
+MAX_PINGS = 50  # while the console takes no data; their answers wait in memory
 MAX_DETAIL = 300  # characters of a console's refusal that are shown
 
 
@@ -52,6 +53,7 @@ class ConsoleConnection(ClientConnection):
         self._expected = expected
         self._for_link = for_link
         self._link: asyncio.Protocol | None = None
+        self._pings: int | None = None  # since the console takes no data; None: it takes them
         self._early: list[bytes] = []  # messages that came before `carry`, as the console's hello with its answer
         self._reader = PacedReader(super().data_received)
 
@@ -85,6 +87,10 @@ class ConsoleConnection(ClientConnection):
         super().eof_received()
 
     def process_event(self, event: Event) -> None:
+        if isinstance(event, Frame) and event.opcode is Opcode.PING and self._pings is not None:
+            self._pings += 1
+            if self._pings > MAX_PINGS:
+                self.transport.abort()
         if not self._for_link or not isinstance(event, Frame) or event.opcode is Opcode.PONG:
             super().process_event(event)
         elif event.opcode is Opcode.TEXT or len(self._early) >= MAX_EARLY:
@@ -105,11 +111,13 @@ class ConsoleConnection(ClientConnection):
 
     def pause_writing(self) -> None:
         super().pause_writing()
+        self._pings = 0
         if self._link is not None:
             self._link.pause_writing()
 
     def resume_writing(self) -> None:
         super().resume_writing()
+        self._pings = None
         if self._link is not None:
             self._link.resume_writing()
 

@@ -94,7 +94,7 @@ class Obstacles:
             places = state.places[moving] + points @ state.turns[moving].T
             for obstacle in obstacles:
                 distances = _distances(obstacle, places) - radii
-                for number in _spread(places, distances, within, APART * reach):
+                for number in _spread(places, distances, within, APART * float(self._reaches[body])):
                     place = places[number]
                     motion = self._chain.motion(state, moving, place)
                     found.append(Gap(float(distances[number]), _outward(obstacle, place) @ motion, obstacle.name))

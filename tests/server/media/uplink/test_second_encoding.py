@@ -152,7 +152,10 @@ async def test_an_observer_changes_only_with_a_keyframe_that_is_as_new_as_the_pi
 
 
 async def test_second_pictures_that_nobody_asked_for_go_nowhere() -> None:
-    async with running_plane(quality=False, second_encoding=True) as hub, viewing(hub, ["video"], uris=NATIVE) as viewer:
+    async with (
+        running_plane(quality=False, second_encoding=True) as hub,
+        viewing(hub, ["video"], uris=NATIVE) as viewer,
+    ):
         robot = Robot(hub)
         for medium in PICTURES[:5]:
             hub.feed(msgspec.structs.replace(medium, second=True), medium.time)
