@@ -38,11 +38,12 @@ async def test_the_tool_goes_where_it_is_told_and_stops_move_nothing(arm: MjcfRo
     still = [None if axis.kind == "goal" else 0.0 for axis in arm.describe().axes]
     async with running_bridge(arm) as bridge, operator(bridge) as driver:
         wanted = driver.feedback.axes[z] - 0.08
-        for number in range(60):
-            values: list[float | None] = [*still]
-            values[z] = wanted + 1e-4 * (number % 2)
-            await driver.drive(values)
-        await driver.heard(lambda each: each.at_rest and abs(each.axes[z] - wanted) < 5e-3)
+        while abs(driver.feedback.axes[z] - wanted) >= 5e-3:  # on a busy machine the watchdog rests it on its way
+            for number in range(60):
+                values: list[float | None] = [*still]
+                values[z] = wanted + 1e-4 * (number % 2)
+                await driver.drive(values)
+            await driver.heard(lambda each: each.at_rest)
         assert driver.feedback.goals[z] == pytest.approx(wanted, abs=2e-3)
         arm.stop()
         held = arm.goals()
