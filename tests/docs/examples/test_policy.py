@@ -41,7 +41,7 @@ async def said_by(folder: Path, *options: str) -> str:
     return said.decode()
 
 
-@pytest.mark.timeout(300)
+@pytest.mark.timeout(600)
 async def test_a_policy_learns_drives_is_corrected_and_learns_of_the_correction(tmp_path: Path) -> None:
     said = await said_by(tmp_path, "--episodes", "1", "--trials", "0", "--corrections", "1")
     assert "corrected once in each of 1 episodes: 1 in the bowl" in said
