@@ -5,6 +5,7 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import matplotlib as mpl
+import numpy as np
 from matplotlib.axes import Axes
 
 from lockstep.protocol.description import Axis
@@ -148,7 +149,7 @@ def _figure(
         for line, panels in zip(grid, rows, strict=True):
             for axes, panel in zip(line, panels, strict=True):
                 panel.draw(axes)
-                if not any(len(line.get_xdata()) for line in axes.lines):
+                if not any(np.size(line.get_xdata()) for line in axes.lines):
                     _say_empty(axes, ticks=share)
                 axes.set_title(panel.title)
                 axes.set_ylabel(panel.ylabel)
