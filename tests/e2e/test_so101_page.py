@@ -51,6 +51,15 @@ async def test_the_keyboard_drives_the_tool_and_the_joints_and_a_stop_ends_it(so
     async with open_console(chromium, so101.operator, width=width, height=height, pad=False) as console:
         page = console.page
         await console.until_live()
+        frames = page.get_by_role("switch", name="Tool frames")
+        await expect(frames).to_be_checked()
+        await page.keyboard.press("KeyP")
+        await expect(frames).not_to_be_checked()
+        await page.reload()
+        await console.until_live()
+        await expect(frames).not_to_be_checked()  # the browser remembers it
+        await page.keyboard.press("KeyP")
+        await expect(frames).to_be_checked()
         for axis in TOOL:  # all seven are in view, whole
             await expect(page.locator(f'[data-axis="{axis}"] .goal-slider')).to_be_in_viewport(ratio=1)
         start = (await console.stats())["axes"]
