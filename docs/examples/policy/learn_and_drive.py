@@ -82,11 +82,12 @@ async def reset(ada: Console) -> None:
     await ada.take_over()
     while True:
         try:
+            await ada.rest()  # an action that moves is refused before
             await armed(ada)
             await ada.act("home")
             break
         except (ActionCancelled, ActionFailed, ActionRefused, CommandRefused) as held_up:
-            print(f"once more to where the episode begins: {held_up}")  # it may not be at rest yet
+            print(f"once more to where the episode begins: {held_up}")
             await anext(aiter(ada.feedbacks()))
     before = said(ada, "scene")
     await ada.act("reset_scene")

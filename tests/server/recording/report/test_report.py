@@ -7,6 +7,7 @@ import pytest
 from lockstep.protocol.console import Report, StreamReport
 from lockstep.protocol.traces.trace import CommandSpans, PictureSpans
 from lockstep.server.recording.format.records import ReportRecord, TraceRecord
+from lockstep.server.recording.format.topics import OWN_TOPICS
 from lockstep.server.recording.report.report import write_report
 from lockstep.server.recording.report.session import read_session
 from lockstep.server.recording.report.traced_events import MOST_STREAMS, TracedEvents, slowest, slowest_by_time
@@ -31,6 +32,17 @@ def test_the_report_draws_every_stream_and_says_what_was_kept(tmp_path: Path) ->
     assert text.count("<svg") == 7  # the session at a glance, events, camera, microphone, delays, force, axes
     assert "front: server" in text
     assert "times not" not in text
+    assert text.count("nothing was reported") == 5  # of the microphone, and no command → picture
+
+
+def test_a_session_that_no_page_reported_of_says_so_where_its_figures_would_be(tmp_path: Path) -> None:
+    reports = OWN_TOPICS[ReportRecord]
+    path = rewritten(
+        tmp_path / "a.mcap", Story(events=80).entries(), lambda each: [] if each.topic == reports else [each]
+    )
+    text = write_report(path, tmp_path / "a.html").read_text()
+    assert text.count("nothing was reported") > 6
+    assert "−0.04" not in text  # an axis of nothing
 
 
 def _trace(event: int, **fields: object) -> TraceRecord:

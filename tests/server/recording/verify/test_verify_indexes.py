@@ -59,7 +59,7 @@ def changed(opcode: Opcode, change: Callable[[ReadDataStream], McapRecord | None
 
 
 def with_entries_swapped(stream: ReadDataStream) -> McapRecord | None:
-    found = MessageIndex.read(stream)
+    found: MessageIndex = MessageIndex.read(stream)
     times, places = zip(*found.records, strict=True)
     found.records = list(zip(times, reversed(places), strict=True))
     return found if len(places) > 1 else None

@@ -84,8 +84,8 @@ class SecondPassthrough(FrameStage):
             self.lost()
             return
         if media.keyframe:
-            self._begin_with(media)
             self._second.keyframes.served(frame.arrived_at)
+            self._begin_with(media)
         elif self._broken:
             self._dropped.count("no_reference")
             return
@@ -98,10 +98,14 @@ class SecondPassthrough(FrameStage):
         profile = inspect(keyframe.payload).profile
         for target in self._all_targets():
             takes = profile is not None and target.h264 is not None and accepts(target.h264, profile)
-            if takes and self._takes(target) and target not in self._second.targets:
-                for encoding in self._encodings:
-                    encoding.leave(target)
-                self._second.targets[target] = None
+            if not takes or not self._takes(target) or target in self._second.targets:
+                continue
+            if any(target in each.targets and each.newest > keyframe.time for each in self._encodings):
+                self._second.keyframes.join()  # it has had a later picture, and events never go back
+                continue
+            for encoding in self._encodings:
+                encoding.leave(target)
+            self._second.targets[target] = None
 
     def _pass(self, frame: SourceFrame) -> None:
         media, at = frame.media, frame.arrived_at

@@ -148,6 +148,8 @@ def _figure(
         for line, panels in zip(grid, rows, strict=True):
             for axes, panel in zip(line, panels, strict=True):
                 panel.draw(axes)
+                if not any(len(line.get_xdata()) for line in axes.lines):
+                    _say_empty(axes, ticks=share)
                 axes.set_title(panel.title)
                 axes.set_ylabel(panel.ylabel)
                 axes.set_xlabel("time (s)")
@@ -155,6 +157,13 @@ def _figure(
             if share:
                 line[1].sharey(line[0])
         return Figure(name, title, words, svg_text(figure))
+
+
+def _say_empty(axes: Axes, *, ticks: bool) -> None:
+    """Say that there is nothing to draw. `ticks`: keep those of the axes beside it."""
+    axes.text(0.5, 0.5, "nothing was reported", transform=axes.transAxes, ha="center", va="center", color=FAINT)
+    if not ticks:
+        axes.set_yticks([])
 
 
 def _line(series: Series, colour: str, label: str = "") -> Callable[[Axes], None]:
