@@ -4,11 +4,16 @@ from lockstep.bench.browsers.console_page import ConsolePage
 
 __all__ = ["hears", "listen", "said"]
 
-# At every change, before the page is drawn.
+# Ten times a second where something changes: the text of a whole page costs a layout, which at every change of a page
+# that drives would hold up the driving.
 LISTEN = """() => {
   window.said = new Set();
-  const note = () => document.body.innerText.split("\\n").forEach((line) => window.said.add(line));
-  new MutationObserver(note).observe(document.body, {
+  let due = null;
+  const note = () => {
+    due = null;
+    document.body.innerText.split("\\n").forEach((line) => window.said.add(line));
+  };
+  new MutationObserver(() => { due ??= setTimeout(note, 100); }).observe(document.body, {
     attributes: true, characterData: true, childList: true, subtree: true,
   });
   note();
