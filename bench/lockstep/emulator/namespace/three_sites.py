@@ -5,26 +5,18 @@ Linux and root only. Each router translates its machine's inner address into an 
 is another's network of a client; between robot and page there is no path.
 """
 
-import asyncio
-import os
 import socket
 import struct
-import sys
 import time
 from collections import Counter
-from collections.abc import Sequence
-from contextlib import AsyncExitStack
 from dataclasses import dataclass
-from types import TracebackType
-from typing import Any, Literal, Self
+from typing import Literal
 
 from lockstep.emulator.impairment.bottleneck import Bottleneck
-from lockstep.emulator.impairment.deliveries import Deliveries
 from lockstep.emulator.impairment.outages import Outages
 from lockstep.emulator.impairment.path import ImpairedPath
 from lockstep.emulator.impairment.profile import DIRECTIONS, Direction, Profile
-from lockstep.emulator.namespace.namespaces import ENTER, end_process, write_packet
-from lockstep.emulator.namespace.tun import Tun, open_tun
+from lockstep.emulator.namespace.tun_sites import TunSites
 from lockstep.emulator.transport.address_translation import Firewall, OneToOneNat
 
 __all__ = ["CONSOLE", "SITES", "Router", "Site", "ThreeSites"]
@@ -34,7 +26,6 @@ INNER: dict[Site, str] = {"robot": "10.0.1.2", "console": "10.0.2.2", "page": "1
 OUTER: dict[Site, str] = {"robot": "198.18.0.1", "console": "198.18.0.2", "page": "198.18.0.3"}  # RFC 2544
 SITES: tuple[Site, ...] = ("robot", "console", "page")
 CONSOLE = OUTER["console"]
-MAX_PACKET, BATCH = 65536, 64
 
 
 class Router:
@@ -80,7 +71,7 @@ class _Leg:
     outages: Outages
 
 
-class ThreeSites:
+class ThreeSites(TunSites[Site]):
     """Enter it, then `start` processes at its sites; leaving ends them.
 
     Raises:
@@ -89,65 +80,27 @@ class ThreeSites:
 
     def __init__(self, robot: Profile, page: Profile, open_port: int, *, seed: int = 1) -> None:
         """`robot` and `page`: the networks between these sites and the console."""
+        super().__init__(INNER)
         self.router = Router(open_port)
         self._legs: dict[Site, _Leg] = {"robot": _robot_leg(robot, seed), "page": _page_leg(page, seed)}
-        self._tuns: dict[Site, Tun] = {}
-        self._stack = AsyncExitStack()
-
-    async def __aenter__(self) -> Self:
-        async with AsyncExitStack() as stack:
-            loop = asyncio.get_running_loop()
-            self._deliveries = Deliveries()
-            stack.callback(self._deliveries.close)
-            for site in SITES:
-                tun = await asyncio.to_thread(open_tun, INNER[site])
-                stack.callback(tun.close)
-                self._tuns[site] = tun
-            for site, tun in self._tuns.items():
-                loop.add_reader(tun.packets, self._from, site)
-                stack.callback(loop.remove_reader, tun.packets)
-            self._stack = stack.pop_all()
-        return self
-
-    async def __aexit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        await self._stack.aclose()
-
-    async def start(self, site: Site, command: Sequence[str], **options: Any) -> asyncio.subprocess.Process:
-        """Start a process that only knows its site's network; `options` are those of `create_subprocess_exec`."""
-        descriptor = self._tuns[site].namespace
-        process = await asyncio.create_subprocess_exec(
-            *(sys.executable, "-I", str(ENTER), str(descriptor), *command),
-            pass_fds=(descriptor,),
-            start_new_session=True,
-            **options,
-        )
-        self._stack.push_async_callback(end_process, process)
-        return process
 
     def sent_bytes(self, site: Site, direction: Direction) -> int:
         """Return the bytes that a site's path to the console has taken in one direction."""
         return self._legs[site].paths[direction].statistics.bytes
 
-    def _from(self, site: Site) -> None:
-        for _ in range(BATCH):
-            try:
-                packet = os.read(self._tuns[site].packets, MAX_PACKET)
-            except OSError:
-                return
-            passed = self.router.passes(site, packet)
-            if passed is None:
-                continue
-            other, arriving = passed
-            leg = self._legs[other if site == "console" else site]
-            now = time.monotonic()
-            if not leg.outages.started:
-                leg.outages.start(now)
-            towards_person: Direction = "to_operator" if (site == "robot" or other == "page") else "to_robot"
-            arrives = leg.paths[towards_person].admit(now, len(packet))
-            if arrives is not None:
-                self._deliveries.at(arrives, write_packet, self._tuns[other].packets, arriving)
+    def _left(self, site: Site, packet: bytes) -> None:
+        passed = self.router.passes(site, packet)
+        if passed is None:
+            return
+        other, arriving = passed
+        leg = self._legs[other if site == "console" else site]
+        now = time.monotonic()
+        if not leg.outages.started:
+            leg.outages.start(now)
+        towards_person: Direction = "to_operator" if (site == "robot" or other == "page") else "to_robot"
+        arrives = leg.paths[towards_person].admit(now, len(packet))
+        if arrives is not None:
+            self._deliver(other, arriving, arrives)
 
 
 def _robot_leg(profile: Profile, seed: int) -> _Leg:

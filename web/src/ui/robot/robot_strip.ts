@@ -42,10 +42,11 @@ export function createRobotStrip(engine: ConsoleEngine): RobotStrip {
       }
       const isSilent = feedbackAge(engine.measuredMs, now) !== null;
       const items = shownItems(state.status, now - engine.statusMs, isSilent);
-      setHidden(element, actions.length === 0 && items.length === 0);
-      setHidden(buttons, !mayDrive(state) || actions.length === 0);
+      const hasButtons = mayDrive(state) && actions.length > 0;
+      setHidden(buttons, !hasButtons);
       for (const each of actions) each.update(now);
       showWords(engine, words, now);
+      setHidden(element, !hasButtons && items.length === 0 && words.textContent === "");
       const key = JSON.stringify(items);
       if (key === shownStatus) return;
       shownStatus = key;
