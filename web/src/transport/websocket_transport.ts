@@ -1,6 +1,8 @@
 /** An observer's way to the console beside a relay: one WebSocket for all that data channels would carry. */
 import { expectsPong } from "./expects_pong";
 import { ConsoleError, type ConsoleApi } from "./signalling/console_api";
+import { TransportEnd, type Transport, type TransportEvents } from "./transport";
+import type { ChannelName } from "./webrtc/data_channels";
 
 const OPEN_MS = 3000; // and so many times what the ticket took: TCP, TLS and the upgrade are round trips too
 const OPEN_TRIPS = 6;
@@ -10,13 +12,8 @@ const UNREAD_MS = 500; // more: a page that was held up has answers waiting that
 const MAX_WAITING = 100_000; // bytes
 const PROBE = JSON.stringify({ type: "ping", id: 0 }); // nobody waits for its round trip
 
-export interface ObserverWebSocketEvents {
-  message(data: unknown): void;
-  ended(why: "closed" | "silent"): void; // once, unless closed from here
-}
-
-/** What of the console's interface lines need. */
-export type ObserverWebSocketApi = Pick<ConsoleApi, "watch" | "declineLine" | "lineAddress">;
+/** What of the console's interface it needs. */
+export type WebSocketApi = Pick<ConsoleApi, "watch" | "declineLine" | "lineAddress">;
 
 export type Socket = Pick<
   WebSocket,
@@ -25,23 +22,25 @@ export type Socket = Pick<
 
 const OPEN = 1; // WebSocket.OPEN
 
-/** It ends once. */
-export class ObserverWebSocket {
+/** A WebSocket that is open. */
+export class WebSocketTransport implements Transport {
+  readonly isConnected = true;
+  readonly isReliable = true;
   private answerTimer: ReturnType<typeof setTimeout> | undefined;
   private isOver = false;
 
   /** `socket` is open. */
   constructor(
     private readonly socket: Socket,
-    private readonly events: ObserverWebSocketEvents,
+    private readonly events: TransportEvents,
   ) {
     socket.onmessage = (event: MessageEvent<unknown>) => this.received(event.data);
-    socket.onclose = () => this.end("closed");
+    socket.onclose = () => this.end(new TransportEnd("lost", "the console closed the connection"));
     socket.onerror = null; // onclose follows
   }
 
-  /** Says whether it could be sent. What cannot go out now is not kept: newer follows. */
-  send(text: string): boolean {
+  /** The kind of a message tells its channel. */
+  send(_channel: ChannelName, text: string): boolean {
     if (this.isOver || this.socket.readyState !== OPEN || this.socket.bufferedAmount > MAX_WAITING)
       return false;
     this.socket.send(text);
@@ -49,9 +48,15 @@ export class ObserverWebSocket {
     return true;
   }
 
-  /** Asks whether the console still hears; without an answer the line ends. */
+  /** Without an answer it ends. */
   probe(): void {
-    this.send(PROBE);
+    this.send("session", PROBE);
+  }
+
+  /** TCP has one path: it is asked whether it lives. */
+  restart(): Promise<void> {
+    this.probe();
+    return Promise.resolve();
   }
 
   close(): void {
@@ -63,33 +68,33 @@ export class ObserverWebSocket {
   }
 
   private overdue(): void {
-    this.answerTimer = setTimeout(() => this.end("silent"), UNREAD_MS);
+    this.answerTimer = setTimeout(() => this.end(new TransportEnd("silent", "")), UNREAD_MS);
   }
 
   private received(data: unknown): void {
     clearTimeout(this.answerTimer);
     this.answerTimer = undefined;
-    this.events.message(data);
+    this.events.message("session", data, performance.now());
   }
 
-  private end(why: "closed" | "silent"): void {
+  private end(end: TransportEnd): void {
     if (this.isOver) return;
     this.close();
-    this.events.ended(why);
+    this.events.ended(end);
   }
 }
 
 /**
- * A line to the console, for an observer behind `relay`. null: no WebSocket passes between here and there, or the console
- * knows no lines. Raises ConsoleError when the console refuses.
+ * Opens a WebSocket to the console, for an observer behind `relay`. null: none passes between here and there, or the
+ * console knows none. Raises ConsoleError when the console refuses.
  */
-export async function openObserverWebSocket(
-  api: ObserverWebSocketApi,
+export async function openWebSocketTransport(
+  api: WebSocketApi,
   relay: string,
   signal: AbortSignal,
-  events: ObserverWebSocketEvents,
+  events: TransportEvents,
   makeSocket: (url: string) => Socket = (url) => new WebSocket(url),
-): Promise<ObserverWebSocket | null> {
+): Promise<WebSocketTransport | null> {
   const askedMs = performance.now();
   const ticket = await ticketOf(api, relay, signal);
   const openMs = Math.round(Math.min(OPEN_MS + OPEN_TRIPS * (performance.now() - askedMs), MOST_OPEN_MS));
@@ -97,18 +102,14 @@ export async function openObserverWebSocket(
   try {
     const socket = makeSocket(api.lineAddress(ticket));
     await opened(socket, AbortSignal.any([signal, AbortSignal.timeout(openMs)]));
-    return new ObserverWebSocket(socket, events);
+    return new WebSocketTransport(socket, events);
   } catch {
     api.declineLine(ticket).catch(() => undefined); // its end comes by itself
     return null;
   }
 }
 
-async function ticketOf(
-  api: ObserverWebSocketApi,
-  relay: string,
-  signal: AbortSignal,
-): Promise<string | null> {
+async function ticketOf(api: WebSocketApi, relay: string, signal: AbortSignal): Promise<string | null> {
   try {
     return await api.watch(relay, signal);
   } catch (error) {

@@ -1,11 +1,12 @@
 import { afterEach, beforeEach, describe, expect, it, vi } from "vitest";
 import { ConsoleError } from "../../src/transport/signalling/console_api";
+import type { TransportEvents } from "../../src/transport/transport";
 import {
-  openObserverWebSocket,
-  ObserverWebSocket,
-  type ObserverWebSocketApi,
+  openWebSocketTransport,
+  WebSocketTransport,
+  type WebSocketApi,
   type Socket,
-} from "../../src/transport/observer_websocket";
+} from "../../src/transport/websocket_transport";
 
 const PING = '{"type":"ping","id":3}';
 const NOTE = '{"type":"note","text":"seen"}';
@@ -39,7 +40,7 @@ class FakeSocket {
   }
 }
 
-class FakeApi implements ObserverWebSocketApi {
+class FakeApi implements WebSocketApi {
   declined: string[] = [];
 
   constructor(private readonly error: ConsoleError | null = null) {}
@@ -58,15 +59,16 @@ class FakeApi implements ObserverWebSocketApi {
   }
 }
 
-function listener(): {
-  heard: unknown[];
-  ends: string[];
-  message(data: unknown): void;
-  ended(why: string): void;
-} {
+function listener(): TransportEvents & { heard: unknown[]; ends: string[] } {
   const heard: unknown[] = [];
   const ends: string[] = [];
-  return { heard, ends, message: (data) => void heard.push(data), ended: (why) => void ends.push(why) };
+  return {
+    heard,
+    ends,
+    message: (_channel, data) => void heard.push(data),
+    troubled: () => expect.unreachable(),
+    ended: ({ why }) => void ends.push(why),
+  };
 }
 
 const never = new AbortController().signal;
@@ -78,16 +80,16 @@ afterEach(() => {
   vi.useRealTimers();
 });
 
-describe("opening a line", () => {
+describe("opening a WebSocket", () => {
   it("opens the address that the ticket stands in", async () => {
     const socket = new FakeSocket();
     const addresses: string[] = [];
-    const opening = openObserverWebSocket(new FakeApi(), "1", never, listener(), (url) => {
+    const opening = openWebSocketTransport(new FakeApi(), "1", never, listener(), (url) => {
       addresses.push(url);
       queueMicrotask(() => socket.open());
       return socket.asSocket;
     });
-    expect(await opening).toBeInstanceOf(ObserverWebSocket);
+    expect(await opening).toBeInstanceOf(WebSocketTransport);
     expect(addresses).toEqual(["wss://console/robots/left/watch/ticket-1"]);
   });
 
@@ -102,7 +104,7 @@ describe("opening a line", () => {
       const api = new FakeApi();
       const socket = new FakeSocket();
       const events = listener();
-      const opening = openObserverWebSocket(api, "0", never, events, () => {
+      const opening = openWebSocketTransport(api, "0", never, events, () => {
         if (fail.length === 0) fail(socket);
         else queueMicrotask(() => fail(socket));
         return socket.asSocket;
@@ -118,7 +120,7 @@ describe("opening a line", () => {
     const limit = new AbortController();
     const socket = new FakeSocket();
     const api = new FakeApi();
-    const opening = openObserverWebSocket(api, "0", limit.signal, listener(), () => {
+    const opening = openWebSocketTransport(api, "0", limit.signal, listener(), () => {
       queueMicrotask(() => limit.abort());
       return socket.asSocket;
     });
@@ -127,80 +129,84 @@ describe("opening a line", () => {
     expect(api.declined).toEqual(["ticket-0"]);
   });
 
-  it("does without at a console that knows no lines, and passes every other refusal on", async () => {
+  it("does without at a console that knows no such WebSocket, and passes every other refusal on", async () => {
     const unused = (): Socket => expect.unreachable();
     for (const status of [404, 405]) {
       const api = new FakeApi(new ConsoleError(status, "not_found", "", null));
-      expect(await openObserverWebSocket(api, "0", never, listener(), unused)).toBeNull();
+      expect(await openWebSocketTransport(api, "0", never, listener(), unused)).toBeNull();
     }
     for (const name of ["too_many_peers", "link_revoked", "console_unreachable"]) {
       const api = new FakeApi(new ConsoleError(503, name, "", 5000));
-      await expect(openObserverWebSocket(api, "0", never, listener(), unused)).rejects.toMatchObject({
+      await expect(openWebSocketTransport(api, "0", never, listener(), unused)).rejects.toMatchObject({
         error: name,
       });
     }
   });
 });
 
-describe("a line", () => {
-  function open(): { socket: FakeSocket; line: ObserverWebSocket; events: ReturnType<typeof listener> } {
+describe("a WebSocket for messages", () => {
+  function open(): {
+    socket: FakeSocket;
+    transport: WebSocketTransport;
+    events: ReturnType<typeof listener>;
+  } {
     const socket = new FakeSocket();
     socket.readyState = 1;
     const events = listener();
-    return { socket, line: new ObserverWebSocket(socket.asSocket, events), events };
+    return { socket, transport: new WebSocketTransport(socket.asSocket, events), events };
   }
 
   it("carries messages as they are", () => {
-    const { socket, line, events } = open();
-    expect(line.send(NOTE)).toBe(true);
+    const { socket, transport, events } = open();
+    expect(transport.send("session", NOTE)).toBe(true);
     socket.onmessage?.({ data: '{"type":"pong","id":3}' });
     expect(socket.sent).toEqual([NOTE]);
     expect(events.heard).toEqual(['{"type":"pong","id":3}']);
   });
 
   it("takes nothing that would wait long, and nothing after its end", () => {
-    const { socket, line } = open();
+    const { socket, transport } = open();
     socket.bufferedAmount = 200_000;
-    expect(line.send(NOTE)).toBe(false);
+    expect(transport.send("session", NOTE)).toBe(false);
     socket.bufferedAmount = 0;
-    line.close();
-    expect(line.send(NOTE)).toBe(false);
+    transport.close();
+    expect(transport.send("session", NOTE)).toBe(false);
     expect(socket.sent).toEqual([]);
   });
 
   it("ends once when the console closes it", () => {
-    const { socket, line, events } = open();
+    const { socket, transport, events } = open();
     const { onclose } = socket;
     onclose?.();
     onclose?.();
-    line.close();
-    expect(events.ends).toEqual(["closed"]);
+    transport.close();
+    expect(events.ends).toEqual(["lost"]);
   });
 
   it("ends when a ping is not answered, and whatever is heard is an answer", () => {
-    const { socket, line, events } = open();
-    line.send(PING);
+    const { socket, transport, events } = open();
+    transport.send("session", PING);
     vi.advanceTimersByTime(4900);
     socket.onmessage?.({ data: "anything" });
     vi.advanceTimersByTime(60_000);
     expect(events.ends).toEqual([]);
-    line.probe();
+    transport.probe();
     vi.advanceTimersByTime(6000);
     expect(events.ends).toEqual(["silent"]);
     expect(socket.closed).toBe(true);
   });
 
   it("waits for no answer to what is not answered", () => {
-    const { line, events } = open();
-    line.send(NOTE);
+    const { transport, events } = open();
+    transport.send("session", NOTE);
     vi.advanceTimersByTime(60_000);
     expect(events.ends).toEqual([]);
   });
 
   it("says nothing of its end when it is closed from here", () => {
-    const { socket, line, events } = open();
-    line.send(PING);
-    line.close();
+    const { socket, transport, events } = open();
+    transport.send("session", PING);
+    transport.close();
     socket.onclose?.();
     vi.advanceTimersByTime(60_000);
     expect(events.ends).toEqual([]);
