@@ -14,6 +14,7 @@ from lockstep.client.transport.whep import Whep
 from lockstep.rtc.ice.settings import IceSettings
 from lockstep.rtc.peer import PeerSettings
 from lockstep.rtc.sdp import Fragment
+from lockstep.server.peers.webrtc_transport import WebRtcTransport
 from tests.server.rig import PATIENCE, Rig, eventually, running_rig
 
 CANDIDATE = re.compile(r"^a=candidate:(\S+ \d+ \S+ \d+) (\S+) (\d+) typ host", re.MULTILINE)
@@ -150,7 +151,9 @@ def hasty_consent(monkeypatch: pytest.MonkeyPatch) -> None:
 
 async def _lapse(rig: Rig, paths: Paths) -> None:
     """The old path carries everything but STUN, and nobody consents on it, while a restart is under way."""
-    session = rig.webrtc_peers[0].ice
+    transport = rig.webrtc_peers[0].transport
+    assert isinstance(transport, WebRtcTransport)
+    session = transport.ice
     session.restart(Fragment("somebody", "x" * 22))
     paths.forwarders[0].checks_pass = False
     await eventually(lambda: not session.has_path)

@@ -11,7 +11,7 @@ from lockstep.server.auth.tokens import Identity
 from lockstep.server.errors import ChannelError
 from lockstep.server.peers.channels import ChannelName
 from lockstep.server.peers.peer import Peer
-from lockstep.server.peers.websocket_peer import LineEnded, WebSocketPeer, close_code
+from lockstep.server.peers.websocket_transport import LineEnded, WebSocketTransport, close_code, peer_beside_relay
 from lockstep.server.settings import Settings
 from lockstep.server.util.fair_queue import FairQueue
 from tests.server.rig import PATIENCE
@@ -69,10 +69,10 @@ class _Line:
             await asyncio.Event().wait()
 
 
-def _watcher(host: _Host, turns: FairQueue | None = None) -> WebSocketPeer:
+def _watcher(host: _Host, turns: FairQueue | None = None) -> tuple[Peer, WebSocketTransport]:
     identity = Identity("observer", "ann", "link", 0.0)
     limits: Any = Settings()
-    return WebSocketPeer("0", identity, host, limits, turns or FairQueue())
+    return peer_beside_relay("0", identity, host, limits, turns or FairQueue())
 
 
 async def test_every_channel_opens_and_messages_go_where_their_kind_belongs() -> None:
@@ -80,8 +80,8 @@ async def test_every_channel_opens_and_messages_go_where_their_kind_belongs() ->
     line = _Line(
         '{"type":"ping","id":1}', '{"type":"note","text":"n"}', '{"type":"stop","by":""}', fault=LineEnded(1000)
     )
-    watcher = _watcher(host)
-    await watcher.serve(line)
+    watcher, transport = _watcher(host)
+    await transport.serve(line)
     assert host.opened == ["control", "session", "stop"]
     assert [channel for channel, _ in host.heard] == ["control", "session", "stop"]
     assert host.heard[0][1] == Ping(id=1)
@@ -90,18 +90,19 @@ async def test_every_channel_opens_and_messages_go_where_their_kind_belongs() ->
 
 async def test_a_fault_ends_the_watcher_by_name_and_nothing_comes_out() -> None:
     host, fault = _Host(), ZeroDivisionError()
-    watcher = _watcher(host)
+    watcher, transport = _watcher(host)
     line = _Line(fault=fault)
-    await watcher.serve(line)
+    await transport.serve(line)
     assert watcher.ended == "internal error"
     assert line.closed == (1011, "internal error")
     assert host.faults == [("line", fault)]
 
 
 async def test_a_goodbye_that_does_not_end_is_left(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("lockstep.server.peers.websocket_peer.GOODBYE_SECONDS", 0.01)
+    monkeypatch.setattr("lockstep.server.peers.websocket_transport.GOODBYE_SECONDS", 0.01)
     async with asyncio.timeout(PATIENCE):
-        await _watcher(_Host()).serve(_Line(fault=LineEnded(1000), closes=False))
+        _, transport = _watcher(_Host())
+        await transport.serve(_Line(fault=LineEnded(1000), closes=False))
 
 
 async def test_what_everyone_is_told_goes_to_one_watcher_in_each_turn_of_the_loop() -> None:
@@ -109,17 +110,17 @@ async def test_what_everyone_is_told_goes_to_one_watcher_in_each_turn_of_the_loo
     watchers = [_watcher(_Host(), turns) for _ in range(20)]
     lines = [_Line() for _ in watchers]
     async with asyncio.TaskGroup() as tasks:
-        for watcher, line in zip(watchers, lines, strict=True):
-            tasks.create_task(watcher.serve(line))
+        for (_, transport), line in zip(watchers, lines, strict=True):
+            tasks.create_task(transport.serve(line))
         await asyncio.sleep(0)
-        for watcher in watchers:
+        for watcher, _ in watchers:
             watcher.send("session", Pong(id=1))
         counts = [0]
         async with asyncio.timeout(PATIENCE):
             while counts[-1] < len(lines):
                 await asyncio.sleep(0)
                 counts.append(sum(len(line.sent) for line in lines))
-        for watcher in watchers:
+        for watcher, _ in watchers:
             watcher.end("shutdown")
     assert max(after - before for before, after in zip(counts, counts[1:], strict=False)) <= 2
     assert {line.closed for line in lines} == {(1001, "shutdown")}
