@@ -9,12 +9,12 @@ import pytest
 from lockstep.bench.harness.driving import drive_on
 from lockstep.client import Console
 from lockstep.client.errors import ConnectFailed, SignallingRefused
-from lockstep.client.transport.webrtc_peer import Peer
+from lockstep.client.transport.webrtc_transport import WebRtcTransport
 from lockstep.client.transport.whep import Whep
 from lockstep.rtc.ice.settings import IceSettings
 from lockstep.rtc.peer import PeerSettings
 from lockstep.rtc.sdp import Fragment
-from lockstep.server.peers.webrtc_transport import WebRtcTransport
+from lockstep.server.peers.webrtc_transport import WebRtcTransport as TransportAtTheConsole
 from tests.server.rig import PATIENCE, Rig, eventually, running_rig
 
 CANDIDATE = re.compile(r"^a=candidate:(\S+ \d+ \S+ \d+) (\S+) (\d+) typ host", re.MULTILINE)
@@ -116,12 +116,12 @@ async def test_after_the_path_is_cut_a_restart_brings_commands_and_pictures_back
 
 
 async def test_a_restart_that_finds_no_path_leaves_the_old_one_as_it_was(monkeypatch: pytest.MonkeyPatch) -> None:
-    restart_ice = Peer.restart_ice
+    restart_ice = WebRtcTransport.restart_ice
 
-    async def hasty(peer: Peer, seconds: float) -> None:
+    async def hasty(peer: WebRtcTransport, seconds: float) -> None:
         await restart_ice(peer, 2.0)
 
-    monkeypatch.setattr(Peer, "restart_ice", hasty)
+    monkeypatch.setattr(WebRtcTransport, "restart_ice", hasty)
 
     class Nowhere(Paths):
         def answer(self, sdp: str) -> str:
@@ -152,7 +152,7 @@ def hasty_consent(monkeypatch: pytest.MonkeyPatch) -> None:
 async def _lapse(rig: Rig, paths: Paths) -> None:
     """The old path carries everything but STUN, and nobody consents on it, while a restart is under way."""
     transport = rig.webrtc_peers[0].transport
-    assert isinstance(transport, WebRtcTransport)
+    assert isinstance(transport, TransportAtTheConsole)
     session = transport.ice
     session.restart(Fragment("somebody", "x" * 22))
     paths.forwarders[0].checks_pass = False

@@ -25,7 +25,7 @@ from lockstep.rtc.sctp import AssociationClosed, SendQueueFull
 from lockstep.rtc.sdp import SdpError, parse_description, parse_fragment, write_description, write_fragment
 from lockstep.rtc.turn.servers import IceServer
 
-__all__ = ["Peer", "Route"]
+__all__ = ["WebRtcTransport", "Route"]
 
 CHANNELS: Mapping[ChannelName, Reliability] = {
     "control": Reliability(ordered=False, max_retransmits=0),
@@ -48,7 +48,7 @@ class Route(Protocol):
     def answer(self, sdp: str) -> str: ...
 
 
-class Peer:
+class WebRtcTransport:
     """A `Transport` by WebRTC, for messages and media."""
 
     def __init__(

@@ -20,7 +20,7 @@ from lockstep.client.transport.whep import Whep
 from lockstep.protocol.console import ClientMessage, Report, encode_console_message
 from lockstep.protocol.messages import Ping
 
-__all__ = ["LineBlocked", "ObserverWebSocket"]
+__all__ = ["WebSocketBlocked", "WebSocketTransport"]
 
 OPEN_SECONDS = 5.0
 UNREAD_SECONDS = 0.5  # s more for an answer: a client that was held up may have it waiting, not yet read
@@ -29,11 +29,11 @@ MAX_MESSAGE = 1024 * 1024  # bytes; the list of a thousand participants is the l
 MAX_WAITING = 64  # messages that could not leave yet; beyond that the oldest are dropped
 
 
-class LineBlocked(ConnectFailed):
+class WebSocketBlocked(ConnectFailed):
     """No WebSocket to the console opens, though it answers over HTTP: a proxy or firewall lets none pass."""
 
 
-class ObserverWebSocket:
+class WebSocketTransport:
     """A `Transport` by WebSocket, for an observer, whose media come from a relay."""
 
     def __init__(
@@ -67,13 +67,13 @@ class ObserverWebSocket:
 
         Raises:
             SignallingRefused, ConnectFailed: as `Whep.offer`.
-            LineBlocked: the console takes a WebSocket, but none can be opened; or the console does not know them.
+            WebSocketBlocked: the console takes a WebSocket, but none can be opened; or the console does not know them.
         """
         try:
             ticket = await self.whep.watch(self._relay)
         except SignallingRefused as error:
             if error.status in (404, 405):
-                raise LineBlocked("this console offers no WebSocket for observers") from error
+                raise WebSocketBlocked("this console offers no WebSocket for observers") from error
             raise
         try:
             self._socket = await connect(
@@ -91,7 +91,7 @@ class ObserverWebSocket:
         except (OSError, TimeoutError, ImportError, WebSocketException) as error:
             # ImportError: this kind of proxy needs a package that is not installed.
             await self._give_back(ticket)
-            raise LineBlocked(f"no WebSocket to the console opens ({error or type(error).__name__})") from error
+            raise WebSocketBlocked(f"no WebSocket to the console opens ({error or type(error).__name__})") from error
         return []
 
     async def connect(self, seconds: float) -> None:

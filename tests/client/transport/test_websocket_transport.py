@@ -15,7 +15,7 @@ from websockets.protocol import State
 
 from lockstep.client.console_url import ConsoleLink, parse_link
 from lockstep.client.errors import ConnectFailed, SignallingRefused
-from lockstep.client.transport.observer_websocket import LineBlocked, ObserverWebSocket
+from lockstep.client.transport.websocket_transport import WebSocketBlocked, WebSocketTransport
 from lockstep.client.transport.whep import Whep
 from lockstep.protocol.console import Welcome, decode_server_message
 from lockstep.protocol.messages import Ping, Pong, Stop
@@ -38,12 +38,12 @@ class _Heard:
         return any(isinstance(each, kind) for each in self.messages)
 
 
-def _line(link: ConsoleLink, heard: _Heard) -> ObserverWebSocket:
-    return ObserverWebSocket(link, "0", None, heard.take, PATIENCE)
+def _line(link: ConsoleLink, heard: _Heard) -> WebSocketTransport:
+    return WebSocketTransport(link, "0", None, heard.take, PATIENCE)
 
 
 @asynccontextmanager
-async def _open(line: ObserverWebSocket) -> AsyncIterator[None]:
+async def _open(line: WebSocketTransport) -> AsyncIterator[None]:
     """Runs the line until it ends or the test is over."""
     try:
         assert await line.negotiate() == []
@@ -94,11 +94,11 @@ async def test_where_no_websocket_passes_the_ticket_is_given_back(monkeypatch: p
     def blocked(*_: object, **__: object) -> None:
         raise ConnectionRefusedError("a proxy")
 
-    monkeypatch.setattr("lockstep.client.transport.observer_websocket.connect", blocked)
+    monkeypatch.setattr("lockstep.client.transport.websocket_transport.connect", blocked)
     async with running_rig(**RELAYED) as rig:
         line = _line(parse_link(f"{rig.url}/#token={rig.access.issue('observer', 'ann')}"), _Heard())
         try:
-            with pytest.raises(LineBlocked, match="a proxy"):
+            with pytest.raises(WebSocketBlocked, match="a proxy"):
                 await line.negotiate()
             await eventually(lambda: len(rig.dependencies.console.peers) == 0)
             assert rig.count("lockstep_peers_ended_total", why="deleted") == 1
@@ -113,7 +113,7 @@ async def test_a_console_that_knows_no_lines_counts_as_blocked(monkeypatch: pyte
 
     monkeypatch.setattr(Whep, "watch", unknown)
     line = _line(parse_link("http://127.0.0.1:9/#token=x"), _Heard())
-    with pytest.raises(LineBlocked):
+    with pytest.raises(WebSocketBlocked):
         await line.negotiate()
     await line.close()
 
@@ -130,7 +130,7 @@ async def test_a_console_that_answers_no_ping_is_lost(monkeypatch: pytest.Monkey
     monkeypatch.setattr(Whep, "watch", ticket)
     async with serve(listen, "127.0.0.1", 0) as server:
         port = server.sockets[0].getsockname()[1]
-        line = ObserverWebSocket(parse_link(f"http://127.0.0.1:{port}/#token=x"), "0", None, _Heard().take, 0.05)
+        line = WebSocketTransport(parse_link(f"http://127.0.0.1:{port}/#token=x"), "0", None, _Heard().take, 0.05)
         async with _open(line):
             line.send("control", Ping(id=1))
             async with asyncio.timeout(PATIENCE):
@@ -164,8 +164,8 @@ async def test_a_line_is_encrypted_where_the_console_is_and_only_its_certificate
     ):
         await eventually(lambda: rig.dependencies.console.robot.description is not None)
         link = parse_link(f"{rig.url}/#token={rig.access.issue('observer', 'ann')}")
-        line = ObserverWebSocket(link, "0", certificate.chain, heard.take, PATIENCE)
-        doubting = ObserverWebSocket(link, "0", None, heard.take, PATIENCE)
+        line = WebSocketTransport(link, "0", certificate.chain, heard.take, PATIENCE)
+        doubting = WebSocketTransport(link, "0", None, heard.take, PATIENCE)
         try:
             async with _open(line):
                 await eventually(lambda: heard.has(Welcome))
