@@ -33,7 +33,7 @@ REAL = (
     "lockstep.bench.harness.stack",
     "lockstep.bench.harness.tcp_path",
     "lockstep.client.console",
-    "lockstep.client.transport.webrtc_peer",
+    "lockstep.client.transport.webrtc_transport",
     "httpx",
     "mujoco",
     "lockstep.robot_bridge.bridge",

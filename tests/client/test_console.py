@@ -19,7 +19,7 @@ from lockstep.client import (
 from lockstep.protocol.carriers import Carrier
 from lockstep.protocol.traces.trace import known_spans
 from lockstep.protocol.traces.trace_messages import Traces
-from tests.client.truth import collecting, drawn_event, executed_after, logged_stamps, until_logged
+from tests.client.live.truth import collecting, drawn_event, executed_after, logged_stamps, until_logged
 from tests.support.stack import Stack
 
 pytestmark = pytest.mark.asyncio(loop_scope="module")

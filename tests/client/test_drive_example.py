@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.client.truth import until_logged
+from tests.client.live.truth import until_logged
 from tests.support.stack import Stack
 
 pytestmark = pytest.mark.asyncio(loop_scope="module")

@@ -29,7 +29,7 @@ from lockstep.rtc.sctp.wire.chunks import (
     Skip,
     Unknown,
 )
-from tests.fuzz.sctp import SCENES, pack
+from tests.fuzz.parsers.sctp import SCENES, pack
 from tests.rtc.sctp.hostile import Victim
 
 __all__ = ["CORPUS", "seeds"]

@@ -24,7 +24,7 @@ class Target(NamedTuple):
 
 TARGETS = {
     "robot_link": Target(
-        "tests.fuzz.robot_link",
+        "tests.fuzz.parsers.robot_link",
         (  # not the ticks: watching those would leave a tenth of the inputs a second
             "lockstep.robot_bridge.control.event_core",
             "lockstep.robot_bridge.link.link_server",
@@ -34,15 +34,16 @@ TARGETS = {
         ),
     ),
     "sdp": Target(
-        "tests.fuzz.sdp", ("lockstep.server.webrtc.sdp_offer", "lockstep.server.routes.webrtc.whep", "aiortc.sdp")
+        "tests.fuzz.parsers.sdp",
+        ("lockstep.server.webrtc.sdp_offer", "lockstep.server.routes.webrtc.whep", "aiortc.sdp"),
     ),
-    "rtc_dtls": Target("tests.fuzz.rtc_dtls", ("lockstep.rtc.dtls",)),
-    "rtc_sdp": Target("tests.fuzz.rtc_sdp", ("lockstep.rtc.sdp",)),
-    "ice": Target("tests.fuzz.ice", ("lockstep.rtc.stun", "lockstep.rtc.ice", "lockstep.rtc.demux")),
-    "sctp": Target("tests.fuzz.sctp", ("lockstep.rtc.sctp", "lockstep.rtc.channels", "lockstep.rtc.dcep")),
-    "rtc_rtp": Target("tests.fuzz.rtc_rtp", ("lockstep.rtc.rtp",)),
+    "rtc_dtls": Target("tests.fuzz.parsers.rtc_dtls", ("lockstep.rtc.dtls",)),
+    "rtc_sdp": Target("tests.fuzz.parsers.rtc_sdp", ("lockstep.rtc.sdp",)),
+    "ice": Target("tests.fuzz.parsers.ice", ("lockstep.rtc.stun", "lockstep.rtc.ice", "lockstep.rtc.demux")),
+    "sctp": Target("tests.fuzz.parsers.sctp", ("lockstep.rtc.sctp", "lockstep.rtc.channels", "lockstep.rtc.dcep")),
+    "rtc_rtp": Target("tests.fuzz.parsers.rtc_rtp", ("lockstep.rtc.rtp",)),
     "channels": Target(
-        "tests.fuzz.channels",
+        "tests.fuzz.parsers.channels",
         ("lockstep.server.peers.channels", "lockstep.server.routes.scene_proxy", "lockstep.protocol"),
     ),
 }

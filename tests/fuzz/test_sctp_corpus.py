@@ -1,6 +1,6 @@
 """The inputs that fuzzing SCTP begins with are in the corpus."""
 
-from tests.fuzz.sctp import SCENES
+from tests.fuzz.parsers.sctp import SCENES
 from tests.fuzz.seeds_sctp import CORPUS, seeds
 
 

@@ -10,7 +10,7 @@ from lockstep.protocol.messages import Command, Feedback, LinkMessage, Refusal, 
 from lockstep.robot_bridge.control.event_core import Answered, EventCore, Executed, Refused
 from lockstep.robot_bridge.stop.stop_latch import LEAST_STOP, ResetRefused, ResetTaken, ResetWaits, StopLatch
 from lockstep.robot_bridge.stop.stop_store import Found, Kept, start_of
-from tests.robot_bridge.core_helpers import AXES, MAX_AGE, MEASURED
+from tests.robot_bridge.control.core_helpers import AXES, MAX_AGE, MEASURED
 
 __all__ = ["BridgeModel", "MotionWitness"]
 

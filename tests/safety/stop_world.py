@@ -36,7 +36,7 @@ from lockstep.server.stop.stop_presses import Press
 from lockstep.server.stop.stop_store import KeptStops
 from lockstep.server.telemetry.metrics import Metrics
 from tests.robot_bridge.bridge_model import BridgeModel
-from tests.robot_bridge.core_helpers import AXES, NEUTRAL
+from tests.robot_bridge.control.core_helpers import AXES, NEUTRAL
 
 __all__ = ["MOVE", "PEOPLE", "World"]
 

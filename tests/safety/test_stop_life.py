@@ -13,7 +13,7 @@ from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, ru
 
 from lockstep.protocol.messages import Command, Reset
 from lockstep.protocol.serial import MAX_EVENT, event_after
-from tests.robot_bridge.core_helpers import NEUTRAL
+from tests.robot_bridge.control.core_helpers import NEUTRAL
 from tests.safety.stop_world import LINKS, MOVE, PEOPLE, Link, World
 
 pytestmark = pytest.mark.slow

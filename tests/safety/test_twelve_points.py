@@ -43,7 +43,7 @@ from tests.robot_bridge.bridge_helpers import (
     raw_link,
     running_bridge,
 )
-from tests.robot_bridge.core_helpers import MAX_AGE, MEASURED, command, core_at
+from tests.robot_bridge.control.core_helpers import MAX_AGE, MEASURED, command, core_at
 from tests.server.rig import eventually, running_rig
 
 ROLES: list[Role] = ["operator", "observer", "supervisor"]
@@ -162,7 +162,10 @@ async def test_point_06_trips_latch_and_reset_moves_nothing() -> None:
 
 
 async def test_point_07_an_operator_who_is_gone_leaves_the_robot_at_rest() -> None:
-    """Blur, hidden tab and unplugged pad: tests/e2e/test_chromium_driving.py and web/test/drive/arming.test.ts."""
+    """Blur, hidden tab and unplugged pad are tested elsewhere.
+
+    tests/e2e/driving/test_chromium_driving.py and web/test/drive/arming.test.ts
+    """
     robot = RecordingRobot()
     async with running_bridge(robot) as bridge:
         async with operator(bridge) as driver:

@@ -27,7 +27,8 @@ from lockstep.server.composition.robot_app import create_app
 from lockstep.server.http.transport.serve import bind, running
 from lockstep.server.http.transport.tls import Certificate
 from lockstep.server.http.transport.uvicorn_http_limits import guarded_by
-from lockstep.server.peers.webrtc_peer import WebRtcPeer
+from lockstep.server.peers.peer import Peer
+from lockstep.server.peers.webrtc_transport import WebRtcTransport
 from lockstep.server.settings import Settings
 from lockstep.server.state.dependencies import Dependencies
 from lockstep.server.state.persistent_state import open_state
@@ -70,8 +71,8 @@ class Rig:
         return found
 
     @property
-    def webrtc_peers(self) -> list[WebRtcPeer]:
-        return [peer for peer in self.dependencies.console.peers if isinstance(peer, WebRtcPeer)]
+    def webrtc_peers(self) -> list[Peer]:
+        return [peer for peer in self.dependencies.console.peers if isinstance(peer.transport, WebRtcTransport)]
 
     def token(self, role: Role) -> dict[str, str]:
         return {"Authorization": f"Bearer {self.access.issue(role, role)}"}

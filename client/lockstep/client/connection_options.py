@@ -6,7 +6,7 @@ from pathlib import Path
 from lockstep.client.console_url import ConsoleLink
 from lockstep.client.control.command_gate import Pacing
 from lockstep.client.media.media_gate import GateMode
-from lockstep.client.transport.webrtc_peer import Route
+from lockstep.client.transport.webrtc_transport import Route
 from lockstep.protocol.carriers import Carrier
 
 __all__ = ["ConnectionOptions"]

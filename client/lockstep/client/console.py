@@ -24,7 +24,7 @@ from lockstep.client.media.render_log import FeedbackArrival, Rendering
 from lockstep.client.media.stream import Picture, Sound, Stream
 from lockstep.client.policies import Policies
 from lockstep.client.statistics import ConsoleStatistics
-from lockstep.client.transport.webrtc_peer import Route
+from lockstep.client.transport.webrtc_transport import Route
 from lockstep.protocol.actions import ActionUpdate, ParameterValue, StatusItem
 from lockstep.protocol.carriers import Carrier
 from lockstep.protocol.console import Participant, Role, Seat, SharedNote

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from lockstep.client.control.clutch import REACH_SHARE, Clutch
 from lockstep.protocol.description import Axis, RobotDescription
 from lockstep.protocol.messages import Feedback, StopState
-from tests.client.vectors import load_vectors
+from tests.client.control.vectors import load_vectors
 from tests.makers import goal_axis
 
 VECTORS = load_vectors("clutch.json")

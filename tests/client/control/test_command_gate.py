@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 
 from lockstep.client.control.command_gate import CommandGate
 from lockstep.protocol.serial import MAX_EVENT, event_after, event_gap
-from tests.client.vectors import load_vectors
+from tests.client.control.vectors import load_vectors
 
 CASES: list[dict[str, Any]] = load_vectors("pacing.json")["cases"]
 

@@ -9,7 +9,7 @@ from lockstep.client.control.repeat_timer import INITIAL
 from lockstep.client.control.resting import SETTLE
 from lockstep.protocol.messages import Command, Feedback, Rest, StopState
 from lockstep.protocol.serial import MAX_EVENT, event_after
-from tests.client.senders import FAST, NEUTRAL, commands, flying, new_sender, rests
+from tests.client.control.senders import FAST, NEUTRAL, commands, flying, new_sender, rests
 from tests.makers import feedback, refusal
 
 

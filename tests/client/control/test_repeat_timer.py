@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from lockstep.client.control.repeat_timer import CAP, FLOOR, RepeatTimer
-from tests.client.vectors import load_vectors
+from tests.client.control.vectors import load_vectors
 
 TABLE: dict[str, Any] = load_vectors("repeat.json")
 

@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 
 from lockstep.client.media.media_gate import MediaGate, verdict
 from lockstep.protocol.serial import MAX_EVENT, event_gap
-from tests.client.vectors import load_vectors
+from tests.client.control.vectors import load_vectors
 
 CASES: list[dict[str, Any]] = load_vectors("gate.json")["cases"]
 events = st.integers(1, 40) | st.integers(MAX_EVENT - 40, MAX_EVENT)

@@ -11,7 +11,7 @@ from lockstep.client.replay.errors import ReplayDeviated, ReplayTooFar, ReplayUn
 from lockstep.client.replay.replay_core import HELD, SETTLE, ReplayCore
 from lockstep.client.replay.trajectory import Trajectory, fit
 from lockstep.protocol.messages import Feedback
-from tests.client.goal_robot import ARM
+from tests.client.live.goal_robot import ARM
 
 BASE, J1, J2 = 0, 1, 2
 REACH = 0.4

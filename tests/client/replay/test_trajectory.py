@@ -6,7 +6,7 @@ import pytest
 
 from lockstep.client.replay.errors import ReplayUnfit
 from lockstep.client.replay.trajectory import Trajectory, fit
-from tests.client.goal_robot import ARM
+from tests.client.live.goal_robot import ARM
 
 
 def recorded(**more: object) -> Trajectory:

@@ -12,8 +12,8 @@ from websockets.asyncio.server import ServerConnection, serve
 
 from lockstep.client.console_url import parse_link
 from lockstep.client.transport.message_turns import MAX_UNREAD, MOST, MessageTurns, in_turns
-from lockstep.client.transport.observer_websocket import ObserverWebSocket
 from lockstep.client.transport.paced_connection import PacedConnection
+from lockstep.client.transport.websocket_transport import WebSocketTransport
 from lockstep.client.transport.whep import Whep
 from tests.waiting import PATIENCE
 
@@ -82,7 +82,7 @@ async def test_a_console_that_sends_an_observer_messages_without_end_leaves_the_
     flooded = _Flooded()
     async with _flooding() as port:
         link = parse_link(f"http://127.0.0.1:{port}/#token=x")
-        line = ObserverWebSocket(link, "0", None, flooded.take, PATIENCE)
+        line = WebSocketTransport(link, "0", None, flooded.take, PATIENCE)
         try:
             await line.negotiate()
             await _watch(flooded, line.run)

@@ -7,7 +7,7 @@ import pytest
 from lockstep.client.console_url import parse_link
 from lockstep.client.errors import SignallingRefused
 from lockstep.client.transport.open_transport import open_transport
-from lockstep.client.transport.webrtc_peer import Peer
+from lockstep.client.transport.webrtc_transport import WebRtcTransport
 from lockstep.protocol.console import Welcome, decode_server_message
 from tests.client.options import options
 from tests.server.rig import PATIENCE, running_rig
@@ -20,7 +20,7 @@ async def test_without_a_line_the_connection_has_data_channels_beside_the_relay(
     def blocked(*_: object, **__: object) -> None:
         raise ConnectionRefusedError("a proxy")
 
-    monkeypatch.setattr("lockstep.client.transport.observer_websocket.connect", blocked)
+    monkeypatch.setattr("lockstep.client.transport.websocket_transport.connect", blocked)
     async with running_rig(relay=NOWHERE, observers_direct=0) as rig:
         link = parse_link(f"{rig.url}/#token={rig.access.issue('observer', 'ann')}")
         welcomed = asyncio.Event()
@@ -32,7 +32,7 @@ async def test_without_a_line_the_connection_has_data_channels_beside_the_relay(
         deadline = asyncio.get_running_loop().time() + PATIENCE
         transport, _ = await open_transport(options(link), take, deadline, beside="0")
         try:
-            assert isinstance(transport, Peer)
+            assert isinstance(transport, WebRtcTransport)
             await transport.connect(PATIENCE)
             async with asyncio.timeout(PATIENCE):
                 await welcomed.wait()
@@ -46,12 +46,12 @@ async def test_while_the_console_does_not_reach_its_robot_it_is_asked_again_unti
 ) -> None:
     asked = 0
 
-    async def unreachable(_: Peer) -> None:
+    async def unreachable(_: WebRtcTransport) -> None:
         nonlocal asked
         asked += 1
         raise SignallingRefused(503, "robot_unreachable", "")
 
-    monkeypatch.setattr(Peer, "negotiate", unreachable)
+    monkeypatch.setattr(WebRtcTransport, "negotiate", unreachable)
     monkeypatch.setattr("lockstep.client.transport.open_transport.RETRY_SECONDS", 0.01)
     link = parse_link("http://127.0.0.1:9/#token=x")
     with pytest.raises(SignallingRefused):

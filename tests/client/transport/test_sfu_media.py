@@ -9,7 +9,7 @@ import pytest
 from lockstep.bench.harness.driving import drive_on
 from lockstep.client import Console
 from lockstep.client.errors import ConnectFailed
-from lockstep.client.transport.webrtc_peer import Peer
+from lockstep.client.transport.webrtc_transport import WebRtcTransport
 from lockstep.client.transport.whep import Whep
 from lockstep.rtc.addresses import Address
 from lockstep.rtc.turn.servers import IceServer
@@ -35,7 +35,7 @@ async def test_with_only_a_relay_the_robot_is_driven_seen_and_moved_to_another_r
             assert picture.stamp is None or picture.stamp >= first.event - 4
             break
         peer = console._live().transport
-        assert isinstance(peer, Peer)
+        assert isinstance(peer, WebRtcTransport)
         before = _relay_in_use(peer)
         await console.restart_ice()
         assert _relay_in_use(peer) != before
@@ -43,7 +43,7 @@ async def test_with_only_a_relay_the_robot_is_driven_seen_and_moved_to_another_r
         await console.rest()
 
 
-def _relay_in_use(peer: Peer) -> Address:
+def _relay_in_use(peer: WebRtcTransport) -> Address:
     assert peer._connection is not None
     ice = peer._connection.peer.ice
     assert ice.path is not None

@@ -12,7 +12,7 @@ from lockstep.bench.pick_place.judge import judge
 from lockstep.server.recording.export import export_lerobot
 from lockstep.server.recording.report.page import session_page
 from lockstep.server.recording.verify.verify_dataset import verify_dataset
-from tests.client.test_policies import policy_link
+from tests.client.live.test_policies import policy_link
 from tests.robot_bridge.robots.so101.driver import MODEL_FOLDER
 from tests.support.stack import running_stack
 

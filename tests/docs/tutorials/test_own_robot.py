@@ -1,6 +1,6 @@
 """docs/tutorials/own-robot.md: the template's own test, and both bridges under `lockstep check`.
 
-What the template does under a console is tested in tests/robot_bridge/test_new_robot.py.
+What the template does under a console is tested in tests/robot_bridge/new_robot/test_new_robot.py.
 """
 
 from pathlib import Path

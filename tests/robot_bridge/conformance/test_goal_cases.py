@@ -16,7 +16,7 @@ from lockstep.robot_bridge.control.limits.goal_axis import GoalAxis
 from lockstep.robot_bridge.robots.base import Robot
 from tests.robot_bridge.bridge_helpers import running_bridge
 from tests.robot_bridge.conformance.plain_bridge import running_plain_bridge
-from tests.robot_bridge.goal_helpers import HangingArm
+from tests.robot_bridge.control.goals.goal_helpers import HangingArm
 
 ABOUT_GOALS = [case for case in CASES if case.name.startswith("goal")]
 

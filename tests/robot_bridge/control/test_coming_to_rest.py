@@ -8,7 +8,7 @@ from lockstep.robot_bridge.control.coming_to_rest import PATIENCE, REPEATS, Comi
 from lockstep.robot_bridge.control.limits.axis_shaper import AxisShaper
 from lockstep.robot_bridge.robots.planar.description import DESCRIPTION
 from lockstep.robot_bridge.robots.planar.robot import PlanarRobot
-from tests.robot_bridge.goal_helpers import ARM_AXES, HangingArm
+from tests.robot_bridge.control.goals.goal_helpers import ARM_AXES, HangingArm
 
 DT = PlanarRobot.tick_seconds
 BRAKE = DESCRIPTION.axes[0].brake

@@ -14,7 +14,7 @@ from lockstep.robot_bridge.control.event_core import (
     draw_nonce,
 )
 from lockstep.robot_bridge.stop.stop_latch import ResetNeedless, ResetRefused, ResetTaken, StopGiven
-from tests.robot_bridge.core_helpers import (
+from tests.robot_bridge.control.core_helpers import (
     AXES,
     MAX_AGE,
     MEASURED,

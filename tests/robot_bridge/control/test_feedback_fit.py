@@ -9,7 +9,7 @@ from lockstep.protocol.messages import MAX_FAULTS, Feedback, Goodbye, Hello, Sto
 from lockstep.robot_bridge.control.feedback_fit import misfit
 from lockstep.robot_bridge.link.link_session import BadInput, ClientSession
 from lockstep.robot_bridge.robots.planar.description import DESCRIPTION
-from tests.robot_bridge.goal_helpers import HangingArm
+from tests.robot_bridge.control.goals.goal_helpers import HangingArm
 
 FEEDBACK = Feedback(
     event=1, issue=1, time=0.0, axes=[0.0] * len(DESCRIPTION.axes), joints=[0.0] * len(DESCRIPTION.joints)

@@ -9,7 +9,7 @@ import pytest
 from lockstep.protocol.description import BodyTwist, PlanarBase, Pose, RobotDescription, StartWarning
 from lockstep.robot_bridge.description.check_description import check_description
 from lockstep.robot_bridge.errors import DescriptionError
-from tests.robot_bridge.goal_helpers import ARM_AXES, SHOULDER, TURN, HangingArm
+from tests.robot_bridge.control.goals.goal_helpers import ARM_AXES, SHOULDER, TURN, HangingArm
 
 ARM = HangingArm().describe()
 TOOL = ARM.poses[0]

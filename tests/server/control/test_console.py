@@ -28,8 +28,9 @@ from lockstep.server.control.console import Console
 from lockstep.server.control.seat import ControlSeat, SeatOutcome, SeatTimes
 from lockstep.server.control.stop_silence import StopSilence
 from lockstep.server.event_clock import EventClock
+from lockstep.server.peers.peer import Peer
 from lockstep.server.peers.peer_registry import PeerRegistry
-from lockstep.server.peers.websocket_peer import WebSocketPeer
+from lockstep.server.peers.websocket_transport import peer_beside_relay
 from lockstep.server.robot.robot_connection import RobotConnection, RobotHost
 from lockstep.server.session_events import SessionEvent, SessionEvents
 from lockstep.server.settings import Settings
@@ -117,14 +118,15 @@ async def test_stop_seat_and_commands_need_no_subscriber_and_survive_subscribers
     monkeypatch.setattr(console.robot, "send_stop", send)
     console.robot.link_opened("operator", "epoch", ONE_AXIS)
 
-    def peer(name: str) -> WebSocketPeer:
-        made = WebSocketPeer("", Identity("operator", name, name, 1e12), console, settings, FairQueue())
+    def peer(name: str) -> Peer:
+        identity = Identity("operator", name, name, 1e12)
+        made, _ = peer_beside_relay("", identity, console, settings, FairQueue())
         console.peers.admit(made)
         return made
 
     ann, bob, issues = peer("ann"), peer("bob"), list[int]()
 
-    def command(by: WebSocketPeer, event: int, value: float) -> list[LinkMessage]:
+    def command(by: Peer, event: int, value: float) -> list[LinkMessage]:
         sent.clear()
         console.message_received(by, "control", Command(event=event, issue=issues[-1], nonce=7, values=[value]))
         return [*sent]

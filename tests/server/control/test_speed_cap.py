@@ -6,7 +6,7 @@ from lockstep.protocol.console import Report, SpeedCapMode, SpeedCapState
 from lockstep.protocol.description import Axis
 from lockstep.protocol.messages import Command, Feedback
 from lockstep.server.control.speed_cap import REMEMBERED, STALE, WINDOW, SpeedCap, within_share
-from tests.client.vectors import load_vectors
+from tests.client.control.vectors import load_vectors
 
 AXIS = Axis(name="grip", label="Grip", unit="m/s", minimum=-1.0, maximum=2.0, slew=1, brake=10, rest=0.5)
 

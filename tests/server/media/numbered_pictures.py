@@ -8,7 +8,7 @@ from typing import NamedTuple
 from lockstep.bench.harness.driving import drive_on
 from lockstep.client import Console
 from lockstep.robot_bridge.robots.event_strip import read_event_strip
-from tests.client.truth import until_logged
+from tests.client.live.truth import until_logged
 from tests.support.stack import Stack
 
 __all__ = ["OF_USE", "Shown", "events_behind", "shown_while_driving"]

@@ -13,7 +13,7 @@ from structlog.testing import capture_logs
 
 from lockstep.protocol.console import Role
 from lockstep.protocol.messages import Ping, Pong
-from lockstep.server.peers.webrtc_peer import WebRtcPeer
+from lockstep.server.peers.peer import Peer
 from lockstep.server.telemetry.faults import Faults
 from tests.server.rig import Rig, TestPeer, eventually, running_rig
 
@@ -21,7 +21,7 @@ ROOT = Path(__file__).resolve().parents[3]
 OBSERVERS = 8
 FAULT = "planted"
 
-Plant = Callable[[Rig, WebRtcPeer, pytest.MonkeyPatch], None]
+Plant = Callable[[Rig, Peer, pytest.MonkeyPatch], None]
 
 
 @pytest.fixture(autouse=True)
@@ -83,44 +83,44 @@ async def _raise_later(*_: object, **__: object) -> NoReturn:
     raise ValueError(FAULT)
 
 
-def _delivery(peer: WebRtcPeer) -> Any:
+def _delivery(peer: Peer) -> Any:
     return cast(Any, peer)._media.deliveries[0]
 
 
-def _connection(peer: WebRtcPeer) -> Any:
-    return cast(Any, peer)._connection
+def _connection(peer: Peer) -> Any:
+    return cast(Any, peer).transport._connection
 
 
-def _stream(peer: WebRtcPeer) -> Any:
+def _stream(peer: Peer) -> Any:
     """The first that it gets, with all stages on its way out."""
     return _connection(peer).peer.streams.outgoing[_delivery(peer).info.mid]
 
 
-def _answer(rig: Rig, peer: WebRtcPeer, patch: pytest.MonkeyPatch) -> None:
+def _answer(rig: Rig, peer: Peer, patch: pytest.MonkeyPatch) -> None:
     patch.setattr(_delivery(peer).stream.encodings, "join", _raise)
 
 
-def _queueing(rig: Rig, peer: WebRtcPeer, patch: pytest.MonkeyPatch) -> None:
+def _queueing(rig: Rig, peer: Peer, patch: pytest.MonkeyPatch) -> None:
     patch.setattr(_delivery(peer).target, "put", _raise)
 
 
-def _packing(rig: Rig, peer: WebRtcPeer, patch: pytest.MonkeyPatch) -> None:
+def _packing(rig: Rig, peer: Peer, patch: pytest.MonkeyPatch) -> None:
     patch.setattr(_connection(peer).peer, "frame_to_send", _raise)
 
 
-def _stage(rig: Rig, peer: WebRtcPeer, patch: pytest.MonkeyPatch) -> None:
+def _stage(rig: Rig, peer: Peer, patch: pytest.MonkeyPatch) -> None:
     patch.setattr(_stream(peer).reports, "rtp", _raise)
 
 
-def _reporting(rig: Rig, peer: WebRtcPeer, patch: pytest.MonkeyPatch) -> None:
+def _reporting(rig: Rig, peer: Peer, patch: pytest.MonkeyPatch) -> None:
     patch.setattr(_stream(peer).reports, "_report", _raise)
 
 
-def _receiving(rig: Rig, peer: WebRtcPeer, patch: pytest.MonkeyPatch) -> None:
+def _receiving(rig: Rig, peer: Peer, patch: pytest.MonkeyPatch) -> None:
     patch.setattr(_connection(peer).peer, "receive_datagram", _raise)
 
 
-def _rtcp(rig: Rig, peer: WebRtcPeer, patch: pytest.MonkeyPatch) -> None:
+def _rtcp(rig: Rig, peer: Peer, patch: pytest.MonkeyPatch) -> None:
     delivery = _delivery(peer)
     request, target = delivery.stream.encodings.request_keyframe, delivery.target
 
@@ -132,7 +132,7 @@ def _rtcp(rig: Rig, peer: WebRtcPeer, patch: pytest.MonkeyPatch) -> None:
     patch.setattr(delivery.stream.encodings, "request_keyframe", fail_for_it)
 
 
-def _message_in(rig: Rig, peer: WebRtcPeer, patch: pytest.MonkeyPatch) -> None:
+def _message_in(rig: Rig, peer: Peer, patch: pytest.MonkeyPatch) -> None:
     console = rig.dependencies.console
     received = console.message_received
 
@@ -144,29 +144,29 @@ def _message_in(rig: Rig, peer: WebRtcPeer, patch: pytest.MonkeyPatch) -> None:
     patch.setattr(console, "message_received", fail_for_it)
 
 
-def _message_out(rig: Rig, peer: WebRtcPeer, patch: pytest.MonkeyPatch) -> None:
-    patch.setattr(cast(Any, peer)._writers["control"], "send_newest", _raise)
+def _message_out(rig: Rig, peer: Peer, patch: pytest.MonkeyPatch) -> None:
+    patch.setattr(cast(Any, peer).transport._writers["control"], "send_newest", _raise)
 
 
-def _flushing(rig: Rig, peer: WebRtcPeer, patch: pytest.MonkeyPatch) -> None:
-    patch.setattr(cast(Any, peer)._writers["control"], "flush", _raise)
+def _flushing(rig: Rig, peer: Peer, patch: pytest.MonkeyPatch) -> None:
+    patch.setattr(cast(Any, peer).transport._writers["control"], "flush", _raise)
 
 
-def _showing(rig: Rig, peer: WebRtcPeer, patch: pytest.MonkeyPatch) -> None:
+def _showing(rig: Rig, peer: Peer, patch: pytest.MonkeyPatch) -> None:
     patch.setattr(peer, "participant", _raise)
 
 
-def _closing_media(rig: Rig, peer: WebRtcPeer, patch: pytest.MonkeyPatch) -> None:
+def _closing_media(rig: Rig, peer: Peer, patch: pytest.MonkeyPatch) -> None:
     patch.setattr(cast(Any, peer)._media, "close", _raise_later)
     peer.end("the test ends it")
 
 
-def _closing_connection(rig: Rig, peer: WebRtcPeer, patch: pytest.MonkeyPatch) -> None:
+def _closing_connection(rig: Rig, peer: Peer, patch: pytest.MonkeyPatch) -> None:
     patch.setattr(_connection(peer).peer, "close", _raise)
     peer.end("the test ends it")
 
 
-def _forgetting(rig: Rig, peer: WebRtcPeer, patch: pytest.MonkeyPatch) -> None:
+def _forgetting(rig: Rig, peer: Peer, patch: pytest.MonkeyPatch) -> None:
     delivery = _delivery(peer)
     leave, target = delivery.stream.encodings.leave, delivery.target
 
@@ -179,7 +179,7 @@ def _forgetting(rig: Rig, peer: WebRtcPeer, patch: pytest.MonkeyPatch) -> None:
     peer.end("the test ends it")
 
 
-def _seeing_off(rig: Rig, peer: WebRtcPeer, patch: pytest.MonkeyPatch) -> None:
+def _seeing_off(rig: Rig, peer: Peer, patch: pytest.MonkeyPatch) -> None:
     people = rig.dependencies.console.people
     left = people.left
 
@@ -233,7 +233,7 @@ def _of_aiortc() -> set[asyncio.Task[Any]]:
     return {task for task in asyncio.all_tasks() if "aiortc" in repr(task)}
 
 
-async def _gone(rig: Rig, peer: WebRtcPeer) -> None:
+async def _gone(rig: Rig, peer: Peer) -> None:
     await eventually(lambda: peer not in rig.webrtc_peers)
 
 

@@ -131,7 +131,7 @@ async def test_a_page_of_another_site_cannot_use_a_ticket() -> None:
 
 async def test_a_ticket_that_nobody_uses_gives_its_place_back(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(
-        "lockstep.server.peers.websocket_peer.TICKET_SECONDS", 2.0
+        "lockstep.server.peers.websocket_transport.TICKET_SECONDS", 2.0
     )  # a slow machine asks twice within it
     async with running_rig(**RELAYED, max_relayed=1, reserved_places=0) as rig:
         used = await ticket(rig)
@@ -147,7 +147,7 @@ async def test_hundreds_of_tickets_cost_one_link_its_own_places_and_nobody_elses
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(
-        "lockstep.server.peers.websocket_peer.TICKET_SECONDS", 600.0
+        "lockstep.server.peers.websocket_transport.TICKET_SECONDS", 600.0
     )  # none ends meanwhile, however slow the machine
     async with running_rig(**RELAYED, max_unconnected=20) as rig:
         headers = rig.token("observer")
@@ -248,7 +248,7 @@ async def test_a_socket_that_never_asks_for_anything_is_no_line() -> None:
 async def test_a_remote_that_does_not_read_is_closed_and_costs_the_others_nothing(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr("lockstep.server.peers.websocket_peer.READ_SECONDS", 0.5)
+    monkeypatch.setattr("lockstep.server.peers.websocket_transport.READ_SECONDS", 0.5)
     async with running_rig(**RELAYED) as rig, open_line(rig) as reader:
         headers = rig.token("observer")
         small = socket.socket()

@@ -17,7 +17,7 @@ from lockstep.server.scene.kinematics import (
     world_poses,
     world_positions,
 )
-from tests.client.vectors import load_vectors
+from tests.client.control.vectors import load_vectors
 
 QUARTER = math.pi / 2
 Z = (0.0, 0.0, 1.0)

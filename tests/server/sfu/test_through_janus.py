@@ -31,7 +31,7 @@ async def test_every_picture_through_two_janus_has_its_event(tmp_path: Path) -> 
         streams = found["streams"]
         assert isinstance(streams, dict)
         assert found["relay"] in ("0", "1")
-        assert found["line"] == "ObserverWebSocket"
+        assert found["line"] == "WebSocketTransport"
         assert (found["note"], found["stopped"]) == ("seen", True)
         for stream in streams.values():
             assert stream["carrier"] == "trailer"

@@ -183,9 +183,9 @@ export class ConsoleEngine {
     return this.state.welcome !== null && this.silentMs(now) < STALE_MS;
   }
 
-  /** Whether the console is connected by a WebSocket. */
-  get usesWebSocket(): boolean {
-    return this.peer?.usesWebSocket === true;
+  /** Whether no message to and from the console is lost: it is connected by a WebSocket. */
+  get isReliable(): boolean {
+    return this.peer?.isReliable === true;
   }
 
   /** Since the console's last message. */
@@ -412,7 +412,7 @@ export class ConsoleEngine {
     if (this.peer !== null) {
       this.peer.id = welcome.peer;
       this.heartbeat.isSlow = this.peer.isRelayed;
-      this.heartbeat.usesWebSocket = this.peer.usesWebSocket;
+      this.heartbeat.isReliable = this.peer.isReliable;
       this.streams.open(this.peer, welcome.streams);
     }
     this.talkback?.attach(this.peer?.voiceSender(welcome.voice) ?? null);

@@ -83,7 +83,7 @@ export function statisticsOf(engine: ConsoleEngine, mainStream: string | null): 
     peer: state.welcome?.peer ?? null,
     role: state.welcome?.role ?? null,
     relay: engine.streams.relay,
-    line: engine.usesWebSocket,
+    line: engine.isReliable,
     connected: state.welcome !== null,
     event: state.feedback?.event ?? null,
     epoch: state.robot?.epoch ?? null,

@@ -11,7 +11,8 @@ import {
 import { connectionErrorOf, type ConnectionEnd, type ConnectionErrorKind } from "./connection_error";
 import { ConsoleError, type ConsoleApi } from "./signalling/console_api";
 import type { Preconnection } from "./webrtc/preconnection";
-import { Peer, PeerEnd, type ChannelName, type PeerEvents, type PeerOptions } from "./peer";
+import { Peer, type ChannelName, type PeerEvents, type PeerOptions } from "./peer";
+import { TransportEnd } from "./transport";
 import type { StreamInfo } from "../protocol/wire";
 import type { StampReader } from "./encoded_transform/stamp_reader";
 
@@ -97,7 +98,7 @@ export class Connection {
   close(): void {
     this.isClosed = true;
     this.peer?.close();
-    this.end(new PeerEnd("lost", "closed"));
+    this.end(new TransportEnd("lost", "closed"));
     this.wake?.();
   }
 
@@ -106,12 +107,12 @@ export class Connection {
   }
 
   /** Ends the present connection. */
-  private end: (end: PeerEnd) => void = () => undefined;
+  private end: (end: TransportEnd) => void = () => undefined;
 
   /** One connection from its first request to its end; says what ended it. */
   private async live(): Promise<Trouble> {
     const started = performance.now();
-    const ending = Promise.withResolvers<PeerEnd>();
+    const ending = Promise.withResolvers<TransportEnd>();
     const events: PeerEvents = {
       message: (channel, data, at) => {
         reconnectHeard(this.reconnect, at);
@@ -144,7 +145,7 @@ export class Connection {
   private act(peer: Peer, action: ReconnectAction | null): void {
     if (action === "ask") void this.ask(peer);
     else if (action === "restart") void this.restart(peer);
-    else if (action === "reconnect") this.end(new PeerEnd("silent", ""));
+    else if (action === "reconnect") this.end(new TransportEnd("silent", ""));
   }
 
   /** Whether the console can be reached; its answer also brings TURN credentials that are good now. */
@@ -188,7 +189,7 @@ interface Trouble {
 const REFUSED_MS = 5000; // a token that was refused is not refused less a moment later
 
 function describe(error: unknown): Trouble {
-  if (error instanceof PeerEnd) return { why: error.why, detail: error.detail, retryAfterMs: null };
+  if (error instanceof TransportEnd) return { why: error.why, detail: error.detail, retryAfterMs: null };
   if (!(error instanceof ConsoleError))
     return { why: "refused", detail: error instanceof Error ? error.message : "", retryAfterMs: null };
   const { status, retryAfterMs } = error;

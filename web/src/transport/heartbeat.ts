@@ -4,7 +4,7 @@ import type { ClientMessage, Report } from "../protocol/wire";
 const BEAT_MS = 500; // reports and pings
 const OBSERVER_BEAT_MS = 1000; // of somebody who cannot drive; there may be hundreds
 const SLOW_BEAT_MS = 5000; // of an observer whose media come from a relay: nobody waits for its reports
-const LINE_BEAT_MS = 15_000; // of one with a line, which loses nothing
+const RELIABLE_BEAT_MS = 15_000; // of one whose transport loses nothing
 const EARLY_PINGS = 5; // to know the path before the first command
 const EARLY_PING_MS = 50; // between them
 
@@ -17,7 +17,7 @@ export interface HeartbeatEvents {
 /** What one connection says on its own: reports and pings, once or twice a second, and a few pings at its beginning. */
 export class Heartbeat {
   isSlow = false;
-  usesWebSocket = false;
+  isReliable = false;
   observes = false;
   private readonly pings = createPingLedger();
   private early = 0; // pings still to send
@@ -52,7 +52,7 @@ export class Heartbeat {
   }
 
   private interval(): number {
-    if (this.isSlow) return this.usesWebSocket ? LINE_BEAT_MS : SLOW_BEAT_MS;
+    if (this.isSlow) return this.isReliable ? RELIABLE_BEAT_MS : SLOW_BEAT_MS;
     return this.observes ? OBSERVER_BEAT_MS : BEAT_MS;
   }
 

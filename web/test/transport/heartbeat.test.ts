@@ -22,6 +22,6 @@ describe("how often a connection says something on its own", () => {
     expect(beats(() => undefined)).toBe(120);
     expect(beats((pulse) => (pulse.observes = true))).toBe(60);
     expect(beats((pulse) => (pulse.isSlow = pulse.observes = true))).toBe(12);
-    expect(beats((pulse) => (pulse.isSlow = pulse.usesWebSocket = true))).toBe(4);
+    expect(beats((pulse) => (pulse.isSlow = pulse.isReliable = true))).toBe(4);
   });
 });

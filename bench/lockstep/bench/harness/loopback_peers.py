@@ -5,7 +5,7 @@ import asyncio
 from aiortc import RTCPeerConnection, RTCSessionDescription
 
 from lockstep.bench.harness.aioice_hosts import use_hosts
-from lockstep.client.transport.webrtc_peer import Route
+from lockstep.client.transport.webrtc_transport import Route
 
 __all__ = ["connect_through"]
 

@@ -19,7 +19,7 @@ from lockstep.client import Console
 from lockstep.client.console_url import parse_link
 from lockstep.client.media.rtp_counter import RtpCounter
 from lockstep.client.media.rtp_header import parse_rtp_header
-from lockstep.client.transport.webrtc_peer import Peer
+from lockstep.client.transport.webrtc_transport import WebRtcTransport
 
 __all__ = ["main"]
 
@@ -60,7 +60,7 @@ async def _observer(link: str) -> AsyncIterator[Callable[[], Counts]]:
 async def _plain(link: str) -> AsyncIterator[Callable[[], Counts]]:
     """Do the same on a server that knows nothing of Lockstep; open the data channels and leave them silent."""
     counter = RtpCounter(None, lambda _: None)
-    peer = Peer(
+    peer = WebRtcTransport(
         parse_link(f"{link}/#token=none"),
         carrier="trailer",
         video=1,

@@ -6,10 +6,10 @@ from collections.abc import Callable
 from lockstep.client.connection_options import ConnectionOptions
 from lockstep.client.errors import SignallingRefused
 from lockstep.client.shielded_close import finish
-from lockstep.client.transport.observer_websocket import LineBlocked, ObserverWebSocket
 from lockstep.client.transport.sdp import Section
 from lockstep.client.transport.transport import Transport
-from lockstep.client.transport.webrtc_peer import Peer
+from lockstep.client.transport.webrtc_transport import WebRtcTransport
+from lockstep.client.transport.websocket_transport import WebSocketBlocked, WebSocketTransport
 
 __all__ = ["open_transport"]
 
@@ -36,13 +36,13 @@ async def open_transport(
     loop = asyncio.get_running_loop()
     transport: Transport
     if beside:
-        transport = ObserverWebSocket(options.link, beside, options.tls_ca, on_message, options.silence_seconds)
+        transport = WebSocketTransport(options.link, beside, options.tls_ca, on_message, options.silence_seconds)
     else:
-        transport = _peer(options, on_message, "")
+        transport = _webrtc(options, on_message, "")
     while True:
         try:
             return transport, await transport.negotiate()
-        except LineBlocked:
+        except WebSocketBlocked:
             wait = 0.0
             await transport.close()
         except SignallingRefused as error:
@@ -54,11 +54,11 @@ async def open_transport(
             await finish(transport.close())
             raise
         await asyncio.sleep(wait)
-        transport = _peer(options, on_message, beside)
+        transport = _webrtc(options, on_message, beside)
 
 
-def _peer(options: ConnectionOptions, on_message: Callable[[str | bytes], None], relay: str) -> Peer:
-    return Peer(
+def _webrtc(options: ConnectionOptions, on_message: Callable[[str | bytes], None], relay: str) -> WebRtcTransport:
+    return WebRtcTransport(
         options.link,
         carrier=options.carrier,
         video=options.video,

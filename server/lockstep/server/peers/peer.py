@@ -1,8 +1,7 @@
-"""One peer: its messages, its heartbeat, its end. `WebRtcPeer` and `WebSocketPeer` are its two transports."""
+"""One peer: its messages, its heartbeat, its end. They travel on its transport, which is WebRTC or a WebSocket."""
 
 import asyncio
 import secrets
-from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Protocol
@@ -29,10 +28,11 @@ from lockstep.server.errors import ChannelError, Flood, TransportRefused
 from lockstep.server.media.picture_traces import PictureTraces
 from lockstep.server.peers.channels import ChannelName, MessageBudget, channel_of, parse_message, stop_in
 from lockstep.server.peers.repeat_reply_limiter import RepeatReplyLimiter
+from lockstep.server.peers.transport import Transport
 from lockstep.server.util.display_names import clean_name
 from lockstep.server.util.rate_limits import RateLimits
 
-__all__ = ["MessageWriter", "Peer", "PeerHost", "PeerLimits", "PeerStreams"]
+__all__ = ["Peer", "PeerHost", "PeerLimits", "PeerStreams"]
 
 log = structlog.get_logger(__name__)
 
@@ -94,28 +94,18 @@ class PeerHost(Protocol):
     def peer_failed(self, peer: "Peer", stage: str, error: Exception) -> None: ...
 
 
-class MessageWriter(Protocol):
-    """Writes to the remote without ever waiting."""
-
-    @property
-    def lost(self) -> int:
-        """Messages that did not fit."""
-        ...
-
-    def send(self, text: str) -> None: ...
-    def send_newest(self, text: str) -> None: ...
-    def send_spare(self, text: str) -> None: ...
-
-
-class Peer(ABC):
+class Peer:
     """A session: await `run`; it returns when the peer has ended and everything of it is closed.
 
     `end` ends it from outside, with the reason that logs and metrics show. An exception while it is served ends it
     alone: `failed` is told of the stage, and methods that others call raise nothing.
+
+    It is the `TransportEvents` of its transport.
     """
 
     def __init__(
         self,
+        transport: Transport,
         media: PeerStreams,
         identity: Identity,
         host: PeerHost,
@@ -136,12 +126,13 @@ class Peer(ABC):
         self.silenced = False  # a supervisor has silenced the stops of its link
         self.thumbnail = False  # a small picture on somebody's overview, not a participant
         self.relay = ""  # the relay that it watches through; "": media and feedback come from here
+        self.transport = transport
         self._media = media
         self._host = host
         self._connect_seconds = limits.peer_connect_timeout if connect_seconds is None else connect_seconds
         self._silence_seconds = limits.peer_silence if silence_seconds is None else silence_seconds
         self._loop = asyncio.get_running_loop()
-        self._writers: dict[ChannelName, MessageWriter] = {}
+        self._channels: set[ChannelName] = set()  # that are open
         rate = limits.max_observer_rate if identity.role == "observer" else limits.max_message_rate
         self._budget = MessageBudget(rate)
         self._patience = RateLimits(FORGIVEN_RATE, limits.max_bad_messages)
@@ -152,6 +143,7 @@ class Peer(ABC):
         self._end = asyncio.Event()
         media.on_quality(self._quality_decided)
         media.on_failed(self.failed)
+        transport.listen(self)
 
     @property
     def connected(self) -> bool:
@@ -222,14 +214,14 @@ class Peer(ABC):
 
     def send_text(self, channel: ChannelName, text: str) -> None:
         """Send unless the peer has ended or the channel is not open: a newcomer is told everything when it opens."""
-        if channel in self._writers and not self.ended:
+        if channel in self._channels and not self.ended:
             with self.contained("message out"):
-                self._writers[channel].send(text)
+                self.transport.send(channel, text)
 
     def send_feedback(self, text: str) -> None:
-        if "control" in self._writers and not self.ended:
+        if "control" in self._channels and not self.ended:
             with self.contained("message out"):
-                self._writers["control"].send_newest(text)
+                self.transport.send_newest(text)
 
     def want_traces(self, wanted: bool) -> None:
         """Begin or end noting which pictures are sent to it, and when."""
@@ -246,9 +238,9 @@ class Peer(ABC):
 
     def send_spare(self, text: str) -> None:
         """Send on the control channel unless something waits there: feedback comes first."""
-        if "control" in self._writers and not self.ended:
+        if "control" in self._channels and not self.ended:
             with self.contained("message out"):
-                self._writers["control"].send_spare(text)
+                self.transport.send_spare(text)
 
     @property
     def round_trip(self) -> float:
@@ -283,10 +275,6 @@ class Peer(ABC):
         self._quality = quality
         self.send("session", quality)
 
-    def dropped(self) -> int:
-        """Return the number of messages that did not fit."""
-        return sum(writer.lost for writer in set(self._writers.values()))
-
     async def _wait_until_connected(self) -> None:
         try:
             async with asyncio.timeout(self._connect_seconds):
@@ -304,7 +292,7 @@ class Peer(ABC):
 
     def _check_silence(self) -> None:
         now = self._loop.time()
-        if not self._writers:
+        if not self._channels:
             self._heard_at = now  # a plain WHEP player has no channel to speak on; ICE consent watches it
         elif now - self._heard_at >= self._silence_seconds:
             self.end("silent")
@@ -316,31 +304,31 @@ class Peer(ABC):
     async def _close(self) -> None:
         try:
             async with asyncio.timeout(CLOSE_TIMEOUT):
-                for close in (self._media.close, self._close_transport):
+                for close in (self._media.close, self.transport.close):
                     with self.contained("close"):
                         await close()
         except TimeoutError:
             log.warning("peer did not close in time", peer=self.id)
 
-    # Called by the transports
+    # Called by the transport
 
-    @abstractmethod
-    async def _close_transport(self) -> None: ...
+    async def until_ended(self) -> None:
+        await self._end.wait()
 
-    def _connection_made(self) -> None:
+    def connection_made(self) -> None:
         self._heard_at = self._loop.time()
         self._connected.set()
 
-    def _open(self, channel: ChannelName, writer: MessageWriter) -> None:
-        """Send to the remote on `channel` with `writer` from now on."""
-        self._writers[channel] = writer
+    def channel_opened(self, channel: ChannelName) -> None:
+        """Send on `channel` from now on."""
+        self._channels.add(channel)
         with self.contained("channel"):
             self._host.channel_opened(self, channel)
             if channel == "session" and self._quality is not None:
                 self.send("session", self._quality)
 
-    def _received(self, channel: ChannelName | None, data: object) -> None:
-        """Take a message. `channel`: None on a line, which carries all. Only a valid message is a sign of life."""
+    def received(self, channel: ChannelName | None, data: object) -> None:
+        """Take a message. `channel`: None on a WebSocket, which carries all. Only a valid message is a sign of life."""
         if not self.ended:
             with self.contained("message in"):
                 self._take(channel, data)
@@ -352,7 +340,7 @@ class Peer(ABC):
         except ChannelError as error:
             if (stop := stop_in(data)) is not None:
                 self._host.message_received(self, channel or "stop", stop)
-            self._refused(channel or "line", error)
+            self.refused(channel or "line", error)
             return
         self._heard_at = now
         if isinstance(message, Report):
@@ -360,7 +348,7 @@ class Peer(ABC):
             self._media.report(message, now)
         self._host.message_received(self, channel or channel_of(message), message)
 
-    def _refused(self, channel: str, error: ChannelError) -> None:
+    def refused(self, channel: str, error: ChannelError) -> None:
         self._host.input_refused(self, channel, error)
         self._lose_patience(self._loop.time())
 
@@ -378,11 +366,8 @@ class Peer(ABC):
             self._lose_patience(now)  # a stop is heard all the same
         return message
 
-    def transport_refused(self, name: str) -> None:
-        """End the peer: a transport below the messages received more than it can hold.
-
-        SCTP and TCP cannot leave a message out.
-        """
+    def overloaded(self, name: str) -> None:
+        """End the peer: its transport received more than it can hold. SCTP and TCP cannot leave a message out."""
         self._host.input_refused(self, "transport", TransportRefused(name))
         self.end("too much")
 

@@ -14,8 +14,8 @@ from lockstep.server.errors import NotFound, ShuttingDown, TooManyRequests
 from lockstep.server.peers.channels import ChannelName
 from lockstep.server.peers.peer import Peer
 from lockstep.server.peers.peer_places import check_place
-from lockstep.server.peers.webrtc_peer import WebRtcPeer
-from lockstep.server.peers.websocket_peer import WebSocketPeer
+from lockstep.server.peers.webrtc_transport import WebRtcTransport
+from lockstep.server.peers.websocket_transport import WebSocketTransport
 from lockstep.server.telemetry.metrics import Metrics
 from lockstep.server.util.fair_queue import FairQueue
 
@@ -133,18 +133,20 @@ class PeerRegistry:
     def by_id(self, peer_id: str) -> Peer | None:
         return next((peer for peer in self._sessions if peer.id == peer_id), None)
 
-    def by_resource(self, resource: str) -> WebRtcPeer:
+    def by_resource(self, resource: str) -> tuple[Peer, WebRtcTransport]:
         """Return the peer with this WHEP resource. Raises NotFound if there is no such peer."""
         for peer in self._sessions:
-            if isinstance(peer, WebRtcPeer) and peer.resource == resource:
-                return peer
+            transport = peer.transport
+            if isinstance(transport, WebRtcTransport) and transport.resource == resource:
+                return peer, transport
         raise NotFound("no such WHEP resource")
 
-    def by_ticket(self, ticket: str) -> WebSocketPeer:
+    def by_ticket(self, ticket: str) -> tuple[Peer, WebSocketTransport]:
         """Return the peer that waits for this ticket. Raises NotFound if there is no such peer."""
         for peer in self._sessions:
-            if isinstance(peer, WebSocketPeer) and not peer.ended and peer.ticket == ticket != "":
-                return peer
+            transport = peer.transport
+            if isinstance(transport, WebSocketTransport) and not peer.ended and transport.ticket == ticket != "":
+                return peer, transport
         raise NotFound("no such ticket")
 
     def tell(self, channel: ChannelName, message: ServerMessage) -> None:
@@ -190,5 +192,5 @@ class PeerRegistry:
             self.ended += 1
             self._metrics.peers.labels(peer.role).dec()
             self._metrics.peers_ended.labels(peer.ended).inc()
-            self._metrics.dropped.labels("channel").inc(peer.dropped())
+            self._metrics.dropped.labels("channel").inc(peer.transport.lost)
             log.info("peer left", peer=peer.id, role=peer.role, name=peer.name, why=peer.ended)

@@ -10,7 +10,7 @@ from lockstep.server.auth.tokens import Right, require_role
 from lockstep.server.errors import ConsoleError, NotFound, RobotUnreachable
 from lockstep.server.http.json_response import json_answer
 from lockstep.server.http.security_headers import check_origin
-from lockstep.server.peers.websocket_peer import POLICY_VIOLATION, TICKET_SECONDS, LineEnded, WebSocketPeer
+from lockstep.server.peers.websocket_transport import POLICY_VIOLATION, TICKET_SECONDS, LineEnded, peer_beside_relay
 from lockstep.server.state.dependencies import authorized, dependencies
 
 __all__ = ["WatchTicket", "router"]
@@ -41,15 +41,16 @@ async def invite(
     if not here.relays.arrived(relay):
         raise NotFound("no such relay")
     with here.console.peers.place(identity, relayed=True):
-        watcher = WebSocketPeer(relay, identity, here.console, here.settings, here.console.peers.turns)
+        turns = here.console.peers.turns
+        watcher, transport = peer_beside_relay(relay, identity, here.console, here.settings, turns)
         here.console.peers.admit(watcher)
-    return json_answer(WatchTicket(watcher.ticket, TICKET_SECONDS), 201)
+    return json_answer(WatchTicket(transport.ticket, TICKET_SECONDS), 201)
 
 
 @router.delete("/watch/{ticket}")
 async def decline(ticket: str, request: Request, caller: Annotated[Right, Depends(authorized)]) -> Response:
     """Give a ticket back that cannot be used, as behind a proxy that lets no WebSocket pass."""
-    watcher = dependencies(request).console.peers.by_ticket(ticket)
+    watcher, _ = dependencies(request).console.peers.by_ticket(ticket)
     if watcher.identity.token_id != caller.token_id:
         raise NotFound("no such ticket")
     watcher.end("deleted")
@@ -65,15 +66,15 @@ async def line(websocket: WebSocket, ticket: str) -> None:
         return
     try:
         check_origin(websocket.headers, here.settings.allowed_origins)
-        watcher = here.console.peers.by_ticket(ticket)
+        watcher, transport = here.console.peers.by_ticket(ticket)
     except ConsoleError as error:
         here.metrics.bad_input.labels("watch", type(error).__name__).inc()
         await websocket.close(POLICY_VIOLATION)
         return
-    watcher.ticket = ""
+    transport.ticket = ""
     try:
         await websocket.accept()
-        await watcher.serve(_WebSocketLine(websocket))
+        await transport.serve(_WebSocketLine(websocket))
     except OSError:
         watcher.end("line closed")  # gone before it was accepted
     except Exception as error:

@@ -9,8 +9,8 @@ from lockstep.protocol.serial import event_after
 from lockstep.robot_bridge.control.event_core import EventCore, Executed, Refused
 from lockstep.robot_bridge.control.goals.command_values import CommandValues
 from lockstep.robot_bridge.robots.base import Measurement
-from tests.robot_bridge.core_helpers import MAX_AGE, NONCE, reason
-from tests.robot_bridge.goal_helpers import ARM_AXES, HangingArm
+from tests.robot_bridge.control.core_helpers import MAX_AGE, NONCE, reason
+from tests.robot_bridge.control.goals.goal_helpers import ARM_AXES, HangingArm
 
 POSES = HangingArm().describe().poses
 PLACES = [0.0, 0.2, 0.4, 3.0, 0.6, -0.2]

@@ -5,7 +5,7 @@ import math
 import pytest
 
 from lockstep.robot_bridge.control.limits.axis_shaper import AxisShaper
-from tests.robot_bridge.goal_helpers import ARM_AXES, HangingArm
+from tests.robot_bridge.control.goals.goal_helpers import ARM_AXES, HangingArm
 
 DT = 0.004
 REST: list[float | None] = [0.0, None, None, None, None, None]

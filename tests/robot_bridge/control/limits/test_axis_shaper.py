@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 
 from lockstep.protocol.description import Axis
 from lockstep.robot_bridge.control.limits.axis_shaper import AxisShaper
-from tests.robot_bridge.core_helpers import AXES
+from tests.robot_bridge.control.core_helpers import AXES
 
 HOLD = 0.3
 DT = 0.004

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from lockstep.protocol.description import Axis
 from lockstep.robot_bridge.control.limits.axis_shaper import AxisShaper
 from lockstep.robot_bridge.control.limits.goal_axis import shorter_way, stopping_speed
-from tests.robot_bridge import goal_helpers
+from tests.robot_bridge.control.goals import goal_helpers
 
 HOLD = 0.3
 DT = 0.004

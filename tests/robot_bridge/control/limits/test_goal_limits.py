@@ -10,7 +10,7 @@ from lockstep.robot_bridge.control.goals.command_values import CommandValues
 from lockstep.robot_bridge.control.limits.axis_shaper import AxisShaper
 from lockstep.robot_bridge.control.limits.motion_limits import MotionLimits
 from lockstep.robot_bridge.description.check_description import check_description
-from tests.robot_bridge.goal_helpers import ARM_AXES, SHOULDER, HangingArm
+from tests.robot_bridge.control.goals.goal_helpers import ARM_AXES, SHOULDER, HangingArm
 
 DT = 0.004
 CRANE = RobotDescription(

@@ -10,7 +10,15 @@ from lockstep.protocol.description import AxisGain
 from lockstep.robot_bridge.control.limits.axis_shaper import AxisShaper
 from lockstep.robot_bridge.control.limits.motion_limits import MotionLimits
 from lockstep.robot_bridge.control.ticker import Ticker
-from tests.robot_bridge.limits_helpers import DT, HOLD, LIFT, ExactBase, ExactLift, base_description, inside
+from tests.robot_bridge.control.limits.limits_helpers import (
+    DT,
+    HOLD,
+    LIFT,
+    ExactBase,
+    ExactLift,
+    base_description,
+    inside,
+)
 
 SQUARE = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)]
 ROOM = [(-3.0, -2.0), (3.0, -2.0), (3.0, 2.0), (-3.0, 2.0)]

@@ -17,7 +17,7 @@ from lockstep.client import Console
 from lockstep.protocol.messages import EncodeRequest
 from lockstep.robot_bridge.robots.event_strip import read_event_strip
 from lockstep.server.media.uplink import second_share
-from lockstep.server.peers.webrtc_peer import WebRtcPeer
+from lockstep.server.peers.peer import Peer
 from tests.server.media.uplink.test_encoding_bridge_live import CAMERA, encoded, link, robot_that_encodes
 from tests.server.rig import Rig
 from tests.waiting import PATIENCE, eventually
@@ -136,8 +136,8 @@ def due_all(rig: Rig) -> None:
                 delivery.target.tier = "high"
 
 
-def media_of(peer: WebRtcPeer) -> list[Any]:
-    return list(cast(Any, peer)._streams.deliveries)
+def media_of(peer: Peer) -> list[Any]:
+    return list(cast(Any, peer)._media.deliveries)
 
 
 async def test_an_observer_gets_more_than_a_narrow_operator_and_costs_the_first_encoding_nothing(

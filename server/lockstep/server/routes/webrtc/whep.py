@@ -29,7 +29,8 @@ from lockstep.server.errors import (
 from lockstep.server.http.request_body import read_text
 from lockstep.server.http.static_files import takes_coding
 from lockstep.server.peers.agreed_channels import agreed_channels
-from lockstep.server.peers.webrtc_peer import WebRtcPeer
+from lockstep.server.peers.peer import Peer
+from lockstep.server.peers.webrtc_transport import WebRtcTransport
 from lockstep.server.routes.webrtc.ice import servers_for
 from lockstep.server.state.dependencies import Dependencies, authorized, dependencies
 from lockstep.server.webrtc.ice_servers import link_headers
@@ -89,14 +90,15 @@ async def create(
         identity = identity._replace(role="observer")
     relayed = bool(relay) and not thumbnail and identity.role == "observer" and here.relays.arrived(relay)
     with here.console.peers.place(identity, relayed=relayed, thumbnail=thumbnail):
-        peer, answer = await _negotiate(here, caller, identity, offer, trailer=stamp == "trailer", thumbnail=thumbnail)
+        trailer = stamp == "trailer"
+        peer, transport, answer = await _negotiate(here, caller, identity, offer, trailer=trailer, thumbnail=thumbnail)
         peer.relay = relay if relayed else ""
         here.console.peers.admit(peer)
     headers = {
-        "Location": f"{request.scope.get('root_path', '')}/whep/{peer.resource}",
+        "Location": f"{request.scope.get('root_path', '')}/whep/{transport.resource}",
         "Accept-Patch": FRAGMENT,
         "Cache-Control": "no-store",
-        "ETag": peer.ice.tag,
+        "ETag": transport.ice.tag,
     }
     if ice.ice_servers:
         headers["Link"] = ", ".join(link_headers(ice))
@@ -121,9 +123,9 @@ async def nothing_to_get() -> Response:
 async def patch(resource: str, request: Request, caller: Annotated[Right, Depends(authorized)]) -> Response:
     """More candidates (RFC 8840), or an ICE restart, which says `If-Match: *` (RFC 9725 4.3.1, 4.3.3)."""
     here = dependencies(request)
-    peer = _own(here, resource, caller)
-    peer.take_request()
-    return await patched(request, here, peer.ice, lambda: _own(here, resource, caller))
+    _, transport = _own(here, resource, caller)
+    transport.take_request()
+    return await patched(request, here, transport.ice, lambda: _own(here, resource, caller))
 
 
 async def patched(request: Request, here: Dependencies, ice: IceSession, still_there: Callable[[], object]) -> Response:
@@ -157,16 +159,17 @@ def _precondition(request: Request, tag: str) -> str:
 
 @router.delete("/whep/{resource}")
 async def delete(resource: str, request: Request, caller: Annotated[Right, Depends(authorized)]) -> Response:
-    _own(dependencies(request), resource, caller).end("deleted")
+    peer, _ = _own(dependencies(request), resource, caller)
+    peer.end("deleted")
     return Response(status_code=200)
 
 
-def _own(here: Dependencies, resource: str, caller: Right) -> WebRtcPeer:
+def _own(here: Dependencies, resource: str, caller: Right) -> tuple[Peer, WebRtcTransport]:
     """Return the caller's peer of this resource. Raises NotFound, also for the resource of somebody else."""
-    peer = here.console.peers.by_resource(resource)
+    peer, transport = here.console.peers.by_resource(resource)
     if peer.identity.token_id != caller.token_id:
         raise NotFound("no such WHEP resource")
-    return peer
+    return peer, transport
 
 
 def _check_sections(here: Dependencies, offer: SessionDescription) -> None:
@@ -178,8 +181,8 @@ def _check_sections(here: Dependencies, offer: SessionDescription) -> None:
 
 async def _negotiate(
     here: Dependencies, caller: Right, identity: Identity, offer: SessionDescription, *, trailer: bool, thumbnail: bool
-) -> tuple[WebRtcPeer, SessionDescription]:
-    """Return the peer, and its answer. `identity`: the one under which `caller` takes part."""
+) -> tuple[Peer, WebRtcTransport, SessionDescription]:
+    """Return the peer, its transport and its answer. `identity`: the one under which `caller` takes part."""
     # The console's own candidates are a setting, and a peer's address is learnt from its checks: no server is asked.
     servers = servers_for(here.settings, identity).ice_servers if here.settings.relay_console else []
     channels = agreed_channels([each for section in offer.accepted for each in section.channel_maps])
@@ -200,25 +203,18 @@ async def _negotiate(
         answer = connection.answer(offer, plan.media)
         media = here.media.subscribers.attach(connection, plan, priority=identity.role == "operator", turns=turns)
         ice = IceSession(connection, offer.transport.ufrag)
-        peer = WebRtcPeer(
-            connection,
-            media,
-            ice,
-            identity,
-            here.console,
-            here.settings,
-            take_voice=None if line is None else line.take,
-        )
+        transport = WebRtcTransport(connection, media, ice, take_voice=None if line is None else line.take)
+        peer = Peer(transport, media, identity, here.console, here.settings)
         peer.thumbnail = thumbnail
         if line is not None:
             line.peer = peer
         try:
-            peer.agree_on(channels)
+            transport.agree_on(channels)
             caller.identity  # noqa: B018  raises when the link has ended meanwhile
         except BaseException:
             await peer.abandon()
             raise
-        connection.listen(peer.heard)
+        connection.listen(transport.heard)
     except BaseException as error:
         connection.close()
         if isinstance(error, SdpError):
@@ -227,4 +223,4 @@ async def _negotiate(
             here.metrics.faults.caught("peer offer", error)
             raise InternalFault("the console could not answer; its log says why") from error
         raise
-    return peer, answer
+    return peer, transport, answer
