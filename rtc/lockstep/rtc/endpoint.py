@@ -21,6 +21,7 @@ from typing import Self
 
 from lockstep.rtc.addresses import Address, Datagram, Path
 from lockstep.rtc.certificate import Certificate
+from lockstep.rtc.demux import DatagramKind, datagram_kind
 from lockstep.rtc.dtls import dtls_context
 from lockstep.rtc.ice.agent import Agent
 from lockstep.rtc.ice.check_list import LocalCandidate
@@ -226,6 +227,7 @@ class Endpoint:
 
     def send(self, datagrams: Sequence[Datagram], *, urgent: bool) -> None:
         """Send datagrams with all others of this turn of the loop; urgent ones now."""
+        used: UdpSocket | None = None
         for datagram in datagrams:
             if self._tcp is not None and datagram.path.transport == "tcp":
                 self._tcp.send(datagram, urgent=urgent)
@@ -233,10 +235,13 @@ class Endpoint:
             found = self._sockets.get(datagram.local)
             if found is None:
                 self._send_relayed(datagram)
-            else:
-                found.queue((datagram,), urgent=urgent)
-        if urgent and datagrams:
-            self._flush()
+                continue
+            if urgent and used is not None and used is not found:
+                self._flush_socket(used)
+            found.queue((datagram,), urgent=urgent)
+            used = found
+        if urgent and used is not None:
+            self._flush_socket(used)
         elif datagrams and not self._flush_is_due:
             self._flush_is_due = True
             self._loop.call_soon(self._flush_later)
@@ -265,7 +270,7 @@ class Endpoint:
     # Sockets
 
     def _readable(self, found: UdpSocket) -> None:
-        self._receive(found.receive())
+        self._receive(found.arriving())
 
     def _receive_stream(self, datagrams: Sequence[bytes], path: Path) -> None:
         self._receive((each, path) for each in datagrams)
@@ -283,7 +288,11 @@ class Endpoint:
             if connection is None or connection.put_off(data, path):
                 continue
             if connection.receive(data, path, now):
-                heard[connection] = True
+                if connection.urgent and datagram_kind(data) is DatagramKind.DTLS:
+                    heard.pop(connection, None)
+                    connection.settle()  # it may be a command
+                else:
+                    heard[connection] = True
             else:
                 heard.setdefault(connection, False)
         for connection, more in heard.items():
@@ -310,10 +319,13 @@ class Endpoint:
 
     def _flush(self) -> None:
         for found in self._sockets.values():
-            found.flush()
-            if found.wants_write:
-                self._loop.add_writer(found.fileno(), self._flush)
-                self._full.add(found)
-            elif found in self._full:
-                self._loop.remove_writer(found.fileno())
-                self._full.remove(found)
+            self._flush_socket(found)
+
+    def _flush_socket(self, found: UdpSocket) -> None:
+        found.flush()
+        if found.wants_write:
+            self._loop.add_writer(found.fileno(), self._flush)
+            self._full.add(found)
+        elif self._full and found in self._full:
+            self._loop.remove_writer(found.fileno())
+            self._full.remove(found)

@@ -584,12 +584,18 @@ class Peer:
         )
 
     def events(self) -> list[PeerEvent]:
+        self.read_on()
         self._settle(self._now)
         return self.settled_events()
 
+    def read_on(self) -> None:
+        """Read what `receive_datagram` has left of a datagram of DTLS; `has_events` tells if there was anything."""
+        if self._dtls is not None:
+            self._dtls.read_on(self._now)
+
     def settled_events(self) -> list[PeerEvent]:
         """Like `events`, for less, if `receive_datagram`, `receive_plain` or `handle_timer` was called last: those
-        leave no core with an event that another one must know."""
+        leave no core with an event that another one must know. After `receive_datagram`, `read_on` comes next."""
         events, self._events = self._events, []
         return events
 
@@ -600,7 +606,7 @@ class Peer:
             self._held.append(data)  # the peer's answer, or the path that ICE has found, is on its way
             self.counts["dtls_early"] += 1
         else:
-            self._dtls.receive_datagram(data, now)
+            self._dtls.receive_first(data, now)
 
     def _receive_media(self, data: bytes, kind: DatagramKind, now: float) -> None:
         if self._unprotect is None or self.streams is None:

@@ -71,6 +71,7 @@ class Connection:
         self._loop = asyncio.get_running_loop()
         self._timer: asyncio.TimerHandle | None = None
         self._timer_at = 0.0
+        self._sets_timer = False  # True: the loop calls `_set_timer_now` in its next turn
         self._turns = turns
         self._later: deque[tuple[bytes, Path]] = deque()  # datagrams that wait for their turn
         self.fault: Exception | None = None  # the exception that serving it raised, after PeerEnded("failed")
@@ -266,11 +267,15 @@ class Connection:
 
     def _finish(self, events: Sequence[PeerEvent]) -> None:
         self._delivery.hand_out(events)
+        self.peer.read_on()
         self._endpoint.send(self.peer.datagrams_to_send(), urgent=self.urgent)
-        if self.peer.has_events:  # a channel is empty now
+        if self.peer.has_events:  # a channel is empty now, or a datagram had further records
             self._delivery.hand_out(self.peer.events())
             self._endpoint.send(self.peer.datagrams_to_send(), urgent=self.urgent)
-        self._set_timer()
+        if self.urgent and not self._delivery.ended:
+            self._set_timer_soon()
+        else:
+            self._set_timer()
         if self._delivery.ended:
             self._later.clear()
             self._endpoint.forget(self)
@@ -282,6 +287,20 @@ class Connection:
     def _not_read(self) -> None:
         self.peer.close(self._loop.time())
         self._loop.call_soon(self.flush)
+
+    def _set_timer_soon(self) -> None:
+        """Set the timer behind everything that this turn of the loop has woken, which may wait for a feedback."""
+        if not self._sets_timer:
+            self._sets_timer = True
+            self._loop.call_soon(self._set_timer_now)
+
+    def _set_timer_now(self) -> None:
+        self._sets_timer = False
+        if self.fault is None:
+            try:
+                self._set_timer()
+            except Exception as error:
+                self._fail(error)
 
     def _set_timer(self) -> None:
         """Set the timer anew. One that fires too early is left: the next datagram puts off most of them, and no code

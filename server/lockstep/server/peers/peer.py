@@ -227,9 +227,12 @@ class Peer(ABC):
                 self._writers[channel].send(text)
 
     def send_feedback(self, text: str) -> None:
-        if "control" in self._writers and not self.ended:
-            with self.contained("message out"):
-                self._writers["control"].send_newest(text)
+        writer = self._writers.get("control")
+        if writer is not None and not self.ended:
+            try:  # not `contained`: the operator waits for each line here, and in `_received`
+                writer.send_newest(text)
+            except Exception as error:
+                self.failed("message out", error)
 
     def want_traces(self, wanted: bool) -> None:
         """Begin or end noting which pictures are sent to it, and when."""
@@ -342,8 +345,10 @@ class Peer(ABC):
     def _received(self, channel: ChannelName | None, data: object) -> None:
         """Take a message. `channel`: None on a line, which carries all. Only a valid message is a sign of life."""
         if not self.ended:
-            with self.contained("message in"):
+            try:
                 self._take(channel, data)
+            except Exception as error:
+                self.failed("message in", error)
 
     def _take(self, channel: ChannelName | None, data: object) -> None:
         now = self._loop.time()
