@@ -21,7 +21,6 @@ from typing import Self
 
 from lockstep.rtc.addresses import Address, Datagram, Path
 from lockstep.rtc.certificate import Certificate
-from lockstep.rtc.demux import DatagramKind, datagram_kind
 from lockstep.rtc.dtls import dtls_context
 from lockstep.rtc.ice.agent import Agent
 from lockstep.rtc.ice.check_list import LocalCandidate
@@ -288,9 +287,9 @@ class Endpoint:
             if connection is None or connection.put_off(data, path):
                 continue
             if connection.receive(data, path, now):
-                if connection.urgent and datagram_kind(data) is DatagramKind.DTLS:
+                if connection.urgent and connection.peer.has_message:
                     heard.pop(connection, None)
-                    connection.settle()  # it may be a command
+                    connection.settle()  # a command does not wait for the datagrams behind it
                 else:
                     heard[connection] = True
             else:

@@ -15,7 +15,7 @@ from random import Random, SystemRandom
 from OpenSSL import SSL
 
 from lockstep.rtc.addresses import Datagram, Path
-from lockstep.rtc.channels import DataChannels
+from lockstep.rtc.channels import ChannelMessage, DataChannels
 from lockstep.rtc.dcep import Reliability
 from lockstep.rtc.demux import DatagramKind, datagram_kind
 from lockstep.rtc.dtls import DtlsClosed, DtlsConnected, DtlsConnection, DtlsData, DtlsFailed, DtlsSettings, DtlsState
@@ -582,6 +582,11 @@ class Peer:
             or (self.channels is not None and self.channels.has_events)
             or (self._dtls is not None and self._dtls.has_events)
         )
+
+    @property
+    def has_message(self) -> bool:
+        """True if the newest event that waits is a message of a channel."""
+        return bool(self._events) and isinstance(self._events[-1], ChannelMessage)
 
     def events(self) -> list[PeerEvent]:
         self.read_on()
