@@ -72,6 +72,33 @@ def test_every_record_of_a_datagram_is_read() -> None:
     assert pair.server.events() == [DtlsData(b"one"), DtlsData(b"two"), DtlsData(b"three")]
 
 
+def test_the_first_record_is_there_before_the_others_are_read_and_all_before_the_next_datagram() -> None:
+    pair = DtlsPair()
+    pair.connect()
+    for text in (b"one", b"two", b"three", b"four", b"five"):
+        pair.client.send(text, NOW)
+    datagrams = pair.client.datagrams_to_send()
+    pair.server.receive_first(b"".join(datagrams[:3]), NOW)
+    assert pair.server.events() == [DtlsData(b"one")]
+    pair.server.read_on(NOW)
+    assert pair.server.events() == [DtlsData(b"two"), DtlsData(b"three")]
+    pair.server.receive_first(datagrams[3], NOW)
+    pair.server.receive_first(datagrams[4], NOW)
+    assert pair.server.events() == [DtlsData(b"four"), DtlsData(b"five")]
+
+
+def test_a_goodbye_behind_data_is_heard_with_the_rest_of_the_datagram() -> None:
+    pair = DtlsPair()
+    pair.connect()
+    pair.client.send(b"last", NOW)
+    pair.client.close(NOW)
+    pair.server.receive_first(b"".join(pair.client.datagrams_to_send()), NOW)
+    assert pair.server.events() == [DtlsData(b"last")]
+    pair.server.read_on(NOW)
+    assert pair.server.events() == [DtlsClosed()]
+    assert pair.server.state is DtlsState.CLOSED
+
+
 def test_application_data_right_behind_the_handshake_is_not_lost() -> None:
     pair = DtlsPair()
     pair.start()

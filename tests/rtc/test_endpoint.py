@@ -1,7 +1,7 @@
 """Whole endpoints on loopback: ours with ours, and with aiortc as it is."""
 
 import asyncio
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncIterator, Callable, Iterator
 from contextlib import AsyncExitStack
 from fractions import Fraction
 
@@ -10,6 +10,7 @@ from aiortc import RTCDataChannel, RTCPeerConnection, RTCSessionDescription, Vid
 from av import VideoFrame
 from av.frame import Frame
 
+from lockstep.rtc.addresses import Path
 from lockstep.rtc.channels import ChannelClosed, ChannelMessage, ChannelOpened
 from lockstep.rtc.endpoint import Connection, Endpoint, EndpointSettings, TooManyPeers
 from lockstep.rtc.peer import OfferedMedia
@@ -241,6 +242,41 @@ async def test_a_listener_hears_everything_in_order_and_its_faults_are_its_own(e
         offerer.close()
     assert faults == ["a listener failed"]
     assert heard[-1] == PeerEnded("closed")
+
+
+async def test_an_urgent_message_is_heard_before_the_next_datagram_is_read_and_none_of_a_datagram_is_missed() -> None:
+    heard: list[str | bytes] = []
+
+    def listen(event: PeerEvent) -> None:
+        if isinstance(event, ChannelMessage):
+            heard.append(event.data)
+
+    async with Endpoint([HOST]) as here, Endpoint([HOST]) as there:
+        sender, driver = here.connect(controlling=True), there.connect(controlling=False)
+        sender.accept(driver.answer(sender.offer(), {}))
+        await until(sender, of(Connected))
+        channel = sender.open_channel("x")
+        sender.send(channel, "first")
+        await until(driver, of(ChannelMessage))
+        driver.listen(listen)
+        driver.urgent = True
+        path = driver.peer.ice.path
+        assert path is not None
+
+        def datagram(text: str) -> bytes:
+            sender.peer.send(channel, text, asyncio.get_running_loop().time())
+            [found] = sender.peer.datagrams_to_send()
+            return found.data
+
+        def arriving() -> Iterator[tuple[bytes, Path]]:
+            yield datagram("a"), path
+            assert heard == ["a"]
+            yield datagram("b") + datagram("c"), path
+            assert heard == ["a", "b", "c"]
+
+        there._receive(arriving())
+        assert heard == ["a", "b", "c"]
+        sender.close()
 
 
 async def test_addresses_that_come_later_are_used_and_those_that_are_none_left_out(endpoint: Endpoint) -> None:

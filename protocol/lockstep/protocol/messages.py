@@ -4,6 +4,7 @@ Unknown fields are ignored, unknown kinds refused.
 """
 
 from collections.abc import Sequence
+from operator import attrgetter
 from typing import Annotated, Literal
 
 import msgspec
@@ -301,6 +302,7 @@ LinkMessageOnWire = _WithoutFeedback | RobotFeedback  # both feedbacks have one 
 
 _decoder: msgspec.msgpack.Decoder[LinkMessageOnWire] = msgspec.msgpack.Decoder(LinkMessageOnWire)
 _encoder = msgspec.msgpack.Encoder()
+_fields_of_feedback = attrgetter(*Feedback.__struct_fields__)
 
 
 def encode_message(message: LinkMessage) -> bytes:
@@ -327,7 +329,7 @@ def plain_feedback(feedback: Feedback) -> Feedback:
     """Return the feedback without the spans that it may have on the robot link."""
     if not isinstance(feedback, RobotFeedback):
         return feedback
-    return Feedback(**{name: getattr(feedback, name) for name in Feedback.__struct_fields__})
+    return Feedback(**dict(zip(Feedback.__struct_fields__, _fields_of_feedback(feedback), strict=True)))
 
 
 def spans_of(feedback: Feedback) -> CommandSpans:

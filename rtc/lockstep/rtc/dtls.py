@@ -157,6 +157,7 @@ class DtlsConnection:
         self._timer: float | None = None
         self._out: list[bytes] = []
         self._events: list[DtlsEvent] = []
+        self._is_unread = False  # True: the last datagram may have further records
 
     @property
     def state(self) -> DtlsState:
@@ -177,6 +178,16 @@ class DtlsConnection:
 
     def receive_datagram(self, data: bytes, now: float) -> None:
         """Take a datagram with one or more records."""
+        self.receive_first(data, now)
+        self.read_on(now)
+
+    def receive_first(self, data: bytes, now: float) -> None:
+        """Take a datagram, and read its first record only if the connection is up.
+
+        Call `read_on` when that has gone on: it may be a command, and to find out that nothing is behind it takes as
+        long again.
+        """
+        self.read_on(now)
         if self._state is DtlsState.NEW:
             self.counts["not_started"] += 1
         elif self._state in (DtlsState.CLOSED, DtlsState.FAILED):
@@ -187,6 +198,12 @@ class DtlsConnection:
             self._fail("too_much_handshake", f"more than {self._settings.max_handshake} bytes before connected")
         else:
             self._ssl.bio_write(data)
+            self._advance(now, only_first=self._state is DtlsState.CONNECTED)
+
+    def read_on(self, now: float) -> None:
+        """Read what `receive_first` has left. `events` and `datagrams_to_send` may have more then."""
+        if self._is_unread:
+            self._is_unread = False
             self._advance(now)
 
     def handle_timer(self, now: float) -> None:
@@ -257,8 +274,8 @@ class DtlsConnection:
         self._handshake_bytes += length
         return self._handshake_bytes > self._settings.max_handshake
 
-    def _advance(self, now: float) -> None:
-        """Let OpenSSL read all records that it has.
+    def _advance(self, now: float, *, only_first: bool = False) -> None:
+        """Let OpenSSL read all records that it has, or the first one with data.
 
         It alone knows how many: it skips only the header of a malformed record, and finds others in its content.
         """
@@ -268,6 +285,9 @@ class DtlsConnection:
                 self._finish_handshake()
             while self._state is DtlsState.CONNECTED:
                 self._events.append(DtlsData(self._ssl.recv(MAX_PLAINTEXT)))
+                if only_first:
+                    self._is_unread = True
+                    return
         except SSL.WantReadError:
             pass  # all was read
         except SSL.ZeroReturnError:

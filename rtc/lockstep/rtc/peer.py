@@ -15,7 +15,7 @@ from random import Random, SystemRandom
 from OpenSSL import SSL
 
 from lockstep.rtc.addresses import Datagram, Path
-from lockstep.rtc.channels import DataChannels
+from lockstep.rtc.channels import ChannelMessage, DataChannels
 from lockstep.rtc.dcep import Reliability
 from lockstep.rtc.demux import DatagramKind, datagram_kind
 from lockstep.rtc.dtls import DtlsClosed, DtlsConnected, DtlsConnection, DtlsData, DtlsFailed, DtlsSettings, DtlsState
@@ -583,13 +583,24 @@ class Peer:
             or (self._dtls is not None and self._dtls.has_events)
         )
 
+    @property
+    def has_message(self) -> bool:
+        """True if the newest event that waits is a message of a channel."""
+        return bool(self._events) and isinstance(self._events[-1], ChannelMessage)
+
     def events(self) -> list[PeerEvent]:
+        self.read_on()
         self._settle(self._now)
         return self.settled_events()
 
+    def read_on(self) -> None:
+        """Read what `receive_datagram` has left of a datagram of DTLS; `has_events` tells if there was anything."""
+        if self._dtls is not None:
+            self._dtls.read_on(self._now)
+
     def settled_events(self) -> list[PeerEvent]:
         """Like `events`, for less, if `receive_datagram`, `receive_plain` or `handle_timer` was called last: those
-        leave no core with an event that another one must know."""
+        leave no core with an event that another one must know. After `receive_datagram`, `read_on` comes next."""
         events, self._events = self._events, []
         return events
 
@@ -600,7 +611,7 @@ class Peer:
             self._held.append(data)  # the peer's answer, or the path that ICE has found, is on its way
             self.counts["dtls_early"] += 1
         else:
-            self._dtls.receive_datagram(data, now)
+            self._dtls.receive_first(data, now)
 
     def _receive_media(self, data: bytes, kind: DatagramKind, now: float) -> None:
         if self._unprotect is None or self.streams is None:

@@ -90,7 +90,7 @@ async def test_a_fault_in_the_questions_to_one_server_is_named_and_the_others_co
             raise ValueError("planted")
         return await open_relay(uri, *rest)
 
-    monkeypatch.setattr("lockstep.rtc.endpoint.open_relay", fails_once)
+    monkeypatch.setattr("lockstep.rtc.sockets.address_servers.open_relay", fails_once)
     async with Endpoint([HOST]) as endpoint:
         troubles = await endpoint.ask([server(turn), server(turn, "tcp")])
         assert [each.candidate.type for each in endpoint.candidates] == ["host", "relay"]
@@ -104,7 +104,8 @@ async def test_addresses_that_carry_nothing_are_given_back(turn: TurnServer) -> 
         await endpoint.ask([server(turn)])
         [second] = [each for each in endpoint.candidates if each.candidate.type == "relay"]
         assert first.base != second.base
-        link = endpoint._relays[0]
+        link = endpoint._servers.relay(second.base)
+        assert link is not None
         await endpoint.ask([])
         assert link.relayed is None
         assert [each.candidate.type for each in endpoint.candidates] == ["host"]

@@ -26,7 +26,7 @@ def misfit(feedback: Feedback, description: RobotDescription) -> str:
     for name, found, lengths in values:
         if len(found) not in lengths:
             return f"a feedback with {len(found)} {name}"
-        if not all(-MOST <= value <= MOST for value in found):
+        if not _are_numbers(found):
             return f"a feedback whose {name} are not numbers"
     if wrong := _misfit_of_goals(feedback.goals, description):
         return wrong
@@ -35,6 +35,11 @@ def misfit(feedback: Feedback, description: RobotDescription) -> str:
     if is_too_large(feedback):
         return f"a feedback of more than {MAX_FEEDBACK_BYTES} bytes"
     return ""
+
+
+def _are_numbers(values: Sequence[float]) -> bool:
+    """Return whether no value is beyond `MOST` or not a number. The sum of hardly any feedback is beyond it."""
+    return sum(map(abs, values)) <= MOST or all(-MOST <= value <= MOST for value in values)
 
 
 def _misfit_of_goals(goals: Sequence[float | None], description: RobotDescription) -> str:

@@ -111,6 +111,7 @@ class Association:
         self.counts: Counter[str] = Counter()
         self.state = State.CLOSED
         self._is_up = False
+        self._may_receive = False
         self.round_trip = RoundTrip(settings)
         self.max_message = min(settings.max_send_message, peer_max_message or settings.max_send_message)
         self._ended = False
@@ -185,7 +186,7 @@ class Association:
             ValueError: an empty message, which SCTP does not have (RFC 8831 6.6 has protocols for it).
         """
         self.now = now
-        if self._ended or self.state not in _WANTS_TO_SEND:
+        if self._ended or (self.state is not State.ESTABLISHED and self.state not in _WANTS_TO_SEND):
             raise AssociationClosed("the association has ended")
         if not payload:
             raise ValueError("an SCTP message has at least one byte")
@@ -298,6 +299,7 @@ class Association:
     def _become(self, state: State) -> None:
         self.state = state
         self._is_up = state in _UP
+        self._may_receive = state in _CAN_RECEIVE
 
     # Packets out
 
@@ -412,13 +414,13 @@ class Association:
         return bool(chunk.kind & 0x80)
 
     def _receive_data(self, chunk: Data | InterleavedData) -> None:
-        if self.state not in _CAN_RECEIVE:
+        if not self._may_receive:
             self.counts["unexpected"] += 1
         elif not self._receiver.receive_data(chunk, self.now):
             self._say(Error([(INVALID_STREAM, chunk.stream.to_bytes(2, "big") + bytes(2))]))
 
     def _receive_forward_tsn(self, chunk: ForwardTsn | InterleavedForwardTsn) -> None:
-        if self.state in _CAN_RECEIVE:
+        if self._may_receive:
             self._receiver.receive_forward_tsn(chunk, self.now)
         else:
             self.counts["unexpected"] += 1

@@ -133,7 +133,9 @@ class SendQueue:
 
     def has(self, stream: int) -> bool:
         """True if anything waits on this stream, newest-wins messages included."""
-        return stream in self._streams or any(message.stream == stream for message in self.newest)
+        if stream in self._streams:
+            return True
+        return bool(self.newest) and any(message.stream == stream for message in self.newest)
 
     def clear(self) -> None:
         self.newest.clear()

@@ -1,1 +1,1 @@
-"""The sockets of the endpoint: UDP, TCP, and links to TURN servers."""
+"""The shells of the endpoint: UDP, TCP, links to STUN and TURN servers, and the connections with their clock."""

@@ -1,4 +1,4 @@
-"""Connections to STUN and TURN servers on asyncio: with `endpoint` and `udp_socket` the shells of this package."""
+"""Connections to STUN and TURN servers on asyncio."""
 
 import asyncio
 import secrets

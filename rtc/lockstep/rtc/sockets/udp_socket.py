@@ -11,7 +11,7 @@ import errno
 import socket
 import struct
 from collections import Counter, deque
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from itertools import chain
 from typing import NamedTuple, Self, TypeVar
 
@@ -46,7 +46,7 @@ class Message(NamedTuple):
 
 
 class UdpSocket:
-    """`queue` datagrams and `flush` once a turn; `receive` when the socket is readable, `flush` when `wants_write`.
+    """`queue` datagrams and `flush` once a turn; `arriving` when the socket is readable, `flush` when `wants_write`.
 
     A datagram that the kernel refuses (EPERM of a firewall, ENETUNREACH of a network that is gone, …) is dropped and
     counted in `counts` by the error's name. When more than `MAX_BACKLOG` wait, the oldest of their kind are dropped.
@@ -64,6 +64,7 @@ class UdpSocket:
         self._any_address = host in ("0.0.0.0", "::") and _tells_local_addresses(sock)
         self._segments = segments and _supports_segments(sock)
         self.is_full = False  # the kernel took no more, and has not since
+        self._refused = 0  # messages that the kernel would not cut
         self._alone = 0  # number of the next datagrams that leave uncombined: the kernel has refused to cut them
         self._paths: dict[tuple[object, bytes], Path] = {}  # by sender and packet information
         self._origins: dict[str, list[Ancillary]] = {}  # by the address to leave from
@@ -103,8 +104,12 @@ class UdpSocket:
 
     def receive(self) -> list[tuple[bytes, Path]]:
         """Return the datagrams that have come, at most `MAX_BATCH`. Errors of the socket are counted."""
-        received: list[tuple[bytes, Path]] = []
-        while len(received) < MAX_BATCH:
+        return list(self.arriving())
+
+    def arriving(self) -> Iterator[tuple[bytes, Path]]:
+        """Yield what `receive` returns. The kernel is asked for each datagram when the caller wants it: a command has
+        gone on before the call that finds nothing more."""
+        for _ in range(MAX_BATCH):
             try:
                 data, ancillary, _, sender = self._socket.recvmsg(MAX_DATAGRAM + 1, 64)
             except OSError as error:
@@ -117,8 +122,7 @@ class UdpSocket:
             path = self._paths.get(key)
             if path is None:
                 path = _remember(self._paths, key, Path(self._local(key[1]), _address(sender)))
-            received.append((data, path))
-        return received
+            yield data, path
 
     def _local(self, information: bytes) -> Address:
         """Return the address that a datagram came to, from in_pktinfo or in6_pktinfo."""
@@ -153,7 +157,7 @@ class UdpSocket:
         waiting = chain(self._urgent, self._others)
         first = next(waiting)
         message = Message([first.data], first.path)
-        if not self._segments or self._alone or self.counts["segments_refused"] >= MAX_REFUSALS:
+        if not self._segments or self._alone or self._refused >= MAX_REFUSALS:
             return message
         size = len(first.data)
         room = MAX_MESSAGE - size
@@ -183,6 +187,7 @@ class UdpSocket:
                 return False
             if len(datagrams) > 1 and error.errno in UNCUT:
                 self.counts["segments_refused"] += 1
+                self._refused += 1
                 self._alone = len(datagrams)
                 return True
             self._count(error)

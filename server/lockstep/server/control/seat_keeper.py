@@ -177,10 +177,10 @@ class SeatKeeper:
         return sum(each is not None and each.identity.token_id == link for each in asking) >= LINK_CLAIMS
 
     def heard(self, peer: Peer) -> None:
-        now = time.monotonic()
-        self.rules.heard(peer.id, now, peer.round_trip)
+        now, round_trip = time.monotonic(), peer.round_trip
+        self.rules.heard(peer.id, now, round_trip)
         if peer.role in PEOPLE:
-            self.rules.attended(peer.identity.token_id, now, peer.round_trip)
+            self.rules.attended(peer.identity.token_id, now, round_trip)
 
     def moved(self, peer: Peer) -> None:
         """Called when a moving command of `peer` was forwarded."""

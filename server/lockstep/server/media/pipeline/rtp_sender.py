@@ -103,6 +103,11 @@ class RtpSender:
         self._reported.remb_bps = bitrate_bps
 
     @property
+    def round_trip_ms(self) -> float | None:
+        """The round trip that the peer's reports tell; None before the first."""
+        return self._reported.round_trip_ms
+
+    @property
     def stats(self) -> SenderStats:
         """The current statistics."""
         stats, stream = self._reported, self._stream

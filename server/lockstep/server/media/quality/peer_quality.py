@@ -87,7 +87,10 @@ class PeerQuality:
     @property
     def round_trip_ms(self) -> float | None:
         """The round trip in ms; None before the first measurement."""
-        return next((ms for ms in (stats.round_trip_ms for stats in self.stats()) if ms is not None), None)
+        for camera in self.cameras:
+            if (measured := camera.target.sender.round_trip_ms) is not None:
+                return measured
+        return None
 
     def stats(self) -> list[SenderStats]:
         return [camera.target.sender.stats for camera in self.cameras]

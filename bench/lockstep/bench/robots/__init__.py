@@ -1,0 +1,1 @@
+"""Robots that only measurements drive."""
