@@ -44,7 +44,7 @@ class Connection:
         self.options = options
         self.session = Session()
         self.driving = Driving(options, self.session, lambda message: self.transport.send("control", message))
-        self.media = MediaReceiver(options.tolerance, options.gate, self.driving.rendered)
+        self.media = MediaReceiver(options.tolerance, options.gate, self.driving.rendered, self.driving.heard)
         self.relay: RelayMedia | None = None
         self._heartbeat = Heartbeat(self.session, self.driving, options.silence_seconds)
         self._messages = MessageDispatcher(self.session, self.driving, self.media, self._heartbeat)

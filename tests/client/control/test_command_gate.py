@@ -21,6 +21,10 @@ def do(gate: CommandGate, action: dict[str, Any], now: float) -> None:
             gate.refused(event)
         case {"shown": stamp}:
             gate.shown(stamp)
+        case {"heard": None}:
+            pass  # the gate itself knows for how long nothing was heard
+        case {"heard": stamp}:
+            gate.heard("microphone", stamp, now)
         case _:
             assert action == {}, f"the table has an action that this test does not know: {action}"
 
@@ -29,7 +33,13 @@ def do(gate: CommandGate, action: dict[str, Any], now: float) -> None:
 def test_the_gate_goes_through_the_shared_table(case: dict[str, Any]) -> None:
     shortest = case["min_interval_ms"]
     calm = case.get("calm_interval_ms", shortest)
-    gate = CommandGate(case["pacing"], case["tolerance"], shortest / 1000, calm_interval=calm / 1000)
+    gate = CommandGate(
+        case["pacing"],
+        case["tolerance"],
+        shortest / 1000,
+        calm_interval=calm / 1000,
+        sound_tolerance=case.get("sound_tolerance", 0),
+    )
     for number, step in enumerate(case["steps"]):
         now = step["at"] / 1000
         do(gate, step["do"], now)
@@ -46,8 +56,19 @@ def test_there_is_no_next_command_before_the_first_feedback() -> None:
 def test_the_first_command_does_not_wait_for_the_event_rate() -> None:
     gate = CommandGate("feedback", 4, 10.0)
     gate.feedback(1, 1)
-    assert gate.opens_at() < 0
+    assert gate.opens_at(0.0) < 0
     assert gate.state(0.0) == "open"
+
+
+def test_of_several_microphones_the_gate_goes_by_the_one_that_is_farthest_behind() -> None:
+    gate = CommandGate("media", 4, 0.0, sound_tolerance=4)
+    gate.feedback(20, 1)
+    gate.shown(20)
+    gate.heard("left", 20, 0.0)
+    gate.heard("right", 16, 0.0)
+    assert gate.state(0.1) == "sound"
+    gate.heard("left", 20, 0.15)
+    assert gate.state(0.21) == "open", "the other has fallen silent"
 
 
 actions = st.lists(

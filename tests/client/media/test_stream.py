@@ -161,3 +161,23 @@ async def test_the_log_says_how_old_each_rendering_was() -> None:
     assert [medium.captured for medium in taken] == [99.0, 99.9]
     assert [(entry.stamp, round(entry.age or 0, 3)) for entry in stream.log.all()] == [(1, 1.0), (1, 0.1)]
     assert (gate.rendered, gate.discarded) == (2, 0)
+
+
+async def test_sound_that_plays_or_is_too_old_is_noted_and_sound_that_overtook_the_feedback_is_not() -> None:
+    heard: list[int] = []
+    last = asyncio.Event()
+
+    def on_heard(microphone: str, stamp: int) -> None:
+        assert microphone == "microphone"
+        heard.append(stamp)
+        if stamp == 12:
+            last.set()
+
+    gate: MediaGate[Decoded] = MediaGate(2)
+    stream = Stream("microphone", "audio", {0: "PCMU"}, "native", gate, Shown(), on_heard=on_heard)
+    stream.feedback(10)
+    async with running(stream):
+        for number, stamp in enumerate([1, 8, 20, 12]):
+            stream.packet(0, MediaPacket(number, number * 160, True, b"\xff" * 160, stamp))
+        await last.wait()
+    assert heard == [1, 8, 12]

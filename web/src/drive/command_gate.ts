@@ -4,6 +4,11 @@ export type Pacing = "feedback" | "media";
 
 /** Events that follow one another sooner wait for pictures and sound; ms. */
 export const CALM_INTERVAL_MS = 40;
+/**
+ * An event that would take sound out of its tolerance waits for it so long at most; ms. Armed and at rest, events follow
+ * one another no sooner, and robots hold a command for longer.
+ */
+export const SOUND_WAIT_MS = 200;
 
 /** Why no new command may be sent now, or that it may. */
 export type GateState = "open" | "no_feedback" | "in_flight" | "rate" | "picture" | "sound";
@@ -38,7 +43,8 @@ export interface NextCommand {
 /**
  * The tolerance counts events, so each picture and each sound has less time where events follow one another quickly.
  * Events sooner than `calmIntervalMs` therefore wait while what is seen or heard is farther behind than two thirds of
- * its tolerance; as long as no picture was shown, they wait for none.
+ * its tolerance; as long as no picture was shown, they wait for none. A picture that is too old stays, veiled, until the
+ * next comes; sound that is too old is gone. So an event that would make it too old waits for it, for `SOUND_WAIT_MS`.
  */
 export function createCommandGate(
   pacing: Pacing,
@@ -127,7 +133,18 @@ export function gateState(gate: CommandGate, now: number): GateState {
 
 /** When the event rate allows the next command, unless a picture or a sound comes before; -Infinity before the first. */
 export function opensAt(gate: CommandGate): number {
-  return gate.lastSentMs + (keepsUp(gate) ? gate.minIntervalMs : gate.calmIntervalMs);
+  return gate.lastSentMs + intervalMs(gate);
+}
+
+function intervalMs(gate: CommandGate): number {
+  if (keepsUp(gate)) return gate.minIntervalMs;
+  return losesSound(gate) ? Math.max(SOUND_WAIT_MS, gate.calmIntervalMs) : gate.calmIntervalMs;
+}
+
+/** Whether the next event would take what is heard out of its tolerance, and no rule but this one waits for it. */
+function losesSound({ pacing, event, heard }: CommandGate): boolean {
+  if (pacing === "media" || event === null || heard === null) return false;
+  return eventGap(event, heard.stamp) > Math.max(heard.tolerance - 1, 0);
 }
 
 function keepsUp({ event, shown, tolerance, heard }: CommandGate): boolean {

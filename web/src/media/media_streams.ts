@@ -91,9 +91,10 @@ export class MediaStreams {
     for (const sound of this.sounds.values()) sound.observe(context, this.isAudible());
   }
 
-  /** What commands paced by media wait for; null: no microphone is heard. */
+  /** What commands wait for; null: no microphone is heard, or its sound is not judged. */
   heard(): HeardSound | null {
-    const { feedback, tolerance } = this.context("audio");
+    const { feedback, tolerance, gate } = this.context("audio");
+    if (gate === "off") return null;
     const stamps = [...this.sounds.values()].map(({ playing }) => playing).filter((stamp) => stamp !== null);
     const stamp = feedback === null ? null : farthestBehind(feedback, stamps);
     return stamp === null ? null : { stamp, tolerance };

@@ -1,5 +1,6 @@
 import { describe, expect, it } from "vitest";
 import {
+  SOUND_WAIT_MS,
   createCommandGate,
   farthestBehind,
   gateState,
@@ -18,7 +19,13 @@ import { readVectors } from "../vectors";
 
 interface Step {
   at: number;
-  do: { feedback?: [number, number]; sent?: boolean; refused?: number; shown?: number };
+  do: {
+    feedback?: [number, number];
+    sent?: boolean;
+    refused?: number;
+    shown?: number;
+    heard?: number | null;
+  };
   then: string;
   next?: { event: number; issue: number };
 }
@@ -27,6 +34,7 @@ interface PacingCase {
   name: string;
   pacing: Pacing;
   tolerance: number;
+  sound_tolerance?: number;
   min_interval_ms: number;
   calm_interval_ms?: number; // as min_interval_ms without
   steps: Step[];
@@ -34,11 +42,14 @@ interface PacingCase {
 
 const { cases } = readVectors("pacing") as { cases: PacingCase[] };
 
-function act(gate: CommandGate, { at, do: { feedback, sent, refused, shown } }: Step): void {
+function act(gate: CommandGate, { at, do: action }: Step, soundTolerance: number): void {
+  const { feedback, sent, refused, shown, heard } = action;
   if (feedback !== undefined) takeFeedback(gate, feedback[0], feedback[1]);
   if (sent === true) noteSent(gate, at);
   if (refused !== undefined) takeRefusal(gate, refused);
   if (shown !== undefined) noteShown(gate, shown);
+  if (heard !== undefined)
+    noteHeard(gate, heard === null ? null : { stamp: heard, tolerance: soundTolerance });
 }
 
 /** The newest feedback and the picture on screen are of event 20. */
@@ -52,14 +63,17 @@ function openGate(pacing: Pacing): CommandGate {
 describe("the command gate", () => {
   it("has a table of cases", () => expect(cases.length).toBeGreaterThan(15));
 
-  it.each(cases)("$name", ({ pacing, tolerance, min_interval_ms, calm_interval_ms, steps }) => {
-    const gate = createCommandGate(pacing, tolerance, min_interval_ms, calm_interval_ms);
-    for (const step of steps) {
-      act(gate, step);
-      expect(gateState(gate, step.at)).toBe(step.then);
-      if (step.next !== undefined) expect(nextCommand(gate)).toMatchObject(step.next);
-    }
-  });
+  it.each(cases)(
+    "$name",
+    ({ pacing, tolerance, sound_tolerance, min_interval_ms, calm_interval_ms, steps }) => {
+      const gate = createCommandGate(pacing, tolerance, min_interval_ms, calm_interval_ms);
+      for (const step of steps) {
+        act(gate, step, sound_tolerance ?? 0);
+        expect(gateState(gate, step.at)).toBe(step.then);
+        if (step.next !== undefined) expect(nextCommand(gate)).toMatchObject(step.next);
+      }
+    },
+  );
 
   it("cannot send before the first feedback", () => {
     const gate = createCommandGate("feedback", 4, 0);
@@ -115,10 +129,14 @@ describe("the command gate", () => {
       expect(opensAt(gate)).toBe(16);
     });
 
-    it("paced by feedback does not wait for it", () => {
+    it("paced by feedback does not wait for it before the first event, nor longer than it says", () => {
       const gate = openGate("feedback");
       noteHeard(gate, heard(1));
       expect(gateState(gate, 0)).toBe("open");
+      noteSent(gate, 0);
+      takeFeedback(gate, 21, 1);
+      expect(gateState(gate, SOUND_WAIT_MS - 1)).toBe("rate");
+      expect(gateState(gate, SOUND_WAIT_MS)).toBe("open");
     });
 
     it("goes by the microphone that is farthest behind, across the wrap too", () => {

@@ -6,10 +6,14 @@ from lockstep.protocol.serial import event_after, event_gap
 
 __all__ = ["CALM_INTERVAL", "CommandGate", "GateState", "NextCommand", "Pacing"]
 
-CALM_INTERVAL = 0.040  # s; events that follow one another sooner wait for the pictures
+CALM_INTERVAL = 0.040  # s; events that follow one another sooner wait for pictures and sound
+# An event that would take sound out of its tolerance waits for it so long at most. Armed and at rest, events follow one
+# another no sooner, and robots hold a command for longer.
+SOUND_WAIT = 0.200  # s
+HEARD = 0.200  # s without a new segment after which nothing is heard
 
 Pacing = Literal["feedback", "media"]
-GateState = Literal["open", "no_feedback", "in_flight", "rate", "picture"]
+GateState = Literal["open", "no_feedback", "in_flight", "rate", "picture", "sound"]
 
 
 class NextCommand(NamedTuple):
@@ -20,26 +24,35 @@ class NextCommand(NamedTuple):
 
 
 class CommandGate:
-    """Opens when the last command was answered, the event rate allows another and, with pacing `media`, the picture on
-    screen will be within tolerance of the next feedback as well.
+    """Opens when the last command was answered, the event rate allows another and, with pacing `media`, what is seen
+    and heard will be within tolerance of the next feedback as well.
 
-    The tolerance counts events, so each picture has less time where events follow one another quickly. Events sooner
-    than `calm_interval` therefore wait while the picture on screen is farther behind than two thirds of the tolerance;
-    as long as no picture was shown, they wait for none.
+    The tolerance counts events, so each picture and each sound has less time where events follow one another quickly.
+    Events sooner than `calm_interval` therefore wait while what is seen or heard is farther behind than two thirds of
+    its tolerance; as long as no picture was shown, they wait for none. A picture that is too old stays until the next
+    arrives; sound that is too old is gone. So an event that would make it too old waits for it, for `SOUND_WAIT`.
     """
 
     def __init__(
-        self, pacing: Pacing, tolerance: int, min_interval: float, *, calm_interval: float | None = None
+        self,
+        pacing: Pacing,
+        tolerance: int,
+        min_interval: float,
+        *,
+        calm_interval: float | None = None,
+        sound_tolerance: int = 0,
     ) -> None:
         """`calm_interval`: s; None: `min_interval`."""
         self.pacing = pacing
         self.tolerance = tolerance
+        self.sound_tolerance = sound_tolerance
         self.min_interval = min_interval  # s between the first sendings of two events
         self.calm_interval = min_interval if calm_interval is None else max(calm_interval, min_interval)
         self._feedback: tuple[int, int] | None = None  # newest (event, issue)
         self._in_flight: int | None = None
         self._sent_at: float | None = None
         self._shown: int | None = None
+        self._heard: dict[str, tuple[int, float]] = {}  # by microphone: stamp of the newest segment, and when
 
     @property
     def in_flight(self) -> int | None:
@@ -73,23 +86,35 @@ class CommandGate:
         """Note that a picture stamped `stamp` is on screen."""
         self._shown = stamp
 
+    def heard(self, microphone: str, stamp: int, now: float) -> None:
+        """Note that a segment of sound stamped `stamp` plays, or is too old to."""
+        self._heard[microphone] = stamp, now
+
     def state(self, now: float) -> GateState:
         """Return "open", or the reason that the gate is closed."""
         if self._feedback is None:
             return "no_feedback"
         if self._in_flight is not None:
             return "in_flight"
-        if self._sent_at is not None and now < self.opens_at():
+        if self._sent_at is not None and now < self.opens_at(now):
             return "rate"
-        if self.pacing == "media" and not self._picture_is_near(self._feedback[0]):
+        if self.pacing != "media":
+            return "open"
+        event, heard = self._feedback[0], self._farthest_heard(now)
+        if self._shown is None or not _is_near(event_gap(event, self._shown), self.tolerance):
             return "picture"
-        return "open"
+        return "open" if heard is None or _is_near(heard, self.sound_tolerance) else "sound"
 
-    def opens_at(self) -> float:
-        """Return the time at which the event rate allows the next command, unless a picture is shown before."""
+    def opens_at(self, now: float) -> float:
+        """Return the time at which the event rate allows the next command, unless a picture is shown or a segment is
+        heard before."""
         if self._sent_at is None:
             return float("-inf")
-        return self._sent_at + (self.min_interval if self._pictures_keep_up() else self.calm_interval)
+        heard = self._farthest_heard(now)
+        if self._picture_keeps_up() and (heard is None or _keeps_up(heard, self.sound_tolerance)):
+            return self._sent_at + self.min_interval
+        loses_sound = self.pacing != "media" and heard is not None and heard > max(self.sound_tolerance - 1, 0)
+        return self._sent_at + (max(SOUND_WAIT, self.calm_interval) if loses_sound else self.calm_interval)
 
     def next(self) -> NextCommand:
         """Return the command that an open gate lets pass.
@@ -101,14 +126,24 @@ class CommandGate:
             raise RuntimeError("no feedback to answer")
         return NextCommand(event_after(self._feedback[0]), self._feedback[1])
 
-    def _pictures_keep_up(self) -> bool:
+    def _picture_keeps_up(self) -> bool:
         if self._shown is None or self._feedback is None:
             return True
-        return abs(event_gap(self._feedback[0], self._shown)) <= 2 * self.tolerance // 3
+        return _keeps_up(event_gap(self._feedback[0], self._shown), self.tolerance)
 
-    def _picture_is_near(self, event: int) -> bool:
-        """True if the picture on screen stays within tolerance when the next feedback arrives, one event on. At
-        tolerance 0 no picture can; there the picture of the newest event suffices."""
-        if self._shown is None:
-            return False
-        return -self.tolerance <= event_gap(event, self._shown) <= max(self.tolerance - 1, 0)
+    def _farthest_heard(self, now: float) -> int | None:
+        """Return the gap of the microphone that is farthest behind of those that are heard; None if none is."""
+        if self._feedback is None:
+            return None
+        event = self._feedback[0]
+        return max((event_gap(event, stamp) for stamp, at in self._heard.values() if now - at < HEARD), default=None)
+
+
+def _keeps_up(gap: int, tolerance: int) -> bool:
+    return abs(gap) <= 2 * tolerance // 3
+
+
+def _is_near(gap: int, tolerance: int) -> bool:
+    """True if what is seen or heard stays within tolerance when the next feedback arrives, one event on. At tolerance 0
+    nothing can; there the medium of the newest event suffices."""
+    return -tolerance <= gap <= max(tolerance - 1, 0)

@@ -1,7 +1,7 @@
 """Decides without I/O which command or rest to send and when, and tells the outcome of each intention.
 
-Call `feedback`, `refusal`, `shown`, `intend` and `rest`. After each call, and at `wake_at`, send the messages that
-`due` returns, and hand out the results that `outcomes` returns.
+Call `feedback`, `refusal`, `shown`, `heard`, `intend` and `rest`. After each call, and at `wake_at`, send the messages
+that `due` returns, and hand out the results that `outcomes` returns.
 
 - One command is in flight; its repeats carry the newest intention under the same event number, and answer the newest
   issue of its feedback.
@@ -186,6 +186,10 @@ class CommandSender:
         """Note that a picture of the main camera is on screen."""
         self.gate.shown(stamp)
 
+    def heard(self, microphone: str, stamp: int, now: float) -> None:
+        """Note that a segment of sound plays, or is too old to."""
+        self.gate.heard(microphone, stamp, now)
+
     def ping_answered(self, round_trip: float) -> None:
         """Take a ping's round trip, in s; it stands in for that of a command while few of those are known."""
         self._pings.append(round_trip)
@@ -262,7 +266,7 @@ class CommandSender:
         if self._flight is not None:
             moments += [self._flight.repeat_at, self._flight.echo_at]
         elif self._want is not _Want.NOTHING:
-            moments.append(self.gate.opens_at() if self.gate.state(now) == "rate" else NEVER)
+            moments.append(self.gate.opens_at(now) if self.gate.state(now) == "rate" else NEVER)
         elif self.armed:
             moments.append(self._idle_at)
         return min(moments)

@@ -69,6 +69,7 @@ class Driving:
             self._options.tolerance["video"],
             1 / rate,
             calm_interval=None if asked else CALM_INTERVAL,
+            sound_tolerance=self._options.tolerance["audio"],
         )
         sender = CommandSender(gate, neutral_values(description.axes))
         self._driver = Driver(sender, self._send, description.max_event_age)
@@ -101,6 +102,11 @@ class Driving:
         cameras = self._robot.description.cameras if self._robot is not None else ()
         if self._driver is not None and cameras and stream == cameras[0].name:
             self._driver.shown(stamp)
+
+    def heard(self, microphone: str, stamp: int) -> None:
+        """Note that sound plays, or is too old to: the events follow its pace. Without a gate none is too old."""
+        if self._driver is not None and self._options.gate == "event":
+            self._driver.heard(microphone, stamp)
 
     def stopped(self) -> None:
         """Note that this connection has pressed STOP."""

@@ -53,6 +53,11 @@ class Driver:
         self.sender.shown(stamp)
         self.pump()
 
+    def heard(self, microphone: str, stamp: int) -> None:
+        """Note that a segment of sound plays, or is too old to."""
+        self.sender.heard(microphone, stamp, self._loop.time())
+        self.pump()
+
     def loss(self) -> None:
         """Note that a message of this connection was lost."""
         self.sender.loss(self._loop.time())

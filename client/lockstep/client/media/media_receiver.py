@@ -33,11 +33,13 @@ class MediaReceiver:
         tolerance: dict[str, int],
         gate: GateMode,
         on_render: Callable[[str, int], None],
+        on_heard: Callable[[str, int], None],
     ) -> None:
         self._carrier: Carrier = "native"  # of the source
         self._tolerance = tolerance
         self._gate = gate
         self._on_render = on_render
+        self._on_heard = on_heard
         self._streams: list[Stream] = []
         self._counters: dict[int, tuple[Section, RtpCounter]] = {}  # by SSRC
         self._executor: ThreadPoolExecutor | None = None
@@ -73,6 +75,7 @@ class MediaReceiver:
             self._carrier,
             MediaGate(tolerance, self._gate),
             self._on_render,
+            on_heard=self._on_heard,
         )
 
     def _count(self, data: bytes) -> None:

@@ -52,7 +52,10 @@ class Stream:
         gate: MediaGate[Decoded],
         on_render: Callable[[str, int], None],
         wall_clock: Callable[[], float] = time.time,
+        *,
+        on_heard: Callable[[str, int], None] | None = None,
     ) -> None:
+        """`on_heard` gets the stamps of sound that plays or is too old to; `on_render` those of what is rendered."""
         self.name = name
         self.kind = kind
         self.carrier = carrier
@@ -62,6 +65,7 @@ class Stream:
         self._codecs = codecs
         self._wall_clock = wall_clock
         self._on_render = on_render
+        self._on_heard = on_heard
         self._assembler: Assembler | None = None
         self._encoded: NewestQueue[EncodedFrame] = NewestQueue(ENCODED_BOUND)
         self._readers: list[NewestQueue[Decoded]] = []
@@ -136,9 +140,16 @@ class Stream:
                     self._start_over(self._assembler)
                 continue
             for frame in frames:
-                self._render(self.gate.offer(frame, frame.stamp))
+                self._offer(frame)
 
     # Through the gate, to the readers
+
+    def _offer(self, frame: Decoded) -> None:
+        self._render(self.gate.offer(frame, frame.stamp))
+        if self._on_heard is None or frame.stamp is None or self.kind != "audio":
+            return
+        if self.gate.check(frame.stamp)[0] != "hold":
+            self._on_heard(self.name, frame.stamp)
 
     def feedback(self, event: int) -> None:
         """Take the event of the newest feedback."""

@@ -1,5 +1,5 @@
 import type { SoundContext } from "../../gate/gate_counters";
-import { judge } from "../../gate/media_gate";
+import { judge, type Verdict } from "../../gate/media_gate";
 import { eventGap } from "../../gate/serial";
 import { createSoundJitter, noteLateness, targetS, type SoundJitter } from "./sound_jitter";
 import {
@@ -160,8 +160,11 @@ export function nextFrame(player: SoundPlayer, now: number): Float32Array {
 function allowedLoudness(player: SoundPlayer): number {
   const next = player.queue.packets[0];
   if (next === undefined) return player.loudness;
-  const { feedback, tolerance, gate } = player.context;
-  return judge(feedback, next.stamp, tolerance, gate).verdict === "discard" ? 0 : 1;
+  return verdictOf(player, next) === "discard" ? 0 : 1;
+}
+
+function verdictOf({ context }: SoundPlayer, { stamp }: SoundPacket): Verdict {
+  return judge(context.feedback, stamp, context.tolerance, context.gate).verdict;
 }
 
 /** A step would click. Sound that was never heard does not fade out: it is silent from its first sample on. */
@@ -191,6 +194,8 @@ export function waitingMs(player: SoundPlayer): number {
 function begin(player: SoundPlayer, now: number): void {
   const { queue, arrived, jitter } = player;
   if (arrived === null) return;
+  const first = queue.packets[0];
+  if (first !== undefined && verdictOf(player, first) === "render") hurryIfOld(player, first, now);
   const target = targetNow(player, now);
   const leadFrom = (first: number): number => {
     const [from, last] = [queue.packets[first], queue.packets.at(-1)];
@@ -234,6 +239,11 @@ function noteBegun(player: SoundPlayer, now: number): void {
   if (packet === null || packet.time === player.playing) return;
   player.playing = packet.time;
   player.begun.push(packet.time);
+  hurryIfOld(player, packet, now);
+}
+
+/** What is, or soon will be, as old as it may be waits for nothing that may come late. */
+function hurryIfOld(player: SoundPlayer, packet: SoundPacket, now: number): void {
   const { feedback, tolerance, gate } = player.context;
   const { gap } = judge(feedback, packet.stamp, tolerance, gate);
   const soon = Math.floor(SOON_S / player.eventS); // events
@@ -307,8 +317,7 @@ function shortened(player: SoundPlayer, length: number, ready: number, now: numb
 
 /** Where the next sound is too old, goes on at once with the first that is not. */
 function skipTooOld(player: SoundPlayer): void {
-  const { feedback, tolerance, gate } = player.context;
-  const verdicts = player.queue.packets.map(({ stamp }) => judge(feedback, stamp, tolerance, gate).verdict);
+  const verdicts = player.queue.packets.map((packet) => verdictOf(player, packet));
   if (verdicts[0] !== "discard") return;
   const first = verdicts.indexOf("render");
   if (first > 0) leaveOut(player, first);

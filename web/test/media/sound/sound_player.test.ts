@@ -229,6 +229,21 @@ describe("the player of sound", () => {
     expect(steepest()).toBeLessThan(STEEPEST);
   });
 
+  it("begins again at once where sound that waits as long as packets were late would be too old", () => {
+    stream(0, 300, (index) => 150 + 150 * Math.sin(index / 5));
+    playUntil(7600); // nothing comes, and it falls silent
+    [begun, leftOut] = [[], 0];
+    for (let index = 330; index < 430; index++) {
+      const ms = 1000 + index * 20;
+      const event = Math.floor(ms / 40);
+      playUntil(ms);
+      judgeAgainst(player, { feedback: event, tolerance: 4, gate: "event" }, ms / 1000);
+      come(index, ms, event);
+    }
+    expect(begun.length).toBeGreaterThan(85);
+    expect(leftOut).toBeLessThan(5);
+  });
+
   it("hurries while what plays is as old as the tolerance allows", () => {
     stream(0, 300, wandering);
     const before = ageMs();
