@@ -137,3 +137,15 @@ def test_every_image_of_others_can_be_named_by_its_digest() -> None:
     assert {each["image"] for each in services.values() if "build" not in each} == {digest}
     built = {name: each["build"]["args"] for name, each in services.items() if "build" in each}
     assert all(set(given.values()) == {digest} for given in built.values()), built
+
+
+@pytest.mark.parametrize(("given", "used"), [({}, "/run/lockstep/link/link_secret"), ({"SECRET_FILE": ""}, "")])
+def test_without_a_key_file_the_console_pairs_a_robot_that_dials_in(given: dict[str, str], used: str) -> None:
+    """A console with a key file takes no code."""
+    variables = {f"LOCKSTEP_LINK_{name}": value for name, value in given.items()}
+    environment = {"PATH": os.environ["PATH"], "HOME": os.environ["HOME"], **variables}
+    done = subprocess.run(
+        ["docker-compose", "config"], cwd=ROOT, env=environment, capture_output=True, text=True, timeout=60
+    )
+    assert done.returncode == 0, done.stderr
+    assert yaml.safe_load(done.stdout)["services"]["console"]["environment"]["LOCKSTEP_LINK_SECRET_FILE"] == used

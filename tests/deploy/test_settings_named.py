@@ -16,7 +16,8 @@ OTHERS = {  # not the programs' own
     "LOCKSTEP_ONE",
     "LOCKSTEP_TWO",
     "LOCKSTEP_EXTERNAL_IP",  # coturn
-    "LOCKSTEP_ROBOT_NAME",  # the unit's own
+    "LOCKSTEP_ROBOT_NAME",
+    "LOCKSTEP_ROBOT_OPTIONS",  # the unit's own
     "LOCKSTEP_LINK",  # of `lockstep pair` and `forget`
     "LOCKSTEP_NAME",  # stands for any in a sentence
 }

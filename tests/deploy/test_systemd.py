@@ -49,3 +49,10 @@ def test_the_bridge_is_started_again_when_it_hangs_and_ends_by_itself_before_sys
 def test_the_console_is_started_again_when_it_hangs() -> None:
     lines = next(unit for unit in UNITS if unit.name == "lockstep-console.service").read_text().splitlines()
     assert {"Type=notify", "Restart=always", "WatchdogSec=20"} <= set(lines)
+
+
+def test_the_bridge_takes_further_options_word_by_word() -> None:
+    """`${NAME}` is one word and `$NAME` as many as its value has (systemd.service(5), "Command lines")."""
+    lines = next(unit for unit in UNITS if unit.name == "lockstep-robot.service").read_text().splitlines()
+    assert "Environment=LOCKSTEP_ROBOT_OPTIONS=" in lines, "systemd warns of a variable that is not set"
+    assert next(line for line in lines if line.startswith("ExecStart=")).endswith(" $LOCKSTEP_ROBOT_OPTIONS")

@@ -1,13 +1,16 @@
 """A policy learns from ten recorded episodes, drives the SO-101, is corrected twice by a person, and learns again.
 
     PYTHONPATH=docs/examples/policy lockstep up --robot varied_blocks:VariedBlocks --state-dir /tmp/policy
-    python docs/examples/policy/learn_and_drive.py OPERATOR_LINK POLICY_LINK --recordings /tmp/policy
+    export OPERATOR_LINK=… POLICY_LINK=…
+    python docs/examples/policy/learn_and_drive.py --recordings /tmp/policy
 
+The links are in the environment, because every user of a machine can see the arguments of its processes.
 All three drivers are scripts here: Ada demonstrates, the policy learns, Grace corrects (docs/policies.md).
 """
 
 import argparse
 import asyncio
+import os
 import sys
 from collections.abc import AsyncIterator, Callable
 from contextlib import AsyncExitStack, asynccontextmanager
@@ -261,14 +264,15 @@ async def main(operator: str, policy_link: str, folder: Path, episodes: int, tri
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("operator", help="an operator's link")
-    parser.add_argument("policy", help="a link of the role policy: lockstep invite --role policy")
     parser.add_argument("--recordings", type=Path, required=True, help="the folder in which the console records")
     parser.add_argument("--episodes", type=int, default=10, help="demonstrations to learn from")
     parser.add_argument("--trials", type=int, default=10, help="before and after the corrections")
     parser.add_argument("--corrections", type=int, default=2, help="episodes in which Grace takes over")
     wanted = parser.parse_args()
-    given = (wanted.operator, wanted.policy, wanted.recordings, wanted.episodes, wanted.trials, wanted.corrections)
+    links = os.environ.get("OPERATOR_LINK", ""), os.environ.get("POLICY_LINK", "")
+    if not all(links):
+        parser.error("set OPERATOR_LINK to an operator's link, and POLICY_LINK to one of lockstep invite --role policy")
+    given = (*links, wanted.recordings, wanted.episodes, wanted.trials, wanted.corrections)
     try:
         asyncio.run(main(*given))
     except ConsoleError as error:

@@ -106,6 +106,7 @@ class ActionUpdate(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", 
     event: Annotated[int, msgspec.Meta(ge=1, le=MAX_EVENT)]  # the current one when this was said
     began: Annotated[int, msgspec.Meta(ge=0, le=MAX_EVENT)] = 0  # the current event when it began; 0: it never did
     by: Text = ""  # who asked for it
+    age: Seconds = 0.0  # s since it came to this state, by the sender's own clock; 0 for one that runs
 
 
 StatusKind = Literal["battery", "mode", "temperature", "hardware_stop", "number", "switch", "text"]

@@ -2,7 +2,9 @@
 
 import asyncio
 import json
+import os
 import re
+import subprocess
 import sys
 from pathlib import Path
 
@@ -31,10 +33,10 @@ async def said_by(folder: Path, *options: str) -> str:
     if not (MODEL_FOLDER / ".installed").is_file():
         pytest.skip("the model of the SO-101 is not here; `make test` fetches it")
     async with running_stack(folder, robot="varied_blocks:VariedBlocks", settings=SETTINGS) as stack:
-        command = [sys.executable, str(SCRIPT), stack.operator, await policy_link(stack, "net")]
-        command += ["--recordings", str(folder), *options]
+        links = {"OPERATOR_LINK": stack.operator, "POLICY_LINK": await policy_link(stack, "net")}
+        command = [sys.executable, str(SCRIPT), "--recordings", str(folder), *options]
         script = await asyncio.create_subprocess_exec(
-            *command, stdout=asyncio.subprocess.PIPE, stderr=asyncio.subprocess.STDOUT
+            *command, stdout=asyncio.subprocess.PIPE, stderr=asyncio.subprocess.STDOUT, env=os.environ | links
         )
         said, _ = await script.communicate()
     assert script.returncode == 0, said.decode()
@@ -77,6 +79,20 @@ async def test_a_policy_learns_from_ten_episodes_and_again_from_two_corrected_on
     assert int(before[1]) + int(after[1]) >= 4, said  # a busy machine may lose an episode
     assert re.search(r"corrected once in each of 2 episodes: \d in the bowl", said)
     assert re.search(r"it learns again, from \d+ episodes", said)
+
+
+def test_without_its_links_it_says_which_to_set_and_none_is_an_argument() -> None:
+    environment = {name: value for name, value in os.environ.items() if not name.endswith("_LINK")}
+    done = subprocess.run(
+        [sys.executable, str(SCRIPT), "--recordings", "nowhere"],
+        capture_output=True,
+        text=True,
+        env=environment,
+        timeout=60,
+    )
+    assert done.returncode == 2
+    assert "set OPERATOR_LINK to an operator's link, and POLICY_LINK" in done.stderr
+    assert done.stderr.startswith("usage: learn_and_drive.py [-h] --recordings RECORDINGS"), "no link before it"
 
 
 def told_of_policies(recording: Path) -> str:

@@ -1,5 +1,6 @@
 """Actions of a whole bridge over real TCP: what moves the robot lives only while armed events renew it."""
 
+import asyncio
 from collections.abc import Awaitable, Callable, Mapping, Sequence
 from pathlib import Path
 from typing import cast
@@ -109,6 +110,19 @@ async def test_home_drives_the_robot_home_while_armed_events_renew_it() -> None:
         repeated = await ask(driver, "home")
         assert repeated == final, "a repeat is answered from memory"
         await driver.heard(lambda feedback: feedback.at_rest)
+
+
+async def test_a_link_that_opens_is_told_how_long_ago_an_action_ended() -> None:
+    async with running_bridge(HomingRobot()) as bridge:
+        async with operator(bridge) as driver:
+            await ask(driver, "home")
+            final = await until_final(driver)
+        await asyncio.sleep(0.02)  # something that has an age
+        async with RobotLink(*bridge.address, "operator", name="test") as link:
+            told = await Operator(link).next(ActionUpdate)
+    assert final.age == 0.0
+    assert told.age >= 0.02
+    assert msgspec.structs.replace(told, age=0.0) == final
 
 
 async def test_without_renewal_the_robot_is_at_rest_when_hold_has_passed(tmp_path: Path) -> None:

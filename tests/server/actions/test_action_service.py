@@ -104,6 +104,28 @@ def update(
     return ActionUpdate(id=id, name="home", state=state, moves=moves, event=7, reason=reason, progress=progress)
 
 
+def test_a_newcomer_is_told_how_long_ago_an_action_ended(monkeypatch: pytest.MonkeyPatch) -> None:
+    bench, now = Bench(), [100.0]
+    monkeypatch.setattr(action_service.time, "monotonic", lambda: now[0])
+    old = msgspec.structs.replace(update("old", "cancelled", reason="driving"), age=40.0)  # from before this console
+    for each in (old, update("a"), update("b")):
+        bench.service.updated(each)
+    now[0] = 110.0
+    bench.service.updated(update("a", "done"))
+    now[0] = 115.0
+    bench.service.updated(msgspec.structs.replace(old, age=55.0))  # a link that came back says it again
+    assert [(each.id, each.age) for each in bench.service.newest()] == [("old", 55.0), ("a", 5.0), ("b", 0.0)]
+    told = [each.update for each in bench.published if isinstance(each, ActionUpdated)]
+    assert [(each.id, each.age) for each in told] == [("old", 40.0), ("a", 0.0), ("b", 0.0), ("a", 0.0)]
+
+
+def test_ends_that_nobody_is_told_of_are_not_kept() -> None:
+    bench = Bench()
+    for number in range(1000):
+        bench.service.updated(update(str(number), "done"))
+    assert len(bench.service._since) == len(bench.service.newest()) <= action_service.KEPT
+
+
 def test_the_holders_request_goes_to_the_robot_under_the_holders_name() -> None:
     bench = Bench()
     bench.service.act_by_peer(bench.peer(), act())
@@ -251,7 +273,8 @@ async def test_a_flood_of_actions_that_nobody_asked_for_does_not_hide_the_end_of
     bench.service.updated(update("asked", "done"))
     assert len(bench.service.newest()) == 32
     running = asyncio.ensure_future(bench.service.run())
-    await eventually(lambda: told(bench)[-1] == update("asked", "done"))
+    await eventually(lambda: (told(bench)[-1].id, told(bench)[-1].state) == ("asked", "done"))
+    assert told(bench)[-1].age > 0, "it is told late, and says so"
     running.cancel()
     await asyncio.wait([running])
 

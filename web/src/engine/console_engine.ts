@@ -374,7 +374,7 @@ export class ConsoleEngine {
     else if (message.type === "seat") this.session.seatMs = now;
     else if (message.type === "status") this.statusMs = now;
     else if (message.type === "action") {
-      this.actionMs = now;
+      this.actionMs = Math.max(this.actionMs, now - message.age * 1000);
       this.actions?.updated(message);
     } else if (message.type === "traces") this.tracing?.told(message);
   }

@@ -50,6 +50,7 @@ export interface ActionUpdate {
   readonly event: number;
   readonly began: number;
   readonly by: string;
+  readonly age: number;
 }
 
 /** One value of a command, in physical units. The value of a rate axis says how fast to move; `rest` means "do not move". The value of a goal axis says where to be; null means "do not move", and the axis stays where it was when rest began (docs/robot-link.md, "Goal axes"). */

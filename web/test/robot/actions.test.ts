@@ -34,6 +34,7 @@ function update(change: Partial<ActionUpdate> = {}): ActionUpdate {
     event: 5,
     began: 5,
     by: "Ada",
+    age: 0,
     ...change,
   };
 }

@@ -46,6 +46,14 @@ describe("the console's state", () => {
     expect(state.stop.by).toBe("x");
   });
 
+  it("logs an action that ended before this page came under the time of its end", () => {
+    const state = createConsoleState();
+    const ended = { id: "a", name: "home", state: "failed", reason: "", text: "jammed", age: 30 } as const;
+    const more = { progress: 0.5, moves: true, event: 5, began: 4, by: "Ada" };
+    applyMessage(state, { type: "action", ...ended, ...more }, 100_000);
+    expect(state.log[0]).toMatchObject({ text: "home: failed jammed", atMs: 70_000 });
+  });
+
   it("logs refusals and notices in words, and counts the same ones up", () => {
     const state = createConsoleState();
     applyMessage(state, refusalOf(4, "late"), 1);

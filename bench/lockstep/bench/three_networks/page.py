@@ -1,4 +1,4 @@
-"""`python -m lockstep.bench.three_networks.page LINK SECONDS`: a page that drives in circles; writes what it saw."""
+"""`python -m lockstep.bench.three_networks.page LINK SECONDS SETTLE`: a page that drives, and what it saw."""
 
 import asyncio
 import json
@@ -11,11 +11,9 @@ from lockstep.bench.browsers.console_page import open_console
 
 __all__ = ["drive"]
 
-SETTLE = 5.0  # s in which the bitrate finds its measure
 
-
-async def drive(link: str, seconds: float) -> dict[str, Any]:
-    """Drive for `seconds`, and return what the page's own statistics say of them."""
+async def drive(link: str, seconds: float, settle: float) -> dict[str, Any]:
+    """Drive for `settle` and then `seconds`; return what the page's own statistics say of the latter."""
     # The console signs its certificate itself, as one without a name has to.
     async with (
         running_chromium(flags=["--ignore-certificate-errors"]) as browser,
@@ -23,7 +21,7 @@ async def drive(link: str, seconds: float) -> dict[str, Any]:
     ):
         await page.until_live()
         async with page.driving():
-            await asyncio.sleep(SETTLE)
+            await asyncio.sleep(settle)
             before, began = await page.stats(), time.monotonic()
             await asyncio.sleep(seconds)
             after, passed = await page.stats(), time.monotonic() - began
@@ -31,4 +29,4 @@ async def drive(link: str, seconds: float) -> dict[str, Any]:
 
 
 if __name__ == "__main__":
-    sys.stdout.write(json.dumps(asyncio.run(drive(sys.argv[1], float(sys.argv[2])))) + "\n")
+    sys.stdout.write(json.dumps(asyncio.run(drive(sys.argv[1], *map(float, sys.argv[2:4])))) + "\n")

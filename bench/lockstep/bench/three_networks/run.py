@@ -23,11 +23,18 @@ from lockstep.server.http.transport.tls import self_signed
 __all__ = ["PORT", "run"]
 
 PORT = 8000  # the console's only open one: TCP for HTTP and the robot link, UDP for media and data channels
+SETTLE = 5.0  # s
 PAGE_SECONDS = 240.0  # for the page to open, to drive and to say what it saw, besides the drive itself
 
 
-async def run(robot: str, page: str, seconds: float, seed: int, say: Callable[[str], None]) -> dict[str, Any]:
-    """Pair, open the page and drive for `seconds`; return what was seen. `robot`, `page`: profiles of their networks.
+async def run(
+    robot: str, page: str, seconds: float, seed: int, say: Callable[[str], None], *, settle: float = SETTLE
+) -> dict[str, Any]:
+    """Pair, open the page and drive for `seconds`; return what was seen.
+
+    Args:
+        robot, page: profiles of their networks
+        settle: s of driving before those, in which the bitrate finds its measure
 
     Raises:
         NamespacesUnavailable: this machine or user cannot have network namespaces.
@@ -71,6 +78,7 @@ async def run(robot: str, page: str, seconds: float, seed: int, say: Callable[[s
                         "lockstep.bench.three_networks.page",
                         _outside(links["operator"]),
                         str(seconds),
+                        str(settle),
                     ]
                     async with asyncio.timeout(PAGE_SECONDS + seconds):
                         seen = json.loads(await _output(sites, "page", driving))

@@ -4,6 +4,8 @@ import logging
 from collections.abc import Callable
 from functools import partial
 
+import msgspec
+
 from lockstep.protocol.actions import Act, ActionCancel, ActionReason, ActionUpdate
 from lockstep.protocol.description import RobotDescription
 from lockstep.protocol.framing import frame
@@ -19,6 +21,7 @@ from lockstep.robot_bridge.robots.base import Robot
 
 __all__ = ["ActionRunner"]
 
+NOTED = 64  # ends of actions whose time is known; a newcomer is told fewer
 KEYS = 32  # updates that may wait for a link that cannot take more; a further one takes the place of an older one
 
 _logger = logging.getLogger(__name__)
@@ -48,6 +51,7 @@ class ActionRunner:
         self._error: BaseException | None = None  # raised by the adapter outside of a tick; it ends the bridge
         self._drives = False  # the moving action drives the axes itself
         self._link: LinkTransport | None = None  # of the operator
+        self._noted: dict[str, float] = {}  # id -> s, when the action ended; oldest first
         self._keys: dict[str, int] = {}  # id -> its key among the messages that wait
 
     @property
@@ -60,8 +64,9 @@ class ActionRunner:
     def link_opened(self, link: LinkTransport) -> None:
         """Tell a new operator link of the newest actions."""
         self._link = link
+        now = self._now()
         for update in self._core.newest():
-            self._send(update)
+            self._send(msgspec.structs.replace(update, age=max(0.0, now - self._noted.get(update.id, now))))
 
     def link_lost(self) -> None:
         self._link = None
@@ -199,6 +204,10 @@ class ActionRunner:
         self._send(update)
 
     def _note(self, update: ActionUpdate) -> None:
+        if update.state != "running":
+            self._noted.setdefault(update.id, self._now())
+            if len(self._noted) > NOTED:
+                del self._noted[next(iter(self._noted))]
         self._counters.actions[update.state] += 1
         self._log.record(
             "action", update.event, id=update.id, name=update.name, state=update.state, reason=update.reason

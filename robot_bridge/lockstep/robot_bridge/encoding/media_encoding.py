@@ -107,11 +107,11 @@ class MediaEncoding:
 
     async def _try_encoder(self) -> None:
         """Try the encoder of the settings before a picture needs it."""
-        from lockstep.robot_bridge.encoding.picture_encoder import try_encoder
+        from lockstep.robot_bridge.encoding.encoder_trial import try_in_time  # needs PyAV
 
         if self._settings.encoder == SOFTWARE or not self._encoders:
             return
-        why = await asyncio.to_thread(try_encoder, self._settings.encoder)
+        why = await try_in_time(self._settings.encoder)
         if why:
             for encoder in self._encoders:
                 encoder.fall_back(why)

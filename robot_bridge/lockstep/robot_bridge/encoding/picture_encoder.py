@@ -2,7 +2,6 @@
 
 import logging
 from collections.abc import Callable, Sequence
-from contextlib import suppress
 from fractions import Fraction
 from typing import NoReturn
 
@@ -18,7 +17,7 @@ from lockstep.robot_bridge.encoding.encoding_requests import EncodingGoal
 from lockstep.robot_bridge.encoding.picture_encoding import EncodedPicture
 from lockstep.robot_bridge.errors import EncodingFailed
 
-__all__ = ["H264Encoder", "try_encoder"]
+__all__ = ["MOST_WRONG", "H264Encoder"]
 
 CLOCK = 90_000  # Hz
 NEVER = 1_000_000  # pictures between keyframes that nobody asked for
@@ -33,7 +32,6 @@ MAX_PIXELS = 4096 * 2304
 MIN_SIDE = 16
 CONSTRAINED_BASELINE = 66 | 1 << 9  # FFmpeg's number
 MOST_WRONG = 3  # pictures in a row for which another encoder gives no packet of theirs; then SOFTWARE takes its place
-TRIED_SIZE, TRIED_BITRATE = (640, 480), 500_000  # of pictures with which an encoder is tried
 PIXELS = {"h264_qsv": "nv12"}  # of encoders that do not take yuv420p
 
 _logger = logging.getLogger(__name__)
@@ -181,21 +179,6 @@ class H264Encoder:
         self._opened_rate = rate
         self._context = context
         return context
-
-
-def try_encoder(name: str) -> str:
-    """Encode grey pictures with an encoder; return why it cannot be used, or "". May take seconds: needs a thread."""
-    reasons: list[str] = []
-    encoder = H264Encoder(name, fell_back=reasons.append)
-    width, height = TRIED_SIZE
-    payload = bytes([128]) * (width * height * 3 // 2)
-    for number in range(MOST_WRONG):
-        media = Media(
-            stream="", codec="yuv420p", stamp=1, time=number / ASSUMED_RATE, payload=payload, width=width, height=height
-        )
-        with suppress(EncodingFailed):
-            encoder.encode(media, EncodingGoal(TRIED_BITRATE, 0.0, 1.0), keyframe=number == 0)
-    return reasons[0] if reasons else ""
 
 
 def _software_options(bitrate: int, keyframe_seconds: float) -> dict[str, str]:

@@ -278,9 +278,12 @@ class LinkServer:
         return any(peer.has_room for peer in self._admitted.media)
 
     def second_has_room(self, stream: str) -> bool:
-        """Return whether each media link that takes the second encoding of a stream takes a picture of it at once."""
+        """Return whether a picture of the second encoding of a stream would wait nowhere on its way to its links.
+
+        So a second encoding takes only what the first leaves, and does not wait for the console to see that.
+        """
         takers = self._takers_of_second(stream)
-        return bool(takers) and all(peer.has_room for peer in takers)
+        return bool(takers) and all(peer.path_is_clear for peer in takers)
 
     def _takers_of_second(self, stream: str) -> list[LinkPeer]:
         encoding = self._encoding

@@ -13,12 +13,14 @@ from lockstep.protocol.messages import LinkMessage, Media, encode_message
 from lockstep.robot_bridge.link.link_session import BadInput, LinkSession, kind_of
 from lockstep.robot_bridge.link.message_rate import MessageRate
 from lockstep.robot_bridge.link.outgoing_queues import MediaOutbox, NewestOutbox
+from lockstep.robot_bridge.link.path_queue import path_queue
 
 __all__ = ["TICK_INTERVAL", "LinkTransport"]
 
 TICK_INTERVAL = 0.05  # s between calls of `LinkTransport.tick`
 HIGH_WATER = 64 << 10  # bytes the kernel would not take before output waits in the outboxes
 LITTLE = 4 << 10  # the same for a link with encoded pictures; at 512 kbit/s that is a sixteenth of a second
+CLEAR = 0.06  # s of a longer round trip that are no queue: the other side's kernel may answer 0.04 s later
 CLOSE_TIMEOUT = 1.0  # s for the goodbye to leave
 
 
@@ -71,6 +73,15 @@ class LinkTransport(asyncio.Protocol):
     def has_room(self) -> bool:
         """True if the socket takes a message at once."""
         return self._transport is not None and self.session.ended is None and not self._full
+
+    @property
+    def path_is_clear(self) -> bool:
+        """True if the socket takes a message at once and nothing waits before it, as far as the kernel knows."""
+        if not self.has_room or self._transport is None:
+            return False
+        tcp = self._transport.get_extra_info("socket")
+        queue = None if tcp is None else path_queue(tcp)
+        return queue is None or (queue.unsent == 0 and queue.seconds < CLEAR)
 
     def send_media(self, media: Media, make: Callable[[], bytes]) -> bool:
         """Send as `send_encoded` does, newest wins per stream. False: pictures were dropped; a keyframe is needed.

@@ -85,14 +85,23 @@ class ActionService:
         self._asks = RateLimits(ASK_RATE, ASKS)
         self._progress = TokenBucket(UPDATE_RATE, UPDATES)
         self._states = TokenBucket(STATE_RATE, STATES)
-        self._updates: OrderedDict[str, ActionUpdate] = OrderedDict()  # by id of the request, oldest first
+        # By id of the request, oldest first; without their age, which changes.
+        self._updates: OrderedDict[str, ActionUpdate] = OrderedDict()
+        self._since: dict[str, float] = {}  # of the same ids: s, when the action came to its state
         self._owed: dict[str, None] = {}  # ids in `_updates` of which a new state came too fast and is told later
         self._is_owing = asyncio.Event()
         self._asked: OrderedDict[str, _Asked] = OrderedDict()  # by id of the request, oldest first
 
     def newest(self) -> list[ActionUpdate]:
-        """Return how the newest actions do, oldest first."""
-        return list(self._updates.values())
+        """Return how the newest actions do, oldest first, with the age of each that has ended."""
+        now = time.monotonic()
+        return [self._aged(each, now) for each in self._updates.values()]
+
+    def _aged(self, update: ActionUpdate, now: float) -> ActionUpdate:
+        """Return an update that was kept with its age as of now."""
+        if update.state == "running":
+            return update
+        return msgspec.structs.replace(update, age=max(0.0, now - self._since[update.id]))
 
     def act_by_peer(self, peer: Peer, act: Act) -> None:
         """Pass on a request of the seat's holder; refuse that of anyone else."""
@@ -208,7 +217,7 @@ class ActionService:
     def updated(self, update: ActionUpdate) -> None:
         """Take the robot's news of an action."""
         now, before, asked = time.monotonic(), self._updates.get(update.id), self._asked.get(update.id)
-        if update == before:
+        if msgspec.structs.replace(update, age=0.0) == before:
             return
         if asked is not None:
             asked.newest = update
@@ -216,26 +225,29 @@ class ActionService:
                 asked.answer.set_result(update)
         if before is not None and before.state == update.state:
             if update.id in self._owed:
-                self._updates[update.id] = update
+                self._keep(update, now)
             elif self._progress.take(now):
-                self._keep(update)
+                self._keep(update, now)
                 self._events.publish(ActionUpdated(update, new_state=False))
         elif not self._owed and self._states.take(now):
-            self._keep(update)
+            self._keep(update, now)
             self._events.publish(ActionUpdated(update, new_state=True))
         else:
             self._events.publish(InputRefused("robot", "too_many_action_states"))
             if before is not None or asked is not None:  # else it is one that nobody here has asked for
-                self._keep(update)
+                self._keep(update, now)
                 self._owed[update.id] = None
                 self._is_owing.set()
 
-    def _keep(self, update: ActionUpdate) -> None:
-        self._updates[update.id] = update
+    def _keep(self, update: ActionUpdate, now: float) -> None:
+        before = self._updates.get(update.id)
+        if before is None or before.state != update.state:
+            self._since[update.id] = now - update.age
+        self._updates[update.id] = msgspec.structs.replace(update, age=0.0)
         if len(self._updates) > KEPT:
             told = (id for id, each in self._updates.items() if each.state != "running" and id not in self._owed)
             evicted = next(told, next(iter(self._updates)))
-            del self._updates[evicted]
+            del self._updates[evicted], self._since[evicted]
             self._owed.pop(evicted, None)
 
     async def run(self) -> None:
@@ -249,7 +261,7 @@ class ActionService:
         while self._owed and self._states.take(now):
             id = next(iter(self._owed))
             del self._owed[id]
-            self._events.publish(ActionUpdated(self._updates[id], new_state=True))
+            self._events.publish(ActionUpdated(self._aged(self._updates[id], now), new_state=True))
         if not self._owed:
             self._is_owing.clear()
 

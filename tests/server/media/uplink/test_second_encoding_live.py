@@ -33,6 +33,7 @@ class KnownUplink:
 
     rate: float = 4e6
     is_limited: bool = False
+    limited_at: float = float("-inf")
 
     def arrived(self, captured: float, now: float, size: int) -> None:
         pass
@@ -43,7 +44,11 @@ class KnownUplink:
     def waits(self, now: float) -> float | None:
         return 0.0
 
+    def carried(self) -> float:
+        return self.rate
+
     def limited(self, now: float) -> bool:
+        self.limited_at = now if self.is_limited else self.limited_at
         return self.is_limited
 
     def shown(self, now: float) -> float:

@@ -13,6 +13,7 @@ from lockstep.server.media.quality.budget import CameraNeed, share_out
 from lockstep.server.media.quality.encoding_target import EncodingTarget
 from lockstep.server.media.settings import MediaSettings
 from lockstep.server.media.uplink.second_requests import SecondRequests
+from lockstep.server.media.uplink.second_share import UplinkNow
 from lockstep.server.media.uplink.uplink_estimator import UplinkEstimator
 
 __all__ = ["RobotEncoding"]
@@ -102,8 +103,12 @@ class RobotEncoding:
         changed |= self._second.tick(
             now,
             first_bps=float(sum(target.bitrate_bps for target in targets)),
-            shown_bps=self._uplink.shown(now) - sounds,
-            limited=limited,
+            uplink=UplinkNow(
+                shown_bps=self._uplink.shown(now) - sounds,
+                carried_bps=self._uplink.carried() - sounds,
+                waits=self._uplink.waits(now),
+                limited_at=self._uplink.limited_at,
+            ),
         )
         if changed or now - self._told_at >= REPEAT:
             for camera, target in zip(self._cameras, targets, strict=True):

@@ -9,7 +9,7 @@ from lockstep.server.media.quality.adaptation import Adaptation
 from lockstep.server.media.quality.budget import CameraNeed, share_out
 from lockstep.server.media.quality.encoding_target import EncodingTarget
 from lockstep.server.media.settings import MediaSettings
-from lockstep.server.media.uplink.second_share import SecondShare
+from lockstep.server.media.uplink.second_share import SecondShare, UplinkNow
 
 __all__ = ["SecondRequests"]
 
@@ -39,13 +39,11 @@ class SecondRequests:
         for camera in self._cameras:
             camera.stream.second.came = self._share.came
 
-    def tick(self, now: float, *, first_bps: float, shown_bps: float, limited: bool) -> bool:
+    def tick(self, now: float, *, first_bps: float, uplink: UplinkNow) -> bool:
         """Decide; return whether the robot has to be told. The arguments are those of `SecondShare.decide`."""
         due = [each for each in self._cameras if self._settings.second_encoding and each.stream.second.is_due]
         most = float(self._settings.video_bitrate_bps)
-        self.bps = self._share.decide(
-            now, first_bps=first_bps, most_bps=most * len(due), shown_bps=shown_bps, limited=limited
-        )
+        self.bps = self._share.decide(now, first_bps=first_bps, most_bps=most * len(due), uplink=uplink)
         taken = due if self.bps > 0 else []
         needs = [CameraNeed(_pixels(each.stream), most) for each in taken]
         shares = dict(zip(map(id, taken), share_out(self.bps, needs), strict=True))

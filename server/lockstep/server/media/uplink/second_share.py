@@ -2,23 +2,42 @@
 
 | second encodings | when | then |
 |---|---|---|
-| off | observers were due 1.5 times the operator's bits for 5 s, and the uplink is known to have room | on |
-| on | – | what the operator leaves of the bits that the uplink was known to carry at the beginning |
-| on | that is less than 1.2 times the operator's, or nobody is due more | off |
-| on | the uplink shows a limit, or no picture came for 3 s | off, and the wait for the next beginning doubles |
+| off | observers were due 1.5 times the operator's bits for 5 s, and nothing waited on the uplink for 5 s | on, with 1.2 times the operator's bits, or with what the uplink is known to carry besides |
+| on | nothing waits on the uplink, and both encodings use what they may | up by 25 % a second |
+| on | all media wait for more than 0.05 s | both have 85 % of what arrives, and more is not tried for a while |
+| on | that leaves hardly more than the operator's bits, the uplink shows a limit, or no picture came for 3 s | off for a while |
 
-The uplink is known to have room when it showed no limit within the last minute, and carried 2.5 times the operator's
-bits and a margin within that minute, without a queue. So nothing is tried out at the operator's expense. The wait is
-10 s to 640 s.
+A while is 10 s, and twice as long each time, up to 640 s; 10 s again after second encodings that went well for 5 s. So
+an uplink without room is tried ever more seldom. A try costs the operator little: the bridge sends no picture of a
+second encoding while something waits on its path (docs/quality.md, "The second encoding").
 """
 
-__all__ = ["SecondShare"]
+from typing import NamedTuple
+
+__all__ = ["SecondShare", "UplinkNow"]
 
 WANTED_SECONDS = 5.0
-WORTH, KEEP = 1.5, 1.2  # of the operator's bits: from which a second encoding begins, and down to which it goes on
+WORTH = 1.5  # of the operator's bits, that observers have to be due
+START, KEEP = 1.2, 1.1  # of the operator's bits: with which a second encoding begins, and down to which it goes on
 MARGIN = 0.85  # of what the uplink carried without a queue, for both encodings together
+GROWTH = 1.25  # a second
+USED = 0.6  # of what both encodings may have, from which more can be tried
+EMPTY, QUEUE = 0.02, 0.05  # s that the least delayed medium waited
+CUT = 0.85  # of what arrives while something waits
+HOLD = 1.0  # s after a cut, besides the time that media waited
+QUIET_SECONDS = 5.0
+STEADY_SECONDS = 5.0
 PATIENCE, MOST_PATIENCE = 10.0, 640.0  # s
 SILENCE = 3.0  # s
+
+
+class UplinkNow(NamedTuple):
+    """What is known of the robot's uplink; bits per second without those of sound."""
+
+    shown_bps: float  # that it lately carried without a queue
+    carried_bps: float  # that arrive now
+    waits: float | None  # s that the least delayed medium of the last half second waited; None: unknown
+    limited_at: float  # s, when it showed a limit last
 
 
 class SecondShare:
@@ -33,42 +52,67 @@ class SecondShare:
         self._wanted_since: float | None = None  # None: nobody is due more
         self._patience = PATIENCE
         self._not_before = float("-inf")  # s; time of the next beginning
+        self._began = 0.0  # s
         self._came = 0.0  # time of the newest picture, or of the beginning
         self._total = 0.0  # bits per second of both encodings together
+        self._ceiling = float("inf")  # of these, until `_more_at`
+        self._more_at = self._hold_until = float("-inf")  # s
+        self._decided_at = 0.0  # s
 
     def came(self, now: float) -> None:
         """A picture of a second encoding arrived."""
         self._came = now
 
-    def decide(self, now: float, *, first_bps: float, most_bps: float, shown_bps: float, limited: bool) -> float:
+    def decide(self, now: float, *, first_bps: float, most_bps: float, uplink: UplinkNow) -> float:
         """Return the bits per second of all second encodings together; 0 for none.
 
         Args:
             first_bps: of all first encodings
             most_bps: that observers can use; 0: nobody is due more than the operator's pictures
-            shown_bps: that the uplink lately carried without a queue, without sound
-            limited: the uplink has shown a limit within the last minute
         """
+        passed, self._decided_at = min(1.0, max(0.0, now - self._decided_at)), now
         if most_bps < WORTH * first_bps or most_bps <= 0:
             self._wanted_since, self.on = None, False
             return 0.0
         if self._wanted_since is None:
             self._wanted_since = now
-        if self.on and (limited or now - self._came > SILENCE):
+        if self.on:
+            self._follow(now, passed, first_bps + most_bps, uplink)
+            if self.on and self._total - first_bps < KEEP * first_bps:
+                self._fail(now)
+        elif self._is_time(now, self._wanted_since, uplink):
+            self.on, self._began, self._came = True, now, now
+            self._total = max(MARGIN * uplink.shown_bps, (1 + START) * first_bps)
+            self._ceiling, self._hold_until = float("inf"), float("-inf")
+        return min(most_bps, self._total - first_bps) if self.on else 0.0
+
+    def _is_time(self, now: float, wanted_since: float, uplink: UplinkNow) -> bool:
+        is_quiet = now - uplink.limited_at >= QUIET_SECONDS and uplink.waits is not None and uplink.waits < QUEUE
+        return is_quiet and now >= self._not_before and now - wanted_since >= WANTED_SECONDS
+
+    def _follow(self, now: float, passed: float, most_bps: float, uplink: UplinkNow) -> None:
+        """Give both encodings less when media wait, and more while they do not. `most_bps`: of both together."""
+        if uplink.limited_at > self._began or now - self._came > SILENCE:
             self._fail(now)
-        if not self.on:
-            is_time = now >= self._not_before and now - self._wanted_since >= WANTED_SECONDS
-            total = MARGIN * shown_bps
-            if limited or not is_time or total - first_bps < WORTH * first_bps:
-                return 0.0
-            self.on, self._came, self._total = True, now, total
-        room = self._total - first_bps
-        if room < KEEP * first_bps:
-            self.on = False
-            return 0.0
-        return min(most_bps, room)
+            return
+        if uplink.waits is None or now < self._hold_until:
+            return
+        if uplink.waits > QUEUE:
+            self._total = self._ceiling = min(self._total, CUT * uplink.carried_bps)
+            self._hold_until = now + HOLD + uplink.waits
+            self._more_at = now + self._wait_longer()
+        elif uplink.waits < EMPTY and uplink.carried_bps >= USED * self._total:
+            ceiling = float("inf") if now >= self._more_at else self._ceiling
+            grown = min(self._total * GROWTH**passed, most_bps, ceiling)
+            self._total = max(self._total, grown)
 
     def _fail(self, now: float) -> None:
+        if now - self._began >= STEADY_SECONDS:
+            self._patience = PATIENCE
         self.on = False
-        self._not_before = now + self._patience
-        self._patience = min(MOST_PATIENCE, 2 * self._patience)
+        self._not_before = now + self._wait_longer()
+
+    def _wait_longer(self) -> float:
+        """Return how long to wait now; the next time it is twice as long."""
+        patience, self._patience = self._patience, min(MOST_PATIENCE, 2 * self._patience)
+        return patience

@@ -34,10 +34,12 @@ class UplinkEstimator:
 
     Attributes:
         rate: bits per second that all media of the robot may have together
+        limited_at: time of the last decrease, s; minus infinity before the first
     """
 
     def __init__(self, start_bps: float, least_bps: float, most_bps: float) -> None:
         self.rate = start_bps
+        self.limited_at = float("-inf")
         self._least_bps = least_bps
         self._most_bps = most_bps
         self._window_start: float | None = None
@@ -45,7 +47,6 @@ class UplinkEstimator:
         self._arrivals: deque[tuple[float, float, int]] = deque()  # time, wait in s, bits
         self._hold_until = 0.0
         self._decided_at: float | None = None
-        self._limited_at: float | None = None  # time of the last decrease
         self._limit = float("inf")  # bits per second that the path carried then, and a margin off
         self._shown: deque[tuple[float, float]] = deque()  # time, bits per second; later ones are lower
 
@@ -63,13 +64,17 @@ class UplinkEstimator:
 
     def limited(self, now: float) -> bool:
         """Return whether media waited on the path within the last minute."""
-        return self._limited_at is not None and now - self._limited_at < LIMITED_SECONDS
+        return now - self.limited_at < LIMITED_SECONDS
 
     def shown(self, now: float) -> float:
         """Return the most bits per second that arrived without a queue in the last minute, since the last limit."""
         while self._shown and now - self._shown[0][0] > SHOWN_SECONDS:
             self._shown.popleft()
         return self._shown[0][1] if self._shown else 0.0
+
+    def carried(self) -> float:
+        """Return the bits per second that arrived in the last second; 0 if too few media came to tell."""
+        return self._received() or 0.0
 
     def waits(self, now: float) -> float | None:
         """Return the wait of the medium that waited least of the last half second, s; None without two media."""
@@ -89,7 +94,7 @@ class UplinkEstimator:
             self._limit = max(self._least_bps, CUT * carried)
             self.rate = max(self._least_bps, DEEPEST * self.rate, self._limit * (1 - min(DEEPEST, waits)))
             self._hold_until = now + HOLD + waits
-            self._limited_at = now
+            self.limited_at = now
             self._shown.clear()
         elif waits < EMPTY and received is not None:
             self._show(now, received)

@@ -1,0 +1,1 @@
+"""What a robot's second encoding gives observers, and what it costs the operator."""

@@ -1,0 +1,3 @@
+from lockstep.bench.second_encoding.cli import app
+
+app()
