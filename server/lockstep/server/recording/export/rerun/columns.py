@@ -46,6 +46,10 @@ class Columns:
         self.waiting_bytes += len(picture)
         self._add(path, _pictures, at, (picture, keyframe))
 
+    def state(self, path: str, at: Moment, state: str) -> None:
+        """Tell a state that holds from here on; "": none does."""
+        self._add(path, _states, at, state)
+
     def text(self, path: str, at: Moment, text: str, *, warning: bool) -> None:
         self._add(path, _texts, at, (text, rr.TextLogLevel.WARN if warning else rr.TextLogLevel.INFO))
 
@@ -90,6 +94,10 @@ def _poses(rows: list[Any]) -> Any:
 def _pictures(rows: list[Any]) -> Any:
     pictures = [np.frombuffer(picture, dtype=np.uint8) for picture, _ in rows]
     return rr.VideoStream.columns(sample=pictures, is_keyframe=[keyframe for _, keyframe in rows])
+
+
+def _states(rows: list[Any]) -> Any:
+    return rr.StateChange.columns(state=rows)
 
 
 def _texts(rows: list[Any]) -> Any:

@@ -21,6 +21,7 @@ JOINTS = "/joints"
 MEASURED, COMMANDED, GOALS = "/axes/measured", "/axes/commanded", "/axes/goals"
 FORCE, TORQUE = "/wrench/force", "/wrench/torque"
 STOPPED, AT_REST = "/state/stopped", "/state/at_rest"
+DRIVER, DRIVER_KIND, INTERVENTION = "/driver", "/driver/kind", "/driver/intervention"
 GAP = "gap"  # and the camera's name: feedback's event minus the picture's stamp, at the picture's arrival
 CODECS = {"h264": rr.VideoCodec.H264, "vp8": rr.VideoCodec.VP8}
 MOST_ROWS = 4000
@@ -48,6 +49,7 @@ class SessionLog:
         self._description = RobotDescription(name="", label="", axes=())
         self._paths = BodyPaths(self._description)
         self._event = 0  # of the newest feedback
+        self._driver = ("", "")  # name and kind of who drove it
         self._begun: set[str] = set()  # entities of the cameras that have given a picture
         self._whole: set[str] = set()  # cameras without a loss since their keyframe
 
@@ -132,6 +134,7 @@ class SessionLog:
             columns.scalars(TORQUE, at, record.wrench[3:])
         columns.scalars(STOPPED, at, [float(record.stop.stopped)])
         columns.scalars(AT_REST, at, [float(record.at_rest)])
+        self._driven(record, at)
         joints = dict(zip((joint.name for joint in description.joints), record.joints, strict=False))
         for body in moving(description):
             if body.name in paths.bodies:
@@ -146,6 +149,16 @@ class SessionLog:
                 if math.isfinite(distance) and ring.range_min <= distance < ring.range_max
             ]
             columns.points(f"{paths.bodies.get(ring.body, '')}{entity('ranges')}", at, seen)
+
+
+    def _driven(self, record: FeedbackRecord, at: Moment) -> None:
+        kind = "" if record.driver_kind == "none" else record.driver_kind
+        driver = record.driver if kind else "", kind
+        if driver != self._driver:
+            self._driver = driver
+            self.columns.state(DRIVER, at, driver[0])
+            self.columns.state(DRIVER_KIND, at, driver[1])
+        self.columns.scalars(INTERVENTION, at, [float(record.intervention)])
 
 
 def _filled(values: Sequence[float | None], count: int) -> list[float]:
