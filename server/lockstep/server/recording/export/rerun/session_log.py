@@ -150,7 +150,6 @@ class SessionLog:
             ]
             columns.points(f"{paths.bodies.get(ring.body, '')}{entity('ranges')}", at, seen)
 
-
     def _driven(self, record: FeedbackRecord, at: Moment) -> None:
         kind = "" if record.driver_kind == "none" else record.driver_kind
         driver = record.driver if kind else "", kind
