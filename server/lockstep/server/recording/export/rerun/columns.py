@@ -37,6 +37,14 @@ class Columns:
     def points(self, path: str, at: Moment, positions: list[tuple[float, float, float]]) -> None:
         self._add(path, _points, at, positions)
 
+    def strip(self, path: str, at: Moment, positions: list[tuple[float, float, float]]) -> None:
+        self._add(path, _strips, at, positions)
+
+    def grid(self, path: str, at: Moment, grid: dict[str, Any]) -> None:
+        """Place a map; `grid`: the fields of Rerun's GridMap but for the colours."""
+        self.waiting_bytes += len(grid["data"])
+        self._add(path, _grids, at, grid)
+
     def pose(self, path: str, at: Moment, position: Sequence[float], orientation: Sequence[float]) -> None:
         """Place an entity in its parent. `orientation`: w, x, y, z."""
         w, x, y, z = orientation
@@ -83,6 +91,17 @@ def _scalars(rows: list[Any]) -> Any:
 def _points(rows: list[Any]) -> Any:
     positions = np.array([point for row in rows for point in row], dtype=np.float32).reshape(-1, 3)
     return rr.Points3D.columns(positions=positions).partition([len(row) for row in rows])
+
+
+def _strips(rows: list[Any]) -> Any:
+    strips = [[positions] if len(positions) > 1 else [] for positions in rows]
+    found = rr.LineStrips3D.columns(strips=[strip for row in strips for strip in row])
+    return found.partition([len(row) for row in strips])
+
+
+def _grids(rows: list[Any]) -> Any:
+    fields = {name: [row[name] for row in rows] for name in rows[0]}
+    return rr.GridMap.columns(**fields, colormap=[rr.components.Colormap.RvizMap] * len(rows))
 
 
 def _poses(rows: list[Any]) -> Any:
