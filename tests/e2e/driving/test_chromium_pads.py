@@ -97,7 +97,7 @@ async def _calibrate(console: ConsolePage, hand: Hand) -> None:
     await hand.asked("up on the cross")
     await hand.move(6, -1, 23 / 7)
     await page.locator(".pad-ask", has_text="up on the cross").wait_for(state="hidden")
-    for _ in range(8):
+    for _ in range(9):
         await page.get_by_role("button", name="Skip").click()
     await hand.asked("Try it")
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 from playwright.async_api import Browser, Page, expect
 
-from lockstep.bench.browsers.console_page import open_console
+from lockstep.bench.browsers.console_page import RB, ConsolePage, open_console
 from lockstep.bench.harness.driving import drive_on
 from lockstep.client import Console
 from lockstep.server.recording.reading.reader import RecordingReader
@@ -16,6 +16,7 @@ from tests.support.stack import running_stack
 pytestmark = pytest.mark.browser
 
 SETTINGS = {"LOCKSTEP_EPISODES__COUNTDOWN_SECONDS": "1"}
+A, X, LB, RIGHT_STICK, CROSS_UP = 0, 2, 4, 11, 12  # W3C standard mapping
 SHOTS = os.environ.get("EPISODE_SHOTS", "")  # directory for pictures of the page, for people to look at
 
 
@@ -24,7 +25,12 @@ async def _shot(page: Page, name: str) -> None:
         await page.screenshot(path=f"{SHOTS}/{name}.png")
 
 
-async def test_a_supervisor_begins_and_keeps_episodes_with_the_keyboard_while_an_operator_drives(
+async def _press(console: ConsolePage, button: int) -> None:
+    for pressed in (True, False):
+        await console.press(button, pressed)
+
+
+async def test_a_supervisor_begins_and_keeps_episodes_with_keys_and_pad_while_an_operator_drives(
     tmp_path: Path, chromium: Browser
 ) -> None:
     recordings = tmp_path / "recordings"
@@ -59,10 +65,23 @@ async def test_a_supervisor_begins_and_keeps_episodes_with_the_keyboard_while_an
         await bar.get_by_role("button", name="Discard").click()
         await expect(bar.locator(".episode-count")).to_have_text("1 kept · 2 discarded")
         await expect(bar.locator(".episode-words")).to_have_text("Episode 3 is discarded")
+        await page_console.press(RIGHT_STICK, True)
+        await _press(page_console, A)
+        await expect(bar.locator(".episode-words")).to_contain_text("Take 4")
+        await page_console.press(RB, True)
+        await _press(page_console, LB)
+        await expect(bar.locator(".episode-words")).to_have_text("Not done: let go of the button to hold first")
+        await page_console.press(RB, False)
+        await _press(page_console, CROSS_UP)
+        for _ in range(3):
+            await drive_on(driver, [0.2, 0.0, 0.0])
+        await _press(page_console, X)
+        await expect(bar.locator(".episode-count")).to_have_text("2 kept · 2 discarded")
+        await page_console.press(RIGHT_STICK, False)
         await page.set_viewport_size({"width": 390, "height": 844})
         await _shot(page, "phone-idle")
         await page.keyboard.press("b")
-        await expect(bar.locator(".episode-words")).to_contain_text("Take 4")
+        await expect(bar.locator(".episode-words")).to_contain_text("Take 5")
         await _shot(page, "phone-open")
         assert await findings(page) == []
         assert await page.evaluate("document.documentElement.scrollWidth <= innerWidth")
@@ -73,8 +92,10 @@ async def test_a_supervisor_begins_and_keeps_episodes_with_the_keyboard_while_an
             ("kept", "success", "push the box b k l"),
             ("discarded", "", "push the box b k l"),
             ("discarded", "", "push the box b k l"),
+            ("kept", "failure", "push the box b k l"),
             ("cut", "", "push the box b k l"),
         ]
+        assert [text for _, text in reader.index.episodes[3].marks] == ["mark"]
 
 
 async def test_an_observer_sees_no_bar_and_without_a_recording_there_is_none(tmp_path: Path, chromium: Browser) -> None:

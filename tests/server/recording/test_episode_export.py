@@ -2,8 +2,6 @@
 
 import csv
 import json
-import subprocess
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +22,7 @@ from lockstep.server.recording.format.topics import CAMERA
 from lockstep.server.recording.reading.reader import RecordingReader
 from lockstep.server.recording.verify.verify_dataset import verify_dataset
 from lockstep.server.recording.writing.writer import Entry
+from tests.server.recording.graders import doctor_counts, graded_defects
 from tests.server.recording.makers import EPOCH, INTERVAL, START, Story, own_entry, rewritten
 
 DATA = Path("data/chunk-000/file-000.parquet")
@@ -102,11 +101,24 @@ def test_a_dataset_has_exactly_the_kept_episodes_and_their_rows_show_their_own_e
 def test_a_checker_that_others_wrote_takes_a_dataset_of_several_episodes(tmp_path: Path) -> None:
     path = recording(tmp_path / "a.mcap", *KEPT_AND_NOT)
     (root,) = export_lerobot.export(path, tmp_path / "dataset", "")
-    command = [str(Path(sys.executable).with_name("lerobot-doctor")), "check", str(root), "--json"]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=50, check=False)
-    summary = json.loads(done.stdout)["summary"]
-    assert summary["FAIL"] == 0, done.stdout
-    assert summary["PASS"] >= 5, done.stdout
+    counts = doctor_counts(root)
+    assert counts["FAIL"] == 0, counts
+    assert counts["PASS"] >= 5, counts
+
+
+def test_a_grader_that_others_wrote_finds_no_defect_but_the_one_that_was_planted(tmp_path: Path) -> None:
+    """What is planted are the same episodes twice."""
+    path = recording(tmp_path / "a.mcap", *KEPT_AND_NOT)
+    (root,) = export_lerobot.export(path, tmp_path / "dataset", "")
+    assert graded_defects(root) == {
+        "hygiene.schema_dim_consistency": (1, 0),
+        "hygiene.topic_frequency": (2, 0),
+        "cross.duplicates": (2, 0),
+    }
+    again = recording(tmp_path / "b.mcap", *KEPT_AND_NOT)
+    (root,) = export_lerobot.export_all([path, again], tmp_path / "twice", "")
+    looked, found = graded_defects(root)["cross.duplicates"]
+    assert (looked, found) == (4, 4)
 
 
 def test_several_recordings_become_one_dataset(tmp_path: Path) -> None:

@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from lockstep.protocol.messages import Feedback
+from lockstep.server.recording.format.drivers import NOBODY, EventDriver
 from lockstep.server.recording.format.records import NoteRecord, RobotRecord
 from lockstep.server.recording.writing.queue_items import FeedbackItem, Item, MediaItem, OwnItem, RobotItem
 from tests.server.recording.makers import CODECS, DESCRIPTION, EPOCH, START
@@ -26,9 +27,9 @@ def note(text: str, epoch: str = EPOCH) -> OwnItem:
     return OwnItem(START, NoteRecord(epoch=epoch, event=7, peer="p", name="Ada", role="operator", text=text))
 
 
-def feedback(event: int, epoch: str = EPOCH) -> FeedbackItem:
+def feedback(event: int, epoch: str = EPOCH, driver: EventDriver = NOBODY) -> FeedbackItem:
     found = Feedback(event=event, issue=1, time=1.0, axes=[0.5, 0.25], joints=[1.0, 2.0, 0.5])
-    return FeedbackItem(START, START, epoch, found)
+    return FeedbackItem(START, START, epoch, found, driver)
 
 
 def picture(event: int, codec: str = "H264") -> MediaItem:
@@ -54,6 +55,18 @@ def test_what_held_before_the_robot_was_told_is_logged_and_sound_is_left_out(tmp
     assert found["/axes/measured"].column("event") == [7]
     assert found["/camera/front"].column("event") == [5]
     assert found["/gap/front"].column("Scalars:scalars") == [[2.0]]
+
+
+def test_who_drove_each_event_and_what_was_an_intervention_is_in_the_live_session(tmp_path: Path) -> None:
+    path = tmp_path / "a.rrd"
+    policy, person = EventDriver("net", "policy"), EventDriver("Ada", "human", intervention=True)
+    items = [robot(), *(feedback(at, driver=each) for at, each in enumerate([NOBODY, policy, policy, person, NOBODY]))]
+    take_items(iter(items), Sink("file", str(path), 1_000_000))
+    found = entities(path)
+    changes = [(row["event"], row["StateChange:state"]) for row in found["/driver"].rows]
+    assert changes == [(1, ["net"]), (3, ["Ada"]), (4, [""])]
+    assert found["/driver/kind"].column("StateChange:state") == [["policy"], ["human"], [""]]
+    assert found["/driver/intervention"].column("Scalars:scalars") == [[0.0], [0.0], [0.0], [1.0], [0.0]]
 
 
 def test_another_epoch_is_another_file_and_nothing_is_overwritten(tmp_path: Path) -> None:

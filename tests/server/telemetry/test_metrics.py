@@ -8,8 +8,7 @@ from lockstep.robot_bridge.robots.planar.description import DESCRIPTION
 from lockstep.server.audit.records import Actor
 from lockstep.server.control.session_metrics import SessionMetrics
 from lockstep.server.recording.episodes.metrics import count_episodes
-from lockstep.server.recording.format.records import EpisodeRecord
-from lockstep.server.recording.writing.episode_written import EpisodeWritten
+from lockstep.server.recording.writing.episode_written import EpisodeEnded
 from lockstep.server.session_events import EpochBegan, SeatChanged, SessionEvents, StatusReceived
 from lockstep.server.telemetry.metrics import MAX_LIMITS, MAX_STATUS_NAMES, Metrics
 
@@ -96,10 +95,8 @@ def test_the_seats_holders_are_counted_by_kind_and_episodes_by_their_end() -> No
     value = metrics.registry.get_sample_value
     counted = {kind: value("lockstep_seat_changes_total", {"kind": kind}) for kind in ("human", "policy", "none")}
     assert counted == {"human": 2, "policy": 1, "none": 1}
-    for kind in ("start", "mark", "kept", "start", "discarded", "start", "kept"):
-        record = EpisodeRecord(
-            epoch="aa", event=1, episode="e", number=1, task="t", kind=kind, first_event=1, last_event=1
-        )
-        events.publish(EpisodeWritten(record))
-    ends = {end: value("lockstep_episodes_total", {"end": end}) for end in ("kept", "discarded", "cut", "start")}
-    assert ends == {"kept": 2, "discarded": 1, "cut": None, "start": None}
+    events.publish(EpisodeEnded("kept"))
+    events.publish(EpisodeEnded("discarded"))
+    events.publish(EpisodeEnded("kept"))
+    ends = {end: value("lockstep_episodes_total", {"end": end}) for end in ("kept", "discarded", "cut")}
+    assert ends == {"kept": 2, "discarded": 1, "cut": None}

@@ -15,6 +15,7 @@ import { STALE_MS } from "../drive/feedback_age";
 import { notePicture } from "../drive/latency";
 import { CALM_INTERVAL_MS, noteHeard, noteShown, setPacing } from "../drive/command_gate";
 import { restartInterlock, snapshotOf } from "../drive/restart_interlock";
+import type { EpisodePress } from "../gamepad/episode_presses";
 import { createRateMeter, noteOccurrence } from "../util/samples";
 import { parseServerMessage } from "../protocol/wire_parser";
 import { ARM_REFUSAL_LABELS } from "../drive/labels/labels";
@@ -89,6 +90,7 @@ export class ConsoleEngine {
   readonly audio = new AudioDevice();
   readonly display = new Display();
   charts: Stepped | null = null; // until its code is there
+  padEpisode: ((press: EpisodePress) => void) | null = null; // likewise
   headset: HeadsetStep | null = null; // while its session lasts
   talkback: Talkback | null = null; // likewise
   connectionState: ConnectionState = { kind: "connecting" };
@@ -146,6 +148,7 @@ export class ConsoleEngine {
       arm: () => this.toggleArmed(),
       nextLayer: () => this.nextLayer(),
       action: (index) => page.actionPressed(index),
+      episode: (press) => this.padEpisode?.(press),
       actionKey: (index, code) => {
         const { description } = this.state.robot ?? {};
         const drives = description?.layers.some((layer) =>

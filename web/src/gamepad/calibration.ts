@@ -40,6 +40,7 @@ export const CALIBRATION_STEPS: readonly CalibrationStep[] = [
   step("layer", "press"),
   step("action_1", "press"),
   step("action_2", "press"),
+  step("episode", "press"),
 ];
 
 /** letting_go: it waits until nothing moves. asking: it waits for the answer. done: every question was asked. */
@@ -157,6 +158,7 @@ export function layoutOf(calibration: Calibration): PadLayout | null {
       layer: presses("layer"),
       action_1: presses("action_1"),
       action_2: presses("action_2"),
+      episode: presses("episode"),
     },
   };
 }

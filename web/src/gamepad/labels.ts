@@ -13,6 +13,7 @@ export const CONTROL_NAMES: Readonly<Record<ControlName, string>> = {
   layer: "Next layer",
   action_1: "First action",
   action_2: "Second action",
+  episode: "Episodes",
   left_x: "Left stick, sideways",
   left_y: "Left stick, up and down",
   right_x: "Right stick, sideways",
@@ -59,6 +60,10 @@ const ASKED: Readonly<Record<ControlName, readonly [what: string, about: string]
     "Such as Home: the first button in the row of actions. You may skip this step.",
   ],
   action_2: ["Press the button for the robot's second action", "You may skip this step."],
+  episode: [
+    "Press the button for episodes",
+    "While it is held, others keep or discard an episode. You may skip this step.",
+  ],
 };
 
 export interface CalibrationPrompt {

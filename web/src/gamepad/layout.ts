@@ -3,7 +3,17 @@
 export const STICKS = ["left_x", "left_y", "right_x", "right_y"] as const;
 export const TRIGGERS = ["left_trigger", "right_trigger"] as const;
 export const CROSS = ["cross_up", "cross_right", "cross_down", "cross_left"] as const;
-export const ACTIONS = ["deadman", "arm", "stop", "slow", "turbo", "layer", "action_1", "action_2"] as const;
+export const ACTIONS = [
+  "deadman",
+  "arm",
+  "stop",
+  "slow",
+  "turbo",
+  "layer",
+  "action_1",
+  "action_2",
+  "episode",
+] as const;
 
 export type StickName = (typeof STICKS)[number];
 export type TriggerName = (typeof TRIGGERS)[number];
@@ -48,6 +58,7 @@ export const STANDARD_LAYOUT: PadLayout = {
     layer: [button(3)],
     action_1: [button(0)],
     action_2: [button(2)],
+    episode: [button(11)],
   },
 };
 

@@ -94,6 +94,7 @@ function readLayout(found: unknown): PadLayout | null {
     layer: actions.layer ?? [],
     action_1: actions.action_1 ?? [], // profiles from before there were actions have none
     action_2: actions.action_2 ?? [],
+    episode: actions.episode ?? [],
   };
   // Without these two a pad could move the robot and not stop it.
   if (presses.deadman.length === 0 || presses.stop.length === 0) return null;

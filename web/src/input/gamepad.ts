@@ -1,4 +1,5 @@
 import { choosePad } from "../gamepad/selection";
+import { EPISODE_PRESSES, type EpisodePress } from "../gamepad/episode_presses";
 import type { PadAction } from "../gamepad/layout";
 import { createReportTimeout, notePadReport, type ReportTimeout } from "../gamepad/report_timeout";
 import { readPad, type PadInputs, type SeenAtRest } from "../gamepad/mapping";
@@ -12,6 +13,8 @@ export interface PadEvents {
   nextLayer(): void;
   /** The robot's action at this place of its description was asked for. */
   action(index: number): void;
+  /** Something was asked of the episode. */
+  episode(press: EpisodePress): void;
   lost(): void;
   /** The one whose deadman is held reports no more: it is out of range, or out of power. */
   silent(): void;
@@ -28,6 +31,7 @@ export interface PadState {
   readonly deadman: boolean;
   readonly inputs: PadInputs; // with the pad's own speed share in them
   readonly pressed: ReadonlySet<PadAction>;
+  readonly marks: boolean; // the cross is held up together with the button for episodes
   readonly gamepad: Gamepad;
 }
 
@@ -37,6 +41,7 @@ interface Known {
   readonly silence: ReportTimeout;
   readMs: number; // Gamepad.timestamp of the report that was read last
   pressed: ReadonlySet<PadAction> | null; // null: not read yet, so nothing is a new press
+  marks: boolean;
 }
 
 /** The gamepad in use, and STOP of all others. Polled, because browsers tell of no button presses. */
@@ -109,30 +114,38 @@ export class Pad {
     const setup = setupOf(gamepad, this.storage.saved.profiles);
     const { layout, shaping } = setup;
     const common = { id: gamepad.id, name: padName(gamepad.id), setup, gamepad };
-    if (layout === null) return { ...common, ready: false, deadman: false, inputs: NOTHING, pressed: NONE };
+    if (layout === null) return { ...common, ready: false, ...LET_GO };
     const { inputs, pressed } = readPad(gamepad, layout, shaping, this.knownOf(gamepad).seen);
-    const share = speedShare(shaping, pressed.has("slow"), pressed.has("turbo"));
+    const isEpisode = pressed.has("episode"); // the other buttons mean something else meanwhile
+    const share = speedShare(shaping, pressed.has("slow"), pressed.has("turbo") && !isEpisode);
     return {
       ...common,
       ready: true,
       deadman: pressed.has("deadman"),
-      inputs: scaled(inputs, share),
+      inputs: scaled(isEpisode ? { ...inputs, dpad_x: 0, dpad_y: 0 } : inputs, share),
       pressed,
+      marks: isEpisode && inputs.dpad_y <= -0.5,
     };
   }
 
   /** Any pad stops the robot; only the one in use does more. */
-  private tellPresses({ gamepad, pressed }: PadState, inUse: boolean): void {
+  private tellPresses({ gamepad, pressed, marks }: PadState, inUse: boolean): void {
     const known = this.knownOf(gamepad);
-    const before = known.pressed;
-    known.pressed = pressed;
+    const { pressed: before, marks: marked } = known;
+    [known.pressed, known.marks] = [pressed, marks];
     if (before === null) return;
     const isNew = (action: PadAction): boolean => pressed.has(action) && !before.has(action);
     if (isNew("stop")) this.events.stop();
-    if (inUse && isNew("arm")) this.events.arm();
-    if (inUse && isNew("layer")) this.events.nextLayer();
-    if (inUse && isNew("action_1")) this.events.action(0);
-    if (inUse && isNew("action_2")) this.events.action(1);
+    if (!inUse) return;
+    if (isNew("arm")) this.events.arm();
+    if (pressed.has("episode")) {
+      for (const [action, press] of EPISODE_PRESSES) if (isNew(action)) this.events.episode(press);
+      if (marks && !marked) this.events.episode("mark");
+      return;
+    }
+    if (isNew("layer")) this.events.nextLayer();
+    if (isNew("action_1")) this.events.action(0);
+    if (isNew("action_2")) this.events.action(1);
   }
 
   private knownOf(gamepad: Gamepad): Known {
@@ -144,6 +157,7 @@ export class Pad {
       silence: createReportTimeout(),
       readMs: -1,
       pressed: null,
+      marks: false,
     };
     this.known.set(gamepad.index, fresh);
     return fresh;
@@ -163,7 +177,6 @@ export class Pad {
   }
 }
 
-const NONE: ReadonlySet<PadAction> = new Set();
 const NOTHING: PadInputs = {
   left_x: 0,
   left_y: 0,
@@ -173,6 +186,8 @@ const NOTHING: PadInputs = {
   dpad_y: 0,
   triggers: 0,
 };
+/** Of a pad that cannot be read yet. */
+const LET_GO = { deadman: false, inputs: NOTHING, pressed: new Set<PadAction>(), marks: false };
 
 function scaled(inputs: PadInputs, share: number): PadInputs {
   return {

@@ -212,7 +212,7 @@ describe("calibration", () => {
   it("makes a layout of all answers, and none before", () => {
     const hand = new Hand().to("layer").press(3).press(0);
     expect(layoutOf(hand.calibration)).toBeNull();
-    hand.press(2);
+    hand.press(2).press(11);
     const layout = layoutOf(hand.calibration);
     expect(layout?.actions).toEqual({
       deadman: [{ kind: "button", index: 5 }],
@@ -223,6 +223,7 @@ describe("calibration", () => {
       layer: [{ kind: "button", index: 3 }],
       action_1: [{ kind: "button", index: 0 }],
       action_2: [{ kind: "button", index: 2 }],
+      episode: [{ kind: "button", index: 11 }],
     });
     expect(layout?.sticks.left_x).toMatchObject({ index: 0 });
     expect(layout?.triggers).toEqual({ left_trigger: null, right_trigger: null });

@@ -37,5 +37,6 @@ export const ODD_LAYOUT: PadLayout = {
     layer: [],
     action_1: [],
     action_2: [],
+    episode: [],
   },
 };

@@ -25,21 +25,23 @@ function pluggedPad(index: number): Report {
   };
 }
 
-function padOf(...reports: Report[]): { pad: Pad; plugged: string[] } {
+function padOf(...reports: Report[]): { pad: Pad; plugged: string[]; told: string[] } {
   vi.stubGlobal("navigator", { getGamepads: () => reports });
   vi.stubGlobal("localStorage", { getItem: () => null, setItem: () => undefined });
   const plugged: string[] = [];
+  const told: string[] = [];
   const nothing = (): void => undefined;
   const others = {
-    stop: nothing,
-    arm: nothing,
-    nextLayer: nothing,
-    action: nothing,
+    stop: () => told.push("stop"),
+    arm: () => told.push("arm"),
+    nextLayer: () => told.push("layer"),
+    episode: (press: string) => told.push(press),
+    action: (index: number) => told.push(`action ${index}`),
     lost: nothing,
     silent: nothing,
   };
   const pad = new Pad({ ...others, plugged: (words) => plugged.push(words) }, new GamepadStorage());
-  return { pad, plugged };
+  return { pad, plugged, told };
 }
 
 afterEach(() => {
@@ -72,6 +74,40 @@ describe("a gamepad", () => {
     pad.poll();
     second.timestamp = 7;
     expect(pad.hasNews).toBe(true);
+  });
+
+  it("asks of the episode while its button is held, and of nothing else but arming and STOP", () => {
+    const report = pluggedPad(0);
+    const { pad, told } = padOf(report);
+    const hold = (button: number, isDown: boolean): void => {
+      report.buttons[button] = { pressed: isDown, touched: isDown, value: Number(isDown) };
+      pad.poll();
+    };
+    const press = (...buttons: number[]): string[] => {
+      for (const button of buttons) {
+        hold(button, true);
+        hold(button, false);
+      }
+      return told.splice(0);
+    };
+    const [A, B, X, Y, LB, START, L3, R3, UP] = [0, 1, 2, 3, 4, 9, 10, 11, 12] as const;
+    pad.poll();
+    expect(press(A, X, Y, LB, L3, R3, UP)).toEqual(["action 0", "action 1", "layer"]);
+    hold(A, true);
+    hold(R3, true);
+    expect(told.splice(0)).toEqual(["action 0"]); // held already: not pressed anew
+    hold(A, false);
+    expect(press(A, X, Y, LB, L3)).toEqual(["begin_or_success", "failure", "keep", "discard", "redo"]);
+    expect(press(UP, B, START)).toEqual(["mark", "stop", "arm"]);
+    hold(L3, true);
+    hold(UP, true);
+    report.axes[1] = -1;
+    pad.poll();
+    expect(pad.state?.inputs.dpad_y).toBe(0); // the cross drives nothing meanwhile
+    expect(pad.state?.inputs.left_y).toBe(-1); // at the normal speed
+    hold(R3, false);
+    expect(pad.state?.inputs.dpad_y).toBe(-1);
+    expect(told).toEqual(["redo", "mark"]);
   });
 
   it("without times has no news, and is read at the ticks", () => {

@@ -19,13 +19,18 @@ from pathlib import Path
 from typing import Final
 from urllib.parse import urlsplit
 
-import msgspec
 import rerun as rr
 
 from lockstep.server.recording.export.rerun.session_log import Moment, SessionLog, new_stream
-from lockstep.server.recording.format.records import FeedbackRecord
 from lockstep.server.recording.format.topics import PICTURE_FORMATS
-from lockstep.server.recording.writing.queue_items import FeedbackItem, Item, MediaItem, OwnItem, RobotItem
+from lockstep.server.recording.writing.queue_items import (
+    FeedbackItem,
+    Item,
+    MediaItem,
+    OwnItem,
+    RobotItem,
+    feedback_record,
+)
 from lockstep.server.rerun.feed import LENGTH
 
 __all__ = ["Pipe", "Sink", "take_items"]
@@ -147,8 +152,7 @@ def _take(item: Item, session: SessionLog, epoch: str) -> None:
             if codec in PICTURE_FORMATS:
                 session.picture(stream, PICTURE_FORMATS[codec], item.data, at, keyframe=item.keyframe)
         case FeedbackItem(feedback=feedback) if item.epoch == epoch:
-            record = FeedbackRecord(epoch=epoch, **msgspec.structs.asdict(feedback))
-            session.own(record, Moment(feedback.event, item.arrived, item.captured))
+            session.own(feedback_record(item), Moment(feedback.event, item.arrived, item.captured))
         case RobotItem(record=record) | OwnItem(record=record) if record.epoch == epoch:
             session.own(record, Moment(record.event, item.arrived, item.arrived))
 

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from lockstep.protocol.serial import MAX_EVENT
 from lockstep.server.recording.episodes.episode_core import (
     Effect,
+    Ended,
     EpisodeCore,
     EpisodeRefused,
     RunReset,
@@ -45,7 +46,7 @@ def test_an_episode_is_kept_only_when_its_record_is_on_the_disk() -> None:
     (kept,) = records(it.keep("", "success", "Ada", LATER))
     assert (kept.kind, kept.first_event, kept.last_event, kept.outcome) == ("kept", 100, 150, "success")
     assert (it.phase, it.kept) == ("keeping", 0)
-    it.on_disk("id1", 1.0)
+    assert it.on_disk("id1", 1.0) == [Ended("kept")]
     assert (it.phase, it.kept, it.last) == ("idle", 1, "episode 1 is kept")
 
 
@@ -150,7 +151,7 @@ def test_an_episode_whose_record_is_on_its_way_survives_the_epoch_but_not_the_di
     it.keep("", "", "Ada", LATER)
     assert it.cut("epoch", LATER) == []
     assert it.phase == "keeping"
-    assert it.cut("recording_failed", LATER) == []
+    assert it.cut("recording_failed", LATER) == [Ended("cut")]
     assert (it.phase, it.kept, it.cuts) == ("idle", 0, 1)
     it.on_disk("id1", 1.0)
     assert it.kept == 0
@@ -176,6 +177,7 @@ def test_whatever_happens_what_is_counted_as_kept_is_what_a_reader_finds_kept(
     """Discarded and cut episodes are never found kept, and each episode is closed before the next one begins."""
     it, book, place, now = core(countdown=countdown, resets=resets), EpisodeBook(), HERE._replace(event=event), 0.0
     on_disk = 0
+    ends: list[str] = []
     for step in steps:
         now += 0.6
         effects: list[Effect] = []
@@ -214,7 +216,13 @@ def test_whatever_happens_what_is_counted_as_kept_is_what_a_reader_finds_kept(
             pass
         for record in records(effects):
             book.take(record, 1)
+        ends += [each.end for each in effects if isinstance(each, Ended)]
     states = [each.state for each in book.entries()]
     assert states.count("kept") == on_disk + (it.phase == "keeping")
     assert states.count("open") == (it.phase == "open")
     assert len(states) >= it.kept + it.discarded
+    assert [ends.count(end) for end in ("kept", "discarded", "cut")] == [
+        on_disk,
+        states.count("discarded"),
+        states.count("cut"),
+    ]

@@ -19,6 +19,10 @@ const ALWAYS: readonly Line[] = [
   [["B"], "Begin an episode, while the session is recorded"],
   [["K", "Y", "N"], "Keep the episode; as a success; as a failure"],
   [["L", "O", "M"], "Discard the episode; do it over; set a mark"],
+  [
+    ["R3"],
+    "Of a pad, held: A begins an episode or keeps it as a success, X as a failure, Y keeps it; LB discards, L3 does it over; cross up marks",
+  ],
   [["C"], "Live charts, open and close"],
   [["F"], "Freeze the charts"],
   [["X"], "Save the charts that are shown as CSV and PNG"],

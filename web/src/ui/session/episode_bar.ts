@@ -1,4 +1,5 @@
 import type { ConsoleEngine } from "../../engine/console_engine";
+import type { EpisodePress } from "../../gamepad/episode_presses";
 import { drivingKeys } from "../../input/shortcuts";
 import { FIELDS } from "../../input/keyboard";
 import type { EpisodeRequest, EpisodeState } from "../../protocol/wire";
@@ -24,6 +25,16 @@ const KEYS: ReadonlyMap<string, Request> = new Map<string, Request>([
   ["KeyO", { do: "redo" }],
   ["KeyM", { do: "mark" }],
 ]);
+
+/** The requests of a gamepad; what one button means depends on the phase. */
+const PRESSES: Readonly<Record<Exclude<EpisodePress, "begin_or_success">, Request>> = {
+  failure: { do: "keep", outcome: "failure" },
+  keep: { do: "keep" },
+  discard: { do: "discard" },
+  redo: { do: "redo" },
+  mark: { do: "mark" },
+};
+const LET_GO = "let go of the button to hold first";
 
 interface EpisodeButton {
   readonly element: HTMLButtonElement;
@@ -51,12 +62,22 @@ export function createEpisodeBar(engine: ConsoleEngine): Panel {
   });
   const form = h("form", "episode-form", {}, task);
   const buttons: readonly EpisodeButton[] = [
-    make("Begin", "B", { do: "start" }, (each) => each.phase === "idle" || each.phase === "resetting"),
-    make("Keep", "K", { do: "keep" }, isOpen),
-    make("Success", "Y", { do: "keep", outcome: "success" }, isOpen),
-    make("Failure", "N", { do: "keep", outcome: "failure" }, isOpen),
-    make("Discard", "L", { do: "discard" }, (each) => isOpen(each) || each.phase === "countdown"),
-    make("Redo", "O", { do: "redo" }, isOpen),
+    make(
+      "Begin",
+      "B, pad: R3 with A",
+      { do: "start" },
+      (each) => each.phase === "idle" || each.phase === "resetting",
+    ),
+    make("Keep", "K, pad: R3 with Y", { do: "keep" }, isOpen),
+    make("Success", "Y, pad: R3 with A", { do: "keep", outcome: "success" }, isOpen),
+    make("Failure", "N, pad: R3 with X", { do: "keep", outcome: "failure" }, isOpen),
+    make(
+      "Discard",
+      "L, pad: R3 with LB",
+      { do: "discard" },
+      (each) => isOpen(each) || each.phase === "countdown",
+    ),
+    make("Redo", "O, pad: R3 with L3", { do: "redo" }, isOpen),
   ];
   const group = h("div", "episode-buttons", { role: "group", "aria-label": "Episode" });
   group.append(...buttons.map((each) => each.element));
@@ -95,6 +116,25 @@ export function createEpisodeBar(engine: ConsoleEngine): Panel {
     engine.tell("session", message);
   }
 
+  /** The right stick is pressed by accident while driving: what cannot be undone is asked for with the robot let go. */
+  function takePress(press: EpisodePress): void {
+    if (element.hidden || state === null) return;
+    if (document.activeElement === task) task.blur();
+    const { visible, occupied } = engine.actConditions(performance.now(), true);
+    if (!visible || occupied) return;
+    const isIdle = state.phase === "idle" || state.phase === "resetting";
+    const succeeds: Request = { do: "keep", outcome: "success" };
+    const request =
+      press !== "begin_or_success" ? PRESSES[press] : isIdle ? { do: "start" as const } : succeeds;
+    if (engine.controls.deadman && (request.do === "discard" || request.do === "redo")) refuse(LET_GO);
+    else ask(request);
+  }
+
+  function refuse(why: string): void {
+    [refusal, refusedMs] = [why, performance.now()];
+    note(engine.state, "warning", `Episode: ${refusal}`, Date.now());
+  }
+
   function take(value: unknown): void {
     const message = readEpisodeMessage(value);
     if (message?.type === "episode") {
@@ -104,12 +144,12 @@ export function createEpisodeBar(engine: ConsoleEngine): Panel {
         note(engine.state, "error", `Episode: ${message.last}`, Date.now());
       [state, heardMs] = [message, performance.now()];
     } else if (message?.type === "episode_answer" && message.reason !== "") {
-      [refusal, refusedMs] = [EPISODE_REFUSALS[message.reason], performance.now()];
-      note(engine.state, "warning", `Episode: ${refusal}`, Date.now());
+      refuse(EPISODE_REFUSALS[message.reason]);
     }
   }
 
   take(engine.late.get("episode")?.value);
+  engine.padEpisode = takePress;
   engine.takeLate["episode"] = engine.takeLate["episode_answer"] = take;
   form.addEventListener("submit", (event) => {
     event.preventDefault();

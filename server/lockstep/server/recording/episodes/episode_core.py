@@ -19,7 +19,7 @@ from lockstep.protocol.serial import event_gap
 from lockstep.server.recording.episodes.open_episode import OpenEpisode, Place
 from lockstep.server.recording.format.records import EpisodeRecord
 
-__all__ = ["Effect", "EpisodeCore", "EpisodeRefused", "RunReset", "Write"]
+__all__ = ["Effect", "Ended", "EpisodeCore", "EpisodeRefused", "RunReset", "Write"]
 
 CUT_WORDS = {
     "epoch": "the robot bridge was restarted",
@@ -29,6 +29,7 @@ CUT_WORDS = {
     "new_part": "the recording went on in another file",
     "console_ended": "the console ended",
 }
+EpisodeEnd = Literal["kept", "discarded", "cut"]
 CutReason = Literal["epoch", "link_down", "recording_ended", "recording_failed", "new_part", "console_ended"]
 
 
@@ -56,7 +57,13 @@ class RunReset(NamedTuple):
     """The caller runs the reset action, and calls `reset_ended`."""
 
 
-Effect = Write | RunReset
+class Ended(NamedTuple):
+    """The caller says that an episode has ended: one that is kept when its record is on the disk, not before."""
+
+    end: EpisodeEnd
+
+
+Effect = Write | RunReset | Ended
 
 
 class EpisodeCore:
@@ -179,7 +186,7 @@ class EpisodeCore:
             return []
         self.kept += 1
         self.last = f"episode {current.number} is kept"
-        return self._end(now)
+        return [Ended("kept"), *self._end(now)]
 
     def noted(self, text: str, place: Place) -> list[Effect]:
         """Note a STOP, a reset or a change of the seat in the open episode. None of them ends it."""
@@ -208,7 +215,7 @@ class EpisodeCore:
         kept, self.phase, self._current = self.phase == "keeping", "idle", None
         self.cuts += 1
         self.last = f"episode {current.number} is lost: {CUT_WORDS[why]}"
-        return [] if kept else [Write(current.record("cut", place, "", why=why))]
+        return [Ended("cut")] if kept else [Write(current.record("cut", place, "", why=why)), Ended("cut")]
 
     def cancel(self, why: str) -> None:
         """Cancel the episode that is about to begin, if there is one. `why`: in words."""
@@ -259,7 +266,7 @@ class EpisodeCore:
         current.last_event = place.event
         self.discarded += 1
         self.last = f"episode {current.number} is discarded"
-        return [Write(current.record("discarded", place, by)), *self._end(now, place)]
+        return [Write(current.record("discarded", place, by)), Ended("discarded"), *self._end(now, place)]
 
     def _end(self, now: float, place: Place | None = None) -> list[Effect]:
         """After an episode: the reset, then the next one if it is wanted."""

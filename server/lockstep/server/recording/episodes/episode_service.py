@@ -21,6 +21,7 @@ from lockstep.server.peers.peer_registry import PeerRegistry
 from lockstep.server.recording.episodes.episode_core import (
     CutReason,
     Effect,
+    Ended,
     EpisodeCore,
     EpisodeRefused,
     RunReset,
@@ -32,7 +33,7 @@ from lockstep.server.recording.episodes.session_checks import CheckedRobot, Sess
 from lockstep.server.recording.episodes.settings import EpisodeSettings
 from lockstep.server.recording.format.records import EpisodeRecord
 from lockstep.server.recording.settings import RecordingSettings
-from lockstep.server.recording.writing.episode_written import EpisodeWritten
+from lockstep.server.recording.writing.episode_written import EpisodeEnded, EpisodeWritten
 from lockstep.server.recording.writing.recorder import Recorder
 from lockstep.server.session_events import (
     ActionUpdated,
@@ -291,6 +292,8 @@ class EpisodeService:
                     self._write(record)
                 case RunReset():
                     self._reset.begin()
+                case Ended(end):
+                    self._events.publish(EpisodeEnded(end))
         if tells and (before is None or before != self._core.phase):
             self._tell()
 

@@ -6,14 +6,12 @@ from lockstep.server.recording.errors import RecordingDamaged
 from lockstep.server.recording.export.rerun.session_log import Moment, SessionLog, new_stream
 from lockstep.server.recording.export.unfinished import unfinished_file
 from lockstep.server.recording.format.payload import own_record_of
-from lockstep.server.recording.format.records import ReportRecord, TraceRecord
 from lockstep.server.recording.format.topics import CAMERA, OWN_TOPICS, SIGNATURE, WRENCH
 from lockstep.server.recording.reading.reader import RecordingReader
 
 __all__ = ["export"]
 
-UNUSED = {SIGNATURE, WRENCH, OWN_TOPICS[ReportRecord], OWN_TOPICS[TraceRecord]}
-READ = set(OWN_TOPICS.values()) - UNUSED
+READ = set(OWN_TOPICS.values()) - {SIGNATURE, WRENCH}
 
 
 def export(path: Path, out: Path | None, task: str) -> list[Path]:

@@ -29,7 +29,7 @@ from lockstep.server.recording.format.records_in_words import in_words
 from lockstep.server.recording.format.topics import LOG, OWN_TOPICS, PICTURE_FORMATS, SOUND_FORMATS, media_topic
 from lockstep.server.recording.writing.writer import Entry
 
-__all__ = ["FeedbackItem", "Item", "MediaItem", "OwnItem", "RobotItem", "entries_of"]
+__all__ = ["FeedbackItem", "Item", "MediaItem", "OwnItem", "RobotItem", "entries_of", "feedback_record"]
 
 
 class RobotItem(NamedTuple):
@@ -72,14 +72,8 @@ def entries_of(item: Item, description: RobotDescription) -> Iterator[Entry]:
     match item:
         case MediaItem():
             yield _media(item)
-        case FeedbackItem(arrived, captured, epoch, feedback, driver):
-            record = FeedbackRecord(
-                epoch=epoch,
-                **msgspec.structs.asdict(feedback),
-                driver=driver.name,
-                driver_kind=driver.kind,
-                intervention=driver.intervention,
-            )
+        case FeedbackItem(arrived, captured):
+            record = feedback_record(item)
             yield _own(record, arrived, captured)
             yield from feedback_messages(description, record, arrived, captured)
         case RobotItem(arrived=arrived, record=record) | OwnItem(arrived=arrived, record=record):
@@ -94,6 +88,18 @@ def entries_of(item: Item, description: RobotDescription) -> Iterator[Entry]:
                 yield from map_messages(description, record, arrived)
             if isinstance(item, RobotItem):
                 yield from robot_messages(description, record.event, arrived)
+
+
+def feedback_record(item: FeedbackItem) -> FeedbackRecord:
+    """Return the record of a feedback, with who drove its event."""
+    driver = item.driver
+    return FeedbackRecord(
+        epoch=item.epoch,
+        **msgspec.structs.asdict(item.feedback),
+        driver=driver.name,
+        driver_kind=driver.kind,
+        intervention=driver.intervention,
+    )
 
 
 def _own(record: OwnRecord, arrived: int, captured: int) -> Entry:

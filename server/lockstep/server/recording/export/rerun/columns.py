@@ -37,6 +37,14 @@ class Columns:
     def points(self, path: str, at: Moment, positions: list[tuple[float, float, float]]) -> None:
         self._add(path, _points, at, positions)
 
+    def strip(self, path: str, at: Moment, positions: list[tuple[float, float, float]]) -> None:
+        self._add(path, _strips, at, positions)
+
+    def grid(self, path: str, at: Moment, grid: dict[str, Any]) -> None:
+        """Place a map; `grid`: the fields of Rerun's GridMap but for the colours."""
+        self.waiting_bytes += len(grid["data"])
+        self._add(path, _grids, at, grid)
+
     def pose(self, path: str, at: Moment, position: Sequence[float], orientation: Sequence[float]) -> None:
         """Place an entity in its parent. `orientation`: w, x, y, z."""
         w, x, y, z = orientation
@@ -45,6 +53,10 @@ class Columns:
     def picture(self, path: str, at: Moment, picture: bytes, *, keyframe: bool) -> None:
         self.waiting_bytes += len(picture)
         self._add(path, _pictures, at, (picture, keyframe))
+
+    def state(self, path: str, at: Moment, state: str) -> None:
+        """Tell a state that holds from here on; "": none does."""
+        self._add(path, _states, at, state)
 
     def text(self, path: str, at: Moment, text: str, *, warning: bool) -> None:
         self._add(path, _texts, at, (text, rr.TextLogLevel.WARN if warning else rr.TextLogLevel.INFO))
@@ -81,6 +93,17 @@ def _points(rows: list[Any]) -> Any:
     return rr.Points3D.columns(positions=positions).partition([len(row) for row in rows])
 
 
+def _strips(rows: list[Any]) -> Any:
+    strips = [[positions] if len(positions) > 1 else [] for positions in rows]
+    found = rr.LineStrips3D.columns(strips=[strip for row in strips for strip in row])
+    return found.partition([len(row) for row in strips])
+
+
+def _grids(rows: list[Any]) -> Any:
+    fields = {name: [row[name] for row in rows] for name in rows[0]}
+    return rr.GridMap.columns(**fields, colormap=[rr.components.Colormap.RvizMap] * len(rows))
+
+
 def _poses(rows: list[Any]) -> Any:
     positions = np.array([position for position, _ in rows], dtype=np.float32)
     turns = np.array([turn for _, turn in rows], dtype=np.float32)
@@ -90,6 +113,10 @@ def _poses(rows: list[Any]) -> Any:
 def _pictures(rows: list[Any]) -> Any:
     pictures = [np.frombuffer(picture, dtype=np.uint8) for picture, _ in rows]
     return rr.VideoStream.columns(sample=pictures, is_keyframe=[keyframe for _, keyframe in rows])
+
+
+def _states(rows: list[Any]) -> Any:
+    return rr.StateChange.columns(state=rows)
 
 
 def _texts(rows: list[Any]) -> Any:

@@ -9,6 +9,7 @@ from lockstep.protocol.description import RobotDescription
 from lockstep.protocol.serial import event_gap
 from lockstep.server.recording.export.rerun.bodies import BodyPaths, entity, log_bodies, log_cameras, moving
 from lockstep.server.recording.export.rerun.columns import Columns, Moment
+from lockstep.server.recording.export.rerun.further_records import FurtherRecords
 from lockstep.server.recording.format.records import CommandRecord, Degraded, FeedbackRecord, OwnRecord
 from lockstep.server.recording.format.records_in_words import in_words
 from lockstep.server.scene.kinematics import body_pose
@@ -21,6 +22,8 @@ JOINTS = "/joints"
 MEASURED, COMMANDED, GOALS = "/axes/measured", "/axes/commanded", "/axes/goals"
 FORCE, TORQUE = "/wrench/force", "/wrench/torque"
 STOPPED, AT_REST = "/state/stopped", "/state/at_rest"
+FAULTS, LIMITS, UNKNOWN = "/state/faults", "/state/limits", "/state/unknown"
+DRIVER, DRIVER_KIND, INTERVENTION = "/driver", "/driver/kind", "/driver/intervention"
 GAP = "gap"  # and the camera's name: feedback's event minus the picture's stamp, at the picture's arrival
 CODECS = {"h264": rr.VideoCodec.H264, "vp8": rr.VideoCodec.VP8}
 MOST_ROWS = 4000
@@ -44,6 +47,7 @@ class SessionLog:
 
     def __init__(self, stream: rr.RecordingStream) -> None:
         self.columns = Columns(stream)
+        self._further = FurtherRecords(stream, self.columns)
         self._stream = stream
         self._description = RobotDescription(name="", label="", axes=())
         self._paths = BodyPaths(self._description)
@@ -60,6 +64,7 @@ class SessionLog:
         log_bodies(self._stream, description, self._paths)
         log_cameras(self._stream, description.cameras, self._paths)
         axes = [axis.name for axis in description.axes]
+        self._further.begin(axes)
         named = {
             MEASURED: axes,
             COMMANDED: axes,
@@ -73,7 +78,7 @@ class SessionLog:
                 self._stream.log(path, rr.SeriesLines(names=names), static=True)
 
     def own(self, record: OwnRecord, at: Moment) -> None:
-        """Take one of Lockstep's own records. What has neither numbers nor words is left out."""
+        """Take one of Lockstep's own records."""
         match record:
             case FeedbackRecord():
                 self._feedback(record, at, self._description, self._paths)
@@ -81,6 +86,8 @@ class SessionLog:
                 self._whole.clear()
             case CommandRecord(outcome="forwarded"):
                 self.columns.scalars(COMMANDED, at, _filled(record.values, len(self._description.axes)))
+            case _:
+                self._further.take(record, at)
         words = in_words(record)
         if words is not None:
             self.columns.text(LOG, at, words.text, warning=words.warning)
@@ -132,6 +139,7 @@ class SessionLog:
             columns.scalars(TORQUE, at, record.wrench[3:])
         columns.scalars(STOPPED, at, [float(record.stop.stopped)])
         columns.scalars(AT_REST, at, [float(record.at_rest)])
+        self._driven(record, at)
         joints = dict(zip((joint.name for joint in description.joints), record.joints, strict=False))
         for body in moving(description):
             if body.name in paths.bodies:
@@ -146,6 +154,14 @@ class SessionLog:
                 if math.isfinite(distance) and ring.range_min <= distance < ring.range_max
             ]
             columns.points(f"{paths.bodies.get(ring.body, '')}{entity('ranges')}", at, seen)
+
+    def _driven(self, record: FeedbackRecord, at: Moment) -> None:
+        kind = "" if record.driver_kind == "none" else record.driver_kind
+        self._further.state(DRIVER, at, record.driver if kind else "")
+        self._further.state(DRIVER_KIND, at, kind)
+        self.columns.scalars(INTERVENTION, at, [float(record.intervention)])
+        for path, names in ((FAULTS, record.faults), (LIMITS, record.limits), (UNKNOWN, record.unknown)):
+            self._further.state(path, at, ", ".join(names))
 
 
 def _filled(values: Sequence[float | None], count: int) -> list[float]:
