@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from lockstep.client.control.clutch import REACH_SHARE, Clutch
-from lockstep.protocol.description import Axis, RobotDescription
+from lockstep.protocol.description import Axis, Pose, RobotDescription
 from lockstep.protocol.messages import Feedback, StopState
 from tests.client.control.vectors import load_vectors
 from tests.makers import goal_axis
@@ -20,11 +20,16 @@ def clutch_of(case: dict[str, Any]) -> Clutch:
         goal_axis(str(i), most=1e4, reach=axis["reach"], wrap=axis["wrap"]) for i, axis in enumerate(case["axes"])
     )
     scales = {str(i): axis["scale"] for i, axis in enumerate(case["axes"])}
-    return Clutch(RobotDescription(name="arm", label="Arm", axes=axes), scales)
+    poses = tuple(
+        Pose(name=f"p{i}", label="", body="", position=(str(i), "", ""), settling=axis["settling"])
+        for i, axis in enumerate(case["axes"])
+        if "settling" in axis
+    )
+    return Clutch(RobotDescription(name="arm", label="Arm", axes=axes, poses=poses), scales)
 
 
 def measured(axes: list[float], goals: list[float | None], **rest: Any) -> Feedback:
-    return Feedback(event=1, issue=1, time=0.0, axes=axes, goals=goals, **rest)
+    return Feedback(**{"event": 1, "issue": 1, "time": 0.0, "axes": axes, "goals": goals} | rest)
 
 
 def check_step(clutch: Clutch, step: dict[str, Any]) -> None:

@@ -14,8 +14,8 @@ ARM = RobotDescription(
 AGE = 2.0  # s
 
 
-def measured(event: int, goal: float = 1.0) -> Feedback:
-    return Feedback(event=event, issue=1, time=0.0, axes=[goal], goals=[goal], at_rest=False)
+def measured(event: int, goal: float = 1.0, *, at_rest: bool = False) -> Feedback:
+    return Feedback(event=event, issue=1, time=0.0, axes=[goal], goals=[goal], at_rest=at_rest)
 
 
 class Side:
@@ -25,7 +25,7 @@ class Side:
         self.sender = CommandSender(CommandGate("feedback", 4, 0.0), [None])
         self.clutches = Clutches(self.sender, AGE)
         self.clutch = Clutch(ARM, {"j": 1.0})
-        self.hear(measured(1), 0.0)
+        self.hear(measured(1, at_rest=True), 0.0)
         self.sender.ready = True
         self.clutches.add(self.clutch, 0.0)
 
@@ -96,7 +96,7 @@ def test_after_a_gap_of_feedback_the_goal_that_waits_is_void_and_a_rest_leaves()
     side.hear(measured(2), 0.05)
     side.drive(0.1, 0.1)
     side.sender.intend(side.clutch.goals([0.4]), 0.2)  # it waits for the answer
-    side.hear(measured(3, 0.5), 3.0)
+    side.hear(measured(3, 0.5, at_rest=True), 3.0)
     assert not side.clutch.engaged
     messages = side.leave(3.0)
     assert any(isinstance(message, Rest) for message in messages)

@@ -72,3 +72,17 @@ def test_no_tool_is_further_from_where_the_chain_begins_than_it_is_long(posture:
     chain = desk_arm()
     assert chain.begins == pytest.approx((0.03, 0.0, 0.1))
     assert np.linalg.norm(chain.at(posture).position - chain.begins) <= chain.length + 1e-9
+
+
+@given(st.tuples(*(st.floats(-1.5, 1.5) for _ in range(3))), st.tuples(*(st.floats(-1.0, 1.0) for _ in range(3))))
+def test_the_twists_of_the_frames_move_a_point_as_the_joints_do(
+    posture: tuple[float, ...], motion: tuple[float, ...]
+) -> None:
+    chain = Chain(LIFT, "tool")
+    state = chain.at(posture)
+    ways, turns = chain.twists(state, np.array(motion))
+    for body in ("carriage", "arm", "tool"):
+        point = chain.point(body, (0.1, -0.2, 0.3))
+        place = chain.place(state, point)
+        moved = ways[point.moving] + np.cross(turns[point.moving], place)
+        assert moved == pytest.approx(chain.motion(state, point.moving, place) @ motion)

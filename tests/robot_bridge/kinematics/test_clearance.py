@@ -57,3 +57,19 @@ def test_only_gaps_within_the_distance_are_given() -> None:
 def test_without_pairs_there_are_no_gaps() -> None:
     chain = desk_arm()
     assert Clearance(chain, {}, ()).gaps(chain.at((0.0,) * 5), FAR) == []
+
+
+@given(
+    st.tuples(*(st.floats(-1.5, 1.5) for _ in range(5))),
+    st.tuples(*(st.floats(-0.3, 0.3) for _ in range(5))),
+    st.floats(0.0, 0.1),
+)
+def test_pairs_that_a_motion_of_the_joints_would_bring_near_are_near_as_well(
+    posture: tuple[float, ...], motion: tuple[float, ...], within: float
+) -> None:
+    chain = desk_arm()
+    apart, state, ahead = clearance(chain), chain.at(posture), np.array(motion)
+    near = [gap.distance for gap in apart.gaps(state, within, ahead)]
+    for gap in apart.gaps(state, FAR):
+        left = gap.distance + min(0.0, float(gap.gradient @ ahead))
+        assert (gap.distance in near) == (left < within) or abs(left - within) < 1e-9

@@ -104,3 +104,17 @@ def test_the_surface_of_a_body_holds_its_shapes_and_the_fingers_that_hang_on_it(
     assert (points.max(axis=0) - (0.0, 0.0, 1.0))[1:] == pytest.approx((0.02, 0.1))
     assert radii.max() == 0.05
     assert points[np.argmax(points[:, 0])].tolist() == pytest.approx((0.3, 0.0, 1.0))
+
+
+@given(postures, st.tuples(*(st.floats(-0.3, 0.3) for _ in range(5))), st.floats(0.0, 0.2))
+def test_gaps_that_a_motion_of_the_joints_would_make_narrow_are_near_as_well(
+    posture: tuple[float, ...], motion: tuple[float, ...], within: float
+) -> None:
+    rod = np.array([(0.0, 0.0, 0.04 * number) for number in range(6)])
+    surfaces = FINGER | {"upper": Surface(rod[:1], np.full(1, 0.02)), "fore": Surface(rod[:1], np.full(1, 0.03))}
+    around = Obstacles(ARM, surfaces, (BOX, plane("the table", (0.0, 0.0, 0.0), (0.1, 0.0, 1.0))))
+    state, ahead = ARM.at(posture), np.array(motion)
+    near = {(gap.what, gap.distance) for gap in around.gaps(state, within, ahead)}
+    for gap in around.gaps(state, FAR):
+        left = gap.distance + min(0.0, float(gap.gradient @ ahead))
+        assert ((gap.what, gap.distance) in near) == (left < within) or abs(left - within) < 1e-9

@@ -282,3 +282,31 @@ def test_the_far_end_of_a_hand_does_not_come_down_about_the_end_that_is_near(
         joints, before = solution.joints, solution.rates
         least = min(least, lowest(joints))
     assert least > 0.007
+
+
+PLATE = {"hand": Surface(np.array([(x, y, 0.0) for x in (0.0, 0.08, 0.16) for y in (-0.3, 0.0, 0.3)]), np.full(9, 0.005))}
+DESK = Obstacles(ARM, PLATE, (plane("the table", (0.0, 0.0, 0.0), (0.0, 0.0, 1.0)),))
+
+
+@pytest.mark.parametrize("seed", [20, 52, 73, 95, 107])
+def test_a_wide_hand_that_moves_as_fast_as_the_joints_can_stays_off_the_table(seed: int) -> None:
+    """Its corners are many times faster than what is slowed near the table: they have to be slowed from far away."""
+
+    def nearest(joints: tuple[float, ...]) -> float:
+        return min(gap.distance for gap in DESK.gaps(ARM.at(joints), 9.0))
+
+    numbers = np.random.default_rng(seed)
+    bounds = BOUNDS._replace(rates=tuple(2.0 * rate for rate in BOUNDS.rates))
+    lower, upper = 0.9 * np.array(bounds.lower), 0.9 * np.array(bounds.upper)
+    joints: tuple[float, ...] = tuple(numbers.uniform(lower, upper))
+    while nearest(joints) < 0.03:
+        joints = tuple(numbers.uniform(lower, upper))
+    solver, rates = PoseSolver(ARM, bounds, keeps_off=(DESK,)), (0.0,) * 5
+    for number in range(240):
+        if number % 60 == 0:
+            here = ARM.at(joints)
+            position = here.position + 0.2 * numbers.normal(size=3)
+            rotation = from_rotation_vector(numbers.uniform(-2.0, 2.0, 3)) @ here.rotation
+        solution = solver.step(joints, position, rotation, TICK, before=rates)
+        joints, rates = solution.joints, solution.rates
+        assert nearest(joints) > 0.004

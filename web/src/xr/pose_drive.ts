@@ -59,6 +59,7 @@ export class PoseDevice implements GoalDevice {
     const goals: AxisValue[] = this.description.axes.map(() => null);
     const taken = new Set<Side>();
     for (const drive of this.drives) {
+      drive.clutch.observe(feedback); // also while nobody leads it: the clutch has to see that its goals stand still
       const side = this.sideFor(drive, taken);
       if (side === null) {
         letGo(drive);
@@ -91,7 +92,6 @@ export class PoseDevice implements GoalDevice {
 
   private lead(drive: PoseDrive, side: Side, feedback: Feedback): readonly AxisValue[] {
     const hand = this.hands.pose(side);
-    drive.clutch.observe(feedback);
     if (hand === null) return [];
     if (drive.leading?.side !== side || !drive.clutch.engaged) {
       const binding = bindHand(

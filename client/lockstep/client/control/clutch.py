@@ -59,6 +59,9 @@ class Clutch:
     the device's own motion since, times the axis' scale. A goal further than 0.8 of the axis' reach from the newest
     measured value is clipped there, and `clipped` says so; the device's motion counts on meanwhile.
 
+    It engages only while the goals of its axes stand still: a goal that still brakes, or a pose that has not settled, is
+    not where the robot comes to rest. `waits` says that engaging again in a moment can succeed.
+
     Call `release` when the operator lets go, and when the feedback, the seat or the arming is lost. The clutch releases
     itself when a reading is None or not finite, and when the robot needs a neutral command. Then the values are None,
     and it has to be engaged anew.
@@ -81,7 +84,11 @@ class Clutch:
             raise ValueError("a scale is NaN or infinite")
         self._axes = len(description.axes)
         self._bound = [_Bound(indices[name], description.axes[indices[name]], scale) for name, scale in scales.items()]
+        settling = {name: pose.settling for pose in description.poses for name in (*pose.position, *pose.rotation)}
+        self._settling = max((settling.get(name, 0.0) for name in scales), default=0.0)  # s
         self._newest: Feedback | None = None
+        self._stood_at = 0.0  # robot's time of the first feedback with the goals of the newest one
+        self._waits = False
         self._engaged = False
         self._clipped: tuple[str, ...] = ()
 
@@ -89,6 +96,11 @@ class Clutch:
     def engaged(self) -> bool:
         """Whether the goals follow the device."""
         return self._engaged
+
+    @property
+    def waits(self) -> bool:
+        """Whether it was not engaged only because the goals do not stand still yet."""
+        return self._waits
 
     @property
     def clipped(self) -> tuple[str, ...]:
@@ -100,6 +112,8 @@ class Clutch:
         if not self._usable(feedback):
             self.lost_feedback()
             return
+        if self._newest is None or self._goals_of(feedback) != self._goals_of(self._newest):
+            self._stood_at = feedback.time
         self._newest = feedback
         if self._engaged:
             for bound in self._bound:
@@ -114,8 +128,8 @@ class Clutch:
             device: one reading per axis of the clutch, in the axes' units before the scale; None: not known
 
         Returns:
-            Whether it is engaged: not without a feedback, not while the robot needs a neutral command, and not with a
-            reading that is not known.
+            Whether it is engaged: not without a feedback, not while the robot needs a neutral command, not with a
+            reading that is not known, and not before the goals stand still (`waits`).
 
         Raises:
             ValueError: not one reading per axis.
@@ -123,6 +137,9 @@ class Clutch:
         self.release()
         readings = self._readings(device)
         if readings is None or self._newest is None:
+            return False
+        self._waits = not self._stands(self._newest)
+        if self._waits:
             return False
         for bound, reading in zip(self._bound, readings, strict=True):
             goal = self._newest.goals[bound.index]
@@ -157,7 +174,7 @@ class Clutch:
 
     def release(self) -> None:
         """Let go: the values are None until it is engaged anew, anywhere."""
-        self._engaged = False
+        self._engaged = self._waits = False
         self._clipped = ()
 
     def lost_feedback(self) -> None:
@@ -167,6 +184,13 @@ class Clutch:
         """
         self.release()
         self._newest = None
+
+    def _stands(self, newest: Feedback) -> bool:
+        """Return whether the goals are where the robot rests: a pose reads them anew once it has settled."""
+        return newest.at_rest or newest.time - self._stood_at > self._settling
+
+    def _goals_of(self, feedback: Feedback) -> list[float | None]:
+        return [feedback.goals[bound.index] for bound in self._bound]
 
     def _usable(self, feedback: Feedback) -> bool:
         if feedback.neutral_needed or feedback.stop.stopped:

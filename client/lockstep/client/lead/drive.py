@@ -50,7 +50,7 @@ async def _drive_on(console: Console, clutch: Clutch, newest: Newest, hand: Hand
     clock = asyncio.get_running_loop().time
     with suppress(NotArmed):
         await console.arm()
-    if not clutch.engage(newest.readings(clock())):
+    if not await _engaged(console, clutch, newest, hand):
         say("not engaged: the leader is not known, or the robot is not ready; let go, and press again")
         return
     clipped: tuple[str, ...] = ()
@@ -65,6 +65,15 @@ async def _drive_on(console: Console, clutch: Clutch, newest: Newest, hand: Hand
         if await _answered(console.drive(values), hand, clock) is None:
             break
     say("rests" if not hand.held(clock()) else "rests: the clutch was released; let go, and press again")
+
+
+async def _engaged(console: Console, clutch: Clutch, newest: Newest, hand: Hand) -> bool:
+    """Engage, as soon as the robot stands still: a press may come soon after the one before."""
+    clock = asyncio.get_running_loop().time
+    while not clutch.engage(newest.readings(clock())):
+        if not clutch.waits or await _answered(console.drive({}), hand, clock) is None:
+            return False
+    return True
 
 
 async def _answered(drive: Coroutine[Any, Any, Feedback], hand: Hand, clock: Callable[[], float]) -> Feedback | None:

@@ -131,6 +131,17 @@ class Chain:
         columns[:moving] = np.where(self._slides[:moving, None], state.axes[:moving], linear)
         return columns.T
 
+    def twists(self, state: ChainState, motion: Array) -> tuple[Array, Array]:
+        """Return how each moving frame moves when the joints do, the base's own first: (joints + 1) x 3 each.
+
+        The first is the motion of the point of the frame that is at the origin now, m; the second its turn, rad. So a
+        point of the frame at `place` moves by the first plus the second x `place`. `motion`: rad or m, of each joint.
+        """
+        turns = np.where(self._slides[:, None], 0.0, state.axes) * motion[:, None]
+        ways = np.where(self._slides[:, None], state.axes * motion[:, None], _cross(state.places[1:], turns))
+        none = np.zeros((1, 3))
+        return np.concatenate((none, ways.cumsum(axis=0))), np.concatenate((none, turns.cumsum(axis=0)))
+
 
 def _cross(one: Array, other: Array) -> Array:
     """Return the cross products of rows: a third of the time that `numpy.cross` takes for so few."""

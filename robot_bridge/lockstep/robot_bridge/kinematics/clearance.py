@@ -33,8 +33,11 @@ class Gap(NamedTuple):
 class GapSource(Protocol):
     """Knows what the robot must keep off."""
 
-    def gaps(self, state: ChainState, within: float) -> list[Gap]:
-        """Return the gaps that are narrower than `within` (m)."""
+    def gaps(self, state: ChainState, within: float, ahead: Array | None = None) -> list[Gap]:
+        """Return the gaps that are narrower than `within` (m).
+
+        `ahead`: rad or m, a motion of each joint: the gaps that it would make narrower than `within` are returned too.
+        """
 
 
 class Clearance:
@@ -55,34 +58,49 @@ class Clearance:
             (names.index(first), names.index(second), capsules[first].radius + capsules[second].radius)
             for first, second in pairs
         ]
+        self._moving = [start.moving for start, _ in self._ends]
         self._columns = np.array([pair[:2] for pair in self._pairs], dtype=int).reshape(-1, 2).T
         reaches = np.array([math.dist(each.start, each.end) / 2 + each.radius for each in capsules.values()])
         self._reaches = reaches[self._columns].sum(axis=0)  # m, of both capsules around their middles
 
-    def gaps(self, state: ChainState, within: float) -> list[Gap]:
-        """Return the gaps of the pairs that are closer than `within` (m)."""
+    def gaps(self, state: ChainState, within: float, ahead: Array | None = None) -> list[Gap]:
+        """Return the gaps of the pairs that are closer than `within` (m), or come so by the motion `ahead`."""
         if not self._pairs:
             return []
         ends = np.array([[self._chain.place(state, end) for end in each] for each in self._ends])
         middles = ends.mean(axis=1)
         apart = middles[self._columns[0]] - middles[self._columns[1]]
-        near = np.flatnonzero((apart * apart).sum(axis=1) < (self._reaches + within) ** 2)
-        gaps = (self._gap(state, self._pairs[number], ends, within) for number in near.tolist())
+        closer = self._reaches + within
+        if ahead is not None:
+            closer = closer + self._comes_closer(state, ends, ahead)
+        near = np.flatnonzero((apart * apart).sum(axis=1) < closer**2)
+        gaps = (self._gap(state, self._pairs[number], ends, within, ahead) for number in near.tolist())
         return [gap for gap in gaps if gap is not None]
 
-    def _gap(self, state: ChainState, pair: tuple[int, int, float], ends: Array, within: float) -> Gap | None:
+    def _comes_closer(self, state: ChainState, ends: Array, ahead: Array) -> Array:
+        """Return by how much two places of each pair come closer to each other at most, m."""
+        ways, turns = self._chain.twists(state, ahead)
+        motions = ways[self._moving][:, None] + np.cross(turns[self._moving][:, None], ends)  # capsules x ends x 3
+        apart = motions[self._columns[0]][:, :, None] - motions[self._columns[1]][:, None, :]
+        return np.sqrt((apart * apart).sum(axis=3).max(axis=(1, 2)))  # type: ignore[no-any-return]
+
+    def _gap(
+        self, state: ChainState, pair: tuple[int, int, float], ends: Array, within: float, ahead: Array | None
+    ) -> Gap | None:
         first, second, radii = pair
         (a, b), (c, d) = ends[first], ends[second]
         s, t = nearest_places(a, b, c, d)
         here, there = a + s * (b - a), c + t * (d - c)
         apart = here - there
         length = math.sqrt(apart @ apart)
-        if length >= radii + within:
+        is_near = length < radii + within
+        if not is_near and ahead is None:
             return None
         if length <= TINY:  # the lines cross: no direction leads apart more than another
             return Gap(length - radii, np.zeros(state.linear.shape[1]))
         motion = self._motion(state, self._ends[first], here) - self._motion(state, self._ends[second], there)
-        return Gap(length - radii, apart @ motion / length)
+        gap = Gap(length - radii, apart @ motion / length)
+        return gap if is_near or (ahead is not None and gap.distance + float(gap.gradient @ ahead) < within) else None
 
     def _motion(self, state: ChainState, ends: tuple[ChainPoint, ChainPoint], place: Array) -> Array:
         return self._chain.motion(state, ends[0].moving, place)

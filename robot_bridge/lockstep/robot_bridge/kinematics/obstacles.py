@@ -83,35 +83,48 @@ class Obstacles:
         self._offsets = np.array([each.position @ each.rotation for each in self._obstacles]).reshape(-1)
         self._halves = np.array([each.half for each in self._obstacles]).reshape(-1)
 
-    def gaps(self, state: ChainState, within: float) -> list[Gap]:
-        """Return the gaps that are narrower than `within` (m): the narrowest of each body and obstacle, and others.
+    def gaps(self, state: ChainState, within: float, ahead: Array | None = None) -> list[Gap]:
+        """Return the gaps that are narrower than `within` (m), or become so by the motion `ahead` of the joints.
 
-        If the nearest place alone were kept off, the far end of a hand could come down fast about it.
+        Of each body and obstacle these are the narrowest and others. If the nearest place alone were kept off, the far
+        end of a hand could come down fast about it.
         """
+        if not self._bodies or not self._obstacles:
+            return []
+        twists = None if ahead is None else self._chain.twists(state, ahead)
         found = []
-        for body, obstacles in self._near(state, within):
+        for body, obstacles in self._near(state, within, twists):
             moving, points, radii = self._bodies[body]
             places = state.places[moving] + points @ state.turns[moving].T
+            ways = None if twists is None else twists[0][moving] + np.cross(twists[1][moving], places)
             for obstacle in obstacles:
                 distances = _distances(obstacle, places) - radii
-                for number in _spread(places, distances, within, APART * float(self._reaches[body])):
-                    place = places[number]
-                    motion = self._chain.motion(state, moving, place)
-                    found.append(Gap(float(distances[number]), _outward(obstacle, place) @ motion, obstacle.name))
+                soon = distances
+                if ways is not None:
+                    soon = distances + np.minimum((_outward(obstacle, places) * ways).sum(axis=1), 0.0)
+                for number in _spread(places, soon, within, APART * float(self._reaches[body])):
+                    motion = self._chain.motion(state, moving, places[number])
+                    out = _outward(obstacle, places[number : number + 1])[0]
+                    found.append(Gap(float(distances[number]), out @ motion, obstacle.name))
         return found
 
-    def _near(self, state: ChainState, within: float) -> Iterator[tuple[int, list[Obstacle]]]:
+    def _near(
+        self, state: ChainState, within: float, twists: tuple[Array, Array] | None
+    ) -> Iterator[tuple[int, list[Obstacle]]]:
         """Yield each body whose ball is near obstacles, and these. One computation for all: most are far, every tick.
 
         The distance of a ball's middle is taken along the sides alone, which is never more than it is.
         """
-        if not self._bodies or not self._obstacles:
-            return
         turns = np.array([state.turns[moving] for moving in self._moving])
         middles = state.places[self._moving] + (turns @ self._middles)[:, :, 0]
+        reaches = self._reaches + within
+        if twists is not None:
+            spins = twists[1][self._moving]
+            ways = twists[0][self._moving] + np.cross(spins, middles)
+            reaches = reaches + np.sqrt((ways * ways).sum(axis=1)) + np.sqrt((spins * spins).sum(axis=1)) * self._reaches
         beyond = np.abs(middles @ self._sides.T - self._offsets) - self._halves  # bodies x (obstacles, 3)
         beyond = beyond.reshape(len(middles), -1, 3).max(axis=2)
-        near = beyond < (self._reaches + within)[:, None]
+        near = beyond < reaches[:, None]
         for body in np.flatnonzero(near.any(axis=1)).tolist():
             yield body, [self._obstacles[number] for number in np.flatnonzero(near[body]).tolist()]
 
@@ -135,12 +148,13 @@ def _distances(obstacle: Obstacle, places: Array) -> Array:
     return np.sqrt((outside * outside).sum(axis=1)) + np.minimum(beyond.max(axis=1), 0.0)  # type: ignore[no-any-return]
 
 
-def _outward(obstacle: Obstacle, place: Array) -> Array:
-    """Return the direction in which a place gets away from an obstacle the fastest."""
-    own = (place - obstacle.position) @ obstacle.rotation
+def _outward(obstacle: Obstacle, places: Array) -> Array:
+    """Return the directions in which places get away from an obstacle the fastest."""
+    own = (places - obstacle.position) @ obstacle.rotation
     beyond = np.abs(own) - obstacle.half
-    way = np.maximum(beyond, 0.0)
-    if not way.any():
-        way[int(np.argmax(beyond))] = 1.0
-    way = np.copysign(way, own)
-    return obstacle.rotation @ (way / np.sqrt(way @ way))  # type: ignore[no-any-return]
+    ways = np.maximum(beyond, 0.0)
+    inside = np.flatnonzero(~ways.any(axis=1))
+    ways[inside, beyond[inside].argmax(axis=1)] = 1.0
+    ways = np.copysign(ways, own)
+    ways /= np.sqrt((ways * ways).sum(axis=1))[:, None]
+    return ways @ obstacle.rotation.T  # type: ignore[no-any-return]

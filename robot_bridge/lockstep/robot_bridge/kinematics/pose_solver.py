@@ -29,6 +29,7 @@ MOST_GAPS: Final = 4  # that bind at once in the order of priority; of more, eac
 SMALL_GAP: Final = 0.05  # of the lengths of the gaps' gradients: those that bind together are damped below it
 DAMPING_GAP: Final = 0.02
 FLAT: Final = 1e-4  # m per rad (or m), of a gap that the joints do not change
+MOST_TRIES: Final = 12  # to keep all gaps with rates that the joints can have now
 KEPT: Final = 1e-6  # m/s, above what a gap allows
 
 
@@ -144,7 +145,7 @@ class PoseSolver:
         part = tuning.gain * (seconds + self._ramp / 2)  # the time in which a rate follows what is solved here
         residual = (part * tuning.bend * min(float(np.sqrt(error @ error)), tuning.longest), part * angle)
         slowest, fastest = self._speeds(here, share)
-        gaps = self._near(state)
+        gaps = self._near(state, before)
         rates, limited, bind = self._within(state, here, (wanted, turn), residual, (slowest, fastest), gaps)
         rates, near = _apart(gaps, rates)
         near = tuple(dict.fromkeys((*(gap.what for gap in bind), *near)))
@@ -152,7 +153,7 @@ class PoseSolver:
         rates = rates * (min(1.0, share / ratio) if ratio > 0.0 else 1.0)
         if before is not None:
             last, most = np.array(before), self._accelerations * seconds
-            rates = np.clip(rates, last - most, last + most)
+            rates = _changed(gaps, rates, (last - most, last + most), last * max(0.0, 1.0 - seconds / self._ramp))
         after = here + np.clip(rates, slowest, fastest) * seconds
         after = np.clip(after, np.minimum(self._lower, here), np.maximum(self._upper, here))
         made = tuple(((after - here) / seconds).tolist())
@@ -165,10 +166,14 @@ class PoseSolver:
         fastest = np.clip(gain * (self._upper - here), 0.0, self._rates)
         return slowest, fastest
 
-    def _near(self, state: ChainState) -> list[_Near]:
-        """Return what is near, the nearest last."""
+    def _near(self, state: ChainState, before: Sequence[float] | None) -> list[_Near]:
+        """Return what is near, the nearest last.
+
+        What comes fast is near from further away: joints need time to become slower.
+        """
         tuning = self._tuning
-        found = [gap for source in self._keeps_off for gap in source.gaps(state, tuning.safe)]
+        ahead = None if before is None or not any(before) else np.array(before) / tuning.limit_gain
+        found = [gap for source in self._keeps_off for gap in source.gaps(state, tuning.safe, ahead)]
         near = []
         for gap in sorted(found, key=lambda gap: -gap.distance):
             steep = float(np.sqrt(gap.gradient @ gap.gradient))
@@ -269,6 +274,27 @@ def _apart(gaps: Sequence[_Near], rates: Array) -> tuple[Array, tuple[str, ...]]
             rates = rates + gap.gradient * (above / gap.steep**2)
             near.append(gap.what)
     return rates, tuple(near)
+
+
+def _changed(gaps: Sequence[_Near], rates: Array, within: tuple[Array, Array], braked: Array) -> Array:
+    """Return rates that the joints can have now, the nearest to those wanted which keep the gaps as well as they can.
+
+    A joint that changes more slowly than the others might otherwise lead towards what the others lead away from.
+    `within`: the least and the most that each rate can be. `braked`: what is left of the rates where all joints brake.
+    """
+    lowest, highest = within
+    rates = np.clip(rates, lowest, highest)
+    for _ in range(MOST_TRIES):
+        if (gap := _narrowed(gaps, rates)) is None:
+            return rates
+        above = -float(gap.gradient @ rates) - gap.most
+        rates = np.clip(rates + gap.gradient * (above / gap.steep**2), lowest, highest)
+    return braked if _excess(gaps, braked) < _excess(gaps, rates) else rates
+
+
+def _excess(gaps: Sequence[_Near], rates: Array) -> float:
+    """Return by how much these rates narrow a gap faster than it allows, m/s."""
+    return max((-float(gap.gradient @ rates) - gap.most for gap in gaps), default=0.0)
 
 
 def _shortened(vector: Array, longest: float) -> Array:

@@ -24,6 +24,7 @@ class FakeDevice:
         self.on_act: Callable[[], None] = _nothing
         self.on_observe: Callable[[], None] = _nothing
         self.has_torque = True
+        self.yields: dict[str, float] = {}  # by which a place differs from its goal, under a load
 
     def camera(self, name: str) -> Shots:
         raise AssertionError(f"no camera {name} is read apart")
@@ -36,7 +37,7 @@ class FakeDevice:
     def act(self, action: dict[str, float]) -> None:
         self.on_act()
         if self.has_torque:
-            self.places.update(action)
+            self.places.update({name: goal + self.yields.get(name, 0.0) for name, goal in action.items()})
         self._note("act", action)
 
     def torque(self, on: bool) -> None:

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 
 import pytest
 
+from lockstep.robot_bridge.control.limits.axis_shaper import AxisShaper
 from lockstep.robot_bridge.errors import RobotUnavailable, SettingsError
 from lockstep.robot_bridge.robots.base import Measurement, Robot
 from lockstep.robot_bridge.robots.lerobot import drive
@@ -38,6 +39,15 @@ def until_unknown(robot: Robot) -> Measurement:
             break
         time.sleep(0.001)
     return measured
+
+
+def until_measured(robot: Robot, axes: list[float]) -> None:
+    """Wait until the thread has read these places."""
+    for _ in range(5000):
+        if robot.measured_axes() == axes:
+            return
+        time.sleep(0.001)
+    raise AssertionError(f"{robot.measured_axes()} is not {axes}")
 
 
 def tick_on(robot: Robot) -> None:
@@ -83,6 +93,37 @@ def test_a_stop_holds_the_goals_and_no_value_moves_the_robot_until_its_reset(rob
     robot.reset()
     robot.apply([11.0, 0.0])
     device.wait("act", {"pan.pos": 11.0, "x.vel": 0.0}, after=seen)
+
+
+def test_a_stop_and_its_reset_keep_the_grip_and_hold_a_loaded_arm_where_it_was(robots: list[Robot]) -> None:
+    """The motors hang below their goals, or a block keeps the jaws from theirs: both goals stay what they were."""
+    device = FakeDevice(at=30.0)
+    robot = make(robots, device)
+    assert robot.goals() == pytest.approx((30.0, 30.0))  # told at the start to be where they are
+    device.yields = {"pan.pos": -4.0, "gripper.pos": 15.0}
+    robot.apply([10.0, 5.0])
+    seen = device.wait("act", {"pan.pos": 10.0, "gripper.pos": 5.0})
+    device.wait("observe", None, after=seen)
+    shaper = AxisShaper(robot.describe().axes, hold=0.5)
+    robot.stop()
+    robot.reset()
+    until_measured(robot, [6.0, 20.0])
+    assert shaper.begin(robot.measured_axes(), robot.goals())
+    assert shaper.goals == [10.0, 5.0]
+
+
+def test_motors_that_had_no_torque_have_no_goal_from_before(robots: list[Robot]) -> None:
+    device = FakeDevice()
+    robot = make(robots, device, LeRobotSettings(rate=200, stop="torque_off"))
+    robot.apply([10.0, 10.0])
+    seen = device.wait("act", {"pan.pos": 10.0, "gripper.pos": 10.0})
+    robot.stop()
+    seen = device.wait("torque", False, after=seen)
+    device.places["pan.pos"] = -30.0
+    robot.reset()
+    device.wait("torque", True, after=seen)
+    until_measured(robot, [-30.0, 10.0])
+    assert robot.goals() == [-30.0, 10.0]
 
 
 def test_a_stop_takes_the_torque_only_where_the_settings_say_so(robots: list[Robot]) -> None:

@@ -6,6 +6,7 @@ export interface ClutchAxis {
   readonly index: number; // of the axis in the description
   readonly axis: Pick<Axis, "reach" | "wrap">;
   readonly scale: number; // goal for the device's motion, in units of the axis; negative: mirrored
+  readonly settling?: number; // s, of its pose
 }
 
 /** The bound places of one axis. Places of an axis with `wrap` are counted on past its period: a turn keeps its direction. */
@@ -18,12 +19,13 @@ interface Binding extends ClutchAxis {
 }
 
 /** The measured values and applied goals that a clutch binds to. */
-type Measured = Pick<Feedback, "axes" | "goals" | "neutral_needed" | "stop">;
+type Measured = Pick<Feedback, "at_rest" | "axes" | "goals" | "neutral_needed" | "stop" | "time">;
 
 /**
  * A clutch between a device that has a pose and goal axes (docs/robot-link.md, "The clutch"): engaging moves nothing,
  * then the goals follow the device. It holds no clock and no connection. `observe` every feedback, `engage` when the
- * operator asks for it, and drive what `goals` returns.
+ * operator asks for it, and drive what `goals` returns. It engages only while the goals of its axes stand still: a goal
+ * that still brakes, or a pose that has not settled, is not where the robot comes to rest.
  *
  * A goal further than a share of the axis' reach from the newest measured value is clipped there; the device's motion
  * counts on meanwhile. Call `release` when the operator lets go, and when the seat or the arming is lost. The clutch
@@ -32,7 +34,9 @@ type Measured = Pick<Feedback, "axes" | "goals" | "neutral_needed" | "stop">;
  */
 export class Clutch {
   private readonly bindings: readonly Binding[];
+  private readonly settling: number; // s
   private newest: Measured | null = null;
+  private stoodAt = 0; // robot's time of the first feedback with the goals of the newest one
   private isEngaged = false;
   private clippedAxes: readonly number[] = [];
 
@@ -45,6 +49,7 @@ export class Clutch {
       measured: 0,
       applied: 0,
     }));
+    this.settling = Math.max(0, ...axes.map(({ settling = 0 }) => settling));
   }
 
   /** Whether the goals follow the device. */
@@ -63,6 +68,9 @@ export class Clutch {
       this.lostFeedback();
       return;
     }
+    const { newest } = this;
+    if (newest === null || this.bindings.some(({ index }) => feedback.goals[index] !== newest.goals[index]))
+      this.stoodAt = feedback.time;
     this.newest = feedback;
     if (!this.isEngaged) return;
     for (const each of this.bindings) {
@@ -73,12 +81,14 @@ export class Clutch {
 
   /**
    * Binds the device's readings, one for each axis of the clutch, to the applied goals of the newest feedback; again, if
-   * it is engaged. Says whether it is engaged now: not without a feedback, and not with a reading that is not known.
+   * it is engaged. Says whether it is engaged now: not without a feedback, not with a reading that is not known, and not
+   * before the goals stand still.
    */
   engage(device: readonly AxisValue[]): boolean {
     this.release();
     const { newest } = this;
     if (newest === null || !isKnown(device, this.bindings.length)) return false;
+    if (!newest.at_rest && newest.time - this.stoodAt <= this.settling) return false;
     for (const [at, each] of this.bindings.entries()) {
       each.origin = each.applied = newest.goals[each.index] ?? 0;
       each.measured = each.origin + wayTo(each.axis, each.origin, newest.axes[each.index] ?? 0);
@@ -136,9 +146,16 @@ export function clutchOf(
     const index = description.axes.findIndex((axis) => axis.name === name);
     const axis = description.axes[index];
     if (axis?.kind !== "goal" || !Number.isFinite(scale)) return null;
-    axes.push({ index, axis, scale });
+    axes.push({ index, axis, scale, settling: settlingOf(description, name) });
   }
   return new Clutch(axes);
+}
+
+/** For how long the robot may still come nearer to a goal of this axis that stands still, s. */
+export function settlingOf({ poses }: RobotDescription, axis: string): number {
+  return (
+    poses.find(({ position, rotation }) => [...position, ...rotation].includes(axis))?.settling ?? 0
+  );
 }
 
 function isKnown(device: readonly AxisValue[], count: number): device is readonly number[] {

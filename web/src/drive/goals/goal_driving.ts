@@ -1,6 +1,6 @@
 import { inputFor, type HeldInputs } from "../axis_mapping";
 import type { Axis, ControlLayer, Feedback, Refusal, RobotDescription } from "../../protocol/wire";
-import { Clutch } from "./clutch";
+import { Clutch, settlingOf } from "./clutch";
 import type { AxisValue } from "./goal_range";
 import type { GoalRefusal } from "./goal_refusal";
 import { createJog, stepJog, type AxisPlace, type Jog } from "./jog";
@@ -91,11 +91,11 @@ export class GoalDriving {
   private takeRobot(description: RobotDescription): void {
     this.release();
     this.description = description;
-    this.axes = description.axes.flatMap((axis, index) =>
-      axis.kind === "goal"
-        ? [{ index, axis, jog: createJog(), clutch: new Clutch([{ index, axis, scale: 1 }]) }]
-        : [],
-    );
+    this.axes = description.axes.flatMap((axis, index) => {
+      if (axis.kind !== "goal") return [];
+      const settling = settlingOf(description, axis.name);
+      return [{ index, axis, jog: createJog(), clutch: new Clutch([{ index, axis, scale: 1, settling }]) }];
+    });
   }
 
   /** Goal, and the share of the axis' largest speed that it needs. */
@@ -107,8 +107,9 @@ export class GoalDriving {
     now: number,
   ): readonly [AxisValue, number] {
     const place = placeOf(feedback, index, axis);
+    clutch.observe(feedback); // also while nobody drags: it has to see that its goal stands still
     const travel = place === null ? undefined : held.sliders?.travels[axis.name];
-    const dragged = travel === undefined ? null : drag(clutch, axis, travel, feedback);
+    const dragged = travel === undefined ? null : drag(clutch, axis, travel);
     if (travel === undefined || posed !== null) clutch.release();
     const led = posed ?? dragged;
     const push = held.sliders?.pushes[axis.name] ?? inputFor(axis, layer, held);
@@ -131,9 +132,8 @@ function replaced({ axes, poses }: RobotDescription, posed: readonly AxisValue[]
 }
 
 /** `travel`: of the slider since it was taken, as a share of the axis' range. */
-function drag(clutch: Clutch, axis: Axis, travel: number, feedback: Feedback): AxisValue {
+function drag(clutch: Clutch, axis: Axis, travel: number): AxisValue {
   const reading = [travel * (axis.maximum - axis.minimum)];
-  clutch.observe(feedback);
   if (!clutch.engaged) clutch.engage(reading);
   return clutch.goals(reading)[0] ?? null;
 }

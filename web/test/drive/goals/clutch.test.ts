@@ -6,7 +6,13 @@ import { randomNumbers } from "../../random";
 import { readVectors } from "../../vectors";
 
 interface Step {
-  readonly feedback?: { axes: number[]; goals: number[]; neutral_needed?: boolean };
+  readonly feedback?: {
+    axes: number[];
+    goals: number[];
+    neutral_needed?: boolean;
+    at_rest?: boolean;
+    time?: number;
+  };
   readonly engage?: AxisValue[];
   readonly move?: AxisValue[];
   readonly release?: true;
@@ -18,7 +24,7 @@ interface Step {
 
 interface Case {
   readonly name: string;
-  readonly axes: readonly { scale: number; wrap: number | null; reach: number }[];
+  readonly axes: readonly { scale: number; wrap: number | null; reach: number; settling?: number }[];
   readonly steps: readonly Step[];
 }
 
@@ -46,7 +52,7 @@ function play(clutch: Clutch, step: Step, about: string): void {
 
 describe("the clutch does what the shared cases say", () => {
   it.each(cases)("$name", ({ axes, steps }) => {
-    const clutch = new Clutch(axes.map(({ scale, ...axis }, index) => ({ index, axis, scale })));
+    const clutch = new Clutch(axes.map(({ scale, settling = 0, ...axis }, index) => ({ index, axis, scale, settling })));
     steps.forEach((step, number) => play(clutch, step, `step ${number}: ${JSON.stringify(step)}`));
   });
 });

@@ -44,6 +44,7 @@ class LeRobotRobot(Robot):
             number for number, axis in enumerate(description.axes) if axis.kind == "goal" and axis.unit == DEGREES
         ]
         self._wanted: tuple[float, ...] | None = None
+        self._held: tuple[float, ...] | None = None  # goals that the motors have; None: none since they had no torque
         self._is_stopped = False
         together = [camera.name for camera in facts.cameras if not camera.apart]
         self._bus = BusLoop(
@@ -82,7 +83,7 @@ class LeRobotRobot(Robot):
 
     def apply(self, values: Sequence[float]) -> None:
         if not self._is_stopped:
-            self._wanted = tuple(values)
+            self._wanted = self._held = tuple(values)
             self._bus.want(self._wanted)
 
     def tick(self) -> None:
@@ -112,6 +113,10 @@ class LeRobotRobot(Robot):
     def measured_axes(self) -> Sequence[float]:
         return self._values(self._fresh(time.monotonic()))
 
+    def goals(self) -> Sequence[float]:
+        """Return the goals that the motors were told last: they hold the arm and squeeze there, also while stopped."""
+        return self.measured_axes() if self._held is None else self._held
+
     def positions(self) -> Sequence[float]:
         return self._joints(self.measured_axes())
 
@@ -124,6 +129,7 @@ class LeRobotRobot(Robot):
     def stop(self) -> None:
         self._is_stopped = True
         if self._settings.stop == "torque_off":
+            self._held = None
             self._bus.switch_torque(False)
         elif self._wanted is not None:
             self._bus.want(self._at_rest(self._wanted))
@@ -146,7 +152,8 @@ class LeRobotRobot(Robot):
         """Tell the motors to be where they are: LeRobot switches them on, and they may have a goal from before."""
         places = self.measured_axes()
         if all(map(math.isfinite, places)):
-            self._bus.want(self._at_rest(places))
+            self._held = self._at_rest(places)
+            self._bus.want(self._held)
 
     def _at_rest(self, values: Sequence[float]) -> tuple[float, ...]:
         return tuple(value if rest is None else rest for value, rest in zip(values, self._rest, strict=True))
