@@ -22,7 +22,7 @@ Array = npt.NDArray[np.float64]
 GRIP: Final = (0.2, 1.3, -0.4)  # m, where the right hand is first
 STEP, TURN = 0.015, 0.06  # m and rad from one look to the next: a calm hand
 SAME_PLACE, SAME_TURN = 0.0005, 0.003  # m and rad, within which it holds still
-CLOSE: Final = 0.03  # rad, of the gripper
+CLOSE: Final = 0.01  # rad, of the gripper
 FULL: Final = 2.5  # rad/s, of the gripper with the trigger pulled
 # WebXR has x to the right, y up and -z ahead; the robot x ahead, y to the left and z up.
 TO_SPACE: Final = np.array(((0.0, -1.0, 0.0), (0.0, 0.0, 1.0), (-1.0, 0.0, 0.0)))

@@ -10,7 +10,7 @@ from lockstep.bench.pick_place.script import by_name
 from lockstep.protocol.description import Axis, RobotDescription
 from lockstep.protocol.messages import Feedback
 
-__all__ = ["DPAD", "PadHand", "PadMove", "deflection", "gain_for"]
+__all__ = ["DPAD", "SLOW_SHARE", "PadHand", "PadMove", "deflection", "gain_for"]
 
 STICKS: Final = {"left_x": 0, "left_y": 1, "right_x": 2, "right_y": 3}  # W3C standard mapping: numbers of axes
 DPAD: Final = {"dpad_x": (14, 15), "dpad_y": (12, 13)}  # numbers of buttons: negative, positive
@@ -18,7 +18,9 @@ LEFT_TRIGGER, RIGHT_TRIGGER = 6, 7
 DEADZONE, EXPO = 0.12, 0.35  # of the page's sticks and triggers (docs/gamepads.md)
 CLOSE: Final = {"m": 0.002, "rad": 0.03}  # from where it is to be: the stick is let go
 # The cross knows no half: far away it is pressed as it is, near with the slow button, in between nobody touches it.
-FAR_TURN, NEAR_TURN = 0.5, 0.06  # rad
+FAR_TURN, NEAR_TURN = 0.5, 0.07  # rad
+SLOW_SHARE: Final = 0.15  # of full speed, with the slow button held
+SLOW_ENOUGH: Final = 0.3  # of full speed, below which the sticks go on while it is held
 TURNED: Final = 0.1  # rad, of the measured tool: as far as a person can see it
 GRIPPED: Final = 0.05  # rad, of the gripper's applied goal
 STANDS: Final = 0.004  # rad, from one feedback to the next
@@ -45,7 +47,7 @@ class PadMove:
 
 def gain_for(delay: float) -> float:
     """Return how fast a hand goes to what it sees `delay` s late, in 1/s: it must not go past it."""
-    return min(max(0.3 / delay, GAINS[0]), GAINS[1]) if delay > 0 else GAINS[1]
+    return min(max(0.8 / delay, GAINS[0]), GAINS[1]) if delay > 0 else GAINS[1]
 
 
 def deflection(share: float) -> float:
@@ -92,6 +94,7 @@ class PadHand:
         here, there = by_name(self._description, feedback.axes), by_name(self._description, feedback.goals)
         ways = {name: goal - (here[name] if name != "gripper" else there[name] or 0.0) for name, goal in wanted.items()}
         self._pushed = set()
+        shares: dict[str, float] = {}  # of full speed, by the pad's part
         crosses: dict[str, tuple[str, float]] = {}
         for binding in self._description.layers[0].bindings:
             name, pad = binding.axis, binding.pad or ""
@@ -101,20 +104,22 @@ class PadHand:
             if pad in DPAD:
                 crosses[pad] = name, way
             elif abs(way) > CLOSE[self._axes[name].unit]:
-                share = _share(way, gain, self._axes[name])
+                shares[pad] = _share(way, gain, self._axes[name])
                 self._push(name)
-                if pad in STICKS:
-                    move.sticks[STICKS[pad]] = deflection(share)
-                else:
-                    move.triggers[RIGHT_TRIGGER if share > 0 else LEFT_TRIGGER] = abs(deflection(share))
-        self._press_cross(move, crosses)
+        self._press_cross(move, crosses, max(map(abs, shares.values()), default=0.0))
+        for pad, share in shares.items():
+            moved = deflection(share / SLOW_SHARE if move.slow else share)
+            if pad in STICKS:
+                move.sticks[STICKS[pad]] = moved
+            else:
+                move.triggers[RIGHT_TRIGGER if moved > 0 else LEFT_TRIGGER] = abs(moved)
         return move
 
-    def _press_cross(self, move: PadMove, crosses: Mapping[str, tuple[str, float]]) -> None:
-        """Press the cross for what is far; for what is near, slowly, once the sticks are let go."""
+    def _press_cross(self, move: PadMove, crosses: Mapping[str, tuple[str, float]], fastest: float) -> None:
+        """Press the cross for what is far; for what is near, slowly, once the sticks ask for little (`fastest`) too."""
         far = {pad: each for pad, each in crosses.items() if abs(each[1]) > FAR_TURN}
         near = {pad: each for pad, each in crosses.items() if abs(each[1]) > NEAR_TURN}
-        chosen = far or ({} if move.sticks else near)
+        chosen = far or (near if fastest < SLOW_ENOUGH else {})
         move.slow = bool(chosen) and not far
         for pad, (name, way) in chosen.items():
             move.pressed.add(DPAD[pad][way > 0])

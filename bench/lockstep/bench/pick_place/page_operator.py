@@ -11,13 +11,15 @@ from collections.abc import AsyncIterator, Mapping
 from contextlib import asynccontextmanager, suppress
 from typing import Any, Final
 
+from playwright.async_api import Error
+
 from lockstep.bench.browsers.chromium import running_chromium
 from lockstep.bench.browsers.console_page import RB, START, ConsolePage, open_console
 from lockstep.bench.browsers.headset_page import Headset, open_headset
 from lockstep.bench.experiment.browser import robot_description
 from lockstep.bench.pick_place.controller_hand import ControllerHand
 from lockstep.bench.pick_place.operator import OperatorFailed, PageHandName, Pictures
-from lockstep.bench.pick_place.pad_hand import DPAD, PadHand, PadMove, gain_for
+from lockstep.bench.pick_place.pad_hand import DPAD, SLOW_SHARE, PadHand, PadMove, gain_for
 from lockstep.bench.pick_place.script import Hand, PickAndPlace, ToolHand
 from lockstep.protocol.description import RobotDescription
 from lockstep.protocol.messages import Feedback
@@ -29,7 +31,6 @@ CONNECT_SECONDS: Final = 60.0
 ARM_SECONDS: Final = 90.0  # a bad network takes the robot away for a while
 ARM_TRY_SECONDS: Final = 3.0
 ENTER_TRIES: Final = 3
-SLOW_PERCENT: Final = 10  # of full speed, with the pad's slow button held
 SLOW = 4  # W3C standard mapping
 HEADSET_WINDOW = (640, 320)  # both eyes: where the processor draws, each pixel costs
 LOOK = "() => ({ page: window.lockstep.stats(), at: window.lockstep.feedbacks().at(-1)?.at ?? null })"
@@ -88,10 +89,10 @@ class PageOperator(ABC):
         return Pictures(sum(each["rendered"] for each in streams), sum(each["violations"] for each in streams))
 
     async def operate(self, task: PickAndPlace, held_up: Counter[str]) -> None:
-        await self._until_armed()
         event: int | None = None
         wanted: dict[str, float] = {}
         try:
+            await self._until_armed()
             while True:
                 look = await self.console.page.evaluate(LOOK)
                 seen, feedback = look["page"], self._feedback(look)
@@ -105,8 +106,11 @@ class PageOperator(ABC):
                         return
                 await self.follow(wanted, feedback, seen)
                 await asyncio.sleep(LOOK_SECONDS)
+        except (Error, AssertionError) as error:
+            raise OperatorFailed(f"the page failed: {error}") from error
         finally:
-            await self.let_go()
+            with suppress(Error):
+                await self.let_go()
 
     def _wanted(self, task: PickAndPlace, feedback: Feedback) -> dict[str, float]:
         values = zip(self.description.axes, task.values(feedback), strict=True)
@@ -152,7 +156,7 @@ class PadOperator(PageOperator):
         """Let the slow button be slow enough for small turns, on the pads' sheet."""
         page = self.console.page
         await page.keyboard.press("KeyG")
-        await page.get_by_label("Slow").fill(str(SLOW_PERCENT))
+        await page.get_by_role("slider", name="Slow", exact=True).fill(str(round(100 * SLOW_SHARE)))
         await page.get_by_role("button", name="Close").click()
 
     async def arm(self) -> None:
