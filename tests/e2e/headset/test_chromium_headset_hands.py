@@ -7,8 +7,8 @@ import pytest
 import pytest_asyncio
 from playwright.async_api import Browser
 
+from lockstep.bench.browsers.headset_page import TRIES, Headset, open_headset
 from tests.e2e.conftest import RobotKeeper
-from tests.e2e.headset.headset import TRIES, Headset, open_headset
 from tests.e2e.headset.posed_arm import PosedArm
 from tests.support.stack import Stack, running_stack
 

@@ -6,7 +6,7 @@ import pytest
 import pytest_asyncio
 from playwright.async_api import Browser
 
-from tests.e2e.headset.headset import Headset, open_headset
+from lockstep.bench.browsers.headset_page import Headset, open_headset
 from tests.support.stack import Stack, running_stack
 
 pytestmark = [pytest.mark.browser, pytest.mark.timeout(240)]

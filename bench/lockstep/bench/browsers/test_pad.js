@@ -44,6 +44,11 @@
       slots[index].buttons[at] = { pressed, touched: pressed, value: pressed ? 1 : 0 };
       slots[index].timestamp = performance.now();
     },
+    // A trigger, which is pulled by a share of its way.
+    pull(at, value, index = 0) {
+      slots[index].buttons[at] = { pressed: value > 0, touched: value > 0, value };
+      slots[index].timestamp = performance.now();
+    },
     tilt(axis, value, index = 0) {
       slots[index].axes[axis] = value;
       slots[index].timestamp = performance.now();

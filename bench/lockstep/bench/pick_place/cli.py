@@ -12,7 +12,8 @@ import typer
 import uvloop
 
 from lockstep.bench.harness.processes import ProcessFailed
-from lockstep.bench.pick_place.run import Choices, HandName, pick_and_place
+from lockstep.bench.pick_place.operator import HandName, OperatorFailed
+from lockstep.bench.pick_place.run import Choices, pick_and_place
 from lockstep.client.errors import ConsoleError
 from lockstep.emulator.errors import ProfileError
 
@@ -31,7 +32,8 @@ def command(
     hand: Annotated[
         HandName,
         typer.Option(
-            help="tool: goals of the tool's pose. leader: a leader arm through the clutch. policy: joint positions."
+            help="tool: goals of the tool's pose. leader: a leader arm through the clutch. policy: joint positions. "
+            "pad, headset: the page in Chromium with an emulated gamepad, or with an emulated headset's controllers."
         ),
     ] = "tool",
     seed: Annotated[int, typer.Option(help="Of the network.")] = 1,
@@ -44,8 +46,8 @@ def command(
         figures = uvloop.run(pick_and_place(Choices(network, times, hand, seed, pictures, keep), _say))
     except ProfileError as error:
         raise typer.BadParameter(str(error)) from error
-    except (ProcessFailed, ConsoleError, TimeoutError) as error:
-        _say(str(error) or "a block took too long")
+    except (ProcessFailed, ConsoleError, OperatorFailed, TimeoutError, AssertionError) as error:
+        _say(str(error) or "the robot does not say that the bowl is empty")
         raise typer.Exit(EXIT_FAILED) from error
     _say(_summary(figures))
     if json_to == "-":

@@ -31,6 +31,7 @@ ROTATION: Final = ("tool.rx", "tool.ry", "tool.rz")
 
 
 class Motion(NamedTuple):
+    name: str  # what it does, for people
     goals: dict[str, float]  # by axis: of the tool, in m and rad, or of the gripper
     must_arrive: bool  # the tool, measured
 
@@ -43,15 +44,15 @@ def motions(name: str, place: Place | None = None) -> Iterator[Motion]:
     aligned = (block.yaw - facing + quarter / 2) % quarter - quarter / 2 + facing
     down = dict(zip(ROTATION, _pointing_down(aligned), strict=True))
     over = dict(zip(ROTATION, _pointing_down(math.atan2(bowl[1], bowl[0] - AXIS)), strict=True))
-    yield Motion({"gripper": OPEN}, must_arrive=False)
-    yield Motion(_at(block.x, block.y, ABOVE) | down, must_arrive=True)
-    yield Motion(_at(block.x, block.y, GRIP) | down, must_arrive=True)
-    yield Motion({"gripper": SHUT}, must_arrive=False)
-    yield Motion(_at(block.x, block.y, CARRY) | down, must_arrive=True)
-    yield Motion(_at(*bowl, CARRY) | over, must_arrive=True)
-    yield Motion(_at(*bowl, OVER_BOWL) | over, must_arrive=True)
-    yield Motion({"gripper": OPEN}, must_arrive=False)
-    yield Motion(_at(*bowl, CARRY) | over, must_arrive=True)
+    yield Motion("opens the fingers", {"gripper": OPEN}, must_arrive=False)
+    yield Motion("goes above the block", _at(block.x, block.y, ABOVE) | down, must_arrive=True)
+    yield Motion("goes down to the block", _at(block.x, block.y, GRIP) | down, must_arrive=True)
+    yield Motion("closes the fingers", {"gripper": SHUT}, must_arrive=False)
+    yield Motion("lifts the block", _at(block.x, block.y, CARRY) | down, must_arrive=True)
+    yield Motion("carries it above the bowl", _at(*bowl, CARRY) | over, must_arrive=True)
+    yield Motion("goes down into the bowl", _at(*bowl, OVER_BOWL) | over, must_arrive=True)
+    yield Motion("lets go of the block", {"gripper": OPEN}, must_arrive=False)
+    yield Motion("goes up", _at(*bowl, CARRY) | over, must_arrive=True)
 
 
 def _at(x: float, y: float, z: float) -> dict[str, float]:

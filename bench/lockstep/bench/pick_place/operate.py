@@ -1,5 +1,6 @@
 """Answers each feedback of a console with the next command of a task, until the task is at its end."""
 
+from collections import Counter
 from typing import Final, Protocol
 
 from lockstep.client import CommandRefused, Console, NotArmed
@@ -23,8 +24,10 @@ class Task(Protocol):
         """Return the values of the command that answers this feedback."""
 
 
-async def operate(console: Console, task: Task) -> int:
+async def operate(console: Console, task: Task, held_up: Counter[str] | None = None) -> int:
     """Drive until the task is done or has failed; return how often the robot had to be armed anew.
+
+    `held_up`: counts why.
 
     Raises:
         CommandRefused: for another reason than that somebody was held up.
@@ -37,6 +40,8 @@ async def operate(console: Console, task: Task) -> int:
         except (CommandRefused, NotArmed) as refused:
             if isinstance(refused, CommandRefused) and refused.reason not in PASSING:
                 raise
+            if held_up is not None:
+                held_up[refused.reason if isinstance(refused, CommandRefused) else "not armed"] += 1
             feedback, armed = await _armed(console), armed + 1
     return armed
 

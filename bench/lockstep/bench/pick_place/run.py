@@ -3,33 +3,33 @@
 import asyncio
 import shutil
 import time
+from collections import Counter
 from collections.abc import AsyncIterator, Callable
-from contextlib import asynccontextmanager
+from contextlib import asynccontextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final, Literal
+from typing import Any, Final
 
 import httpx
 
 from lockstep.bench.experiment.choices import media_of
 from lockstep.bench.experiment.stage import Stage, running_stage
-from lockstep.bench.pick_place.hands import LEADER_SCALES, LeaderHand, PolicyHand
+from lockstep.bench.pick_place.headless_operator import headless_operator
 from lockstep.bench.pick_place.judge import Judged, judge
 from lockstep.bench.pick_place.motions import BLOCKS
-from lockstep.bench.pick_place.operate import operate
-from lockstep.bench.pick_place.script import Hand, PickAndPlace, ToolHand
-from lockstep.client import Console
+from lockstep.bench.pick_place.operator import HandName, Operator, OperatorFailed
+from lockstep.bench.pick_place.script import PickAndPlace
+from lockstep.client import CommandRefused, ConsoleError
 from lockstep.emulator.impairment.profile import load_profile
 
-__all__ = ["Choices", "HandName", "pick_and_place", "recorder_of"]
+__all__ = ["Choices", "pick_and_place", "recorder_of"]
 
-HandName = Literal["tool", "leader", "policy"]
 ROBOT: Final = "so101"
 NO_NETWORK: Final = "perfect"
-CONNECT_SECONDS: Final = 60.0  # through a bad network, with a busy machine
-SILENCE_SECONDS: Final = 15.0
-BLOCK_SECONDS: Final = 240.0
 LANDS_SECONDS: Final = 15.0  # until the robot says that the block lies in the bowl
+RESET_SECONDS: Final = 60.0
+
+Say = Callable[[str], None]
 
 
 @dataclass(frozen=True)
@@ -48,34 +48,22 @@ class Choices:
     keep: Path | None = None
 
 
-async def pick_and_place(choices: Choices, say: Callable[[str], None]) -> dict[str, Any]:
+async def pick_and_place(choices: Choices, say: Say) -> dict[str, Any]:
     """Put blocks into the bowl, and return the figures of each.
 
     Raises:
         ProcessFailed, ConsoleError, TimeoutError: a part did not start, or was lost.
     """
     profile = load_profile(choices.network or NO_NETWORK)
-    async with running_stage(
-        ROBOT, profile, media_of(profile), choices.seed, robot_link=bool(choices.network)
-    ) as stage:
-        link = stage.link if choices.network else stage.near_link
-        async with (
-            recorder_of(stage.near_link) as recorder,
-            Console(
-                link,
-                video=2 if choices.pictures else False,
-                audio=False,
-                decode=choices.pictures,
-                name=choices.hand,
-                connect_seconds=CONNECT_SECONDS,
-                silence_seconds=SILENCE_SECONDS,
-            ) as console,
-        ):
-            await console.take_seat()
-            stage.network.begin()
-            session = _Session(stage, console, recorder, choices, say)
-            runs = [await session.run(number) for number in range(choices.times)]
-            statistics = console.stats()
+    async with (
+        running_stage(ROBOT, profile, media_of(profile), choices.seed, robot_link=bool(choices.network)) as stage,
+        recorder_of(stage.near_link) as recorder,
+        _operator(stage, choices) as operator,
+    ):
+        stage.network.begin()
+        session = _Session(stage, operator, recorder, choices, say)
+        runs = [await session.run(number) for number in range(choices.times)]
+        pictures = await operator.pictures()
     return {
         "network": choices.network,
         "hand": choices.hand,
@@ -84,41 +72,59 @@ async def pick_and_place(choices: Choices, say: Callable[[str], None]) -> dict[s
         "jumps": sum(run["refusals"].get("jump", 0) for run in runs),
         "largest_step": max(run["largest_step"] for run in runs),
         "verified": sum(run["verified"] for run in runs),
-        "pictures": sum(each.rendered for each in statistics.streams),
-        "violations": sum(each.violations for each in statistics.streams),
+        "pictures": pictures.rendered,
+        "violations": pictures.violations,
         "runs": runs,
     }
 
 
+@asynccontextmanager
+async def _operator(stage: Stage, choices: Choices) -> AsyncIterator[Operator]:
+    link = stage.link if choices.network else stage.near_link
+    name = choices.hand
+    if name == "pad" or name == "headset":
+        from lockstep.bench.pick_place.page_operator import page_operator  # needs Playwright, which only tests install
+
+        async with page_operator(link, stage.near_link, name) as page:
+            yield page
+    else:
+        async with headless_operator(link, name, pictures=choices.pictures) as client:
+            yield client
+
+
 class _Session:
     def __init__(
-        self, stage: Stage, console: Console, recorder: httpx.AsyncClient, choices: Choices, say: Callable[[str], None]
+        self, stage: Stage, operator: Operator, recorder: httpx.AsyncClient, choices: Choices, say: Say
     ) -> None:
-        self._stage, self._console, self._recorder = stage, console, recorder
+        self._stage, self._operator, self._recorder = stage, operator, recorder
         self._choices, self._say = choices, say
+        self._in_bowl: int | None = None  # blocks that lie in the bowl; None: nobody knows
 
     async def run(self, number: int) -> dict[str, Any]:
         """Put one block into the bowl, beside those of the two runs before it, while it is recorded."""
-        name, before = list(BLOCKS)[number % len(BLOCKS)], number % len(BLOCKS)
-        if not before:
-            await self._console.act("reset_scene")
-            await self._in_bowl(0)
+        name = list(BLOCKS)[number % len(BLOCKS)]
+        if not number % len(BLOCKS) or self._in_bowl is None:
+            await self._reset()
         recording = await self._record(f"{self._choices.hand} {number + 1} {name}")
-        task, began = PickAndPlace(self._console.description, name, self._hand()), time.monotonic()
-        async with asyncio.timeout(BLOCK_SECONDS):
-            armed = await operate(self._console, task)
+        operator, held_up = self._operator, Counter[str]()
+        task = PickAndPlace(operator.description, name, operator.hand(), longest=operator.longest)
+        began = time.monotonic()
+        failed = await self._operate(task, held_up)
         seconds = time.monotonic() - began
-        placed = task.done and await self._in_bowl(before + 1)
+        placed = not failed and await self._lands()
+        if not failed and not placed:
+            failed = "all motions are done, and the robot does not say that the block lies in the bowl"
         judged = await self._judged(recording)
-        self._say(_line(number, name, placed, judged, seconds, armed) + (f": {task.failed}" if task.failed else ""))
+        self._say(_line(number, name, placed, judged, seconds, held_up) + (f": {failed}" if failed else ""))
         return {
             "block": name,
             "placed": placed,
-            "failed": task.failed,
+            "failed": failed,
             "seconds": round(seconds, 1),
             "events": judged.events,
             "events_per_second": round(judged.events / judged.seconds, 1) if judged.seconds else 0.0,
-            "armed_anew": armed,
+            "armed_anew": held_up.total(),
+            "held_up": dict(held_up),
             "refusals": dict(judged.refusals),
             "largest_step": round(judged.step, 3),
             "largest_step_axis": judged.step_axis,
@@ -126,22 +132,40 @@ class _Session:
             "broken": [check for check, each in judged.verdict.checks.items() if not each.ok],
         }
 
-    def _hand(self) -> Hand:
-        console = self._console
-        if self._choices.hand == "leader":
-            return LeaderHand(console.description, console.clutch(LEADER_SCALES))
-        return PolicyHand(console.description) if self._choices.hand == "policy" else ToolHand(console.description)
-
-    async def _in_bowl(self, count: int) -> bool:
-        """Wait until the robot says that so many blocks lie in the bowl."""
+    async def _operate(self, task: PickAndPlace, held_up: Counter[str]) -> str:
+        """Return what went wrong; "" if nothing did."""
+        limit = self._operator.longest_block
         try:
-            async with asyncio.timeout(LANDS_SECONDS):
-                async for _ in self._console.feedbacks():
-                    if any(item.name == "bowl" and item.value == count for item in self._console.status):
-                        return True
+            async with asyncio.timeout(limit):
+                await self._operator.operate(task, held_up)
         except TimeoutError:
-            pass
-        return False
+            return f"the block took longer than {limit:g} s; {task.where()}"
+        except (CommandRefused, OperatorFailed) as error:
+            return f"{error}; {task.where()}"
+        except ConsoleError:
+            self._say(f"the connection ended {task.where()}")
+            raise
+        return task.failed
+
+    async def _reset(self) -> None:
+        """Put blocks and bowl back.
+
+        Raises:
+            TimeoutError: the robot does not say that the bowl is empty.
+        """
+        async with asyncio.timeout(RESET_SECONDS):
+            await self._operator.reset_scene()
+            await self._operator.until_in_bowl(0)
+        self._in_bowl = 0
+
+    async def _lands(self) -> bool:
+        """Wait until the robot says that one more block lies in the bowl."""
+        count, self._in_bowl = (self._in_bowl or 0) + 1, None
+        with suppress(TimeoutError):
+            async with asyncio.timeout(LANDS_SECONDS):
+                await self._operator.until_in_bowl(count)
+            self._in_bowl = count
+        return self._in_bowl is not None
 
     async def _record(self, name: str) -> str:
         answer = await self._recorder.post("/api/recordings", json={"name": name})
@@ -169,12 +193,15 @@ async def recorder_of(link: str) -> AsyncIterator[httpx.AsyncClient]:
         yield http
 
 
-def _line(number: int, name: str, placed: bool, judged: Judged, seconds: float, armed: int) -> str:
+def _line(number: int, name: str, placed: bool, judged: Judged, seconds: float, held_up: Counter[str]) -> str:
     verified = "verified" if judged.verdict.ok else "BROKEN"
     where = "in the bowl" if placed else "NOT in the bowl"
-    refused = ", ".join(f"{count} {reason}" for reason, count in judged.refusals.items()) or "none"
     return (
-        f"{number + 1}: {name} {where} after {seconds:.1f} s and {judged.events} events, refused {refused}, "
-        f"armed anew {armed} times, "
+        f"{number + 1}: {name} {where} after {seconds:.1f} s and {judged.events} events, "
+        f"refused {_counted(judged.refusals)}, armed anew {_counted(held_up)}, "
         f"largest step {judged.step:.2f} of {judged.step_axis}'s limit, {verified}"
     )
+
+
+def _counted(reasons: Counter[str]) -> str:
+    return ", ".join(f"{count} {reason}" for reason, count in reasons.items()) or "none"

@@ -75,9 +75,21 @@ class PickAndPlace:
     """
 
     def __init__(
-        self, description: RobotDescription, block: str, hand: Hand | None = None, place: Place | None = None
+        self,
+        description: RobotDescription,
+        block: str,
+        hand: Hand | None = None,
+        place: Place | None = None,
+        longest: float = LONGEST,
     ) -> None:
-        """`block`: one of BLOCKS. `hand`: None: the tool's pose is driven. `place`: None: where the scene begins."""
+        """
+        Args:
+            block: one of BLOCKS
+            hand: None: the tool's pose is driven
+            place: of the block; None: where the scene begins
+            longest: s that one motion may take
+        """
+        self._longest = longest
         self._description = description
         self._index = {axis.name: number for number, axis in enumerate(description.axes)}
         self._hand = ToolHand(description) if hand is None else hand
@@ -85,6 +97,7 @@ class PickAndPlace:
         self._motion = next(self._motions, None)  # the present one
         self._begun: float | None = None  # s, of the robot's clock
         self._there: float | None = None
+        self._newest: Feedback | None = None
         self.motions_done = 0
         self.failed = ""
 
@@ -94,6 +107,7 @@ class PickAndPlace:
 
     def values(self, feedback: Feedback) -> list[float | None]:
         """Return the values of the command that answers this feedback; all None once it is done."""
+        self._newest = feedback
         self._go_on(feedback)
         if self._motion is None or self.failed:
             return [None] * len(self._index)
@@ -107,8 +121,8 @@ class PickAndPlace:
         self._begun = feedback.time if self._begun is None else self._begun
         if not self._is_there(self._motion, feedback):
             self._there = None
-            if feedback.time - self._begun > LONGEST:
-                self.failed = self._where(self._motion, feedback)
+            if feedback.time - self._begun > self._longest:
+                self.failed = f"after {self._longest:g} s {self.where()}"
             return
         self._there = feedback.time if self._there is None else self._there
         if feedback.time - self._there >= PAUSE:
@@ -116,16 +130,25 @@ class PickAndPlace:
             self.motions_done += 1
             self._begun = self._there = None
 
-    def _where(self, motion: Motion, feedback: Feedback) -> str:
+    def where(self) -> str:
+        """Say which motion goes on, and where each axis is that it moves, by the newest feedback."""
+        motion, feedback = self._motion, self._newest
+        if motion is None or feedback is None:
+            return "the arm has not begun" if feedback is None else "all motions are done"
+        here, there = by_name(self._description, feedback.axes), by_name(self._description, feedback.goals)
         places = [
-            f"{name} is {feedback.axes[self._index[name]]:.3f}, commanded {feedback.goals[self._index[name]]}, "
-            f"wanted {goal:.3f}"
+            f"{name} is {here[name]:.3f}, its goal {_number(there[name])}, wanted {goal:.3f}"
             for name, goal in motion.goals.items()
         ]
-        return f"after {LONGEST:g} s {'; '.join([*places, *feedback.faults, *feedback.limits])}"
+        words = [*places, *feedback.faults, *feedback.limits]
+        return f"while it {motion.name} (motion {self.motions_done + 1}): {'; '.join(words)}"
 
     def _is_there(self, motion: Motion, feedback: Feedback) -> bool:
         place = [feedback.axes[self._index[name]] - motion.goals[name] for name in POSITION if name in motion.goals]
         if motion.must_arrive and math.hypot(*place) >= THERE:
             return False
         return self._hand.applied(motion.goals, feedback)
+
+
+def _number(goal: float | None) -> str:
+    return "nothing" if goal is None else f"{goal:.3f}"

@@ -1,4 +1,4 @@
-// A headset that a test puts on, moves and takes off: window.testHeadset, on top of iwer's emulated runtime.
+// A headset that a test or a scripted operator puts on, moves and takes off: window.testHeadset, on top of iwer's emulated runtime.
 (() => {
   if (window !== window.top) return;
   const device = new IWER.XRDevice(IWER.metaQuest3, { stereoEnabled: true });
@@ -135,6 +135,11 @@
       const [c, d] = [Math.sin(up / 2), Math.cos(up / 2)];
       hand.quaternion.set(b * c, a * d, -a * c, b * d);
       return frames(3);
+    },
+    /** Where the controller is, m, and how it is turned: a quaternion x, y, z, w. Nobody waits for the page to see it. */
+    turn(side, [x, y, z], turned) {
+      device.controllers[side].position.set(x, y, z);
+      device.controllers[side].quaternion.set(...turned);
     },
     /** Points the controller at a place: m to the right, up and ahead of the eyes of who looks along -z. */
     aim(side, right, up, ahead) {

@@ -1,4 +1,4 @@
-"""An emulated headset on a page in Chromium: `iwer`, and what a test does with it."""
+"""An emulated headset on a page in Chromium: `iwer`, and what a test or a scripted operator does with it."""
 
 import time
 from collections.abc import AsyncIterator
@@ -11,11 +11,11 @@ from playwright.async_api import Browser, expect
 from lockstep.bench.browsers import console_page
 from lockstep.bench.browsers.console_page import ConsolePage, open_console
 
-__all__ = ["HELD_UP", "TRIES", "Headset", "open_headset"]
+__all__ = ["HEADSET_SCRIPTS", "HELD_UP", "TRIES", "Headset", "open_headset"]
 
-HERE = Path(__file__).parent
-IWER = HERE.parents[2] / "web" / "node_modules" / "iwer" / "build" / "iwer.min.js"
-DRIVEN = HERE / "headset.js"
+IWER = Path(__file__).parents[4] / "web" / "node_modules" / "iwer" / "build" / "iwer.min.js"  # of a checkout
+EMULATED = Path(__file__).with_name("emulated_headset.js")
+HEADSET_SCRIPTS = (IWER, EMULATED)
 
 TRIES = 5
 ARM_SECONDS, DRIVE_SECONDS = 2.0, 60.0  # for one squeeze to arm; for all of them to drive
@@ -104,6 +104,6 @@ class Headset:
 @asynccontextmanager
 async def open_headset(browser: Browser, link: str, *, width: int = 1024, height: int = 400) -> AsyncIterator[Headset]:
     """Open the console's page on a machine with a headset; each eye gets half of the window's width."""
-    async with open_console(browser, link, width=width, height=height, scripts=(IWER, DRIVEN)) as console:
+    async with open_console(browser, link, width=width, height=height, scripts=HEADSET_SCRIPTS) as console:
         await console.until_live()
         yield Headset(console)
