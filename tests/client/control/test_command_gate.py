@@ -71,6 +71,25 @@ def test_of_several_microphones_the_gate_goes_by_the_one_that_is_farthest_behind
     assert gate.state(0.21) == "open", "the other has fallen silent"
 
 
+def test_a_command_that_only_lets_go_does_not_wait_for_sound() -> None:
+    gate = CommandGate("feedback", 4, 0.016, calm_interval=0.04, sound_tolerance=4)
+    gate.feedback(20, 1)
+    gate.sent(0.0)
+    gate.feedback(21, 1)
+    gate.heard("microphone", 16, 0.0)
+    assert (gate.opens_at(0.01), gate.opens_at(0.01, lets_go=True)) == (0.2, 0.04)
+    assert (gate.state(0.04), gate.state(0.04, lets_go=True)) == ("rate", "open")
+
+
+def test_an_event_waits_for_sound_no_longer_than_half_the_time_for_which_the_robot_holds_a_command() -> None:
+    gate = CommandGate("feedback", 4, 0.016, calm_interval=0.04, sound_tolerance=4, hold=0.25)
+    gate.feedback(20, 1)
+    gate.sent(0.0)
+    gate.feedback(21, 1)
+    gate.heard("microphone", 16, 0.0)
+    assert gate.opens_at(0.01) == 0.125
+
+
 actions = st.lists(
     st.one_of(
         st.tuples(st.just("feedback"), st.integers(-3, 3)),

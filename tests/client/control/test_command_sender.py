@@ -44,6 +44,21 @@ def test_the_highest_event_rate_is_kept_and_waited_for() -> None:
     assert [command.event for command in commands(sender.due(0.04))] == [3]
 
 
+def test_a_stick_that_is_let_go_does_not_wait_for_the_sound_that_its_command_makes_too_old() -> None:
+    gate = CommandGate("feedback", 4, 0.016, calm_interval=0.04, sound_tolerance=4)
+    sender = CommandSender(gate, NEUTRAL)
+    sender.feedback(feedback(20), 0.0)
+    flying(sender)
+    sender.feedback(feedback(21, at_rest=False), 0.01)
+    sender.heard("microphone", 16, 0.01)
+    sender.intend(FAST, 0.01)
+    assert sender.wake_at(0.01) == 0.2
+    assert sender.due(0.04) == []
+    sender.intend(NEUTRAL, 0.04)
+    assert sender.wake_at(0.03) == 0.04
+    assert [command.values for command in commands(sender.due(0.04))] == [NEUTRAL]
+
+
 def test_an_unanswered_command_is_repeated_with_the_newest_intention_and_the_newest_issue() -> None:
     sender = new_sender()
     flying(sender)

@@ -5,8 +5,8 @@ export type Pacing = "feedback" | "media";
 /** Events that follow one another sooner wait for pictures and sound; ms. */
 export const CALM_INTERVAL_MS = 40;
 /**
- * An event that would take sound out of its tolerance waits for it so long at most; ms. Armed and at rest, events follow
- * one another no sooner, and robots hold a command for longer.
+ * An event that would take sound out of its tolerance waits for it so long at most, and for half of the time for which
+ * the robot holds a command; ms. Armed and at rest, events follow one another no sooner.
  */
 export const SOUND_WAIT_MS = 200;
 
@@ -18,6 +18,7 @@ export interface CommandGate {
   tolerance: number; // events, of the picture; 4
   minIntervalMs: number; // between two events; 17
   calmIntervalMs: number; // not less; 40
+  soundWaitMs: number; // 200
   event: number | null; // newest feedback; null before the first
   issue: number; // newest issue of that event
   nonce: number; // of that issue: a command names it, as proof that it was seen
@@ -45,18 +46,21 @@ export interface NextCommand {
  * Events sooner than `calmIntervalMs` therefore wait while what is seen or heard is farther behind than two thirds of
  * its tolerance; as long as no picture was shown, they wait for none. A picture that is too old stays, veiled, until the
  * next comes; sound that is too old is gone. So an event that would make it too old waits for it, for `SOUND_WAIT_MS`.
+ * A command that only lets go (`letsGo`: it is neutral) does not: the robot comes to rest as soon as without sound.
  */
 export function createCommandGate(
   pacing: Pacing,
   tolerance: number,
   minIntervalMs: number,
   calmIntervalMs = minIntervalMs,
+  holdMs = Infinity,
 ): CommandGate {
   return {
     pacing,
     tolerance,
     minIntervalMs,
     calmIntervalMs: Math.max(calmIntervalMs, minIntervalMs),
+    soundWaitMs: Math.min(SOUND_WAIT_MS, holdMs / 2),
     event: null,
     issue: 0,
     nonce: 0,
@@ -121,10 +125,10 @@ export function farthestBehind(event: number, stamps: readonly number[]): number
   );
 }
 
-export function gateState(gate: CommandGate, now: number): GateState {
+export function gateState(gate: CommandGate, now: number, letsGo = false): GateState {
   if (gate.event === null) return "no_feedback";
   if (gate.inFlight !== null) return "in_flight";
-  if (now < opensAt(gate)) return "rate";
+  if (now < opensAt(gate, letsGo)) return "rate";
   if (gate.pacing !== "media") return "open";
   if (!isNear(gate.event, gate.shown, gate.tolerance)) return "picture";
   const { heard } = gate;
@@ -132,13 +136,13 @@ export function gateState(gate: CommandGate, now: number): GateState {
 }
 
 /** When the event rate allows the next command, unless a picture or a sound comes before; -Infinity before the first. */
-export function opensAt(gate: CommandGate): number {
-  return gate.lastSentMs + intervalMs(gate);
+export function opensAt(gate: CommandGate, letsGo = false): number {
+  return gate.lastSentMs + intervalMs(gate, letsGo);
 }
 
-function intervalMs(gate: CommandGate): number {
+function intervalMs(gate: CommandGate, letsGo: boolean): number {
   if (keepsUp(gate)) return gate.minIntervalMs;
-  return losesSound(gate) ? Math.max(SOUND_WAIT_MS, gate.calmIntervalMs) : gate.calmIntervalMs;
+  return losesSound(gate) && !letsGo ? Math.max(gate.soundWaitMs, gate.calmIntervalMs) : gate.calmIntervalMs;
 }
 
 /** Whether the next event would take what is heard out of its tolerance, and no rule but this one waits for it. */

@@ -92,9 +92,10 @@ export function createDriver(
   minIntervalMs: number,
   neutral: readonly (number | null)[],
   calmIntervalMs = minIntervalMs,
+  holdMs = Infinity,
 ): Driver {
   return {
-    gate: createCommandGate(pacing, tolerance, minIntervalMs, calmIntervalMs),
+    gate: createCommandGate(pacing, tolerance, minIntervalMs, calmIntervalMs, holdMs),
     repeat: createRepeatTimer(),
     latency: createLatency(),
     neutral,
@@ -238,8 +239,19 @@ export function driverStep(
 }
 
 /** How long the event rate alone holds the next command back, in ms; null when it does not. */
-export function driverOpensIn({ gate }: Driver, now: number): number | null {
-  return gateState(gate, now) === "rate" ? opensAt(gate) - now : null;
+export function driverOpensIn(driver: Driver, intention: Intention, now: number): number | null {
+  const { gate } = driver;
+  const letsGo = onlyLetsGo(driver, intention);
+  return gateState(gate, now, letsGo) === "rate" ? opensAt(gate, letsGo) - now : null;
+}
+
+/** Whether the next command is neutral and renews no action. */
+function onlyLetsGo(driver: Driver, intention: Intention): boolean {
+  return (intention.action ?? "") === "" && isSame(wantedValues(driver, intention), driver.neutral);
+}
+
+function wantedValues(driver: Driver, { armed, values }: Intention): readonly (number | null)[] {
+  return armed && driverMayMove(driver) ? values : driver.neutral;
 }
 
 function restDue(driver: Driver, now: number): ClientMessage | null {
@@ -258,7 +270,7 @@ function commandDue(driver: Driver, intention: Intention, now: number): ClientMe
   const next = nextCommand(driver.gate);
   if (next === null || driver.barred) return null;
   const mayMove = intention.armed && driverMayMove(driver);
-  const values = mayMove ? intention.values : driver.neutral;
+  const values = wantedValues(driver, intention);
   if (driver.gate.inFlight !== null) {
     if (now < Math.min(driver.repeatAtMs, driver.echoAtMs)) return null;
     if (now >= driver.repeatAtMs) noteSending(driver, driver.sends + 1, now);
@@ -334,7 +346,7 @@ function wantsToSend(
   values: readonly (number | null)[],
   now: number,
 ): boolean {
-  if (gateState(driver.gate, now) !== "open") return false;
+  if (gateState(driver.gate, now, onlyLetsGo(driver, intention)) !== "open") return false;
   if (!intention.armed) return driver.neutralOwed;
   if (driver.unproven) return true;
   if ((intention.action ?? "") !== "") return true; // every answer is renewed at once

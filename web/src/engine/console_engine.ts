@@ -425,7 +425,7 @@ export class ConsoleEngine {
   private robotChanged(robot: RobotState, now: number): void {
     if (robot.link === "down" && this.driver !== null) driver.driverSilence(this.driver);
     if (this.driver !== null) return;
-    const { axes, layers, max_event_rate: rate } = robot.description;
+    const { axes, layers, hold, max_event_rate: rate } = robot.description;
     const { settings, feedback } = this.state;
     const { pacing, tolerance } = settings;
     this.driver = driver.createDriver(
@@ -434,6 +434,7 @@ export class ConsoleEngine {
       1000 / rate,
       neutralValues(axes),
       CALM_INTERVAL_MS,
+      hold * 1000,
     );
     this.heartbeat.begin();
     this.layer = Math.min(this.layer, Math.max(0, layers.length - 1));
@@ -527,7 +528,7 @@ export class ConsoleEngine {
       this.tell("control", message);
       this.tracing?.noteSent(message, now);
     }
-    this.sendTimer.set(this.isArmed() ? driver.driverOpensIn(this.driver, now) : null);
+    this.sendTimer.set(this.isArmed() ? driver.driverOpensIn(this.driver, intention, now) : null);
   }
 
   tell(channel: ChannelName, message: ClientMessage): boolean {

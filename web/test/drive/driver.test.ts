@@ -15,6 +15,8 @@ import {
   driverStep,
   type Driver,
 } from "../../src/drive/driver";
+import { noteHeard } from "../../src/drive/command_gate";
+import { MAX_EVENT } from "../../src/gate/serial";
 import type { ClientMessage } from "../../src/protocol/wire";
 import { feedbackOf, refusalOf } from "../messages";
 
@@ -61,13 +63,28 @@ describe("commands", () => {
     driver = createDriver("feedback", 4, 16, NEUTRAL, 40);
     proven(driver);
     driverFeedback(driver, feedbackOf(1), true, 0);
-    expect(driverOpensIn(driver, 0)).toBeNull();
+    expect(driverOpensIn(driver, MOVING, 0)).toBeNull();
     expect(driverStep(driver, MOVING, true, 0)).toHaveLength(1);
-    expect(driverOpensIn(driver, 4)).toBeNull(); // in flight
+    expect(driverOpensIn(driver, MOVING, 4)).toBeNull(); // in flight
     driverFeedback(driver, feedbackOf(2), true, 5);
-    expect(driverOpensIn(driver, 5)).toBe(11);
+    expect(driverOpensIn(driver, MOVING, 5)).toBe(11);
     expect(driverStep(driver, MOVING, true, 15)).toEqual([]);
     expect(driverStep(driver, MOVING, true, 16)).toHaveLength(1);
+  });
+
+  it("wait for sound that they would make too old, for half of the robot's hold, but not where they only let go", () => {
+    driver = createDriver("feedback", 4, 16, NEUTRAL, 40, 300);
+    proven(driver);
+    driverFeedback(driver, feedbackOf(1), true, 0);
+    expect(driverStep(driver, MOVING, true, 0)).toHaveLength(1);
+    driverFeedback(driver, feedbackOf(2), true, 5);
+    noteHeard(driver.gate, { stamp: MAX_EVENT - 1, tolerance: 4 });
+    expect(driverOpensIn(driver, MOVING, 5)).toBe(145);
+    expect(driverStep(driver, MOVING, true, 40)).toEqual([]);
+    const released = { ...MOVING, values: NEUTRAL };
+    expect(driverOpensIn(driver, { ...released, action: "dock" }, 5)).toBe(145);
+    expect(driverOpensIn(driver, released, 5)).toBe(35);
+    expect(driverStep(driver, released, true, 40)).toHaveLength(1);
   });
 
   it("name the action that an armed page lets go on, at every answer and never after disarming", () => {

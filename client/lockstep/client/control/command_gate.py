@@ -1,5 +1,6 @@
 """The gate for commands, which decides when the next one may leave. Checked by tests/vectors/pacing.json. No I/O."""
 
+import math
 from typing import Literal, NamedTuple
 
 from lockstep.protocol.serial import event_after, event_gap
@@ -7,8 +8,8 @@ from lockstep.protocol.serial import event_after, event_gap
 __all__ = ["CALM_INTERVAL", "CommandGate", "GateState", "NextCommand", "Pacing"]
 
 CALM_INTERVAL = 0.040  # s; events that follow one another sooner wait for pictures and sound
-# An event that would take sound out of its tolerance waits for it so long at most. Armed and at rest, events follow one
-# another no sooner, and robots hold a command for longer.
+# An event that would take sound out of its tolerance waits for it so long at most, and for half of the time for which
+# the robot holds a command. Armed and at rest, events follow one another no sooner.
 SOUND_WAIT = 0.200  # s
 HEARD = 0.200  # s without a new segment after which nothing is heard
 
@@ -30,7 +31,8 @@ class CommandGate:
     The tolerance counts events, so each picture and each sound has less time where events follow one another quickly.
     Events sooner than `calm_interval` therefore wait while what is seen or heard is farther behind than two thirds of
     its tolerance; as long as no picture was shown, they wait for none. A picture that is too old stays until the next
-    arrives; sound that is too old is gone. So an event that would make it too old waits for it, for `SOUND_WAIT`.
+    arrives; sound that is too old is gone. So an event that would make it too old waits for it, for `SOUND_WAIT`. A
+    command that only lets go does not wait for it: the robot comes to rest as soon as without sound.
     """
 
     def __init__(
@@ -41,13 +43,15 @@ class CommandGate:
         *,
         calm_interval: float | None = None,
         sound_tolerance: int = 0,
+        hold: float = math.inf,
     ) -> None:
-        """`calm_interval`: s; None: `min_interval`."""
+        """`calm_interval`: s; None: `min_interval`. `hold`: s for which the robot holds a command."""
         self.pacing = pacing
         self.tolerance = tolerance
         self.sound_tolerance = sound_tolerance
         self.min_interval = min_interval  # s between the first sendings of two events
         self.calm_interval = min_interval if calm_interval is None else max(calm_interval, min_interval)
+        self._sound_wait = min(SOUND_WAIT, hold / 2)  # s
         self._feedback: tuple[int, int] | None = None  # newest (event, issue)
         self._in_flight: int | None = None
         self._sent_at: float | None = None
@@ -90,13 +94,13 @@ class CommandGate:
         """Note that a segment of sound stamped `stamp` plays, or is too old to."""
         self._heard[microphone] = stamp, now
 
-    def state(self, now: float) -> GateState:
-        """Return "open", or the reason that the gate is closed."""
+    def state(self, now: float, *, lets_go: bool = False) -> GateState:
+        """Return "open", or the reason that the gate is closed. `lets_go`: the command would be neutral."""
         if self._feedback is None:
             return "no_feedback"
         if self._in_flight is not None:
             return "in_flight"
-        if self._sent_at is not None and now < self.opens_at(now):
+        if self._sent_at is not None and now < self.opens_at(now, lets_go=lets_go):
             return "rate"
         if self.pacing != "media":
             return "open"
@@ -105,7 +109,7 @@ class CommandGate:
             return "picture"
         return "open" if heard is None or _is_near(heard, self.sound_tolerance) else "sound"
 
-    def opens_at(self, now: float) -> float:
+    def opens_at(self, now: float, *, lets_go: bool = False) -> float:
         """Return the time at which the event rate allows the next command, unless a picture is shown or a segment is
         heard before."""
         if self._sent_at is None:
@@ -114,7 +118,8 @@ class CommandGate:
         if self._picture_keeps_up() and (heard is None or _keeps_up(heard, self.sound_tolerance)):
             return self._sent_at + self.min_interval
         loses_sound = self.pacing != "media" and heard is not None and heard > max(self.sound_tolerance - 1, 0)
-        return self._sent_at + (max(SOUND_WAIT, self.calm_interval) if loses_sound else self.calm_interval)
+        waits = loses_sound and not lets_go
+        return self._sent_at + (max(self._sound_wait, self.calm_interval) if waits else self.calm_interval)
 
     def next(self) -> NextCommand:
         """Return the command that an open gate lets pass.

@@ -23,7 +23,7 @@ from collections.abc import Sequence
 from enum import Enum
 from typing import NamedTuple
 
-from lockstep.client.control.command_gate import CommandGate
+from lockstep.client.control.command_gate import CommandGate, GateState
 from lockstep.client.control.repeat_timer import INITIAL, RepeatTimer
 from lockstep.client.control.resting import RestCall
 from lockstep.protocol.messages import Command, Feedback, Refusal, RefusalReason, Rest
@@ -256,7 +256,7 @@ class CommandSender:
             self._want = _Want.NEUTRAL
         if self._flight is not None:
             messages += self._again(self._flight, now)
-        elif self._want is not _Want.NOTHING and self.gate.state(now) == "open" and not self._is_used_up():
+        elif self._want is not _Want.NOTHING and self._gate_state(now) == "open" and not self._is_used_up():
             messages.append(self._next(now))
         return messages
 
@@ -266,7 +266,8 @@ class CommandSender:
         if self._flight is not None:
             moments += [self._flight.repeat_at, self._flight.echo_at]
         elif self._want is not _Want.NOTHING:
-            moments.append(self.gate.opens_at(now) if self.gate.state(now) == "rate" else NEVER)
+            opens_at = self.gate.opens_at(now, lets_go=self._lets_go())
+            moments.append(opens_at if self._gate_state(now) == "rate" else NEVER)
         elif self.armed:
             moments.append(self._idle_at)
         return min(moments)
@@ -334,6 +335,12 @@ class CommandSender:
             action=self.action,
             speed=1.0 if is_neutral else self._speed,
         )
+
+    def _gate_state(self, now: float) -> GateState:
+        return self.gate.state(now, lets_go=self._lets_go())
+
+    def _lets_go(self) -> bool:
+        return not self.action and (self._want is _Want.NEUTRAL or self._values == self._neutral)
 
     def moves_nothing(self, command: Command) -> bool:
         """Return whether the command is neutral: each rate axis at rest, and no goal."""

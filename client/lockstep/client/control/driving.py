@@ -70,6 +70,7 @@ class Driving:
             1 / rate,
             calm_interval=None if asked else CALM_INTERVAL,
             sound_tolerance=self._options.tolerance["audio"],
+            hold=description.hold,
         )
         sender = CommandSender(gate, neutral_values(description.axes))
         self._driver = Driver(sender, self._send, description.max_event_age)
