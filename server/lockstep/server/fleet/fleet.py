@@ -127,7 +127,7 @@ class Fleet:
         if here is None:
             return absent_tile(session.name)
         try:
-            return tile_of(here, session.pulse, now)
+            return tile_of(here, session.rate_meter, now)
         except Exception as error:
             here.metrics.faults.caught("tile", error, robot=session.name)
             return absent_tile(session.name, UNREADABLE)

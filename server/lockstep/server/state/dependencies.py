@@ -77,8 +77,8 @@ class Dependencies:
         return self.context.state
 
     @property
-    def guard(self) -> RequestRateLimits:
-        return self.context.guard
+    def request_limits(self) -> RequestRateLimits:
+        return self.context.request_limits
 
     async def stop(self, press: Press) -> StopAnswer:
         """Latch a STOP at once; return the robot's answer, or that there is none. Raises Silenced."""
