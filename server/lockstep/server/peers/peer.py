@@ -220,8 +220,10 @@ class Peer:
 
     def send_feedback(self, text: str) -> None:
         if "control" in self._channels and not self.ended:
-            with self.contained("message out"):
+            try:  # not `contained`: the operator waits for each line here, and in `received`
                 self.transport.send_newest(text)
+            except Exception as error:
+                self.failed("message out", error)
 
     def want_traces(self, wanted: bool) -> None:
         """Begin or end noting which pictures are sent to it, and when."""
@@ -330,8 +332,10 @@ class Peer:
     def received(self, channel: ChannelName | None, data: object) -> None:
         """Take a message. `channel`: None on a WebSocket, which carries all. Only a valid message is a sign of life."""
         if not self.ended:
-            with self.contained("message in"):
+            try:
                 self._take(channel, data)
+            except Exception as error:
+                self.failed("message in", error)
 
     def _take(self, channel: ChannelName | None, data: object) -> None:
         now = self._loop.time()

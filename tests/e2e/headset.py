@@ -14,7 +14,7 @@ from lockstep.bench.browsers.console_page import ConsolePage, open_console
 __all__ = ["HELD_UP", "TRIES", "Headset", "open_headset"]
 
 HERE = Path(__file__).parent
-IWER = HERE.parents[2] / "web" / "node_modules" / "iwer" / "build" / "iwer.min.js"
+IWER = HERE.parents[1] / "web" / "node_modules" / "iwer" / "build" / "iwer.min.js"
 DRIVEN = HERE / "headset.js"
 
 TRIES = 5

@@ -6,7 +6,7 @@ The window's own frames are silent and its document is hidden during each sessio
 import pytest
 from playwright.async_api import Browser
 
-from tests.e2e.headset.headset import HELD_UP, TRIES, Headset, open_headset
+from tests.e2e.headset import HELD_UP, TRIES, Headset, open_headset
 from tests.support.stack import Stack
 
 pytestmark = [pytest.mark.browser, pytest.mark.timeout(240)]
