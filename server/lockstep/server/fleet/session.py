@@ -11,8 +11,8 @@ from lockstep.server.audit.records import AuditRecord
 from lockstep.server.auth.tokens import Access
 from lockstep.server.composition.robot_app import attach_session, session_app
 from lockstep.server.composition.robot_session import running_session
-from lockstep.server.control.stop_service import StopAnswer, StopOutcome
-from lockstep.server.control.stop_silence import SILENCED
+from lockstep.server.control.stop.stop_service import StopAnswer, StopOutcome
+from lockstep.server.control.stop.stop_silence import SILENCED
 from lockstep.server.errors import Silenced
 from lockstep.server.fleet.event_rate import EventRateMeter
 from lockstep.server.fleet.metrics import FleetMetrics

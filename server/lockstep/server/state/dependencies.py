@@ -13,7 +13,7 @@ from starlette.requests import HTTPConnection
 from lockstep.server.audit.audit_log import AuditLog
 from lockstep.server.auth.tokens import Access, Right
 from lockstep.server.control.console import Console
-from lockstep.server.control.stop_service import StopAnswer
+from lockstep.server.control.stop.stop_service import StopAnswer
 from lockstep.server.errors import RobotFailed, SceneUnavailable
 from lockstep.server.foxglove.service import FoxgloveService
 from lockstep.server.http.request_rate_limits import RequestRateLimits
