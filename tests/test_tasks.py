@@ -45,7 +45,7 @@ NOT_YET = {
     "bench/lockstep/bench/soak/crowd.py": 1,
     "bench/lockstep/emulator/cli.py": 3,
     "bench/lockstep/emulator/transport/delayed.py": 1,
-    "bench/lockstep/emulator/transport/tcp_relay.py": 1,
+    "bench/lockstep/emulator/transport/tcp_forwarder.py": 1,
     "bench/lockstep/emulator/transport/websocket_proxy.py": 2,
 }
 

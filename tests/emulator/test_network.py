@@ -53,12 +53,12 @@ async def test_on_every_network_commands_are_answered_and_nothing_outside_the_to
     counts = network.statistics()
     assert counts.clients == 1
     passed = [counts.paths[kind]["to_operator"].passed for kind in ("media", "control")]
-    assert min(passed) > 5, "the relay is the only way"
+    assert min(passed) > 5, "the forwarder is the only way"
     assert sum(stream.rendered for stream in shown if stream.kind == "video") > 0
     assert {stream.stream: stream.violations for stream in shown} == {stream.stream: 0 for stream in shown}
 
 
-async def test_several_clients_at_once_and_one_after_the_other_each_have_their_own_relay(stack: Stack) -> None:
+async def test_several_clients_at_once_and_one_after_the_other_each_have_their_own_forwarder(stack: Stack) -> None:
     async with Network(SLOW, console_url=stack.console) as network:
         link = network.link(stack.observer)
         async with (
@@ -102,9 +102,9 @@ async def test_an_outage_silences_a_client_and_its_end_brings_it_back(stack: Sta
 async def test_what_is_set_before_a_robot_is_what_a_console_is_to_connect_to(stack: Stack) -> None:
     parts = urlsplit(stack.robot)
     async with Network(SLOW, robot=(parts.hostname or "", parts.port or 0)) as network:
-        relay = urlsplit(network.robot_address)
-        assert (relay.scheme, relay.hostname) == ("tcp", "127.0.0.1")
-        assert relay.port not in (parts.port, None)
+        forwarder = urlsplit(network.robot_address)
+        assert (forwarder.scheme, forwarder.hostname) == ("tcp", "127.0.0.1")
+        assert forwarder.port not in (parts.port, None)
 
 
 async def test_one_network_has_one_console(stack: Stack) -> None:

@@ -21,12 +21,12 @@ from lockstep.protocol.serial import event_after, is_newer
 from lockstep.server.audit.records import Actor
 from lockstep.server.auth.silenced_links import SilencedLinks
 from lockstep.server.auth.tokens import Identity
-from lockstep.server.control import reset_service, stop_service, stop_silence
 from lockstep.server.control.command_arbiter import CommandArbiter, Forward, ForwardRest
-from lockstep.server.control.reset_service import ResetService
 from lockstep.server.control.seat import ControlSeat, SeatOutcome, SeatTimes
-from lockstep.server.control.stop_service import StopService
-from lockstep.server.control.stop_silence import StopSilence
+from lockstep.server.control.stop import reset_service, stop_service, stop_silence
+from lockstep.server.control.stop.reset_service import ResetService
+from lockstep.server.control.stop.stop_service import StopService
+from lockstep.server.control.stop.stop_silence import StopSilence
 from lockstep.server.errors import ConsoleError, Silenced
 from lockstep.server.event_clock import EventClock
 from lockstep.server.peers.peer_registry import PeerRegistry

@@ -26,7 +26,7 @@ from lockstep.server.auth.tokens import Access, Identity
 from lockstep.server.composition.robot_app import create_app
 from lockstep.server.http.transport.serve import bind, running
 from lockstep.server.http.transport.tls import Certificate
-from lockstep.server.http.transport.uvicorn_http_limits import guarded_by
+from lockstep.server.http.transport.uvicorn_http_limits import bounded_by
 from lockstep.server.peers.peer import Peer
 from lockstep.server.peers.webrtc_transport import WebRtcTransport
 from lockstep.server.settings import Settings
@@ -254,7 +254,7 @@ async def _console(wanted: Settings, certificate: Certificate | None) -> AsyncIt
         url = f"{'https' if certificate else 'http'}://127.0.0.1:{listener.getsockname()[1]}"
         verify = ssl.create_default_context(cafile=certificate.chain) if certificate else False
         async with (
-            running(app, listener, http=guarded_by(wanted, app), tls=certificate),
+            running(app, listener, http=bounded_by(wanted, app), tls=certificate),
             httpx.AsyncClient(base_url=url, trust_env=False, verify=verify, timeout=PATIENCE) as http,
         ):
             yield Rig(url, app, state.access, http)

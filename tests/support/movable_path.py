@@ -12,7 +12,7 @@ from lockstep.emulator.impairment.deliveries import Deliveries
 from lockstep.emulator.impairment.outages import Outages
 from lockstep.emulator.impairment.profile import load_profile
 from lockstep.emulator.transport.client_paths import ClientPaths
-from lockstep.emulator.transport.udp_relay import LOOPBACK, UdpRelay
+from lockstep.emulator.transport.udp_forwarder import LOOPBACK, UdpForwarder
 from lockstep.rtc.interfaces import own_addresses
 
 __all__ = ["MovablePath", "movable_path"]
@@ -24,7 +24,7 @@ OFFERS = re.compile(r"/whep(\?|$)")
 class MovablePath:
     """The first connection of the page goes through it. What an ICE restart finds does not."""
 
-    def __init__(self, relay: UdpRelay, outages: Outages) -> None:
+    def __init__(self, relay: UdpForwarder, outages: Outages) -> None:
         self.restarts: list[int] = []  # HTTP status of each ICE restart so far
         self.refuses_restarts = False
         self._relay = relay
@@ -75,7 +75,7 @@ async def movable_path(page: Page) -> AsyncIterator[MovablePath]:
     profile, outages, deliveries = load_profile("perfect"), Outages(), Deliveries()
     own = await asyncio.to_thread(own_addresses)
     hosts = [each for each in own if ":" not in each and each != LOOPBACK]
-    relay = UdpRelay(ClientPaths(profile, "1", outages), deliveries, [*hosts, LOOPBACK])
+    relay = UdpForwarder(ClientPaths(profile, "1", outages), deliveries, [*hosts, LOOPBACK])
     path = MovablePath(relay, outages)
     try:
         await page.route(OFFERS, path.connect)

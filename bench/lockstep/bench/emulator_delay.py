@@ -24,7 +24,7 @@ from lockstep.emulator.impairment.deliveries import prefer_this_process
 from lockstep.emulator.impairment.impairment import Impairment
 from lockstep.emulator.impairment.profile import even_profile
 from lockstep.emulator.network import Network
-from lockstep.emulator.transport.udp_relay import UdpRelay
+from lockstep.emulator.transport.udp_forwarder import UdpForwarder
 
 __all__ = ["measure"]
 
@@ -55,7 +55,7 @@ async def measure(clients: int, seconds: float) -> dict[str, Any]:
         Network(even_profile("own", Impairment(delay=Constant(DELAY)))) as network,
         running_process(*command, "--ends") as (ends, ready),
     ):
-        doors = [_lead(network.open_relay(), client, console) for client, console in ready["ports"]]
+        doors = [_lead(network.open_forwarder(), client, console) for client, console in ready["ports"]]
         began, used = time.monotonic(), time.process_time()
         relayed = await ends.ask(json.dumps(doors), seconds + PATIENCE)
         core = (time.process_time() - used) / (time.monotonic() - began)
@@ -73,7 +73,7 @@ def _spread(values: list[float]) -> dict[str, float]:
     return {name: round(quantile(values, share), 3) for name, share in shares.items()}
 
 
-def _lead(relay: UdpRelay, client: int, console: int) -> int:
+def _lead(relay: UdpForwarder, client: int, console: int) -> int:
     """Lead a client and a console through the relay, and return the port at which the client finds it."""
     relay.offer(_description(OFFER, client))
     return int(relay.answer(_description(ANSWER, console)).split(" typ host")[0].rsplit(" ", 1)[1])

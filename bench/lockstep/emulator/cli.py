@@ -32,7 +32,7 @@ def network_command(
     console: Annotated[
         str | None, typer.Option(help="The console's URL, or a link with a token, to put a proxy in front of.")
     ] = None,
-    robot: Annotated[str | None, typer.Option(help="A robot bridge, tcp://host:port, to put a relay before.")] = None,
+    robot: Annotated[str | None, typer.Option(help="A robot bridge, tcp://host:port, to stand in front of.")] = None,
     host: Annotated[str, typer.Option(help="Address on which the proxy listens.")] = "127.0.0.1",
     port: Annotated[int, typer.Option(min=0, max=65535, help="Port of the proxy; 0 takes any free one.")] = 0,
     seed: Annotated[int, typer.Option(help="The same seed makes the same network.")] = 1,

@@ -2,7 +2,7 @@
 
 EmulatorError
 ├── ProfileError            a profile cannot be used; says where and what to write instead
-├── BadDescription          an SDP that no relay can stand in
+├── BadDescription          an SDP that no forwarder can stand in
 └── NamespacesUnavailable   this machine or user cannot have network namespaces or TUN devices
 """
 

@@ -18,8 +18,8 @@ from lockstep.emulator.network_statistics import NetworkStatistics, collect
 from lockstep.emulator.transport.client_paths import SignallingPaths
 from lockstep.emulator.transport.http_proxy import ConsoleProxy
 from lockstep.emulator.transport.sessions import Sessions
-from lockstep.emulator.transport.tcp_relay import TcpRelay
-from lockstep.emulator.transport.udp_relay import LOOPBACK, UdpRelay
+from lockstep.emulator.transport.tcp_forwarder import TcpForwarder
+from lockstep.emulator.transport.udp_forwarder import LOOPBACK, UdpForwarder
 from lockstep.server.http.transport.serve import bind, running
 
 __all__ = ["Network"]
@@ -38,7 +38,7 @@ class Network:
         console_url: the console; None if `open_console` is called later, or never
         robot: host and port of a robot bridge; None: the robot link stays direct
         seed: the same seed meets each client, in the order of their arrival, with the same network
-        hosts: this machine's addresses at which clients find the relay; None: loopback and the IPv4 addresses
+        hosts: this machine's addresses at which clients find the forwarder; None: loopback and the IPv4 addresses
         host, port: address of the proxy
     """
 
@@ -55,7 +55,7 @@ class Network:
     ) -> None:
         self.profile = load_profile(profile) if isinstance(profile, str) else profile
         self.console_url = ""  # the proxy's
-        self.robot_address = ""  # the relay's, "tcp://127.0.0.1:40000"
+        self.robot_address = ""  # the forwarder's, "tcp://127.0.0.1:40000"
         self._console = console_url
         self._robot = robot
         self._seed = seed
@@ -65,7 +65,7 @@ class Network:
         self._robot_outages = Outages(self.profile.robot_outages)
         self._signalling = SignallingPaths(self.profile, str(seed), self._client_outages)
         self._proxied = False
-        self._relay: TcpRelay | None = None
+        self._forwarder: TcpForwarder | None = None
         self._stack = AsyncExitStack()
 
     async def __aenter__(self) -> Self:
@@ -76,9 +76,9 @@ class Network:
             self._sessions = Sessions(self.profile, self._seed, self._client_outages, self._deliveries, hosts)
             stack.callback(self._sessions.close)
             if self._robot is not None:
-                relay = TcpRelay(self._robot, self.profile, self._seed, self._robot_outages, self._deliveries)
-                self._relay = await stack.enter_async_context(relay)
-                self.robot_address = "tcp://{}:{}".format(*relay.address)
+                forwarder = TcpForwarder(self._robot, self.profile, self._seed, self._robot_outages, self._deliveries)
+                self._forwarder = await stack.enter_async_context(forwarder)
+                self.robot_address = "tcp://{}:{}".format(*forwarder.address)
             self._stack = stack.pop_all()
         try:
             if self._console is not None:
@@ -111,11 +111,11 @@ class Network:
         """Return the console's link `http://host:port/#token=…`, through this network."""
         return urlsplit(link)._replace(scheme="http", netloc=urlsplit(self.console_url).netloc).geturl()
 
-    def open_relay(self) -> UdpRelay:
-        """Open a separate relay between two peers whose descriptions the caller leads through it."""
-        relay = self._sessions.open()
-        self._sessions.keep(f"own {id(relay)}", relay)
-        return relay
+    def open_forwarder(self) -> UdpForwarder:
+        """Open a separate forwarder between two peers whose descriptions the caller leads through it."""
+        forwarder = self._sessions.open()
+        self._sessions.keep(f"own {id(forwarder)}", forwarder)
+        return forwarder
 
     def begin(self) -> None:
         """Start the schedule of outages now."""
@@ -135,12 +135,12 @@ class Network:
 
     def cut_robot(self) -> None:
         """Break the connections of the robot link."""
-        if self._relay is not None:
-            self._relay.cut()
+        if self._forwarder is not None:
+            self._forwarder.cut()
 
     def statistics(self) -> NetworkStatistics:
         """Return the statistics of all packets so far."""
-        robot = {} if self._relay is None else self._relay.statistics
+        robot = {} if self._forwarder is None else self._forwarder.statistics
         return collect(self._sessions.all_paths, self._signalling.statistics, robot, time.monotonic())
 
 

@@ -9,7 +9,7 @@ import pytest
 from playwright.async_api import Browser
 
 from lockstep.bench.browsers.console_page import RB, STOP_BUTTON, ConsolePage, open_console
-from tests.e2e.robots.so101 import SO101, needs_so101
+from tests.e2e.so101 import SO101, needs_so101
 from tests.support.c_robot import running_c_robot
 from tests.support.ros2 import EXAMPLES, have_ros, ros_python, running_ros_robot
 from tests.support.stack import Stack, running_console, running_stack

@@ -10,7 +10,7 @@ from playwright.async_api import Browser, expect
 
 from lockstep.bench.browsers.console_page import ConsolePage, open_console
 from lockstep.bench.browsers.headset_page import TRIES, Headset, open_headset
-from tests.e2e.robots.so101 import SO101, needs_so101
+from tests.e2e.so101 import SO101, needs_so101
 from tests.support.stack import Stack, running_stack
 
 pytestmark = [pytest.mark.browser, pytest.mark.timeout(240), needs_so101]

@@ -135,7 +135,7 @@ async def test_a_console_that_is_not_there_is_a_bad_gateway() -> None:
             assert "does not answer" in answer.text
 
 
-async def test_a_session_is_led_through_a_relay_that_ends_with_it() -> None:
+async def test_a_session_is_led_through_a_forwarder_that_ends_with_it() -> None:
     async with proxied() as (console, network, browser):
         answer = await browser.post("/whep?stamp=trailer", content=OFFER, headers=SDP)
         assert (answer.status_code, answer.headers["location"], answer.headers["etag"]) == (201, "/whep/1", '"e"')
@@ -143,7 +143,7 @@ async def test_a_session_is_led_through_a_relay_that_ends_with_it() -> None:
         assert console.headers[0]["authorization"] == "Bearer t"
         method, path, offer = console.asked[0]
         assert (method, path) == ("POST", "/whep?stamp=trailer")
-        assert "candidate" not in offer, "the console must not find a way around the relay"
+        assert "candidate" not in offer, "the console must not find a way around the forwarder"
         door = port_in(answer.text)
         assert door != 4000
         assert is_taken(door)
@@ -156,7 +156,7 @@ async def test_a_session_is_led_through_a_relay_that_ends_with_it() -> None:
         assert not is_taken(door)
 
 
-async def test_two_clients_get_a_relay_each() -> None:
+async def test_two_clients_get_a_forwarder_each() -> None:
     async with proxied() as (_, network, browser):
         ports = {port_in((await browser.post("/whep", content=OFFER, headers=SDP)).text) for _ in range(2)}
         assert len(ports) == 2
@@ -176,7 +176,7 @@ async def test_trickled_candidates_are_left_out_and_an_ice_restart_gets_new_port
         assert is_taken(first)
 
 
-async def test_a_refused_offer_leaves_no_relay_behind() -> None:
+async def test_a_refused_offer_leaves_no_forwarder_behind() -> None:
     async with proxied() as (console, network, browser):
         console.status, console.answer = 503, '{"error": "link_down"}'
         answer = await browser.post("/whep", content=OFFER, headers=SDP)

@@ -33,7 +33,7 @@ def test_names_and_addresses_are_found() -> None:
     assert console_addresses(ANSWER)[:2] == [Address("192.0.2.7", 4001), Address("127.0.0.1", 4002)]
 
 
-def test_a_client_is_led_to_the_console_at_the_address_at_which_it_finds_the_relay() -> None:
+def test_a_client_is_led_to_the_console_at_the_address_at_which_it_finds_the_forwarder() -> None:
     console = console_addresses(ANSWER)
     assert reached_from("127.0.0.1", console) == Address("127.0.0.1", 4002)
     assert reached_from("203.0.113.5", console) == Address("192.0.2.7", 4001)
@@ -51,7 +51,7 @@ def test_nothing_of_a_way_around_is_left_in_an_offer() -> None:
     assert left.endswith("\r\n")
 
 
-def test_the_relays_addresses_take_the_place_of_each_sections_own() -> None:
+def test_the_forwarders_addresses_take_the_place_of_each_sections_own() -> None:
     addresses = [Address("127.0.0.1", 5001), Address("192.0.2.7", 5002)]
     audio, video = candidates_replaced(ANSWER, addresses).split("m=")[1:]
     for section in (audio, video):

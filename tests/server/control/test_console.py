@@ -26,7 +26,7 @@ from lockstep.server.auth.silenced_links import SilencedLinks
 from lockstep.server.auth.tokens import Identity
 from lockstep.server.control.console import Console
 from lockstep.server.control.seat import ControlSeat, SeatOutcome, SeatTimes
-from lockstep.server.control.stop_silence import StopSilence
+from lockstep.server.control.stop.stop_silence import StopSilence
 from lockstep.server.event_clock import EventClock
 from lockstep.server.peers.peer import Peer
 from lockstep.server.peers.peer_registry import PeerRegistry

@@ -15,7 +15,7 @@ from lockstep.server.fleet.fleet import Fleet
 from lockstep.server.fleet.fleet_app import create_fleet_app
 from lockstep.server.fleet.robots import robot_settings
 from lockstep.server.http.transport.serve import bind, running
-from lockstep.server.http.transport.uvicorn_http_limits import guarded_by
+from lockstep.server.http.transport.uvicorn_http_limits import bounded_by
 from lockstep.server.settings import Settings
 from lockstep.server.state.dependencies import Dependencies
 from lockstep.server.state.persistent_state import ConsoleState, open_state
@@ -97,7 +97,7 @@ async def running_fleet(ports: Mapping[str, int], **settings: Any) -> AsyncItera
         url = f"http://127.0.0.1:{listener.getsockname()[1]}"
         try:
             async with (
-                running(app, listener, http=guarded_by(wanted, app)),
+                running(app, listener, http=bounded_by(wanted, app)),
                 httpx.AsyncClient(base_url=url, trust_env=False, timeout=PATIENCE) as http,
             ):
                 yield FleetRig(url, app.state.fleet, state, http)

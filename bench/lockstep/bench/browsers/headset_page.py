@@ -13,9 +13,15 @@ from lockstep.bench.browsers.console_page import ConsolePage, open_console
 
 __all__ = ["HEADSET_SCRIPTS", "HELD_UP", "TRIES", "Headset", "open_headset"]
 
+<<<<<<<< HEAD:bench/lockstep/bench/browsers/headset_page.py
 IWER = Path(__file__).parents[4] / "web" / "node_modules" / "iwer" / "build" / "iwer.min.js"  # of a checkout
 EMULATED = Path(__file__).with_name("emulated_headset.js")
 HEADSET_SCRIPTS = (IWER, EMULATED)
+========
+HERE = Path(__file__).parent
+IWER = HERE.parents[1] / "web" / "node_modules" / "iwer" / "build" / "iwer.min.js"
+DRIVEN = HERE / "headset.js"
+>>>>>>>> house:tests/e2e/headset.py
 
 TRIES = 5
 ARM_SECONDS, DRIVE_SECONDS = 2.0, 60.0  # for one squeeze to arm; for all of them to drive

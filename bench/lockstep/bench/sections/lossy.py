@@ -98,7 +98,7 @@ async def _echoes(count: int) -> list[float]:
         try:
             channel = asking.createDataChannel("reliable")
             answering.on("datachannel", _echo)
-            await connect_through(network.open_relay(), asking, answering)
+            await connect_through(network.open_forwarder(), asking, answering)
             return await _ask(channel, count)
         finally:
             await asking.close()

@@ -7,7 +7,7 @@ within a minute.
 
 Pictures: at both ends of the spell the bridge is held still for a moment, so that nothing is on its way while the
 pictures are counted, at the console's encoders and at each observer. Missed are the pictures that the console dropped
-because an outbox was full, and those lost on the way, by the gaps in RTP's numbers. Observers that were in one tier
+because a queue was full, and those lost on the way, by the gaps in RTP's numbers. Observers that were in one tier
 (docs/quality.md) all the time show that nothing else is missing: they have exactly as many pictures as its encoder
 made. The number of observers whose count is no tier's is reported: their path looked full for a part of the spell, so
 that they got other pictures meanwhile, or they missed some.
@@ -66,7 +66,7 @@ class Counts:
 
     taken: dict[str, int]  # pictures that were encoded, by camera, each once for however many tiers
     tiers: dict[str, dict[str, int]]  # encoded pictures of each tier, by camera
-    dropped: int  # pictures that did not fit an observer's outbox
+    dropped: int  # pictures that did not fit an observer's queue
     received: list[Received]  # by observer
 
 

@@ -21,7 +21,7 @@ TFD_CLOEXEC = os.O_CLOEXEC
 
 
 def prefer_this_process() -> bool:
-    """Let the system run this process before others, if it may: a relay that waits for a processor adds delay.
+    """Let the system run this process before others, if it may: a forwarder that waits for a processor adds delay.
 
     It needs a few percent of a processor. Processes that it starts are not preferred.
     """

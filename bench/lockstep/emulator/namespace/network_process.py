@@ -19,7 +19,7 @@ from lockstep.emulator.impairment.deliveries import prefer_this_process
 from lockstep.emulator.impairment.profile import Profile, load_profile
 from lockstep.emulator.network import Network
 from lockstep.emulator.network_statistics import NetworkStatistics
-from lockstep.emulator.transport.udp_relay import LOOPBACK
+from lockstep.emulator.transport.udp_forwarder import LOOPBACK
 
 __all__ = ["NetworkProcess", "serve"]
 
@@ -29,7 +29,7 @@ OWN_METHODS = frozenset({"open_console", "outage", "begin", "cut_robot", "statis
 
 
 class NetworkProcess:
-    """Has the arguments and methods of `Network`, which documents them, but no `open_relay`.
+    """Has the arguments and methods of `Network`, which documents them, but no `open_forwarder`.
 
     As root on Linux its process runs before others, so that a busy machine does not disturb it.
     """

@@ -1,7 +1,7 @@
 """A reverse proxy in front of a console: through it an unmodified browser or client meets a network.
 
 HTTP and the 3D scene's WebSocket take the signalling path's time: one delay for a request and one for its answer;
-connections are taken as open. Each WHEP session gets its own relay, which is written into offer and answer.
+connections are taken as open. Each WHEP session gets its own forwarder, which is written into offer and answer.
 """
 
 import time
@@ -78,37 +78,37 @@ class ConsoleProxy:
         return response
 
     async def _new_session(self, request: Request, body: bytes) -> Response:
-        relay = self._sessions.open()
+        forwarder = self._sessions.open()
         kept = False
         try:
-            offer = relay.offer(body.decode("utf-8", "replace"))
+            offer = forwarder.offer(body.decode("utf-8", "replace"))
             answer = await self._ask(request, offer.encode())
             text = await answer.aread()
             await answer.aclose()
             if answer.status_code == 201:
-                text = relay.answer(text.decode()).encode()
-                self._sessions.keep(urlsplit(answer.headers.get("location", "")).path, relay)
+                text = forwarder.answer(text.decode()).encode()
+                self._sessions.keep(urlsplit(answer.headers.get("location", "")).path, forwarder)
                 kept = True
             response = Response(text, answer.status_code)
         except BadDescription as error:
             return PlainTextResponse(str(error), 502)
         finally:
             if not kept:
-                relay.close()
+                forwarder.close()
         self._copy_headers(answer, response, {"content-length", "content-encoding"})
         return response
 
     async def _more_candidates(self, request: Request, body: bytes) -> Response:
-        """Pass trickle ICE, without its candidates, or an ICE restart, which is led through the relay as well."""
-        relay = self._sessions.find(request.url.path)
+        """Pass trickle ICE, without its candidates, or an ICE restart, which is led through the forwarder as well."""
+        forwarder = self._sessions.find(request.url.path)
         fragment = body.decode("utf-8", "replace")
-        sent = without_candidates(fragment) if relay is None else relay.offer(fragment)
+        sent = without_candidates(fragment) if forwarder is None else forwarder.offer(fragment)
         answer = await self._ask(request, sent.encode())
         text = await answer.aread()
         await answer.aclose()
-        if relay is not None and answer.status_code == 200:
+        if forwarder is not None and answer.status_code == 200:
             try:
-                text = relay.answer(text.decode()).encode()
+                text = forwarder.answer(text.decode()).encode()
             except BadDescription as error:
                 return PlainTextResponse(str(error), 502)
         response = Response(text, answer.status_code)

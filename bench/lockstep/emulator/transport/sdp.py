@@ -1,4 +1,4 @@
-"""Reads and changes an SDP for a relay, so that each side only knows the relay. Text in, text out."""
+"""Reads and changes an SDP for a forwarder, so that each side only knows the forwarder. Text in, text out."""
 
 import re
 from typing import NamedTuple
@@ -27,7 +27,7 @@ def console_addresses(sdp: str) -> list[Address]:
     """Return the addresses at which the console's answer says that it listens, IPv4 only.
 
     Raises:
-        BadDescription: none of them can be reached by a relay.
+        BadDescription: none of them can be reached by a forwarder.
     """
     found = [Address(host, int(port)) for host, port in HOST.findall(sdp)]
     if not found:
@@ -36,16 +36,17 @@ def console_addresses(sdp: str) -> list[Address]:
 
 
 def reached_from(host: str, console: list[Address]) -> Address:
-    """Return the console's address for a client that finds the relay at `host`: the same if it has it, else the first.
+    """Return the console's address for a client that finds the forwarder at `host`.
 
-    The answer to a check tells the client the address from which the relay's other side sent it (RFC 8445 7.2.5.3.1).
-    Firefox goes no further if that is a loopback address and its own is not.
+    It is the same if the console has it, else the first. The answer to a check tells the client the address from which
+    the forwarder's other side sent it (RFC 8445 7.2.5.3.1). Firefox goes no further if that is a loopback address and
+    its own is not.
     """
     return next((each for each in console if each.host == host), console[0])
 
 
 def without_candidates(sdp: str) -> str:
-    """Return the offer, or a fragment of trickle ICE, without a way around the relay.
+    """Return the offer, or a fragment of trickle ICE, without a way around the forwarder.
 
     The console learns the client's addresses from the checks that arrive. The end of candidates is removed too, or ICE
     would give up at once.

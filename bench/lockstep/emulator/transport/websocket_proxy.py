@@ -24,7 +24,7 @@ CLOSE_SECONDS = 1.0
 
 
 async def join(browser: WebSocket, console: str, paths: Mapping[Direction, StreamPath]) -> None:
-    """Relay messages until one side closes.
+    """Forward messages until one side closes.
 
     `console`: the console's URL; the request to it names the host that the browser asked for.
     """

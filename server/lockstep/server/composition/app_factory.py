@@ -25,7 +25,7 @@ from lockstep.server.state.persistent_state import ConsoleState, open_state
 from lockstep.server.util.rate_limits import RateLimits
 from lockstep.server.webrtc.media_endpoint import MediaEndpoint
 
-__all__ = ["bare_app", "guard_app", "open_context"]
+__all__ = ["bare_app", "add_middleware", "open_context"]
 
 log = structlog.get_logger(__name__)
 
@@ -82,7 +82,7 @@ def open_context(
     return context
 
 
-def guard_app(app: FastAPI, settings: Settings) -> None:
+def add_middleware(app: FastAPI, settings: Settings) -> None:
     """Add the middleware that every request passes before any route."""
     if settings.allowed_origins:
         app.add_middleware(

@@ -9,7 +9,7 @@ import msgspec
 from fastapi import FastAPI, Response
 from starlette.types import Lifespan
 
-from lockstep.server.composition.app_factory import bare_app, guard_app, open_context
+from lockstep.server.composition.app_factory import add_middleware, bare_app, open_context
 from lockstep.server.composition.robot_session import running_session
 from lockstep.server.http.json_response import json_answer
 from lockstep.server.http.static_files import page_router
@@ -67,7 +67,7 @@ def create_app(settings: Settings, state: ConsoleState | None = None) -> FastAPI
     app = session_app(settings, lifespan)
     app.add_api_route("/openapi.json", _describe, include_in_schema=False)
     app.include_router(page_router())
-    guard_app(app, settings)
+    add_middleware(app, settings)
     return app
 
 

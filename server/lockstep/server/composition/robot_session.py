@@ -13,7 +13,7 @@ from lockstep.server.control.notices import Notices
 from lockstep.server.control.seat import ControlSeat, SeatTimes
 from lockstep.server.control.session_audit import SessionAudit
 from lockstep.server.control.session_metrics import SessionMetrics
-from lockstep.server.control.stop_silence import StopSilence
+from lockstep.server.control.stop.stop_silence import StopSilence
 from lockstep.server.event_clock import EventClock
 from lockstep.server.evidence.anchors import anchor_text
 from lockstep.server.foxglove.service import FoxgloveService

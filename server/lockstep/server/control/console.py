@@ -60,12 +60,12 @@ from lockstep.server.control.command_arbiter import (
 )
 from lockstep.server.control.participants import ParticipantList
 from lockstep.server.control.policies.shadow_service import ShadowService
-from lockstep.server.control.reset_service import ResetService
 from lockstep.server.control.seat import ControlSeat, SeatRefusal
 from lockstep.server.control.seat_keeper import SeatKeeper
 from lockstep.server.control.speed_cap import SpeedCap
-from lockstep.server.control.stop_service import StopService
-from lockstep.server.control.stop_silence import StopSilence
+from lockstep.server.control.stop.reset_service import ResetService
+from lockstep.server.control.stop.stop_service import StopService
+from lockstep.server.control.stop.stop_silence import StopSilence
 from lockstep.server.control.trace_service import TraceService, command_spans
 from lockstep.server.errors import ChannelError, Flood, Silenced
 from lockstep.server.event_clock import EventClock

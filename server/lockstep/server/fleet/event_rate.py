@@ -4,12 +4,12 @@ from collections import deque
 
 from lockstep.protocol.serial import event_gap
 
-__all__ = ["Pulse"]
+__all__ = ["EventRateMeter"]
 
 WINDOW = 3.0  # s over which the rate is taken
 
 
-class Pulse:
+class EventRateMeter:
     """The event rate and the link of one robot. Call `look` at intervals.
 
     Attributes:

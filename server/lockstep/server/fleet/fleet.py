@@ -13,7 +13,7 @@ from starlette.requests import HTTPConnection, Request
 from lockstep.server.audit.records import Actor, AuditRecord
 from lockstep.server.auth.invitations import Invitation
 from lockstep.server.auth.tokens import Access, Identity, Right
-from lockstep.server.control.stop_silence import SILENCED
+from lockstep.server.control.stop.stop_silence import SILENCED
 from lockstep.server.errors import Silenced
 from lockstep.server.federation.board import Board, StopAnswer
 from lockstep.server.federation.memory_board import MemoryBoard
@@ -127,7 +127,7 @@ class Fleet:
         if here is None:
             return absent_tile(session.name)
         try:
-            return tile_of(here, session.pulse, now)
+            return tile_of(here, session.rate_meter, now)
         except Exception as error:
             here.metrics.faults.caught("tile", error, robot=session.name)
             return absent_tile(session.name, UNREADABLE)

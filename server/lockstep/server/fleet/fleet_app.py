@@ -8,7 +8,7 @@ import msgspec
 from fastapi import FastAPI, Request, Response
 from starlette.routing import Mount
 
-from lockstep.server.composition.app_factory import bare_app, guard_app, open_context
+from lockstep.server.composition.app_factory import add_middleware, bare_app, open_context
 from lockstep.server.errors import NotFound
 from lockstep.server.federation import make_board
 from lockstep.server.fleet import audit_routes, fleet_routes
@@ -51,7 +51,7 @@ def create_fleet_app(settings: Settings, robots: Mapping[str, Settings], state: 
         app.router.routes.append(Mount(f"{ROBOTS}/{name}", app=session.app))
     app.add_api_route(f"{ROBOTS}/{{name}}", _with_slash, include_in_schema=False)
     app.include_router(page_router(first="fleet.html", of_robot=False))
-    guard_app(app, settings)
+    add_middleware(app, settings)
     return app
 
 

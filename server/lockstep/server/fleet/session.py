@@ -11,10 +11,10 @@ from lockstep.server.audit.records import AuditRecord
 from lockstep.server.auth.tokens import Access
 from lockstep.server.composition.robot_app import attach_session, session_app
 from lockstep.server.composition.robot_session import running_session
-from lockstep.server.control.stop_service import StopAnswer, StopOutcome
-from lockstep.server.control.stop_silence import SILENCED
+from lockstep.server.control.stop.stop_service import StopAnswer, StopOutcome
+from lockstep.server.control.stop.stop_silence import SILENCED
 from lockstep.server.errors import Silenced
-from lockstep.server.fleet.event_rate import Pulse
+from lockstep.server.fleet.event_rate import EventRateMeter
 from lockstep.server.fleet.metrics import FleetMetrics
 from lockstep.server.http.static_files import page_router
 from lockstep.server.settings import Settings
@@ -47,7 +47,7 @@ class FleetSession:
     def __init__(self, name: str, settings: Settings) -> None:
         self.name = name
         self.settings = settings
-        self.pulse = Pulse()
+        self.rate_meter = EventRateMeter()
         self.settled = asyncio.Event()
         self.app = session_app(settings)
         self.app.include_router(page_router())
@@ -165,7 +165,7 @@ class FleetSession:
         """Take the session's event and link state, once a second."""
         here = self.dependencies
         if here is None:
-            self.pulse.look(now, up=False, epoch="", event=1)
+            self.rate_meter.look(now, up=False, epoch="", event=1)
         else:
             clock = here.console.clock
-            self.pulse.look(now, up=here.console.robot.up, epoch=clock.epoch, event=clock.event)
+            self.rate_meter.look(now, up=here.console.robot.up, epoch=clock.epoch, event=clock.event)

@@ -2,7 +2,7 @@
 
 from lockstep.protocol.console import Report
 from lockstep.server.federation.robot_summary import MAX_PEOPLE, Person, Tile
-from lockstep.server.fleet.event_rate import Pulse
+from lockstep.server.fleet.event_rate import EventRateMeter
 from lockstep.server.state.dependencies import Dependencies
 
 __all__ = ["FAILED", "UNREADABLE", "absent_tile", "tile_of"]
@@ -17,7 +17,7 @@ def absent_tile(name: str, trouble: str = FAILED) -> Tile:
     return Tile(name=name, label="", url=_url(name), link="down", trouble=trouble)
 
 
-def tile_of(here: Dependencies, pulse: Pulse, now: float) -> Tile:
+def tile_of(here: Dependencies, meter: EventRateMeter, now: float) -> Tile:
     """Return the tile of a robot whose session runs. `now` is on the monotonic clock."""
     console, clock, robot = here.console, here.console.clock, here.console.robot
     driver = console.peers.by_id(console.seat.rules.holder)
@@ -31,10 +31,10 @@ def tile_of(here: Dependencies, pulse: Pulse, now: float) -> Tile:
         url=_url(here.robot),
         link="up" if robot.up else "down",
         detail=robot.detail[:MAX_WORDS],
-        link_age_ms=None if pulse.link_since is None else _ms(now - pulse.link_since),
+        link_age_ms=None if meter.link_since is None else _ms(now - meter.link_since),
         epoch=clock.epoch,
         event=0 if feedback is None else feedback.event,
-        event_rate=round(pulse.event_rate, 1) if robot.up else 0.0,
+        event_rate=round(meter.event_rate, 1) if robot.up else 0.0,
         stopped=clock.stop.stopped,
         stop_by=clock.stop.by[:MAX_WORDS],
         stop_reason=clock.stop.reason[:MAX_WORDS],

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from lockstep.protocol.console import StreamInfo
 from lockstep.rtc.endpoint import Connection, Turns
 from lockstep.server.media.codecs.codec_choice import h264_profile
-from lockstep.server.media.encoding.frame_queue import Outbox
+from lockstep.server.media.encoding.frame_queue import FrameQueue
 from lockstep.server.media.metrics import MediaMetrics
 from lockstep.server.media.picture_traces import PictureTraces
 from lockstep.server.media.pipeline.fanout import FanOut
@@ -103,7 +103,7 @@ class Subscribers:
         video, settings = stream.kind == "video", self._settings
         epoch = self._wall_clock() - asyncio.get_running_loop().time()
         target = Subscription(
-            Outbox(settings.video_queue_frames if video else settings.audio_queue_frames, video=video),
+            FrameQueue(settings.video_queue_frames if video else settings.audio_queue_frames, video=video),
             RtpSender(connection, mid, carrier, video=video, wall_clock=epoch),
             priority=priority,
             stream=stream.name,

@@ -5,7 +5,7 @@ from collections.abc import Callable
 
 from lockstep.protocol.carriers import Carrier
 from lockstep.server.media.codecs.h264 import Profile
-from lockstep.server.media.encoding.frame_queue import Outbox
+from lockstep.server.media.encoding.frame_queue import FrameQueue
 from lockstep.server.media.metrics import MediaMetrics
 from lockstep.server.media.picture_traces import SentPictures
 from lockstep.server.media.pipeline.frame import EncodedFrame
@@ -16,11 +16,11 @@ __all__ = ["Subscription"]
 
 
 class Subscription:
-    """A fan-out target: an outbox in front of a sender."""
+    """A fan-out target: a queue in front of a sender."""
 
     def __init__(
         self,
-        outbox: Outbox,
+        queue: FrameQueue,
         sender: RtpSender,
         *,
         priority: bool,
@@ -39,7 +39,7 @@ class Subscription:
         self.sends = False  # True from the connection's begin to the peer's end
         self.sender = sender
         self.traced = SentPictures(stream)
-        self._outbox = outbox
+        self._queue = queue
         self._on_dropped = on_dropped
         self._on_failed = on_failed
         self._dropped = metrics.dropped.labels(stream, "peer_busy")
@@ -49,7 +49,7 @@ class Subscription:
     @property
     def dropped(self) -> int:
         """Frames that this peer did not get because it could not keep up."""
-        return self._outbox.dropped
+        return self._queue.dropped
 
     @property
     def paced(self) -> bool:
@@ -57,10 +57,10 @@ class Subscription:
         return self.sends and self.sender.paced
 
     def put(self, frame: EncodedFrame) -> None:
-        before = self._outbox.dropped
-        complete = self._outbox.put(frame)
-        if self._outbox.dropped != before:
-            self._dropped.inc(self._outbox.dropped - before)
+        before = self._queue.dropped
+        complete = self._queue.put(frame)
+        if self._queue.dropped != before:
+            self._dropped.inc(self._queue.dropped - before)
         if not complete:
             self._on_dropped()
 
@@ -68,17 +68,17 @@ class Subscription:
         sender = self.sender
         if not self.sends or sender.paced:
             return False
-        frame = self._outbox.peek()
+        frame = self._queue.peek()
         if frame is None:
             return False
         sent = sender.transmit(frame)
         if sent is None:
             return False
-        self._outbox.pop()
+        self._queue.pop()
         if self.traced.wanted:
             self.traced.sent(frame, sender.rtp_time, time.monotonic())
         self._count(*sent)
-        return self._outbox.peek() is not None and not sender.paced
+        return self._queue.peek() is not None and not sender.paced
 
     def failed(self, error: Exception) -> None:
         self.sends = False

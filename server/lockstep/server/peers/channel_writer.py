@@ -1,4 +1,4 @@
-"""Writes to one data channel without ever filling it: messages that it does not take at once wait in an outbox."""
+"""Writes to one data channel without ever filling it: messages that it does not take at once wait in a queue."""
 
 from lockstep.rtc.channels import ChannelNotOpen
 from lockstep.rtc.endpoint import Connection
@@ -22,32 +22,32 @@ class ChannelWriter:
         """Call `flush` on `ChannelWritable`."""
         self._connection = connection
         self._channel = channel
-        self.outbox = ChannelQueue()
+        self.queue = ChannelQueue()
         self.too_large = 0
 
     @property
     def lost(self) -> int:
         """Messages that did not fit."""
-        return self.outbox.dropped + self.too_large
+        return self.queue.dropped + self.too_large
 
     def send(self, text: str) -> None:
-        self.outbox.put(text)
+        self.queue.put(text)
         self.flush()
 
     def send_newest(self, text: str) -> None:
-        self.outbox.put_newest(text)
+        self.queue.put_newest(text)
         self.flush()
 
     def send_spare(self, text: str) -> None:
         """Send unless something waits already: then nobody needs it."""
-        if self.outbox.empty and not self._connection.peer.has_waiting(self._channel):
+        if self.queue.empty and not self._connection.peer.has_waiting(self._channel):
             self.send(text)
 
     def flush(self) -> None:
-        """Hand on the messages in the outbox, as far as the channel takes them at once."""
+        """Hand on the messages in the queue, as far as the channel takes them at once."""
         peer = self._connection.peer
         while not peer.has_waiting(self._channel):
-            text = self.outbox.take()
+            text = self.queue.take()
             if text is None:
                 return
             try:
@@ -56,5 +56,5 @@ class ChannelWriter:
                 self.too_large += 1
             except ENDED:
                 return  # the peer's end follows
-        if not self.outbox.empty:
+        if not self.queue.empty:
             peer.tell_when_empty(self._channel)

@@ -79,7 +79,7 @@ class WebSocketTransport:
         self.ticket = secrets.token_urlsafe(16)
         self._turns = turns
         self._name = name
-        self._outbox = ChannelQueue()  # messages that wait to be sent, bounded as for a data channel
+        self._queue = ChannelQueue()  # messages that wait to be sent, bounded as for a data channel
         self._filled = asyncio.Event()
         self._peer: TransportEvents | None = None
 
@@ -88,18 +88,18 @@ class WebSocketTransport:
 
     @property
     def lost(self) -> int:
-        return self._outbox.dropped
+        return self._queue.dropped
 
     def send(self, channel: ChannelName, text: str) -> None:
-        self._outbox.put(text)
+        self._queue.put(text)
         self._filled.set()
 
     def send_newest(self, text: str) -> None:
-        self._outbox.put_newest(text)
+        self._queue.put_newest(text)
         self._filled.set()
 
     def send_spare(self, text: str) -> None:
-        if self._outbox.empty:
+        if self._queue.empty:
             self.send("control", text)
 
     async def close(self) -> None:
@@ -146,7 +146,7 @@ class WebSocketTransport:
             return  # `_hear` ends the peer
 
     async def _next(self) -> str:
-        while (text := self._outbox.take()) is None:
+        while (text := self._queue.take()) is None:
             self._filled.clear()
             await self._filled.wait()
         return text

@@ -26,7 +26,7 @@ from lockstep.server.errors import (
 from lockstep.server.http.json_response import json_answer
 from lockstep.server.http.problem import problem_response
 from lockstep.server.http.transport.client_address import counted_address
-from lockstep.server.http.transport.uvicorn_websocket_limits import CLOSED_FOR, SOCKET, GuardedWebSocket
+from lockstep.server.http.transport.uvicorn_websocket_limits import CLOSED_FOR, SOCKET, BoundedWebSocket
 from lockstep.server.robot.dial_in import DialIn
 from lockstep.server.robot.pairing_offer import MAX_TRIES, OFFER_SECONDS, OfferState, Paired, Refusal
 from lockstep.server.state.dependencies import Dependencies, authorized, dependencies
@@ -97,7 +97,7 @@ async def open_code(request: Request, caller: Caller) -> Response:
         raise NotDialIn("this robot's key is in the console's settings (link_secret_file), so it is not paired")
     if dial_in.paired is not None:
         raise AlreadyPaired(f"{dial_in.paired.robot or 'a robot'} is paired here; forget it first")
-    here.guard.offer(caller.identity.token_id)
+    here.request_limits.offer(caller.identity.token_id)
     code = await dial_in.open_code(caller.name)
     here.console.audit.record("pairing", caller.actor, "code", f"good for {OFFER_SECONDS:g} s")
     base = here.settings.public_url or str(request.base_url).rstrip("/")
@@ -191,7 +191,7 @@ async def dial(websocket: WebSocket, name: str) -> None:
             await _carry(websocket, here, dial_in, name)
     except ConsoleError as error:
         here.metrics.bad_input.labels("dial", http_error(error).name).inc()
-        if isinstance(error, RobotUnknown) and not here.guard.may_fail(websocket.scope):
+        if isinstance(error, RobotUnknown) and not here.request_limits.may_fail(websocket.scope):
             error = TooManyRequests("too many requests without a valid token from this address")
         await _refuse(websocket, error)
     except WebSocketDisconnect as ended:
@@ -227,9 +227,9 @@ async def _carry(websocket: WebSocket, here: Dependencies, dial_in: DialIn, name
         line.close()
 
 
-def _socket(websocket: WebSocket) -> GuardedWebSocket:
+def _socket(websocket: WebSocket) -> BoundedWebSocket:
     socket = websocket.scope["extensions"].get(SOCKET)
-    if not isinstance(socket, GuardedWebSocket):
+    if not isinstance(socket, BoundedWebSocket):
         raise NotDialIn("this server takes no robots that dial in")
     return socket
 
@@ -237,7 +237,7 @@ def _socket(websocket: WebSocket) -> GuardedWebSocket:
 class _Line:
     """A robot's WebSocket as a RobotLine."""
 
-    def __init__(self, socket: GuardedWebSocket) -> None:
+    def __init__(self, socket: BoundedWebSocket) -> None:
         self._socket = socket
         self.address = "" if socket.client is None else counted_address(str(socket.client[0]))
 
@@ -255,7 +255,7 @@ class _Line:
 async def _pair(websocket: WebSocket, here: Dependencies, dial_in: DialIn) -> None:
     if (ended := dial_in.offer.ended(time.monotonic())) is not None:
         raise NotPairing(f"{ended.name}: {ended.detail}" if ended.name != "not_pairing" else NOT_PAIRING)
-    if dial_in.exchanges >= MAX_PAIRING or not here.guard.may_fail(websocket.scope):
+    if dial_in.exchanges >= MAX_PAIRING or not here.request_limits.may_fail(websocket.scope):
         raise TooManyRequests("too many robots try to pair: wait, and try again")
     _socket(websocket).expect(messages=PAIRING_MESSAGES, size=MAX_PAIRING_MESSAGE)
     dial_in.exchanges += 1

@@ -49,10 +49,14 @@ async def _answer_console_error(request: Request, error: Exception) -> Response:
     entry = http_error(error)
     if entry.status == HTTPStatus.FORBIDDEN:
         _audit_refused(request, entry.name)
-    if entry.status == HTTPStatus.UNAUTHORIZED and not _context(request.app.state).guard.may_fail(request.scope):
+    if entry.status == HTTPStatus.UNAUTHORIZED and not _may_fail(request):
         error = TooManyRequests("too many requests without a valid token from this address")
         entry = http_error(error)
     return _error_response(request, entry.status, entry.name, error.detail, entry.headers)
+
+
+def _may_fail(request: Request) -> bool:
+    return _context(request.app.state).request_limits.may_fail(request.scope)
 
 
 def _audit_refused(request: Request, name: str) -> None:

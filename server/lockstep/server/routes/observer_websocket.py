@@ -37,7 +37,7 @@ async def invite(
     identity = caller.identity
     if here.console.robot.description is None:
         raise RobotUnreachable(here.console.robot.detail)
-    here.guard.offer(identity.token_id)
+    here.request_limits.offer(identity.token_id)
     if not here.relays.arrived(relay):
         raise NotFound("no such relay")
     with here.console.peers.place(identity, relayed=True):

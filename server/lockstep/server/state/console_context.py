@@ -55,7 +55,7 @@ class ConsoleContext:
     def __init__(
         self,
         state: ConsoleState,
-        guard: RequestRateLimits,
+        request_limits: RequestRateLimits,
         metrics: ContextMetrics,
         endpoint: MediaEndpoint,
         max_peers: int | None = None,
@@ -64,7 +64,7 @@ class ConsoleContext:
         self.endpoint = endpoint
         self._dropped: Counter[str] = Counter()  # datagrams that are in the metrics
         self.state = state
-        self.guard = guard
+        self.request_limits = request_limits
         self.metrics = metrics
         self.revocations: list[TokenRevocation] = []
         self.silenced = SilencedLinks(state.invitations.invited_with)

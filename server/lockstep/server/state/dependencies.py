@@ -13,7 +13,7 @@ from starlette.requests import HTTPConnection
 from lockstep.server.audit.audit_log import AuditLog
 from lockstep.server.auth.tokens import Access, Right
 from lockstep.server.control.console import Console
-from lockstep.server.control.stop_service import StopAnswer
+from lockstep.server.control.stop.stop_service import StopAnswer
 from lockstep.server.errors import RobotFailed, SceneUnavailable
 from lockstep.server.foxglove.service import FoxgloveService
 from lockstep.server.http.request_rate_limits import RequestRateLimits
@@ -77,8 +77,8 @@ class Dependencies:
         return self.context.state
 
     @property
-    def guard(self) -> RequestRateLimits:
-        return self.context.guard
+    def request_limits(self) -> RequestRateLimits:
+        return self.context.request_limits
 
     async def stop(self, press: Press) -> StopAnswer:
         """Latch a STOP at once; return the robot's answer, or that there is none. Raises Silenced."""

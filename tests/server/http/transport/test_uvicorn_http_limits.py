@@ -29,7 +29,7 @@ HEAD = b"GET /healthz HTTP/1.1\r\nHost: localhost\r\n"
 
 
 @asynccontextmanager
-async def guarded_console(**settings: Any) -> AsyncIterator[tuple[Rig, int]]:
+async def bounded_console(**settings: Any) -> AsyncIterator[tuple[Rig, int]]:
     """A console, and its port."""
     async with running_bridge() as bridge, running_console(bridge.address[1], **settings) as rig:
         yield rig, int(rig.url.rpartition(":")[2])
@@ -46,7 +46,7 @@ async def _said(reader: asyncio.StreamReader) -> bytes:
 
 @pytest.mark.parametrize("beginning", [b"", b"G", HEAD])
 async def test_a_head_that_does_not_come_ends_the_connection(beginning: bytes) -> None:
-    async with guarded_console(request_timeout=0.2) as (rig, port):
+    async with bounded_console(request_timeout=0.2) as (rig, port):
         reader, writer = await asyncio.open_connection("127.0.0.1", port)
         writer.write(beginning)
         assert await _said(reader) == b""
@@ -55,7 +55,7 @@ async def test_a_head_that_does_not_come_ends_the_connection(beginning: bytes) -
 
 
 async def test_a_second_head_on_the_same_connection_may_not_dawdle_either() -> None:
-    async with guarded_console(request_timeout=0.2) as (rig, port):
+    async with bounded_console(request_timeout=0.2) as (rig, port):
         reader, writer = await asyncio.open_connection("127.0.0.1", port)
         writer.write(HEAD + b"\r\n")
         async with asyncio.timeout(PATIENCE):
@@ -76,20 +76,20 @@ async def _answer_to_half_a_body(rig: Rig, port: int, asked: bytes) -> bytes:
 
 
 async def test_a_body_that_does_not_come_is_refused_by_name() -> None:
-    async with guarded_console(request_timeout=0.2) as (rig, port):
+    async with bounded_console(request_timeout=0.2) as (rig, port):
         assert b'"too_slow"' in await _answer_to_half_a_body(rig, port, b"POST /api/reset")
         assert rig.count("lockstep_bad_input_total", where="http", reason="too_slow") == 1
 
 
 async def test_a_stop_whose_body_does_not_come_is_a_stop_all_the_same() -> None:
-    async with guarded_console(request_timeout=0.2) as (rig, port):
+    async with bounded_console(request_timeout=0.2) as (rig, port):
         assert b'"delivered":true' in await _answer_to_half_a_body(rig, port, b"POST /api/stop")
         await eventually(lambda: rig.dependencies.console.clock.stop.stopped)
         assert rig.count("lockstep_bad_input_total", where="http", reason="too_slow") == 1
 
 
 async def test_a_stop_does_not_wait_for_a_body_that_the_network_holds_up() -> None:
-    async with guarded_console(request_timeout=3600) as (rig, port):
+    async with bounded_console(request_timeout=3600) as (rig, port):
         head = HEAD.replace(b"GET /healthz", b"POST /api/stop")
         authorization = b"Authorization: " + rig.token("observer")["Authorization"].encode()
         reader, writer = await asyncio.open_connection("127.0.0.1", port)
@@ -104,7 +104,7 @@ async def test_a_stop_does_not_wait_for_a_body_that_the_network_holds_up() -> No
 
 
 async def test_a_head_that_is_too_large_is_refused() -> None:
-    async with guarded_console() as (_, port):
+    async with bounded_console() as (_, port):
         reader, writer = await asyncio.open_connection("127.0.0.1", port)
         writer.write(HEAD + b"X-Long: " + b"x" * 20_000)
         assert (await _said(reader)).startswith(b"HTTP/1.1 400")
@@ -115,7 +115,7 @@ BROKEN_CHUNK = b"Transfer-Encoding: chunked\r\n\r\nzz\r\n"
 
 
 async def test_a_body_in_broken_chunks_is_refused_and_is_no_fault_of_the_console() -> None:
-    async with guarded_console() as (rig, port):
+    async with bounded_console() as (rig, port):
         for path in (b"/whep", b"/api/stop", b"/api/reset", b"/nothing"):
             head = HEAD.replace(b"GET /healthz", b"POST " + path)
             reader, writer = await asyncio.open_connection("127.0.0.1", port)
@@ -135,7 +135,7 @@ async def test_a_body_in_broken_chunks_is_refused_and_is_no_fault_of_the_console
 
 
 async def test_a_stop_with_a_body_in_broken_chunks_is_a_stop_all_the_same() -> None:
-    async with guarded_console() as (rig, port):
+    async with bounded_console() as (rig, port):
         reader, writer = await asyncio.open_connection("127.0.0.1", port)
         head = HEAD.replace(b"GET /healthz", b"POST /api/stop")
         writer.write(
@@ -165,7 +165,7 @@ async def _answer(reader: asyncio.StreamReader) -> bytes:
 
 
 async def test_when_there_is_no_place_the_oldest_stranger_goes_and_not_the_newcomer() -> None:
-    async with guarded_console(max_connections=3) as (rig, port):
+    async with bounded_console(max_connections=3) as (rig, port):
         held = [await _open(port, HEAD) for _ in range(3)]
         await eventually(lambda: len(rig.app.state.connection_places) == 3)
         reader, writer = await _open(port, HEAD + b"\r\n")
@@ -181,7 +181,7 @@ async def test_when_there_is_no_place_the_oldest_stranger_goes_and_not_the_newco
 
 
 async def test_who_brought_a_good_token_keeps_the_connection_when_strangers_take_all() -> None:
-    async with guarded_console(max_connections=4) as (rig, port):
+    async with bounded_console(max_connections=4) as (rig, port):
         token = rig.token("observer")["Authorization"].encode()
         reader, writer = await _open(port, HEAD + b"Authorization: " + token + b"\r\n\r\n")
         assert (await _answer(reader)).startswith(b"HTTP/1.1 200")
@@ -197,7 +197,7 @@ async def test_who_brought_a_good_token_keeps_the_connection_when_strangers_take
 
 
 async def test_a_proxy_on_this_machine_holds_as_many_connections_as_it_needs_and_nobody_else_does() -> None:
-    async with guarded_console(max_connections=20, max_address_connections=2) as (rig, port):
+    async with bounded_console(max_connections=20, max_address_connections=2) as (rig, port):
         for address, most, turned_away in (("127.0.0.1", 6, 0), ("127.0.0.2", 2, 4)):
             held = [await asyncio.open_connection("127.0.0.1", port, local_addr=(address, 0)) for _ in range(6)]
             async with asyncio.timeout(PATIENCE):
@@ -210,7 +210,7 @@ async def test_a_proxy_on_this_machine_holds_as_many_connections_as_it_needs_and
 
 
 async def test_strangers_wait_for_their_pace_and_who_brings_a_good_token_does_not() -> None:
-    async with guarded_console(max_stranger_burst=4, max_stranger_rate=0.001) as (rig, port):
+    async with bounded_console(max_stranger_burst=4, max_stranger_rate=0.001) as (rig, port):
         token = rig.token("observer")["Authorization"].encode()
         known, writer = await _open(port, HEAD + b"Authorization: " + token + b"\r\n\r\n")
         assert (await _answer(known)).startswith(b"HTTP/1.1 200")
@@ -239,7 +239,7 @@ async def test_each_request_of_those_that_come_together_has_a_turn_and_the_stran
             await reader.readuntil(b"}")
             answered += 1
 
-    async with guarded_console(max_stranger_burst=8, max_stranger_rate=0.001) as (rig, port):
+    async with bounded_console(max_stranger_burst=8, max_stranger_rate=0.001) as (rig, port):
         head = HEAD + b"Authorization: " + rig.token("observer")["Authorization"].encode() + b"\r\n\r\n"
         known, writer = await _open(port, head)
         await _answer(known)
@@ -258,7 +258,7 @@ async def test_each_request_of_those_that_come_together_has_a_turn_and_the_stran
 
 
 async def test_a_request_behind_another_comes_whole_though_its_end_comes_later() -> None:
-    async with guarded_console() as (_, port):
+    async with bounded_console() as (_, port):
         reader, writer = await _open(port, (HEAD + b"\r\n") * 2 + HEAD)
         for _ in range(2):
             assert (await _answer(reader)).startswith(b"HTTP/1.1 200")
@@ -284,7 +284,7 @@ async def test_a_link_that_floods_comes_first_no_more_but_its_stops_do(monkeypat
         monkeypatch.setattr(uvicorn_http_limits, name, 1e-6)
     monkeypatch.setattr(uvicorn_http_limits, "LINK_BURST", 2)
     monkeypatch.setattr(uvicorn_http_limits, "STOP_BURST", 3)
-    async with guarded_console() as (rig, port):
+    async with bounded_console() as (rig, port):
         header = rig.token("observer")
         await rig.http.get("/api/session", headers=header)  # a token is known from its first use on
         token = b"Authorization: " + header["Authorization"].encode() + b"\r\n"
@@ -307,7 +307,7 @@ async def test_a_link_that_floods_comes_first_no_more_but_its_stops_do(monkeypat
 
 
 async def test_a_link_that_has_ended_is_a_strangers_and_no_longer_comes_first() -> None:
-    async with guarded_console() as (rig, port):
+    async with bounded_console() as (rig, port):
         token = rig.access.sign(Identity("observer", "x", "id", time.time() + 3600), time.time())
         request = HEAD + b"Authorization: Bearer " + token.encode() + b"\r\n\r\n"
         reader, writer = await _open(port, request)
@@ -325,7 +325,7 @@ async def test_a_link_that_has_ended_is_a_strangers_and_no_longer_comes_first() 
 
 async def test_a_body_that_was_announced_does_not_keep_a_connection_that_was_answered() -> None:
     """One byte of it ends the server's own timer between two requests."""
-    async with guarded_console(request_timeout=1.5) as (rig, port):
+    async with bounded_console(request_timeout=1.5) as (rig, port):
         reader, writer = await _open(
             port, HEAD.replace(b"GET /healthz", b"POST /api/stop") + b"Content-Length: 9\r\n\r\n"
         )
@@ -347,7 +347,7 @@ async def test_one_deadline_holds_for_head_and_body_together(monkeypatch: pytest
 
     monkeypatch.setattr(request_body, "deadline", spied)
     seconds = 100.0
-    async with guarded_console(request_timeout=seconds) as (rig, port):
+    async with bounded_console(request_timeout=seconds) as (rig, port):
         token = rig.token("observer")["Authorization"].encode()
         reader, writer = await _open(port, HEAD.replace(b"GET /healthz", b"POST /api/stop"))
         await eventually(lambda: len(rig.app.state.connection_places) == 1)
@@ -360,7 +360,7 @@ async def test_one_deadline_holds_for_head_and_body_together(monkeypatch: pytest
 
 
 async def test_who_does_not_read_its_answer_loses_the_connection() -> None:
-    async with guarded_console(request_timeout=0.2) as (rig, port):
+    async with bounded_console(request_timeout=0.2) as (rig, port):
         held = socket.socket()
         held.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
         held.setblocking(False)
@@ -393,7 +393,7 @@ async def test_an_answer_has_to_be_read_so_fast(taken: int, stays: bool, monkeyp
             looked.set()
         return left
 
-    async with guarded_console(request_timeout=0.1) as (rig, port):
+    async with bounded_console(request_timeout=0.1) as (rig, port):
         reader, writer = await _open(port, HEAD + b"\r\n")
         await _answer(reader)
         if stays:
@@ -406,7 +406,7 @@ async def test_an_answer_has_to_be_read_so_fast(taken: int, stays: bool, monkeyp
 
 
 async def test_who_is_turned_away_again_and_again_has_the_connection_closed() -> None:
-    async with guarded_console() as (_, port):
+    async with bounded_console() as (_, port):
         reader, writer = await _open(port)
         answers = []
         for _ in range(PATIENCE_OF_THE_DOOR):
@@ -421,7 +421,7 @@ async def test_who_is_turned_away_again_and_again_has_the_connection_closed() ->
 
 
 async def test_what_is_no_http_is_counted_and_closed() -> None:
-    async with guarded_console() as (rig, port):
+    async with bounded_console() as (rig, port):
         reader, writer = await _open(port, b"\x16\x03\x01 what\r\n\r\n")
         assert (await _said(reader)).startswith(b"HTTP/1.1 400")
         writer.close()
@@ -431,7 +431,7 @@ async def test_what_is_no_http_is_counted_and_closed() -> None:
 async def test_silent_tls_connections_hold_no_more_than_their_places_and_a_stop_gets_through(tmp_path: Path) -> None:
     names = {"localhost", "127.0.0.1"}
     certificate = self_signed(tmp_path, names, datetime.datetime.now(datetime.UTC))
-    async with guarded_console(certificate=certificate, max_connections=20) as (rig, port):
+    async with bounded_console(certificate=certificate, max_connections=20) as (rig, port):
         await rig.dependencies.console.robot.reached.wait()
         before = len(os.listdir("/proc/self/fd"))
         silent = [await asyncio.open_connection("127.0.0.1", port) for _ in range(100)]
@@ -449,7 +449,7 @@ async def test_silent_tls_connections_hold_no_more_than_their_places_and_a_stop_
 async def test_a_tls_handshake_that_never_ends_is_ended(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setattr("lockstep.server.http.transport.acceptor.HANDSHAKE_SECONDS", 0.2)
     certificate = self_signed(tmp_path, {"localhost"}, datetime.datetime.now(datetime.UTC))
-    async with guarded_console(certificate=certificate) as (rig, port):
+    async with bounded_console(certificate=certificate) as (rig, port):
         reader, writer = await _open(port)
         assert await _said(reader) == b""
         writer.close()

@@ -17,7 +17,7 @@ from lockstep.server.http.transport.uvicorn_websocket_limits import (
     FRAME_BURST,
     LAST_WORDS,
     SOCKET,
-    GuardedWebSocket,
+    BoundedWebSocket,
 )
 from tests.server.rig import PATIENCE, eventually, running_rig
 from tests.server.watch_lines import NOWHERE, address, joined, ticket
@@ -76,9 +76,9 @@ class Server:
     def __init__(self, path: str = "/dial/operator", headers: str = "") -> None:
         self.done = asyncio.Event()
         self.socket = Socket()
-        config = uvicorn.Config(self._app, ws=GuardedWebSocket, interface="asgi3", log_level="critical")
+        config = uvicorn.Config(self._app, ws=BoundedWebSocket, interface="asgi3", log_level="critical")
         config.load()
-        self.connection = GuardedWebSocket(config, ServerState(), {})
+        self.connection = BoundedWebSocket(config, ServerState(), {})
         self.connection.connection_made(self.socket)
         self.connection.data_received(
             f"GET {path} HTTP/1.1\r\nHost: a\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
@@ -88,7 +88,7 @@ class Server:
     async def _app(self, scope: Any, receive: Any, send: Any) -> None:
         await self.done.wait()
 
-    async def accepted(self) -> GuardedWebSocket:
+    async def accepted(self) -> BoundedWebSocket:
         assert (await self.connection.receive())["type"] == "websocket.connect"
         await self.connection.send({"type": "websocket.accept"})
         return self.connection

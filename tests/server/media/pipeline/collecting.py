@@ -5,7 +5,7 @@ from typing import Any, cast
 from prometheus_client import CollectorRegistry
 
 from lockstep.protocol.messages import Media
-from lockstep.server.media.encoding.frame_queue import Outbox
+from lockstep.server.media.encoding.frame_queue import FrameQueue
 from lockstep.server.media.encoding.stream_encodings import StreamEncodings
 from lockstep.server.media.encoding.tier_encoding import TierEncoding
 from lockstep.server.media.metrics import DropCounter, MediaMetrics
@@ -56,7 +56,7 @@ class Counted:
         fields: dict[str, Any] = {"priority": False, "stream": "camera0", "carrier": "none", "metrics": self.metrics}
         sender = cast(RtpSender, None)  # these tests send nothing
         return Subscription(
-            Outbox(6, video=True),
+            FrameQueue(6, video=True),
             sender,
             on_dropped=lambda: None,
             on_failed=lambda error: None,

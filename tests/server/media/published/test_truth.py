@@ -12,7 +12,7 @@ from lockstep.emulator.impairment.deliveries import Deliveries
 from lockstep.emulator.impairment.outages import Outages
 from lockstep.emulator.impairment.profile import load_profile
 from lockstep.emulator.transport.client_paths import ClientPaths
-from lockstep.emulator.transport.udp_relay import UdpRelay
+from lockstep.emulator.transport.udp_forwarder import UdpForwarder
 from tests.server.media.numbered_pictures import OF_USE, events_behind, shown_while_driving
 from tests.server.media.published.publishing import TestPublisher
 from tests.support.stack import Stack, running_stack
@@ -25,7 +25,7 @@ LATENCY = 0.1  # s; the publisher encodes in some milliseconds
 async def publishing(stack: Stack, codec: str, network: str) -> AsyncIterator[TestPublisher]:
     """Through an emulated network; only media pass it, HTTP does not."""
     deliveries = Deliveries()
-    relay = UdpRelay(ClientPaths(load_profile(network), "1", Outages()), deliveries)
+    relay = UdpForwarder(ClientPaths(load_profile(network), "1", Outages()), deliveries)
     headers = {"Authorization": f"Bearer {stack.operator.partition('#token=')[2]}", "Content-Type": "application/sdp"}
     try:
         async with (

@@ -6,7 +6,6 @@ import os
 import ssl
 import sys
 from collections.abc import Mapping
-from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
 
@@ -17,32 +16,11 @@ from pydantic import SecretStr
 from lockstep.protocol.link_secret import LinkSecret
 from lockstep.robot_bridge.encoding.encoder_choice import ENCODERS
 from lockstep.robot_bridge.robots.registry import is_robot, robot_names, simulated_names
+from lockstep.server.cli.console.console_options import ConsoleOptions
 from lockstep.server.cli.console.run_console import ConsoleFailed, run_console, say
 from lockstep.server.cli.console.unknown_settings import unknown_settings
 from lockstep.server.cli.extras import load_extra
-from lockstep.server.cli.options import (
-    AllowedHosts,
-    Board,
-    Cameras,
-    Config,
-    Foxglove,
-    Microphones,
-    ObserversDirect,
-    PublicUrl,
-    Record,
-    Relay,
-    Rerun,
-    Speaker,
-    SpeedCap,
-    StateDirOption,
-    Stun,
-    Tls,
-    TlsCert,
-    TlsKey,
-    Turn,
-    TurnSecret,
-    Whip,
-)
+from lockstep.server.cli.option_group import with_options
 from lockstep.server.cli.settings_from_flags import make_settings
 from lockstep.server.federation import check_board
 from lockstep.server.federation.errors import BoardUnusable
@@ -54,7 +32,7 @@ from lockstep.server.robot.credentials import link_access
 from lockstep.server.settings import Settings
 from lockstep.server.settings_file import SettingsFileUnusable, exposed_secrets
 from lockstep.server.state.persistent_state import open_state
-from lockstep.server.telemetry.logs import LogFormat, configure_logs
+from lockstep.server.telemetry.logs import configure_logs
 from lockstep.server.util.file_limit import raise_file_limit
 from lockstep.server.util.glibc_malloc import share_arenas
 from lockstep.server.util.robot_names import BadFleet, is_named
@@ -73,44 +51,11 @@ NO_NAMES = "a board needs robots with names that no other console has: --robot N
 SWITCH_INTERVAL = 0.0005  # s; Python's own is ten times that
 
 
-class Switch(StrEnum):
-    ON = "on"
-    OFF = "off"
-
-
 commands = typer.Typer()
-
-Host = Annotated[str | None, typer.Option(help="Address to listen on. Default: 127.0.0.1.")]
-Port = Annotated[int | None, typer.Option(min=0, max=65535, help="Port of the console; 0: any free port.")]
-Json = Annotated[bool, typer.Option("--json", help="Print the links as one JSON line when the console is ready.")]
-IceHosts = Annotated[
-    list[str] | None,
-    typer.Option("--ice-host", help="Address of this machine that browsers get for media; repeat for several."),
-]
-Advertise = Annotated[
-    list[str] | None,
-    typer.Option(help="Public address of this machine behind a 1:1 NAT, as in a cloud; repeat for several."),
-]
-MediaPort = Annotated[
-    int | None,
-    typer.Option(
-        min=0, max=65535, help="UDP port for the media and data channels of all peers. Default: 0, any free port."
-    ),
-]
-MediaTcp = Annotated[
-    bool | None,
-    typer.Option(
-        "--media-tcp/--no-media-tcp", help="Accept media over TCP on the same port, for networks that block UDP."
-    ),
-]
-Quality = Annotated[
-    Switch | None, typer.Option(help="Adapt the bitrate, rate and size of pictures to the network. Default: on.")
-]
-LogFormatOption = Annotated[LogFormat | None, typer.Option("--log-format", help="Format of log lines: text or JSON.")]
-Quiet = Annotated[bool, typer.Option("--quiet", help="Log only warnings and errors.")]
 
 
 @commands.command()
+@with_options(ConsoleOptions)
 def up(
     robot: Annotated[
         list[str] | None,
@@ -149,69 +94,17 @@ def up(
         str | None,
         typer.Option(help=f"Encode pictures in the robot bridge, as over a narrow uplink: {', '.join(ENCODERS)}."),
     ] = None,
-    host: Host = None,
-    port: Port = None,
-    ice_host: IceHosts = None,
-    advertise: Advertise = None,
-    media_port: MediaPort = None,
-    media_tcp: MediaTcp = None,
-    camera: Cameras = None,
-    microphone: Microphones = None,
-    whip: Whip = None,
-    speaker: Speaker = None,
-    quality: Quality = None,
-    speed_cap: SpeedCap = None,
-    record: Record = None,
-    foxglove: Foxglove = None,
-    rerun: Rerun = None,
-    relay: Relay = None,
-    observers_direct: ObserversDirect = None,
-    public_url: PublicUrl = None,
-    allowed_host: AllowedHosts = None,
-    board: Board = None,
-    tls: Tls = None,
-    tls_cert: TlsCert = None,
-    tls_key: TlsKey = None,
-    stun: Stun = None,
-    turn: Turn = None,
-    turn_secret: TurnSecret = None,
-    as_json: Json = False,
-    quiet: Quiet = False,
-    log_format: LogFormatOption = None,
-    state_dir: StateDirOption = None,
-    config: Config = None,
+    *,
+    options: ConsoleOptions,
 ) -> None:
     """Run a simulated robot and the console, and print the links that open it."""
-    network = _network(public_url, allowed_host, board, tls, tls_cert, tls_key, stun, turn, turn_secret)
-    settings = make_settings(
-        host=host,
-        port=port,
-        ice_hosts=ice_host,
-        advertise=advertise,
-        media_port=media_port,
-        media_tcp=media_tcp,
-        media=_media(quality),
-        cameras=_words(camera),
-        microphones=_words(microphone),
-        whip=_words(whip),
-        speaker=speaker,
-        speed_cap=speed_cap,
-        recording=_recording(record),
-        foxglove=None if foxglove is None else {"port": foxglove},
-        rerun=None if rerun is None else {"to": rerun},
-        relay=relay,
-        observers_direct=observers_direct,
-        log_format=log_format,
-        state_dir=state_dir,
-        config=config,
-        **network,
-    )
+    settings = make_settings(**options.settings())
     file = ros2 or mjcf or lerobot
-    options = [] if ros2 is None else ["--ros2", str(ros2)]
-    options += [] if mjcf is None else ["--mjcf", str(mjcf)]
-    options += [] if lerobot is None else ["--lerobot", str(lerobot)]
-    options += ["--event-strip"] if event_strip else []
-    options += [] if encode is None else ["--encode", encode]
+    arguments = [] if ros2 is None else ["--ros2", str(ros2)]
+    arguments += [] if mjcf is None else ["--mjcf", str(mjcf)]
+    arguments += [] if lerobot is None else ["--lerobot", str(lerobot)]
+    arguments += ["--event-strip"] if event_strip else []
+    arguments += [] if encode is None else ["--encode", encode]
     secret = link_access(settings).secret or LinkSecret.draw()
     settings = settings.model_copy(update={"link_secret": SecretStr(secret.reveal()), "link_secret_file": None})
     bridges = {}
@@ -230,15 +123,16 @@ def up(
         own += [] if event_log is None else ["--event-log", str(own_event_log(event_log, name))]
         port_of_bridge = robot_port + number if robot_port else 0
         bridges[name] = BridgeProcess(
-            kind, "127.0.0.1", port_of_bridge, [*options, *own], secret.reveal(), say, robot_python
+            kind, "127.0.0.1", port_of_bridge, [*arguments, *own], secret.reveal(), say, robot_python
         )
     if "" not in bridges:  # their addresses are known when they run
         settings = settings.model_copy(update={"robots": tuple(f"{name}=tcp://127.0.0.1:1" for name in bridges)})
     is_own = any(kind not in simulated_names() for kind in kinds.values())
-    _run(settings, bridges, as_json, quiet, is_own)
+    _run(settings, bridges, options, is_own)
 
 
 @commands.command()
+@with_options(ConsoleOptions)
 def serve(
     robot: Annotated[
         list[str] | None,
@@ -263,40 +157,10 @@ def serve(
     link_tls_key: Annotated[
         Path | None, typer.Option(help="Private key of that certificate, if it is in another file.")
     ] = None,
-    host: Host = None,
-    port: Port = None,
-    ice_host: IceHosts = None,
-    advertise: Advertise = None,
-    media_port: MediaPort = None,
-    media_tcp: MediaTcp = None,
-    camera: Cameras = None,
-    microphone: Microphones = None,
-    whip: Whip = None,
-    speaker: Speaker = None,
-    quality: Quality = None,
-    speed_cap: SpeedCap = None,
-    record: Record = None,
-    foxglove: Foxglove = None,
-    rerun: Rerun = None,
-    relay: Relay = None,
-    observers_direct: ObserversDirect = None,
-    public_url: PublicUrl = None,
-    allowed_host: AllowedHosts = None,
-    board: Board = None,
-    tls: Tls = None,
-    tls_cert: TlsCert = None,
-    tls_key: TlsKey = None,
-    stun: Stun = None,
-    turn: Turn = None,
-    turn_secret: TurnSecret = None,
-    as_json: Json = False,
-    quiet: Quiet = False,
-    log_format: LogFormatOption = None,
-    state_dir: StateDirOption = None,
-    config: Config = None,
+    *,
+    options: ConsoleOptions,
 ) -> None:
     """Run the console for a robot bridge that runs elsewhere."""
-    network = _network(public_url, allowed_host, board, tls, tls_cert, tls_key, stun, turn, turn_secret)
     settings = make_settings(
         **_robots(robot),
         fleet_file=fleet,
@@ -304,29 +168,9 @@ def serve(
         link_tls_ca=link_tls_ca,
         link_tls_cert=link_tls_cert,
         link_tls_key=link_tls_key,
-        host=host,
-        port=port,
-        ice_hosts=ice_host,
-        advertise=advertise,
-        media_port=media_port,
-        media_tcp=media_tcp,
-        media=_media(quality),
-        cameras=_words(camera),
-        microphones=_words(microphone),
-        whip=_words(whip),
-        speaker=speaker,
-        speed_cap=speed_cap,
-        recording=_recording(record),
-        foxglove=None if foxglove is None else {"port": foxglove},
-        rerun=None if rerun is None else {"to": rerun},
-        relay=relay,
-        observers_direct=observers_direct,
-        log_format=log_format,
-        state_dir=state_dir,
-        config=config,
-        **network,
+        **options.settings(),
     )
-    _run(settings, {}, as_json, quiet)
+    _run(settings, {}, options)
 
 
 def _robots(given: list[str] | None) -> dict[str, object]:
@@ -346,34 +190,6 @@ def _simulated(given: list[str] | None) -> dict[str, str]:
         raise _usage(f"robot: {error}") from error
 
 
-def _media(quality: Switch | None) -> dict[str, bool] | None:
-    return None if quality is None else {"quality": quality is Switch.ON}
-
-
-def _words(texts: list[str] | None) -> tuple[str, ...] | None:
-    """Return the value of a setting that may be given several times, and may hold any character."""
-    return tuple(texts) if texts else None
-
-
-def _recording(directory: Record) -> dict[str, object] | None:
-    return None if directory is None else {"directory": directory, "automatic": True}
-
-
-def _network(
-    public_url: PublicUrl,
-    allowed_hosts: AllowedHosts,
-    board: Board,
-    tls: Tls,
-    tls_cert: TlsCert,
-    tls_key: TlsKey,
-    stun: Stun,
-    turn: Turn,
-    turn_secret: TurnSecret,
-) -> dict[str, object]:
-    """Return the arguments by the names of their settings."""
-    return dict(locals())
-
-
 def _warn_of_open_files(settings: Settings) -> None:
     """Tell of files of settings that hold a secret and that everybody on this machine may read."""
     for path in {each for each in (settings.config, settings.fleet_file) if each is not None}:
@@ -385,12 +201,11 @@ def _warn_of_open_files(settings: Settings) -> None:
 def _run(
     settings: Settings,
     bridges: Mapping[str, BridgeProcess],
-    as_json: bool,
-    quiet: bool,
+    options: ConsoleOptions,
     own_robot: bool = False,
 ) -> None:
     """Run the console. `own_robot`: a robot is the user's own class, which its bridge may fail to find."""
-    configure_logs(logging.WARNING if quiet else logging.INFO, settings.log_format)
+    configure_logs(logging.WARNING if options.quiet else logging.INFO, settings.log_format)
     for each in unknown_settings(os.environ, Settings):
         say(each)
     _warn_of_open_files(settings)
@@ -412,7 +227,7 @@ def _run(
             load_extra("rerun", "rerun")
         listener = bind(settings.host, settings.port)
         state = open_state(settings, fall_back=True)
-        uvloop.run(run_console(settings, state, listener, bridges, as_json))
+        uvloop.run(run_console(settings, state, listener, bridges, options.as_json))
     except PortTaken as error:
         say(f"{error}; choose another with --port")
         raise typer.Exit(EXIT_PORT_TAKEN) from error

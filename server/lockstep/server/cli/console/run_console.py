@@ -23,7 +23,7 @@ from lockstep.server.fleet.fleet_app import create_fleet_app
 from lockstep.server.fleet.robots import robot_settings
 from lockstep.server.http.transport.serve import running, wait_for_signal
 from lockstep.server.http.transport.tls import Certificate, ends_at, fingerprint, own_names, self_signed
-from lockstep.server.http.transport.uvicorn_http_limits import guarded_by
+from lockstep.server.http.transport.uvicorn_http_limits import bounded_by
 from lockstep.server.robot.bridge_process import BridgeProcess
 from lockstep.server.robot.dial_in import DIAL_IN
 from lockstep.server.robot.robot_connection import RobotConnection
@@ -67,7 +67,7 @@ async def run_console(
             return
         settings = _with_addresses(settings, addresses)
         application = _application(settings, state)
-        http = guarded_by(settings, application)
+        http = bounded_by(settings, application)
         async with running(application, listener, http=http, tls=certificate), asyncio.TaskGroup() as tasks:
             if certificate is not None:
                 application.state.context.metrics.certificate_end.set(ends_at(certificate))

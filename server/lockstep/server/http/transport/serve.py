@@ -14,8 +14,8 @@ from starlette.applications import Starlette
 
 from lockstep.server.http.transport.acceptor import PROXIES, Acceptor, PlacedProtocol
 from lockstep.server.http.transport.tls import Certificate
-from lockstep.server.http.transport.uvicorn_http_limits import MAX_HEAD, GuardedConnections
-from lockstep.server.http.transport.uvicorn_websocket_limits import guarded_websocket
+from lockstep.server.http.transport.uvicorn_http_limits import MAX_HEAD, BoundedConnections
+from lockstep.server.http.transport.uvicorn_websocket_limits import bounded_websocket
 
 __all__ = ["PortTaken", "bind", "running", "wait_for_signal"]
 
@@ -60,22 +60,22 @@ def bind(host: str, port: int) -> socket.socket:
 class _Server(uvicorn.Server):
     """A uvicorn server that tells when it is ready, and leaves the signals to its caller."""
 
-    def __init__(self, config: uvicorn.Config, guarded: GuardedConnections | None, listener: socket.socket) -> None:
+    def __init__(self, config: uvicorn.Config, bounded: BoundedConnections | None, listener: socket.socket) -> None:
         super().__init__(config)
         self.settled = asyncio.Event()  # set when it answers, or has failed
-        self._guarded = guarded
+        self._bounded = bounded
         self._listener = listener
         self._accepting: asyncio.Task[None] | None = None
 
     async def startup(self, sockets: list[socket.socket] | None = None) -> None:
         try:
-            await super().startup(sockets if self._guarded is None else [])
-            if self._guarded is not None and not self.should_exit:
-                self._accept(self._guarded)
+            await super().startup(sockets if self._bounded is None else [])
+            if self._bounded is not None and not self.should_exit:
+                self._accept(self._bounded)
         finally:
             self.settled.set()
 
-    def _accept(self, guarded: GuardedConnections) -> None:
+    def _accept(self, bounded: BoundedConnections) -> None:
         """Accept connections in place of uvicorn, which takes any number, and tells of each after its TLS handshake."""
         loop = asyncio.get_running_loop()
 
@@ -88,7 +88,7 @@ class _Server(uvicorn.Server):
                 ),
             )
 
-        acceptor = Acceptor(self._listener, guarded.places, guarded.turns, make_protocol, self.config.ssl)
+        acceptor = Acceptor(self._listener, bounded.places, bounded.turns, make_protocol, self.config.ssl)
         self._accepting = loop.create_task(acceptor.run(), name="accept")
 
     async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
@@ -107,7 +107,7 @@ async def running(
     app: Starlette,
     listener: socket.socket,
     *,
-    http: GuardedConnections | None = None,
+    http: BoundedConnections | None = None,
     tls: Certificate | None = None,
 ) -> AsyncIterator[None]:
     """Serve `app` on `listener` while entered; shut it down gracefully on leaving.
@@ -121,7 +121,7 @@ async def running(
         access_log=False,  # a path can hold a ticket
         log_level="error",  # uvicorn warns of every request that is not HTTP; the console counts them
         lifespan="on",
-        ws=guarded_websocket(),
+        ws=bounded_websocket(),
         ws_max_size=MAX_WEBSOCKET_MESSAGE,
         forwarded_allow_ips=os.environ.get("FORWARDED_ALLOW_IPS") or sorted(PROXIES),
         timeout_graceful_shutdown=SHUTDOWN_TIMEOUT,

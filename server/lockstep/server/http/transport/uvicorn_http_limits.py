@@ -20,7 +20,7 @@ from lockstep.server.http.transport.connection_places import ConnectionPlaces, P
 from lockstep.server.util.fair_queue import FairQueue
 from lockstep.server.util.rate_limits import RateLimits
 
-__all__ = ["DEADLINE", "MAX_HEAD", "PLACE", "GuardedConnections", "guarded_by", "guarded_http"]
+__all__ = ["DEADLINE", "MAX_HEAD", "PLACE", "BoundedConnections", "bounded_by", "bounded_http"]
 
 DEADLINE, PLACE = "request_deadline", "place"  # keys of a request's `state`
 GRACE = 1.0  # s after the deadline, in which the answer that reports it may leave
@@ -32,7 +32,7 @@ STOP = re.compile(rb"POST [!-~]{0,500}/api/(?:fleet/)?stop[ ?]")
 BEARER = re.compile(rb"\r\nauthorization:[ \t]*bearer[ \t]+([!-~]{1,4096})[ \t]*\r\n", re.IGNORECASE)
 
 
-class GuardedConnections(NamedTuple):
+class BoundedConnections(NamedTuple):
     """The parts that `lockstep.server.http.transport.serve.running` needs to bound connections."""
 
     protocol: type[PlacedProtocol]
@@ -40,13 +40,13 @@ class GuardedConnections(NamedTuple):
     turns: FairQueue
 
 
-def guarded_http(
+def bounded_http(
     places: ConnectionPlaces, turns: FairQueue, tokens: KnownTokens, seconds: float
 ) -> type[PlacedProtocol]:
     """Return uvicorn's protocol with bounds. `seconds`: for a whole request, and for each part of its answer."""
     budgets = {True: RateLimits(STOP_RATE, STOP_BURST), False: RateLimits(LINK_RATE, LINK_BURST)}  # by: is it a stop
 
-    class GuardedHttp(H11Protocol, PlacedProtocol):
+    class BoundedHttp(H11Protocol, PlacedProtocol):
         place: Place
         _timer: asyncio.TimerHandle | None = None
         _asked = False  # for a turn
@@ -185,12 +185,12 @@ def guarded_http(
                 self._timer = None
             places.leave(self.place)
 
-    return GuardedHttp
+    return BoundedHttp
 
 
-def guarded_by(settings: LimitSettings, app: Starlette) -> GuardedConnections:
-    """Return connections within the settings' bounds, to an app that `guard_app` has prepared."""
+def bounded_by(settings: LimitSettings, app: Starlette) -> BoundedConnections:
+    """Return connections within the settings' bounds, to an app that `add_middleware` has prepared."""
     places: ConnectionPlaces = app.state.connection_places
     turns = FairQueue(TokenBucket(settings.max_stranger_rate, settings.max_stranger_burst))
-    protocol = guarded_http(places, turns, app.state.known_tokens, settings.request_timeout)
-    return GuardedConnections(protocol, places, turns)
+    protocol = bounded_http(places, turns, app.state.known_tokens, settings.request_timeout)
+    return BoundedConnections(protocol, places, turns)

@@ -22,9 +22,9 @@ from lockstep.rtc.token_bucket import TokenBucket
 from lockstep.server.http.robot_paths import below_robot
 from lockstep.server.util.read_turns import ReadTurns
 
-__all__ = ["CLOSED_FOR", "LINES", "SOCKET", "GuardedWebSocket", "guarded_websocket"]
+__all__ = ["CLOSED_FOR", "LINES", "SOCKET", "BoundedWebSocket", "bounded_websocket"]
 
-SOCKET = "lockstep.socket"  # key of a dialled connection's `GuardedWebSocket` in the scope's extensions
+SOCKET = "lockstep.socket"  # key of a dialled connection's `BoundedWebSocket` in the scope's extensions
 
 LINES = "/watch/"  # paths of observers' WebSockets (server/lockstep/server/routes/observer_websocket.py)
 LINE_BUFFER = 64 * 1024  # bytes that the kernel keeps for one that does not read; Linux doubles it
@@ -40,7 +40,7 @@ CLOSED_FOR = {1007: "not_utf8", 1008: "too_many_frames", 1009: "too_large"}  # R
 UNSUPPORTED, NOT_UTF8, TOO_MANY_FRAMES, TOO_LARGE = 1003, 1007, 1008, 1009
 
 
-class GuardedWebSocket(WebSocketsSansIOProtocol):
+class BoundedWebSocket(WebSocketsSansIOProtocol):
     """What comes is parsed in small pieces, and no more of it than the connection's share of the thread's time allows.
 
     Nothing is parsed before the app has accepted the connection, while a message waits for the app, or after the end.
@@ -235,13 +235,13 @@ class GuardedWebSocket(WebSocketsSansIOProtocol):
             self._goodbye = self.loop.call_later(GOODBYE_SECONDS, self.transport.abort)
 
 
-def guarded_websocket() -> type[GuardedWebSocket]:
+def bounded_websocket() -> type[BoundedWebSocket]:
     """Return the class of one server's connections, which share a bound for all of them together."""
 
-    class Guarded(GuardedWebSocket):
+    class Bounded(BoundedWebSocket):
         turns = ReadTurns(ALL_SHARE, ALL_BURST)
 
-    return Guarded
+    return Bounded
 
 
 def _is_utf8(data: bytes) -> bool:

@@ -4,10 +4,10 @@ from collections import deque
 
 from lockstep.server.media.pipeline.frame import EncodedFrame
 
-__all__ = ["Outbox"]
+__all__ = ["FrameQueue"]
 
 
-class Outbox:
+class FrameQueue:
     """A queue that nothing leaves before the first keyframe or, when frames had to be dropped, before the next one.
 
     Every sound packet counts as a keyframe, so that for sound this is "keep the newest `capacity`".

@@ -33,7 +33,7 @@ class Target(Protocol):
 
 
 class FanOut(FrameStage):
-    """Ends all chains. A slow target fills only its own outbox; an observer never delays the operator."""
+    """Ends all chains. A slow target fills only its own queue; an observer never delays the operator."""
 
     def __init__(self, turns: CooperativeScheduler) -> None:
         self._turns = turns

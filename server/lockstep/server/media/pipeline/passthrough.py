@@ -11,22 +11,18 @@ A robot bridge that encodes as it is asked makes keyframes, and fits the operato
 on from the beginning, and after a lost picture the bridge is asked instead.
 """
 
-import time
 from collections import deque
 from collections.abc import Callable
 
 from lockstep.protocol.messages import Media
 from lockstep.server.media.codecs.group_of_pictures import GroupOfPictures
 from lockstep.server.media.codecs.h264 import Profile, accepts, inspect
-from lockstep.server.media.codecs.packetise import packetise_h264
 from lockstep.server.media.encoding.stream_encodings import StreamEncodings
 from lockstep.server.media.encoding.tier_encoding import TierEncoding
 from lockstep.server.media.errors import PayloadError
 from lockstep.server.media.metrics import DropCounter
-from lockstep.server.media.pipeline.access_unit import is_access_unit
-from lockstep.server.media.pipeline.frame import EncodedFrame
+from lockstep.server.media.pipeline.access_unit import is_access_unit, passed_frame
 from lockstep.server.media.pipeline.media_clock import PictureClock
-from lockstep.server.media.pipeline.picture_timing import PictureTiming
 from lockstep.server.media.pipeline.stage import FrameStage, SourceFrame
 from lockstep.server.media.subscription import Subscription
 
@@ -155,23 +151,10 @@ class Passthrough(FrameStage):
         self._measure(media)
         if not self._passed.needed:
             return
-        encoded = EncodedFrame(
-            media.payload,
-            packetise_h264,
-            keyframe=media.keyframe,
-            marker=True,
-            stamp=media.stamp,
-            capture_time=self._passed.monotone(frame.capture_time),
-            media_time=self._clock.timestamp(media.time),
-            time=media.time,
-        )
-        whole = bool(encoded.payloads(trailer=False))
-        at = frame.arrived_at  # nothing is encoded here: from its arrival on it is being packetised
-        encoded.timing = PictureTiming(media.spans, at, at, at, time.monotonic())
-        if whole:
-            self.following.encoded(encoded, self._passed)
-        else:
+        if (encoded := passed_frame(frame, self._clock.timestamp(media.time), self._passed)) is None:
             self._dropped.count(PayloadError.name)
+        else:
+            self.following.encoded(encoded, self._passed)
 
     def _measure(self, media: Media) -> None:
         self._recent.append((media.time, len(media.payload)))

@@ -1,19 +1,15 @@
 """The stage that passes on a robot's second encoding of a camera: to observers who are due more than the operator."""
 
-import time
 from collections.abc import Callable
 
 from lockstep.protocol.messages import Media
 from lockstep.server.media.codecs.h264 import accepts, inspect
-from lockstep.server.media.codecs.packetise import packetise_h264
 from lockstep.server.media.encoding.stream_encodings import SECOND_TIERS, StreamEncodings
 from lockstep.server.media.encoding.tier_encoding import TierEncoding
 from lockstep.server.media.errors import PayloadError
 from lockstep.server.media.metrics import DropCounter
-from lockstep.server.media.pipeline.access_unit import is_access_unit
-from lockstep.server.media.pipeline.frame import EncodedFrame
+from lockstep.server.media.pipeline.access_unit import is_access_unit, passed_frame
 from lockstep.server.media.pipeline.media_clock import PictureClock
-from lockstep.server.media.pipeline.picture_timing import PictureTiming
 from lockstep.server.media.pipeline.stage import FrameStage, SourceFrame
 from lockstep.server.media.subscription import Subscription
 
@@ -108,23 +104,11 @@ class SecondPassthrough(FrameStage):
             self._second.targets[target] = None
 
     def _pass(self, frame: SourceFrame) -> None:
-        media, at = frame.media, frame.arrived_at
-        self._media_time = max(self._media_time + 1, self._clock.place(media.time))
-        encoded = EncodedFrame(
-            media.payload,
-            packetise_h264,
-            keyframe=media.keyframe,
-            marker=True,
-            stamp=media.stamp,
-            capture_time=self._second.monotone(frame.capture_time),
-            media_time=self._media_time,
-            time=media.time,
-        )
-        if not encoded.payloads(trailer=False):
+        self._media_time = max(self._media_time + 1, self._clock.place(frame.media.time))
+        if (encoded := passed_frame(frame, self._media_time, self._second)) is None:
             self._dropped.count(PayloadError.name)
-            return
-        encoded.timing = PictureTiming(media.spans, at, at, at, time.monotonic())
-        self.following.encoded(encoded, self._second)
+        else:
+            self.following.encoded(encoded, self._second)
 
     def _all_targets(self) -> list[Subscription]:
         return list({each: None for encoding in self._encodings for each in (*encoding.targets, *encoding.arriving)})

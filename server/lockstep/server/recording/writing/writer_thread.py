@@ -19,9 +19,9 @@ from lockstep.server.recording.format.records import Degraded, EpisodeRecord, Ow
 from lockstep.server.recording.format.signature import RecordingSigning
 from lockstep.server.recording.reading.scan import complete_file
 from lockstep.server.recording.settings import RecordingSettings
-from lockstep.server.recording.writing.episode_guard import EpisodeGuard
 from lockstep.server.recording.writing.live_queue import size_of
 from lockstep.server.recording.writing.queue_items import FeedbackItem, Item, MediaItem, OwnItem, RobotItem, entries_of
+from lockstep.server.recording.writing.whole_episodes import WholeEpisodes
 from lockstep.server.recording.writing.writer import RecordingWriter
 
 __all__ = ["RecordingThread"]
@@ -75,7 +75,7 @@ class RecordingThread:
         self._on_end = on_end
         self._signing = signing
         self._on_episode = on_episode
-        self._episodes = EpisodeGuard()
+        self._episodes = WholeEpisodes()
         self._is_keeping = False  # a record `kept` is written, and not known to be on the disk
         self.free_bytes = 0  # on the disk, when it was looked at last; 0: not yet
         self._head = ""  # of the previous part's signed chain

@@ -78,7 +78,7 @@ async def create(
     here = dependencies(request)
     if here.console.robot.description is None:
         raise RobotUnreachable(here.console.robot.detail)
-    here.guard.offer(caller.token_id)  # before it costs anything
+    here.request_limits.offer(caller.token_id)  # before it costs anything
     text = await read_text(request, SDP, here.settings.max_sdp_bytes)
     offer = parse_offer(text, max(MAX_SECTIONS, len(here.media.offers) + FURTHER_SECTIONS))
     if sections == "all":

@@ -66,7 +66,7 @@ async def create(
         raise NotAllowed("observers and policies may not publish")
     if here.console.robot.description is None:
         raise RobotUnreachable(here.console.robot.detail)
-    here.guard.offer(caller.token_id)  # before it costs anything
+    here.request_limits.offer(caller.token_id)  # before it costs anything
     text = await read_text(request, SDP, here.settings.max_sdp_bytes)
     offer = _parsed(text)
     section = _pictures(offer)

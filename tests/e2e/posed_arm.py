@@ -1,4 +1,4 @@
-"""A mobile robot with a tool for tests: `lockstep up --robot tests.e2e.headset.posed_arm:PosedArm`.
+"""A mobile robot with a tool for tests: `lockstep up --robot tests.e2e.posed_arm:PosedArm`.
 
 Its base is the planar robot's. The tool's pose and its jaw are goal axes, and are where their goals are; a joint moves
 what the pose moves too. Its two cameras are a stereo pair.

@@ -10,13 +10,13 @@ from structlog.testing import capture_logs
 from lockstep.protocol.console import Notice
 from lockstep.protocol.messages import Stop, StopState, StopTaken
 from lockstep.server.audit.records import Actor
-from lockstep.server.control import stop_service
 from lockstep.server.control.session_audit import STOPS
+from lockstep.server.control.stop import stop_service
 from lockstep.server.errors import (
     LinkDown,
 )
 from lockstep.server.stop.stop_presses import Press, new_press
-from tests.server.control.stop_bench import StopBench, raised
+from tests.server.control.stop.stop_bench import StopBench, raised
 from tests.server.rig import PATIENCE
 
 

@@ -12,7 +12,7 @@ import structlog
 
 from lockstep.protocol.messages import Stop, StopState, StopTaken
 from lockstep.server.audit.records import Actor
-from lockstep.server.control.stop_silence import SILENCED, StopSilence
+from lockstep.server.control.stop.stop_silence import SILENCED, StopSilence
 from lockstep.server.errors import LinkDown, Silenced, Unavailable, Unconfirmed
 from lockstep.server.event_clock import EventClock
 from lockstep.server.peers.peer_registry import PeerRegistry

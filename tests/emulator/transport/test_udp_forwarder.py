@@ -16,7 +16,7 @@ from lockstep.emulator.impairment.loss import independent
 from lockstep.emulator.impairment.outages import Outages
 from lockstep.emulator.impairment.profile import Profile, TwoWay, even_profile
 from lockstep.emulator.transport.client_paths import ClientPaths
-from lockstep.emulator.transport.udp_relay import MAX_RESTARTS, UdpRelay
+from lockstep.emulator.transport.udp_forwarder import MAX_RESTARTS, UdpForwarder
 
 CANDIDATE = re.compile(r"127\.0\.0\.1 (\d+) typ host")
 LOOPBACK = "127.0.0.1"
@@ -67,13 +67,13 @@ async def sockets(count: int) -> AsyncIterator[list[End]]:
 
 
 @asynccontextmanager
-async def relay_for(profile: Profile) -> AsyncIterator[tuple[UdpRelay, Outages]]:
+async def forwarder_for(profile: Profile) -> AsyncIterator[tuple[UdpForwarder, Outages]]:
     deliveries, outages = Deliveries(), Outages()
-    relay = UdpRelay(ClientPaths(profile, "1", outages), deliveries)
+    forwarder = UdpForwarder(ClientPaths(profile, "1", outages), deliveries)
     try:
-        yield relay, outages
+        yield forwarder, outages
     finally:
-        relay.close()
+        forwarder.close()
         deliveries.close()
 
 
@@ -87,16 +87,16 @@ def description(name: str, port: int) -> str:
     return f"a=ice-ufrag:{name}\r\nm=audio 9 X\r\na=candidate:1 1 udp 5 {LOOPBACK} {port} typ host\r\n"
 
 
-def join(relay: UdpRelay, client: End, console: End, name: str = "console") -> int:
-    """The port at which the client finds the relay."""
-    assert "candidate" not in relay.offer(description("client", client.port))
-    found = CANDIDATE.findall(relay.answer(description(name, console.port)))
+def join(forwarder: UdpForwarder, client: End, console: End, name: str = "console") -> int:
+    """The port at which the client finds the forwarder."""
+    assert "candidate" not in forwarder.offer(description("client", client.port))
+    found = CANDIDATE.findall(forwarder.answer(description(name, console.port)))
     return int(found[0])
 
 
 async def test_packets_pass_both_ways_once_the_client_has_shown_that_it_knows_the_names() -> None:
-    async with relay_for(even_profile("x", PERFECT)) as (relay, _), sockets(2) as (client, console):
-        door = join(relay, client, console)
+    async with forwarder_for(even_profile("x", PERFECT)) as (forwarder, _), sockets(2) as (client, console):
+        door = join(forwarder, client, console)
         client.send(check("console:client"), door)
         data, behind = await console.hear()
         assert stun.parse_message(data).attributes["USERNAME"] == "console:client"
@@ -107,19 +107,19 @@ async def test_packets_pass_both_ways_once_the_client_has_shown_that_it_knows_th
 
 
 async def test_strangers_do_not_pass() -> None:
-    async with relay_for(even_profile("x", PERFECT)) as (relay, _), sockets(3) as (client, console, stranger):
-        door = join(relay, client, console)
+    async with forwarder_for(even_profile("x", PERFECT)) as (forwarder, _), sockets(3) as (client, console, stranger):
+        door = join(forwarder, client, console)
         for data in (b"hello", check("console:other"), check("other:client"), check("")):
             stranger.send(data, door)
         client.send(check("console:client"), door)
         await console.hear()
-        assert relay.strangers == 4
+        assert forwarder.strangers == 4
         assert console.silent
 
 
 async def test_each_address_of_the_client_is_another_one_to_the_console() -> None:
-    async with relay_for(even_profile("x", PERFECT)) as (relay, _), sockets(3) as (client, console, second):
-        door = join(relay, client, console)
+    async with forwarder_for(even_profile("x", PERFECT)) as (forwarder, _), sockets(3) as (client, console, second):
+        door = join(forwarder, client, console)
         client.send(check("console:client"), door)
         _, one = await console.hear()
         second.send(check("console:client"), door)
@@ -133,8 +133,8 @@ async def test_each_address_of_the_client_is_another_one_to_the_console() -> Non
 async def test_media_and_control_meet_different_networks() -> None:
     nothing = Impairment(loss=independent(1.0))
     profile = Profile("x", media=TwoWay(nothing, nothing))
-    async with relay_for(profile) as (relay, _), sockets(2) as (client, console):
-        door = join(relay, client, console)
+    async with forwarder_for(profile) as (forwarder, _), sockets(2) as (client, console):
+        door = join(forwarder, client, console)
         client.send(check("console:client"), door)
         _, behind = await console.hear()
         console.send(b"\x80media", behind)
@@ -143,11 +143,11 @@ async def test_media_and_control_meet_different_networks() -> None:
 
 
 async def test_an_ice_restart_leads_to_the_consoles_new_address_while_the_old_one_still_works() -> None:
-    async with relay_for(even_profile("x", PERFECT)) as (relay, _), sockets(3) as (client, console, again):
-        door = join(relay, client, console)
+    async with forwarder_for(even_profile("x", PERFECT)) as (forwarder, _), sockets(3) as (client, console, again):
+        door = join(forwarder, client, console)
         client.send(check("console:client"), door)
         await console.hear()
-        new_door = join(relay, client, again, "restarted")
+        new_door = join(forwarder, client, again, "restarted")
         assert new_door != door
         client.send(check("restarted:client"), new_door)
         _, behind = await again.hear()
@@ -158,19 +158,19 @@ async def test_an_ice_restart_leads_to_the_consoles_new_address_while_the_old_on
 
 
 async def test_restarts_are_bounded() -> None:
-    async with relay_for(even_profile("x", PERFECT)) as (relay, _), sockets(2) as (client, console):
+    async with forwarder_for(even_profile("x", PERFECT)) as (forwarder, _), sockets(2) as (client, console):
         for number in range(MAX_RESTARTS):
-            join(relay, client, console, f"n{number}")
+            join(forwarder, client, console, f"n{number}")
         with pytest.raises(BadDescription, match="too many"):
-            join(relay, client, console, "more")
+            join(forwarder, client, console, "more")
 
 
 async def test_an_outage_holds_packets_until_its_end_and_the_first_packet_starts_the_schedule() -> None:
     async with (
-        relay_for(even_profile("x", Impairment(delay=Constant(0.001)))) as (relay, outages),
+        forwarder_for(even_profile("x", Impairment(delay=Constant(0.001)))) as (forwarder, outages),
         sockets(2) as (client, console),
     ):
-        door = join(relay, client, console)
+        door = join(forwarder, client, console)
         before = outages.started
         client.send(check("console:client"), door)
         await console.hear()
@@ -183,18 +183,18 @@ async def test_an_outage_holds_packets_until_its_end_and_the_first_packet_starts
 
 
 async def test_a_closed_relay_passes_nothing_and_its_ports_are_free() -> None:
-    async with relay_for(even_profile("x", PERFECT)) as (relay, _), sockets(2) as (client, console):
-        door = join(relay, client, console)
-        relay.close()
-        relay.close()
+    async with forwarder_for(even_profile("x", PERFECT)) as (forwarder, _), sockets(2) as (client, console):
+        door = join(forwarder, client, console)
+        forwarder.close()
+        forwarder.close()
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as own:
             own.bind((LOOPBACK, door))
 
 
 async def test_an_address_that_is_not_ours_is_refused() -> None:
     deliveries = Deliveries()
-    relay = UdpRelay(ClientPaths(even_profile("x", PERFECT), "1", Outages()), deliveries, ["192.0.2.250"])
+    forwarder = UdpForwarder(ClientPaths(even_profile("x", PERFECT), "1", Outages()), deliveries, ["192.0.2.250"])
     with pytest.raises(OSError, match="assign"):
-        relay.answer(description("console", 4000))
-    relay.close()
+        forwarder.answer(description("console", 4000))
+    forwarder.close()
     deliveries.close()

@@ -15,10 +15,10 @@ from lockstep.server.audit.records import Actor, AuditRecord
 from lockstep.server.auth.silenced_links import SilencedLinks
 from lockstep.server.auth.tokens import Identity
 from lockstep.server.control.notices import Notices
-from lockstep.server.control.reset_service import ResetService
 from lockstep.server.control.session_audit import SessionAudit
-from lockstep.server.control.stop_service import StopService
-from lockstep.server.control.stop_silence import StopSilence
+from lockstep.server.control.stop.reset_service import ResetService
+from lockstep.server.control.stop.stop_service import StopService
+from lockstep.server.control.stop.stop_silence import StopSilence
 from lockstep.server.errors import (
     ConsoleError,
 )

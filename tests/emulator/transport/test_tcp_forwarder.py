@@ -10,7 +10,7 @@ from lockstep.emulator.impairment.deliveries import Deliveries
 from lockstep.emulator.impairment.impairment import Impairment
 from lockstep.emulator.impairment.outages import Outages
 from lockstep.emulator.impairment.profile import Profile, TwoWay
-from lockstep.emulator.transport.tcp_relay import WINDOW, TcpRelay
+from lockstep.emulator.transport.tcp_forwarder import WINDOW, TcpForwarder
 from lockstep.protocol.framing import frame
 from lockstep.protocol.messages import Hello, LinkRole, Ping, encode_message
 
@@ -40,15 +40,15 @@ class Bridge:
 
 
 class Rig:
-    def __init__(self, relay: TcpRelay, bridge: Bridge, outages: Outages) -> None:
-        self.relay = relay
+    def __init__(self, forwarder: TcpForwarder, bridge: Bridge, outages: Outages) -> None:
+        self.forwarder = forwarder
         self.bridge = bridge
         self.outages = outages
         self._writers: list[asyncio.StreamWriter] = []
 
     async def connect(self, begins: bytes) -> tuple[Streams, Streams]:
         """The client's and the bridge's end of a new connection, after the bridge has read its beginning."""
-        reader, writer = await asyncio.open_connection(*self.relay.address)
+        reader, writer = await asyncio.open_connection(*self.forwarder.address)
         self._writers.append(writer)
         writer.write(begins)
         at_bridge = await self.bridge.next()
@@ -64,8 +64,8 @@ class Rig:
 async def rig_for(profile: Profile) -> AsyncIterator[Rig]:
     bridge, outages, deliveries = Bridge(), Outages(), Deliveries()
     server = await asyncio.start_server(bridge.accept, "127.0.0.1", 0)
-    async with server, TcpRelay(server.sockets[0].getsockname()[:2], profile, 1, outages, deliveries) as relay:
-        rig = Rig(relay, bridge, outages)
+    async with server, TcpForwarder(server.sockets[0].getsockname()[:2], profile, 1, outages, deliveries) as forwarder:
+        rig = Rig(forwarder, bridge, outages)
         try:
             yield rig
         finally:
@@ -99,7 +99,7 @@ async def test_each_role_takes_its_own_path_in_both_directions() -> None:
         assert await heard(reader, len(picture)) == picture
         assert time.monotonic() - began >= 0.06
         await rig.connect(hello("operator"))
-        counts = rig.relay.statistics
+        counts = rig.forwarder.statistics
         assert counts["robot_media", "to_robot"].mean_delay == pytest.approx(0.03)
         assert counts["robot_media", "to_operator"].bytes == len(picture)
         assert counts["robot_control", "to_robot"].mean_delay < 0.01
@@ -114,7 +114,7 @@ async def test_a_frame_is_one_message_however_it_comes() -> None:
             await writer.drain()
         writer.write(ping * 3)
         assert await heard(reader, 4 * len(ping)) == 4 * ping
-        assert rig.relay.statistics["robot_control", "to_robot"].offered == 5
+        assert rig.forwarder.statistics["robot_control", "to_robot"].offered == 5
 
 
 async def test_what_is_not_framed_passes_as_it_comes() -> None:
@@ -137,15 +137,15 @@ async def test_the_end_of_one_side_reaches_the_other_behind_what_is_under_way() 
 async def test_a_cut_breaks_connections_and_new_ones_are_taken() -> None:
     async with rig_for(Profile("x")) as rig:
         (reader, _), _ = await rig.connect(hello("operator"))
-        rig.relay.cut()
+        rig.forwarder.cut()
         await closed(reader)
         await rig.connect(hello("operator"))
 
 
 async def test_a_bridge_that_is_not_there_closes_the_connection() -> None:
     async with rig_for(Profile("x")) as rig:
-        rig.relay._target = ("127.0.0.1", 1)
-        reader, writer = await asyncio.open_connection(*rig.relay.address)
+        rig.forwarder._target = ("127.0.0.1", 1)
+        reader, writer = await asyncio.open_connection(*rig.forwarder.address)
         writer.write(hello("operator"))
         await closed(reader)
         writer.close()
@@ -158,7 +158,7 @@ async def test_a_sender_waits_while_too_much_is_under_way() -> None:
         picture = frame(bytes(WINDOW // 4))
         for _ in range(12):
             writer.write(picture)
-        flying = rig.relay.statistics["robot_media", "to_operator"]
+        flying = rig.forwarder.statistics["robot_media", "to_operator"]
         async with asyncio.timeout(20):
             assert await reader.readexactly(len(picture))
             assert flying.offered < 12, "the rest waits at the sender"

@@ -37,7 +37,7 @@ def _far(one: Sequence[float], other: Sequence[float]) -> float:
 
 @pytest_asyncio.fixture(loop_scope="session")
 async def posed(half_rate: None, tmp_path_factory: pytest.TempPathFactory) -> AsyncIterator[Stack]:
-    async with running_stack(tmp_path_factory.mktemp("posed"), robot="tests.e2e.headset.posed_arm:PosedArm") as stack:
+    async with running_stack(tmp_path_factory.mktemp("posed"), robot="tests.e2e.posed_arm:PosedArm") as stack:
         yield stack
 
 

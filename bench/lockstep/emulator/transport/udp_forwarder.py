@@ -1,8 +1,8 @@
-"""Relays everything but HTTP between one client and the console, over the paths of a profile.
+"""Forwards everything but HTTP between one client and the console, over the paths of a profile.
 
-It puts itself into both descriptions. The console sees a client at the relay, the client sees a console there; neither
-learns another address. A client may try several of its addresses: each becomes a flow with its own socket towards the
-console, as at a NAT, so that ICE can tell them apart.
+It puts itself into both descriptions. The console sees a client at the forwarder, the client sees a console there;
+neither learns another address. A client may try several of its addresses: each becomes a flow with its own socket
+towards the console, as at a NAT, so that ICE can tell them apart.
 """
 
 import asyncio
@@ -25,7 +25,7 @@ from lockstep.emulator.transport.sdp import (
     without_candidates,
 )
 
-__all__ = ["LOOPBACK", "UdpRelay"]
+__all__ = ["LOOPBACK", "UdpForwarder"]
 
 LOOPBACK = "127.0.0.1"
 MAX_DATAGRAM = 65536
@@ -36,7 +36,7 @@ MAX_RESTARTS = 20
 
 
 class _Door:
-    """A socket of the relay at which the client finds one ICE session of the console."""
+    """A socket of the forwarder at which the client finds one ICE session of the console."""
 
     def __init__(self, host: str, console: Address, names: set[str]) -> None:
         self.socket = _udp_socket(host)
@@ -58,8 +58,8 @@ class _Flow:
         self.upstream.connect(door.console)
 
 
-class UdpRelay:
-    """A relay. Call `offer`, then `answer`; packets pass until `close`. Use it inside a running loop.
+class UdpForwarder:
+    """A forwarder. Call `offer`, then `answer`; packets pass until `close`. Use it inside a running loop.
 
     An ICE restart is one more `offer` and `answer`, with fragments: the console's new session gets its own sockets.
 
@@ -104,7 +104,7 @@ class UdpRelay:
         return candidates_replaced(sdp, [door.address for door in opened])
 
     def close(self) -> None:
-        """Close the relay; packets under way do not arrive. Idempotent."""
+        """Close the forwarder; packets under way do not arrive. Idempotent."""
         self._closed = True
         for own in (*(door.socket for door in self._doors), *(flow.upstream for flow in self._flows.values())):
             self._loop.remove_reader(own)

@@ -23,7 +23,7 @@ from lockstep.protocol.errors import MessageError
 from lockstep.protocol.framing import MAX_MEDIA_FRAME
 from lockstep.protocol.messages import Hello, decode_message
 
-__all__ = ["TcpRelay"]
+__all__ = ["TcpForwarder"]
 
 HEADER = 4  # bytes of a frame's length
 READ = 1 << 18  # bytes
@@ -33,8 +33,8 @@ CONNECT_TIMEOUT = 10.0  # s
 Name = str  # "robot_media" or "robot_control"
 
 
-class TcpRelay:
-    """A relay. Connect to `address` instead of to the bridge at `target`. Enter it before use."""
+class TcpForwarder:
+    """A forwarder. Connect to `address` instead of to the bridge at `target`. Enter it before use."""
 
     def __init__(
         self, target: tuple[str, int], profile: Profile, seed: int, outages: Outages, deliveries: Deliveries
@@ -69,7 +69,7 @@ class TcpRelay:
     @property
     def address(self) -> tuple[str, int]:
         if self._server is None:
-            raise RuntimeError("enter the relay first")
+            raise RuntimeError("enter the forwarder first")
         host, port = self._server.sockets[0].getsockname()[:2]
         return host, port
 
@@ -79,11 +79,11 @@ class TcpRelay:
             task.cancel()
 
     def _accepted(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-        task = asyncio.get_running_loop().create_task(self._relay(reader, writer))
+        task = asyncio.get_running_loop().create_task(self._forward(reader, writer))
         self._tasks.add(task)
         task.add_done_callback(self._tasks.discard)
 
-    async def _relay(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+    async def _forward(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         bridge: asyncio.StreamWriter | None = None
         try:
             cutter, begun = await _first_messages(reader)
@@ -183,7 +183,7 @@ class _Way:
         self._landed = asyncio.Event()
 
     async def run(self, reader: asyncio.StreamReader, cutter: _Cutter, begun: list[bytes]) -> None:
-        """Relay until the sender closes; then the bytes under way arrive, and the receiver is closed too."""
+        """Forward until the sender closes; then the bytes under way arrive, and the receiver is closed too."""
         for message in begun:
             self._launch(message)
         while data := await reader.read(READ):

@@ -2,10 +2,10 @@
 
 from lockstep.server.recording.format.records import EpisodeRecord
 
-__all__ = ["EpisodeGuard"]
+__all__ = ["WholeEpisodes"]
 
 
-class EpisodeGuard:
+class WholeEpisodes:
     """Show it each record before it is written.
 
     Attributes:

@@ -6,7 +6,7 @@ from typing import cast
 import pytest
 
 from lockstep.protocol.messages import Refusal, RefusalReason, Reset, Stop, StopState
-from lockstep.server.control import reset_service
+from lockstep.server.control.stop import reset_service
 from lockstep.server.errors import (
     ConsoleError,
     LinkDown,
@@ -19,7 +19,7 @@ from lockstep.server.errors import (
     Unconfirmed,
 )
 from lockstep.server.peers.peer import Peer
-from tests.server.control.stop_bench import StopBench, raised
+from tests.server.control.stop.stop_bench import StopBench, raised
 
 
 async def test_a_reset_returns_when_the_robot_shows_that_it_is_released(bench: StopBench) -> None:

@@ -12,7 +12,7 @@ from lockstep.server.errors import (
     Silenced,
 )
 from lockstep.server.peers.peer import Peer
-from tests.server.control.stop_bench import StopBench
+from tests.server.control.stop.stop_bench import StopBench
 
 
 async def test_a_supervisor_silences_a_link_that_keeps_pressing_and_what_it_stopped_stays_stopped(

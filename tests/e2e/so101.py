@@ -9,7 +9,7 @@ from lockstep.robot_bridge.robots.so101.model_source import FOLDER_VARIABLE
 
 __all__ = ["SO101", "needs_so101"]
 
-FOLDER: Final = Path(__file__).parents[3] / ".so101"
+FOLDER: Final = Path(__file__).parents[2] / ".so101"
 SO101: Final = {FOLDER_VARIABLE: str(FOLDER)}  # of the environment
 
 needs_so101 = pytest.mark.skipif(

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.server.control.stop_bench import StopBench
+from tests.server.control.stop.stop_bench import StopBench
 
 
 @pytest.fixture

@@ -9,7 +9,7 @@ from playwright.async_api import Browser
 
 from lockstep.bench.browsers.headset_page import TRIES, Headset, open_headset
 from tests.e2e.conftest import RobotKeeper
-from tests.e2e.headset.posed_arm import PosedArm
+from tests.e2e.posed_arm import PosedArm
 from tests.support.stack import Stack, running_stack
 
 pytestmark = [pytest.mark.browser, pytest.mark.timeout(240)]
@@ -20,7 +20,7 @@ GRIP = [0.2, 1.3, -0.4]
 
 @pytest_asyncio.fixture(loop_scope="session")
 async def posed(robot_keeper: RobotKeeper) -> Stack:
-    return await robot_keeper.stack("tests.e2e.headset.posed_arm:PosedArm")
+    return await robot_keeper.stack("tests.e2e.posed_arm:PosedArm")
 
 
 def _moved(position: list[float], by: tuple[float, float, float]) -> list[float]:
@@ -91,7 +91,7 @@ async def test_a_pose_in_the_frame_of_a_camera_follows_the_hand_as_seen_in_that_
     half_rate: None, tmp_path: Path, chromium: Browser
 ) -> None:
     async with (
-        running_stack(tmp_path, robot="tests.e2e.headset.posed_arm:CameraPosedArm") as stack,
+        running_stack(tmp_path, robot="tests.e2e.posed_arm:CameraPosedArm") as stack,
         open_headset(chromium, stack.operator) as headset,
     ):
         await headset.enter()
