@@ -187,14 +187,15 @@ class DtlsConnection:
         Call `read_on` when that has gone on: it may be a command, and to find out that nothing is behind it takes as
         long again.
         """
-        self.read_on(now)
+        if self._is_unread:
+            self.read_on(now)
         if self._state is DtlsState.NEW:
             self.counts["not_started"] += 1
         elif self._state in (DtlsState.CLOSED, DtlsState.FAILED):
             self.counts["ended"] += 1
         elif not data or data[0] not in FIRST_BYTES:
             self.counts["not_dtls"] += 1
-        elif self._is_too_much(len(data)):
+        elif self._state is DtlsState.CONNECTING and self._is_too_much(len(data)):
             self._fail("too_much_handshake", f"more than {self._settings.max_handshake} bytes before connected")
         else:
             self._ssl.bio_write(data)
@@ -269,8 +270,6 @@ class DtlsConnection:
     # OpenSSL
 
     def _is_too_much(self, length: int) -> bool:
-        if self._state is DtlsState.CONNECTED:
-            return False
         self._handshake_bytes += length
         return self._handshake_bytes > self._settings.max_handshake
 

@@ -428,10 +428,11 @@ class Association:
     def _after_packet(self) -> None:
         receiver = self._receiver
         if receiver.packet_ends(self.now):
-            if receiver.messages:
-                self._events += receiver.messages
-                receiver.messages.clear()
-            self._take_reset_events(self._resets.advanced(receiver.received.cumulative))
+            if messages := receiver.messages:
+                self._events += messages
+                messages.clear()
+            if events := self._resets.advanced(receiver.received.cumulative):
+                self._take_reset_events(events)
 
     def _receive_sack(self, chunk: Sack) -> None:
         if self._is_up:
