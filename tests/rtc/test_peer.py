@@ -348,10 +348,10 @@ def test_what_comes_before_it_can_be_read_is_counted_and_bounded() -> None:
 def test_what_the_peer_sends_that_is_nothing_is_counted() -> None:
     pair = connected()
     sender, receiver = pair.peers
-    assert sender._protect is not None
+    assert sender._media._protect is not None
     path = receiver.ice.path
     assert path is not None
-    protect, protect_rtcp = sender._protect.protect, sender._protect.protect_rtcp
+    protect, protect_rtcp = sender._media._protect.protect, sender._media._protect.protect_rtcp
     malformed = b"\xb0" + bytes(3) + bytes(4) + b"\x00\x00\x00\x09" + b"\xbe\xde\x00\x01\x1f\x00\x00\x00" + b"\xff"
     for data in (
         protect(b"\x80\x21" + bytes(10)),

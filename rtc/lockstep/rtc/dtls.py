@@ -55,7 +55,10 @@ FIRST_BYTES = range(20, 64)  # RFC 7983 7
 HEADER = 13  # bytes of a record's header (RFC 6347 4.1)
 MAX_PLAINTEXT = 1 << 14  # bytes of one record (RFC 6347 4.1.1 and RFC 5246 6.2.1)
 APPLICATION_DATA = 23
-READ_SIZE = 1 << 16
+# pyOpenSSL clears a buffer of the size that it is asked for, which takes the processor's caches: large ones cost more
+# than reading twice.
+WRITTEN_AT_ONCE = 1 << 11  # bytes that OpenSSL wrote; a flight of a handshake is read in pieces
+READ_AT_LEAST = 1 << 11  # bytes of room for a record
 MOST_ADDED = 128  # bytes that a record has on top of its content: header, nonce, MAC and padding
 
 
@@ -158,6 +161,7 @@ class DtlsConnection:
         self._out: list[bytes] = []
         self._events: list[DtlsEvent] = []
         self._is_unread = False  # True: the last datagram may have further records
+        self._room = MAX_PLAINTEXT  # bytes of the longest record that may wait: no more than its datagram
 
     @property
     def state(self) -> DtlsState:
@@ -187,16 +191,19 @@ class DtlsConnection:
         Call `read_on` when that has gone on: it may be a command, and to find out that nothing is behind it takes as
         long again.
         """
-        self.read_on(now)
+        if self._is_unread:
+            self.read_on(now)
         if self._state is DtlsState.NEW:
             self.counts["not_started"] += 1
         elif self._state in (DtlsState.CLOSED, DtlsState.FAILED):
             self.counts["ended"] += 1
         elif not data or data[0] not in FIRST_BYTES:
             self.counts["not_dtls"] += 1
-        elif self._is_too_much(len(data)):
+        elif self._state is DtlsState.CONNECTING and self._is_too_much(len(data)):
             self._fail("too_much_handshake", f"more than {self._settings.max_handshake} bytes before connected")
         else:
+            if self._state is DtlsState.CONNECTED:
+                self._room = max(READ_AT_LEAST, len(data))
             self._ssl.bio_write(data)
             self._advance(now, only_first=self._state is DtlsState.CONNECTED)
 
@@ -269,8 +276,6 @@ class DtlsConnection:
     # OpenSSL
 
     def _is_too_much(self, length: int) -> bool:
-        if self._state is DtlsState.CONNECTED:
-            return False
         self._handshake_bytes += length
         return self._handshake_bytes > self._settings.max_handshake
 
@@ -284,7 +289,7 @@ class DtlsConnection:
                 self._ssl.do_handshake()
                 self._finish_handshake()
             while self._state is DtlsState.CONNECTED:
-                self._events.append(DtlsData(self._ssl.recv(MAX_PLAINTEXT)))
+                self._events.append(DtlsData(self._ssl.recv(self._room)))
                 if only_first:
                     self._is_unread = True
                     return
@@ -335,7 +340,7 @@ class DtlsConnection:
         written = b""
         try:
             while True:
-                written += self._ssl.bio_read(READ_SIZE)
+                written += self._ssl.bio_read(WRITTEN_AT_ONCE)
         except SSL.WantReadError:
             return written
 

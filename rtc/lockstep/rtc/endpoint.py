@@ -226,6 +226,8 @@ class Endpoint:
 
     def send(self, datagrams: Sequence[Datagram], *, urgent: bool) -> None:
         """Send datagrams with all others of this turn of the loop; urgent ones now."""
+        if not datagrams or (urgent and len(datagrams) == 1 and self._send_at_once(datagrams[0])):
+            return
         used: UdpSocket | None = None
         for datagram in datagrams:
             if self._tcp is not None and datagram.path.transport == "tcp":
@@ -239,11 +241,20 @@ class Endpoint:
                 self._flush_socket(used)
             found.queue((datagram,), urgent=urgent)
             used = found
-        if urgent and used is not None:
+        if used is None:
+            return
+        if urgent:
             self._flush_socket(used)
-        elif datagrams and not self._flush_is_due:
+        elif not self._flush_is_due:
             self._flush_is_due = True
             self._loop.call_soon(self._flush_later)
+
+    def _send_at_once(self, datagram: Datagram) -> bool:
+        """Send a datagram by UDP, without the queues; return False if it has to take its turn there."""
+        if datagram.path.transport == "tcp":
+            return False
+        found = self._sockets.get(datagram.path.local)
+        return found is not None and found.send_at_once(datagram)
 
     def is_blocked(self, path: Path) -> bool:
         """True if data sent on this path now would only wait for the network."""

@@ -8,17 +8,20 @@ drain `datagrams_to_send` and `events` after each; `timer`.
 """
 
 from collections import Counter, deque
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from random import Random, SystemRandom
 
 from OpenSSL import SSL
 
 from lockstep.rtc.addresses import Datagram, Path
+from lockstep.rtc.bundle.bundle_media import BundleMedia
+from lockstep.rtc.bundle.local_side import LocalSide
+from lockstep.rtc.bundle.settings import OfferedMedia, PeerNotReady, PeerSettings
 from lockstep.rtc.channels import ChannelMessage, DataChannels
 from lockstep.rtc.dcep import Reliability
 from lockstep.rtc.demux import DatagramKind, datagram_kind
-from lockstep.rtc.dtls import DtlsClosed, DtlsConnected, DtlsConnection, DtlsData, DtlsFailed, DtlsSettings, DtlsState
+from lockstep.rtc.dtls import DtlsClosed, DtlsConnected, DtlsConnection, DtlsData, DtlsFailed, DtlsState
 from lockstep.rtc.fingerprint import Fingerprint
 from lockstep.rtc.ice.agent import Agent
 from lockstep.rtc.ice.candidates import CandidateError, parse_candidate
@@ -26,22 +29,15 @@ from lockstep.rtc.ice.check_list import LocalCandidate
 from lockstep.rtc.ice.credentials import Credentials
 from lockstep.rtc.ice.directory import Directory
 from lockstep.rtc.ice.events import Answered, Ended, PathChanged, Restarted, RestartFailed
-from lockstep.rtc.ice.settings import IceSettings
 from lockstep.rtc.peer_events import (
     Connected,
-    MediaEvent,
-    PacketReceived,
     PathFound,
     PeerEnded,
     PeerEvent,
-    PlainRtcp,
-    PlainRtp,
 )
-from lockstep.rtc.rtp.incoming import IncomingStream
 from lockstep.rtc.rtp.outgoing import OutgoingStream, PathShare
 from lockstep.rtc.rtp.stage import earliest
-from lockstep.rtc.rtp.streams import Identity, NegotiatedMedia, Streams
-from lockstep.rtc.sctp import SctpSettings
+from lockstep.rtc.rtp.streams import Streams
 from lockstep.rtc.sdp import (
     Fragment,
     FragmentCandidate,
@@ -49,56 +45,12 @@ from lockstep.rtc.sdp import (
     MediaSection,
     SdpError,
     SessionDescription,
-    Setup,
-    Source,
-    SourceGroup,
     Transport,
-    answer_to,
     check_answer,
-    data_section,
-    media_section,
-    offer_of,
     reverse,
 )
-from lockstep.rtc.srtp import SrtpPacketTooLong, SrtpReceiver, SrtpSender
 
 __all__ = ["OfferedMedia", "Peer", "PeerNotReady", "PeerSettings"]
-
-DATA_MID = "data"  # mid of the section for channels in an offer of this side
-EXTENSION_IDS = (*range(1, 15), *range(16, 256))  # of header extensions; 15 is reserved (RFC 8285 4.2)
-
-
-class PeerNotReady(RuntimeError):
-    """The peer has no such stream or no channels: not negotiated, not yet, or not any more."""
-
-
-@dataclass(frozen=True, slots=True)
-class PeerSettings:
-    """The settings of a peer that an application may change."""
-
-    ice: IceSettings = field(default_factory=IceSettings)
-    dtls: DtlsSettings = field(default_factory=DtlsSettings)
-    sctp: SctpSettings = field(default_factory=SctpSettings)
-    # The DTLS role of an answer, where the offer leaves the choice (RFC 8842 5.3). A peer that asks for a path is the
-    # first to know that ICE has found one.
-    setup: Setup = "passive"
-    epoch: float = 0.0  # s since 1970 at which the clock of `now` was 0; for sender reports
-    held: int = 32  # datagrams of DTLS that overtake the description they need; a handshake has fewer
-
-
-@dataclass(frozen=True, slots=True)
-class OfferedMedia:
-    """A section of an offer of this side."""
-
-    mid: str
-    kind: str  # "audio" or "video"
-    media: LocalMedia
-
-
-@dataclass(slots=True)
-class _Ssrcs:
-    stream: int
-    repair: int
 
 
 class Peer:
@@ -133,26 +85,22 @@ class Peer:
             candidates, controlling=controlling, settings=self.settings.ice, directory=directory, rng=self._random
         )
         self._context = context
-        self._fingerprint = fingerprint
-        self._identity = Identity.new(self._random)
-        self._session_id = self._random.getrandbits(62)  # RFC 8829 5.2.1
-        self._ssrcs: dict[str, _Ssrcs] = {}  # by mid
+        self._local = LocalSide(self.ice, fingerprint, self.settings, self._random)
+        self._media = BundleMedia(self.counts)
         self._offer: SessionDescription | None = None  # the offer of this side, until it is answered
         self._dtls: DtlsConnection | None = None  # None until both descriptions are known
         self._held: deque[bytes] = deque(maxlen=self.settings.held)
         self.channels: DataChannels | None = None  # None when there are none
-        self.streams: Streams | None = None  # None until both descriptions are known
-        self._protect: SrtpSender | None = None
-        self._unprotect: SrtpReceiver | None = None
-        self._plain_packets = False
         self._tagged: MediaSection | None = None  # section with the transport of the bundle; None until negotiated
-        # True if streams may have news: most datagrams are about something else, and each stream is a chain of stages.
-        self._media_unsent = self._media_untold = self._media_untimed = False
-        self._media_due: float | None = None  # the streams' timer, as far as it is known
         self._out: list[Datagram] = []
         self._events: list[PeerEvent] = []
         self._now = 0.0
         self._ended = False
+
+    @property
+    def streams(self) -> Streams | None:
+        """The streams of its media; None until both descriptions are known."""
+        return self._media.streams
 
     # Negotiation
 
@@ -164,25 +112,14 @@ class Peer:
             RuntimeError: this session was negotiated before.
         """
         self._check_new()
-        answer = answer_to(
-            offer,
-            self._own_transport(),
-            {mid: self._with_sources(mid, own) for mid, own in media.items()},
-            max_message_size=self.settings.sctp.max_receive_message,
-            session_id=self._session_id,
-        )
+        answer = self._local.answer(offer, media)
         self._negotiated(offer, answer, answer.sections, now)
         return answer
 
     def offer(self, media: Sequence[OfferedMedia], *, data: bool = True) -> SessionDescription:
         """Return an offer, with channels if `data`. The answer goes to `accept`. Raises RuntimeError like `answer`."""
         self._check_new()
-        uris = dict.fromkeys(uri for each in media for uri in each.media.extensions)
-        ids = dict(zip(uris, EXTENSION_IDS, strict=False))
-        sections = [media_section(x.mid, x.kind, self._with_sources(x.mid, x.media), ids) for x in media]
-        if data:
-            sections.append(data_section(DATA_MID, self.settings.sctp.max_receive_message))
-        self._offer = offer_of(sections, self._own_transport(), session_id=self._session_id)
+        self._offer = self._local.offer(media, data=data)
         return self._offer
 
     def accept(self, answer: SessionDescription, now: float) -> None:
@@ -266,46 +203,14 @@ class Peer:
         if self._dtls is not None:
             raise RuntimeError("this session is negotiated; another one is another peer")
 
-    def _own_transport(self) -> Transport:
-        credentials = self.ice.local_credentials
-        return Transport(
-            ufrag=credentials.ufrag,
-            password=credentials.password,
-            fingerprints=(self._fingerprint,),
-            setup=self.settings.setup,
-            candidates=tuple(local.candidate.line() for local in self.ice.local_candidates),
-            end_of_candidates=True,
-            ice_options=("trickle",),
-        )
-
-    def _with_sources(self, mid: str, own: LocalMedia) -> LocalMedia:
-        """Return `own` with the SSRCs that this side sends under."""
-        ssrcs = self._ssrcs.setdefault(mid, _Ssrcs(self._random.getrandbits(32), self._random.getrandbits(32)))
-        names = {"cname": self._identity.cname} | ({"msid": own.msid} if own.msid else {})
-        if not any(codec.name.lower() == "rtx" for codec in own.codecs):
-            return replace(own, sources=(Source(ssrcs.stream, names),))
-        sources = (Source(ssrcs.stream, names), Source(ssrcs.repair, names))
-        return replace(own, sources=sources, source_groups=(SourceGroup("FID", (ssrcs.stream, ssrcs.repair)),))
-
     def _negotiated(
         self, remote: SessionDescription, answer: SessionDescription, ours: Sequence[MediaSection], now: float
     ) -> None:
         """Take the result of a negotiation. `ours`: the answer's sections with the direction of this side."""
         self._now = now
         self._tagged = next(iter(answer.accepted), None)
-        media = [
-            NegotiatedMedia(
-                section,
-                own.direction,
-                self._ssrcs[section.mid].stream,
-                self._ssrcs[section.mid].repair,
-                frozenset(source.ssrc for source in (theirs.sources if theirs else ())),
-            )
-            for section, own in zip(answer.sections, ours, strict=True)
-            if section.is_media and not section.rejected
-            for theirs in (remote.section(section.mid),)
-        ]
-        self.streams = Streams(media, self._identity, PathShare(self.settings.epoch), self._random)
+        media = self._local.negotiated(remote, answer, ours)
+        self._media.negotiated(Streams(media, self._local.identity, PathShare(self.settings.epoch), self._random))
         we_answer = remote is not answer
         active = (answer.transport.setup == "active") is we_answer
         self._dtls = DtlsConnection(
@@ -336,7 +241,7 @@ class Peer:
         """Hand out packets decrypted and unread, as PlainRtp and PlainRtcp, for a receiver that only counts. Then this
         package sends no reports on them, and no requests for missing ones.
         """
-        self._plain_packets = True
+        self._media.take_plain()
 
     def receive_plain(self, data: bytes) -> bool:
         """Take a media datagram the short way, after `take_plain_packets`; drain `settled_events`.
@@ -344,21 +249,17 @@ class Peer:
         It came on a path of this peer. Return False for another datagram, which is for `receive_datagram`. This makes
         no timer and nothing to send.
         """
-        if not self._plain_packets or self._unprotect is None or self._ended:
+        if self._ended or not self._media.receive_plain(data):
             return False
-        if datagram_kind(data) is not DatagramKind.RTP:
-            return False
-        plain = self._unprotect.unprotect(data)
-        if plain is not None:
-            self._events.append(PlainRtp(plain))
+        self._events += self._media.events()
         return True
 
     def send_rtcp(self, packet: bytes) -> None:
         """Send a compound packet of the application. Raises PeerNotReady before media are up, SrtpPacketTooLong."""
-        if self._protect is None or self._ended:
+        if self._ended:
             raise PeerNotReady("media are not up")
         path = self.ice.path
-        protected = self._protect.protect_rtcp(packet)
+        protected = self._media.protected_rtcp(packet)
         if path is not None:
             self._out.append(Datagram(protected, path))
 
@@ -415,7 +316,7 @@ class Peer:
         `mid`."""
         self._now = now
         self._need_outgoing(mid).send(payloads, media_time, now, marker=marker, values=values, captured_at=captured_at)
-        self._stir_media()
+        self._media.stir()
 
     def frame_to_send(
         self,
@@ -432,37 +333,24 @@ class Peer:
         stream = self._need_outgoing(mid)
         self._now = now
         stream.send(payloads, media_time, now, marker=marker, values=values, captured_at=captured_at)
-        self._media_due = earliest(self._media_due, stream.timer())
-        sent, path = self._drained(stream), self.ice.path
+        sent, path = self._media.datagrams_of(stream), self.ice.path
         return [] if path is None else [Datagram(data, path) for data in sent]
 
     @property
     def media_timer(self) -> float | None:
         """The time at which `handle_timer` is due for the sake of outgoing media."""
-        return None if self._ended else self._media_due
+        return None if self._ended else self._media.due
 
     @property
     def channel_timer(self) -> float | None:
         """The time at which `handle_timer` is due for the sake of data channels."""
         return None if self._ended or self.channels is None else self.channels.timer()
 
-    def _drained(self, stream: OutgoingStream) -> list[bytes]:
-        if self._protect is None or self.streams is None:
-            return []
-        sent = list(self._protected(self._protect.protect, stream.packets_to_send()))
-        if controls := stream.controls_to_send():
-            sent += self._protected(self._protect.protect_rtcp, self.streams.compounds(controls))
-        return sent
-
     def _need_outgoing(self, mid: str) -> OutgoingStream:
-        stream = self.streams.outgoing.get(mid) if self.streams is not None else None
-        if stream is None or self._protect is None or self._ended:
+        stream = self._media.outgoing(mid)
+        if stream is None or self._ended:
             raise PeerNotReady(f"nothing can be sent in section {mid!r}")
         return stream
-
-    def _stir_media(self) -> None:
-        """Note that streams may have something to send and to tell, and another timer."""
-        self._media_unsent = self._media_untold = self._media_untimed = True
 
     def holds_back(self, mid: str) -> bool:
         """True if packets of the outgoing stream in section `mid` wait for its pacer. `PacketsLeft` follows."""
@@ -483,38 +371,26 @@ class Peer:
     def request_keyframe(self, mid: str, now: float) -> None:
         """Ask the peer for a keyframe. Raises PeerNotReady: this side does not receive in section `mid`."""
         self._now = now
-        self._need_incoming(mid).request_keyframe(now)
-        self._stir_media()
+        self._media.need_incoming(mid).request_keyframe(now)
+        self._media.stir()
 
     def limit(self, mid: str, bitrate: int) -> None:
         """Ask the peer to send at most `bitrate` bit/s in this section (REMB). Raises PeerNotReady like
         `request_keyframe`."""
-        self._need_incoming(mid).limit = bitrate
-
-    def _need_incoming(self, mid: str) -> IncomingStream:
-        stream = self.streams.incoming.get(mid) if self.streams is not None else None
-        if stream is None:
-            raise PeerNotReady(f"nothing is received in section {mid!r}")
-        return stream
+        self._media.need_incoming(mid).limit = bitrate
 
     @property
     def dropped(self) -> Counter[str]:
         """Counts of unused input, by reason; without the input that ICE passes over as a matter of course."""
         dropped = self.counts - Counter(dtls_early=self.counts["dtls_early"])  # those were kept
-        if self.streams is not None:
-            dropped += self.streams.counts
-        if self._unprotect is not None:
-            dropped += Counter({f"srtp_{name}": count for name, count in self._unprotect.counts.items()})
-        return dropped
+        return dropped + self._media.dropped
 
     def close(self, now: float) -> None:
         """Say goodbye in every protocol that has a message for it. Idempotent; drain `datagrams_to_send` once more."""
         if self._ended:
             return
         self._now = now
-        if self.streams is not None:
-            self.streams.close(now)
-            self._stir_media()
+        self._media.close(now)
         if self.channels is not None:
             self.channels.abort(now)
         self._collect()
@@ -544,7 +420,7 @@ class Peer:
         elif kind is DatagramKind.DTLS:
             self._receive_dtls(data, now)
         elif kind in (DatagramKind.RTP, DatagramKind.RTCP):
-            self._receive_media(data, kind, now)
+            self._media.receive(data, kind, now)
         else:
             self.counts["unknown_protocol"] += 1
         self._settle(now)
@@ -558,16 +434,14 @@ class Peer:
             due = core.timer() if core is not None else None
             if core is not None and due is not None and now >= due:
                 core.handle_timer(now)
-        self._stir_media()
+        self._media.stir()
         self._settle(now)
 
     def timer(self) -> float | None:
         if self._ended:
             return None
-        if self._media_untimed and self.streams is not None:
-            self._media_due, self._media_untimed = self.streams.timer(), False
         cores = (self.ice, self._dtls, self.channels)
-        return earliest(self._media_due, *(core.timer() for core in cores if core is not None))
+        return earliest(self._media.timer(), *(core.timer() for core in cores if core is not None))
 
     def datagrams_to_send(self) -> list[Datagram]:
         self._collect()
@@ -613,24 +487,6 @@ class Peer:
         else:
             self._dtls.receive_first(data, now)
 
-    def _receive_media(self, data: bytes, kind: DatagramKind, now: float) -> None:
-        if self._unprotect is None or self.streams is None:
-            self.counts["media_early"] += 1
-        elif kind is DatagramKind.RTP:
-            plain = self._unprotect.unprotect(data)
-            if plain is not None and self._plain_packets:
-                self._events.append(PlainRtp(plain))
-            elif plain is not None:
-                self.streams.receive_rtp(plain, now)
-                self._stir_media()
-        else:
-            plain = self._unprotect.unprotect_rtcp(data)
-            if plain is not None and self._plain_packets:
-                self._events.append(PlainRtcp(plain))
-            elif plain is not None:
-                self.streams.receive_rtcp(plain, now)
-                self._stir_media()
-
     def _settle(self, now: float) -> None:
         """Pass the cores' events to one another, and to the application."""
         for event in self.ice.events():
@@ -651,10 +507,7 @@ class Peer:
             return
         if self.channels is not None:
             self._events += self.channels.events()
-        if self.streams is not None and self._media_untold:
-            self._media_untold = False
-            self._events += [PacketReceived(mid, packet) for mid, packet in self.streams.packets()]
-            self._events += [MediaEvent(mid, event) for mid, event in self.streams.events()]
+        self._events += self._media.events()
 
     def _start_dtls(self, now: float) -> None:
         if self._dtls is not None and self._dtls.state is DtlsState.NEW and self.ice.path is not None:
@@ -678,7 +531,7 @@ class Peer:
 
     def _connected(self, event: DtlsConnected, now: float) -> None:
         if event.srtp is not None:
-            self._protect, self._unprotect = SrtpSender(event.srtp), SrtpReceiver(event.srtp)
+            self._media.connected(event.srtp)
         self._events.append(Connected(event.srtp.profile.name if event.srtp is not None else None))
         if self.channels is not None:
             self.channels.start(now)
@@ -707,16 +560,6 @@ class Peer:
                 if dtls.state is DtlsState.CONNECTED:  # any of them may end it
                     dtls.send(packet, self._now)
         sent = dtls.datagrams_to_send()
-        if self.streams is not None and self._protect is not None and self._media_unsent:
-            self._media_unsent = False
-            sent += self._protected(self._protect.protect_rtcp, self.streams.rtcp_to_send())
-            sent += self._protected(self._protect.protect, self.streams.rtp_to_send())
+        sent += self._media.datagrams_to_send()
         if path is not None:  # without a path every packet is as good as lost, and repeated as such
             self._out += [Datagram(data, path) for data in sent]
-
-    def _protected(self, protect: Callable[[bytes], bytes], packets: Iterable[bytes]) -> Iterator[bytes]:
-        for packet in packets:
-            try:
-                yield protect(packet)
-            except SrtpPacketTooLong:  # the application's header extensions have hundreds of bytes
-                self.counts["packet_too_long"] += 1

@@ -172,6 +172,35 @@ def test_what_the_kernel_has_no_room_for_waits_and_keeps_its_order(full: int) ->
     assert flat(kernel) == [0, 1, 2, 3, 4, 0, 1, 0, 1, 2, 3, 4]
 
 
+def test_an_urgent_datagram_is_sent_at_once_before_all_that_wait_but_urgent_ones() -> None:
+    here, kernel = with_kernel()
+    [first, second, third] = numbered(3)
+    here.queue([second])
+    assert here.send_at_once(first)
+    assert flat(kernel) == [0]
+    here.queue([third], urgent=True)
+    assert not here.send_at_once(first)
+    here.flush()
+    assert flat(kernel) == [0, 2, 1]
+
+
+@pytest.mark.parametrize("full", [errno.EAGAIN, errno.ENOBUFS])
+def test_an_urgent_datagram_that_the_kernel_has_no_room_for_is_left_to_the_caller(full: int) -> None:
+    here, kernel = with_kernel(full, 0)
+    [datagram] = numbered(1)
+    assert not here.send_at_once(datagram)
+    assert here.is_full
+    assert here.send_at_once(datagram)
+    assert not here.is_full
+    assert flat(kernel) == [0]
+
+
+def test_an_urgent_datagram_that_the_kernel_refuses_is_dropped_and_counted() -> None:
+    here, _ = with_kernel(errno.EPERM)
+    assert here.send_at_once(*numbered(1))
+    assert here.counts["EPERM"] == 1
+
+
 @pytest.mark.parametrize("code", [errno.EPERM, errno.ENETUNREACH, errno.EHOSTUNREACH, errno.EADDRNOTAVAIL])
 def test_what_the_kernel_refuses_is_dropped_and_counted_by_name(code: int) -> None:
     here, kernel = with_kernel(0, code)

@@ -130,7 +130,7 @@ class Viewer:
         streams = self.connection.peer.streams
         assert streams is not None
         streams.receive_rtcp(compound, asyncio.get_running_loop().time())
-        self.connection.peer._stir_media()
+        self.connection.peer._media.stir()
         self.connection.flush()
 
     @property

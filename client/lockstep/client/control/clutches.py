@@ -36,8 +36,9 @@ class Clutches:
             for clutch in self._clutches:
                 clutch.lost_feedback()
         self._heard_at = now
-        for clutch in self._clutches:
-            clutch.observe(feedback)
+        if self._clutches:  # few programs have any, and the caller waits for this
+            for clutch in self._clutches:
+                clutch.observe(feedback)
 
     def sent(self, message: Command | Rest) -> None:
         """Take a message that leaves."""

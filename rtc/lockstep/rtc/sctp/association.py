@@ -112,6 +112,7 @@ class Association:
         self.state = State.CLOSED
         self._is_up = False
         self._may_receive = False
+        self._late_sack: tuple[Sack, float] | None = None  # received, and when; not looked at yet
         self.round_trip = RoundTrip(settings)
         self.max_message = min(settings.max_send_message, peer_max_message or settings.max_send_message)
         self._ended = False
@@ -260,6 +261,7 @@ class Association:
     def packets_to_send(self) -> list[bytes]:
         """Return every due packet, as of the last `now`. SACK and data share packets."""
         if not self._ended:
+            self._take_late_sack()
             if self._is_up:
                 self._bundle()
             elif self._cookie_is_due:
@@ -273,6 +275,7 @@ class Association:
         """Return the time at which `handle_timer` is due; None: never."""
         if self._ended:
             return None
+        self._take_late_sack()
         due = self._repeat_at
         if self._is_up:
             for each in (self._receiver.acknowledge_at, self._resets.due_at, self._sender.deadline()):
@@ -285,6 +288,7 @@ class Association:
         self.now = now
         if self._ended:
             return
+        self._take_late_sack()
         if self._repeat_at is not None and now >= self._repeat_at:
             self._repeats += 1
             self._repeat()
@@ -428,14 +432,23 @@ class Association:
     def _after_packet(self) -> None:
         receiver = self._receiver
         if receiver.packet_ends(self.now):
-            if receiver.messages:
-                self._events += receiver.messages
-                receiver.messages.clear()
-            self._take_reset_events(self._resets.advanced(receiver.received.cumulative))
+            if messages := receiver.messages:
+                self._events += messages
+                messages.clear()
+            if events := self._resets.advanced(receiver.received.cumulative):
+                self._take_reset_events(events)
 
     def _receive_sack(self, chunk: Sack) -> None:
+        """Keep it until something is to be sent or timed: a message in the same packet may be a command, and goes on
+        before it."""
         if self._is_up:
-            self._sender.receive_sack(chunk, self.now)
+            self._take_late_sack()
+            self._late_sack = chunk, self.now
+
+    def _take_late_sack(self) -> None:
+        if self._late_sack is not None:
+            (chunk, now), self._late_sack = self._late_sack, None
+            self._sender.receive_sack(chunk, now)
 
     def _receive_reconfig(self, chunk: Reconfig) -> None:
         if self._is_up:
@@ -574,6 +587,7 @@ class Association:
 
     def _go_on_shutting_down(self) -> None:
         """Send SHUTDOWN, or the answer to it, when everything has arrived (RFC 9260 9.2)."""
+        self._take_late_sack()
         if not self._sender.idle:
             return
         if self.state is State.SHUTDOWN_PENDING:
@@ -627,4 +641,5 @@ class Association:
         self._repeat_at = None
         self._control.clear()
         self._sender.clear()
+        self._late_sack = None
         self._events.append(Closed(reason, detail))

@@ -27,6 +27,11 @@ class ReceivedTsns:
         self._marks: deque[tuple[float, int]] = deque()
 
     @property
+    def is_plain(self) -> bool:
+        """True if the next SACK has neither gaps nor duplicates."""
+        return not self._runs and not self._duplicates
+
+    @property
     def has_gaps(self) -> bool:
         return bool(self._runs)
 

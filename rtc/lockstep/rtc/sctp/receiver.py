@@ -6,8 +6,16 @@ from lockstep.rtc.sctp.errors import ProtocolViolation
 from lockstep.rtc.sctp.events import MessageReceived
 from lockstep.rtc.sctp.reassembly import Reassembly
 from lockstep.rtc.sctp.received import ReceivedTsns
+from lockstep.rtc.sctp.serial import MASK_32
 from lockstep.rtc.sctp.settings import SctpSettings
-from lockstep.rtc.sctp.wire.chunks import IMMEDIATE, Data, ForwardTsn, InterleavedData, InterleavedForwardTsn
+from lockstep.rtc.sctp.wire.chunks import (
+    IMMEDIATE,
+    Data,
+    ForwardTsn,
+    InterleavedData,
+    InterleavedForwardTsn,
+    encode_plain_sack,
+)
 
 __all__ = ["PLAIN_SACK", "Receiver"]
 
@@ -125,4 +133,7 @@ class Receiver:
         """Return the SACK chunk, which leaves now."""
         self._packets = 0
         self.acknowledge_at = None
-        return self.received.sack(max(0, self._window - self.reassembly.held), MOST_GAPS).encode()
+        received, window = self.received, max(0, self._window - self.reassembly.held)
+        if received.is_plain:
+            return encode_plain_sack(received.cumulative & MASK_32, window)
+        return received.sack(window, MOST_GAPS).encode()

@@ -17,11 +17,11 @@ from lockstep.rtc.sctp.wire.chunks import (
     INTERLEAVED_HEADER,
     UNORDERED,
     ForwardTsn,
-    InterleavedData,
     InterleavedForwardTsn,
     Sack,
     Skip,
     encode_data,
+    encode_interleaved,
 )
 from lockstep.rtc.sctp.wire.packet import COMMON_HEADER
 
@@ -164,6 +164,8 @@ class Sender:
             encoded = self._send(chunk, now)
             room -= len(encoded)
             taken = taken + encoded if taken else encoded
+            if not (self.queue.newest or self._waiting or self.queue.turns or self._newest_waiting):
+                break  # nothing else waits, as after most messages
         return taken
 
     def _due(self, now: float) -> Outgoing | None:
@@ -276,9 +278,8 @@ class Sender:
         message, tsn = chunk.message, chunk.tsn & MASK_32
         if self._interleaving:
             sequence = message.sequence & MASK_32
-            return InterleavedData(
-                tsn, chunk.flags, message.stream, sequence, chunk.fragment, message.protocol, chunk.payload
-            ).encode()
+            either = message.protocol if chunk.flags & BEGIN else chunk.fragment
+            return encode_interleaved(tsn, chunk.flags, message.stream, sequence, either, chunk.payload)
         return encode_data(
             tsn, chunk.flags, message.stream, message.sequence & MASK_16, message.protocol, chunk.payload
         )
@@ -330,7 +331,8 @@ class Sender:
         if arrived:
             self._expiries = 0
             self._measure(arrived, now)
-            self.window.acknowledged(sum(chunk.size for chunk in arrived), was_full, cumulative)
+            size = arrived[0].size if len(arrived) == 1 else sum(chunk.size for chunk in arrived)
+            self.window.acknowledged(size, was_full, cumulative)
         if sack.duplicates:
             self._take_duplicates(sack, now)
         if sack.gaps and arrived and outstanding:

@@ -2,8 +2,8 @@
 
 from dataclasses import dataclass, field
 
+from lockstep.rtc.bundle.settings import PeerSettings
 from lockstep.rtc.ice.port import PortSettings
-from lockstep.rtc.peer import PeerSettings
 from lockstep.rtc.sockets.tcp_port import TcpPortSettings
 
 __all__ = ["EndpointSettings"]

@@ -147,6 +147,25 @@ class UdpSocket:
             queue.popleft()  # the oldest datagram is worth least
             self.counts[name] += 1
 
+    def send_at_once(self, datagram: Datagram) -> bool:
+        """Send one urgent datagram before all that wait. Return False, and `queue` it, if urgent ones wait already or
+        the kernel takes no more."""
+        if self._urgent:
+            return False
+        data, path = datagram
+        try:
+            if ancillary := self._origin(path.local[0]):
+                self._socket.sendmsg((data,), ancillary, 0, path.remote)
+            else:
+                self._socket.sendto(data, path.remote)
+        except OSError as error:
+            if error.errno in FULL:
+                self.is_full = True
+                return False
+            self._count(error)
+        self.is_full = False
+        return True
+
     def flush(self) -> None:
         """Send the waiting datagrams, urgent ones first, until the kernel takes no more."""
         while self.wants_write and self._send(self._next_message()):

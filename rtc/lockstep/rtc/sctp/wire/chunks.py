@@ -38,6 +38,8 @@ __all__ = [
     "Skip",
     "Unknown",
     "encode_data",
+    "encode_interleaved",
+    "encode_plain_sack",
 ]
 
 # Flags of DATA and I-DATA, RFC 9260 3.3.1
@@ -55,6 +57,7 @@ _data = Struct("!BBHLHHL")
 _interleaved = Struct("!BBHLHHLL")
 _init = Struct("!LLHHL")
 _sack = Struct("!LLHH")
+_plain_sack = Struct("!BBHLLHH")
 _gap = Struct("!HH")
 _word = Struct("!L")
 _interleaved_skip = Struct("!HHL")
@@ -70,6 +73,18 @@ def encode_data(tsn: int, flags: int, stream: int, sequence: int, protocol: int,
     length = DATA_HEADER + len(payload)
     encoded = _data.pack(0, flags, length, tsn, stream, sequence, protocol) + payload
     return encoded + bytes(-length % 4) if length % 4 else encoded
+
+
+def encode_interleaved(tsn: int, flags: int, stream: int, sequence: int, either: int, payload: bytes) -> bytes:
+    """Return an I-DATA chunk. `either`: the PPID of a first fragment, the number of another one."""
+    length = INTERLEAVED_HEADER + len(payload)
+    encoded = _interleaved.pack(64, flags, length, tsn, stream, 0, sequence, either) + payload
+    return encoded + bytes(-length % 4) if length % 4 else encoded
+
+
+def encode_plain_sack(cumulative: int, window: int) -> bytes:
+    """Return a SACK without gaps and duplicates."""
+    return _plain_sack.pack(3, 0, CHUNK_HEADER + _sack.size, cumulative, window, 0, 0)
 
 
 @dataclass(slots=True)
@@ -107,10 +122,8 @@ class InterleavedData:
     payload: bytes
 
     def encode(self) -> bytes:
-        length = INTERLEAVED_HEADER + len(self.payload)
         either = self.protocol if self.flags & BEGIN else self.fragment
-        header = _interleaved.pack(64, self.flags, length, self.tsn, self.stream, 0, self.sequence, either)
-        return header + self.payload + bytes(-length % 4)
+        return encode_interleaved(self.tsn, self.flags, self.stream, self.sequence, either, self.payload)
 
     @classmethod
     def decode(cls, flags: int, data: bytes, start: int, end: int) -> "InterleavedData":
@@ -161,10 +174,11 @@ class Sack:
     duplicates: Sequence[int] = ()
 
     def encode(self) -> bytes:
+        if not self.gaps and not self.duplicates:
+            return encode_plain_sack(self.cumulative, self.window)
         body = _sack.pack(self.cumulative, self.window, len(self.gaps), len(self.duplicates))
-        if self.gaps or self.duplicates:
-            body += b"".join(_gap.pack(*gap) for gap in self.gaps)
-            body += b"".join(_word.pack(tsn) for tsn in self.duplicates)
+        body += b"".join(_gap.pack(*gap) for gap in self.gaps)
+        body += b"".join(_word.pack(tsn) for tsn in self.duplicates)
         return _packed(self.kind, 0, body)
 
     @classmethod

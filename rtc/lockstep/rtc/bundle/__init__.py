@@ -1,0 +1,1 @@
+"""The parts of a peer: what it says of itself, and the media of its one BUNDLE."""
