@@ -6,6 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from lockstep.protocol.description import Body, Geom
+from lockstep.robot_bridge.kinematics.body_capsules import body_capsules
 from lockstep.robot_bridge.kinematics.chain import Chain
 from lockstep.robot_bridge.kinematics.obstacles import Obstacle, Obstacles, Surface, plane
 from lockstep.robot_bridge.kinematics.rotations import from_rotation_vector
@@ -104,3 +105,19 @@ def test_the_surface_of_a_body_holds_its_shapes_and_the_fingers_that_hang_on_it(
     assert (points.max(axis=0) - (0.0, 0.0, 1.0))[1:] == pytest.approx((0.02, 0.1))
     assert radii.max() == 0.05
     assert points[np.argmax(points[:, 0])].tolist() == pytest.approx((0.3, 0.0, 1.0))
+
+
+def test_a_mesh_is_kept_off_as_the_box_around_it_and_its_capsule_holds_all_of_it() -> None:
+    mesh = Geom(shape="mesh", vertices=(0.0, 0.0, 0.0, 0.2, 0.0, 0.0, 0.0, 0.4, 0.6), triangles=(0, 1, 2))
+    box = Geom(shape="box", size=(0.1, 0.2, 0.3), position=(0.1, 0.2, 0.3))
+    meshed, boxed = [
+        (Body(name="hand", parent="", joints=(revolute("turn", (0.0, 0.0, 1.0)),), geoms=(geom,)),)
+        for geom in (mesh, box)
+    ]
+    found, wanted = [body_surfaces(bodies, Chain(bodies, "hand"))["hand"] for bodies in (meshed, boxed)]
+    assert found.points == pytest.approx(wanted.points)
+    capsule = body_capsules(meshed)["hand"]
+    start, end = np.array(capsule.start), np.array(capsule.end)
+    for corner in np.array(mesh.vertices).reshape(-1, 3):
+        along = np.clip(np.dot(corner - start, end - start) / np.dot(end - start, end - start), 0, 1)
+        assert np.linalg.norm(corner - start - along * (end - start)) <= capsule.radius + 1e-9
