@@ -197,14 +197,16 @@ class Microphone(msgspec.Struct, frozen=True, kw_only=True):
 class Geom(msgspec.Struct, frozen=True, kw_only=True):
     """A shape for the 3D view.
 
-    `size`: box: half extents; sphere: (radius, 0, 0); cylinder and capsule: (radius, half length, 0).
+    `size`: box: half extents; sphere: (radius, 0, 0); cylinder and capsule: (radius, half length, 0); mesh: none.
     """
 
-    shape: Literal["box", "sphere", "cylinder", "capsule"]
-    size: Vector3
+    shape: Literal["box", "sphere", "cylinder", "capsule", "mesh"]
+    size: Vector3 = (0.0, 0.0, 0.0)
     position: Vector3 = (0.0, 0.0, 0.0)
     orientation: Quaternion = (1.0, 0.0, 0.0, 0.0)
     rgba: Rgba = (0.7, 0.7, 0.7, 1.0)
+    vertices: tuple[float, ...] = ()  # m; of a mesh: x, y and z of each in turn
+    triangles: tuple[int, ...] = ()  # of a mesh: numbers of three vertices each, counter-clockwise from outside
 
 
 class BodyJoint(msgspec.Struct, frozen=True, kw_only=True):

@@ -14,6 +14,7 @@ from lockstep.protocol.description import (
     CameraCalibration,
     ControlLayer,
     ForceFeeling,
+    Geom,
     Joint,
     Microphone,
     RobotDescription,
@@ -35,6 +36,15 @@ def with_change(**changes: object) -> RobotDescription:
 
 def _camera(**changes: object) -> Camera:
     return msgspec.structs.replace(DESCRIPTION.cameras[0], **changes)
+
+
+def with_mesh(vertices: tuple[float, ...], triangles: tuple[int, ...], shape: Any = "mesh") -> RobotDescription:
+    geom = Geom(shape=shape, vertices=vertices, triangles=triangles)
+    return with_change(bodies=(*DESCRIPTION.bodies, Body(name="m", parent="", geoms=(geom,))))
+
+
+def test_a_mesh_is_sound() -> None:
+    check_description(with_mesh((0, 0, 0, 1, 0, 0, 0, 1, 0), (0, 1, 2)))
 
 
 def test_the_planar_robots_description_is_sound() -> None:
@@ -71,6 +81,14 @@ def test_the_planar_robots_description_is_sound() -> None:
         (with_change(label="x" * 201), "201 characters"),
         (with_change(microphones=(Microphone(name="m", label="M", sample_rate=0),)), "0 Hz"),
         (with_change(bodies=(Body(name="a", parent="b"), Body(name="b", parent="a"))), "part of itself"),
+        (with_mesh((0, 0, 0, 1, 0, 0, 0, 1, 0), (0, 1, 3)), "does not have"),
+        (with_mesh((0, 0, 0, 1, 0, 0, 0, 1, 0), (0, 1, -1)), "does not have"),
+        (with_mesh((0, 0, 0, 1, 0, 0, 0, 1), (0, 1, 2)), "three numbers"),
+        (with_mesh((0, 0, 0, 1, 0, 0, 0, 1, 0), (0, 1)), "three numbers"),
+        (with_mesh((), ()), "three numbers"),
+        (with_mesh((0, 0, 0, 1, 0, 0, 0, 1, math.inf), (0, 1, 2)), "body m: every number"),
+        (with_mesh((0.0,) * 30_000, (0,) * 30_003), "60003 numbers of meshes"),
+        (with_mesh((0, 0, 0, 1, 0, 0, 0, 1, 0), (0, 1, 2), "box"), "a box has no vertices"),
         (with_change(bodies=(Body(name="a", parent="", position=(0.0, math.nan, 0.0)),)), "body a: every number"),
         (
             with_change(cameras=(msgspec.structs.replace(DESCRIPTION.cameras[0], metres_per_pixel=0.0),)),

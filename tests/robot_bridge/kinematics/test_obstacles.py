@@ -6,6 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from lockstep.protocol.description import Body, Geom
+from lockstep.robot_bridge.kinematics.body_capsules import body_capsules
 from lockstep.robot_bridge.kinematics.chain import Chain
 from lockstep.robot_bridge.kinematics.obstacles import Obstacle, Obstacles, Surface, plane
 from lockstep.robot_bridge.kinematics.rotations import from_rotation_vector
@@ -118,3 +119,19 @@ def test_gaps_that_a_motion_of_the_joints_would_make_narrow_are_near_as_well(
     for gap in around.gaps(state, FAR):
         left = gap.distance + min(0.0, float(gap.gradient @ ahead))
         assert ((gap.what, gap.distance) in near) == (left < within) or abs(left - within) < 1e-9
+
+
+def test_a_mesh_is_kept_off_as_the_box_around_it_and_its_capsule_holds_all_of_it() -> None:
+    mesh = Geom(shape="mesh", vertices=(0.0, 0.0, 0.0, 0.2, 0.0, 0.0, 0.0, 0.4, 0.6), triangles=(0, 1, 2))
+    box = Geom(shape="box", size=(0.1, 0.2, 0.3), position=(0.1, 0.2, 0.3))
+    meshed, boxed = [
+        (Body(name="hand", parent="", joints=(revolute("turn", (0.0, 0.0, 1.0)),), geoms=(geom,)),)
+        for geom in (mesh, box)
+    ]
+    found, wanted = [body_surfaces(bodies, Chain(bodies, "hand"))["hand"] for bodies in (meshed, boxed)]
+    assert found.points == pytest.approx(wanted.points)
+    capsule = body_capsules(meshed)["hand"]
+    start, end = np.array(capsule.start), np.array(capsule.end)
+    for corner in np.array(mesh.vertices).reshape(-1, 3):
+        along = np.clip(np.dot(corner - start, end - start) / np.dot(end - start, end - start), 0, 1)
+        assert np.linalg.norm(corner - start - along * (end - start)) <= capsule.radius + 1e-9

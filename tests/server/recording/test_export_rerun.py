@@ -122,6 +122,7 @@ def test_shapes_are_whole_and_a_capsule_reaches_as_far_as_the_descriptions(tmp_p
             Geom(shape="sphere", size=(0.5, 0.0, 0.0)),
             Geom(shape="cylinder", size=(0.5, 2.0, 0.0)),
             Geom(shape="capsule", size=(0.25, 1.0, 0.0), position=(0.0, 0.0, 3.0)),
+            Geom(shape="mesh", vertices=(0, 0, 0, 1, 0, 0, 0, 2, 0), triangles=(0, 1, 2), position=(0.0, 0.0, 4.0)),
         ),
     )
     axis = Axis(name="a/b c", label="A", unit="m", minimum=-1.0, maximum=1.0, slew=1.0, brake=1.0, kind="goal", reach=1)
@@ -135,6 +136,10 @@ def test_shapes_are_whole_and_a_capsule_reaches_as_far_as_the_descriptions(tmp_p
     assert found["/robot/room/cylinder"].static[0]["Cylinders3D:lengths"] == [4.0]
     capsule = found["/robot/room/capsule"].static[0]
     assert (capsule["Capsules3D:lengths"], capsule["Capsules3D:translations"]) == ([2.0], [[0.0, 0.0, 2.0]])
+    mesh = {name: value for row in found["/robot/room/mesh/0"].static for name, value in row.items()}
+    assert mesh["Mesh3D:vertex_positions"] == [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 2.0, 0.0]]
+    assert mesh["Mesh3D:triangle_indices"] == [[0, 1, 2]]
+    assert mesh["Transform3D:translation"] == [[0.0, 0.0, 4.0]]
     (goal,) = found["/axes/goals"].column("Scalars:scalars")
     assert math.isnan(goal[0])
 

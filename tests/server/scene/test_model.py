@@ -33,6 +33,7 @@ ROBOT = RobotDescription(
                 Geom(shape="sphere", size=(0.1, 0, 0)),
                 Geom(shape="cylinder", size=(0.1, 0.5, 0)),
                 Geom(shape="capsule", size=(0.1, 0.5, 0), rgba=(1, 0, 0, 0.5)),
+                Geom(shape="mesh", vertices=(0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1), triangles=(0, 1, 2, 0, 3, 1)),
             ),
         ),
     ),

@@ -41,6 +41,18 @@ def test_a_robot_of_micrometres_gets_metres_large_and_its_joints_with_it() -> No
     assert [body.geoms[0].rgba for body in large.bodies] == [body.geoms[0].rgba for body in MICRO.bodies]
 
 
+def test_a_mesh_of_micrometres_is_magnified_too() -> None:
+    corners = tuple(1e-6 * each for each in (0, 0, 0, 1, 0, 0, 0, 1, 0))
+    tiny = RobotDescription(
+        name="r",
+        label="R",
+        axes=(),
+        bodies=(Body(name="m", parent="", geoms=(Geom(shape="mesh", vertices=corners, triangles=(0, 1, 2)),)),),
+    )
+    scale = SceneScale(tiny)
+    assert 0.1 < max(scale.description(tiny).bodies[0].geoms[0].vertices) < 10.0
+
+
 def test_angles_are_not_magnified() -> None:
     joints = tuple(msgspec.structs.replace(joint, unit="rad") for joint in MICRO.joints)
     scale = SceneScale(msgspec.structs.replace(MICRO, joints=joints))

@@ -268,13 +268,15 @@ export interface Geofence {
   readonly polygon: readonly (readonly [number, number])[];
 }
 
-/** A shape for the 3D view. `size`: box: half extents; sphere: (radius, 0, 0); cylinder and capsule: (radius, half length, 0). */
+/** A shape for the 3D view. `size`: box: half extents; sphere: (radius, 0, 0); cylinder and capsule: (radius, half length, 0); mesh: none. */
 export interface Geom {
-  readonly shape: "box" | "capsule" | "cylinder" | "sphere";
+  readonly shape: "box" | "capsule" | "cylinder" | "mesh" | "sphere";
   readonly size: readonly [number, number, number];
   readonly position: readonly [number, number, number];
   readonly orientation: readonly [number, number, number, number];
   readonly rgba: readonly [number, number, number, number];
+  readonly vertices: readonly (number)[];
+  readonly triangles: readonly (number)[];
 }
 
 /** One measured joint position, in the order of `Feedback.joints`. */

@@ -1,13 +1,14 @@
 import {
   BoxGeometry,
+  BufferGeometry,
   CapsuleGeometry,
   Color,
   CylinderGeometry,
+  Float32BufferAttribute,
   Mesh,
   MeshStandardMaterial,
   SphereGeometry,
   SRGBColorSpace,
-  type BufferGeometry,
 } from "three";
 import type { Geom } from "../protocol/wire";
 
@@ -22,7 +23,8 @@ export function shapeOf(geom: Geom): Mesh {
   return mesh;
 }
 
-function geometryOf({ shape, size }: Geom): BufferGeometry {
+function geometryOf(geom: Geom): BufferGeometry {
+  const { shape, size } = geom;
   const [first, second, third] = size;
   switch (shape) {
     case "box":
@@ -34,7 +36,17 @@ function geometryOf({ shape, size }: Geom): BufferGeometry {
       return new CylinderGeometry(first, first, 2 * second, ROUND).rotateX(Math.PI / 2);
     case "capsule":
       return new CapsuleGeometry(first, 2 * second, 8, ROUND).rotateX(Math.PI / 2);
+    case "mesh":
+      return meshOf(geom);
   }
+}
+
+/** Each triangle has corners of its own, so that its edges are sharp. */
+function meshOf({ vertices, triangles }: Geom): BufferGeometry {
+  const corners = triangles.flatMap((at) => vertices.slice(3 * at, 3 * at + 3));
+  const geometry = new BufferGeometry().setAttribute("position", new Float32BufferAttribute(corners, 3));
+  geometry.computeVertexNormals();
+  return geometry;
 }
 
 function materialOf([red, green, blue, alpha]: Geom["rgba"]): MeshStandardMaterial {

@@ -2,6 +2,7 @@ import { ArrowHelper, type BufferGeometry, LineSegments } from "three";
 import { describe, expect, test } from "vitest";
 import { addAnnotations, type SceneState } from "../../src/scene/robot_annotations";
 import { RobotModel } from "../../src/scene/robot_model";
+import { shapeOf } from "../../src/scene/robot_shapes";
 import type { Body, RobotDescription } from "../../src/protocol/wire";
 import { readVectors } from "../vectors";
 
@@ -61,10 +62,29 @@ test("the size is that of the moving parts, and never nothing", () => {
     size: [2e-6, 0, 0],
     position: [0, 0, 0],
     orientation: [1, 0, 0, 0],
+    vertices: [],
+    triangles: [],
   } as const;
   const tiny = body("tip", "", { geoms: [{ ...ball, rgba: [1, 1, 1, 1] }] });
   expect(new RobotModel(robot({ bodies: [tiny] })).extent().radius).toBeCloseTo(2e-6 * Math.sqrt(3), 8);
   expect(new RobotModel(robot({})).extent().radius).toBeGreaterThan(0);
+});
+
+test("a mesh has its triangles, each with corners and normals of its own", () => {
+  const geom = {
+    shape: "mesh",
+    size: [0, 0, 0],
+    position: [0, 0, 1],
+    orientation: [1, 0, 0, 0],
+    rgba: [1, 1, 1, 1],
+    vertices: [0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1],
+    triangles: [0, 1, 2, 0, 3, 1],
+  } as const;
+  const mesh = shapeOf(geom);
+  const { position, normal } = mesh.geometry.attributes;
+  expect(Array.from(position?.array ?? [])).toEqual([0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 1, 1, 0, 0]);
+  expect([normal?.getZ(0), normal?.getY(3)]).toEqual([1, 1]);
+  expect(mesh.position.z).toBe(1);
 });
 
 test("the arrow shows a force from the sensor's threshold on, as long as its share of full scale", () => {

@@ -32,6 +32,7 @@ __all__ = ["check_bounds", "check_description"]
 MAX_STREAMS = 32  # cameras and microphones
 MAX_BODIES = 1024
 MAX_GEOMS = 4096
+MAX_MESH_NUMBERS = 60_000  # coordinates of vertices, and corners of triangles
 MAX_LAYERS = 32
 MAX_LIMITS = 256
 MAX_DISTORTION = 14  # coefficients, those of the longest model
@@ -111,6 +112,7 @@ def _check_counts(description: RobotDescription) -> None:
         ("cameras and microphones", len(description.cameras) + len(description.microphones), MAX_STREAMS),
         ("bodies", len(description.bodies), MAX_BODIES),
         ("geoms", sum(len(body.geoms) for body in description.bodies), MAX_GEOMS),
+        ("numbers of meshes", sum(map(_mesh_numbers, description.bodies)), MAX_MESH_NUMBERS),
         ("coefficients of distortion", max(map(_coefficients, description.cameras), default=0), MAX_DISTORTION),
         ("layers", len(description.layers), MAX_LAYERS),
         ("bindings", sum(len(layer.bindings) for layer in description.layers), MAX_GEOMS),
@@ -128,6 +130,22 @@ def _check_counts(description: RobotDescription) -> None:
             raise DescriptionError(f"{count} {kind}, the bound is {most}")
 
 
+def _mesh_numbers(body: Body) -> int:
+    return sum(len(geom.vertices) + len(geom.triangles) for geom in body.geoms)
+
+
+def _check_meshes(body: Body) -> None:
+    for geom in body.geoms:
+        vertices, left = divmod(len(geom.vertices), 3)
+        if geom.shape != "mesh":
+            if geom.vertices or geom.triangles:
+                raise DescriptionError(f"body {body.name}: a {geom.shape} has no vertices and no triangles")
+        elif not geom.triangles or left or len(geom.triangles) % 3:
+            raise DescriptionError(f"body {body.name}: a mesh has three numbers for each vertex and each triangle")
+        elif not all(0 <= number < vertices for number in geom.triangles):
+            raise DescriptionError(f"body {body.name}: a triangle names a vertex that the mesh does not have")
+
+
 def _coefficients(camera: Camera) -> int:
     return 0 if camera.calibration is None else len(camera.calibration.distortion)
 
@@ -135,11 +153,12 @@ def _coefficients(camera: Camera) -> int:
 def _check_reach(description: RobotDescription) -> None:
     """Check that drawn parts are within a bound: beyond it, computed numbers are not finite."""
     for body in description.bodies:
+        _check_meshes(body)
         numbers = [*body.position, *body.orientation]
         for joint in body.joints:
             numbers += joint.axis
         for geom in body.geoms:
-            numbers += (*geom.size, *geom.position, *geom.orientation, *geom.rgba)
+            numbers += (*geom.size, *geom.position, *geom.orientation, *geom.rgba, *geom.vertices)
         _check_far(f"body {body.name}", numbers)
     for camera in description.cameras:
         if camera.calibration is not None:

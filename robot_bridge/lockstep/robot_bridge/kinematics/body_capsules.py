@@ -34,6 +34,8 @@ def _spheres(geom: Geom) -> Iterator[tuple[Array, float]]:
 
 def _hull(geom: Geom) -> tuple[Array, float]:
     first, second, third = geom.size
+    if geom.shape == "mesh":
+        return np.array(geom.vertices).reshape(-1, 3), 0.0
     if geom.shape == "sphere":
         return np.zeros((1, 3)), first
     if geom.shape == "capsule":

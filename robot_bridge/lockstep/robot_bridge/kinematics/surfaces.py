@@ -55,6 +55,11 @@ def rod(half: float) -> Array:
 
 def _of(geom: Geom) -> Surface:
     first, second, third = geom.size
+    if geom.shape == "mesh":  # the box around it: its own corners may be far apart
+        corners = np.array(geom.vertices).reshape(-1, 3)
+        low, high = corners.min(axis=0), corners.max(axis=0)
+        points = box_points((high - low) / 2) + (low + high) / 2
+        return Surface(points, np.zeros(len(points)))
     if geom.shape == "sphere":
         return Surface(np.zeros((1, 3)), np.array((first,)))
     if geom.shape == "capsule":

@@ -21,8 +21,8 @@ class MediaSettings(BaseModel):
     sound_codecs: tuple[Literal["opus", "PCMU"], ...] = Field(default=("opus", "PCMU"), min_length=1)  # in answers
     opus_bitrate_bps: int = Field(default=32_000, ge=6_000, le=256_000)
     opus_packet_loss_percent: int = Field(default=10, ge=0, le=100)  # initial value; in-band FEC is sized for it
-    # A robot that encodes makes another encoding for observers while the operator's path is narrow. Both share the
-    # robot's uplink: one that becomes narrower meanwhile delays the operator's pictures until the second has ended.
+    # A robot that encodes makes another encoding for observers while the operator's path is narrow, of what the
+    # operator's leaves of the robot's uplink (docs/quality.md, "The second encoding").
     second_encoding: bool = False
     video_queue_frames: int = Field(default=6, ge=1, le=100)  # pictures that may wait for one peer
     audio_queue_frames: int = Field(default=10, ge=1, le=100)  # sound packets that may wait for one peer

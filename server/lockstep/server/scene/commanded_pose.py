@@ -83,4 +83,6 @@ def _ghostly(geom: Geom, color: Color) -> Geom:
         position=geom.position,
         orientation=geom.orientation,
         rgba=color,
+        vertices=tuple(value * LARGER for value in geom.vertices),
+        triangles=geom.triangles,
     )

@@ -86,7 +86,7 @@ def _reaches(description: RobotDescription) -> Iterator[float]:
     for body in description.bodies:
         yield math.hypot(*body.position)
         for geom in body.geoms:
-            yield math.hypot(*geom.position) + 2.0 * max(map(abs, geom.size))
+            yield math.hypot(*geom.position) + 2.0 * max(map(abs, (*geom.size, *geom.vertices)))
 
 
 def _body(body: Body, by: float) -> Body:
@@ -96,7 +96,12 @@ def _body(body: Body, by: float) -> Body:
 
 
 def _geom(geom: Geom, by: float) -> Geom:
-    return msgspec.structs.replace(geom, size=_times(geom.size, by), position=_times(geom.position, by))
+    return msgspec.structs.replace(
+        geom,
+        size=_times(geom.size, by),
+        position=_times(geom.position, by),
+        vertices=tuple(value * by for value in geom.vertices),
+    )
 
 
 def _joint(joint: Joint, by: float) -> Joint:

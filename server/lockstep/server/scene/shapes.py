@@ -15,7 +15,13 @@ def add_geom(server: viser.ViserServer, path: str, geom: Geom) -> None:
     color = (round(red * 255), round(green * 255), round(blue * 255))
     opacity = None if alpha >= 1 else alpha
     at, wxyz = geom.position, geom.orientation
-    if geom.shape == "box":
+    if geom.shape == "mesh":
+        vertices = np.array(geom.vertices, dtype=np.float32).reshape(-1, 3)
+        faces = np.array(geom.triangles, dtype=np.uint32).reshape(-1, 3)
+        scene.add_mesh_simple(
+            path, vertices, faces, color=color, opacity=opacity, flat_shading=True, position=at, wxyz=wxyz
+        )
+    elif geom.shape == "box":
         dimensions = (2 * geom.size[0], 2 * geom.size[1], 2 * geom.size[2])
         scene.add_box(path, color=color, dimensions=dimensions, opacity=opacity, position=at, wxyz=wxyz)
     elif geom.shape == "sphere":

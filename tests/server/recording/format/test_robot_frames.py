@@ -111,6 +111,7 @@ def test_shapes_are_whole_sizes_in_the_frame_of_their_body_and_replace_those_bef
         Geom(shape="sphere", size=(0.5, 0.0, 0.0), position=(1.0, 0.0, 0.0)),
         Geom(shape="cylinder", size=(0.5, 2.0, 0.0)),
         Geom(shape="capsule", size=(0.25, 1.0, 0.0), orientation=TURNED),
+        Geom(shape="mesh", vertices=(0, 0, 0, 1, 0, 0, 0, 2, 0), triangles=(0, 1, 2), position=(0.0, 0.0, 4.0)),
     )
     update = SceneUpdate.FromString(
         robot_shapes(robot(Body(name="base", parent="", geoms=geoms), Body(name="bare", parent="base")), AT)
@@ -125,6 +126,9 @@ def test_shapes_are_whole_sizes_in_the_frame_of_their_body_and_replace_those_bef
     assert (cylinder.size.x, cylinder.size.z, cylinder.top_scale, cylinder.bottom_scale) == (1.0, 4.0, 1.0, 1.0)
     assert (tube.size.x, tube.size.z) == (0.5, 2.0)
     assert sorted(each.pose.position.x for each in spheres[1:]) == pytest.approx([-1.0, 1.0])
+    (mesh,) = entity.triangles
+    assert [(point.x, point.y, point.z) for point in mesh.points] == [(0, 0, 0), (1, 0, 0), (0, 2, 0)]
+    assert (list(mesh.indices), mesh.pose.position.z) == ([0, 1, 2], 4.0)
 
 
 def test_odometry_has_the_measured_twist_in_the_frame_of_the_body_that_turns() -> None:

@@ -2,14 +2,15 @@
 
 | second encodings | when | then |
 |---|---|---|
-| off | observers were due 1.5 times the operator's bits for 5 s, and nothing waited on the uplink for 5 s | on, with 1.2 times the operator's bits, or with what the uplink is known to carry besides |
+| off | observers were due 1.5 times the operator's for 5 s, nothing waits | on, with 1.2 times the operator's |
 | on | nothing waits on the uplink, and both encodings use what they may | up by 25 % a second |
 | on | all media wait for more than 0.05 s | both have 85 % of what arrives, and more is not tried for a while |
-| on | that leaves hardly more than the operator's bits, the uplink shows a limit, or no picture came for 3 s | off for a while |
+| on | that leaves too little, the uplink shows a limit, or no picture came for 3 s | off for a while |
 
-A while is 10 s, and twice as long each time, up to 640 s; 10 s again after second encodings that went well for 5 s. So
-an uplink without room is tried ever more seldom. A try costs the operator little: the bridge sends no picture of a
-second encoding while something waits on its path (docs/quality.md, "The second encoding").
+It begins with more where the uplink carried more within the last minute, and not within 5 s of a limit. A while is
+10 s, and twice as long each time, up to 640 s; 10 s again after second encodings that went well for 5 s. So an uplink
+without room is tried ever more seldom. A try costs the operator little: the bridge sends no picture of a second
+encoding while something waits on its path (docs/quality.md, "The second encoding").
 """
 
 from typing import NamedTuple

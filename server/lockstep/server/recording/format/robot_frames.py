@@ -13,12 +13,14 @@ from foxglove_schemas_protobuf.CylinderPrimitive_pb2 import CylinderPrimitive
 from foxglove_schemas_protobuf.FrameTransform_pb2 import FrameTransform
 from foxglove_schemas_protobuf.FrameTransforms_pb2 import FrameTransforms
 from foxglove_schemas_protobuf.Odometry_pb2 import Odometry
+from foxglove_schemas_protobuf.Point3_pb2 import Point3
 from foxglove_schemas_protobuf.Pose_pb2 import Pose
 from foxglove_schemas_protobuf.Quaternion_pb2 import Quaternion
 from foxglove_schemas_protobuf.SceneEntity_pb2 import SceneEntity
 from foxglove_schemas_protobuf.SceneEntityDeletion_pb2 import SceneEntityDeletion
 from foxglove_schemas_protobuf.SceneUpdate_pb2 import SceneUpdate
 from foxglove_schemas_protobuf.SpherePrimitive_pb2 import SpherePrimitive
+from foxglove_schemas_protobuf.TriangleListPrimitive_pb2 import TriangleListPrimitive
 from foxglove_schemas_protobuf.Vector3_pb2 import Vector3
 from google.protobuf.timestamp_pb2 import Timestamp
 
@@ -118,6 +120,12 @@ def robot_shapes(description: RobotDescription, captured: int) -> bytes:
 def _add_shape(entity: SceneEntity, geom: Geom) -> None:
     at = BodyPose(geom.position, geom.orientation)
     color = Color(r=geom.rgba[0], g=geom.rgba[1], b=geom.rgba[2], a=geom.rgba[3])
+    if geom.shape == "mesh":
+        points = [Point3(x=x, y=y, z=z) for x, y, z in zip(*(geom.vertices[at::3] for at in range(3)), strict=True)]
+        entity.triangles.append(
+            TriangleListPrimitive(pose=_pose(at), points=points, color=color, indices=geom.triangles)
+        )
+        return
     first, second, third = (2 * each for each in geom.size)
     if geom.shape == "box":
         size = Vector3(x=first, y=second, z=third)

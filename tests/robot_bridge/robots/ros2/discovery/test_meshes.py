@@ -1,16 +1,17 @@
-"""The box around a mesh that a URDF names, and what is not read."""
+"""The triangles of a mesh that a URDF names, and what is not read."""
 
+import math
 import os
 import struct
 from pathlib import Path
 
+import numpy as np
 import pytest
 
-from lockstep.robot_bridge.robots.ros2.discovery.meshes import mesh_box, mesh_file
-from lockstep.robot_bridge.robots.ros2.discovery.urdf import Box
+from lockstep.robot_bridge.robots.ros2.discovery.meshes import mesh_file, read_mesh, simplified
+from lockstep.robot_bridge.robots.ros2.discovery.urdf import Mesh
 
 CORNERS = ((0.0, 0.0, 0.0), (2.0, 0.0, 0.0), (0.0, 4.0, -6.0))
-BOX = Box((1.0, 2.0, -3.0), (1.0, 2.0, 3.0))
 
 
 def binary(corners: tuple[tuple[float, ...], ...] = CORNERS, head: bytes = b"solid by some program") -> bytes:
@@ -24,10 +25,55 @@ def text() -> bytes:
 
 
 @pytest.mark.parametrize("data", [binary(), text()])
-def test_a_mesh_in_a_file_has_a_box(data: bytes, tmp_path: Path) -> None:
+def test_a_mesh_in_a_file_has_its_triangles(data: bytes, tmp_path: Path) -> None:
     file = tmp_path / "link.STL"
     file.write_bytes(data)
-    assert mesh_box(f"file://{file}") == BOX
+    mesh = read_mesh(f"file://{file}", 8)
+    assert mesh is not None
+    assert [[mesh.vertices[number] for number in triangle] for triangle in mesh.triangles] == [list(CORNERS)]
+
+
+def ball(rings: int) -> list[list[float]]:
+    """The corners of a ball's triangles, three each, counter-clockwise from outside."""
+
+    def at(ring: int, side: int) -> list[float]:
+        polar, around = math.pi * ring / rings, 2 * math.pi * side / rings
+        return [math.sin(polar) * math.cos(around), math.sin(polar) * math.sin(around), math.cos(polar)]
+
+    corners = []
+    for ring in range(rings):
+        for side in range(rings):
+            a, b = at(ring, side), at(ring + 1, side)
+            c, d = at(ring + 1, side + 1), at(ring, side + 1)
+            corners += [a, b, c, a, c, d]
+    return corners
+
+
+@pytest.mark.parametrize("most", [20, 60, 150])
+def test_a_fine_mesh_keeps_its_form_in_few_triangles_that_look_outwards(most: int) -> None:
+    mesh = simplified(np.array(ball(60)), most)
+    assert mesh is not None
+    assert most / 3 < len(mesh.vertices) <= most
+    for vertex in mesh.vertices:
+        assert 0.6 < math.hypot(*vertex) < 1.01
+    outwards = 0
+    for triangle in mesh.triangles:
+        a, b, c = (np.array(mesh.vertices[number]) for number in triangle)
+        outwards += float(np.dot(np.cross(b - a, c - a), a + b + c)) > 0
+    assert outwards > 0.9 * len(mesh.triangles)
+
+
+def test_a_mesh_without_an_extent_and_one_that_is_too_fine_for_its_room_are_none() -> None:
+    assert simplified(np.zeros((3, 3)), 8) is None
+    assert simplified(np.full((3, 3), 1e7) * np.arange(9).reshape(3, 3), 8) is None
+    assert simplified(np.array(ball(60)), 3) is None
+
+
+def test_few_triangles_stay_as_they_are() -> None:
+    corners = np.array([*CORNERS, CORNERS[1], CORNERS[0], (0.0, -1.0, 0.0)], dtype=float)
+    mesh = simplified(corners, 8)
+    assert mesh == Mesh([(0, -1, 0), (0, 0, 0), (0, 4, -6), (2, 0, 0)], mesh.triangles if mesh else [])
+    assert len(mesh.triangles) == 2
 
 
 def test_a_mesh_of_a_package_is_looked_for_where_packages_are(tmp_path: Path) -> None:
@@ -43,10 +89,10 @@ def test_a_mesh_of_a_package_is_looked_for_where_packages_are(tmp_path: Path) ->
 @pytest.mark.parametrize(
     "data", [b"", b"no mesh", binary()[:-1], binary(((float("nan"),) * 3,) * 3), b"solid\nvertex a b c\n"]
 )
-def test_what_is_no_mesh_has_no_box(data: bytes, tmp_path: Path) -> None:
+def test_what_is_no_mesh_is_not_drawn(data: bytes, tmp_path: Path) -> None:
     file = tmp_path / "link.stl"
     file.write_bytes(data)
-    assert mesh_box(f"file://{file}") is None
+    assert read_mesh(f"file://{file}", 8) is None
 
 
 def test_only_regular_files_of_meshes_are_read(tmp_path: Path) -> None:
@@ -60,4 +106,4 @@ def test_only_regular_files_of_meshes_are_read(tmp_path: Path) -> None:
         f"http://localhost{tmp_path}/link.stl",
         "",
     ):
-        assert mesh_box(uri) is None
+        assert read_mesh(uri, 8) is None

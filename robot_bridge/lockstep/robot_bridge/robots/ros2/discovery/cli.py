@@ -91,9 +91,9 @@ def _look_and_draft(seconds: float, domain: int | None, namespace: str | None, a
     finally:
         ros.close()
     from lockstep.robot_bridge.robots.ros2.discovery.drafting.draft import draft
-    from lockstep.robot_bridge.robots.ros2.discovery.meshes import mesh_box
+    from lockstep.robot_bridge.robots.ros2.discovery.meshes import read_mesh
 
-    return draft(graph, ask, namespace, domain, mesh_box)
+    return draft(graph, ask, namespace, domain, read_mesh)
 
 
 def write(out: Path, drafted: "Draft") -> None:

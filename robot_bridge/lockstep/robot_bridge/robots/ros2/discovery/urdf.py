@@ -12,7 +12,7 @@ from xml.parsers import expat
 
 from lockstep.robot_bridge.robots.ros2.discovery.pose import Pose, from_rpy
 
-__all__ = ["BadUrdf", "Box", "Shape", "Urdf", "UrdfJoint", "UrdfLink", "parse_urdf"]
+__all__ = ["BadUrdf", "Mesh", "Shape", "Urdf", "UrdfJoint", "UrdfLink", "parse_urdf"]
 
 MAX_CHARACTERS = 4 << 20
 MAX_PARTS = 2000  # links or joints
@@ -25,11 +25,11 @@ class BadUrdf(ValueError):
     """The text is not a URDF that can be used; the message says why."""
 
 
-class Box(NamedTuple):
-    """The box around a mesh, in its own frame and units."""
+class Mesh(NamedTuple):
+    """A mesh with few triangles, in its own frame and units."""
 
-    centre: Vector
-    half: Vector
+    vertices: list[Vector]
+    triangles: list[tuple[int, int, int]]  # numbers of vertices
 
 
 class Shape(NamedTuple):

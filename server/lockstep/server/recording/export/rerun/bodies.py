@@ -3,6 +3,7 @@
 from collections.abc import Iterable
 from typing import Any
 
+import numpy as np
 import rerun as rr
 
 from lockstep.protocol.description import Body, Camera, Geom, RobotDescription
@@ -48,6 +49,9 @@ def log_bodies(stream: rr.RecordingStream, description: RobotDescription, paths:
             geoms = [geom for geom in body.geoms if geom.shape == kind]
             if geoms:
                 stream.log(f"{path}/{kind}", _shapes(kind, geoms), static=True)
+        meshes = [geom for geom in body.geoms if geom.shape == "mesh"]
+        for number, mesh in enumerate(meshes):
+            stream.log(f"{path}/mesh/{number}", _transform(mesh.position, mesh.orientation), _mesh(mesh), static=True)
 
 
 def log_cameras(stream: rr.RecordingStream, cameras: Iterable[Camera], paths: BodyPaths) -> None:
@@ -78,6 +82,14 @@ def _transform(position: Iterable[float], orientation: Iterable[float]) -> rr.Tr
 def _xyzw(orientation: Iterable[float]) -> tuple[float, ...]:
     w, x, y, z = orientation
     return (x, y, z, w)
+
+
+def _mesh(geom: Geom) -> Any:
+    return rr.Mesh3D(
+        vertex_positions=np.array(geom.vertices, np.float32).reshape(-1, 3),
+        triangle_indices=np.array(geom.triangles, np.uint32).reshape(-1, 3),
+        albedo_factor=tuple(round(255 * min(max(value, 0.0), 1.0)) for value in geom.rgba),
+    )
 
 
 def _shapes(kind: str, geoms: list[Geom]) -> Any:

@@ -12,7 +12,7 @@ from lockstep.robot_bridge.robots.ros2.discovery.drafting.draft_base import draf
 from lockstep.robot_bridge.robots.ros2.discovery.drafting.draft_bodies import (
     BASE_BODY,
     LINK_PREFIX,
-    FindBox,
+    FindMesh,
     draft_bodies,
 )
 from lockstep.robot_bridge.robots.ros2.discovery.drafting.draft_calibration import Places
@@ -51,9 +51,9 @@ def draft(
     ask: Ask,
     namespace: str | None,
     domain: int | None = None,
-    find_box: FindBox = lambda _: None,
+    find_mesh: FindMesh = lambda name, most: None,
 ) -> Draft:
-    """Return a robot's file. `find_box`: of a mesh of the URDF, by its name.
+    """Return a robot's file. `find_mesh`: of a mesh of the URDF, by its name.
 
     Raises:
         NothingToDrive: nobody takes commands, or nothing says where the robot is.
@@ -67,7 +67,7 @@ def draft(
     if base is None and not arm:
         raise NothingToDrive(_nothing(graph, namespace, remarks))
     simulated = bool(graph.topics.get("/clock") and graph.topics["/clock"].publishers)
-    bodies = None if urdf is None else draft_bodies(urdf, _names(arm), find_box, has_base=base is not None)
+    bodies = None if urdf is None else draft_bodies(urdf, _names(arm), find_mesh, has_base=base is not None)
     cameras, camera_remarks = draft_cameras(graph, simulated, _places(graph, urdf, bodies, arm, base))
     remarks += camera_remarks
     ranges, scanner = draft_ranges(graph, ask, urdf, has_base=base is not None)
