@@ -60,3 +60,12 @@ def test_only_so_much_history_is_kept() -> None:
         clock.observe(feedback(event), float(event))
     assert clock.reference_at(1.5) is None
     assert clock.reference_at(2.5) == 2
+
+
+def test_the_robot_is_driven_for_a_second_after_each_event() -> None:
+    clock = EventClock()
+    assert not clock.is_driven(0.0)
+    clock.observe(feedback(7, 1), 10.0)
+    clock.observe(feedback(7, 2), 10.8)  # the same event, measured again
+    assert clock.is_driven(10.9)
+    assert not clock.is_driven(11.1)

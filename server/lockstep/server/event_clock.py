@@ -10,6 +10,8 @@ __all__ = ["EventClock"]
 
 HISTORY = 1024  # changes remembered; at 60 events/s that is 17 s, longer than any medium takes to arrive
 
+DRIVEN_SECONDS = 1.0
+
 
 class Change(NamedTuple):
     """A change of the event reference: from `time` on, `event` held."""
@@ -30,6 +32,10 @@ class EventClock:
     @property
     def event(self) -> EventReference:
         return FIRST_EVENT if self.feedback is None else self.feedback.event
+
+    def is_driven(self, now: float) -> bool:
+        """Return whether an event was executed within the last second."""
+        return bool(self._changes) and now - self._changes[-1].time < DRIVEN_SECONDS
 
     @property
     def stop(self) -> StopState:

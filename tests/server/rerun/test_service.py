@@ -61,6 +61,7 @@ async def test_a_driven_session_is_in_the_file_by_event_with_pictures(
     overview = found["/camera/overview"]
     assert overview.rows[0]["VideoStream:is_keyframe"] == [True]
     assert any("drives" in text for (text,) in found["/log"].column("TextLog:text"))
+    assert found["/driver/kind"].column("StateChange:state")[0] == ["human"]
 
 
 @asynccontextmanager

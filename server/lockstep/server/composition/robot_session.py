@@ -1,6 +1,7 @@
 """The session of one robot: console, media, seat, recorder, scene, audit, and all else that robots do not share."""
 
 import asyncio
+import time
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 
@@ -186,7 +187,13 @@ async def _session(
         voice=voice,
         publishers=publishers,
         dial_in=dial_in,
-        recordings=RecordingService(ConsoleLibrary(recorder), access, trail, console.seat.is_held_with),
+        recordings=RecordingService(
+            ConsoleLibrary(recorder),
+            access,
+            trail,
+            console.seat.is_held_with,
+            lambda: console.clock.is_driven(time.monotonic()),
+        ),
         episodes=episodes,
     )
     try:

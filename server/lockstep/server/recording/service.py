@@ -51,6 +51,7 @@ class RecordingService:
         holds_seat: whether a peer with the link of this id drives
         starts, edits, lists, pictures, reports: how often each link may begin a recording, change an episode, ask for
             the list of episodes, for one picture, or for a report
+        is_driven: whether somebody drives the robot now: then reading takes little of the machine
         opens_all: every good link reads everything: it was made for the one file that is replayed
     """
 
@@ -58,6 +59,7 @@ class RecordingService:
     access: Access
     audit: RecordingAudit = _NoAudit()
     holds_seat: Callable[[str], bool] = lambda link: False
+    is_driven: Callable[[], bool] = lambda: False
     opens_all: bool = False
     starts: RateLimits = field(default_factory=lambda: RateLimits(START_RATE, STARTS))
     edits: RateLimits = field(default_factory=lambda: RateLimits(EDIT_RATE, EDITS))
@@ -69,7 +71,7 @@ class RecordingService:
     @cached_property
     def catalog(self) -> EpisodeCatalog:
         """The episodes of all recordings."""
-        return EpisodeCatalog(self.library, self.in_thread)
+        return EpisodeCatalog(self.library, self.in_thread, is_driven=self.is_driven)
 
     async def in_thread(self, work: Callable[[], Result]) -> Result:
         """Run `work`, which reads files. A slow disk, or many readers, take no thread from anything else.

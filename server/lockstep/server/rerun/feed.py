@@ -5,13 +5,14 @@ import pickle
 import threading
 import time
 
-from lockstep.server.recording.writing.live_queue import LiveQueue
+from lockstep.server.recording.writing.live_queue import LiveQueue, size_of
 from lockstep.server.recording.writing.queue_items import Item, RobotItem
 
 __all__ = ["LENGTH", "Feed"]
 
-DRAIN_SECONDS = 0.02  # between two looks at the queue: nobody is woken for each item
-LENGTH = 4  # bytes, big-endian, before each item
+DRAIN_SECONDS = 0.1  # between two looks at the queue: each look takes the interpreter from the loop for a moment
+BATCH_BYTES = 200_000  # about, of the items that are handed over together
+LENGTH = 4  # bytes, big-endian, before each batch
 
 
 class Feed:
@@ -77,14 +78,8 @@ class Feed:
                 self._news.wait()
                 self._news.clear()
                 ending = self._closing.is_set()
-                for _ in range(len(self._waiting)):
-                    if self._waiting.dropped_robot and self._robot is not None:
-                        self._waiting.dropped_robot = False
-                        self._write(self._robot)
-                    taken = self._waiting.take()
-                    if taken is None:
-                        break
-                    self._write(taken[0])
+                while batch := self._take():
+                    self._write(batch)
                     time.sleep(0)  # the loop goes first
                 if ending:
                     break
@@ -94,8 +89,23 @@ class Feed:
         finally:
             os.close(self._pipe)
 
-    def _write(self, item: Item) -> None:
-        data = pickle.dumps(item, protocol=pickle.HIGHEST_PROTOCOL)
+    def _take(self) -> list[Item]:
+        """Return the oldest items that wait; none: nothing does."""
+        found: list[Item] = []
+        size = 0
+        while size < BATCH_BYTES:
+            if self._waiting.dropped_robot and self._robot is not None:
+                self._waiting.dropped_robot = False
+                found.append(self._robot)
+            taken = self._waiting.take()
+            if taken is None:
+                break
+            found.append(taken[0])
+            size += size_of(taken[0])
+        return found
+
+    def _write(self, batch: list[Item]) -> None:
+        data = pickle.dumps(batch, protocol=pickle.HIGHEST_PROTOCOL)
         left = memoryview(len(data).to_bytes(LENGTH, "big") + data)
         while left:
             self._since = time.monotonic()

@@ -182,7 +182,7 @@ class Pipe:
             end = at + LENGTH + int.from_bytes(waiting[at : at + LENGTH], "big")
             if len(waiting) < end:
                 break
-            yield pickle.loads(bytes(waiting[at + LENGTH : end]))  # written by the console, which started this process
+            yield from pickle.loads(bytes(waiting[at + LENGTH : end]))  # of the console, which started this process
             at = end
         del waiting[:at]
 

@@ -91,6 +91,9 @@ def test_a_dataset_is_verified_and_never_written_over_another(directory: Path, t
     verdict = _lockstep(directory, "verify", str(tmp_path / "dataset"))
     assert verdict.exit_code == 0, verdict.output
     assert verdict.stdout.startswith("2 episodes, 25 rows, tolerance 4 events\n")
+    assert verdict.stdout.endswith("\n--    shown (not looked at: --pixels)\n")
+    verdict = _lockstep(directory, "verify", str(tmp_path / "dataset"), "--pixels")
+    assert verdict.stdout.endswith("\n--    shown (not looked at: no event is drawn into the pictures)\n")
     again = _lockstep(directory, *command)
     assert (again.exit_code, "already" in again.stderr) == (2, True)
 

@@ -18,6 +18,7 @@ from lockstep.server.errors import (
     ShuttingDown,
     TooManyRequests,
 )
+from lockstep.server.recording.browsing import worker as worker_module
 from lockstep.server.recording.browsing.jobs import ListEpisodes, ShowPicture
 from lockstep.server.recording.browsing.worker import RecordingWorker
 from lockstep.server.recording.episodes.edits import edits_path
@@ -142,3 +143,29 @@ async def test_only_so_many_jobs_wait_and_closing_ends_the_process() -> None:
     assert isinstance(first, RecordingFailed)
     assert isinstance(second, ShuttingDown)
     assert worker.pid is None
+
+
+async def test_while_somebody_drives_the_process_rests_after_each_job(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = recording(tmp_path / "a.mcap")
+    is_driven, rests = False, list[float]()
+    real_sleep = asyncio.sleep
+
+    async def sleep(seconds: float) -> None:
+        rests.append(seconds)
+        await real_sleep(0)
+
+    monkeypatch.setattr(worker_module, "LEAST_REST", 3600.0)
+    monkeypatch.setattr(worker_module, "MOST_REST", 7200.0)
+    worker = RecordingWorker(is_driven=lambda: is_driven)
+    await worker.ask(picture(path, 20), SECONDS)
+    await worker.ask(picture(path, 30), SECONDS)
+    is_driven = True
+    await worker.ask(picture(path, 20), SECONDS)
+    monkeypatch.setattr(asyncio, "sleep", sleep)
+    await worker.ask(picture(path, 30), SECONDS)
+    monkeypatch.undo()
+    (rest,) = rests
+    assert 0 < rest <= 3600.0
+    await worker.close()

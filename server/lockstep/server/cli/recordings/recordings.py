@@ -44,6 +44,8 @@ __all__ = [
 
 EXIT_BROKEN = 1  # a promise is not kept
 EXIT_USAGE = 2
+NO_PIXELS = "not looked at: --pixels"
+NO_STRIP = "not looked at: no event is drawn into the pictures"
 
 Json = Annotated[bool, typer.Option("--json", help="Print JSON.")]
 File = Annotated[Path, typer.Argument(help="A recording: its file, or its id in the recordings' directory.")]
@@ -216,6 +218,9 @@ def _verify_dataset(root: Path, as_json: bool, pixels: bool) -> None:
     else:
         lines = [f"{verdict.episodes} episodes, {verdict.rows} rows, tolerance {verdict.tolerance} events"]
         for name, check in verdict.checks.items():
+            if name == "shown" and not check.looked:
+                lines.append(f"--    shown ({NO_STRIP if pixels else NO_PIXELS})")
+                continue
             lines.append(f"{'ok  ' if check.ok else 'FAIL'}  {name} ({check.looked} looked at)")
             lines += [f"        row {each.row}: {printable(each.text)}" for each in check.violations[:5]]
         sys.stdout.write("\n".join(lines) + "\n")

@@ -95,12 +95,13 @@ class EpisodeCatalog:
         in_thread: InThread,
         worker: RecordingWorker | None = None,
         clock: Callable[[], float] = time.monotonic,
+        is_driven: Callable[[], bool] = lambda: False,
     ) -> None:
-        """`in_thread`: runs what blocks. `clock`: s, monotonic."""
+        """`in_thread`: runs what blocks. `clock`: s, monotonic. `is_driven`: whether somebody drives a robot here."""
         self._clock = clock
         self._library = library
         self._in_thread = in_thread
-        self._worker = worker or RecordingWorker()
+        self._worker = worker or RecordingWorker(is_driven=is_driven)
         self._reports = RecordingWorker(max_waiting=4)  # a report takes long: pictures do not wait for it
         self._known: OrderedDict[Path, _Known] = OrderedDict()
         self._kept_bytes = 0

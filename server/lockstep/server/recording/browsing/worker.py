@@ -2,6 +2,7 @@
 
 import asyncio
 import sys
+from collections.abc import Callable
 from contextlib import suppress
 
 import msgspec
@@ -22,14 +23,24 @@ __all__ = ["COMMAND", "RecordingWorker"]
 COMMAND = (sys.executable, "-m", "lockstep.server.recording.browsing.worker_process")
 MAX_WAITING = 48  # jobs; further ones are refused
 IDLE_SECONDS = 60.0  # then the process ends
+REST_SHARE = 2.0  # of a job's time, for which the process rests after it while somebody drives
+LEAST_REST, MOST_REST = 0.1, 0.5  # s
 START_SECONDS = 20.0  # a process may need on a busy machine, besides the time of its first job
 
 
 class RecordingWorker:
     """Call `ask` on the loop, as often as wanted: jobs wait for each other. `close` it."""
 
-    def __init__(self, command: tuple[str, ...] = COMMAND, max_waiting: int = MAX_WAITING) -> None:
+    def __init__(
+        self,
+        command: tuple[str, ...] = COMMAND,
+        max_waiting: int = MAX_WAITING,
+        is_driven: Callable[[], bool] = lambda: False,
+    ) -> None:
+        """`is_driven`: whether somebody drives; then the process rests after each job."""
         self._command = command
+        self._is_driven = is_driven
+        self._free_at = 0.0  # s, of the loop: when it may do the next job
         self._max_waiting = max_waiting
         self._turn = asyncio.Lock()
         self._waiting = 0
@@ -56,7 +67,14 @@ class RecordingWorker:
         self._waiting += 1
         try:
             async with self._turn:
+                loop = asyncio.get_running_loop()
+                if (rest := self._free_at - loop.time()) > 0:
+                    await asyncio.sleep(rest)
+                began = loop.time()
                 status, body = await self._do(job, seconds)
+                if self._is_driven():
+                    took = loop.time() - began
+                    self._free_at = loop.time() + min(max(LEAST_REST, REST_SHARE * took), MOST_REST)
         finally:
             self._waiting -= 1
         if status == "done":

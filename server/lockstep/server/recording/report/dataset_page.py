@@ -21,7 +21,7 @@ from lockstep.server.recording.reading.picture_at import jpeg_of
 from lockstep.server.recording.report import page_parts as parts
 from lockstep.server.recording.report.driver_figures import DriverTally
 from lockstep.server.recording.report.policies import policies_section
-from lockstep.server.recording.verify.verify_dataset import DatasetVerdict, verify_dataset
+from lockstep.server.recording.verify.verify_dataset import DatasetCheck, DatasetVerdict, verify_dataset
 
 __all__ = ["dataset_page"]
 
@@ -94,11 +94,14 @@ def _stamps(row: Row) -> list[int]:
     return [found] if isinstance(found, int) else list(found)
 
 
+def _result(check: DatasetCheck) -> str:
+    if not check.ok:
+        return f"{check.count} times not: {check.violations[0].text}"
+    return "kept" if check.looked else "not looked at"
+
+
 def _checks(verdict: DatasetVerdict) -> str:
-    rows = [
-        (name, check.looked, "kept" if check.ok else f"{check.count} times not: {check.violations[0].text}")
-        for name, check in verdict.checks.items()
-    ]
+    rows = [(name, check.looked or None, _result(check)) for name, check in verdict.checks.items()]
     return parts.table(("Check", "Looked at", "Result"), rows)
 
 

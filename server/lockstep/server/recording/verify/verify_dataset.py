@@ -16,7 +16,7 @@ from lockstep.server.recording.errors import RecordingDamaged
 from lockstep.server.recording.export.lerobot_meta import DatasetEpisode, DatasetNotes, file_of
 from lockstep.server.recording.export.lerobot_sampling import LONGEST
 
-__all__ = ["DatasetVerdict", "verify_dataset"]
+__all__ = ["DatasetCheck", "DatasetVerdict", "verify_dataset"]
 
 DatasetCheckName = Literal[
     "aligned",  # no picture is stamped newer than its row's event, or older by more than the tolerance
