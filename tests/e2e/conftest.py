@@ -34,7 +34,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
             continue
         if pytest_asyncio.is_async_test(item):
             item.add_marker(on_one_loop, append=False)
-        if item.get_closest_marker("full_rate") or _listens(item):
+        if _listens(item):
             item.add_marker(pytest.mark.alone)
 
 

@@ -79,11 +79,12 @@ async def test_the_same_page_drives_stops_and_shows_any_robot(
         async with open_console(chromium, stack.operator) as console:
             await console.until_live()
             robot = await console.page.evaluate("window.lockstep.robot()")
+            driven: set[str] = set()
             for layer in robot["layers"]:
                 await _choose(console, robot, layer)
                 await _arm(console)
                 for binding in layer["bindings"]:
-                    await _drive(console, robot, binding)
+                    await _drive(console, robot, binding, driven)
             await _saw_every_camera(console, robot)
             await _stop_and_reset(console)
         await _no_stamp_is_newer_than_the_truth(stack, robot)
@@ -102,10 +103,11 @@ async def _arm(console: ConsolePage) -> None:
         await console.arm()
 
 
-async def _drive(console: ConsolePage, robot: Any, binding: Any) -> None:
+async def _drive(console: ConsolePage, robot: Any, binding: Any, driven: set[str]) -> None:
     """Hold the deadman and this one input until the axis is seen to move the way it was told to."""
     axis = next(axis for axis in robot["axes"] if axis["name"] == binding["axis"])
-    sign, moved = await _moved(console, axis, binding["scale"])
+    sign, moved = await _moved(console, axis, binding["scale"], again=axis["name"] in driven)
+    driven.add(axis["name"])
     direction = -sign if binding["invert_pad"] else sign
     rendered = await _rendered(console)
     for _ in range(TRIES):
@@ -127,15 +129,18 @@ async def _drive(console: ConsolePage, robot: Any, binding: Any) -> None:
     await console.until("!s.driving && s.at_rest === true", 30)
 
 
-async def _moved(console: ConsolePage, axis: Any, scale: float) -> tuple[int, str]:
+async def _moved(console: ConsolePage, axis: Any, scale: float, *, again: bool) -> tuple[int, str]:
     """Return the direction to drive an axis in, and the condition that it has moved.
 
-    A goal axis goes to the wider side of its range; it is its applied goal that moves: five joints cannot turn a tool
-    every way.
+    A rate axis that was driven before goes back: on a busy machine it may have come to the end of its range. A goal
+    axis goes to the wider side of its range; it is its applied goal that moves: five joints cannot turn a tool every
+    way.
     """
     name = axis["name"]
     if axis["kind"] == "rate":
-        return 1, f"s.axes['{name}'] - {axis['rest']} > {MOVED * scale * (axis['maximum'] - axis['rest'])}"
+        sign = -1 if again and axis["minimum"] < axis["rest"] else 1
+        share = MOVED * scale * abs(axis["maximum" if sign > 0 else "minimum"] - axis["rest"])
+        return sign, f"{sign} * (s.axes['{name}'] - {axis['rest']}) > {share}"
     start = (await console.stats())["goals"][name]
     sign = 1 if start <= (axis["minimum"] + axis["maximum"]) / 2 else -1
     return sign, f"{sign} * (s.goals['{name}'] - {start}) > {MOVED * scale * min(axis['reach'], axis['slew'])}"
