@@ -183,6 +183,7 @@ class Operator:
         """Release the newest stop as soon as the bridge lets it; its number."""
         number = self.feedback.stop.number
         while self.feedback.stop.stopped:
+            number = self.feedback.stop.number  # feedback of a newer one may only now be read
             self.link.send(Reset(by=by, number=number))
             with contextlib.suppress(TimeoutError):
                 async with asyncio.timeout(RESET_AGAIN):

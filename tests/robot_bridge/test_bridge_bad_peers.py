@@ -124,16 +124,20 @@ async def test_a_media_peer_that_does_not_read_is_dropped_and_disturbs_nobody() 
 
 
 async def test_whatever_bytes_strangers_send_the_operator_drives_on() -> None:
+    """Four at a time: the robot that one of them has stopped answers by its refresh alone, twice a second."""
     random = Random(1)
     hello = frame(encode_message(Hello(role="media")))
     stop = frame(encode_message(Stop(by="x" * 40)))
     async with running_bridge() as bridge, operator(bridge) as driver:
-        for attempt in range(40):
-            garbage = bytearray(hello + stop * 3 if attempt % 2 else random.randbytes(300))
-            for _ in range(3):
-                garbage[random.randrange(len(hello) if attempt % 4 == 1 else len(garbage))] = random.randrange(256)
-            async with raw_link(bridge) as stranger:
-                stranger.writer.write(bytes(garbage))
+        for first in range(0, 40, 4):
+            async with AsyncExitStack() as strangers:
+                for attempt in range(first, first + 4):
+                    garbage = bytearray(hello + stop * 3 if attempt % 2 else random.randbytes(300))
+                    for _ in range(3):
+                        place = random.randrange(len(hello) if attempt % 4 == 1 else len(garbage))
+                        garbage[place] = random.randrange(256)
+                    stranger = await strangers.enter_async_context(raw_link(bridge))
+                    stranger.writer.write(bytes(garbage))
                 driver.link.send(driver.command())
                 await driver.next(Feedback)
         await driver.reset()
