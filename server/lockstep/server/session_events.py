@@ -37,6 +37,7 @@ __all__ = [
     "LinkUp",
     "MapReceived",
     "NavigationReceived",
+    "NewcomerWelcomed",
     "NoteWritten",
     "ParticipantsChanged",
     "PeerJoined",
@@ -321,6 +322,12 @@ class SeatChanged(SessionEvent, frozen=True):
 class PeerJoined(SessionEvent, frozen=True):
     peer: Actor
     carriers: str  # of its media
+
+
+class NewcomerWelcomed(SessionEvent, frozen=True):
+    """A peer's channel of the session is open, and the console has told it what the console itself knows."""
+
+    peer: Actor
 
 
 class PeerLeft(SessionEvent, frozen=True):
