@@ -128,7 +128,7 @@ class SpeedCapChanged(SessionEvent, frozen=True):
 
 
 class ShadowJudged(SessionEvent, frozen=True):
-    """What a shadow policy wanted for an event was judged; it did not reach the robot."""
+    """The values that a shadow policy wanted for an event were judged; they did not reach the robot."""
 
     by: Actor
     verdict: ShadowVerdict
