@@ -35,6 +35,8 @@ interface Fakes {
   readonly forceStickCollections: () => HidCollection[];
 }
 
-runInThisContext(readFileSync(join(import.meta.dirname, "../../../tests/e2e/driving/force_stick.js"), "utf8"));
+runInThisContext(
+  readFileSync(join(import.meta.dirname, "../../../tests/e2e/driving/force_stick.js"), "utf8"),
+);
 
 export const { ForceStickFake, HidFake, forceStickCollections } = globalThis as unknown as Fakes;
