@@ -223,7 +223,7 @@ class Console:
 
     @property
     def status(self) -> list[StatusItem]:
-        """What the robot reports of itself: battery, mode, temperatures. Empty before the first report.
+        """The robot's reports of itself: battery, mode, temperatures. Empty before the first report.
 
         `age` (s) of each item is its age now.
         """

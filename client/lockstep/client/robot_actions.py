@@ -30,7 +30,7 @@ ANSWER_SECONDS = 5.0  # for the robot to answer a request, or to end an action t
 
 
 class RobotNews:
-    """What the console has reported of actions, status and the map. No I/O.
+    """The console's reports of actions, status and the map. No I/O.
 
     Attributes:
         status: the newest status; None before the first

@@ -37,6 +37,7 @@ __all__ = [
     "LinkUp",
     "MapReceived",
     "NavigationReceived",
+    "NewcomerWelcomed",
     "NoteWritten",
     "ParticipantsChanged",
     "PeerJoined",
@@ -127,7 +128,7 @@ class SpeedCapChanged(SessionEvent, frozen=True):
 
 
 class ShadowJudged(SessionEvent, frozen=True):
-    """What a shadow policy wanted for an event was judged; it did not reach the robot."""
+    """The values that a shadow policy wanted for an event were judged; they did not reach the robot."""
 
     by: Actor
     verdict: ShadowVerdict
@@ -321,6 +322,12 @@ class SeatChanged(SessionEvent, frozen=True):
 class PeerJoined(SessionEvent, frozen=True):
     peer: Actor
     carriers: str  # of its media
+
+
+class NewcomerWelcomed(SessionEvent, frozen=True):
+    """A peer's channel of the session is open, and the console has told it what the console itself knows."""
+
+    peer: Actor
 
 
 class PeerLeft(SessionEvent, frozen=True):

@@ -81,7 +81,8 @@ def _stops(rig: FleetRig, name: str) -> list[tuple[str, str]]:
 
 async def test_a_session_that_fails_is_started_again_and_no_other_notices(faults: Faults) -> None:
     async with (
-        running_fleet_rig("left", "right") as rig,
+        # The driver is silent meanwhile, which on a busy machine takes longer than a seat is kept.
+        running_fleet_rig("left", "right", seat_timeout=120.0) as rig,
         rig.peer("left", "operator") as lost,
         rig.peer("right", "operator") as peer,
     ):

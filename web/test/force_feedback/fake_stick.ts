@@ -13,7 +13,7 @@ export interface Felt {
   readonly damper: number;
 }
 
-/** A fake, written from the standard: tests/e2e/force_stick.js, which Chromium's tests use too. */
+/** A fake, written from the standard: tests/e2e/driving/force_stick.js, which Chromium's tests use too. */
 export interface StickFake extends HidDevice {
   plugged: boolean;
   room: number;
@@ -35,6 +35,8 @@ interface Fakes {
   readonly forceStickCollections: () => HidCollection[];
 }
 
-runInThisContext(readFileSync(join(import.meta.dirname, "../../../tests/e2e/force_stick.js"), "utf8"));
+runInThisContext(
+  readFileSync(join(import.meta.dirname, "../../../tests/e2e/driving/force_stick.js"), "utf8"),
+);
 
 export const { ForceStickFake, HidFake, forceStickCollections } = globalThis as unknown as Fakes;

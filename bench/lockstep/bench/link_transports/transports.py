@@ -27,7 +27,7 @@ CONNECT_SECONDS = 20.0
 
 
 class Ends(Protocol):
-    """What an end does with what arrives."""
+    """Takes the messages that arrive at one end."""
 
     def control(self, message: Message) -> None: ...
     def picture(self, message: Message) -> None: ...

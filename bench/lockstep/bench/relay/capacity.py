@@ -112,7 +112,7 @@ def main(
     cores: Annotated[int, typer.Option(help="Cores of each relay.")] = MEASURED.relay_cores,
     megabits: Annotated[float, typer.Option(help="To one observer.")] = MEASURED.bits_per_second / 1e6,
 ) -> None:
-    """What so many observers take, from measured figures."""
+    """The load of so many observers, from measured figures."""
     scale = megabits * 1e6 / MEASURED.bits_per_second
     figures = Figures(
         bits_per_second=megabits * 1e6,

@@ -1,1 +1,1 @@
-"""What a robot's uplink has to carry: raw pictures against encoding at the bridge."""
+"""Measures the load of a robot's uplink: raw pictures against encoding at the bridge."""

@@ -29,7 +29,7 @@ CONSOLE = OUTER["console"]
 
 
 class Router:
-    """What a packet of one site becomes at another. No I/O.
+    """Translates the packets of one site for another, as a NAT does. No I/O.
 
     Attributes:
         refused: packets that a site's router has not let in, by site

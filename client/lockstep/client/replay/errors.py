@@ -17,7 +17,7 @@ class ReplayError(ConsoleError):
 
 
 class ReplayUnfit(ReplayError):
-    """What was recorded does not fit this robot."""
+    """The recording does not fit this robot."""
 
 
 class ReplayTooFar(ReplayError):

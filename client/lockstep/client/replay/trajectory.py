@@ -1,4 +1,4 @@
-"""What was recorded of one episode, and how it fits a robot. No I/O."""
+"""The recorded values of one episode, and how they fit a robot. No I/O."""
 
 import math
 from collections.abc import Mapping, Sequence

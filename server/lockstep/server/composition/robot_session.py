@@ -127,12 +127,6 @@ async def _session(
     relays = SfuCoordinator(settings, engine, peers, context.state.invitations.has_ended)
     sources = SourceManager(settings.sources, clock, media, metrics.registry, peers.announce)
     voice = Talkback(settings.speaker_spec, seat.holds, metrics.registry, peers.announce)
-    states: list[Callable[[], ServerMessage]] = [recorder.state]
-    if sources.sources:
-        states.append(sources.state)
-    if voice.enabled:
-        states.append(voice.state)
-    notices = Notices(peers, states, stops.trouble)
     dial_in = _dial_in(settings, context, directory) if settings.dials_in else None
     console = Console(
         settings,
@@ -147,11 +141,16 @@ async def _session(
         silence=silence,
         relays=[relays],
         dial_in=dial_in,
-        further_news=notices.for_newcomers,
     )
     has_ended = context.state.invitations.has_ended
     episodes = _episodes(settings, clock, events, recorder, media, console, seat, has_ended, peers, trail)
+    states: list[Callable[[], ServerMessage]] = [recorder.state]
+    if sources.sources:
+        states.append(sources.state)
+    if voice.enabled:
+        states.append(voice.state)
     states.append(episodes.state)
+    notices = Notices(peers, states, stops.trouble)
     media.robot_encoding.ask_by(console.robot.ask_for_encoding)
     SessionMetrics(metrics).subscribe(events)
     count_episodes(events, metrics)

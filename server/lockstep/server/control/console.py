@@ -2,7 +2,7 @@
 
 import asyncio
 import time
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Sequence
 from typing import Protocol
 
 from lockstep.protocol.actions import Act, ActionCancel, ActionUpdate, Status
@@ -17,7 +17,6 @@ from lockstep.protocol.console import (
     SeatRelease,
     SeatRequest,
     SeatTake,
-    ServerMessage,
     Shadow,
     SilenceStops,
     StopStateNotice,
@@ -88,6 +87,7 @@ from lockstep.server.session_events import (
     LinkUp,
     MapReceived,
     NavigationReceived,
+    NewcomerWelcomed,
     Refused,
     RestForwarded,
     RobotTaken,
@@ -131,7 +131,6 @@ class Console:
         silence: StopSilence,
         relays: Sequence[FeedbackReceiver] = (),
         dial_in: DialIn | None = None,
-        further_news: Callable[[], Iterable[ServerMessage]] = tuple,
     ) -> None:
         """Make the console; it publishes to `events`, whether anybody subscribes or not.
 
@@ -139,7 +138,6 @@ class Console:
             audit: the trail that the console runs
             relays: get feedback as observers do
             dial_in: where the robot connects to this console; None: the console connects to it
-            further_news: returns messages for newcomers, besides those of the console itself
         """
         self.clock = clock
         self.audit = audit
@@ -147,7 +145,6 @@ class Console:
         self._events = events
         self._faults = faults
         self._media = media
-        self._further_news = further_news
         self.robot = RobotConnection(settings, self, media, dial_in)
         self.seat = SeatKeeper(seat, peers, self, events)
         self.people = ParticipantList(peers, clock, events, self.seat.renamed)
@@ -220,8 +217,7 @@ class Console:
                 peer.send("session", status)
             if (navigation := self.navigation.message(time.monotonic())) is not None:
                 peer.send("session", navigation)
-            for news in self._further_news():
-                peer.send("session", news)
+            self._events.publish(NewcomerWelcomed(peer=peer.actor))
 
     def message_received(self, peer: Peer, channel: ChannelName, message: ClientMessage) -> None:
         now = time.monotonic()

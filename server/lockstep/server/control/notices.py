@@ -10,6 +10,7 @@ from lockstep.server.session_events import (
     LinkDown,
     LinkUp,
     NavigationReceived,
+    NewcomerWelcomed,
     NoteWritten,
     ParticipantsChanged,
     RobotTaken,
@@ -51,6 +52,7 @@ class Notices:
         self._audit_trouble = ""
 
     def subscribe(self, events: SessionEvents) -> None:
+        events.subscribe(NewcomerWelcomed, self._newcomer_welcomed)
         events.subscribe(LinkUp, self._link_changed)
         events.subscribe(LinkDown, self._link_changed)
         events.subscribe(RobotTaken, self._robot_taken)
@@ -65,6 +67,11 @@ class Notices:
         events.subscribe(StopSent, self._stop_sent)
         events.subscribe(StopsDiskChanged, self._stops_disk_changed)
         events.subscribe(AuditTrouble, self._audit_trouble_changed)
+
+    def _newcomer_welcomed(self, event: NewcomerWelcomed) -> None:
+        if (peer := self._peers.by_id(event.peer.peer)) is not None:
+            for message in self.for_newcomers():
+                peer.send("session", message)
 
     def for_newcomers(self) -> Iterator[ServerMessage]:
         for state in self._states:

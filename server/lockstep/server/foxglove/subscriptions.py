@@ -1,4 +1,4 @@
-"""What the viewers want, from the topics that somebody is subscribed to. No I/O, no clock."""
+"""Finds the streams that viewers want, from the topics that somebody is subscribed to. No I/O, no clock."""
 
 from collections.abc import Set
 from typing import NamedTuple

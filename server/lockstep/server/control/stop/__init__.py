@@ -1,1 +1,1 @@
-"""Who may stop and reset the robot: what the console does with a press of STOP, and with a RESET."""
+"""Decides who may stop and reset the robot, and passes presses of STOP and resets on."""

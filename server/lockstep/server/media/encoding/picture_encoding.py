@@ -1,4 +1,4 @@
-"""What is encoded of a camera's pictures: the newest one, once for each tier and codec that somebody needs."""
+"""Chooses the next picture of a camera to encode: the newest, once for each tier and codec that somebody needs."""
 
 import time
 from collections.abc import Sequence

@@ -1,4 +1,4 @@
-"""What is encoded of a microphone's sound: once for each codec in use; a crowd gets several packets in one."""
+"""Chooses the next sound of a microphone to encode: once for each codec in use; a crowd gets several packets in one."""
 
 import time
 from collections import deque

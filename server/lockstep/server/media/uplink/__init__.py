@@ -1,1 +1,1 @@
-"""What the console asks of a robot bridge that encodes: bitrate, size, rate and keyframes that its uplink carries."""
+"""Asks a robot bridge that encodes for bitrate, size, rate and keyframes that its uplink carries."""

@@ -44,7 +44,7 @@ class RobotEncoding:
         clock: Callable[[], float] = time.monotonic,
         operator_limited: Callable[[], bool] = lambda: False,
     ) -> None:
-        """What the requests depend on.
+        """The facts that the requests depend on.
 
         Args:
             planned_bps: bits per second of a camera that the operator's path carries

@@ -1,4 +1,4 @@
-"""What a robot is asked for its second encodings: shares of what the operator's pictures leave of the uplink."""
+"""Requests of second encodings from a robot: shares of what the operator's pictures leave of the uplink."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field

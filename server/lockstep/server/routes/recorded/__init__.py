@@ -1,1 +1,1 @@
-"""What the console has recorded: the files and their episodes."""
+"""Recorded sessions: the files and their episodes."""

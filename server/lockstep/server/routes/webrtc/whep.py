@@ -110,7 +110,7 @@ async def create(
 
 @router.options("/whep", include_in_schema=False)
 async def options() -> Response:
-    """What may be posted here (draft-ietf-wish-whep 4.2); a browser's preflight is answered before it comes here."""
+    """Name the type to post (draft-ietf-wish-whep 4.2); a browser's preflight is answered before it comes here."""
     return Response(status_code=204, headers={"Accept-Post": SDP, "Allow": "OPTIONS, POST"})
 
 

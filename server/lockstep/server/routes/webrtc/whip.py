@@ -87,7 +87,7 @@ async def create(
 
 @router.options("/whip", include_in_schema=False)
 async def options(request: Request) -> Response:
-    """What may be posted here (RFC 9725 4.2); a browser's preflight is answered before it comes here."""
+    """Name what may be posted here (RFC 9725 4.2); a browser's preflight is answered before it comes here."""
     _enabled(request)
     return Response(status_code=204, headers={"Accept-Post": SDP, "Allow": ENDPOINT_METHODS})
 

@@ -1,1 +1,1 @@
-"""What shadow policies want, in the 3D scene."""
+"""The wishes of shadow policies, in the 3D scene."""
