@@ -25,4 +25,5 @@ def is_too_large(feedback: Feedback) -> bool:
 
 def most_bytes(numbers: int, texts: Iterable[str]) -> int:
     """Return the most bytes that so many numbers, and these texts, have as JSON."""
-    return NUMBER * numbers + sum(QUOTES + CHARACTER * len(text) for text in texts)
+    lengths = list(map(len, texts))
+    return NUMBER * numbers + QUOTES * len(lengths) + CHARACTER * sum(lengths)

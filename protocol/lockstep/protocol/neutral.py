@@ -19,4 +19,4 @@ def neutral_values(axes: Sequence[Axis]) -> list[float | None]:
 
 def has_goals(axes: Sequence[Axis]) -> bool:
     """Return whether any of the axes is a goal axis."""
-    return any(axis.kind == "goal" for axis in axes)
+    return "goal" in [axis.kind for axis in axes]  # asked of each command: `any` would resume once for each axis

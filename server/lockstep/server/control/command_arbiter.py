@@ -179,8 +179,10 @@ class CommandArbiter:
         if description is None:
             return False
         signal = "" if description.start_warning is None else description.start_warning.axis
-        axes = zip(command.values, description.axes, strict=False)
-        return any(value != neutral_value(axis) and axis.name != signal for value, axis in axes)
+        for value, axis in zip(command.values, description.axes, strict=False):
+            if value != neutral_value(axis) and axis.name != signal:
+                return True
+        return False
 
     def rest(self, peer: str, rest: Rest) -> RestOutcome:
         """Forward a rest of the holder, always. If it names an event beyond the next one, it names the next instead."""
