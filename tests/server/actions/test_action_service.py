@@ -2,6 +2,7 @@
 
 import asyncio
 import json
+import time
 from types import SimpleNamespace
 from typing import Any, cast
 
@@ -106,7 +107,7 @@ def update(
 
 def test_a_newcomer_is_told_how_long_ago_an_action_ended(monkeypatch: pytest.MonkeyPatch) -> None:
     bench, now = Bench(), [100.0]
-    monkeypatch.setattr(action_service.time, "monotonic", lambda: now[0])
+    monkeypatch.setattr(time, "monotonic", lambda: now[0])
     old = msgspec.structs.replace(update("old", "cancelled", reason="driving"), age=40.0)  # from before this console
     for each in (old, update("a"), update("b")):
         bench.service.updated(each)

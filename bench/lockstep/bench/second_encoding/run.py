@@ -37,7 +37,7 @@ class Client(NamedTuple):
 
     def command_to_picture(self) -> list[float]:
         """Return for each command the time to the first picture that shows its event or a later one, ms."""
-        delays, pictures = [], iter(self.shown)
+        delays, pictures = list[float](), iter(self.shown)
         at, stamp = 0.0, 0
         for event, sent in self.sent:
             while stamp < event or at < sent:
@@ -101,11 +101,11 @@ async def run(
                     before = sites.sent_bytes("robot", "to_operator"), robot_end.cpu_seconds()
                     await asyncio.sleep(seconds)
                     after = sites.sent_bytes("robot", "to_operator"), robot_end.cpu_seconds()
-                    seen = [await client_of(client) for client in people]
+                    mine, theirs = [await client_of(client) for client in people]
     return {
         "robot_kbit_s": round(8 * (after[0] - before[0]) / seconds / 1000),
         "bridge_cpu_percent": round(100 * (after[1] - before[1]) / seconds, 1),
-        **_figures(*seen, seconds),
+        **_figures(mine, theirs, seconds),
     }
 
 

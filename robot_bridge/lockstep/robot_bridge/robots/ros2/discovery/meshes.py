@@ -76,7 +76,7 @@ def _merged(corners: Points, cells: npt.NDArray[np.int64]) -> Mesh:
     _, numbers, counts = np.unique(cells @ (BASE**2, BASE, 1), return_inverse=True, return_counts=True)
     numbers = numbers.reshape(-1)
     means = np.stack([np.bincount(numbers, corners[:, axis]) for axis in range(3)], axis=1) / counts[:, None]
-    triangles = {}
+    triangles: dict[tuple[int, ...], tuple[int, int, int]] = {}
     for a, b, c in numbers.reshape(-1, 3).tolist():
         if a != b and b != c and c != a:
             triangles.setdefault(tuple(sorted((a, b, c))), (a, b, c))

@@ -99,7 +99,8 @@ def _mesh(shape: Shape, mesh: Mesh) -> Drawn:
     vertices = [round(value * by, DIGITS) for vertex in mesh.vertices for value, by in zip(vertex, scale, strict=True)]
     step = -1 if math.prod(scale) < 0 else 1
     corners = [number for triangle in mesh.triangles for number in triangle[::step]]
-    return {"shape": "mesh", "vertices": vertices, "triangles": corners} | _placed_as(shape)
+    drawn: Drawn = {"shape": "mesh", "vertices": vertices, "triangles": corners}
+    return drawn | _placed_as(shape)
 
 
 def _simple(link: UrdfLink) -> list[Drawn]:
