@@ -60,7 +60,10 @@ def test_what_held_before_the_robot_was_told_is_logged_and_sound_is_left_out(tmp
 def test_who_drove_each_event_and_what_was_an_intervention_is_in_the_live_session(tmp_path: Path) -> None:
     path = tmp_path / "a.rrd"
     policy, person = EventDriver("net", "policy"), EventDriver("Ada", "human", intervention=True)
-    items = [robot(), *(feedback(at, driver=each) for at, each in enumerate([NOBODY, policy, policy, person, NOBODY]))]
+    items: list[Item | None] = [
+        robot(),
+        *(feedback(at, driver=each) for at, each in enumerate([NOBODY, policy, policy, person, NOBODY])),
+    ]
     take_items(iter(items), Sink("file", str(path), 1_000_000))
     found = entities(path)
     changes = [(row["event"], row["StateChange:state"]) for row in found["/driver"].rows]
