@@ -284,7 +284,9 @@ def test_the_far_end_of_a_hand_does_not_come_down_about_the_end_that_is_near(
     assert least > 0.007
 
 
-PLATE = {"hand": Surface(np.array([(x, y, 0.0) for x in (0.0, 0.08, 0.16) for y in (-0.3, 0.0, 0.3)]), np.full(9, 0.005))}
+PLATE = {
+    "hand": Surface(np.array([(x, y, 0.0) for x in (0.0, 0.08, 0.16) for y in (-0.3, 0.0, 0.3)]), np.full(9, 0.005))
+}
 DESK = Obstacles(ARM, PLATE, (plane("the table", (0.0, 0.0, 0.0), (0.0, 0.0, 1.0)),))
 
 

@@ -121,7 +121,9 @@ class Obstacles:
         if twists is not None:
             spins = twists[1][self._moving]
             ways = twists[0][self._moving] + np.cross(spins, middles)
-            reaches = reaches + np.sqrt((ways * ways).sum(axis=1)) + np.sqrt((spins * spins).sum(axis=1)) * self._reaches
+            reaches = (
+                reaches + np.sqrt((ways * ways).sum(axis=1)) + np.sqrt((spins * spins).sum(axis=1)) * self._reaches
+            )
         beyond = np.abs(middles @ self._sides.T - self._offsets) - self._halves  # bodies x (obstacles, 3)
         beyond = beyond.reshape(len(middles), -1, 3).max(axis=2)
         near = beyond < reaches[:, None]
