@@ -29,7 +29,8 @@ def clutch_of(case: dict[str, Any]) -> Clutch:
 
 
 def measured(axes: list[float], goals: list[float | None], **rest: Any) -> Feedback:
-    return Feedback(**{"event": 1, "issue": 1, "time": 0.0, "axes": axes, "goals": goals} | rest)
+    time = rest.pop("time", 0.0)
+    return Feedback(event=1, issue=1, time=time, axes=axes, goals=goals, **rest)
 
 
 def check_step(clutch: Clutch, step: dict[str, Any]) -> None:

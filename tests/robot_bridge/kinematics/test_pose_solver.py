@@ -303,12 +303,13 @@ def test_a_wide_hand_that_moves_as_fast_as_the_joints_can_stays_off_the_table(se
     joints: tuple[float, ...] = tuple(numbers.uniform(lower, upper))
     while nearest(joints) < 0.03:
         joints = tuple(numbers.uniform(lower, upper))
-    solver, rates = PoseSolver(ARM, bounds, keeps_off=(DESK,)), (0.0,) * 5
+    solver = PoseSolver(ARM, bounds, keeps_off=(DESK,))
+    rates: tuple[float, ...] = (0.0,) * 5
     for number in range(240):
         if number % 60 == 0:
             here = ARM.at(joints)
             position = here.position + 0.2 * numbers.normal(size=3)
-            rotation = from_rotation_vector(numbers.uniform(-2.0, 2.0, 3)) @ here.rotation
+            rotation = from_rotation_vector(numbers.uniform(-2.0, 2.0, 3).tolist()) @ here.rotation
         solution = solver.step(joints, position, rotation, TICK, before=rates)
         joints, rates = solution.joints, solution.rates
         assert nearest(joints) > 0.004

@@ -1,7 +1,7 @@
 import { createScenePoses, forgetPoses, keepPose } from "../gate/scene_poses";
 import type { Camera, Feedback, RobotDescription } from "../protocol/wire";
 import { BodyPoses } from "../robot/body_poses";
-import { toolFrames } from "../robot/tool_frames";
+import { toolFrames, type ToolState } from "../robot/tool_frames";
 import { difference, inverse, rotate, type RigidPose, type Vector } from "../xr/rigid";
 
 type View = NonNullable<Camera["calibration"]>;
@@ -54,11 +54,22 @@ export class ToolOverlay {
   /** Draws into the picture of `stream` with the stamp `event`; null: it has none. */
   paint(context: CanvasRenderingContext2D, stream: string, event: number | null): void {
     const description = this.robot();
-    if (this.hides || description === null || event === null || description.poses.length === 0) return;
-    const camera = description.cameras.find(({ name }) => name === stream);
+    if (description === null || event === null) return;
     const state = this.poses.kept.findLast((each) => each.event === event);
+    if (state !== undefined) this.paintState(context, stream, description, state);
+  }
+
+  /** Draws into the picture of `stream` the frames of a robot in the state of exactly that picture's event. */
+  paintState(
+    context: CanvasRenderingContext2D,
+    stream: string,
+    description: RobotDescription,
+    state: ToolState,
+  ): void {
+    if (this.hides || description.poses.length === 0) return;
+    const camera = description.cameras.find(({ name }) => name === stream);
     const view = camera?.calibration ?? null;
-    if (camera === undefined || view === null || isDistorted(view) || state === undefined) return;
+    if (camera === undefined || view === null || isDistorted(view)) return;
     if (description.joints.some(({ name }) => state.unknown.includes(name))) return; // the camera may be on one
     const place = new BodyPoses(description, state.joints).ofCamera(camera);
     if (place === null) return;

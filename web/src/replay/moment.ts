@@ -19,6 +19,7 @@ export interface ReplayPlace {
 export interface ReplayPicture {
   readonly record: ReplayRecord;
   readonly sequence: readonly ReplayRecord[];
+  readonly feedback?: ReplayFeedback; // of exactly its event, the newest when it came; none if that is not loaded
 }
 
 /** A segment of sound, and the packets before it, which a decoder has to have heard. */
@@ -79,7 +80,7 @@ export function momentOf(chunks: readonly ReplayChunkContent[], place: ReplayPla
     if (topic.startsWith(CAMERA)) {
       const picture = pictureAt(records, place.event, until);
       if (picture === null || isTorn(picture.sequence, picture.record)) continue;
-      if (isWhole(picture.sequence[0])) pictures.set(topic, picture);
+      if (isWhole(picture.sequence[0])) pictures.set(topic, withFeedback(picture, chunks));
     } else if (topic.startsWith(MICROPHONE)) {
       const segment = segmentAt(records, place.event, until);
       if (isWhole(segment.packets[0])) sounds.set(topic, segment);
@@ -118,6 +119,13 @@ export function pictureAt(
   const record = records[last];
   if (first === -1 || record === undefined) return null;
   return { record, sequence: records.slice(first, last + 1) };
+}
+
+function withFeedback(picture: ReplayPicture, chunks: readonly ReplayChunkContent[]): ReplayPicture {
+  const { event, arrived } = picture.record;
+  const issues = chunks.flatMap((chunk) => chunk.feedback.filter((each) => each.event === event));
+  const feedback = issues.findLast((each) => each.arrived <= arrived) ?? issues[0];
+  return feedback === undefined ? picture : { ...picture, feedback };
 }
 
 /** The packets that carry the newest stamp that is not newer than `event`. */

@@ -278,3 +278,25 @@ describe("what somebody else's file says", () => {
     expect([feedback?.ranges.length, feedback?.faults.length]).toEqual([4096, 512]);
   });
 });
+
+describe("the feedback of a picture", () => {
+  const loaded = (parts: readonly Part[]): ReturnType<typeof momentOf> =>
+    momentOf([parseChunkBody(0, bodyOf(parts))], { event: 5, until: null });
+
+  it("is of exactly its event, as it was when the picture came", () => {
+    const parts = [feedback(4, 1, 5), feedback(4, 2, 9), picture(4, 10, true), feedback(4, 3, 12)];
+    const moment = loaded([...parts, feedback(5, 1, 20)]);
+    expect(moment.feedback?.event).toBe(5);
+    expect(moment.pictures.get("/camera/front")?.feedback).toMatchObject({ event: 4, issue: 2 });
+  });
+
+  it("is the first of its event where the picture overtook it", () => {
+    const moment = loaded([picture(5, 10, true), feedback(5, 1, 12), feedback(5, 2, 14)]);
+    expect(moment.pictures.get("/camera/front")?.feedback).toMatchObject({ event: 5, issue: 1 });
+  });
+
+  it("is none where that event's is not loaded", () => {
+    const moment = loaded([picture(4, 10, true), feedback(5, 1, 12)]);
+    expect(moment.pictures.get("/camera/front")).not.toHaveProperty("feedback");
+  });
+});

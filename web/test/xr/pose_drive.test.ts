@@ -68,6 +68,19 @@ describe("a hand that takes the deadman", () => {
     expectGoals(device.goals(feedbackAt(PLACE)), [null, 0.5, 0.1, 0.3, 0, 0, 1.7]);
   });
 
+  it("leads the tool only once it has come to rest, where it has come to", () => {
+    const hands = new Hands();
+    const settles = { ...descriptionOf(AXES), poses: [{ ...TOOL, settling: 0.12 }] };
+    const device = new PoseDevice(settles, hands);
+    hands.at("right", [0, 1, 0]);
+    const before = { ...feedbackAt(PLACE), at_rest: false };
+    for (const time of [1, 1.06, 1.11])
+      expectGoals(device.goals({ ...before, time }), [null, null, null, null, null, null, null]);
+    hands.at("right", [0, 1.5, 0], 1);
+    const come = [0.28, 0.1, 0.2, 0, 0, 1.2];
+    expectGoals(device.goals({ ...feedbackAt(come), time: 1.13 }), [null, ...come]);
+  });
+
   it("takes it again anywhere, and moves nothing", () => {
     const hands = new Hands();
     const device = new PoseDevice({ ...descriptionOf(AXES), poses: [TOOL] }, hands);

@@ -59,8 +59,9 @@ class Clutch:
     the device's own motion since, times the axis' scale. A goal further than 0.8 of the axis' reach from the newest
     measured value is clipped there, and `clipped` says so; the device's motion counts on meanwhile.
 
-    It engages only while the goals of its axes stand still: a goal that still brakes, or a pose that has not settled, is
-    not where the robot comes to rest. `waits` says that engaging again in a moment can succeed.
+    It engages only while the goals of its axes stand still: a goal that still brakes, or a pose that has not settled,
+    is not where the robot comes to rest. `waits` says that engaging again in a moment can succeed. Let go with
+    `Console.rest`, and engage after it: a command from before may still be under way.
 
     Call `release` when the operator lets go, and when the feedback, the seat or the arming is lost. The clutch releases
     itself when a reading is None or not finite, and when the robot needs a neutral command. Then the values are None,

@@ -7,7 +7,7 @@ from typing import NamedTuple, Protocol
 import numpy as np
 import numpy.typing as npt
 
-from lockstep.robot_bridge.kinematics.chain import Chain, ChainPoint, ChainState
+from lockstep.robot_bridge.kinematics.chain import Chain, ChainPoint, ChainState, cross
 
 __all__ = ["Capsule", "Clearance", "Gap", "GapSource", "nearest_places"]
 
@@ -58,7 +58,7 @@ class Clearance:
             (names.index(first), names.index(second), capsules[first].radius + capsules[second].radius)
             for first, second in pairs
         ]
-        self._moving = [start.moving for start, _ in self._ends]
+        self._both = [end.moving for each in self._ends for end in each]
         self._columns = np.array([pair[:2] for pair in self._pairs], dtype=int).reshape(-1, 2).T
         reaches = np.array([math.dist(each.start, each.end) / 2 + each.radius for each in capsules.values()])
         self._reaches = reaches[self._columns].sum(axis=0)  # m, of both capsules around their middles
@@ -80,7 +80,7 @@ class Clearance:
     def _comes_closer(self, state: ChainState, ends: Array, ahead: Array) -> Array:
         """Return by how much two places of each pair come closer to each other at most, m."""
         ways, turns = self._chain.twists(state, ahead)
-        motions = ways[self._moving][:, None] + np.cross(turns[self._moving][:, None], ends)  # capsules x ends x 3
+        motions = (ways[self._both] + cross(turns[self._both], ends.reshape(-1, 3))).reshape(-1, 2, 3)  # of the ends
         apart = motions[self._columns[0]][:, :, None] - motions[self._columns[1]][:, None, :]
         return np.sqrt((apart * apart).sum(axis=3).max(axis=(1, 2)))  # type: ignore[no-any-return]
 

@@ -10,7 +10,7 @@ from typing import Final, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from lockstep.robot_bridge.kinematics.chain import Chain, ChainState
+from lockstep.robot_bridge.kinematics.chain import Chain, ChainState, cross
 from lockstep.robot_bridge.kinematics.clearance import Gap
 
 __all__ = ["Obstacle", "Obstacles", "Surface", "plane"]
@@ -96,15 +96,16 @@ class Obstacles:
         for body, obstacles in self._near(state, within, twists):
             moving, points, radii = self._bodies[body]
             places = state.places[moving] + points @ state.turns[moving].T
-            ways = None if twists is None else twists[0][moving] + np.cross(twists[1][moving], places)
+            ways = None if twists is None else twists[0][moving] + cross(twists[1][moving : moving + 1], places)
             for obstacle in obstacles:
-                distances = _distances(obstacle, places) - radii
-                soon = distances
+                distances = soon = _distances(obstacle, places) - radii
+                outward = None
                 if ways is not None:
-                    soon = distances + np.minimum((_outward(obstacle, places) * ways).sum(axis=1), 0.0)
+                    outward = _outward(obstacle, places)
+                    soon = distances + np.minimum((outward * ways).sum(axis=1), 0.0)
                 for number in _spread(places, soon, within, APART * float(self._reaches[body])):
+                    out = _outward(obstacle, places[number : number + 1])[0] if outward is None else outward[number]
                     motion = self._chain.motion(state, moving, places[number])
-                    out = _outward(obstacle, places[number : number + 1])[0]
                     found.append(Gap(float(distances[number]), out @ motion, obstacle.name))
         return found
 
@@ -120,7 +121,7 @@ class Obstacles:
         reaches = self._reaches + within
         if twists is not None:
             spins = twists[1][self._moving]
-            ways = twists[0][self._moving] + np.cross(spins, middles)
+            ways = twists[0][self._moving] + cross(spins, middles)
             reaches = (
                 reaches + np.sqrt((ways * ways).sum(axis=1)) + np.sqrt((spins * spins).sum(axis=1)) * self._reaches
             )
@@ -159,4 +160,4 @@ def _outward(obstacle: Obstacle, places: Array) -> Array:
     ways[inside, beyond[inside].argmax(axis=1)] = 1.0
     ways = np.copysign(ways, own)
     ways /= np.sqrt((ways * ways).sum(axis=1))[:, None]
-    return ways @ obstacle.rotation.T  # type: ignore[no-any-return]
+    return ways @ obstacle.rotation.T

@@ -129,6 +129,21 @@ def test_a_tool_that_is_driven_at_no_speed_comes_to_rest_and_goes_on_at_another(
     assert world.drive.pursued()[5] == pytest.approx(goal[5], abs=1e-4)
 
 
+def test_in_the_tick_in_which_the_arm_counts_as_at_rest_its_goals_are_where_it_has_come_to() -> None:
+    """The feedback of that tick is what the next hand engages at."""
+    world = World(SLOW)
+    goal: list[float | None] = [*([None] * 5), *world.drive.pursued()[5:]]
+    assert goal[5] is not None
+    goal[5] -= 0.08
+    for _ in range(10):
+        world.command(goal)
+        world.wait(EVENT)
+    world.shaper.rest()
+    while not world.shaper.at_rest:
+        world.tick(TICK)
+    assert world.shaper.goals == pytest.approx(world.drive.pursued(), abs=1e-9)
+
+
 @pytest.mark.parametrize("gap", [EVENT, 0.2, 0.45])
 def test_a_client_that_moves_the_tool_gets_there_however_slow_arm_and_network_are(gap: float) -> None:
     world = World(SLOW)

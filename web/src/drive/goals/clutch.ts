@@ -153,9 +153,7 @@ export function clutchOf(
 
 /** For how long the robot may still come nearer to a goal of this axis that stands still, s. */
 export function settlingOf({ poses }: RobotDescription, axis: string): number {
-  return (
-    poses.find(({ position, rotation }) => [...position, ...rotation].includes(axis))?.settling ?? 0
-  );
+  return poses.find(({ position, rotation }) => [...position, ...rotation].includes(axis))?.settling ?? 0;
 }
 
 function isKnown(device: readonly AxisValue[], count: number): device is readonly number[] {

@@ -19,11 +19,19 @@ import type { RecordingDetails, RecordingsApi } from "../recordings_api";
 import { SceneCard } from "./scene_card";
 import { SoundCard } from "./sound_card";
 import { Timeline } from "./timeline";
+import { ToolOverlay } from "../../media/tool_overlay";
 import { createPlaybackControls, type PlaybackControls } from "./playback_controls";
 
 interface CameraView {
   readonly element: HTMLElement;
-  show(picture: VideoFrame | undefined, stamp: number | null, event: number, trouble: string): void;
+  /** `paint`: draws over the picture. */
+  show(
+    picture: VideoFrame | undefined,
+    stamp: number | null,
+    event: number,
+    trouble: string,
+    paint: (context: CanvasRenderingContext2D) => void,
+  ): void;
 }
 
 /** One recording: its pictures, figures and marks, all of one event. */
@@ -33,6 +41,7 @@ export class PlayerView {
   readonly sounds: SoundCard;
   readonly rendered = new Map<string, { stamp: number; event: number }[]>(); // by camera, for tests
   private readonly cameras = new Map<string, CameraView>();
+  private readonly tools = new ToolOverlay(() => this.player.description);
   private readonly timeline = new Timeline((event) => void this.player.seek(event));
   private readonly marks: MarkList;
   private readonly transport: PlaybackControls;
@@ -123,9 +132,18 @@ export class PlayerView {
     this.scene?.close();
   }
 
-  /** Left and right step, space plays; true: it was one of these. */
+  /** Left and right step, space plays, P shows or hides the tools' frames; true: it was one of these. */
   key(event: KeyboardEvent): boolean {
-    return this.transport.key(event);
+    if (this.transport.key(event)) return true;
+    const isPlain = !event.ctrlKey && !event.metaKey && !event.altKey;
+    if (event.key !== "p" || !isPlain || !this.hasTools) return false;
+    this.tools.toggle();
+    if (this.player.shown !== null) this.show(this.player.shown);
+    return true;
+  }
+
+  private get hasTools(): boolean {
+    return (this.player.description?.poses.length ?? 0) > 0;
   }
 
   private createHead(back: () => void): HTMLElement {
@@ -155,15 +173,20 @@ export class PlayerView {
   private show(shown: ShownMoment): void {
     const { moment, pictures, troubles } = shown;
     const { event } = moment.place;
+    const description = this.player.description;
     for (const [topic, view] of this.cameras) {
-      const stamp = moment.pictures.get(topic)?.record.event ?? null;
-      view.show(pictures.get(topic), stamp, event, troubles.get(topic) ?? "");
+      const shownPicture = moment.pictures.get(topic);
+      const stamp = shownPicture?.record.event ?? null;
+      view.show(pictures.get(topic), stamp, event, troubles.get(topic) ?? "", (context) => {
+        const state = shownPicture?.feedback;
+        if (description !== null && state !== undefined)
+          this.tools.paintState(context, topic.slice(CAMERA.length), description, state);
+      });
       if (stamp !== null && pictures.has(topic))
         this.rendered.set(topic.slice(CAMERA.length), [{ stamp, event }]);
     }
     const { feedback, command } = moment;
     this.scene?.show(event, feedback, moment.damaged);
-    const description = this.player.description;
     const unknown = new Set(
       feedback?.unknown.map((name) => description?.axes.findIndex((axis) => axis.name === name) ?? -1),
     );
@@ -270,7 +293,7 @@ function createCameraView(name: string, label: string): CameraView {
   const drawing = canvas.getContext("2d", { willReadFrequently: false });
   return {
     element: h("figure", "view replay-view", {}, canvas, words, caption),
-    show(picture, stamp, event, trouble) {
+    show(picture, stamp, event, trouble, paint) {
       setHidden(words, picture !== undefined);
       setText(words, trouble);
       canvas.classList.toggle("is-blank", picture === undefined);
@@ -279,7 +302,9 @@ function createCameraView(name: string, label: string): CameraView {
       if (picture === undefined) return;
       const { displayWidth: width, displayHeight: height } = picture;
       if (canvas.width !== width || canvas.height !== height) Object.assign(canvas, { width, height });
-      drawing?.drawImage(picture, 0, 0, width, height);
+      if (drawing === null) return;
+      drawing.drawImage(picture, 0, 0, width, height);
+      paint(drawing);
     },
   };
 }

@@ -52,7 +52,9 @@ function play(clutch: Clutch, step: Step, about: string): void {
 
 describe("the clutch does what the shared cases say", () => {
   it.each(cases)("$name", ({ axes, steps }) => {
-    const clutch = new Clutch(axes.map(({ scale, settling = 0, ...axis }, index) => ({ index, axis, scale, settling })));
+    const clutch = new Clutch(
+      axes.map(({ scale, settling = 0, ...axis }, index) => ({ index, axis, scale, settling })),
+    );
     steps.forEach((step, number) => play(clutch, step, `step ${number}: ${JSON.stringify(step)}`));
   });
 });

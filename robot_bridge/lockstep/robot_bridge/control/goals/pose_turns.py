@@ -21,8 +21,8 @@ __all__ = ["PoseTurns"]
 
 
 class PoseTurns:
-    """Knows the goals that are out of date. Call `take` before each tick in which axes are driven, then `settle`, and
-    `pursue` when the limits of the tick are known.
+    """Knows the goals that are out of date. Call `take` before each tick in which axes are driven, `pursue` when the
+    limits of the tick are known, and `settle` when the axes have taken it.
 
     Attributes:
         settled: a pose has settled since this was set to False

@@ -145,14 +145,15 @@ class AxisShaper:
         if left <= 0:
             self._released = True
         released = self._released
-        if self._turns is not None:
-            if not released:
-                self._turns.take()
-            self._turns.settle(released)
+        if self._turns is not None and not released:
+            self._turns.take()
         wanted = rates = [axis.next_rate(left, dt, released) for axis in self._axes]
         if self._limiter is not None:
             rates = self._limiter(rates, lambda: [axis.braked(dt) for axis in self._axes])
         if self._turns is not None:
             slowed = [axis for axis, rate, most in zip(self._axes, rates, wanted, strict=True) if rate != most]
             self._turns.pursue(0.0 if released else left, slowed)
-        return [axis.take(rate, dt) for axis, rate in zip(self._axes, rates, strict=True)]
+        values = [axis.take(rate, dt) for axis, rate in zip(self._axes, rates, strict=True)]
+        if self._turns is not None:
+            self._turns.settle(released)  # from this tick on `at_rest` may be true, and `goals` says where
+        return values
