@@ -73,6 +73,9 @@ class PadHand:
         self._before: dict[str, float] = {}
         self._pushed: set[str] = set()
 
+    def think(self, goals: Mapping[str, float], feedback: Feedback) -> None:
+        """A person looks."""
+
     def values(self, goals: Mapping[str, float], feedback: Feedback) -> Mapping[str, float | None]:
         if goals is not self._goals:
             self._goals, self._stood, self._before = goals, {}, {}
@@ -97,7 +100,8 @@ class PadHand:
         shares: dict[str, float] = {}  # of full speed, by the pad's part
         crosses: dict[str, tuple[str, float]] = {}
         for binding in self._description.layers[0].bindings:
-            name, pad = binding.axis, binding.pad or ""
+            name = binding.axis
+            pad: str = binding.pad or ""
             if name not in ways or self._is_stuck(name):
                 continue
             way = ways[name] / binding.scale * (-1 if binding.invert_pad else 1)
