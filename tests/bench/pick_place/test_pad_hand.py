@@ -5,7 +5,7 @@ from typing import Final
 
 import pytest
 
-from lockstep.bench.pick_place.pad_hand import FAR_TURN, PATIENCE, SLOW_SHARE, PadHand, deflection, gain_for
+from lockstep.bench.pick_place.pad_hand import FAR_TURN, HARDER, PATIENCE, SLOW_SHARE, PadHand, deflection, gain_for
 from lockstep.protocol.description import RobotDescription
 from lockstep.protocol.messages import Feedback
 from lockstep.robot_bridge.robots.so101.controls import AXES, LAYERS
@@ -73,6 +73,19 @@ def test_a_tool_that_does_not_turn_further_is_turned_as_far_as_the_joints_can() 
         assert hand.applied(goals, seen(AT, event)) == (event > PATIENCE)
         hand.move(goals, seen(AT, event), 1.0)
     assert not hand.move(goals, seen(AT), 1.0).pressed
+
+
+def test_a_tool_that_does_not_move_is_pushed_harder_until_it_does() -> None:
+    hand, goals = PadHand(ROBOT), AT | {"tool.z": 0.11}
+    pushed = []
+    for event in range(1, 4 * HARDER):
+        hand.values(goals, seen(AT, event))
+        pushed.append(abs(hand.move(goals, seen(AT, event), 0.5).sticks[3]))
+    assert pushed == sorted(pushed)
+    assert pushed[-1] > 2 * pushed[0]
+    moved = seen(AT | {"tool.z": 0.102}, 4 * HARDER)
+    hand.values(goals, moved)
+    assert abs(hand.move(goals, moved, 0.5).sticks[3]) < pushed[0]
 
 
 def test_a_gripper_that_the_block_keeps_open_is_shut_when_its_goal_is() -> None:

@@ -96,7 +96,7 @@ class Postures:
         for _ in range(STEPS):
             before, arm = arm, self._solver.step(arm, position, rotation, TICK).joints
             if max(abs(new - old) for new, old in zip(arm, before, strict=True)) < stands:
-                break  # the console's loop waits for this, and a silent client loses the seat
+                break  # somebody waits for this
         return arm
 
 
@@ -117,6 +117,9 @@ class PolicyHand:
 
     def __init__(self, description: RobotDescription) -> None:
         self._postures = Postures(description)
+
+    def think(self, goals: Mapping[str, float], feedback: Feedback) -> None:
+        self._postures.of(goals, feedback)
 
     def values(self, goals: Mapping[str, float], feedback: Feedback) -> Mapping[str, float | None]:
         measured = np.array(feedback.axes[: len(JOINTS)])
@@ -144,6 +147,9 @@ class LeaderHand:
         self._postures = Postures(description)
         self._device: list[float] = [LEADER_BEGINS] * len(LEADER_SCALES)  # rad
         self._asked = np.zeros(len(JOINTS))  # rad, of the follower, with the last event
+
+    def think(self, goals: Mapping[str, float], feedback: Feedback) -> None:
+        self._postures.of(goals, feedback)
 
     def values(self, goals: Mapping[str, float], feedback: Feedback) -> Mapping[str, float | None]:
         if not self.clutch.engaged:

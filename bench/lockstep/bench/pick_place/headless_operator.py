@@ -9,7 +9,7 @@ from lockstep.bench.pick_place.hands import LEADER_SCALES, LeaderHand, PolicyHan
 from lockstep.bench.pick_place.operate import operate
 from lockstep.bench.pick_place.operator import HandName, Pictures
 from lockstep.bench.pick_place.script import Hand, PickAndPlace, ToolHand
-from lockstep.client import Console
+from lockstep.client import CommandRefused, Console
 from lockstep.protocol.description import RobotDescription
 
 __all__ = ["HeadlessOperator", "headless_operator"]
@@ -47,7 +47,17 @@ class HeadlessOperator:
                 return
 
     async def operate(self, task: PickAndPlace, held_up: Counter[str]) -> None:
-        await operate(self._console, task, held_up)
+        """As a person does, ask for the seat anew where the console has freed it because the client was held up."""
+        while True:
+            try:
+                await operate(self._console, task, held_up, task.think)
+            except CommandRefused as refused:
+                if refused.reason != "no_seat":
+                    raise
+                held_up[refused.reason] += 1
+                await self._console.take_seat()
+            else:
+                return
 
     async def pictures(self) -> Pictures:
         streams = self._console.stats().streams

@@ -1,6 +1,8 @@
 """Answers each feedback of a console with the next command of a task, until the task is at its end."""
 
+import asyncio
 from collections import Counter
+from collections.abc import Callable
 from typing import Final, Protocol
 
 from lockstep.client import CommandRefused, Console, NotArmed
@@ -24,10 +26,17 @@ class Task(Protocol):
         """Return the values of the command that answers this feedback."""
 
 
-async def operate(console: Console, task: Task, held_up: Counter[str] | None = None) -> int:
+async def operate(
+    console: Console,
+    task: Task,
+    held_up: Counter[str] | None = None,
+    think: Callable[[Feedback], None] | None = None,
+) -> int:
     """Drive until the task is done or has failed; return how often the robot had to be armed anew.
 
-    `held_up`: counts why.
+    Args:
+        held_up: counts why
+        think: computes what the next answer needs, in a thread: a client that computes falls silent, and loses the seat
 
     Raises:
         CommandRefused: for another reason than that somebody was held up.
@@ -35,6 +44,8 @@ async def operate(console: Console, task: Task, held_up: Counter[str] | None = N
     """
     feedback, armed = await _armed(console), 0
     while not task.done and not task.failed:
+        if think is not None:
+            await asyncio.to_thread(think, feedback)
         try:
             feedback = await console.drive(task.values(feedback))
         except (CommandRefused, NotArmed) as refused:

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Final
 
-from lockstep.bench.pick_place.motions import ROTATION
+from lockstep.bench.pick_place.motions import POSITION, ROTATION
 from lockstep.bench.pick_place.script import by_name
 from lockstep.protocol.description import Axis, RobotDescription
 from lockstep.protocol.messages import Feedback
@@ -25,6 +25,8 @@ TURNED: Final = 0.1  # rad, of the measured tool: as far as a person can see it
 GRIPPED: Final = 0.05  # rad, of the gripper's applied goal
 STANDS: Final = 0.004  # rad, from one feedback to the next
 PATIENCE: Final = 8  # feedbacks in which it is pushed and does not turn: the joints cannot turn it further
+# m and feedbacks: a tool that is pushed and does not move further in so many is pushed twice as hard, up to a share.
+MOVES, HARDER, HARDEST = 0.0005, 3, 0.5
 GAINS: Final = (0.5, 4.0)  # 1/s, of the speed by the distance
 
 
@@ -69,13 +71,17 @@ class PadHand:
         self._description = description
         self._axes = {axis.name: axis for axis in description.axes}
         self._goals: Mapping[str, float] = {}
+        self._waited: dict[str, int] = {}  # feedbacks that a place was pushed and did not move, by axis
         self._stood: dict[str, int] = {}  # feedbacks that a rotation was pushed in and stood, by axis
         self._before: dict[str, float] = {}
         self._pushed: set[str] = set()
 
+    def think(self, goals: Mapping[str, float], feedback: Feedback) -> None:
+        """A person looks."""
+
     def values(self, goals: Mapping[str, float], feedback: Feedback) -> Mapping[str, float | None]:
         if goals is not self._goals:
-            self._goals, self._stood, self._before = goals, {}, {}
+            self._goals, self._stood, self._waited, self._before = goals, {}, {}, {}
         self._watch(by_name(self._description, feedback.axes))
         return dict(goals)
 
@@ -97,14 +103,15 @@ class PadHand:
         shares: dict[str, float] = {}  # of full speed, by the pad's part
         crosses: dict[str, tuple[str, float]] = {}
         for binding in self._description.layers[0].bindings:
-            name, pad = binding.axis, binding.pad or ""
+            name = binding.axis
+            pad: str = binding.pad or ""
             if name not in ways or self._is_stuck(name):
                 continue
             way = ways[name] / binding.scale * (-1 if binding.invert_pad else 1)
             if pad in DPAD:
                 crosses[pad] = name, way
             elif abs(way) > CLOSE[self._axes[name].unit]:
-                shares[pad] = _share(way, gain, self._axes[name])
+                shares[pad] = self._share(way, gain, self._axes[name])
                 self._push(name)
         self._press_cross(move, crosses, max(map(abs, shares.values()), default=0.0))
         for pad, share in shares.items():
@@ -126,20 +133,24 @@ class PadHand:
             self._push(name)
 
     def _push(self, name: str) -> None:
-        if name in ROTATION:
-            self._pushed.add(name)
+        self._pushed.add(name)
 
     def _watch(self, here: Mapping[str, float]) -> None:
-        """Count the feedbacks in which the tool is pushed and does not turn."""
+        """Count the feedbacks in which the tool is pushed and neither turns nor moves."""
         for name in ROTATION:
             stood = name in self._pushed and abs(here[name] - self._before.get(name, math.inf)) < STANDS
             if name in self._pushed:
                 self._stood[name] = self._stood.get(name, 0) + 1 if stood else 0
-        self._before = {name: here[name] for name in ROTATION}
+        for name in POSITION:
+            waits = name in self._pushed and abs(here[name] - self._before.get(name, math.inf)) < MOVES
+            self._waited[name] = self._waited.get(name, 0) + 1 if waits else 0
+        self._before = {name: here[name] for name in (*POSITION, *ROTATION)}
 
     def _is_stuck(self, name: str) -> bool:
         return self._stood.get(name, 0) >= PATIENCE
 
-
-def _share(way: float, gain: float, axis: Axis) -> float:
-    return min(max(gain * way / axis.slew, -1.0), 1.0)
+    def _share(self, way: float, gain: float, axis: Axis) -> float:
+        """Return the share of full speed: the more, the further it is, and the longer nothing has moved."""
+        share = min(max(gain * way / axis.slew, -1.0), 1.0)
+        harder = share * 2.0 ** (self._waited.get(axis.name, 0) // HARDER)
+        return math.copysign(max(abs(share), min(abs(harder), HARDEST)), share)

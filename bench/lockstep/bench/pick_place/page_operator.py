@@ -208,7 +208,11 @@ class HeadsetOperator(PageOperator):
         await self._headset.squeeze()
 
     async def why_disarmed(self, seen: Mapping[str, Any]) -> str:
-        headset = seen["headset"]
+        if seen["headset"] is None:
+            return "the session ended"
+        with suppress(AssertionError):  # it is drawn later
+            await self.console.until("s.headset?.state === 'Disarmed'", ARM_TRY_SECONDS)
+        headset = (await self.console.stats())["headset"]
         return "the session ended" if headset is None else str(headset["text"])
 
     async def let_go(self) -> None:

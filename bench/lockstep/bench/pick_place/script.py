@@ -29,6 +29,9 @@ Value = TypeVar("Value", float, float | None)
 class Hand(Protocol):
     """The way in which a motion becomes a command."""
 
+    def think(self, goals: Mapping[str, float], feedback: Feedback) -> None:
+        """Compute what `values` and `applied` need for these goals, if that takes long."""
+
     def values(self, goals: Mapping[str, float], feedback: Feedback) -> Mapping[str, float | None]:
         """Return values by axis that answer the feedback and lead to these goals of the tool or the gripper."""
 
@@ -47,6 +50,9 @@ class ToolHand:
     def __init__(self, description: RobotDescription) -> None:
         self._description = description
         self._turned: dict[str, float] = {}  # rad, how the tool was measured to be turned before
+
+    def think(self, goals: Mapping[str, float], feedback: Feedback) -> None:
+        """The robot does."""
 
     def values(self, goals: Mapping[str, float], feedback: Feedback) -> Mapping[str, float | None]:
         here = by_name(self._description, feedback.axes)
@@ -107,12 +113,20 @@ class PickAndPlace:
 
     def values(self, feedback: Feedback) -> list[float | None]:
         """Return the values of the command that answers this feedback; all None once it is done."""
-        self._newest = feedback
-        self._go_on(feedback)
+        self.think(feedback)
         if self._motion is None or self.failed:
             return [None] * len(self._index)
         named = self._hand.values(self._motion.goals, feedback)
         return [named.get(name) for name in self._index]
+
+    def think(self, feedback: Feedback) -> None:
+        """Compute what the answer to this feedback needs; in another thread, if nobody else calls meanwhile."""
+        if feedback is self._newest:
+            return
+        self._newest = feedback
+        self._go_on(feedback)
+        if self._motion is not None and not self.failed:
+            self._hand.think(self._motion.goals, feedback)
 
     def _go_on(self, feedback: Feedback) -> None:
         """Begin the next motion when the present one has settled."""
