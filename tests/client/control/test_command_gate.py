@@ -81,6 +81,28 @@ def test_a_command_that_only_lets_go_does_not_wait_for_sound() -> None:
     assert (gate.state(0.04), gate.state(0.04, lets_go=True)) == ("rate", "open")
 
 
+def test_nothing_waits_for_sound_that_was_too_old_for_three_seconds_until_it_is_not() -> None:
+    gate = CommandGate("media", 4, 0.0, sound_tolerance=4)
+    gate.feedback(20, 1)
+    gate.shown(20)
+    gate.heard("microphone", 10, 0.0)
+    gate.heard("microphone", 10, 3.0)
+    assert gate.state(3.0) == "sound"
+    gate.heard("microphone", 11, 3.1)
+    assert gate.state(3.1) == "open"
+    gate.heard("microphone", 16, 3.5)
+    gate.heard("microphone", 12, 6.55)
+    assert gate.state(6.6) == "sound"
+
+
+def test_a_command_that_only_lets_go_does_not_wait_for_sound_when_media_set_the_pace() -> None:
+    gate = CommandGate("media", 4, 0.0, sound_tolerance=4)
+    gate.feedback(20, 1)
+    gate.shown(20)
+    gate.heard("microphone", 10, 0.0)
+    assert (gate.state(0.0), gate.state(0.0, lets_go=True)) == ("sound", "open")
+
+
 def test_an_event_waits_for_sound_no_longer_than_half_the_time_for_which_the_robot_holds_a_command() -> None:
     gate = CommandGate("feedback", 4, 0.016, calm_interval=0.04, sound_tolerance=4, hold=0.25)
     gate.feedback(20, 1)

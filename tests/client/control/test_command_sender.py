@@ -59,6 +59,17 @@ def test_a_stick_that_is_let_go_does_not_wait_for_the_sound_that_its_command_mak
     assert [command.values for command in commands(sender.due(0.04))] == [NEUTRAL]
 
 
+def test_a_sender_that_waits_for_sound_wakes_when_none_has_been_heard_for_a_while() -> None:
+    sender = CommandSender(CommandGate("media", 4, 0.0, sound_tolerance=4), NEUTRAL)
+    sender.feedback(feedback(20), 0.0)
+    sender.shown(20)
+    sender.heard("microphone", 16, 0.0)
+    sender.intend(FAST, 0.05)
+    assert sender.due(0.05) == []
+    assert sender.wake_at(0.05) == 0.2
+    assert [command.event for command in commands(sender.due(0.2))] == [21]
+
+
 def test_an_unanswered_command_is_repeated_with_the_newest_intention_and_the_newest_issue() -> None:
     sender = new_sender()
     flying(sender)

@@ -177,7 +177,35 @@ async def test_sound_that_plays_or_is_too_old_is_noted_and_sound_that_overtook_t
     stream = Stream("microphone", "audio", {0: "PCMU"}, "native", gate, Shown(), on_heard=on_heard)
     stream.feedback(10)
     async with running(stream):
+        stream.open_reader(50)
         for number, stamp in enumerate([1, 8, 20, 12]):
             stream.packet(0, MediaPacket(number, number * 160, True, b"\xff" * 160, stamp))
         await last.wait()
     assert heard == [1, 8, 12]
+
+
+async def test_sound_that_nobody_reads_is_not_heard() -> None:
+    heard: list[int] = []
+    rendered = asyncio.Event()
+    gate: MediaGate[Decoded] = MediaGate(2)
+    stream = Stream(
+        "microphone",
+        "audio",
+        {0: "PCMU"},
+        "native",
+        gate,
+        lambda *_: rendered.set(),
+        on_heard=lambda _, stamp: heard.append(stamp),
+    )
+    stream.feedback(10)
+    with ThreadPoolExecutor(1) as executor:
+        async with asyncio.TaskGroup() as group, asyncio.timeout(20):
+            task = group.create_task(stream.run(executor))
+            stream.packet(0, MediaPacket(0, 0, True, b"\xff" * 160, 10))
+            await rendered.wait()
+            rendered.clear()
+            stream.open_reader(50)
+            stream.packet(0, MediaPacket(1, 160, True, b"\xff" * 160, 9))
+            await rendered.wait()
+            task.cancel()
+    assert heard == [9]

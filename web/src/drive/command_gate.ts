@@ -9,6 +9,7 @@ export const CALM_INTERVAL_MS = 40;
  * the robot holds a command; ms. Armed and at rest, events follow one another no sooner.
  */
 export const SOUND_WAIT_MS = 200;
+const TOO_OLD_FOR_MS = 3000;
 
 /** Why no new command may be sent now, or that it may. */
 export type GateState = "open" | "no_feedback" | "in_flight" | "rate" | "picture" | "sound";
@@ -26,6 +27,7 @@ export interface CommandGate {
   lastSentMs: number; // -Infinity before the first
   shown: number | null; // stamp of the picture on screen
   heard: HeardSound | null; // null: nothing is heard, and nothing is waited for
+  tooOldSinceMs: number; // what is heard; Infinity: it is not
 }
 
 /** The sound that plays now; of several the one that is farthest behind. */
@@ -68,6 +70,7 @@ export function createCommandGate(
     lastSentMs: -Infinity,
     shown: null,
     heard: null,
+    tooOldSinceMs: Infinity,
   };
 }
 
@@ -112,9 +115,12 @@ export function noteShown(gate: CommandGate, stamp: number): void {
   gate.shown = stamp;
 }
 
-/** What is heard now; null: nothing. */
-export function noteHeard(gate: CommandGate, heard: HeardSound | null): void {
-  gate.heard = heard;
+/** What is heard now; null: nothing. Nothing waits for sound that has been too old for 3 s: it is on a slower path. */
+export function noteHeard(gate: CommandGate, heard: HeardSound | null, now: number): void {
+  const isTooOld =
+    heard !== null && gate.event !== null && eventGap(gate.event, heard.stamp) > heard.tolerance;
+  gate.tooOldSinceMs = isTooOld ? Math.min(gate.tooOldSinceMs, now) : Infinity;
+  gate.heard = now - gate.tooOldSinceMs > TOO_OLD_FOR_MS ? null : heard;
 }
 
 /** Of several stamps the one that lags `event` most; null of none. */
@@ -132,7 +138,7 @@ export function gateState(gate: CommandGate, now: number, letsGo = false): GateS
   if (gate.pacing !== "media") return "open";
   if (!isNear(gate.event, gate.shown, gate.tolerance)) return "picture";
   const { heard } = gate;
-  return heard === null || isNear(gate.event, heard.stamp, heard.tolerance) ? "open" : "sound";
+  return letsGo || heard === null || isNear(gate.event, heard.stamp, heard.tolerance) ? "open" : "sound";
 }
 
 /** When the event rate allows the next command, unless a picture or a sound comes before; -Infinity before the first. */

@@ -516,7 +516,7 @@ export class ConsoleEngine {
 
   private drive(now: number): void {
     if (this.driver === null || this.state.welcome === null) return;
-    noteHeard(this.driver.gate, this.streams.heard());
+    noteHeard(this.driver.gate, this.streams.heard(), now);
     const intention = {
       armed: this.isArmed(),
       values: this.values,

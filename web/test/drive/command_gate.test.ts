@@ -49,7 +49,7 @@ function act(gate: CommandGate, { at, do: action }: Step, soundTolerance: number
   if (refused !== undefined) takeRefusal(gate, refused);
   if (shown !== undefined) noteShown(gate, shown);
   if (heard !== undefined)
-    noteHeard(gate, heard === null ? null : { stamp: heard, tolerance: soundTolerance });
+    noteHeard(gate, heard === null ? null : { stamp: heard, tolerance: soundTolerance }, at);
 }
 
 /** The newest feedback and the picture on screen are of event 20. */
@@ -87,56 +87,75 @@ describe("the command gate", () => {
 
     it("paced by media waits until the sound stays within tolerance when the next feedback comes", () => {
       const gate = openGate("media");
-      noteHeard(gate, heard(14));
+      noteHeard(gate, heard(14), 0);
       expect(gateState(gate, 0)).toBe("sound");
-      noteHeard(gate, heard(15));
+      noteHeard(gate, heard(15), 0);
       expect(gateState(gate, 0)).toBe("open");
     });
 
     it("waits for sound only while some is heard", () => {
       const gate = openGate("media");
-      noteHeard(gate, heard(1));
+      noteHeard(gate, heard(1), 0);
       expect(gateState(gate, 0)).toBe("sound");
-      noteHeard(gate, null);
+      noteHeard(gate, null, 0);
       expect(gateState(gate, 0)).toBe("open");
     });
 
     it("paced by media with tolerance 0 waits for the sound of the newest event", () => {
       const gate = openGate("media");
-      noteHeard(gate, heard(19, 0));
+      noteHeard(gate, heard(19, 0), 0);
       expect(gateState(gate, 0)).toBe("sound");
-      noteHeard(gate, heard(20, 0));
+      noteHeard(gate, heard(20, 0), 0);
       expect(gateState(gate, 0)).toBe("open");
     });
 
     it("says the picture before the sound", () => {
       const gate = openGate("media");
       takeFeedback(gate, 30, 1);
-      noteHeard(gate, heard(1));
+      noteHeard(gate, heard(1), 0);
       expect(gateState(gate, 0)).toBe("picture");
     });
 
     it("lets no event follow sooner than the calm interval while the sound is behind by more than two thirds", () => {
       const gate = createCommandGate("feedback", 4, 16, 40);
       takeFeedback(gate, 20, 1);
-      noteHeard(gate, heard(16));
+      noteHeard(gate, heard(16), 0);
       noteSent(gate, 0);
       takeFeedback(gate, 21, 1);
       expect(gateState(gate, 16)).toBe("rate");
       expect(opensAt(gate)).toBe(40);
-      noteHeard(gate, heard(17));
+      noteHeard(gate, heard(17), 0);
       expect(gateState(gate, 16)).toBe("open");
       expect(opensAt(gate)).toBe(16);
     });
 
     it("paced by feedback does not wait for it before the first event, nor longer than it says", () => {
       const gate = openGate("feedback");
-      noteHeard(gate, heard(1));
+      noteHeard(gate, heard(1), 0);
       expect(gateState(gate, 0)).toBe("open");
       noteSent(gate, 0);
       takeFeedback(gate, 21, 1);
       expect(gateState(gate, SOUND_WAIT_MS - 1)).toBe("rate");
       expect(gateState(gate, SOUND_WAIT_MS)).toBe("open");
+    });
+
+    it("waits no longer for sound that was too old for three seconds, until it is not", () => {
+      const gate = openGate("media");
+      noteHeard(gate, heard(10), 0);
+      noteHeard(gate, heard(10), 3000);
+      expect(gateState(gate, 3000)).toBe("sound");
+      noteHeard(gate, heard(11), 3001);
+      expect(gateState(gate, 3001)).toBe("open");
+      noteHeard(gate, heard(16), 3500);
+      noteHeard(gate, heard(15), 3600);
+      noteHeard(gate, heard(12), 6500);
+      expect(gateState(gate, 6600)).toBe("sound");
+    });
+
+    it("paced by media does not let a command that only lets go wait for it", () => {
+      const gate = openGate("media");
+      noteHeard(gate, heard(1), 0);
+      expect(gateState(gate, 0, true)).toBe("open");
     });
 
     it("goes by the microphone that is farthest behind, across the wrap too", () => {

@@ -1,6 +1,7 @@
 """Clients without a browser, which watch, check pixels, and drive."""
 
 import asyncio
+import contextlib
 import time
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
@@ -15,7 +16,7 @@ from lockstep.bench.experiment.judge.record import Arrival, ClientRecord, Gate, 
 from lockstep.bench.experiment.observation import Look, Observation
 from lockstep.bench.experiment.operator_script import OperatorScript
 from lockstep.bench.harness.driving import applied_goals, drive_on
-from lockstep.client import Console, ConsoleLost, Picture
+from lockstep.client import Console, ConsoleLost, NoSuchStream, Picture
 from lockstep.client.control.command_gate import Pacing
 from lockstep.robot_bridge.robots.event_strip import read_event_strip
 
@@ -52,7 +53,14 @@ class HeadlessClient:
         observation = Observation(self.record, self._look)
         await observation.begin()
         async with asyncio.TaskGroup() as group:
-            tasks = [group.create_task(observation.run()), group.create_task(self._check_pixels())]
+            tasks = [
+                group.create_task(each)
+                for each in (
+                    observation.run(),
+                    self._check_pixels(),
+                    *(self._listen(microphone.name) for microphone in self._console.description.microphones),
+                )
+            ]
             try:
                 yield
             finally:
@@ -80,6 +88,11 @@ class HeadlessClient:
                     self.record.drawn_wrong += 1
         except ConsoleLost as error:
             self.record.lost = str(error)
+
+    async def _listen(self, microphone: str) -> None:
+        with contextlib.suppress(ConsoleLost, NoSuchStream):
+            async for _ in self._console.sounds(microphone):
+                pass
 
     async def drive(self, script: OperatorScript, seconds: float) -> None:
         """Follow the script: one command at a time, each as the answer to the last feedback."""

@@ -12,6 +12,7 @@ CALM_INTERVAL = 0.040  # s; events that follow one another sooner wait for pictu
 # the robot holds a command. Armed and at rest, events follow one another no sooner.
 SOUND_WAIT = 0.200  # s
 HEARD = 0.200  # s without a new segment after which nothing is heard
+TOO_OLD_FOR = 3.0  # s after which nothing waits for sound that was too old all the time: it is on a slower path
 
 Pacing = Literal["feedback", "media"]
 GateState = Literal["open", "no_feedback", "in_flight", "rate", "picture", "sound"]
@@ -57,6 +58,7 @@ class CommandGate:
         self._sent_at: float | None = None
         self._shown: int | None = None
         self._heard: dict[str, tuple[int, float]] = {}  # by microphone: stamp of the newest segment, and when
+        self._too_old_since: dict[str, float] = {}
 
     @property
     def in_flight(self) -> int | None:
@@ -92,6 +94,11 @@ class CommandGate:
 
     def heard(self, microphone: str, stamp: int, now: float) -> None:
         """Note that a segment of sound stamped `stamp` plays, or is too old to."""
+        if self._feedback is None or event_gap(self._feedback[0], stamp) <= self.sound_tolerance:
+            self._too_old_since.pop(microphone, None)
+        elif now - self._too_old_since.setdefault(microphone, now) > TOO_OLD_FOR:
+            self._heard.pop(microphone, None)
+            return
         self._heard[microphone] = stamp, now
 
     def state(self, now: float, *, lets_go: bool = False) -> GateState:
@@ -107,7 +114,7 @@ class CommandGate:
         event, heard = self._feedback[0], self._farthest_heard(now)
         if self._shown is None or not _is_near(event_gap(event, self._shown), self.tolerance):
             return "picture"
-        return "open" if heard is None or _is_near(heard, self.sound_tolerance) else "sound"
+        return "open" if lets_go or heard is None or _is_near(heard, self.sound_tolerance) else "sound"
 
     def opens_at(self, now: float, *, lets_go: bool = False) -> float:
         """Return the time at which the event rate allows the next command, unless a picture is shown or a segment is
@@ -120,6 +127,10 @@ class CommandGate:
         loses_sound = self.pacing != "media" and heard is not None and heard > max(self.sound_tolerance - 1, 0)
         waits = loses_sound and not lets_go
         return self._sent_at + (max(self._sound_wait, self.calm_interval) if waits else self.calm_interval)
+
+    def silent_at(self, now: float) -> float:
+        """Return when a gate that waits for sound opens although none comes."""
+        return min((at + HEARD for _, at in self._heard.values() if now - at < HEARD), default=now)
 
     def next(self) -> NextCommand:
         """Return the command that an open gate lets pass.

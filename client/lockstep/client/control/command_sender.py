@@ -266,8 +266,11 @@ class CommandSender:
         if self._flight is not None:
             moments += [self._flight.repeat_at, self._flight.echo_at]
         elif self._want is not _Want.NOTHING:
-            opens_at = self.gate.opens_at(now, lets_go=self._lets_go())
-            moments.append(opens_at if self._gate_state(now) == "rate" else NEVER)
+            match self._gate_state(now):
+                case "rate":
+                    moments.append(self.gate.opens_at(now, lets_go=self._lets_go()))
+                case "sound":
+                    moments.append(self.gate.silent_at(now))
         elif self.armed:
             moments.append(self._idle_at)
         return min(moments)

@@ -55,7 +55,8 @@ class Stream:
         *,
         on_heard: Callable[[str, int], None] | None = None,
     ) -> None:
-        """`on_heard` gets the stamps of sound that plays or is too old to; `on_render` those of what is rendered."""
+        """`on_heard` gets the stamps of sound that plays or is too old to, while it is read; `on_render` those of what
+        is rendered."""
         self.name = name
         self.kind = kind
         self.carrier = carrier
@@ -146,7 +147,7 @@ class Stream:
 
     def _offer(self, frame: Decoded) -> None:
         self._render(self.gate.offer(frame, frame.stamp))
-        if self._on_heard is None or frame.stamp is None or self.kind != "audio":
+        if self._on_heard is None or frame.stamp is None or self.kind != "audio" or not self._readers:
             return
         if self.gate.check(frame.stamp)[0] != "hold":
             self._on_heard(self.name, frame.stamp)

@@ -16,7 +16,7 @@ from lockstep.bench.experiment.operator_script import OperatorScript
 from lockstep.bench.experiment.stage import Stage, running_stage
 from lockstep.bench.harness.driving import applied_goals, drive_on
 from lockstep.bench.harness.stack import Metrics
-from lockstep.client import CommandRefused, Console, ConsoleError
+from lockstep.client import CommandRefused, Console, ConsoleError, NoSuchStream
 from lockstep.emulator.impairment.profile import Profile
 
 __all__ = ["Driven", "EnduranceClient", "run_endurance"]
@@ -151,6 +151,8 @@ class HeadlessHands:
             self._console = console
             async with asyncio.TaskGroup() as group:
                 group.create_task(_watch(console))
+                for microphone in console.description.microphones:
+                    group.create_task(_listen(console, microphone.name))
                 await self._drive(console, clock)
 
     async def _drive(self, console: Console, clock: Callable[[], float]) -> None:
@@ -180,6 +182,12 @@ async def _watch(console: Console) -> None:
     """Take the pictures, which a client has to do."""
     async for _ in console.pictures(console.description.cameras[0].name):
         pass
+
+
+async def _listen(console: Console, microphone: str) -> None:
+    with contextlib.suppress(NoSuchStream):
+        async for _ in console.sounds(microphone):
+            pass
 
 
 def _look_at(console: Console, endurance: Endurance, at: float) -> None:
