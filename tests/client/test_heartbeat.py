@@ -47,7 +47,7 @@ class Beating:
         self.heartbeat = Heartbeat(session, self.driving, silence_seconds)
 
     async def run(self) -> None:
-        media = MediaReceiver({}, "event", self.driving.rendered)
+        media = MediaReceiver({}, "event", self.driving.rendered, self.driving.heard)
         await self.heartbeat.run(cast(Transport, self.wire), media, relayed=False)
 
 

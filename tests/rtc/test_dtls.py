@@ -1,4 +1,5 @@
 import random
+import time
 from collections.abc import Sequence
 
 import pytest
@@ -85,6 +86,37 @@ def test_the_first_record_is_there_before_the_others_are_read_and_all_before_the
     pair.server.receive_first(datagrams[3], NOW)
     pair.server.receive_first(datagrams[4], NOW)
     assert pair.server.events() == [DtlsData(b"four"), DtlsData(b"five")]
+
+
+def test_an_answer_to_a_repeated_handshake_does_not_share_the_datagram_of_the_next_message() -> None:
+    pair = DtlsPair()
+    pair.start()
+    finished: list[bytes] = []
+    for _ in range(3):
+        for data in pair.client.datagrams_to_send():
+            pair.server.receive_datagram(data, NOW)
+        if pair.server.state is DtlsState.CONNECTED:
+            break
+        for data in pair.server.datagrams_to_send():
+            pair.client.receive_datagram(data, NOW)
+    answer = pair.server.datagrams_to_send()  # late: the client repeats its last flight first
+    while not finished:
+        time.sleep(max(0.0, (pair.client.timer() or 0.0) - time.monotonic()))
+        pair.client.handle_timer(time.monotonic())
+        finished = pair.client.datagrams_to_send()
+    for data in answer:
+        pair.client.receive_datagram(data, NOW)
+    pair.client.send(b"command", NOW)
+    pair.server.events()
+    pair.server.receive_first(b"".join((*finished, *pair.client.datagrams_to_send())), NOW)
+    assert pair.server.events() == [DtlsData(b"command")]
+    pair.server.send(b"feedback", NOW)
+    *again, feedback = pair.server.datagrams_to_send()
+    assert again
+    assert len(list(records(feedback))) == 1
+    for data in (*again, feedback):
+        pair.client.receive_datagram(data, NOW)
+    assert pair.client.events()[-1] == DtlsData(b"feedback")
 
 
 def test_a_goodbye_behind_data_is_heard_with_the_rest_of_the_datagram() -> None:

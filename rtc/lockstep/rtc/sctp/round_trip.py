@@ -36,7 +36,9 @@ class RoundTrip:
 
     def sample(self, seconds: float, now: float) -> None:
         """Take a sample: a chunk that was sent once, with the I bit, was acknowledged after `seconds` (Karn's rule, RFC
-        9260 6.3.1 C5). One sample a round trip is used (C4), so that the latest samples cover some time."""
+        9260 6.3.1 C5). One sample a round trip is used (C4), so that the latest samples cover some time. A caller's
+        clock may go back a little between two calls; no acknowledgement comes before its chunk."""
+        seconds = max(seconds, 0.0)
         if self.smoothed is not None and now - self.sampled_at < self.smoothed:
             return
         if self.smoothed is None:

@@ -18,6 +18,7 @@ from lockstep.rtc.sockets.event_delivery import EventDelivery, Listener
 __all__ = ["Connection", "Turns"]
 
 CLOCK_RESOLUTION = 0.001  # s; a loop may call too early by so much
+PASSES = 4  # a channel is empty now, or a datagram had further records; what is left waits for the next datagram or timer
 
 
 class SocketSide(Protocol):
@@ -269,7 +270,9 @@ class Connection:
         self._delivery.hand_out(events)
         self.peer.read_on()
         self._endpoint.send(self.peer.datagrams_to_send(), urgent=self.urgent)
-        if self.peer.has_events:  # a channel is empty now, or a datagram had further records
+        for _ in range(PASSES):
+            if not self.peer.has_events:
+                break
             self._delivery.hand_out(self.peer.events())
             self._endpoint.send(self.peer.datagrams_to_send(), urgent=self.urgent)
         if self.urgent and not self._delivery.ended:
