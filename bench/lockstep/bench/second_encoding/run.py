@@ -38,7 +38,7 @@ class Client(NamedTuple):
 
     def command_to_picture(self) -> list[float]:
         """Return for each command the time to the first picture that shows its event or a later one, ms."""
-        delays, pictures = [], iter(self.shown)
+        delays, pictures = list[float](), iter(self.shown)
         at, stamp = 0.0, 0
         for event, sent in self.sent:
             while stamp < event or at < sent:
@@ -109,12 +109,12 @@ async def run(
                     for client in people:
                         await client.ask("mark", PATIENCE)
                     await asyncio.sleep(seconds)
-                    seen = [await client_of(client) for client in people]
+                    mine, theirs = [await client_of(client) for client in people]
                     sent, cpu, took = (late - early for late, early in zip(look(), before, strict=True))
     return {
         "robot_kbit_s": round(8 * sent / took / 1000, 1),
         "bridge_cpu_percent": round(100 * cpu / took, 1),
-        **_figures(*seen, took),
+        **_figures(mine, theirs, took),
     }
 
 
