@@ -15,7 +15,8 @@ async def test_a_robot_behind_nat_pairs_by_code_and_is_driven_from_a_page_in_a_t
     except NamespacesUnavailable as reason:
         pytest.skip(str(reason))
     said: list[str] = []
-    found = await run("perfect", "perfect", 0.5, 1, said.append, settle=0.0)
+    found = await run("perfect", "perfect", 0.0, 1, said.append, settle=0.0)
     assert said == ["the console has given a code", "the page has driven"]
+    # However short the drive is: it begins when the page sees the robot move.
     assert found["moving_commands_executed"] > 0
     assert {stream["violations"] for stream in found["after"]["streams"].values()} == {0}

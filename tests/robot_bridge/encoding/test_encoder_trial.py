@@ -33,4 +33,4 @@ async def test_an_error_that_nobody_expected_is_a_reason_and_does_not_end_the_br
 
 async def test_an_encoder_that_works_is_used_and_one_that_is_missing_says_why() -> None:
     assert await try_in_time(SOFTWARE) == ""
-    assert await try_in_time("h264_qsv") != ""
+    assert "h264_missing" in await try_in_time("h264_missing")  # no hardware has it, whatever machine runs this

@@ -126,13 +126,6 @@ def fallback(caplog: pytest.LogCaptureFixture) -> str:
     return "".join(why for _, found, why in said if found)
 
 
-def test_the_software_encoder_takes_the_place_of_one_that_cannot_be_opened(caplog: pytest.LogCaptureFixture) -> None:
-    encoder = H264Encoder("h264_v4l2m2m")
-    assert encoder.encode(raw(0), WHOLE, keyframe=False).keyframe
-    assert fallback(caplog).startswith("h264_v4l2m2m cannot be opened")
-    assert not encoder.encode(raw(1), WHOLE, keyframe=False).keyframe
-
-
 @pytest.mark.parametrize("name", ["h264_v4l2m2m", "h264_nvenc", "h264_qsv"])
 def test_ffmpeg_takes_the_options_of_each_hardware_encoder_even_where_its_device_is_missing(
     name: str, caplog: pytest.LogCaptureFixture
@@ -163,6 +156,19 @@ def stand_in(monkeypatch: pytest.MonkeyPatch, open_one: Callable[..., Any]) -> H
 
     monkeypatch.setattr(H264Encoder, "_open_as", open_instead)
     return H264Encoder("h264_nvenc")
+
+
+@pytest.mark.parametrize("preset", ["", "none such"])
+def test_the_software_encoder_takes_the_place_of_one_that_is_missing_or_cannot_be_opened(
+    preset: str, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    if preset:
+        name, encoder = "h264_nvenc", stand_in(monkeypatch, lambda opened: opened({"preset": preset}))
+    else:
+        name, encoder = "h264_missing", H264Encoder("h264_missing")
+    assert encoder.encode(raw(0), WHOLE, keyframe=False).keyframe
+    assert fallback(caplog).startswith(f"{name} cannot be opened")
+    assert not encoder.encode(raw(1), WHOLE, keyframe=False).keyframe
 
 
 def test_an_encoder_that_delays_gives_no_older_picture_and_the_software_encoder_takes_its_place(

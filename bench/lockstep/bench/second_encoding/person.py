@@ -1,6 +1,7 @@
 """`python -m lockstep.bench.second_encoding.person LINK CA`: a client that drives or watches, in a place of its own.
 
-It says `{}` when it sees the robot. At the word `mark` it begins to count, at `end` it says what it has seen since.
+It says `{}` when it sees the robot. At the word `mark` it begins to count, at `end` it says what it has seen since, as
+soon as that is something: a picture, and the answer to a command that it has sent since.
 """
 
 import asyncio
@@ -27,6 +28,10 @@ class Seen:
     sent: list[tuple[int, float]] = field(default_factory=list)  # event, when its command was sent
     shown: list[tuple[float, int, int, int]] = field(default_factory=list)  # time, stamp, gap, width
 
+    def has_seen(self, *, drives: bool) -> bool:
+        """True if a picture came since the mark, and if it drives, the answer to a command that left after it."""
+        return bool(self.shown) and (not drives or len(self.sent) > 1)
+
     def mark(self) -> None:
         self.sent.clear()
         self.shown.clear()
@@ -51,6 +56,8 @@ async def be(link: str, authority: Path) -> None:
                 seen.mark()
                 _say({})
             else:
+                while not seen.has_seen(drives=len(doing) > 1):  # noqa: ASYNC110
+                    await asyncio.sleep(0.1)
                 _say({"sent": seen.sent, "shown": seen.shown})
                 break
         for task in doing:

@@ -5,6 +5,7 @@ import datetime
 import json
 import secrets
 import sys
+import time
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
@@ -51,7 +52,11 @@ class Client(NamedTuple):
 async def run(
     network: str, robot: str, operator_bps: float, seconds: float, *, seed: int, second: bool
 ) -> dict[str, Any]:
-    """Drive for `seconds` after half a minute; return the figures. `network`: the robot's; `second`: it may be made.
+    """Drive after half a minute, for `seconds` and until both have seen something since; return the figures.
+
+    Args:
+        network: the robot's
+        second: a second encoding may be made
 
     Raises:
         NamespacesUnavailable: this machine or user cannot have network namespaces.
@@ -96,16 +101,20 @@ async def run(
                         await client.read(PATIENCE)
                     await asyncio.sleep(SETTLE)
                     people = (operator, observer)
+
+                    def look() -> tuple[int, float, float]:
+                        return sites.sent_bytes("robot", "to_operator"), robot_end.cpu_seconds(), time.monotonic()
+
+                    before = look()
                     for client in people:
                         await client.ask("mark", PATIENCE)
-                    before = sites.sent_bytes("robot", "to_operator"), robot_end.cpu_seconds()
                     await asyncio.sleep(seconds)
-                    after = sites.sent_bytes("robot", "to_operator"), robot_end.cpu_seconds()
                     mine, theirs = [await client_of(client) for client in people]
+                    sent, cpu, took = (late - early for late, early in zip(look(), before, strict=True))
     return {
-        "robot_kbit_s": round(8 * (after[0] - before[0]) / seconds / 1000),
-        "bridge_cpu_percent": round(100 * (after[1] - before[1]) / seconds, 1),
-        **_figures(mine, theirs, seconds),
+        "robot_kbit_s": round(8 * sent / took / 1000, 1),
+        "bridge_cpu_percent": round(100 * cpu / took, 1),
+        **_figures(mine, theirs, took),
     }
 
 

@@ -89,7 +89,7 @@ async def test_no_second_is_asked_for_while_media_wait_on_the_uplink_or_where_it
     async with running_plane(quality=False, second_encoding=is_set) as hub:
         robot = Robot(hub)
         narrow_operator(hub)
-        cast(Any, hub.robot_encoding)._uplink.waits = lambda now: waits
+        cast(Any, hub.robot_encoding)._uplink.pictures_wait = lambda now: waits
         async with (
             viewing(hub, ["video"], uris=NATIVE, priority=True) as operator,
             viewing(hub, ["video"], uris=NATIVE) as observer,

@@ -35,13 +35,16 @@ class KnownUplink:
     is_limited: bool = False
     limited_at: float = float("-inf")
 
-    def arrived(self, captured: float, now: float, size: int) -> None:
+    def arrived(self, captured: float, now: float, size: int, camera: str | None = None) -> None:
         pass
 
     def decide(self, now: float) -> None:
         pass
 
     def waits(self, now: float) -> float | None:
+        return 0.0
+
+    def pictures_wait(self, now: float) -> float | None:
         return 0.0
 
     def carried(self) -> float:

@@ -168,3 +168,24 @@ def test_a_burst_shows_nothing() -> None:
     uplink = UplinkEstimator(300_000, 80_000, 1_600_000)
     feed(uplink, 0.0, 0.5, 5_000_000)
     assert uplink.shown(0.5) == 0
+
+
+def test_a_queue_that_comes_and_goes_shows_in_the_operators_pictures_and_not_in_the_least_wait() -> None:
+    uplink = UplinkEstimator(300_000, 80_000, 1_600_000)
+    for number in range(90):
+        now, wait = number * PICTURE, 0.0 if number % 10 < 3 else 0.08
+        uplink.arrived(now, now + 0.05 + wait, 3000, "main")
+        uplink.arrived(now, now + 0.05 + wait, 3000)
+    assert uplink.waits(now) == pytest.approx(0.0)
+    assert uplink.pictures_wait(now) == pytest.approx(0.08)
+
+
+def test_what_a_cameras_own_encoder_takes_is_no_wait_and_no_medium_but_the_operators_pictures_counts() -> None:
+    uplink = UplinkEstimator(300_000, 80_000, 1_600_000)
+    for number in range(60):
+        now = number * PICTURE
+        uplink.arrived(now, now + 0.03, 3000, "main")
+        uplink.arrived(now, now + 0.09, 3000, "slow")
+        uplink.arrived(now, now + 0.2, 3000)
+    assert uplink.pictures_wait(now) == pytest.approx(0.0)
+    assert uplink.pictures_wait(now + 2.0) is None

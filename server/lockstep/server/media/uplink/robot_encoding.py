@@ -57,6 +57,7 @@ class RobotEncoding:
         self._clock = clock
         self._ask: Callable[[EncodeRequest], bool] = lambda request: False
         self._cameras: list[_Camera] = []
+        self._camera_names: frozenset[str] = frozenset()
         self._sounds = 0  # microphones
         self._second = SecondRequests(settings, ())
         self._uplink = self._new_uplink()
@@ -70,6 +71,7 @@ class RobotEncoding:
         """Take the robot's streams; once per epoch."""
         given = list(streams)
         self._cameras = [_Camera(stream) for stream in given if isinstance(stream, VideoStream)]
+        self._camera_names = frozenset(each.stream.name for each in self._cameras)
         self._sounds = len(given) - len(self._cameras)
         self._second = SecondRequests(self._settings, [each.stream for each in self._cameras])
         self._uplink = self._new_uplink()
@@ -78,7 +80,8 @@ class RobotEncoding:
 
     def arrived(self, media: Media, now: float) -> None:
         """Take the arrival of a robot's medium."""
-        self._uplink.arrived(media.time, now, len(media.payload))
+        is_operators = media.stream in self._camera_names and not media.second
+        self._uplink.arrived(media.time, now, len(media.payload), media.stream if is_operators else None)
 
     async def run(self) -> None:
         """Ask until cancelled."""
@@ -106,7 +109,7 @@ class RobotEncoding:
             uplink=UplinkNow(
                 shown_bps=self._uplink.shown(now) - sounds,
                 carried_bps=self._uplink.carried() - sounds,
-                waits=self._uplink.waits(now),
+                waits=self._uplink.pictures_wait(now),
                 limited_at=self._uplink.limited_at,
             ),
         )

@@ -4,13 +4,16 @@
 |---|---|---|
 | off | observers were due 1.5 times the operator's for 5 s, nothing waits | on, with 1.2 times the operator's |
 | on | nothing waits on the uplink, and both encodings use what they may | up by 25 % a second |
-| on | all media wait for more than 0.05 s | both have 85 % of what arrives, and more is not tried for a while |
+| on | half of the operator's pictures wait for more than 0.03 s | both have 85 % of what arrives, no more for a while |
 | on | that leaves too little, the uplink shows a limit, or no picture came for 3 s | off for a while |
 
 It begins with more where the uplink carried more within the last minute, and not within 5 s of a limit. A while is
-10 s, and twice as long each time, up to 640 s; 10 s again after second encodings that went well for 5 s. So an uplink
-without room is tried ever more seldom. A try costs the operator little: the bridge sends no picture of a second
-encoding while something waits on its path (docs/quality.md, "The second encoding").
+10 s, and twice as long each time, up to 640 s; 10 s again after second encodings that went well for a minute. So an
+uplink without room, or one that is wide for less than a minute at a time, is tried ever more seldom.
+
+The bridge sends no picture of a second encoding while something waits on its path (docs/quality.md, "The second
+encoding"), so a queue of second pictures is gone within half a second, and comes again. The least delayed medium
+therefore never shows it; the operator's pictures, which wait in it, do.
 """
 
 from typing import NamedTuple
@@ -23,11 +26,11 @@ START, KEEP = 1.2, 1.1  # of the operator's bits: with which a second encoding b
 MARGIN = 0.85  # of what the uplink carried without a queue, for both encodings together
 GROWTH = 1.25  # a second
 USED = 0.6  # of what both encodings may have, from which more can be tried
-EMPTY, QUEUE = 0.02, 0.05  # s that the least delayed medium waited
+EMPTY, QUEUE = 0.02, 0.03  # s that half of the operator's pictures waited
 CUT = 0.85  # of what arrives while something waits
-HOLD = 1.0  # s after a cut, besides the time that media waited
+HOLD = 1.0  # s after a cut, besides the time that pictures waited: `waits` looks back so far
 QUIET_SECONDS = 5.0
-STEADY_SECONDS = 5.0
+STEADY_SECONDS = 60.0
 PATIENCE, MOST_PATIENCE = 10.0, 640.0  # s
 SILENCE = 3.0  # s
 
@@ -37,7 +40,7 @@ class UplinkNow(NamedTuple):
 
     shown_bps: float  # that it lately carried without a queue
     carried_bps: float  # that arrive now
-    waits: float | None  # s that the least delayed medium of the last half second waited; None: unknown
+    waits: float | None  # s, the median wait of the operator's pictures of the last second; None: unknown
     limited_at: float  # s, when it showed a limit last
 
 
@@ -92,7 +95,7 @@ class SecondShare:
         return is_quiet and now >= self._not_before and now - wanted_since >= WANTED_SECONDS
 
     def _follow(self, now: float, passed: float, most_bps: float, uplink: UplinkNow) -> None:
-        """Give both encodings less when media wait, and more while they do not. `most_bps`: of both together."""
+        """Give both encodings less when pictures wait, and more while they do not. `most_bps`: of both together."""
         if uplink.limited_at > self._began or now - self._came > SILENCE:
             self._fail(now)
             return

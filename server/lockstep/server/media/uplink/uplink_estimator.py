@@ -10,12 +10,15 @@ sides differ by an unknown offset; the medium that waited least shows it.
 """
 
 from collections import deque
+from statistics import median
+
+from lockstep.server.media.uplink.least_age import LeastAge
 
 __all__ = ["UplinkEstimator"]
 
-BASE_SECONDS = 30.0  # the least age of this window and the one before is the path's own
 LOOK_SECONDS = 0.5  # for a standing queue
 RATE_SECONDS = 1.0  # over which the arriving bits are counted
+PICTURE_SECONDS = 1.0  # of the operator's pictures whose median wait is told
 MOST_ARRIVALS = 2000
 LEAST_SPAN = 0.1  # s between arrivals from which a rate can be told
 STANDING, EMPTY = 0.12, 0.05  # s that the least delayed medium waited
@@ -42,25 +45,26 @@ class UplinkEstimator:
         self.limited_at = float("-inf")
         self._least_bps = least_bps
         self._most_bps = most_bps
-        self._window_start: float | None = None
-        self._current = self._previous = float("inf")  # least arrival − capture, s
+        self._base = LeastAge()  # of all media
         self._arrivals: deque[tuple[float, float, int]] = deque()  # time, wait in s, bits
+        self._camera_bases: dict[str, LeastAge] = {}  # a camera's encoder takes its own time
+        self._pictures: deque[tuple[float, float]] = deque(maxlen=MOST_ARRIVALS)  # time, wait in s
         self._hold_until = 0.0
         self._decided_at: float | None = None
         self._limit = float("inf")  # bits per second that the path carried then, and a margin off
         self._shown: deque[tuple[float, float]] = deque()  # time, bits per second; later ones are lower
 
-    def arrived(self, captured: float, now: float, size: int) -> None:
-        """Take a medium of `size` bytes, captured at `captured` by the robot's clock."""
-        offset = now - captured
-        if self._window_start is None:
-            self._window_start = now
-        elif now - self._window_start >= BASE_SECONDS:
-            self._window_start, self._previous, self._current = now, self._current, float("inf")
-        self._current = min(self._current, offset)
-        self._arrivals.append((now, offset - min(self._current, self._previous), 8 * (size + HEADER)))
+    def arrived(self, captured: float, now: float, size: int, camera: str | None = None) -> None:
+        """Take a medium of `size` bytes, captured at `captured` by the robot's clock.
+
+        `camera`: whose picture for the operator it is; None for all other media.
+        """
+        age = now - captured
+        self._arrivals.append((now, self._base.wait(age, now), 8 * (size + HEADER)))
         while len(self._arrivals) > MOST_ARRIVALS or now - self._arrivals[0][0] > RATE_SECONDS:
             self._arrivals.popleft()
+        if camera is not None:
+            self._pictures.append((now, self._camera_bases.setdefault(camera, LeastAge()).wait(age, now)))
 
     def limited(self, now: float) -> bool:
         """Return whether media waited on the path within the last minute."""
@@ -80,6 +84,15 @@ class UplinkEstimator:
         """Return the wait of the medium that waited least of the last half second, s; None without two media."""
         waits = [wait for time, wait, _ in self._arrivals if now - time <= LOOK_SECONDS]
         return min(waits) if len(waits) >= 2 else None
+
+    def pictures_wait(self, now: float) -> float | None:
+        """Return the median wait of the operator's pictures of the last second, s; None without two of them.
+
+        It shows a queue that comes and goes several times a second, which the least wait does not.
+        """
+        while self._pictures and now - self._pictures[0][0] > PICTURE_SECONDS:
+            self._pictures.popleft()
+        return median(wait for _, wait in self._pictures) if len(self._pictures) >= 2 else None
 
     def decide(self, now: float) -> None:
         """Adapt the rate."""
