@@ -205,6 +205,10 @@ class HeadsetOperator(PageOperator):
         )
 
     async def arm(self) -> None:
+        """Squeeze; in a session that has ended, as by a trigger that met its button, begin a new one first."""
+        if not await self._is_worn():
+            await self.console.page.evaluate("testHeadset.silence(false)")
+            await self._headset.enter()
         await self._headset.squeeze()
 
     async def why_disarmed(self, seen: Mapping[str, Any]) -> str:
@@ -215,7 +219,12 @@ class HeadsetOperator(PageOperator):
         headset = (await self.console.stats())["headset"]
         return "the session ended" if headset is None else str(headset["text"])
 
+    async def _is_worn(self) -> bool:
+        return (await self.console.stats())["headset"] is not None
+
     async def let_go(self) -> None:
+        if not await self._is_worn():
+            return
         for button in ("squeeze", "trigger"):
             for side in ("left", "right"):
                 await self._headset.press(side, button, 0)
