@@ -7,7 +7,7 @@ import pytest
 
 from lockstep.client.media.decoder import Decoded
 from lockstep.client.media.frame_assembler import MediaPacket
-from lockstep.client.media.media_gate import GateMode, MediaGate
+from lockstep.client.media.media_gate import Gated, GateMode, MediaGate
 from lockstep.client.media.newest_queue import NewestQueue, QueueClosed
 from lockstep.client.media.stream import ENCODED_BOUND, Stream
 from lockstep.protocol.carriers import Carrier, append_trailer
@@ -163,7 +163,22 @@ async def test_the_log_says_how_old_each_rendering_was() -> None:
     assert (gate.rendered, gate.discarded) == (2, 0)
 
 
-async def test_sound_that_plays_or_is_too_old_is_noted_and_sound_that_overtook_the_feedback_is_not() -> None:
+class OfferedGate(MediaGate[Decoded]):
+    """Says when a medium with this stamp was put to it."""
+
+    def __init__(self, tolerance: int, stamp: int) -> None:
+        super().__init__(tolerance)
+        self.offered = asyncio.Event()
+        self._awaited = stamp
+
+    def offer(self, medium: Decoded, stamp: int | None) -> Gated[Decoded] | None:
+        if stamp == self._awaited:
+            self.offered.set()
+        return super().offer(medium, stamp)
+
+
+async def test_sound_that_plays_or_is_too_old_is_noted_while_somebody_reads_it() -> None:
+    """Sound that overtook the feedback does not play yet."""
     heard: list[int] = []
     last = asyncio.Event()
 
@@ -173,7 +188,7 @@ async def test_sound_that_plays_or_is_too_old_is_noted_and_sound_that_overtook_t
         if stamp == 12:
             last.set()
 
-    gate: MediaGate[Decoded] = MediaGate(2)
+    gate = OfferedGate(2, 30)
     stream = Stream("microphone", "audio", {0: "PCMU"}, "native", gate, Shown(), on_heard=on_heard)
     stream.feedback(10)
     async with running(stream):
@@ -181,3 +196,12 @@ async def test_sound_that_plays_or_is_too_old_is_noted_and_sound_that_overtook_t
             stream.packet(0, MediaPacket(number, number * 160, True, b"\xff" * 160, stamp))
         await last.wait()
     assert heard == [1, 8, 12]
+    stream.feedback(30)
+    with ThreadPoolExecutor(1) as executor:
+        async with asyncio.TaskGroup() as group, asyncio.timeout(20):
+            task = group.create_task(stream.run(executor))
+            stream.packet(0, MediaPacket(4, 4 * 160, True, b"\xff" * 160, 30))
+            await gate.offered.wait()
+            await asyncio.sleep(0)
+            task.cancel()
+    assert heard == [1, 8, 12], "nobody reads it any more"

@@ -1,6 +1,7 @@
 """Clients without a browser, which watch, check pixels, and drive."""
 
 import asyncio
+import contextlib
 import time
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
@@ -52,7 +53,7 @@ class HeadlessClient:
         observation = Observation(self.record, self._look)
         await observation.begin()
         async with asyncio.TaskGroup() as group:
-            tasks = [group.create_task(observation.run()), group.create_task(self._check_pixels())]
+            tasks = [group.create_task(each) for each in (observation.run(), self._check_pixels(), self._listen())]
             try:
                 yield
             finally:
@@ -80,6 +81,14 @@ class HeadlessClient:
                     self.record.drawn_wrong += 1
         except ConsoleLost as error:
             self.record.lost = str(error)
+
+    async def _listen(self) -> None:
+        """Take the sound as somebody who plays it: the events follow its pace."""
+        if not self._console.description.microphones:
+            return
+        with contextlib.suppress(ConsoleLost):  # which `_check_pixels` tells
+            async for _ in self._console.sounds():
+                pass
 
     async def drive(self, script: OperatorScript, seconds: float) -> None:
         """Follow the script: one command at a time, each as the answer to the last feedback."""

@@ -55,7 +55,8 @@ class Stream:
         *,
         on_heard: Callable[[str, int], None] | None = None,
     ) -> None:
-        """`on_heard` gets the stamps of sound that plays or is too old to; `on_render` those of what is rendered."""
+        """`on_render` gets the stamps of what is rendered, `on_heard` those of sound that a reader gets, or would if it
+        were not too old."""
         self.name = name
         self.kind = kind
         self.carrier = carrier
@@ -146,8 +147,8 @@ class Stream:
 
     def _offer(self, frame: Decoded) -> None:
         self._render(self.gate.offer(frame, frame.stamp))
-        if self._on_heard is None or frame.stamp is None or self.kind != "audio":
-            return
+        if self._on_heard is None or not self._readers or frame.stamp is None or self.kind != "audio":
+            return  # sound that nobody reads is heard by nobody
         if self.gate.check(frame.stamp)[0] != "hold":
             self._on_heard(self.name, frame.stamp)
 
