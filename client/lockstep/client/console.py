@@ -47,8 +47,8 @@ class Console:
 
     Args:
         link: the link that `lockstep up` prints: "http://host:port/#token=…"
-        pacing: "feedback": the next command waits for the feedback of the last, and up to 0.2 s for sound that it
-            would make too old; "media": also for picture and sound
+        pacing: "feedback": the next command waits for the feedback of the last, and up to 0.2 s for sound that is
+            read and that it would make too old; "media": also for its picture, and such sound
         tolerance: largest gap of a rendered picture, in events; 0 or more
         audio_tolerance: the same for sound
         gate: "event": the rule. "off": renders everything, for comparison

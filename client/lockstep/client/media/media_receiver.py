@@ -33,7 +33,7 @@ class MediaReceiver:
         tolerance: dict[str, int],
         gate: GateMode,
         on_render: Callable[[str, int], None],
-        on_heard: Callable[[str, int], None],
+        on_heard: Callable[[str, int], None] | None = None,
     ) -> None:
         self._carrier: Carrier = "native"  # of the source
         self._tolerance = tolerance
