@@ -69,8 +69,10 @@ async def test_a_supervisor_begins_and_keeps_episodes_with_keys_and_pad_while_an
         await _press(page_console, A)
         await expect(bar.locator(".episode-words")).to_contain_text("Take 4")
         await page_console.press(RB, True)
-        await _press(page_console, LB)
-        await expect(bar.locator(".episode-words")).to_have_text("Not done: let go of the button to hold first")
+        for button in (X, LB):
+            await _press(page_console, button)
+            await expect(bar.locator(".episode-words")).to_have_text("Not done: let go of the button to hold first")
+        await expect(bar.locator(".episode-count")).to_have_text("1 kept · 2 discarded")
         await page_console.press(RB, False)
         await _press(page_console, CROSS_UP)
         for _ in range(3):

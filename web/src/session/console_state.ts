@@ -260,7 +260,12 @@ function takeAction(state: ConsoleState, update: ActionUpdate, wallMs: number): 
   if (isRunning(update) || known?.state === update.state) return;
   if (update.state === "done" && update.text === "") return;
   const label = actionNamed(state.robot?.description ?? null, update.name)?.label ?? update.name;
-  note(state, update.state === "done" ? "info" : "warning", state.actionWords({ label }, update), wallMs - update.age * 1000);
+  note(
+    state,
+    update.state === "done" ? "info" : "warning",
+    state.actionWords({ label }, update),
+    wallMs - update.age * 1000,
+  );
 }
 
 /** A failure is said once, in the log too. */

@@ -88,6 +88,10 @@ class ActionCore:
         late = len(known) - TOLD_TO_NEWCOMERS
         return [each for index, each in enumerate(known) if index >= late or each.id in self._running]
 
+    def remembers(self, id: str) -> bool:
+        """True if a copy of this request is answered with what became of it, and a newcomer may be told."""
+        return id in self._updates
+
     def issued(self, nonce: int, now: float) -> None:
         """Note a feedback: for `max_event_age` requests may answer it."""
         self._nonces[nonce] = _Seen(now, self._spell)

@@ -204,7 +204,7 @@ class ActionRunner:
         self._send(update)
 
     def _note(self, update: ActionUpdate) -> None:
-        if update.state != "running":
+        if update.state != "running" and self._core.remembers(update.id):
             self._noted.setdefault(update.id, self._now())
             if len(self._noted) > NOTED:
                 del self._noted[next(iter(self._noted))]

@@ -18,7 +18,9 @@ from lockstep.rtc.sockets.event_delivery import EventDelivery, Listener
 __all__ = ["Connection", "Turns"]
 
 CLOCK_RESOLUTION = 0.001  # s; a loop may call too early by so much
-PASSES = 4  # a channel is empty now, or a datagram had further records; what is left waits for the next datagram or timer
+PASSES = (
+    4  # a channel is empty now, or a datagram had further records; what is left waits for the next datagram or timer
+)
 
 
 class SocketSide(Protocol):

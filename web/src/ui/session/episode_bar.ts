@@ -34,6 +34,7 @@ const PRESSES: Readonly<Record<Exclude<EpisodePress, "begin_or_success">, Reques
   redo: { do: "redo" },
   mark: { do: "mark" },
 };
+const ENDS: ReadonlySet<EpisodeRequest["do"]> = new Set(["keep", "discard", "redo"]);
 const LET_GO = "let go of the button to hold first";
 
 interface EpisodeButton {
@@ -116,7 +117,10 @@ export function createEpisodeBar(engine: ConsoleEngine): Panel {
     engine.tell("session", message);
   }
 
-  /** The right stick is pressed by accident while driving: what cannot be undone is asked for with the robot let go. */
+  /**
+   * The right stick is pressed by accident while driving, and the buttons beside it begin actions: whatever ends an
+   * episode is asked for with the robot let go.
+   */
   function takePress(press: EpisodePress): void {
     if (element.hidden || state === null) return;
     if (document.activeElement === task) task.blur();
@@ -126,7 +130,7 @@ export function createEpisodeBar(engine: ConsoleEngine): Panel {
     const succeeds: Request = { do: "keep", outcome: "success" };
     const request =
       press !== "begin_or_success" ? PRESSES[press] : isIdle ? { do: "start" as const } : succeeds;
-    if (engine.controls.deadman && (request.do === "discard" || request.do === "redo")) refuse(LET_GO);
+    if (engine.controls.deadman && ENDS.has(request.do)) refuse(LET_GO);
     else ask(request);
   }
 
