@@ -188,10 +188,8 @@ def test_an_urgent_datagram_is_sent_at_once_before_all_that_wait_but_urgent_ones
 def test_an_urgent_datagram_that_the_kernel_has_no_room_for_is_left_to_the_caller(full: int) -> None:
     here, kernel = with_kernel(full, 0)
     [datagram] = numbered(1)
-    assert not here.send_at_once(datagram)
-    assert here.is_full
-    assert here.send_at_once(datagram)
-    assert not here.is_full
+    assert (here.send_at_once(datagram), here.is_full) == (False, True)
+    assert (here.send_at_once(datagram), here.is_full) == (True, False)
     assert flat(kernel) == [0]
 
 
