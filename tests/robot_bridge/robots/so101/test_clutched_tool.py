@@ -32,7 +32,7 @@ NEUTRAL: Final[list[float | None]] = [None] * len(AXES)
 AGE: Final = 2.0  # s
 SLACK: Final = 1e-6  # rad
 HANDS: Final = (
-    {name: 1.0 for name in (*POSE.position, *POSE.rotation)},
+    dict.fromkeys((*POSE.position, *POSE.rotation), 1.0),
     {"shoulder_pan": 1.0, "elbow_flex": -1.0},
 )
 SIZES: Final = (6, 2)
