@@ -15,8 +15,19 @@ from tests.support.stack import Stack
 
 pytestmark = pytest.mark.timeout(240)
 
+HELD_UP = "not_neutral: the robot was stopped, reset or lost"  # of a robot that nobody stopped
+
 
 async def replayed(stack: Stack, directory: Path, *words: str | Path) -> tuple[int, str, str]:
+    """Replay, and again while a busy machine holds the bridge up: the robot rests then, which ends a replay."""
+    for _ in range(5):
+        code, output, errors = await _replayed_once(stack, directory, *words)
+        if code == 0 or HELD_UP not in errors:
+            break
+    return code, output, errors
+
+
+async def _replayed_once(stack: Stack, directory: Path, *words: str | Path) -> tuple[int, str, str]:
     command: Sequence[str] = ("replay", *map(str, words), "--to", stack.operator, "--json")
     process = await asyncio.create_subprocess_exec(
         *(str(LOCKSTEP), *command, "--state-dir", str(directory / "replay")),
