@@ -11,6 +11,7 @@ from lockstep.protocol.messages import Media, MediaCodec
 from lockstep.robot_bridge.encoding.encoding_requests import EncodingGoal
 from lockstep.robot_bridge.encoding.picture_encoder import MOST_WRONG, H264Encoder
 from lockstep.robot_bridge.errors import EncodingFailed
+from lockstep.robot_bridge.robots.event_strip import read_event_strip, with_event_strip
 from lockstep.server.media.codecs.h264 import inspect
 
 WHOLE = EncodingGoal(500_000, 0.0, 1.0)
@@ -73,6 +74,16 @@ def test_a_keyframe_of_a_second_encoding_takes_no_more_than_the_time_to_the_next
     assert [n for n, each in enumerate(pictures) if each.keyframe] == [0, 20, 30]
     most = 1.3 / 30 * goal.bitrate  # the encoder's highest rate is 1.3 times what is asked for
     assert [n for n, each in enumerate(pictures) if 8 * len(each.data) > most] == []
+
+
+def test_a_keyframe_of_a_starved_path_still_shows_the_picture() -> None:
+    """Beyond the quantisers of H.264, x264 leaves nothing of it but grey."""
+    encoder = H264Encoder()
+    starved = EncodingGoal(30_000, 0.0, 1.0)
+    media = [with_event_strip(raw(number, 240, 180)) for number in range(40)]
+    pictures = [encoder.encode(each, starved, keyframe=number % 10 == 0) for number, each in enumerate(media)]
+    shown = [read_event_strip(frame.to_ndarray(format="gray")) for frame in decoded([each.data for each in pictures])]
+    assert shown[::10] == [1, 11, 21, 31]
 
 
 def test_a_smaller_size_begins_with_a_keyframe() -> None:

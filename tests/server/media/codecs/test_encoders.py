@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from lockstep.protocol.messages import Media
+from lockstep.robot_bridge.robots.event_strip import read_event_strip, with_event_strip
 from lockstep.server.media.codecs.packetise import split_nal_units
 from lockstep.server.media.codecs.picture import PictureDecoder
 from lockstep.server.media.codecs.picture_encoder import (
@@ -254,3 +255,15 @@ def test_a_bitrate_beyond_what_steering_can_do_begins_with_a_keyframe(codec: str
     encoder.aim(50_000, 30.0)
     decoder = PictureDecoder()
     assert encoder.encode(decoder.decode(picture(3, 0.0)), 9000, False).keyframe
+
+
+@pytest.mark.parametrize("codec", VIDEO_CODECS)
+def test_a_keyframe_of_a_starved_path_still_shows_the_picture(codec: str) -> None:
+    """Beyond the quantisers of H.264, x264 leaves nothing of it but grey."""
+    encoder = create_picture_encoder(codec, 30_000, 30.0)
+    media = [with_event_strip(noise(number, 0.0)) for number in range(1, 41)]
+    encoded = encode(encoder, media, keys=(0, 10, 20, 30))
+    context: Any = av.CodecContext.create(DECODERS[codec], "r")
+    frames = [frame for each in encoded if each.data for frame in context.decode(av.Packet(each.data))]
+    shown = {read_event_strip(frame.to_ndarray(format="gray")) for frame in frames}
+    assert {11, 21, 31} <= shown

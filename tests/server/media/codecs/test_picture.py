@@ -4,6 +4,7 @@ from fractions import Fraction
 from typing import Any
 
 import av
+import msgspec
 import numpy as np
 import numpy.typing as npt
 import pytest
@@ -12,6 +13,7 @@ from lockstep.protocol.messages import Media
 from lockstep.server.media.codecs.picture import PictureDecoder
 from lockstep.server.media.codecs.picture_encoder import VIDEO_CODECS, create_picture_encoder
 from lockstep.server.media.errors import PayloadError
+from tests.server.media.camera_h264 import camera_pictures
 
 SIZES = [(250, 250), (480, 270), (440, 330), (1920, 1078), (320, 240), (251, 250), (250, 251), (333, 251)]
 DECODERS = {"H264": "h264", "VP8": "libvpx"}
@@ -116,3 +118,18 @@ def test_a_picture_that_says_it_is_huge_is_refused_before_there_is_memory_for_it
     with pytest.raises(PayloadError):
         decoder.decode(Media(stream="camera", codec="mjpeg", stamp=1, time=0.0, payload=huge, width=64, height=64))
     assert decoder.decode(jpeg(64, 64)).width == 64, "and the next one is decoded"
+
+
+def test_what_builds_on_a_picture_that_was_not_decoded_is_refused_until_a_keyframe() -> None:
+    """FFmpeg would draw it over grey, or over a picture that it does not build on."""
+    key, first, second, third = camera_pictures(4)
+    decoder = PictureDecoder()
+    with pytest.raises(PayloadError):
+        decoder.decode(first, (first,))
+    assert decoder.decode(key, (key,)).width > 0
+    broken = msgspec.structs.replace(first, payload=b"\x00\x00\x00\x01\x67")
+    with pytest.raises(PayloadError):
+        decoder.decode(second, (broken, second))
+    with pytest.raises(PayloadError):
+        decoder.decode(third, (third,))
+    assert decoder.decode(first, (key, first)).width > 0

@@ -15,7 +15,8 @@ class World(Counted):
         for tier in tiers:
             self.all.join("H264", self.subscription(), tier)  # type: ignore[arg-type]
         taken = self.metrics.taken.labels("camera0")
-        self.queue = PictureQueue(self.all, 30.0, PictureClock(), GroupOfPictures(), taken, self.dropped)
+        self.group = GroupOfPictures()
+        self.queue = PictureQueue(self.all, 30.0, PictureClock(), self.group, taken, self.dropped)
 
     def put(self, stamp: int) -> None:
         self.queue.put(SourceFrame(picture(stamp, stamp / 30), stamp / 30, 1000 + stamp / 30))
@@ -69,3 +70,32 @@ def test_an_encoding_that_everybody_has_left_meanwhile_is_not_made() -> None:
     for target in list(low.targets):
         world.all.leave(target)
     assert world.next() is None
+
+
+def test_pictures_that_build_on_each_other_are_taken_with_the_job_that_decodes_them() -> None:
+    world = World("operator")
+    (target,) = world.all.get("H264", "operator").targets
+
+    def put(stamp: int) -> None:
+        media = picture(stamp, stamp / 30, codec="h264", keyframe=stamp == 1)
+        world.group.add(media)
+        world.queue.put(SourceFrame(media, stamp / 30, 1000 + stamp / 30))
+
+    put(1)
+    put(2)
+    world.all.leave(target)
+    assert world.next() is None, "nobody wants it any more"
+    world.all.join("H264", target)
+    put(3)
+    job = world.queue.next_job()
+    assert job is not None
+    assert [each.stamp for each in job.source.group] == [1, 2, 3]
+    put(4)
+    world.group.add(picture(5, 5 / 30, codec="h264", keyframe=False))  # which nobody needs from here
+    job = world.queue.next_job()
+    assert job is not None
+    assert [each.stamp for each in job.source.group] == [4], "5 would be shown with the stamp of 4"
+    put(6)
+    world.group.add(picture(7, 7 / 30, codec="h264", keyframe=True))
+    assert world.next() is None, "it cannot be decoded any more, and a newer one comes"
+    assert world.drops("no_reference") == 1

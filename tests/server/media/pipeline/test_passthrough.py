@@ -135,18 +135,19 @@ async def test_a_camera_that_gives_other_pictures_is_encoded_from_then_on() -> N
 
 def test_a_group_is_kept_from_its_keyframe_on_and_within_its_bound() -> None:
     group = GroupOfPictures()
-    key = picture(1, 0.0, codec="h264", payload=b"key", keyframe=True)
-    delta = picture(2, 0.1, codec="h264", payload=b"delta", keyframe=False)
-    group.add(delta)
-    assert group.take() == ()
-    for medium in (key, delta, delta):
-        group.add(medium)
-    assert group.take() == (key, delta, delta)
-    group.add(delta)
-    assert group.take() == (delta,)
-    group.add(key)
-    for _ in range(MOST_PICTURES):
-        group.add(delta)
-    assert group.take() == ()
-    group.add(delta)
-    assert group.take() == ()
+
+    def added(number: int, *, keyframe: bool = False) -> Media:
+        media = picture(number, number / 10, codec="h264", payload=b"picture", keyframe=keyframe)
+        group.add(media)
+        return media
+
+    assert group.take(added(1)) == ()
+    pictures = [added(2, keyframe=True), *map(added, range(3, 7))]
+    assert group.take(pictures[2]) == tuple(pictures[:3]), "not the newer ones: they show later events"
+    assert group.take(pictures[1]) == (), "it was taken"
+    assert group.take(pictures[4]) == tuple(pictures[3:])
+    before, key = added(7), added(8, keyframe=True)
+    assert group.take(before) == (), "nothing after the keyframe builds on it"
+    for number in range(MOST_PICTURES):
+        newest = added(number)
+    assert (group.take(key), group.take(newest), group.take(added(1))) == ((), (), ())

@@ -31,11 +31,18 @@ class GroupOfPictures:
         self._waiting.append(media)
         self._bytes += len(media.payload)
 
-    def take(self) -> tuple[Media, ...]:
-        """Return the pictures to decode, in order, for the newest one; empty while that is not possible."""
-        found = tuple(self._waiting)
-        self._clear()
-        return found
+    def take(self, last: Media) -> tuple[Media, ...]:
+        """Return the pictures to decode for `last`, in order, itself the last; empty if that is not possible any more.
+
+        The caller has to decode them: later pictures build on them.
+        """
+        if not any(each is last for each in self._waiting):
+            return ()
+        found: list[Media] = []
+        while not found or found[-1] is not last:
+            found.append(self._waiting.popleft())
+            self._bytes -= len(found[-1].payload)
+        return tuple(found)
 
     def _clear(self) -> None:
         self._waiting.clear()

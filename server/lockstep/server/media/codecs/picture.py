@@ -30,6 +30,7 @@ class PictureDecoder:
     def __init__(self) -> None:
         self._mjpeg: VideoCodecContext | None = None
         self._h264: VideoCodecContext | None = None
+        self._is_whole = False  # the H.264 pictures up to now were all decoded, from a keyframe on
 
     def decode(self, media: Media, group: Sequence[Media] = ()) -> av.VideoFrame:
         """Decode a picture.
@@ -74,10 +75,14 @@ class PictureDecoder:
             self._h264.flags |= Flags.low_delay  # one in, one out: there are no B-frames
         frame = None
         for media in group:
+            if not media.keyframe and not self._is_whole:
+                continue  # FFmpeg would draw it over grey, or over a picture that it does not build on
+            self._is_whole = False
             try:
                 frames = self._h264.decode(av.Packet(media.payload))
             except (FFmpegError, ValueError) as error:
                 raise PayloadError(f"not an H.264 picture: {error}") from error
+            self._is_whole = True
             frame = frames[-1] if frames else frame
         if frame is None:
             raise PayloadError("not a whole H.264 picture")

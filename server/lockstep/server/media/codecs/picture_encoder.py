@@ -132,7 +132,7 @@ class H264Encoder(PictureEncoder):
             "forced-idr": "1",
             "maxrate": str(self.bitrate_bps),
             "bufsize": str(self._buffer_bits()),
-            "x264-params": "scenecut=0:keyint=infinite:repeat-headers=1",
+            "x264-params": "scenecut=0:keyint=infinite:repeat-headers=1:qpmax=51",  # coarser is grey
         }
         return context
 

@@ -129,6 +129,8 @@ class EncoderWorker(FrameStage, Generic[Job]):
         if result.error is not None:
             self._dropped.count(result.error.name)
             result.encoding.keyframes.request()  # it may have been a keyframe that somebody waits for
+            if self._encodings.passed is not None:
+                self._encodings.passed.request_keyframe("drop")  # and the robot's pictures may build on one that is bad
         else:
             result.encoding.encode_seconds.observe(result.seconds)
         for frame in result.frames:

@@ -31,13 +31,11 @@ PACKETISE = {"H264": packetise_h264, "VP8": packetise_vp8}
 class SourcePicture:
     """A picture of the source, decoded and resized at most once for all encodings."""
 
-    def __init__(
-        self, media: Media, capture_time: float, media_time: int, group: tuple[Media, ...] = (), arrived: float = 0.0
-    ) -> None:
-        """`group`: the pictures to decode for it, if it builds on others. `arrived`: s, on the monotonic clock."""
+    def __init__(self, media: Media, capture_time: float, media_time: int, arrived: float = 0.0) -> None:
+        """`arrived`: s, on the monotonic clock."""
         self.media = media
         self.arrived = arrived
-        self._group = group
+        self.group: tuple[Media, ...] = ()  # the pictures to decode for it, if it builds on others
         self.capture_time = capture_time
         self.media_time = media_time
         self._sizes: dict[tuple[int, int], av.VideoFrame] = {}
@@ -50,7 +48,7 @@ class SourcePicture:
             raise self._error
         if self._whole is None:
             try:
-                self._whole = decoder.decode(self.media, self._group)
+                self._whole = decoder.decode(self.media, self.group)
             except MediaError as error:
                 self._error = error
                 raise
@@ -120,7 +118,7 @@ class PictureQueue:
                 self._take(self._newest)
             while self._orders:
                 encoding = self._orders.pop(0)
-                if encoding.needed and self._source is not None:
+                if encoding.needed and self._source is not None and self._can_decode(self._source):
                     return self._job(self._source, encoding)
             if self._newest is None:
                 return None
@@ -133,10 +131,19 @@ class PictureQueue:
             self._dropped.count("encoder_busy", len(self._orders))
         self._began, self._others_served = now, 0
         due = [each for each in self._encodings.own if self._is_due(each, media.time, now)]
-        group = self._group.take() if media.codec == "h264" and due else ()
-        self._source = SourcePicture(media, capture_time, self._clock.timestamp(media.time), group, now)
+        self._source = SourcePicture(media, capture_time, self._clock.timestamp(media.time), now)
         self._taken.inc(bool(due))
         self._orders = sorted(due, key=lambda each: (each.tier != "operator", each.encoded_at))
+
+    def _can_decode(self, source: SourcePicture) -> bool:
+        """Take what has to be decoded for a picture. Not before a job is given out, which decodes it: whatever is
+        taken and not decoded is missing to all pictures up to the next keyframe."""
+        if source.media.codec == "h264" and not source.group:
+            source.group = self._group.take(source.media)
+            if not source.group:
+                self._dropped.count("no_reference")
+                return False
+        return True
 
     def _is_due(self, encoding: TierEncoding, time: float, now: float) -> bool:
         if not encoding.needed or not encoding.cadence.take(time, encoding.plan.frame_rate, self._frame_rate):
@@ -175,8 +182,8 @@ class TierEncoders:
         started = time.monotonic()
         encoding, source = job.encoding, job.source
         try:
+            frame = source.frame(self._decoder, job.plan)  # first: later pictures build on it
             encoder = self._encoder(encoding, job.plan)
-            frame = source.frame(self._decoder, job.plan)
             encoded = encoder.encode(frame, source.media_time, job.keyframe)
         except MediaError as error:
             return [Encoded(encoding, (), error=error)]
