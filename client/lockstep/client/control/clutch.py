@@ -61,9 +61,9 @@ class Clutch:
     measured value is clipped there, and `clipped` says so; the device's motion counts on meanwhile.
 
     It engages only while the goals of its axes stand still: a goal that still brakes, or a pose that has not settled,
-    is not where the robot comes to rest. Nor does it engage while a goal that it gave before may be under way: not before
-    the second event after the feedback for which it gave that goal. `waits` says that engaging again can succeed after
-    another command, such as a neutral one.
+    is not where the robot comes to rest. Nor does it engage while a goal that it gave before may be under way: that
+    is until the second event after the feedback for which it gave that goal. `waits` says that engaging again can
+    succeed after another command, such as a neutral one.
 
     Call `release` when the operator lets go, and when the feedback, the seat or the arming is lost. The clutch releases
     itself when a reading is None or not finite, and when the robot needs a neutral command. Then the values are None,
