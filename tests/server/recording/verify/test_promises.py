@@ -92,7 +92,7 @@ def with_a_stall(seconds: float = 2.22, *, voided: bool = False, spans_first: bo
     return change
 
 
-def spans_of(tick_wait: float = 4, apply: float = 1, rate_wait: float = 0) -> dict[str, float]:
+def spans_of(tick_wait: float = 4, apply: float = 1, rate_wait: float = 0) -> dict[str, Any]:
     return {"tick_wait_ms": tick_wait, "apply_ms": apply, "rate_wait_ms": rate_wait}
 
 
