@@ -54,7 +54,8 @@ class FurtherRecords:
     def begin(self, description: RobotDescription) -> None:
         """Take the names of the robot's axes, cameras and microphones."""
         self._axes = [axis.name for axis in description.axes]
-        self._streams = frozenset(each.name for each in (*description.cameras, *description.microphones))
+        cameras, microphones = description.cameras, description.microphones
+        self._streams = frozenset([each.name for each in cameras] + [each.name for each in microphones])
         self._named.clear()
 
     def take(self, record: OwnRecord, at: Moment) -> None:
