@@ -1,3 +1,4 @@
+import itertools
 import math
 from typing import Any
 
@@ -13,6 +14,7 @@ from tests.makers import goal_axis
 
 VECTORS = load_vectors("clutch.json")
 CASES: list[dict[str, Any]] = VECTORS["cases"]
+EVENTS = itertools.count(10, 10)
 
 
 def clutch_of(case: dict[str, Any]) -> Clutch:
@@ -29,8 +31,8 @@ def clutch_of(case: dict[str, Any]) -> Clutch:
 
 
 def measured(axes: list[float], goals: list[float | None], **rest: Any) -> Feedback:
-    time = rest.pop("time", 0.0)
-    return Feedback(event=1, issue=1, time=time, axes=axes, goals=goals, **rest)
+    time, event = rest.pop("time", 0.0), rest.pop("event", None) or next(EVENTS)
+    return Feedback(event=event, issue=1, time=time, axes=axes, goals=goals, **rest)
 
 
 def check_step(clutch: Clutch, step: dict[str, Any]) -> None:

@@ -239,7 +239,7 @@ class GoalDriving(RuleBasedStateMachine):
             assert newest is not None
             assert self.clutch.goals([where]) == [newest.goals[1]]
             self.engaged_at = self.losses_at[newest.nonce]
-            self.drive()
+        self.drive()
 
     @rule(motion=st.floats(-0.3, 0.3))
     def move(self, motion: float) -> None:

@@ -47,6 +47,8 @@ class FakeConsole:
         self.go.set()
         self.refusal: CommandRefused | None = None
         self.place = 40.0
+        self.event = 1
+        self.at_rest = True
 
     async def note(self, what: object) -> None:
         async with self.changed:
@@ -58,7 +60,9 @@ class FakeConsole:
             await self.changed.wait_for(lambda: condition(self.said))
 
     def feedback(self) -> Feedback:
-        return Feedback(event=1, issue=1, time=0.0, axes=[self.place], goals=[self.place])
+        return Feedback(
+            event=self.event, issue=1, time=0.0, axes=[self.place], goals=[self.place], at_rest=self.at_rest
+        )
 
     async def arm(self) -> Feedback:
         await self.note("arm")
@@ -66,11 +70,12 @@ class FakeConsole:
         return self.feedback()
 
     async def drive(self, values: dict[str, float]) -> Feedback:
-        await self.note(values["pan.pos"])
+        await self.note(values.get("pan.pos", "neutral"))
         await self.go.wait()
         if self.refusal is not None:
             raise self.refusal
-        self.place = values["pan.pos"]
+        self.place = values.get("pan.pos", self.place)
+        self.event += 1
         self.clutch.observe(self.feedback())
         return self.feedback()
 
@@ -167,4 +172,30 @@ async def test_a_leader_that_is_not_known_any_more_rests_the_robot(stage: Stage)
     stage.move(0.0)
     await stage.hand.until_looked_at(5)
     assert stage.console.said[-1] == "rest"
+    await stage.end(driving)
+
+
+async def test_it_says_that_it_waits_for_the_robot_to_stand_still_and_drives_then(stage: Stage) -> None:
+    stage.console.at_rest = False
+    driving = stage.start()
+    await stage.hand.until_looked_at()
+    stage.hand.is_held = True
+    await stage.console.until(lambda said: said.count("neutral") > 3)
+    assert stage.words[1:] == ["waits until the robot stands still"]  # once
+    stage.console.at_rest = True
+    await stage.console.until(lambda said: 40.0 in said)
+    assert stage.words[2:] == ["drives"]
+    await stage.end(driving)
+
+
+async def test_letting_go_while_it_waits_is_no_fault_of_the_leader(stage: Stage) -> None:
+    stage.console.at_rest = False
+    stage.console.go.clear()
+    driving = stage.start()
+    await stage.hand.until_looked_at()
+    stage.hand.is_held = True
+    await stage.console.until(lambda said: "neutral" in said)
+    stage.hand.is_held = False
+    await stage.console.until(lambda said: said[-1] == "rest")
+    assert stage.words[1:] == ["waits until the robot stands still", "rests"]
     await stage.end(driving)

@@ -24,6 +24,7 @@ from lockstep.server.recording.format.records import (
 from tests.server.recording.makers import DESCRIPTION, EPOCH, START
 from tests.server.recording.rrd import Entity, entities
 
+from lockstep.server.recording.export.rerun.further_records import MOST_ENTITIES  # isort: skip  (needs rerun)
 from lockstep.server.recording.export.rerun.session_log import (  # isort: skip  (needs rerun, which `rrd` looks for)
     Moment,
     SessionLog,
@@ -127,3 +128,27 @@ def test_reports_of_pages_and_traces_are_lines_with_names(tmp_path: Path) -> Non
     known = {name: value for name, value in zip(names, way, strict=True) if not math.isnan(value)}
     assert known == {"forward": 0.5, "back": 0.25}
     assert len(found["/trace/picture/front"].rows) == 1
+
+
+def test_names_that_peers_make_up_become_no_entities(tmp_path: Path) -> None:
+    made_up = [StreamReport(stream=f"made up {number}", carrier="native") for number in range(31)]
+    known = StreamReport(stream="ear", carrier="native", gap=2)
+    found = logged(
+        tmp_path / "a.rrd",
+        ReportRecord(epoch=EPOCH, event=9, peer="p", name="Ada", report=Report(event=9, streams=[*made_up, known])),
+        TraceRecord(epoch=EPOCH, event=9, stream="made up", picture=PictureSpans(encode_ms=2.0)),
+    )
+    assert {path for path in found if path.startswith(("/reports/", "/trace/"))} == {
+        "/reports/Ada/delays",
+        "/reports/Ada/ear",
+    }
+
+
+def test_however_many_names_come_and_go_an_epoch_has_a_bounded_number_of_entities(tmp_path: Path) -> None:
+    def shadow(name: str) -> ShadowRecord:
+        return ShadowRecord(epoch=EPOCH, event=3, peer="q", name=name, values=[0.5, 0.0], judgement="late")
+
+    names = [f"net {number}" for number in range(MOST_ENTITIES + 50)]
+    found = logged(tmp_path / "a.rrd", *map(shadow, [*names, names[0]]))
+    assert sum(path.startswith("/shadow/") for path in found) == MOST_ENTITIES
+    assert len(found["/shadow/net\\ 0/wanted"].rows) == 2  # one that is known goes on

@@ -276,7 +276,7 @@ export class HeadsetSession implements HeadsetControls {
   private carryOut(event: HeadsetEvent, now: number): void {
     const { engine } = this.page;
     if (event.kind === "arm") this.arm(event.side);
-    else if (event.kind === "press") this.press(event.side, now);
+    else if (event.kind === "press") this.press(event, now);
     else if (event.kind === "lost") engine.disarm(event.why);
     else if (event.kind === "stop") engine.stop("headset button");
     else if (event.kind === "layer") engine.nextLayer();
@@ -291,8 +291,10 @@ export class HeadsetSession implements HeadsetControls {
     if (engine.isArmed()) grab(this.input, side);
   }
 
-  private press(side: Side, now: number): void {
+  /** A hand that drives presses STOP alone: its trigger is the gripper's, wherever the hand points. */
+  private press({ side, drives }: { readonly side: Side; readonly drives: boolean }, now: number): void {
     const button = this.view.buttonAt(side);
+    if (drives && button !== "stop") return;
     if (button === "stop") this.page.engine.stop("headset button");
     else if (button === "recentre") this.recentre();
     else if (button === "leave") this.end();

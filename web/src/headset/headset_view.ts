@@ -96,7 +96,7 @@ export class HeadsetView {
     this.drawButtons(state);
   }
 
-  /** The button that the hand points at; null: none. */
+  /** The button that the hand points at and may press; null: none. */
   buttonAt(side: Side): ButtonName | null {
     return this.pointed.get(side) ?? null;
   }
@@ -160,7 +160,8 @@ export class HeadsetView {
     this.pointed = new Map(
       [...met].flatMap(([side, object]) => {
         const name = nameOf(object);
-        return name === undefined ? [] : [[side, name] as const];
+        const isLive = name !== undefined && (name === "stop" || !held.has(side));
+        return isLive ? [[side, name] as const] : [];
       }),
     );
   }

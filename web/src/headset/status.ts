@@ -3,6 +3,7 @@ import { armRefusal } from "../drive/arming";
 import { ageLabel, feedbackAge } from "../drive/feedback_age";
 import { ARM_REFUSAL_LABELS, disarmLabel } from "../drive/labels/labels";
 import { HEADSET_DISARM_LABELS } from "./disarm_labels";
+import { WAITS_LABEL } from "../drive/labels/limit_labels";
 import { warningSeconds } from "../drive/labels/start_warning";
 import type { ConsoleEngine } from "../engine/console_engine";
 import { forceOf } from "../haptics/contact_force";
@@ -77,8 +78,11 @@ function stateWords(engine: ConsoleEngine, now: number): Pick<HeadsetStatus, "te
   const warned = warningSeconds(engine.state.feedback, engine.measuredMs, now);
   if (engine.isArmed() && warned > 0)
     return { tone: "armed", title: "Armed", text: `The robot warns first: ${warned} s` };
-  if (arming.state === "driving")
-    return { tone: "driving", title: "Driving", text: "Let go of the grip to bring the robot to rest" };
+  if (arming.state === "driving") {
+    const waits = engine.goals?.saysWhatItWaitsFor(now) === true;
+    const text = waits ? WAITS_LABEL : "Let go of the grip to bring the robot to rest";
+    return { tone: "driving", title: "Driving", text };
+  }
   if (arming.state === "armed") return { tone: "armed", title: "Armed", text: "Squeeze the grip to drive" };
   const refusal = armRefusal(arming, engine.conditions(now));
   const text =

@@ -20,7 +20,7 @@ export interface HandSample {
 export type HeadsetEvent =
   | { readonly kind: "arm"; readonly side: Side } // and `grab` if that succeeded
   | { readonly kind: "lost"; readonly why: "squeeze_released" | "tracking_lost" }
-  | { readonly kind: "press"; readonly side: Side } // of the trigger
+  | { readonly kind: "press"; readonly side: Side; readonly drives: boolean } // of the trigger
   | { readonly kind: "layer" | "recentre" | "stop" };
 
 interface HandState {
@@ -109,11 +109,13 @@ function takeHand(input: HeadsetInput, sample: HandSample, elapsed: number, even
   }
   for (const kind of ["stop", "layer", "recentre"] as const)
     if (state[kind] && !before[kind]) events.push({ kind });
-  if (state.pressed && !before.pressed) events.push({ kind: "press", side });
+  const asks = state.squeezed && !before.squeezed;
+  const drives = input.held.has(side) || asks;
+  if (state.pressed && !before.pressed) events.push({ kind: "press", side, drives });
   if (input.held.has(side)) {
     if (pose === null || hasJumped(before.pose, pose, elapsed)) drop(input, side, "tracking_lost", events);
     else if (!state.squeezed) drop(input, side, "squeeze_released", events);
-  } else if (state.squeezed && !before.squeezed && pose !== null) events.push({ kind: "arm", side });
+  } else if (asks && pose !== null) events.push({ kind: "arm", side });
 }
 
 function lose(input: HeadsetInput, side: Side, events: HeadsetEvent[]): void {

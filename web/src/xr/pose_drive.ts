@@ -55,6 +55,10 @@ export class PoseDevice implements GoalDevice {
     });
   }
 
+  get waits(): boolean {
+    return this.drives.some(({ clutch }) => clutch.waits);
+  }
+
   goals(feedback: Feedback): readonly AxisValue[] {
     const goals: AxisValue[] = this.description.axes.map(() => null);
     const taken = new Set<Side>();

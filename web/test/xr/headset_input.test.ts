@@ -143,6 +143,27 @@ describe("buttons", () => {
     expect(session.frame(hand({ stop: true, layer: true, recentre: true, trigger: 1 }))).toEqual([]);
   });
 
+  it("of the view are pressed by a hand that drives for STOP alone: its trigger is the gripper's", () => {
+    const session = new Session();
+    const left = (trigger: number): HandSample => hand({ side: "left", trigger });
+    const presses = (...samples: readonly HandSample[]): HeadsetEvent[] =>
+      session.frame(...samples).filter(({ kind }) => kind === "press");
+    session.frame(hand(), left(0));
+    // One that begins to drive in this very frame does so too.
+    expect(presses(hand({ squeeze: 1, trigger: 1 }), left(0))).toEqual([
+      { kind: "press", side: "right", drives: true },
+    ]);
+    presses(hand({ squeeze: 1 }), left(0));
+    expect(presses(hand({ squeeze: 1, trigger: 1 }), left(1))).toEqual([
+      { kind: "press", side: "right", drives: true },
+      { kind: "press", side: "left", drives: false },
+    ]);
+    presses(hand({ squeeze: 1 }), left(0));
+    expect(presses(hand({ trigger: 1 }), left(0))).toEqual([{ kind: "press", side: "right", drives: true }]); // lets go
+    presses(hand(), left(0));
+    expect(presses(hand({ trigger: 1 }), left(0))).toEqual([{ kind: "press", side: "right", drives: false }]);
+  });
+
   it("stop the robot from a hand that is not tracked too", () => {
     const session = new Session();
     session.frame(hand({ pose: null }));

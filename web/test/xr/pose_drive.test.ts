@@ -44,8 +44,8 @@ class Hands implements DrivingHands {
   }
 }
 
-function feedbackAt(values: readonly number[]): ReturnType<typeof feedbackOf> {
-  return feedbackOf(5, { axes: [0, ...values], goals: [null, ...values] });
+function feedbackAt(values: readonly number[], event = 5): ReturnType<typeof feedbackOf> {
+  return feedbackOf(event, { axes: [0, ...values], goals: [null, ...values] });
 }
 
 const PLACE = [0.3, 0.1, 0.2, 0, 0, 1.2];
@@ -89,7 +89,26 @@ describe("a hand that takes the deadman", () => {
     hands.held.clear();
     expectGoals(device.goals(feedbackAt(PLACE)), [null, null, null, null, null, null, null]);
     hands.at("left", [-1, 2, 1], -1);
-    expectGoals(device.goals(feedbackAt(PLACE)), [null, ...PLACE]);
+    expectGoals(device.goals(feedbackAt(PLACE, 7)), [null, ...PLACE]);
+  });
+
+  it("again while a goal of before may be under way leads nothing until it has been answered", () => {
+    const hands = new Hands();
+    const device = new PoseDevice({ ...descriptionOf(AXES), poses: [TOOL] }, hands);
+    hands.at("right", [0, 1, 0]);
+    device.goals(feedbackAt(PLACE));
+    hands.at("right", [0, 1.5, 0]);
+    device.goals(feedbackAt(PLACE)); // this goal leaves
+    hands.held.clear();
+    device.goals(feedbackAt(PLACE));
+    hands.at("right", [0, 1, 0]);
+    for (const event of [5, 6]) {
+      expectGoals(device.goals(feedbackAt(PLACE, event)), [null, null, null, null, null, null, null]);
+      expect(device.waits).toBe(true);
+    }
+    const led = [0.3, 0.1, 0.7, 0, 0, 1.2];
+    expectGoals(device.goals(feedbackAt(led, 7)), [null, ...led]);
+    expect(device.waits).toBe(false);
   });
 
   it("engages anew after a release, from where the robot is then", () => {

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 from lockstep.protocol.description import Axis, RobotDescription
 from lockstep.protocol.messages import Feedback
+from lockstep.protocol.serial import event_after
 
 __all__ = ["REACH_SHARE", "Clutch"]
 
@@ -60,8 +61,9 @@ class Clutch:
     measured value is clipped there, and `clipped` says so; the device's motion counts on meanwhile.
 
     It engages only while the goals of its axes stand still: a goal that still brakes, or a pose that has not settled,
-    is not where the robot comes to rest. `waits` says that engaging again in a moment can succeed. Let go with
-    `Console.rest`, and engage after it: a command from before may still be under way.
+    is not where the robot comes to rest. Nor does it engage while a goal that it gave before may be under way: that
+    is until the second event after the feedback for which it gave that goal. `waits` says that engaging again can
+    succeed after another command, such as a neutral one.
 
     Call `release` when the operator lets go, and when the feedback, the seat or the arming is lost. The clutch releases
     itself when a reading is None or not finite, and when the robot needs a neutral command. Then the values are None,
@@ -88,6 +90,7 @@ class Clutch:
         settling = {name: pose.settling for pose in description.poses for name in (*pose.position, *pose.rotation)}
         self._settling = max((settling.get(name, 0.0) for name in scales), default=0.0)  # s
         self._newest: Feedback | None = None
+        self._given: int | None = None  # event of the feedback for which it gave a goal last
         self._stood_at = 0.0  # robot's time of the first feedback with the goals of the newest one
         self._waits = False
         self._engaged = False
@@ -100,7 +103,7 @@ class Clutch:
 
     @property
     def waits(self) -> bool:
-        """Whether it was not engaged only because the goals do not stand still yet."""
+        """Whether it was not engaged only because the goals do not stand still yet, or one may be under way."""
         return self._waits
 
     @property
@@ -130,7 +133,7 @@ class Clutch:
 
         Returns:
             Whether it is engaged: not without a feedback, not while the robot needs a neutral command, not with a
-            reading that is not known, and not before the goals stand still (`waits`).
+            reading that is not known, and not before the goals stand still and none is under way (`waits`).
 
         Raises:
             ValueError: not one reading per axis.
@@ -139,7 +142,7 @@ class Clutch:
         readings = self._readings(device)
         if readings is None or self._newest is None:
             return False
-        self._waits = not self._stands(self._newest)
+        self._waits = self._is_under_way(self._newest) or not self._stands(self._newest)
         if self._waits:
             return False
         for bound, reading in zip(self._bound, readings, strict=True):
@@ -161,8 +164,9 @@ class Clutch:
         readings = self._readings(device)
         if readings is None:
             self.release()
-        if readings is None or not self._engaged:
+        if readings is None or not self._engaged or self._newest is None:
             return [None] * len(self._bound)
+        self._given = self._newest.event
         found = [bound.goal(reading) for bound, reading in zip(self._bound, readings, strict=True)]
         self._clipped = tuple(
             bound.axis.name for bound, (_, clipped) in zip(self._bound, found, strict=True) if clipped
@@ -184,7 +188,14 @@ class Clutch:
         The newest one may be of another state, or of another run of the robot bridge.
         """
         self.release()
-        self._newest = None
+        self._newest = self._given = None
+
+    def _is_under_way(self, newest: Feedback) -> bool:
+        """Return whether a goal from before it was released may execute after this feedback.
+
+        It left in the command after its feedback, or, made ready before its turn, in the one after that.
+        """
+        return self._given is not None and newest.event in (self._given, event_after(self._given))
 
     def _stands(self, newest: Feedback) -> bool:
         """Return whether the goals are where the robot rests: a pose reads them anew once it has settled."""

@@ -50,8 +50,11 @@ async def _drive_on(console: Console, clutch: Clutch, newest: Newest, hand: Hand
     clock = asyncio.get_running_loop().time
     with suppress(NotArmed):
         await console.arm()
-    if not await _engaged(console, clutch, newest, hand):
-        say("not engaged: the leader is not known, or the robot is not ready; let go, and press again")
+    if not await _engaged(console, clutch, newest, hand, say):
+        if hand.held(clock()):
+            say("not engaged: the leader is not known, or the robot is not ready; let go, and press again")
+        else:
+            say("rests")
         return
     clipped: tuple[str, ...] = ()
     say("drives")
@@ -67,11 +70,17 @@ async def _drive_on(console: Console, clutch: Clutch, newest: Newest, hand: Hand
     say("rests" if not hand.held(clock()) else "rests: the clutch was released; let go, and press again")
 
 
-async def _engaged(console: Console, clutch: Clutch, newest: Newest, hand: Hand) -> bool:
+async def _engaged(console: Console, clutch: Clutch, newest: Newest, hand: Hand, say: Callable[[str], None]) -> bool:
     """Engage, as soon as the robot stands still: a press may come soon after the one before."""
     clock = asyncio.get_running_loop().time
+    said = False
     while not clutch.engage(newest.readings(clock())):
-        if not clutch.waits or await _answered(console.drive({}), hand, clock) is None:
+        if not clutch.waits:
+            return False
+        if not said:
+            said = True
+            say("waits until the robot stands still")
+        if await _answered(console.drive({}), hand, clock) is None:
             return False
     return True
 

@@ -121,9 +121,10 @@ class PoseSolver:
         """Return the joint goals after `seconds`.
 
         `joints`: the goals before. `position` (m) and `rotation` (3 x 3): of the tool. `velocity` (m/s) and `spin`
-        (rad/s): of that pose, so that the tool follows it without lag. `share`: of the joints' rates, 0 to 1.
-        `before`: the rates of the step before; without them a rate may change at once. `turns`: False to keep the
-        rotation that the tool has, as far as its way to the position allows.
+        (rad/s): of that pose, so that the tool follows it without lag. `share`: of the joints' rates, 0 to 1, for what
+        is wanted; where it falls, a joint may be faster while it brakes, or while it keeps a gap that the joints that
+        brake would narrow. `before`: the rates of the step before; without them a rate may change at once. `turns`:
+        False to keep the rotation that the tool has, as far as its way to the position allows.
         """
         here = np.array(joints)
         state = self._chain.at(joints)

@@ -72,6 +72,16 @@ def test_the_motors_are_told_at_first_to_be_where_they_are(robots: list[Robot]) 
     assert device.made("act")[0] == {"pan.pos": 30.0, "x.vel": 0.0}
 
 
+def test_a_new_bridge_forgets_the_goals_from_before_so_a_gripper_squeezes_no_more(robots: list[Robot]) -> None:
+    device = FakeDevice()
+    device.yields = {"pan.pos": -4.0, "gripper.pos": 15.0}
+    device.act({"pan.pos": 10.0, "gripper.pos": 5.0})  # by the bridge before: the arm hangs, and a block is held
+    device.yields = {}
+    robot = make(robots, device)
+    assert robot.goals() == pytest.approx((6.0, 20.0))
+    device.wait("act", {"pan.pos": 6.0, "gripper.pos": 20.0})
+
+
 def test_the_applied_goals_reach_the_device_under_its_own_names(robots: list[Robot]) -> None:
     device = FakeDevice()
     robot = make(robots, device)

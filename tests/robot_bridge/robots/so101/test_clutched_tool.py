@@ -53,6 +53,7 @@ class ClutchedTool(RuleBasedStateMachine):
             self.clutches.add(clutch, 0.0)
         self.devices = [[3.0] * size for size in SIZES]
         self.hand: int | None = None  # that holds
+        self.led: int | None = None  # by the hand that held last, and by nobody else since
         self.kept_still: tuple[float, ...] | None = None  # joints' goals while a hand that engaged has not moved yet
         self.delay, self.losses = 0.0, [False]
         self.up: list[tuple[float, Command | Rest]] = []
@@ -72,32 +73,37 @@ class ClutchedTool(RuleBasedStateMachine):
 
     @rule(
         hand=st.sampled_from([0, 1]), way=st.lists(ways, min_size=6, max_size=6), times=st.integers(1, 3),
-        gap=st.integers(0, 40),
+        gap=st.integers(0, 40), rests=st.booleans(),
     )  # fmt: skip
-    def drive_and_take_hold_again_and_again(self, hand: int, way: list[float], times: int, gap: int) -> None:
+    def drive_and_take_hold_again_and_again(
+        self, hand: int, way: list[float], times: int, gap: int, rests: bool
+    ) -> None:
         if not self.sender.ready:
             self.arm_and_wait()
         for number in range(times):
-            self.take_hold(hand, float(number))
+            self.take_hold(hand, float(number), rests)
             self.ticks_pass(gap)
             self.the_hand_moves(way, 30)
-            self.let_go()
+            self.let_go(rests)
             self.ticks_pass(gap)
 
-    @rule(hand=st.sampled_from([0, 1]), device=st.floats(-3, 3))
-    def take_hold(self, hand: int, device: float) -> None:
-        """Anywhere: it engages as soon as it can. Another hand lets go."""
-        self.let_go()
-        self.hand = hand
+    @rule(hand=st.sampled_from([0, 1]), device=st.floats(-3, 3), rests=st.booleans())
+    def take_hold(self, hand: int, device: float, rests: bool) -> None:
+        """Anywhere: it engages as soon as it can. Another hand lets go, with a rest."""
+        self.let_go(rests or hand != self.led)
+        self.hand = self.led = hand
         self.devices[hand] = [device] * SIZES[hand]
 
-    @rule()
-    def let_go(self) -> None:
-        """With a rest, as `lockstep drive` and the page do: it voids what is under way."""
+    @rule(rests=st.booleans())
+    def let_go(self, rests: bool) -> None:
+        """With a rest, as `lockstep drive` and the page do: it voids what is under way. Or without."""
         self.hand = self.kept_still = None
         for clutch in self.hands:
             clutch.release()
-        self.sender.rest(self.world.now)
+        if rests:
+            self.sender.rest(self.world.now)
+        elif self.sender.ready and not self.sender.resting:
+            self.sender.intend(NEUTRAL, self.world.now)
 
     @rule(way=st.lists(ways, min_size=6, max_size=6), ticks=st.integers(1, 60))
     def the_hand_moves(self, way: list[float], ticks: int) -> None:
@@ -157,7 +163,7 @@ class ClutchedTool(RuleBasedStateMachine):
     def another_operator_takes_over_and_moves_the_arm(self, way: float, ticks: int) -> None:
         self.sender.unseated()
         self.clutches.settle()
-        self.hand = self.kept_still = None
+        self.hand = self.led = self.kept_still = None
         self.up.clear()
         self.world.shaper.rest()
         self.core.need_neutral()

@@ -1,8 +1,9 @@
 """What is promised is found kept in a good recording, and not kept in each kind of tampered one."""
 
 from collections.abc import Callable
+from itertools import count
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 import msgspec
 import pytest
@@ -10,12 +11,14 @@ import pytest
 from lockstep.protocol.console import Report, StreamReport
 from lockstep.protocol.messages import StopState
 from lockstep.protocol.serial import MAX_EVENT
+from lockstep.protocol.traces.trace import CommandSpans
 from lockstep.server.recording.format.records import (
     ActionRecord,
     CommandRecord,
     FeedbackRecord,
     ReportRecord,
     StopRecord,
+    TraceRecord,
 )
 from lockstep.server.recording.format.topics import CAMERA
 from lockstep.server.recording.verify.promises import CheckName
@@ -69,6 +72,28 @@ def with_a_late_command(entry: Entry) -> list[Entry]:
     if entry.event >= 50 and isinstance(entry.record, FeedbackRecord):
         return [changed(entry, time=entry.record.time + 3.0)]
     return [] if entry.event >= 50 and entry.record is None else [entry]
+
+
+def with_a_stall(seconds: float = 2.22, *, voided: bool = False, spans_first: bool = False, **spans: Any) -> Change:
+    """As if event 50 had been fed back 40 ms and `seconds` after the event before, of which the bridge says `spans`."""
+
+    def change(entry: Entry) -> list[Entry]:
+        if entry.event < 50 or not isinstance(entry.record, FeedbackRecord):
+            return [] if entry.event >= 50 and entry.record is None else [entry]
+        late = changed(entry, time=entry.record.time + seconds, neutral_needed=voided and entry.event == 50)
+        if entry.event != 50 or not spans:
+            return [late]
+        about = {name: value for name, value in spans.items() if not name.endswith("_ms")}
+        command = CommandSpans(**{name: value for name, value in spans.items() if name.endswith("_ms")})
+        record = TraceRecord(**{"epoch": EPOCH, "event": 50, "command": command, **about})
+        trace = own_entry(record, entry.arrived, entry.captured)
+        return [trace, late] if spans_first else [late, trace]
+
+    return change
+
+
+def spans_of(tick_wait: float = 4, apply: float = 1, rate_wait: float = 0) -> dict[str, Any]:
+    return {"tick_wait_ms": tick_wait, "apply_ms": apply, "rate_wait_ms": rate_wait}
 
 
 def with_somebody_elses_command(entry: Entry) -> list[Entry]:
@@ -146,6 +171,14 @@ def with_another_epoch(entry: Entry) -> list[Entry]:
         (with_an_event_that_goes_back, "monotonic"),
         (with_an_event_executed_twice, "once"),
         (with_a_late_command, "in_time"),
+        (with_a_stall(), "in_time"),  # without its spans nobody knows when it executed
+        (with_a_stall(**spans_of()), "in_time"),  # it came late, and the bridge was quick
+        (with_a_stall(**spans_of(tick_wait=520)), "in_time"),  # its tick was late, and nothing voided it
+        (with_a_stall(measure_ms=520), "in_time"),
+        (with_a_stall(**spans_of(apply=3000)), "in_time"),  # it cannot have come before the feedback that it answers
+        (with_a_stall(**spans_of(apply=520), peer="p1"), "in_time"),  # the operator's page says so, not the bridge
+        (with_a_stall(**spans_of(apply=520), event=49), "in_time"),
+        (with_a_stall(3.0, voided=True, **spans_of(tick_wait=520)), "in_time"),
         (with_somebody_elses_command, "seat"),
         (with_a_command_while_stopped, "stopped"),
         (with_stop_records(stop_record("stop", "a")), "stopped"),
@@ -165,6 +198,35 @@ def with_another_epoch(entry: Entry) -> list[Entry]:
 def test_a_tampered_recording_fails_the_check_that_it_breaks(tmp_path: Path, tamper: Change, check: CheckName) -> None:
     path = rewritten(tmp_path / "a.mcap", Story(events=80).entries(), tamper)
     assert check in failed(path)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        with_a_stall(voided=True, **spans_of(tick_wait=520)),
+        with_a_stall(**spans_of(apply=520)),
+        with_a_stall(spans_first=True, **spans_of(rate_wait=520)),
+    ],
+    ids=["before its tick, which brought the robot to rest", "in its tick", "after its tick"],
+)
+def test_a_bridge_that_took_a_command_in_time_and_was_held_up_then_has_kept_its_promise(
+    tmp_path: Path, change: Change
+) -> None:
+    assert failed(rewritten(tmp_path / "a.mcap", Story(events=80).entries(), change)) == set()
+
+
+def test_what_verify_cannot_know_it_does_not_claim(tmp_path: Path) -> None:
+    files, answers = count(), "after the feedback that it answers"
+
+    def text(change: Change) -> str:
+        path = rewritten(tmp_path / f"{next(files)}.mcap", Story(events=80).entries(), change)
+        [violation] = verify_file(path).checks["in_time"].violations
+        return violation.text
+
+    assert text(with_a_stall()) == f"executed at most 2.260 s {answers}: when is not recorded; 2 s are allowed"
+    assert text(with_a_stall(**spans_of())) == f"executed 2.255 s {answers}; 2 s are allowed"
+    late_tick = text(with_a_stall(**spans_of(tick_wait=520)))
+    assert late_tick == f"executed 2.259 s {answers}, because its tick was late; 2 s are allowed"
 
 
 @pytest.mark.parametrize(

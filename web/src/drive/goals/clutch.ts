@@ -1,3 +1,4 @@
+import { eventAfter } from "../../gate/serial";
 import type { Axis, Feedback, RobotDescription } from "../../protocol/wire";
 import { wayTo, withinReach, type AxisValue } from "./goal_range";
 
@@ -19,13 +20,14 @@ interface Binding extends ClutchAxis {
 }
 
 /** The measured values and applied goals that a clutch binds to. */
-type Measured = Pick<Feedback, "at_rest" | "axes" | "goals" | "neutral_needed" | "stop" | "time">;
+type Measured = Pick<Feedback, "at_rest" | "axes" | "event" | "goals" | "neutral_needed" | "stop" | "time">;
 
 /**
  * A clutch between a device that has a pose and goal axes (docs/robot-link.md, "The clutch"): engaging moves nothing,
  * then the goals follow the device. It holds no clock and no connection. `observe` every feedback, `engage` when the
  * operator asks for it, and drive what `goals` returns. It engages only while the goals of its axes stand still: a goal
- * that still brakes, or a pose that has not settled, is not where the robot comes to rest.
+ * that still brakes, or a pose that has not settled, is not where the robot comes to rest. Nor does it engage while a
+ * goal that it gave before may still be under way: not before the second event after the feedback that it was made for.
  *
  * A goal further than a share of the axis' reach from the newest measured value is clipped there; the device's motion
  * counts on meanwhile. Call `release` when the operator lets go, and when the seat or the arming is lost. The clutch
@@ -36,8 +38,10 @@ export class Clutch {
   private readonly bindings: readonly Binding[];
   private readonly settling: number; // s
   private newest: Measured | null = null;
+  private given: number | null = null; // event of the feedback for which it gave a goal last
   private stoodAt = 0; // robot's time of the first feedback with the goals of the newest one
   private isEngaged = false;
+  private isWaiting = false;
   private clippedAxes: readonly number[] = [];
 
   constructor(axes: readonly ClutchAxis[]) {
@@ -55,6 +59,11 @@ export class Clutch {
   /** Whether the goals follow the device. */
   get engaged(): boolean {
     return this.isEngaged;
+  }
+
+  /** Whether it was not engaged only because its goals do not stand still yet, or one may be under way. */
+  get waits(): boolean {
+    return this.isWaiting;
   }
 
   /** The axes, by number in this clutch, whose newest goal is nearer than the device asks for. */
@@ -82,13 +91,15 @@ export class Clutch {
   /**
    * Binds the device's readings, one for each axis of the clutch, to the applied goals of the newest feedback; again, if
    * it is engaged. Says whether it is engaged now: not without a feedback, not with a reading that is not known, and not
-   * before the goals stand still.
+   * before the goals stand still and none is under way (`waits`).
    */
   engage(device: readonly AxisValue[]): boolean {
     this.release();
     const { newest } = this;
     if (newest === null || !isKnown(device, this.bindings.length)) return false;
-    if (!newest.at_rest && newest.time - this.stoodAt <= this.settling) return false;
+    this.isWaiting =
+      this.isUnderWay(newest) || !(newest.at_rest || newest.time - this.stoodAt > this.settling);
+    if (this.isWaiting) return false;
     for (const [at, each] of this.bindings.entries()) {
       each.origin = each.applied = newest.goals[each.index] ?? 0;
       each.measured = each.origin + wayTo(each.axis, each.origin, newest.axes[each.index] ?? 0);
@@ -101,7 +112,8 @@ export class Clutch {
   /** One goal for each axis of the clutch; null for each unless it is engaged. */
   goals(device: readonly AxisValue[]): AxisValue[] {
     if (!isKnown(device, this.bindings.length)) this.release();
-    if (!this.isEngaged) return this.bindings.map(() => null);
+    if (!this.isEngaged || this.newest === null) return this.bindings.map(() => null);
+    this.given = this.newest.event;
     const clipped: number[] = [];
     const goals = this.bindings.map((each, at) => {
       const reading = device[at] ?? 0;
@@ -118,14 +130,22 @@ export class Clutch {
 
   /** Lets go: the goals are null until it is engaged anew, anywhere. */
   release(): void {
-    this.isEngaged = false;
+    this.isEngaged = this.isWaiting = false;
     this.clippedAxes = [];
   }
 
   /** Lets go, and does not engage before another feedback: the newest one may be of another state, or another run. */
   lostFeedback(): void {
     this.release();
-    this.newest = null;
+    this.newest = this.given = null;
+  }
+
+  /**
+   * Whether a goal from before it was released may execute after this feedback: it left in the command after its own
+   * feedback or, made ready before its turn, in the one after that.
+   */
+  private isUnderWay({ event }: Measured): boolean {
+    return this.given !== null && (event === this.given || event === eventAfter(this.given));
   }
 
   private isUsable(feedback: Measured): boolean {

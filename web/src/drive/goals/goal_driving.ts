@@ -5,8 +5,12 @@ import type { AxisValue } from "./goal_range";
 import type { GoalRefusal } from "./goal_refusal";
 import { createJog, stepJog, type AxisPlace, type Jog } from "./jog";
 
+/** Most waits are shorter: they need no words. */
+const SAID_AFTER_MS = 300;
+
 /** A device that has a pose and drives goal axes by a clutch of its own: a headset, a leader arm. */
 export interface GoalDevice {
+  readonly waits: boolean; // its operator wants to drive, and its clutch waits until the robot stands still
   /** One value for each axis of the robot, null where it drives none. Asked only while its operator may drive. */
   goals(feedback: Feedback): readonly AxisValue[];
   /** Driving has ended, for whatever reason: it engages anew. */
@@ -39,6 +43,7 @@ export class GoalDriving {
   speed = 1; // of the axes' largest speed that the next command uses at most
   refusal: GoalRefusal | null = null; // the newest
   device: GoalDevice | null = null;
+  waitsSinceMs: number | null = null; // a slider or the device is held, and moves nothing until the robot stands still
   private description: RobotDescription | null = null;
   private axes: readonly GoalAxis[] = [];
 
@@ -56,23 +61,27 @@ export class GoalDriving {
     const taken = [...values];
     let fastest = 0;
     for (const each of this.axes) {
-      const [goal, share] = this.goalOf(each, posed[each.index] ?? null, inputs, feedback, now);
-      if (idle.has(each.axis.name)) {
-        each.jog.goal = null;
-        each.clutch.release(); // a slider that is held meanwhile goes on from where the pose has led its axis
-        taken[each.index] = null;
-        continue;
-      }
+      const isIdle = idle.has(each.axis.name);
+      const posedAt = posed[each.index] ?? null;
+      const [goal, share] = this.goalOf(each, posedAt, isIdle, inputs, feedback, now);
       taken[each.index] = goal;
       fastest = Math.max(fastest, share);
     }
+    const waits = this.device?.waits === true || this.axes.some(({ clutch }) => clutch.waits);
+    this.waitsSinceMs = waits ? (this.waitsSinceMs ?? now) : null;
     this.speed = fastest * inputs.share;
     return taken;
+  }
+
+  /** Whether somebody wants to drive and has waited for so long that the page says for what. */
+  saysWhatItWaitsFor(now: number): boolean {
+    return this.waitsSinceMs !== null && now - this.waitsSinceMs >= SAID_AFTER_MS;
   }
 
   /** Nobody drives: each hand engages anew. */
   release(): void {
     this.speed = 1;
+    this.waitsSinceMs = null;
     for (const { jog, clutch } of this.axes) {
       jog.goal = null;
       clutch.lostFeedback();
@@ -98,22 +107,23 @@ export class GoalDriving {
     });
   }
 
-  /** Goal, and the share of the axis' largest speed that it needs. */
+  /** Goal, and the share of the axis' largest speed that it needs. `isIdle`: a pose moves the axis instead. */
   private goalOf(
     { index, axis, jog, clutch }: GoalAxis,
     posed: AxisValue,
+    isIdle: boolean,
     { layer, held, share }: GoalInputs,
     feedback: Feedback,
     now: number,
   ): readonly [AxisValue, number] {
     const place = placeOf(feedback, index, axis);
     clutch.observe(feedback); // also while nobody drags: it has to see that its goal stands still
-    const travel = place === null ? undefined : held.sliders?.travels[axis.name];
-    const dragged = travel === undefined ? null : drag(clutch, axis, travel);
-    if (travel === undefined || posed !== null) clutch.release();
-    const led = posed ?? dragged;
+    const isFree = place !== null && posed === null && !isIdle;
+    const travel = isFree ? held.sliders?.travels[axis.name] : undefined;
+    if (travel === undefined) clutch.release(); // a slider that is held goes on from where the pose has led its axis
+    const led = travel !== undefined ? drag(clutch, axis, travel) : isIdle ? null : posed;
     const push = held.sliders?.pushes[axis.name] ?? inputFor(axis, layer, held);
-    const input = led === null ? push : 0;
+    const input = led === null && !isIdle ? push : 0;
     const jogged = stepJog(jog, axis, input * share * axis.slew, place, now);
     if (led !== null) return [led, 1];
     return [jogged, jogged === null ? 0 : Math.min(1, Math.abs(input))];

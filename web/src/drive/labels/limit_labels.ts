@@ -6,6 +6,8 @@ export interface LimitLabel {
   readonly text: string;
 }
 
+export const WAITS_LABEL = "Waits until the robot stands still";
+
 /** What holds the robot back now, the gravest first. */
 export function limitLabels(
   feedback: Feedback | null,
@@ -13,8 +15,10 @@ export function limitLabels(
   cap: SpeedCapState | null,
   share: number,
   refused: readonly string[] = [], // goals, in words
+  waits = false, // somebody wants to drive a goal axis that does not stand still yet
 ): LimitLabel[] {
   const words: LimitLabel[] = refused.map((text) => ({ tone: "fault", text }));
+  if (waits) words.push({ tone: "limit", text: WAITS_LABEL });
   for (const fault of feedback?.faults ?? []) words.push({ tone: "fault", text: fault });
   for (const name of feedback?.limits ?? [])
     words.push({ tone: "limit", text: limitLabel(name, description) });

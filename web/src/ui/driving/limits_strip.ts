@@ -16,7 +16,8 @@ export function createLimitsStrip(engine: ConsoleEngine): Panel {
       const description = state.robot?.description ?? null;
       const refusal = shownRefusal(engine.goals?.refusal ?? null, now);
       const refused = refusal === null ? [] : [goalRefusalWords(refusal, description)];
-      const words = limitLabels(state.feedback, description, state.speedCap, share, refused);
+      const waits = engine.goals?.saysWhatItWaitsFor(now) ?? false;
+      const words = limitLabels(state.feedback, description, state.speedCap, share, refused, waits);
       const key = JSON.stringify(words);
       if (key === shown) return;
       shown = key;

@@ -12,6 +12,7 @@ interface Step {
     neutral_needed?: boolean;
     at_rest?: boolean;
     time?: number;
+    event?: number;
   };
   readonly engage?: AxisValue[];
   readonly move?: AxisValue[];
@@ -30,8 +31,9 @@ interface Case {
 
 const { cases } = readVectors("clutch") as { cases: Case[] };
 
-function play(clutch: Clutch, step: Step, about: string): void {
-  if (step.feedback !== undefined) clutch.observe(feedbackOf(1, step.feedback));
+/** `event`: of a feedback that names none. */
+function play(clutch: Clutch, step: Step, event: number, about: string): void {
+  if (step.feedback !== undefined) clutch.observe(feedbackOf(event, step.feedback));
   if (step.engage !== undefined) clutch.engage(step.engage);
   if (step.release === true) clutch.release();
   if (step.lost === "feedback") clutch.lostFeedback();
@@ -55,7 +57,9 @@ describe("the clutch does what the shared cases say", () => {
     const clutch = new Clutch(
       axes.map(({ scale, settling = 0, ...axis }, index) => ({ index, axis, scale, settling })),
     );
-    steps.forEach((step, number) => play(clutch, step, `step ${number}: ${JSON.stringify(step)}`));
+    steps.forEach((step, number) =>
+      play(clutch, step, 10 * number + 10, `step ${number}: ${JSON.stringify(step)}`),
+    );
   });
 });
 
@@ -96,7 +100,7 @@ describe("a clutch", () => {
         if (lot < 0.4) {
           const applied = place.applied + random() - 0.5;
           place = { applied, measured: applied + 3 * random() - 1.5 };
-          clutch.observe(feedbackOf(step, { axes: [place.measured], goals: [applied] }));
+          clutch.observe(feedbackOf(2 * step + 1, { axes: [place.measured], goals: [applied] }));
         } else if (lot < 0.5) clutch.release();
         else if (lot < 0.55) clutch.lostFeedback();
         else if (lot < 0.7) {

@@ -19,6 +19,7 @@ const layer: ControlLayer = {
   ],
 };
 const feedback = feedbackOf(5, { axes: [0, 1, -1], goals: [null, 1.05, -1] });
+const later = { ...feedback, event: 7 };
 const REST: readonly AxisValue[] = [0, null, null];
 
 function heldOf(keys: readonly string[], travels: Record<string, number> = {}, pushes = {}): HeldInputs {
@@ -73,7 +74,12 @@ describe("goal axes", () => {
     expect(takeAt(driving, inputsOf(heldOf([], { elbow: 0.45 })), 10)[1]).toBeCloseTo(1.25); // of 4 rad
     expect(takeAt(driving, inputsOf(heldOf([], { elbow: 1 })), 20)[1]).toBeCloseTo(1.4); // 0.8 of reach
     expect(takeAt(driving, inputsOf(heldOf([])), 30)).toEqual(REST);
-    expect(takeAt(driving, inputsOf(heldOf([], { elbow: -0.2 })), 40)[1]).toBe(1.05);
+    const again = heldOf([], { elbow: -0.2 });
+    expect(takeAt(driving, inputsOf(again), 40)[1]).toBeNull(); // a goal may be under way
+    expect(driving.saysWhatItWaitsFor(40)).toBe(false); // yet
+    expect(driving.saysWhatItWaitsFor(340)).toBe(true);
+    expect(takeAt(driving, inputsOf(again, { feedback: later }), 350)[1]).toBe(1.05);
+    expect(driving.saysWhatItWaitsFor(700)).toBe(false);
   });
 
   it("are pushed by arrow keys on a slider, which wins over its layer's keys", () => {
@@ -86,7 +92,7 @@ describe("goal axes", () => {
   it("follow a device, which is let go whenever nothing may move", () => {
     const driving = new GoalDriving();
     let released = 0;
-    driving.device = { goals: () => [9, 1.3, null], release: () => (released += 1) };
+    driving.device = { goals: () => [9, 1.3, null], release: () => (released += 1), waits: false };
     expect(takeAt(driving, inputsOf(heldOf(["KeyE"])), 0)).toEqual([0, 1.3, -1]);
     expect(driving.speed).toBe(1);
     const before = released;
@@ -105,7 +111,8 @@ describe("goal axes", () => {
       for (let now = 0; now < 100; now += 10) takeAt(driving, inputsOf(held), now);
       const rates = neutralValues(axes);
       expect(driving.take(rates, inputsOf(held, lost), 100)[1]).toBeNull();
-      expect(takeAt(driving, inputsOf(held), 110)[1]).toBe(1.05);
+      expect(takeAt(driving, inputsOf(held, { feedback: later }), 110)[1]).toBe(1.05);
+      driving.release();
     }
   });
 
@@ -170,7 +177,7 @@ describe("a pose that a device drives", () => {
     const places = feedbackOf(5, { axes: [1, 0, 0, 0], goals: [1, 0, 0, 0] });
     const inputs = inputsOf(heldOf(["KeyW"]), { description: robot, feedback: places });
     expect(driving.take([null, null, null, null], inputs, 0)).toEqual([1, null, null, null]);
-    driving.device = { goals: () => [null, 0.1, 0.2, 0.3], release: () => undefined };
+    driving.device = { goals: () => [null, 0.1, 0.2, 0.3], release: () => undefined, waits: false };
     expect(driving.take([null, null, null, null], inputs, 10)).toEqual([null, 0.1, 0.2, 0.3]);
   });
 
@@ -190,7 +197,7 @@ describe("a pose that a device drives", () => {
     });
     for (const name of ["elbow", "x"]) {
       const held = heldOf([], { [name]: 0.1 });
-      driving.device = { goals: () => [null, 0.1, 0.2, 0.3], release: () => undefined };
+      driving.device = { goals: () => [null, 0.1, 0.2, 0.3], release: () => undefined, waits: false };
       driving.take(rest, at(0, held), 0);
       driving.take(rest, at(0.3, held), 10);
       driving.device = null;

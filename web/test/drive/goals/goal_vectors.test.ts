@@ -41,8 +41,9 @@ describe("the clutch does what the bridge's cases say", () => {
   it.each(vectors.clutch)("$name", ({ scale, steps }) => {
     const clutch = new Clutch([{ index: 0, axis: { reach: Infinity, wrap: null }, scale }]);
     let device: AxisValue = null;
-    for (const step of steps) {
-      if (step.do === "feedback") clutch.observe(feedbackOf(1, { axes: [0], goals: [step.goal ?? null] }));
+    for (const [number, step] of steps.entries()) {
+      const found = { axes: [0], goals: [step.goal ?? null] };
+      if (step.do === "feedback") clutch.observe(feedbackOf(10 * number + 10, found));
       device = step.device ?? device;
       if (step.do === "engage") clutch.engage([device]);
       if (step.do === "release") clutch.release();

@@ -53,3 +53,10 @@ it("a delay that is not known is called so", () => {
     { tone: "cap", text: "Speed 20 % · delay unknown" },
   ]);
 });
+
+it("a hand that waits for the robot to stand still is told so, after what was refused", () => {
+  expect(limitLabels(null, null, null, 1, ["Refused"], true)).toEqual([
+    { tone: "fault", text: "Refused" },
+    { tone: "limit", text: "Waits until the robot stands still" },
+  ]);
+});

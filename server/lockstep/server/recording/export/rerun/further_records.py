@@ -8,6 +8,7 @@ import msgspec
 import numpy as np
 import rerun as rr
 
+from lockstep.protocol.description import RobotDescription
 from lockstep.protocol.errors import MessageError
 from lockstep.protocol.maps import OccupancyMap, map_cells
 from lockstep.protocol.traces.trace import COMMAND_WAY, PICTURE_WAY, CommandSpans, PictureSpans, Span
@@ -31,21 +32,30 @@ MAP, GRID, PATH, GOAL = "/map", "/map/grid", "/map/path", "/map/goal"
 PEOPLE = "/people"
 REPORTED = ("gap", "largest gap", "discarded", "tolerance")
 DELAYS = ("command to picture, ms", "round trip, ms")
+MOST_ENTITIES = 1000  # of an epoch: people name themselves and their shadows, and may do so anew each time they connect
 
 
 class FurtherRecords:
-    """Takes those records, in the order of their arrival, and adds their rows to `columns`."""
+    """Takes those records, in the order of their arrival, and adds their rows to `columns`.
+
+    Peers choose some of the names in them. Rerun keeps an entity for ever, so a stream that the robot does not have,
+    and an entity above `MOST_ENTITIES`, are left out.
+    """
 
     def __init__(self, stream: rr.RecordingStream, columns: Columns) -> None:
         self._stream = stream
         self._columns = columns
         self._axes: list[str] = []
+        self._streams: frozenset[str] = frozenset()
+        self._entities: set[str] = set()
         self._named: set[str] = set()  # entities whose lines have names
         self._states: dict[str, str] = {}  # by entity, as told last
 
-    def begin(self, axes: list[str]) -> None:
-        """Take the names of the robot's axes."""
-        self._axes = axes
+    def begin(self, description: RobotDescription) -> None:
+        """Take the names of the robot's axes, cameras and microphones."""
+        self._axes = [axis.name for axis in description.axes]
+        cameras, microphones = description.cameras, description.microphones
+        self._streams = frozenset([each.name for each in cameras] + [each.name for each in microphones])
         self._named.clear()
 
     def take(self, record: OwnRecord, at: Moment) -> None:
@@ -77,15 +87,22 @@ class FurtherRecords:
 
     def state(self, path: str, at: Moment, state: str) -> None:
         """Tell a state where it changes; "": none holds."""
-        if self._states.get(path, "") != state:
+        if self._states.get(path, "") != state and self._has_room(path):
             self._states[path] = state
             self._columns.state(path, at, state)
 
     def _lines(self, path: str, names: list[str], at: Moment, values: Sequence[float | None]) -> None:
+        if not self._has_room(path):
+            return
         if path not in self._named:
             self._named.add(path)
             self._stream.log(path, rr.SeriesLines(names=names), static=True)
         self._columns.scalars(path, at, [math.nan if value is None else value for value in values])
+
+    def _has_room(self, path: str) -> bool:
+        if len(self._entities) < MOST_ENTITIES:
+            self._entities.add(path)
+        return path in self._entities
 
     def _map(self, map: OccupancyMap, at: Moment) -> None:
         try:
@@ -117,11 +134,12 @@ class FurtherRecords:
         self._lines(f"{path}/delays", list(DELAYS), at, [report.picture_delay_ms, report.round_trip_ms])
         for each in report.streams:
             values = [each.gap, each.max_gap, each.discarded, each.tolerance]
-            self._lines(f"{path}{entity(each.stream)}", list(REPORTED), at, values)
+            if each.stream in self._streams:
+                self._lines(f"{path}{entity(each.stream)}", list(REPORTED), at, values)
 
     def _trace(self, record: TraceRecord, at: Moment) -> None:
         self._way("/trace/command", COMMAND_WAY, record.command, at)
-        if record.stream:
+        if record.stream in self._streams:
             self._way(f"/trace/picture{entity(record.stream)}", PICTURE_WAY, record.picture, at)
 
     def _way(self, path: str, way: Sequence[Span], spans: CommandSpans | PictureSpans, at: Moment) -> None:

@@ -64,7 +64,7 @@ class SessionLog:
         log_bodies(self._stream, description, self._paths)
         log_cameras(self._stream, description.cameras, self._paths)
         axes = [axis.name for axis in description.axes]
-        self._further.begin(axes)
+        self._further.begin(description)
         named = {
             MEASURED: axes,
             COMMANDED: axes,
