@@ -14,7 +14,7 @@ from lockstep.bench.harness.stack import LOCKSTEP
 from lockstep.client import Console
 from tests.lerobot.commands import PATIENCE, Arm, environment, lerobot_python, newest
 
-pytestmark = [pytest.mark.long, pytest.mark.timeout(300)]
+pytestmark = [pytest.mark.long, pytest.mark.timeout(1500)]
 
 REPEAT = 0.04  # s between two characters of a held key
 
