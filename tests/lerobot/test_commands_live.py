@@ -151,7 +151,8 @@ async def test_a_stopped_robot_is_not_driven_and_the_command_says_why(arm: Arm, 
         await console.stop("a person is near")
     with pytest.raises(AssertionError, match="stopped"):
         await run_lerobot(
-            *(tmp_path, "lerobot-teleoperate", "--robot.type=lockstep", *LEADER, "--fps=15", "--teleop_time_s=2"),
+            *(tmp_path, "lerobot-teleoperate", "--robot.type=lockstep", *LEADER, *PATIENT),
+            *("--fps=15", "--teleop_time_s=2"),
             link=arm.stack.operator,
         )
 
