@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.lerobot.commands import Arm, environment, lerobot_python
+from tests.lerobot.commands import PATIENCE, Arm, environment, lerobot_python
 from tests.support.stack import running_stack
 
 SETTINGS = """
@@ -21,7 +21,8 @@ async def running_arm(directory: Path, settings: str = SETTINGS) -> AsyncIterato
     file = directory / "arm.yaml"
     file.write_text(settings)
     extra = ("--lerobot", str(file), "--robot-python", lerobot_python())
-    async with running_stack(directory, extra=extra, settings=environment(directory)) as stack:
+    settings_of_all = environment(directory)
+    async with running_stack(directory, extra=extra, settings=settings_of_all, ready_seconds=PATIENCE) as stack:
         yield Arm(stack, directory)
 
 

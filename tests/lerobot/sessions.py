@@ -13,7 +13,7 @@ from tests.support.stack import Stack, running_stack
 
 __all__ = ["PATIENCE", "drive", "following", "recorded_stack", "so101_joints", "so101_tool"]
 
-PATIENCE = 120.0
+PATIENCE = 600.0
 Motion = Callable[[float, Mapping[str, float]], dict[str, float]]
 """Values by axis after some seconds, from where the axes were at the beginning."""
 PASSING = ("late", "link_down", "not_neutral", "rested")
@@ -24,7 +24,7 @@ async def recorded_stack(directory: Path, robot: str, recordings: Path) -> Async
     """`lockstep up` that records, with the event drawn into each picture."""
     settings = {"LOCKSTEP_EPISODES__COUNTDOWN_SECONDS": "0", "SO101_MODEL_FOLDER": str(ROOT / ".so101")}
     extra = ("--record", str(recordings), "--event-strip")
-    async with running_stack(directory, robot=robot, extra=extra, settings=settings) as stack:
+    async with running_stack(directory, robot=robot, extra=extra, settings=settings, ready_seconds=PATIENCE) as stack:
         yield stack
 
 

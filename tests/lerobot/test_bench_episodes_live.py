@@ -11,7 +11,7 @@ import pytest
 from tests.lerobot.commands import ROOT, run_lerobot
 from tests.lerobot.test_datasets_live import SMALL_ACT
 
-pytestmark = [pytest.mark.long, pytest.mark.timeout(1500)]
+pytestmark = [pytest.mark.long, pytest.mark.timeout(3600)]
 
 FEW = ("--times", "3", "--discard", "1", "--redo", "1", "--no-pictures")
 

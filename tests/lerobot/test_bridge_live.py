@@ -15,7 +15,7 @@ from lockstep.protocol.messages import Feedback
 from tests.lerobot.commands import PATIENCE, Arm, environment, lerobot_python, newest, reach
 from tests.lerobot.conftest import SETTINGS, running_arm
 
-pytestmark = [pytest.mark.long, pytest.mark.timeout(300)]
+pytestmark = [pytest.mark.long, pytest.mark.timeout(1500)]
 
 
 async def feedback_with(console: Console, fault: str) -> Feedback:

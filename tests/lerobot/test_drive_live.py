@@ -8,15 +8,18 @@ from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from lockstep.bench.harness.stack import LOCKSTEP
 from lockstep.client import Console
 from tests.lerobot.commands import PATIENCE, Arm, environment, lerobot_python, newest
 
-pytestmark = [pytest.mark.long, pytest.mark.timeout(300)]
+pytestmark = [pytest.mark.long, pytest.mark.timeout(1500)]
 
 REPEAT = 0.04  # s between two characters of a held key
+SLEW = 60.0  # degrees/s, of the arm's goals
+TICK = 0.2  # s that a goal is older than its feedback at most: the arm's watchdog
 
 
 class Terminal:
@@ -95,11 +98,13 @@ async def test_the_leader_drives_only_while_the_key_is_held(arm: Arm, tmp_path: 
         assert watching.feedback is not None
         start = list(watching.feedback.axes)
         goals: list[float] = []
+        times: list[float] = []  # s, of the bridge
 
         async def watch() -> None:
             async for feedback in watching.feedbacks():
                 if feedback.goals and feedback.goals[0] is not None:
                     goals.append(feedback.goals[0])
+                    times.append(feedback.time)
 
         task = asyncio.create_task(watch())
         try:
@@ -124,8 +129,8 @@ async def test_the_leader_drives_only_while_the_key_is_held(arm: Arm, tmp_path: 
         terminal.type("q")
         async with asyncio.timeout(PATIENCE):
             assert await terminal.process.wait() == 0
-        steps = [abs(b - a) for a, b in zip(goals, goals[1:], strict=False)]
-        assert max(steps) < 20.0  # no leap, at 60 degrees/s
+        steps = np.abs(np.diff(goals))
+        assert (steps <= SLEW * (np.diff(times) + TICK)).all()  # no leap
 
 
 async def test_without_a_terminal_it_says_so(arm: Arm, tmp_path: Path) -> None:

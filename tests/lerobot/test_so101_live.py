@@ -12,7 +12,7 @@ from tests.lerobot.commands import PATIENCE, newest, reach
 from tests.lerobot.conftest import running_arm
 from tests.lerobot.parts.feetech_bus import FeetechBus
 
-pytestmark = [pytest.mark.long, pytest.mark.timeout(400)]
+pytestmark = [pytest.mark.long, pytest.mark.timeout(1500)]
 
 NAMES = ("shoulder_pan", "shoulder_lift", "elbow_flex", "wrist_flex", "wrist_roll", "gripper")
 LIMITS = dict.fromkeys(range(1, 6), (1024, 3072)) | {6: (2000, 3000)}

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from lockstep.bench.harness.processes import Running, running_process
+from lockstep.bench.harness.processes import READY_SECONDS, Running, running_process
 from lockstep.bench.harness.stack import LOCKSTEP
 from lockstep.server.fleet.simulated import own_event_log
 from tests.support.event_logs import PATIENCE, written
@@ -116,12 +116,13 @@ async def running_stack(
     extra: tuple[str, ...] = (),
     settings: Mapping[str, str] | None = None,
     lockstep: Path | None = None,
+    ready_seconds: float = READY_SECONDS,
 ) -> AsyncIterator[Stack]:
     """Start `lockstep up`, wait until it says that it is ready, and end it on leaving. `lockstep`: another one's."""
     event_log = directory / "events.jsonl"
     command: tuple[str, ...] = ("up", "--json", "--robot", robot, "--port", str(port), "--robot-port", "0")
     command = (*command, "--event-log", str(event_log), *extra)
-    async with _running(directory, command, event_log, settings, lockstep) as stack:
+    async with _running(directory, command, event_log, settings, lockstep, ready_seconds) as stack:
         yield stack
 
 
@@ -156,11 +157,12 @@ async def _running(
     event_log: Path,
     settings: Mapping[str, str] | None = None,
     lockstep: Path | None = None,
+    ready_seconds: float = READY_SECONDS,
 ) -> AsyncIterator[Stack]:
     # One state directory for all runs of a test: the key in it lets a page's token outlive a restart of the console.
     environment = {"PYTHONWARNINGS": "default", "LOCKSTEP_STATE_DIR": str(directory / "state"), **(settings or {})}
     command = (*FIRST, str(lockstep or LOCKSTEP), *arguments)
-    async with running_process(*command, environment=environment) as (running, links):
+    async with running_process(*command, environment=environment, ready_seconds=ready_seconds) as (running, links):
         try:
             yield Stack(running=running, event_log=event_log, **links)
         finally:

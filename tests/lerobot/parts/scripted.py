@@ -1,4 +1,6 @@
-"""A leader of the tests behind LeRobot's Teleoperator class: it moves by the clock, as nobody's hand is here."""
+"""A leader of the tests behind LeRobot's Teleoperator class, as nobody's hand is here: it moves by the clock, or so far
+with each action.
+"""
 
 import math
 import time
@@ -16,6 +18,7 @@ __all__ = ["Scripted", "ScriptedConfig"]
 class ScriptedConfig(TeleoperatorConfig):
     swing: float = 15.0  # degrees
     period: float = 4.0  # s
+    steps: int = 0  # actions of one period, whenever they are asked for; 0: the clock counts
 
 
 class Scripted(Teleoperator):
@@ -26,6 +29,7 @@ class Scripted(Teleoperator):
         super().__init__(config)
         self.config = config
         self._began: float | None = None
+        self._asked = 0
 
     @property
     def action_features(self) -> dict[str, Any]:
@@ -52,9 +56,15 @@ class Scripted(Teleoperator):
     def configure(self) -> None:
         pass
 
-    def get_action(self) -> dict[str, float]:
+    def _turn(self) -> float:
+        """From -1 to 1."""
         assert self._began is not None
-        turn = math.sin((time.monotonic() - self._began) / self.config.period * math.tau)
+        self._asked += 1
+        by_clock = (time.monotonic() - self._began) / self.config.period
+        return math.sin((self._asked / self.config.steps if self.config.steps else by_clock) * math.tau)
+
+    def get_action(self) -> dict[str, float]:
+        turn = self._turn()
         return {
             "pan.pos": 10.0 + self.config.swing * turn,
             "lift.pos": -20.0 + self.config.swing * turn,

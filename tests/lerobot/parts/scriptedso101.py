@@ -1,7 +1,5 @@
 """A leader for an SO-101. LeRobot looks for a device's class in the module of its name, in lower case."""
 
-import math
-import time
 from dataclasses import dataclass
 from typing import Any
 
@@ -37,6 +35,4 @@ class ScriptedSo101(Scripted):
         return dict.fromkeys(self.home, float)
 
     def get_action(self) -> dict[str, float]:
-        assert self._began is not None
-        turn = math.sin((time.monotonic() - self._began) / self.config.period * math.tau)
-        return self.home | {"shoulder_pan.pos": self.config.swing * turn}
+        return self.home | {"shoulder_pan.pos": self.config.swing * self._turn()}
