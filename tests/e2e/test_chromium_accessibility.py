@@ -20,7 +20,8 @@ pytestmark = [pytest.mark.browser, pytest.mark.timeout(240)]
 
 State = Callable[[ConsolePage], Awaitable[None]]
 
-STOPPED = {"stopped": True, "by": "Ann", "reason": "stop button", "number": 7_000_000}
+NUMBER = 9_000_000_000_000_000  # newer than any that the shared robot has given; a restart of its bridge takes a leap
+STOPPED = {"stopped": True, "by": "Ann", "reason": "stop button", "number": NUMBER}
 
 
 async def _ready(console: ConsolePage) -> None:
@@ -42,15 +43,15 @@ async def _stopped(console: ConsolePage) -> None:
 
 
 async def _not_kept_and_refused(console: ConsolePage) -> None:
-    await alter(console, stop=STOPPED | {"kept": False, "number": 7_000_001})
-    refusal = {"event": 0, "reason": "stale_reset", "current": 1, "detail": "", "stop": 7_000_000}
+    await alter(console, stop=STOPPED | {"kept": False, "number": NUMBER + 1})
+    refusal = {"event": 0, "reason": "stale_reset", "current": 1, "detail": "", "stop": NUMBER}
     await say(console, "stop", {"type": "refusal"} | refusal)
     await console.page.locator(".plate").get_by_text("could not save").wait_for()
     await console.page.locator(".plate").get_by_text("Not reset").wait_for()
 
 
 async def _locked(console: ConsolePage) -> None:
-    await alter(console, stop=STOPPED | {"locked_out": "key switch at the door", "number": 7_000_002})
+    await alter(console, stop=STOPPED | {"locked_out": "key switch at the door", "number": NUMBER + 2})
     await console.page.locator(".plate").get_by_text("key switch at the door").wait_for()
 
 

@@ -72,7 +72,7 @@ function wayOf(name, spans) {
 }
 
 /** Messages that the operator's page reads only with code that it loads after its first picture. */
-const LATER = ["EpisodeAnswer", "EpisodeState", "Navigation", "ShadowVerdict"];
+const LATER = ["EpisodeAnswer", "EpisodeState", "Navigation", "ShadowVerdict", "Traces"];
 
 function reachableFrom(name, found = new Set(), without = []) {
   if (found.has(name) || without.includes(name)) return found;

@@ -106,6 +106,7 @@ export class SidePanels {
       mainStream: () => grid.mainStream(),
     });
     engine.tracing = tracing;
+    engine.takeLate["traces"] = (value): void => tracing.told(value);
     engine.streams.traceBy(() => new PictureTrace());
     const ways: WaySource = {
       book: tracing.book,

@@ -69,7 +69,7 @@ export interface ConsoleEngineEvents {
 /** An input that is told so late waited behind a page that was held up. */
 const HELD_UP_MS = 50;
 /** Messages whose schema comes with later code. */
-const LATE = /^(episode|episode_answer|navigation|shadow_verdict)$/;
+const LATE = /^(episode|episode_answer|navigation|shadow_verdict|traces)$/;
 
 /** What is called at every tick. */
 interface Stepped {
@@ -379,7 +379,7 @@ export class ConsoleEngine {
     else if (message.type === "action") {
       this.actionMs = Math.max(this.actionMs, now - message.age * 1000);
       this.actions?.updated(message);
-    } else if (message.type === "traces") this.tracing?.told(message);
+    }
   }
 
   /** Whoever drives next has to arm, and nothing of the one before is executed. */

@@ -216,7 +216,7 @@ export function applyMessage(state: ConsoleState, message: ServerMessage, wallMs
     case "episode": // the episode bar's
     case "episode_answer":
     case "stop_taken": // the stop sender's
-    case "traces": // the engine's
+    case "traces": // the charts'
     case "navigation": // the map's
       return;
     default:

@@ -22,7 +22,7 @@ export interface RobotStrip extends Panel {
 /** A button for each action of the robot, and what the robot says of itself. Its height never changes. */
 export function createRobotStrip(engine: ConsoleEngine): RobotStrip {
   engine.state.actionWords = actionWords;
-  const status = h("ul", "status-items", { "aria-label": "Status of the robot" });
+  const status = h("ul", "status-items", { "aria-label": "Status of the robot", tabindex: "0" });
   const buttons = h("div", "action-buttons", { role: "group", "aria-label": "Actions of the robot" });
   const words = h("p", "action-words", { role: "status" });
   const element = h("section", "robot-strip", { "aria-label": "Robot" }, buttons, words, status);
