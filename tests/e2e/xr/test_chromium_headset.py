@@ -210,6 +210,13 @@ async def test_stop_is_pressed_in_the_headset_and_reset_there(stack: Stack, chro
             await console.until("!s.stop.stopped")
             await headset.press("left", "trigger", 0)
         await headset.drive()
+        # The trigger of a hand that drives is the gripper's: there is nothing to press but STOP, wherever it points.
+        await headset.aim("right", "leave")
+        await headset.drive_until("s.driving && s.headset.pointed.right === null")
+        await headset.squeeze(value=0)
+        await console.until("s.headset.pointed.right === 'leave'")
+        await headset.press("right", "trigger")
+        await console.until("s.headset === null")
 
 
 async def test_a_contact_is_felt_in_the_hand_that_drives(own_stack: Stack, chromium: Browser) -> None:

@@ -165,10 +165,11 @@ function drawWay(
   context.textBaseline = "alphabetic";
   context.font = `600 32px ${FAMILY}`;
   context.fillStyle = MUTED;
-  context.textAlign = "left";
-  context.fillText(wayTitle(way, total), left, top + 30);
   context.textAlign = "right";
   context.fillText(frame, left + width, top + 30);
+  context.textAlign = "left";
+  const room = width - context.measureText(frame).width - 40;
+  context.fillText(wayTitle(way, total), left, top + 30, room); // narrower rather than over the other
   if (total === 0) return;
   let x = left;
   for (const { name, ms } of way) {
@@ -210,7 +211,7 @@ function drawLegend(
 
 function wayTitle(way: readonly WayGroup[], total: number): string {
   if (way.some(({ name }) => name !== "Headset")) return `Camera to eye ${total.toFixed(0)} ms`;
-  return way.length === 0 ? "No picture yet" : "The way to this page shows while the robot moves";
+  return way.length === 0 ? "No picture yet" : "Camera to eye shows while the robot moves";
 }
 
 function plate(

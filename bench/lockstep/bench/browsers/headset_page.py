@@ -22,7 +22,12 @@ SHOWN_MS = 30_000  # a page looks for a headset when a busy machine lets it
 ARM_SECONDS, DRIVE_SECONDS = 2.0, 60.0  # for one squeeze to arm; for all of them to drive
 HELD_UP = (*console_page.HELD_UP, "the headset stood still")
 # Of the middles of the view's buttons from the operator's eyes, in m: to the right, up and ahead.
-BUTTONS = {"stop": (0.76, -0.96, 1.42), "reset": (0.12, -1.3, 1.27), "recentre": (-0.8, -1.3, 1.27)}
+BUTTONS = {
+    "stop": (0.76, -0.96, 1.42),
+    "reset": (0.12, -1.3, 1.27),
+    "leave": (-0.42, -1.3, 1.27),
+    "recentre": (-0.8, -1.3, 1.27),
+}
 
 Side = Literal["left", "right"]
 Mode = Literal["AR", "VR"]
@@ -68,9 +73,13 @@ class Headset:
         """Evaluate on `testHeadset` as `h`."""
         return await self.page.evaluate(f"(() => {{ const h = testHeadset; return {script}; }})()")
 
+    async def aim(self, side: Side, button: str) -> None:
+        """Turn the hand to a button of the view, also where it may not press that."""
+        await self.page.evaluate("(at) => testHeadset.aim(...at)", [side, *BUTTONS[button]])
+
     async def point(self, side: Side, button: str) -> None:
         """Point at a button of the view from where the hand is."""
-        await self.page.evaluate("(at) => testHeadset.aim(...at)", [side, *BUTTONS[button]])
+        await self.aim(side, button)
         await self.console.until(f"s.headset.pointed.{side} === {button!r}")
 
     async def holds(self, condition: str) -> bool:
