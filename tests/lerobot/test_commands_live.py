@@ -26,6 +26,7 @@ LEADER = ("--teleop.type=scripted", "--teleop.discover_packages_path=tests.lerob
 GREY = 128  # of the picture at 0 degrees
 STEPS = 45  # actions of one swing: at most 2.1 degrees each
 NEAR = 12.0  # degrees: the picture may be four events older, and JPEG and H.264 blur
+HELD_UP = 0.5  # s; the watchdog acts after 0.2
 # A busy machine has no fresh observation for longer than a robot's operator would wait.
 PATIENT = ("--robot.observation_timeout_s=120", "--robot.connect_timeout_s=300")
 
@@ -155,6 +156,26 @@ async def test_a_stopped_robot_is_not_driven_and_the_command_says_why(arm: Arm, 
             *("--fps=15", "--teleop_time_s=2"),
             link=arm.stack.operator,
         )
+
+
+async def test_a_bridge_that_its_machine_held_up_ends_the_command_which_says_why(arm: Arm, tmp_path: Path) -> None:
+    async def hold_up() -> None:
+        async with Console(arm.stack.observer, audio=False, video=False) as watching:
+            async for feedback in watching.feedbacks():
+                if abs(feedback.axes[0] - 10.0) > 2.0:  # it is driven
+                    break
+        with arm.stack.frozen_bridge():
+            await asyncio.sleep(HELD_UP)
+
+    async with asyncio.TaskGroup() as tasks:
+        tasks.create_task(hold_up())
+        with pytest.raises(AssertionError, match="NotArmed"):
+            await run_lerobot(
+                *(tmp_path, "lerobot-teleoperate", "--robot.type=lockstep", *LEADER, *PATIENT),
+                *("--fps=15", "--teleop_time_s=300"),
+                link=arm.stack.operator,
+            )
+    assert any(each["watchdog"] for each in await arm.stack.events("stall"))
 
 
 A_PAGE = """
