@@ -135,7 +135,7 @@ async def run_driving(arm: Arm, directory: Path, command: str, *flags: str, data
         try:
             await run_lerobot(directory, command, *flags, link=arm.stack.operator)
         except AssertionError as error:
-            stalls = [each for each in await here.events("stall") if each["watchdog"]]
+            stalls = await here.events("stall")  # by the watchdog, or by the bridge itself if that was held up as well
             if "NotArmed" not in str(error) or not stalls or attempt == ATTEMPTS - 1:
                 raise
             if dataset is not None:
