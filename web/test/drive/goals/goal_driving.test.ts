@@ -181,6 +181,15 @@ describe("a pose that a device drives", () => {
     expect(driving.take([null, null, null, null], inputs, 10)).toEqual([null, 0.1, 0.2, 0.3]);
   });
 
+  it("is said to wait when its own clutch has done so for a while, until nobody may drive", () => {
+    const driving = new GoalDriving();
+    driving.device = { goals: () => REST, release: () => undefined, waits: true };
+    for (const now of [0, 200, 400]) takeAt(driving, inputsOf(heldOf([])), now);
+    expect(driving.saysWhatItWaitsFor(400)).toBe(true);
+    takeAt(driving, inputsOf(heldOf([]), { moves: false }), 410);
+    expect(driving.saysWhatItWaitsFor(410)).toBe(false);
+  });
+
   it("leaves nothing behind for a slider that was held meanwhile, of its own axes or of those it stands for", () => {
     const names = ["x", "y", "z"] as const;
     const arm = [goalAxisOf("elbow"), ...names.map((name) => goalAxisOf(name))];
