@@ -237,7 +237,7 @@ class DtlsConnection:
         if not data:
             return  # an empty record would tell the peer nothing
         if self._is_unread:
-            self._written(now)  # what OpenSSL has to say of a record before: a datagram of its own
+            self._written(now)  # its answer to an earlier record leaves in a datagram of its own
         try:
             self._ssl.send(data)
             # One record, and nothing else was left. Each call of OpenSSL that is spared counts: between two commands,

@@ -301,7 +301,7 @@ class Endpoint:
                 if connection.urgent and connection.peer.has_message:
                     heard.pop(connection, None)
                     connection.settle()  # a command does not wait for the datagrams behind it
-                    now = self._loop.time()  # what settled has sent at a later time than before
+                    now = self._loop.time()  # settling may have sent later than `now`, and no core's time runs back
                 else:
                     heard[connection] = True
             else:

@@ -12,7 +12,7 @@ CALM_INTERVAL = 0.040  # s; events that follow one another sooner wait for pictu
 # the robot holds a command. Armed and at rest, events follow one another no sooner.
 SOUND_WAIT = 0.200  # s
 HEARD = 0.200  # s without a new segment after which nothing is heard
-TOO_OLD_FOR = 3.0  # s after which nothing waits for sound that was too old all the time: it is on a slower path
+TOO_OLD_FOR = 3.0  # s of sound that was always too old, after which nothing waits for it: its path is too slow
 
 Pacing = Literal["feedback", "media"]
 GateState = Literal["open", "no_feedback", "in_flight", "rate", "picture", "sound"]

@@ -189,7 +189,8 @@ def _software_options(bitrate: int, keyframe_seconds: float) -> dict[str, str]:
         "forced-idr": "1",
         "maxrate": str(int(bitrate * HEADROOM)),
         "bufsize": str(int(bitrate * keyframe_seconds)),
-        "x264-params": "scenecut=0:keyint=infinite:repeat-headers=1:qpmax=51",  # coarser is grey
+        # x264 would go on to 69, where nothing but grey is left of a keyframe.
+        "x264-params": "scenecut=0:keyint=infinite:repeat-headers=1:qpmax=51",
     }
 
 

@@ -132,7 +132,8 @@ class H264Encoder(PictureEncoder):
             "forced-idr": "1",
             "maxrate": str(self.bitrate_bps),
             "bufsize": str(self._buffer_bits()),
-            "x264-params": "scenecut=0:keyint=infinite:repeat-headers=1:qpmax=51",  # coarser is grey
+            # x264 would go on to 69, where nothing but grey is left of a keyframe.
+            "x264-params": "scenecut=0:keyint=infinite:repeat-headers=1:qpmax=51",
         }
         return context
 

@@ -136,8 +136,11 @@ class PictureQueue:
         self._orders = sorted(due, key=lambda each: (each.tier != "operator", each.encoded_at))
 
     def _can_decode(self, source: SourcePicture) -> bool:
-        """Take what has to be decoded for a picture. Not before a job is given out, which decodes it: whatever is
-        taken and not decoded is missing to all pictures up to the next keyframe."""
+        """Take the pictures to decode for `source`; return False if that is not possible any more.
+
+        Only with the job that decodes them: a picture that is taken and not decoded is missing to all those after it,
+        up to the next keyframe.
+        """
         if source.media.codec == "h264" and not source.group:
             source.group = self._group.take(source.media)
             if not source.group:
