@@ -219,6 +219,8 @@ def test_what_moves_is_known_to_have_ended_when_the_link_is_lost() -> None:
     ]
     bench.service.epoch_ends()
     assert bench.service.newest() == []
+    bench.service.updated(update("a"))
+    assert bench.service.newest()[0].age == 0.0, "an id of the bridge before has no time any more"
 
 
 def test_a_flood_of_progress_is_thinned_and_every_end_is_told() -> None:

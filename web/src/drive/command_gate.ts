@@ -27,13 +27,14 @@ export interface CommandGate {
   lastSentMs: number; // -Infinity before the first
   shown: number | null; // stamp of the picture on screen
   heard: HeardSound | null; // null: nothing is heard, and nothing is waited for
-  tooOldSinceMs: number; // what is heard; Infinity: it is not
+  tooOldSinceMs: Map<string, number>; // by microphone, of those whose sound is too old now
 }
 
 /** The sound that plays now; of several the one that is farthest behind. */
 export interface HeardSound {
   readonly stamp: number;
   readonly tolerance: number; // events
+  readonly microphone: string;
 }
 
 /** The next event and the issue of the feedback that it answers. */
@@ -70,7 +71,7 @@ export function createCommandGate(
     lastSentMs: -Infinity,
     shown: null,
     heard: null,
-    tooOldSinceMs: Infinity,
+    tooOldSinceMs: new Map(),
   };
 }
 
@@ -115,20 +116,20 @@ export function noteShown(gate: CommandGate, stamp: number): void {
   gate.shown = stamp;
 }
 
-/** What is heard now; null: nothing. Nothing waits for sound that has been too old for 3 s: it is on a slower path. */
-export function noteHeard(gate: CommandGate, heard: HeardSound | null, now: number): void {
-  const isTooOld =
-    heard !== null && gate.event !== null && eventGap(gate.event, heard.stamp) > heard.tolerance;
-  gate.tooOldSinceMs = isTooOld ? Math.min(gate.tooOldSinceMs, now) : Infinity;
-  gate.heard = now - gate.tooOldSinceMs > TOO_OLD_FOR_MS ? null : heard;
-}
-
-/** Of several stamps the one that lags `event` most; null of none. */
-export function farthestBehind(event: number, stamps: readonly number[]): number | null {
-  if (stamps.length === 0) return null;
-  return stamps.reduce((farthest, stamp) =>
-    eventGap(event, stamp) > eventGap(event, farthest) ? stamp : farthest,
-  );
+/** What is heard now. Nothing waits for a microphone whose sound has been too old for 3 s: its path is too slow. */
+export function noteHeard(gate: CommandGate, sounds: readonly HeardSound[], now: number): void {
+  const before = gate.tooOldSinceMs;
+  gate.tooOldSinceMs = new Map();
+  const event = gate.event ?? 0;
+  gate.heard = null;
+  for (const sound of sounds) {
+    const { microphone, stamp, tolerance } = sound;
+    const sinceMs = before.get(microphone) ?? now;
+    if (gate.event !== null && eventGap(event, stamp) > tolerance)
+      gate.tooOldSinceMs.set(microphone, sinceMs);
+    if (gate.tooOldSinceMs.has(microphone) && now - sinceMs > TOO_OLD_FOR_MS) continue;
+    if (gate.heard === null || eventGap(event, stamp) > eventGap(event, gate.heard.stamp)) gate.heard = sound;
+  }
 }
 
 export function gateState(gate: CommandGate, now: number, letsGo = false): GateState {

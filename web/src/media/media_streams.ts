@@ -1,4 +1,4 @@
-import { farthestBehind, type HeardSound } from "../drive/command_gate";
+import type { HeardSound } from "../drive/command_gate";
 import type { GateContext } from "../gate/gate_counters";
 import type { ConsoleState } from "../session/console_state";
 import { BoundedLog } from "../util/bounded_log";
@@ -91,13 +91,13 @@ export class MediaStreams {
     for (const sound of this.sounds.values()) sound.observe(context, this.isAudible());
   }
 
-  /** What commands wait for; null: no microphone is heard, or its sound is not judged. */
-  heard(): HeardSound | null {
-    const { feedback, tolerance, gate } = this.context("audio");
-    if (gate === "off") return null;
-    const stamps = [...this.sounds.values()].map(({ playing }) => playing).filter((stamp) => stamp !== null);
-    const stamp = feedback === null ? null : farthestBehind(feedback, stamps);
-    return stamp === null ? null : { stamp, tolerance };
+  /** What commands wait for: the sound of each microphone that is heard, unless it is not judged. */
+  heard(): HeardSound[] {
+    const { tolerance, gate } = this.context("audio");
+    if (gate === "off") return [];
+    return [...this.sounds].flatMap(([microphone, { playing }]) =>
+      playing === null ? [] : [{ microphone, stamp: playing, tolerance }],
+    );
   }
 
   /** Timers are slow on a hidden page, too slow to gate sound. */

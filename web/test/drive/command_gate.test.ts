@@ -2,7 +2,6 @@ import { describe, expect, it } from "vitest";
 import {
   SOUND_WAIT_MS,
   createCommandGate,
-  farthestBehind,
   gateState,
   nextCommand,
   noteHeard,
@@ -49,7 +48,11 @@ function act(gate: CommandGate, { at, do: action }: Step, soundTolerance: number
   if (refused !== undefined) takeRefusal(gate, refused);
   if (shown !== undefined) noteShown(gate, shown);
   if (heard !== undefined)
-    noteHeard(gate, heard === null ? null : { stamp: heard, tolerance: soundTolerance }, at);
+    noteHeard(
+      gate,
+      heard === null ? [] : [{ microphone: "front", stamp: heard, tolerance: soundTolerance }],
+      at,
+    );
 }
 
 /** The newest feedback and the picture on screen are of event 20. */
@@ -83,55 +86,55 @@ describe("the command gate", () => {
   });
 
   describe("with sound that is heard", () => {
-    const heard = (stamp: number, tolerance = 6) => ({ stamp, tolerance });
+    const heard = (stamp: number, tolerance = 6, microphone = "front") => ({ microphone, stamp, tolerance });
 
     it("paced by media waits until the sound stays within tolerance when the next feedback comes", () => {
       const gate = openGate("media");
-      noteHeard(gate, heard(14), 0);
+      noteHeard(gate, [heard(14)], 0);
       expect(gateState(gate, 0)).toBe("sound");
-      noteHeard(gate, heard(15), 0);
+      noteHeard(gate, [heard(15)], 0);
       expect(gateState(gate, 0)).toBe("open");
     });
 
     it("waits for sound only while some is heard", () => {
       const gate = openGate("media");
-      noteHeard(gate, heard(1), 0);
+      noteHeard(gate, [heard(1)], 0);
       expect(gateState(gate, 0)).toBe("sound");
-      noteHeard(gate, null, 0);
+      noteHeard(gate, [], 0);
       expect(gateState(gate, 0)).toBe("open");
     });
 
     it("paced by media with tolerance 0 waits for the sound of the newest event", () => {
       const gate = openGate("media");
-      noteHeard(gate, heard(19, 0), 0);
+      noteHeard(gate, [heard(19, 0)], 0);
       expect(gateState(gate, 0)).toBe("sound");
-      noteHeard(gate, heard(20, 0), 0);
+      noteHeard(gate, [heard(20, 0)], 0);
       expect(gateState(gate, 0)).toBe("open");
     });
 
     it("says the picture before the sound", () => {
       const gate = openGate("media");
       takeFeedback(gate, 30, 1);
-      noteHeard(gate, heard(1), 0);
+      noteHeard(gate, [heard(1)], 0);
       expect(gateState(gate, 0)).toBe("picture");
     });
 
     it("lets no event follow sooner than the calm interval while the sound is behind by more than two thirds", () => {
       const gate = createCommandGate("feedback", 4, 16, 40);
       takeFeedback(gate, 20, 1);
-      noteHeard(gate, heard(16), 0);
+      noteHeard(gate, [heard(16)], 0);
       noteSent(gate, 0);
       takeFeedback(gate, 21, 1);
       expect(gateState(gate, 16)).toBe("rate");
       expect(opensAt(gate)).toBe(40);
-      noteHeard(gate, heard(17), 0);
+      noteHeard(gate, [heard(17)], 0);
       expect(gateState(gate, 16)).toBe("open");
       expect(opensAt(gate)).toBe(16);
     });
 
     it("paced by feedback does not wait for it before the first event, nor longer than it says", () => {
       const gate = openGate("feedback");
-      noteHeard(gate, heard(1), 0);
+      noteHeard(gate, [heard(1)], 0);
       expect(gateState(gate, 0)).toBe("open");
       noteSent(gate, 0);
       takeFeedback(gate, 21, 1);
@@ -141,27 +144,43 @@ describe("the command gate", () => {
 
     it("waits no longer for sound that was too old for three seconds, until it is not", () => {
       const gate = openGate("media");
-      noteHeard(gate, heard(10), 0);
-      noteHeard(gate, heard(10), 3000);
+      noteHeard(gate, [heard(10)], 0);
+      noteHeard(gate, [heard(10)], 3000);
       expect(gateState(gate, 3000)).toBe("sound");
-      noteHeard(gate, heard(11), 3001);
+      noteHeard(gate, [heard(11)], 3001);
       expect(gateState(gate, 3001)).toBe("open");
-      noteHeard(gate, heard(16), 3500);
-      noteHeard(gate, heard(15), 3600);
-      noteHeard(gate, heard(12), 6500);
+      noteHeard(gate, [heard(16)], 3500);
+      noteHeard(gate, [heard(15)], 3600);
+      noteHeard(gate, [heard(12)], 6500);
       expect(gateState(gate, 6600)).toBe("sound");
     });
 
     it("paced by media does not let a command that only lets go wait for it", () => {
       const gate = openGate("media");
-      noteHeard(gate, heard(1), 0);
+      noteHeard(gate, [heard(1)], 0);
       expect(gateState(gate, 0, true)).toBe("open");
     });
 
     it("goes by the microphone that is farthest behind, across the wrap too", () => {
-      expect(farthestBehind(20, [])).toBeNull();
-      expect(farthestBehind(20, [18, 15, 19])).toBe(15);
-      expect(farthestBehind(2, [1, MAX_EVENT - 1, MAX_EVENT])).toBe(MAX_EVENT - 1);
+      const gate = openGate("media");
+      noteHeard(gate, [heard(18), heard(15, 6, "left"), heard(19, 6, "right")], 0);
+      expect(gate.heard?.stamp).toBe(15);
+      takeFeedback(gate, MAX_EVENT, 1);
+      takeFeedback(gate, 2, 1);
+      noteHeard(gate, [heard(1), heard(MAX_EVENT - 1, 6, "left")], 0);
+      expect(gate.heard?.stamp).toBe(MAX_EVENT - 1);
+    });
+
+    it("gives up one microphone on a slower path, and goes on waiting for the other", () => {
+      const gate = openGate("media");
+      for (const ms of [0, 1500, 3001]) noteHeard(gate, [heard(1), heard(15, 6, "left")], ms);
+      expect(gate.heard?.stamp).toBe(15);
+      expect(gateState(gate, 3001)).toBe("open");
+      noteHeard(gate, [heard(1), heard(14, 6, "left")], 3002);
+      expect(gateState(gate, 3002)).toBe("sound");
+      noteHeard(gate, [heard(14, 6, "left")], 3003);
+      noteHeard(gate, [heard(1), heard(14, 6, "left")], 3004);
+      expect(gate.heard?.stamp).toBe(1); // it went away and came again: it is waited for again
     });
   });
 });

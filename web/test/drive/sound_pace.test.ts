@@ -135,7 +135,11 @@ function drive(pacing: Pacing, seed: number, blockMs: number, busyMs: number): R
     runRobot(ms);
     receive(ms);
     if (ms % blockMs === 0) play(ms);
-    noteHeard(gate, ms - heardMs < CONCEALED_MS ? { stamp: heard, tolerance: TOLERANCE } : null, ms);
+    noteHeard(
+      gate,
+      ms - heardMs < CONCEALED_MS ? [{ microphone: "front", stamp: heard, tolerance: TOLERANCE }] : [],
+      ms,
+    );
     gate.shown = gate.event; // no picture holds anything up
     if (gateState(gate, ms) !== "open") continue;
     noteSent(gate, ms);

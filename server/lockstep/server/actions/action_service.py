@@ -278,6 +278,7 @@ class ActionService:
                 asked.answer.set_result(None)
         self._asked.clear()
         self._updates.clear()
+        self._since.clear()
         self._owed.clear()
 
 

@@ -127,9 +127,22 @@ def test_what_builds_on_a_picture_that_was_not_decoded_is_refused_until_a_keyfra
     with pytest.raises(PayloadError):
         decoder.decode(first, (first,))
     assert decoder.decode(key, (key,)).width > 0
-    broken = msgspec.structs.replace(first, payload=b"\x00\x00\x00\x01\x67")
+    broken = msgspec.structs.replace(first, payload=b"\x00\x00\x00\x01\x65key")
     with pytest.raises(PayloadError):
         decoder.decode(second, (broken, second))
     with pytest.raises(PayloadError):
         decoder.decode(third, (third,))
     assert decoder.decode(first, (key, first)).width > 0
+
+
+def test_a_message_or_parameter_sets_by_themselves_are_no_hole_between_pictures() -> None:
+    key, first, second, _ = camera_pictures(4)
+    aside = [
+        msgspec.structs.replace(first, payload=b"\x00\x00\x00\x01" + unit)
+        for unit in (b"\x06\x05\x01\x00\x80", b"\x09\x10", b"\x67\x42")
+    ]
+    decoder = PictureDecoder()
+    assert decoder.decode(first, (aside[0], key, aside[1], first)).width > 0
+    assert decoder.decode(second, (*aside[:2], second)).width > 0
+    with pytest.raises(PayloadError):
+        decoder.decode(aside[1], (aside[1],))

@@ -12,7 +12,7 @@ import pytest
 from lockstep.server.media.codecs.packetise import packetise_h264
 from lockstep.server.media.encoding.encoder_worker import Encoded, EncoderWorker
 from lockstep.server.media.encoding.tier_encoding import TierEncoding
-from lockstep.server.media.errors import PayloadError
+from lockstep.server.media.errors import EncodeError, MediaError, PayloadError
 from lockstep.server.media.pipeline.frame import EncodedFrame
 from lockstep.server.media.pipeline.stage import SourceFrame
 from tests.server.media.pipeline.collecting import Collector, Counted, arrive
@@ -38,6 +38,7 @@ class Stamps:
 
     def __init__(self, encoding: TierEncoding) -> None:
         self.encoding = encoding
+        self.error: MediaError = PayloadError("13")
         self.threads: set[str] = set()
         self.goes_on = threading.Event()
         self.goes_on.set()
@@ -46,7 +47,7 @@ class Stamps:
         self.threads.add(threading.current_thread().name)
         self.goes_on.wait(TIMEOUT)
         if job == 13:
-            return [Encoded(self.encoding, (), error=PayloadError("13"))]
+            return [Encoded(self.encoding, (), error=self.error)]
         frame = EncodedFrame(
             b"x", packetise_h264, keyframe=True, marker=True, stamp=job, capture_time=0.0, media_time=0
         )
@@ -66,10 +67,10 @@ class End(Collector):
 class World(Counted):
     def __init__(self) -> None:
         super().__init__()
-        encodings = self.encodings("H264")
-        self.encoder = Stamps(encodings.get("H264", "operator"))
+        self.all = self.encodings("H264", "VP8")
+        self.encoder = Stamps(self.all.get("H264", "operator"))
         self.end = End()
-        self.worker = EncoderWorker(self.end, NewestFirst(), self.encoder, encodings, self.dropped)
+        self.worker = EncoderWorker(self.end, NewestFirst(), self.encoder, self.all, self.dropped)
 
     @asynccontextmanager
     async def running(self) -> AsyncIterator[None]:
@@ -117,6 +118,30 @@ async def test_a_bad_picture_is_counted_by_its_name_and_the_next_one_passes() ->
             await world.end.came.wait()
     assert world.stamps == [1, 2]
     assert world.drops("bad_payload") == 1
+
+
+@pytest.mark.parametrize(
+    ("error", "drives", "others"),
+    [
+        (PayloadError("no picture"), True, [False]),
+        (PayloadError("no picture"), False, [True]),
+        (EncodeError("x"), True, []),
+    ],
+)
+async def test_only_a_picture_that_cannot_be_decoded_asks_the_robot_for_a_keyframe_and_the_operators_come_first(
+    error: MediaError, drives: bool, others: list[bool], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    world, asked = World(), list[bool]()
+    world.all.join("H264", world.subscription(priority=drives))
+    if not drives:
+        world.all.join("VP8", world.subscription(priority=True))
+    passed = world.all.add_passed()
+    monkeypatch.setattr(passed, "request_keyframe", lambda cause, *, other: asked.append(other))
+    world.encoder.error = error
+    async with world.running():
+        arrive(world.worker, picture(13, 1.0))
+        await world.take(2)
+    assert asked == others
 
 
 async def test_nothing_passes_after_the_end_and_it_can_run_again() -> None:

@@ -251,3 +251,11 @@ def test_while_something_waits_both_encodings_get_less_than_what_arrives_and_nev
         if share.on and not was_on:
             held = NEVER
         total = first + bps
+
+
+def test_a_queue_now_and_then_does_not_hold_it_down_for_ever() -> None:
+    share, given = begun(), 0.0
+    for step in range(36_000):  # an hour
+        waits = 0.3 if step % 6000 < 3 else 0.0  # s; once in ten minutes
+        given = decide(share, 5.0 + step / 10, carried=FIRST + given, waits=waits)
+    assert given == MOST

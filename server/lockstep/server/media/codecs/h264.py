@@ -4,11 +4,12 @@ from typing import NamedTuple
 
 from lockstep.server.media.codecs.packetise import split_nal_units
 
-__all__ = ["START_CODE", "H264Access", "Profile", "accepts", "inspect", "profile_of_fmtp"]
+__all__ = ["START_CODE", "H264Access", "Profile", "accepts", "holds_slice", "inspect", "profile_of_fmtp"]
 
 START_CODE = b"\x00\x00\x00\x01"
 NAL_SLICE, NAL_IDR, NAL_SPS, NAL_PPS = 1, 5, 7, 8
 BASELINE, MAIN, HIGH = 66, 77, 100
+SLICES = range(1, 6)  # NAL types of a picture's parts, table 7-1
 SLICE_B = (1, 6)  # table 7-6
 HEAD = 16  # bytes of a slice that hold the two numbers we need
 
@@ -52,6 +53,16 @@ def inspect(stream: bytes) -> H264Access:
             if kind == NAL_SPS and len(nal) >= 4:
                 profile = Profile(nal[1], nal[2], nal[3])
     return H264Access(keyframe, profile, sets, reordered)
+
+
+def holds_slice(stream: bytes) -> bool:
+    """Return whether this is a picture or a part of one: some cameras send parameter sets or messages by themselves."""
+    at = stream.find(START_CODE[1:])
+    while 0 <= at < len(stream) - 3:
+        if stream[at + 3] & 0x1F in SLICES:
+            return True
+        at = stream.find(START_CODE[1:], at + 3)
+    return False
 
 
 def accepts(negotiated: Profile, stream: Profile) -> bool:

@@ -1,6 +1,7 @@
 """Turns pictures from the robot link into frames for encoders."""
 
 from collections.abc import Sequence
+from contextlib import suppress
 
 import av
 import numpy as np
@@ -11,6 +12,7 @@ from av.video.codeccontext import VideoCodecContext
 from av.video.plane import VideoPlane
 
 from lockstep.protocol.messages import Media
+from lockstep.server.media.codecs.h264 import holds_slice
 from lockstep.server.media.errors import PayloadError, UnsupportedCodecError
 
 __all__ = ["PictureDecoder"]
@@ -75,6 +77,10 @@ class PictureDecoder:
             self._h264.flags |= Flags.low_delay  # one in, one out: there are no B-frames
         frame = None
         for media in group:
+            if not holds_slice(media.payload):
+                with suppress(FFmpegError, ValueError):  # it finds no picture, and keeps the parameter sets
+                    self._h264.decode(av.Packet(media.payload))
+                continue
             if not media.keyframe and not self._is_whole:
                 continue  # FFmpeg would draw it over grey, or over a picture that it does not build on
             self._is_whole = False

@@ -10,7 +10,7 @@ from typing import Generic, NamedTuple, Protocol, TypeVar
 from lockstep.robot_bridge.thread_name import name_thread
 from lockstep.server.media.encoding.stream_encodings import StreamEncodings
 from lockstep.server.media.encoding.tier_encoding import TierEncoding
-from lockstep.server.media.errors import MediaError
+from lockstep.server.media.errors import MediaError, PayloadError
 from lockstep.server.media.metrics import DropCounter
 from lockstep.server.media.pipeline.frame import EncodedFrame
 from lockstep.server.media.pipeline.stage import FrameStage, SourceFrame
@@ -129,8 +129,10 @@ class EncoderWorker(FrameStage, Generic[Job]):
         if result.error is not None:
             self._dropped.count(result.error.name)
             result.encoding.keyframes.request()  # it may have been a keyframe that somebody waits for
-            if self._encodings.passed is not None:
-                self._encodings.passed.request_keyframe("drop")  # and the robot's pictures may build on one that is bad
+            if isinstance(result.error, PayloadError) and self._encodings.passed is not None:
+                # The robot's next pictures build on one that could not be decoded. The operator's come first.
+                others = all(map(self._encodings.is_other, result.encoding.targets))
+                self._encodings.passed.request_keyframe("drop", other=others)
         else:
             result.encoding.encode_seconds.observe(result.seconds)
         for frame in result.frames:

@@ -16,7 +16,7 @@ from collections.abc import Callable
 
 from lockstep.protocol.messages import Media
 from lockstep.server.media.codecs.group_of_pictures import GroupOfPictures
-from lockstep.server.media.codecs.h264 import Profile, accepts, inspect
+from lockstep.server.media.codecs.h264 import Profile, accepts, holds_slice, inspect
 from lockstep.server.media.encoding.stream_encodings import StreamEncodings
 from lockstep.server.media.encoding.tier_encoding import TierEncoding
 from lockstep.server.media.errors import PayloadError
@@ -114,6 +114,8 @@ class Passthrough(FrameStage):
                 return
             self._pass(frame)
             self.serve_requests(frame.arrived_at)
+            if not holds_slice(frame.media.payload):
+                return  # the decoder gets it with the next picture
             if not any(self._needs_console(each) for each in self._encodings.own):
                 return
         elif self._profile is not None:

@@ -8,7 +8,7 @@
 | on | that leaves too little, the uplink shows a limit, or no picture came for 3 s | off for a while |
 
 It begins with more where the uplink carried more within the last minute, and not within 5 s of a limit. A while is
-10 s, and twice as long each time, up to 640 s; 10 s again after second encodings that went well for a minute. So an
+10 s, and twice as long each time, up to 640 s; 10 s again after a minute in which nothing waited. So an
 uplink without room, or one that is wide for less than a minute at a time, is tried ever more seldom.
 
 The bridge sends no picture of a second encoding while something waits on its path (docs/quality.md, "The second
@@ -58,6 +58,7 @@ class SecondShare:
         self._not_before = float("-inf")  # s; time of the next beginning
         self._began = 0.0  # s
         self._came = 0.0  # time of the newest picture, or of the beginning
+        self._cut_at = 0.0  # time of the last cut, or of the beginning
         self._total = 0.0  # bits per second of both encodings together
         self._ceiling = float("inf")  # of these, until `_more_at`
         self._more_at = self._hold_until = float("-inf")  # s
@@ -85,7 +86,7 @@ class SecondShare:
             if self.on and self._total - first_bps < KEEP * first_bps:
                 self._fail(now)
         elif self._is_time(now, self._wanted_since, uplink):
-            self.on, self._began, self._came = True, now, now
+            self.on, self._began, self._came, self._cut_at = True, now, now, now
             self._total = max(MARGIN * uplink.shown_bps, (1 + START) * first_bps)
             self._ceiling, self._hold_until = float("inf"), float("-inf")
         return min(most_bps, self._total - first_bps) if self.on else 0.0
@@ -102,17 +103,19 @@ class SecondShare:
         if uplink.waits is None or now < self._hold_until:
             return
         if uplink.waits > QUEUE:
+            self._cut_at = now
             self._total = self._ceiling = min(self._total, CUT * uplink.carried_bps)
             self._hold_until = now + HOLD + uplink.waits
             self._more_at = now + self._wait_longer()
-        elif uplink.waits < EMPTY and uplink.carried_bps >= USED * self._total:
+            return
+        if now - self._cut_at >= STEADY_SECONDS:
+            self._patience = PATIENCE
+        if uplink.waits < EMPTY and uplink.carried_bps >= USED * self._total:
             ceiling = float("inf") if now >= self._more_at else self._ceiling
             grown = min(self._total * GROWTH**passed, most_bps, ceiling)
             self._total = max(self._total, grown)
 
     def _fail(self, now: float) -> None:
-        if now - self._began >= STEADY_SECONDS:
-            self._patience = PATIENCE
         self.on = False
         self._not_before = now + self._wait_longer()
 
