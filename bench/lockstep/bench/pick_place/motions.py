@@ -4,7 +4,7 @@ import math
 from collections.abc import Iterator, Mapping
 from typing import Final, NamedTuple
 
-__all__ = ["BLOCKS", "POSITION", "ROTATION", "Motion", "Place", "motions"]
+__all__ = ["BLOCKS", "BOWL", "POSITION", "ROTATION", "Motion", "Place", "motions"]
 
 
 class Place(NamedTuple):
@@ -18,7 +18,8 @@ BLOCKS: Final[Mapping[str, Place]] = {  # robots/so101/scene.xml
     "green": Place(0.29, 0.01, math.radians(20)),
     "blue": Place(0.20, -0.03, math.radians(-35)),
 }
-IN_BOWL: Final[Mapping[str, tuple[float, float]]] = {  # m, beside each other in the bowl, which is at 0.20, 0.16
+BOWL: Final = (0.20, 0.16)  # m
+BESIDE: Final[Mapping[str, tuple[float, float]]] = {  # m, where three blocks lie beside each other in it
     "red": (0.220, 0.160),
     "green": (0.190, 0.178),
     "blue": (0.190, 0.142),
@@ -36,9 +37,14 @@ class Motion(NamedTuple):
     must_arrive: bool  # the tool, measured
 
 
-def motions(name: str, place: Place | None = None) -> Iterator[Motion]:
-    """Yield the motions for the block of this name, one of BLOCKS. `place`: None: where the scene begins."""
-    block, bowl = place or BLOCKS[name], IN_BOWL[name]
+def motions(name: str, place: Place | None = None, bowl: tuple[float, float] | None = None) -> Iterator[Motion]:
+    """Yield the motions for the block of this name, one of BLOCKS.
+
+    Args:
+        place: of the block; None: where the scene begins
+        bowl: m, where to let go of it; None: beside the other blocks in the bowl
+    """
+    block, bowl = place or BLOCKS[name], bowl or BESIDE[name]
     facing = math.atan2(block.y, block.x - AXIS)
     quarter = math.pi / 2
     aligned = (block.yaw - facing + quarter / 2) % quarter - quarter / 2 + facing

@@ -16,7 +16,7 @@ from lockstep.bench.experiment.choices import media_of
 from lockstep.bench.experiment.stage import Stage, running_stage
 from lockstep.bench.pick_place.headless_operator import headless_operator
 from lockstep.bench.pick_place.judge import Judged, judge
-from lockstep.bench.pick_place.motions import BLOCKS
+from lockstep.bench.pick_place.motions import BLOCKS, BOWL
 from lockstep.bench.pick_place.operator import HandName, Operator, OperatorFailed
 from lockstep.bench.pick_place.script import PickAndPlace
 from lockstep.client import CommandRefused, ConsoleError
@@ -98,16 +98,14 @@ class _Session:
     ) -> None:
         self._stage, self._operator, self._recorder = stage, operator, recorder
         self._choices, self._say = choices, say
-        self._in_bowl: int | None = None  # blocks that lie in the bowl; None: nobody knows
 
     async def run(self, number: int) -> dict[str, Any]:
-        """Put one block into the bowl, beside those of the two runs before it, while it is recorded."""
+        """Put one block into the empty bowl while it is recorded."""
         name = list(BLOCKS)[number % len(BLOCKS)]
-        if not number % len(BLOCKS) or self._in_bowl is None:
-            await self._reset()
+        await self._reset()
         recording = await self._record(f"{self._choices.hand} {number + 1} {name}")
         operator, held_up = self._operator, Counter[str]()
-        task = PickAndPlace(operator.description, name, operator.hand(), longest=operator.longest)
+        task = PickAndPlace(operator.description, name, operator.hand(), longest=operator.longest, bowl=BOWL)
         began = time.monotonic()
         failed = await self._operate(task, held_up)
         seconds = time.monotonic() - began
@@ -156,16 +154,14 @@ class _Session:
         async with asyncio.timeout(RESET_SECONDS):
             await self._operator.reset_scene()
             await self._operator.until_in_bowl(0)
-        self._in_bowl = 0
 
     async def _lands(self) -> bool:
-        """Wait until the robot says that one more block lies in the bowl."""
-        count, self._in_bowl = (self._in_bowl or 0) + 1, None
+        """Wait until the robot says that the block lies in the bowl."""
         with suppress(TimeoutError):
             async with asyncio.timeout(LANDS_SECONDS):
-                await self._operator.until_in_bowl(count)
-            self._in_bowl = count
-        return self._in_bowl is not None
+                await self._operator.until_in_bowl(1)
+            return True
+        return False
 
     async def _record(self, name: str) -> str:
         answer = await self._recorder.post("/api/recordings", json={"name": name})

@@ -87,6 +87,7 @@ class PickAndPlace:
         hand: Hand | None = None,
         place: Place | None = None,
         longest: float = LONGEST,
+        bowl: tuple[float, float] | None = None,
     ) -> None:
         """
         Args:
@@ -94,12 +95,13 @@ class PickAndPlace:
             hand: None: the tool's pose is driven
             place: of the block; None: where the scene begins
             longest: s that one motion may take
+            bowl: m, where to let go of the block; None: beside the other blocks in the bowl
         """
         self._longest = longest
         self._description = description
         self._index = {axis.name: number for number, axis in enumerate(description.axes)}
         self._hand = ToolHand(description) if hand is None else hand
-        self._motions = motions(block, place)
+        self._motions = motions(block, place, bowl)
         self._motion = next(self._motions, None)  # the present one
         self._begun: float | None = None  # s, of the robot's clock
         self._there: float | None = None
