@@ -32,7 +32,7 @@ ARM_SECONDS: Final = 90.0  # a bad network takes the robot away for a while
 ARM_TRY_SECONDS: Final = 3.0
 ENTER_TRIES: Final = 3
 SLOW = 4  # W3C standard mapping
-HEADSET_WINDOW = (1024, 400)  # both eyes: where the processor draws, each pixel costs
+HEADSET_WINDOW = (1000, 220)  # both eyes: where the processor draws, each pixel costs
 LOOK = "() => ({ page: window.lockstep.stats(), at: window.lockstep.feedbacks().at(-1)?.at ?? null })"
 MOVE_PAD = """({ tilts, pulls, presses }) => {
   for (const [axis, value] of tilts) window.testPad.tilt(axis, value);
