@@ -9,6 +9,7 @@ import {
   type Pacing,
 } from "../../src/drive/command_gate";
 import { judge } from "../../src/gate/media_gate";
+import { AWAITED_MS } from "../../src/gate/sound_gate";
 import { eventAfter } from "../../src/gate/serial";
 import { createSoundPlayer, judgeAgainst, nextFrame, takePacket } from "../../src/media/sound/sound_player";
 
@@ -23,8 +24,9 @@ const PACKET_MS = 20;
 const FRAME_MS = 5;
 const VARY_MS = 500;
 const LOSS = 0.005; // one way
-const REPEAT_MS = { control: 60, link: 200 }; // what a loss costs: a repeat of ours, and TCP's shortest timer
-const CONCEALED_MS = 200;
+/** What a loss costs: a repeat of ours, TCP's shortest timer, and its timer where the round trip has varied. */
+const REPEAT_MS = { control: 60, link: 200, variedLink: 350 };
+const HOLD_MS = 300;
 const SECONDS = 30;
 
 /** One way, in ms: lognormal above `min`, none above `max`. */
@@ -77,11 +79,11 @@ function path(seed: number, delay: Delay, repeatMs: number): (ms: number) => num
   };
 }
 
-function drive(pacing: Pacing, seed: number, blockMs: number, busyMs: number): Run {
+function drive(pacing: Pacing, seed: number, blockMs: number, busyMs: number, linkMs = REPEAT_MS.link): Run {
   const up = path(seed, CONTROL, REPEAT_MS.control);
   const down = path(seed + 100, CONTROL, REPEAT_MS.control);
-  const link = path(seed + 200, LINK, REPEAT_MS.link);
-  const gate = createCommandGate(pacing, TOLERANCE, 1000 / EVENT_RATE, CALM_INTERVAL_MS);
+  const link = path(seed + 200, LINK, linkMs);
+  const gate = createCommandGate(pacing, TOLERANCE, 1000 / EVENT_RATE, CALM_INTERVAL_MS, HOLD_MS);
   const player = createSoundPlayer(RATE, blockMs / 1000);
   const stamps: number[] = []; // by packet
   const coming: { readonly index: number; readonly at: number }[] = [];
@@ -137,7 +139,7 @@ function drive(pacing: Pacing, seed: number, blockMs: number, busyMs: number): R
     if (ms % blockMs === 0) play(ms);
     noteHeard(
       gate,
-      ms - heardMs < CONCEALED_MS ? [{ microphone: "front", stamp: heard, tolerance: TOLERANCE }] : [],
+      ms - heardMs < AWAITED_MS ? [{ microphone: "front", stamp: heard, tolerance: TOLERANCE }] : [],
       ms,
     );
     gate.shown = gate.event; // no picture holds anything up
@@ -154,9 +156,11 @@ describe("sound and the pace of events, over a network whose delays wander", () 
   it.each(cases)("leaves out at most 2 % of the sound: $seed, blocks of $blockMs ms", ({ seed, blockMs }) => {
     const quiet = drive("feedback", seed, blockMs, 0);
     const busy = drive("feedback", seed, blockMs, BUSY_MS);
+    const varied = drive("feedback", seed, blockMs, 0, REPEAT_MS.variedLink);
     expect(quiet.segments).toBeGreaterThan(SECONDS * 45);
     expect(quiet.share).toBeLessThan(0.02);
     expect(busy.share).toBeLessThan(0.02);
+    expect(varied.share).toBeLessThan(0.02);
     expect(busy.eventRate).toBeGreaterThan(12);
   });
 });

@@ -1,6 +1,6 @@
 import { judge } from "../../gate/media_gate";
 import { UNMARKED, ageOf, noteSeen, type FrameMark, type GateContext } from "../../gate/gate_counters";
-import { START_MS, createSoundGate, isConcealed, observeSound } from "../../gate/sound_gate";
+import { AWAITED_MS, START_MS, createSoundGate, isConcealed, observeSound } from "../../gate/sound_gate";
 import { findMark } from "../../gate/stamp_table";
 import type { MediaSection } from "../../transport/webrtc/media_section";
 import type { StreamInfo } from "../../protocol/wire";
@@ -16,7 +16,9 @@ export class SoundStream {
   readonly gate = createSoundGate();
   readonly log = new RenderLog();
   isOpen = false;
-  playing: number | null = null; // stamp of the sound that plays, heard or too old to be; null: none does
+  /** Stamp of the sound that plays, heard or too old to be, or played a moment ago; null: no sound is waited for. */
+  playing: number | null = null;
+  private playedMs = -Infinity; // when sound last played
   private source: SoundSource;
   private output: SoundOutput;
   private droppedAtStart: number; // before decoding, to begin with the newest
@@ -52,12 +54,14 @@ export class SoundStream {
     const { stamps } = this.section;
     const mark = playing === undefined || stamps === null ? UNMARKED : findMark(stamps.table, playing);
     const before = this.gate.counts.rendered;
-    const passes = playing !== undefined && this.judge(playing, mark, context, audible, performance.now());
+    const now = performance.now();
+    const passes = playing !== undefined && this.judge(playing, mark, context, audible, now);
     if (this.gate.counts.rendered > before) this.note(mark ?? UNMARKED, context);
     this.isOpen = passes && audible;
     this.output.open(this.isOpen);
-    const isReal = playing !== undefined && !this.isStarting() && !isConcealed(this.gate, performance.now());
-    this.playing = isReal && audible ? (mark?.stamp ?? null) : null;
+    const isReal = playing !== undefined && !this.isStarting() && !isConcealed(this.gate, now);
+    if (isReal && audible) [this.playing, this.playedMs] = [mark?.stamp ?? null, now];
+    else if (!audible || now - this.playedMs > AWAITED_MS) this.playing = null;
   }
 
   private judge(
