@@ -11,7 +11,7 @@ CALM_INTERVAL = 0.040  # s; events that follow one another sooner wait for pictu
 # An event that would take sound out of its tolerance waits for it so long at most, and for half of the time for which
 # the robot holds a command. Armed and at rest, events follow one another no sooner.
 SOUND_WAIT = 0.200  # s
-HEARD = 0.200  # s without a new segment after which nothing is heard
+HEARD = 0.600  # s without a new segment after which nothing waits for it: what is late may still come
 TOO_OLD_FOR = 3.0  # s of sound that was always too old, after which nothing waits for it: its path is too slow
 
 Pacing = Literal["feedback", "media"]
