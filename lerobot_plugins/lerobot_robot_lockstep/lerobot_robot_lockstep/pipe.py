@@ -33,8 +33,8 @@ class Pipe:
         Raises:
             LockstepLost: it cannot be started.
         """
-        # Isolated: the paths of LeRobot's environment are for another Python's packages. The process ends with this one,
-        # also if this one ends while it is starting.
+        # Isolated: the paths of LeRobot's environment are for another Python's packages. The process ends with this
+        # one, also if this one ends while it is starting.
         command = [python, "-I", "-m", module, str(os.getpid())]
         try:
             self._process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, bufsize=0)

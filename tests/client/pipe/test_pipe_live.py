@@ -175,6 +175,6 @@ async def test_it_ends_with_a_process_that_ended_while_it_was_starting(module: s
     assert process.stdin is not None
     assert process.stdout is not None
     async with asyncio.timeout(SECONDS):
-        await process.wait()
         assert await process.stdout.read() == b""  # the helper has closed it
-    process.stdin.close()
+        process.stdin.close()
+        await process.wait()

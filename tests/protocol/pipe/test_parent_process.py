@@ -1,6 +1,5 @@
 import asyncio
 import os
-import subprocess
 import sys
 
 import pytest
@@ -26,8 +25,8 @@ def test_the_parent_is_the_process_that_started_this_one() -> None:
 
 
 async def test_a_parent_that_ended_while_this_process_was_starting_has_ended() -> None:
-    process = subprocess.Popen([sys.executable, "-c", ""])
-    process.wait()
+    process = await asyncio.create_subprocess_exec(sys.executable, "-c", "")
+    await process.wait()
     assert parent_of([str(process.pid)]) == process.pid
     async with asyncio.timeout(20):
         await parent_ended(process.pid)
