@@ -1,7 +1,6 @@
 import { expect, it } from "vitest";
 import type { EpisodeState, RecordingState } from "../../src/protocol/wire";
 import { episodeLabels, problemWords } from "../../src/session/episode_labels";
-import { readEpisodeMessage } from "../../src/session/episode_reader";
 
 const IDLE: EpisodeState = {
   type: "episode",
@@ -63,22 +62,4 @@ it("says why no episode can begin", () => {
     tone: "bad",
     text: "Not recording: only 3 MB are free on the disk",
   });
-});
-
-it("reads messages about episodes and nothing else", () => {
-  expect(readEpisodeMessage({ ...IDLE })).toEqual(IDLE);
-  expect(
-    readEpisodeMessage({ type: "episode_answer", id: "x", reason: "empty", detail: "", episode: "" }),
-  ).toMatchObject({
-    reason: "empty",
-  });
-  for (const wrong of [
-    null,
-    [],
-    { type: "episode" },
-    { ...IDLE, kept: "3" },
-    { type: "welcome" },
-    { ...IDLE, phase: "x" },
-  ])
-    expect(readEpisodeMessage(wrong)).toBeNull();
 });

@@ -2,11 +2,10 @@ import type { ConsoleEngine } from "../../engine/console_engine";
 import type { EpisodePress } from "../../gamepad/episode_presses";
 import { drivingKeys } from "../../input/shortcuts";
 import { FIELDS } from "../../input/keyboard";
-import type { EpisodeRequest, EpisodeState } from "../../protocol/wire";
+import type { EpisodeRequest, EpisodeState, ServerMessage } from "../../protocol/wire";
 import { drawId } from "../../robot/action_client";
 import { holdsSeat, isOperator, note } from "../../session/console_state";
 import { EPISODE_REFUSALS, episodeLabels, problemWords } from "../../session/episode_labels";
-import { readEpisodeMessage } from "../../session/episode_reader";
 import { button, h, setData, setHidden, setText, type Panel } from "../elements/dom";
 
 type Request = Pick<EpisodeRequest, "do"> & Partial<EpisodeRequest>;
@@ -139,8 +138,7 @@ export function createEpisodeBar(engine: ConsoleEngine): Panel {
     note(engine.state, "warning", `Episode: ${refusal}`, Date.now());
   }
 
-  function take(value: unknown): void {
-    const message = readEpisodeMessage(value);
+  function take(message: ServerMessage | undefined): void {
     if (message?.type === "episode") {
       if (state?.task !== message.task && document.activeElement !== task && message.task !== "")
         task.value = message.task;
@@ -152,9 +150,9 @@ export function createEpisodeBar(engine: ConsoleEngine): Panel {
     }
   }
 
-  take(engine.late.get("episode")?.value);
+  take(engine.late.newest.get("episode")?.message);
   engine.padEpisode = takePress;
-  engine.takeLate["episode"] = engine.takeLate["episode_answer"] = take;
+  engine.late.take["episode"] = engine.late.take["episode_answer"] = take;
   form.addEventListener("submit", (event) => {
     event.preventDefault();
     task.blur(); // keys drive again
