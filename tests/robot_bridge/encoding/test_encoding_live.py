@@ -163,7 +163,7 @@ async def test_pictures_are_left_out_before_they_are_encoded_while_no_link_takes
 
 
 class SlowLink:
-    """A media link whose receiver takes few bytes at a time, and says that it lives."""
+    """A media link whose receiver takes few bytes at a time. `beat` says that it lives, also while nothing comes."""
 
     def __init__(self, own: socket.socket) -> None:
         self._socket = own
@@ -172,13 +172,25 @@ class SlowLink:
     async def send(self, message: Hello | EncodeRequest | Ping) -> None:
         await asyncio.get_running_loop().sock_sendall(self._socket, frame(encode_message(message)))
 
+    async def beat(self) -> None:
+        while True:
+            await self.send(Ping(id=1))
+            await asyncio.sleep(0.2)
+
     async def read(self, size: int) -> list[Media]:
         data = await asyncio.get_running_loop().sock_recv(self._socket, size)
         assert data, "the bridge has ended the link"
-        await self.send(Ping(id=1))
         self._reader.feed(data)
         messages = [decode_message(bytes(payload)) for payload in self._reader.frames()]
         return [each for each in messages if isinstance(each, Media)]
+
+
+async def test_a_link_on_which_nothing_comes_for_long_stays_while_its_client_says_that_it_lives() -> None:
+    async with encoding_bridge() as bridge, slow_link(bridge) as slow:
+        await slow.read(1)
+        await asyncio.sleep(1.5)  # beyond the silence after which the bridge ends a link
+        for _ in range(100):
+            await slow.read(20_000)
 
 
 @asynccontextmanager
@@ -190,7 +202,10 @@ async def slow_link(bridge: Bridge) -> AsyncIterator[SlowLink]:
         link = SlowLink(own)
         await link.send(Hello(role="media"))
         await link.send(EncodeRequest(streams=[StreamRequest(stream=name, bitrate=20_000_000) for name in CAMERAS]))
-        yield link
+        async with asyncio.TaskGroup() as tasks:
+            beating = tasks.create_task(link.beat())
+            yield link
+            beating.cancel()
 
 
 async def test_a_bridge_that_encodes_keeps_to_the_protocol() -> None:
