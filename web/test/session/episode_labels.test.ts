@@ -1,6 +1,12 @@
 import { expect, it } from "vitest";
 import type { EpisodeState, RecordingState } from "../../src/protocol/wire";
-import { episodeLabels, problemWords } from "../../src/session/episode_labels";
+import {
+  episodeLabels,
+  leftEpisode,
+  problemWords,
+  spokenProblems,
+  withLeftEpisode,
+} from "../../src/session/episode_labels";
 
 const IDLE: EpisodeState = {
   type: "episode",
@@ -62,4 +68,47 @@ it("says why no episode can begin", () => {
     tone: "bad",
     text: "Not recording: only 3 MB are free on the disk",
   });
+});
+
+it("names the worst problem first, and aloud without figures that change", () => {
+  const problems = [
+    { kind: "camera_slow", stream: "front", text: "front: 3 pictures a second instead of 15" },
+    { kind: "no_events", stream: "", text: "nobody has driven for 12 s" },
+    { kind: "disk_low", stream: "", text: "the disk is almost full: 3 MB until the recording ends" },
+    { kind: "camera_missing", stream: "wrist", text: "wrist: no picture for 2 s" },
+  ] as const;
+  expect(problemWords(problems)).toBe(
+    "wrist: no picture for 2 s · the disk is almost full: 3 MB until the recording ends · " +
+      "front: 3 pictures a second instead of 15 · nobody has driven for 12 s",
+  );
+  expect(spokenProblems(problems)).toBe(
+    "wrist: no picture, the disk is almost full, front: too few pictures, nobody drives",
+  );
+});
+
+it("says that an episode is lost also where the recording ended with it", () => {
+  const state = { ...IDLE, last: "episode 2 is lost: the recording failed" };
+  const failed: RecordingState = { ...RECORDING, state: "failed", detail: "no space left" };
+  expect(episodeLabels(state, failed, 0, 0)).toMatchObject({
+    tone: "bad",
+    text: "Episode 2 is lost: the recording failed · Not recording: no space left",
+  });
+  expect(episodeLabels(state, { ...RECORDING, state: "off" }, 0, 0)).toMatchObject({
+    tone: "bad",
+    text: "Episode 2 is lost: the recording failed · Record first",
+  });
+  expect(episodeLabels({ ...IDLE, last: "episode 1 is kept" }, null, 0, 0).text).toBe("Record first");
+});
+
+it("says that an episode is lost with the console", () => {
+  const left = leftEpisode({ ...IDLE, phase: "open", episode: "a", number: 3 });
+  expect(left).toEqual({ episode: "a", number: 3 });
+  expect(leftEpisode(IDLE)).toBeNull();
+  expect(leftEpisode(null)).toBeNull();
+  expect(withLeftEpisode(IDLE, left).last).toBe("episode 3 is lost: the console has ended");
+  const goesOn = { ...IDLE, phase: "open", episode: "a", number: 3 } as const;
+  expect(withLeftEpisode(goesOn, left)).toEqual(goesOn);
+  const kept = { ...IDLE, last: "episode 3 is kept" };
+  expect(withLeftEpisode(kept, left)).toEqual(kept);
+  expect(withLeftEpisode(IDLE, null)).toEqual(IDLE);
 });

@@ -5,7 +5,16 @@ import { FIELDS } from "../../input/keyboard";
 import type { EpisodeRequest, EpisodeState, ServerMessage } from "../../protocol/wire";
 import { drawId } from "../../robot/action_client";
 import { holdsSeat, isOperator, note } from "../../session/console_state";
-import { EPISODE_REFUSALS, episodeLabels, problemWords } from "../../session/episode_labels";
+import {
+  EPISODE_REFUSALS,
+  episodeLabels,
+  hasLost,
+  leftEpisode,
+  problemWords,
+  spokenProblems,
+  withLeftEpisode,
+  type LeftEpisode,
+} from "../../session/episode_labels";
 import { button, h, setData, setHidden, setText, type Panel } from "../elements/dom";
 
 type Request = Pick<EpisodeRequest, "do"> & Partial<EpisodeRequest>;
@@ -44,6 +53,7 @@ interface EpisodeButton {
 /** Begins, keeps and discards episodes, and says what would spoil the one that is open. */
 export function createEpisodeBar(engine: ConsoleEngine): Panel {
   let state: EpisodeState | null = null;
+  let left: LeftEpisode | null = null; // open when the connection ended; null: none was, or its fate is known
   let heardMs = 0;
   let refusal = "";
   let refusedMs = -Infinity;
@@ -53,7 +63,8 @@ export function createEpisodeBar(engine: ConsoleEngine): Panel {
   const words = h("strong", "episode-words", { role: "status" });
   const time = h("span", "episode-time"); // apart from the words, which are read aloud when they change
   const count = h("span", "episode-count");
-  const problems = h("span", "episode-problems", { role: "alert" });
+  const problems = h("span", "episode-problems", { "aria-hidden": "true" });
+  const spoken = h("span", "unseen", { role: "alert" });
   const task = h("input", "episode-task", {
     "aria-label": "Task of the episode",
     placeholder: "Task, in words",
@@ -82,7 +93,7 @@ export function createEpisodeBar(engine: ConsoleEngine): Panel {
   const group = h("div", "episode-buttons", { role: "group", "aria-label": "Episode" });
   group.append(...buttons.map((each) => each.element));
   const element = h("section", "episode-bar", { "aria-label": "Episodes" });
-  element.append(h("div", "episode-state", {}, lamp, words, time, problems, count), form, group);
+  element.append(h("div", "episode-state", {}, lamp, words, time, problems, spoken, count), form, group);
 
   function make(
     label: string,
@@ -138,16 +149,28 @@ export function createEpisodeBar(engine: ConsoleEngine): Panel {
     note(engine.state, "warning", `Episode: ${refusal}`, Date.now());
   }
 
-  function take(message: ServerMessage | undefined): void {
-    if (message?.type === "episode") {
+  function take(said: ServerMessage | undefined): void {
+    if (said?.type === "episode") {
+      const message = withLeftEpisode(said, left ?? leftEpisode(state));
+      left = null;
       if (state?.task !== message.task && document.activeElement !== task && message.task !== "")
         task.value = message.task;
-      if (message.phase === "idle" && message.last !== state?.last && message.last.includes("lost"))
+      if (hasLost(message) && message.last !== state?.last)
         note(engine.state, "error", `Episode: ${message.last}`, Date.now());
       [state, heardMs] = [message, performance.now()];
-    } else if (message?.type === "episode_answer" && message.reason !== "") {
-      refuse(EPISODE_REFUSALS[message.reason]);
+    } else if (said?.type === "episode_answer" && said.reason !== "") {
+      refuse(EPISODE_REFUSALS[said.reason]);
     }
+  }
+
+  /** While the console does not answer, nobody knows what becomes of the episode. */
+  function showLeft(): void {
+    setHidden(element, left === null);
+    if (left === null) return;
+    setData(element, "tone", "bad");
+    setText(words, `Take ${left.number}: the console does not answer`);
+    for (const each of [time, problems, spoken, count]) setText(each, "");
+    for (const each of buttons) each.element.disabled = true;
   }
 
   take(engine.late.newest.get("episode")?.message);
@@ -171,10 +194,17 @@ export function createEpisodeBar(engine: ConsoleEngine): Panel {
     element,
     update(now) {
       const { recording, welcome } = engine.state;
-      if (welcome === null) state = null; // of a connection that ended
+      if (welcome === null) {
+        if (!element.hidden) left ??= leftEpisode(state);
+        state = null; // of a connection that ended
+      }
+      if (state === null) {
+        showLeft();
+        return;
+      }
       const records = recording?.state === "recording" || recording?.state === "failed";
-      setHidden(element, state === null || !may() || (!records && state.phase === "idle"));
-      if (state === null || element.hidden) return;
+      setHidden(element, !may() || (!records && state.phase === "idle" && !hasLost(state)));
+      if (element.hidden) return;
       const current = state;
       const seconds = Math.max(0, Date.now() / 1000 - current.since);
       const labels = episodeLabels(current, recording, (now - heardMs) / 1000, seconds);
@@ -184,7 +214,9 @@ export function createEpisodeBar(engine: ConsoleEngine): Panel {
       setText(time, labels.time);
       setText(count, labels.count);
       setText(problems, problemWords(current.problems));
+      problems.title = problemWords(current.problems);
       setHidden(problems, current.problems.length === 0);
+      setText(spoken, spokenProblems(current.problems));
       setHidden(form, current.phase === "open" || current.phase === "keeping");
       task.disabled = current.phase === "countdown";
       for (const each of buttons) {
