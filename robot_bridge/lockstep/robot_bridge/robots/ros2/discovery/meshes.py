@@ -8,6 +8,7 @@ import io
 import os
 from collections.abc import Iterator, Mapping
 from pathlib import Path
+from typing import Any
 from urllib.parse import unquote, urlsplit
 
 import numpy as np
@@ -26,7 +27,7 @@ DENSE_CELLS = 65**3  # a grid with more of them is numbered by its cells in use
 HEAD, TRIANGLE = 84, 50  # bytes of a binary STL: head with the count, each triangle
 _TRIANGLE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 
-Points = npt.NDArray[np.floating]  # n x 3
+Points = npt.NDArray[Any]  # n x 3, floats of either size
 Numbers = npt.NDArray[np.int64]
 
 
@@ -121,7 +122,7 @@ def _cell_numbers(shares: npt.NDArray[np.float32], cells: int) -> Numbers:
         numbers *= cells + 1  # the farthest corner has a cell of its own
         numbers += (shares[:, axis] * np.float32(cells)).astype(np.int64)
     if (cells + 1) ** 3 > DENSE_CELLS:
-        numbers = np.unique(numbers, return_inverse=True)[1].reshape(-1)
+        numbers = np.unique(numbers, return_inverse=True)[1].reshape(-1).astype(np.int64)
     return numbers
 
 
