@@ -55,6 +55,7 @@ export function createEpisodeBar(engine: ConsoleEngine): Panel {
   let state: EpisodeState | null = null;
   let left: LeftEpisode | null = null; // open when the connection ended; null: none was, or its fate is known
   let heardMs = 0;
+  let beganMs: number | null = null; // when this page saw the open episode begin; null: it did not
   let refusal = "";
   let refusedMs = -Infinity;
 
@@ -157,6 +158,8 @@ export function createEpisodeBar(engine: ConsoleEngine): Panel {
         task.value = message.task;
       if (hasLost(message) && message.last !== state?.last)
         note(engine.state, "error", `Episode: ${message.last}`, Date.now());
+      const isSame = state?.phase === "open" && state.episode === message.episode;
+      if (message.phase === "open" && !isSame) beganMs = state === null ? null : performance.now();
       [state, heardMs] = [message, performance.now()];
     } else if (said?.type === "episode_answer" && said.reason !== "") {
       refuse(EPISODE_REFUSALS[said.reason]);
@@ -206,7 +209,8 @@ export function createEpisodeBar(engine: ConsoleEngine): Panel {
       setHidden(element, !may() || (!records && state.phase === "idle" && !hasLost(state)));
       if (element.hidden) return;
       const current = state;
-      const seconds = Math.max(0, Date.now() / 1000 - current.since);
+      // The console's clock may be another: it counts only where the page came later.
+      const seconds = Math.max(0, beganMs === null ? Date.now() / 1000 - current.since : (now - beganMs) / 1000);
       const labels = episodeLabels(current, recording, (now - heardMs) / 1000, seconds);
       const isRefused = now - refusedMs < SHOWN_MS;
       setData(element, "tone", isRefused ? "bad" : labels.tone);
