@@ -24,8 +24,11 @@ describe("the schema of later messages", () => {
     expect(lateMisfit("episode", message)).not.toBeNull();
   });
 
-  it.each(["navigation", "traces", "shadow_verdict", "episode_answer", "surprise"])("knows %s by its type", (type) => {
-    const known = type !== "surprise";
-    expect(lateMisfit(type, { type })?.includes("unknown schema")).toBe(!known);
-  });
+  it.each(["navigation", "traces", "shadow_verdict", "episode_answer", "surprise"])(
+    "knows %s by its type",
+    (type) => {
+      const known = type !== "surprise";
+      expect(lateMisfit(type, { type })?.includes("unknown schema")).toBe(!known);
+    },
+  );
 });

@@ -3,7 +3,8 @@ import { pressable } from "../../src/xr/headset_buttons";
 
 describe("the buttons in a headset", () => {
   it("are all for a hand that does not drive", () => {
-    for (const name of ["leave", "recentre", "reset", "stop"] as const) expect(pressable(name, false)).toBe(name);
+    for (const name of ["leave", "recentre", "reset", "stop"] as const)
+      expect(pressable(name, false)).toBe(name);
     expect(pressable(null, false)).toBeNull();
   });
 

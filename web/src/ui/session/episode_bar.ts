@@ -210,7 +210,10 @@ export function createEpisodeBar(engine: ConsoleEngine): Panel {
       if (element.hidden) return;
       const current = state;
       // The console's clock may be another: it counts only where the page came later.
-      const seconds = Math.max(0, beganMs === null ? Date.now() / 1000 - current.since : (now - beganMs) / 1000);
+      const seconds = Math.max(
+        0,
+        beganMs === null ? Date.now() / 1000 - current.since : (now - beganMs) / 1000,
+      );
       const labels = episodeLabels(current, recording, (now - heardMs) / 1000, seconds);
       const isRefused = now - refusedMs < SHOWN_MS;
       setData(element, "tone", isRefused ? "bad" : labels.tone);
