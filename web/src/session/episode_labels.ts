@@ -42,6 +42,7 @@ export function episodeLabels(
     case "keeping":
       return { tone: "wait", text: "Being written", time: "", count };
     case "open":
+      if (isSilent(state, ageSeconds)) return { tone: "bad", text: unknownWords(state), time: "", count };
       return {
         tone: state.problems.length > 0 ? "bad" : "on",
         text: `Take ${state.number}`,
@@ -51,10 +52,27 @@ export function episodeLabels(
     case "idle": {
       const isLost = hasLost(state);
       const hint = recordingHint(recording);
+      if (isLost && recording?.state === "failed") {
+        const text = said(state.last).replace(FAILED, recording.detail); // the line has no room for both
+        return { tone: "bad", text, time: "", count };
+      }
       const text = [isLost || hint === "" ? said(state.last) : "", hint].filter(Boolean).join(" · ");
       return { tone: isLost || recording?.state === "failed" ? "bad" : "off", text, time: "", count };
     }
   }
+}
+
+const FAILED = "the recording failed"; // as the console says it
+const SILENT_SECONDS = 3;
+
+/** Whether nothing was heard of the open episode for longer than that takes: every second. */
+export function isSilent({ phase }: EpisodeState, ageSeconds: number): boolean {
+  return phase === "open" && ageSeconds > SILENT_SECONDS;
+}
+
+/** Nobody knows what becomes of an episode while the console does not answer. */
+export function unknownWords({ number }: Pick<EpisodeState, "number">): string {
+  return `Take ${number}: the console does not answer`;
 }
 
 /** Whether the last episode was lost. */

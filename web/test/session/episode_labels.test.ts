@@ -91,7 +91,7 @@ it("says that an episode is lost also where the recording ended with it", () => 
   const failed: RecordingState = { ...RECORDING, state: "failed", detail: "no space left" };
   expect(episodeLabels(state, failed, 0, 0)).toMatchObject({
     tone: "bad",
-    text: "Episode 2 is lost: the recording failed · Not recording: no space left",
+    text: "Episode 2 is lost: no space left",
   });
   expect(episodeLabels(state, { ...RECORDING, state: "off" }, 0, 0)).toMatchObject({
     tone: "bad",
@@ -111,4 +111,12 @@ it("says that an episode is lost with the console", () => {
   const kept = { ...IDLE, last: "episode 3 is kept" };
   expect(withLeftEpisode(kept, left)).toEqual(kept);
   expect(withLeftEpisode(IDLE, null)).toEqual(IDLE);
+});
+
+it("says that the console does not answer as soon as nothing is heard of the open episode", () => {
+  const open = { ...IDLE, phase: "open", number: 7 } as const;
+  expect(episodeLabels(open, RECORDING, 2.5, 65).text).toBe("Take 7");
+  const silent = episodeLabels(open, RECORDING, 3.5, 65);
+  expect(silent).toMatchObject({ tone: "bad", text: "Take 7: the console does not answer", time: "" });
+  expect(episodeLabels(IDLE, RECORDING, 60, 0).text).toBe("No episode yet");
 });

@@ -9,9 +9,11 @@ import {
   EPISODE_REFUSALS,
   episodeLabels,
   hasLost,
+  isSilent,
   leftEpisode,
   problemWords,
   spokenProblems,
+  unknownWords,
   withLeftEpisode,
   type LeftEpisode,
 } from "../../session/episode_labels";
@@ -166,12 +168,12 @@ export function createEpisodeBar(engine: ConsoleEngine): Panel {
     }
   }
 
-  /** While the console does not answer, nobody knows what becomes of the episode. */
+  /** The episode that was open when the connection ended. */
   function showLeft(): void {
     setHidden(element, left === null);
     if (left === null) return;
     setData(element, "tone", "bad");
-    setText(words, `Take ${left.number}: the console does not answer`);
+    setText(words, unknownWords(left));
     for (const each of [time, problems, spoken, count]) setText(each, "");
     for (const each of buttons) each.element.disabled = true;
   }
@@ -214,16 +216,19 @@ export function createEpisodeBar(engine: ConsoleEngine): Panel {
         0,
         beganMs === null ? Date.now() / 1000 - current.since : (now - beganMs) / 1000,
       );
-      const labels = episodeLabels(current, recording, (now - heardMs) / 1000, seconds);
+      const age = (now - heardMs) / 1000;
+      const labels = episodeLabels(current, recording, age, seconds);
+      const known = isSilent(current, age) ? [] : current.problems;
       const isRefused = now - refusedMs < SHOWN_MS;
       setData(element, "tone", isRefused ? "bad" : labels.tone);
       setText(words, isRefused ? `Not done: ${refusal}` : labels.text);
+      words.title = words.textContent;
       setText(time, labels.time);
       setText(count, labels.count);
-      setText(problems, problemWords(current.problems));
-      problems.title = problemWords(current.problems);
-      setHidden(problems, current.problems.length === 0);
-      setText(spoken, spokenProblems(current.problems));
+      setText(problems, problemWords(known));
+      problems.title = problemWords(known);
+      setHidden(problems, known.length === 0);
+      setText(spoken, spokenProblems(known));
       setHidden(form, current.phase === "open" || current.phase === "keeping");
       task.disabled = current.phase === "countdown";
       for (const each of buttons) {
