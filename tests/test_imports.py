@@ -22,7 +22,7 @@ PARTS = {
 # how a process reports to its service manager.
 FROM_THE_BRIDGE = {
     *("link", "cli", "conformance", "description", "encoding", "errors", "robots", "service_manager", "stop"),
-    *("thread_name", "watchdog"),
+    "watchdog",
 }
 # The console's folders and files, from the bottom to the top: each imports those before it.
 LAYERS = (

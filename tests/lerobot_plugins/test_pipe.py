@@ -1,6 +1,7 @@
 """The plugins' end of the pipe, without LeRobot: a script is the process at the other end."""
 
 import importlib
+import os
 import sys
 import time
 from collections.abc import Callable, Iterator
@@ -48,7 +49,7 @@ def opened(pipe: ModuleType, tmp_path: Path) -> Iterator[Callable[[str], Any]]:
     def open_(script: str) -> Any:
         program, python = tmp_path / "other_side.py", tmp_path / "python"
         program.write_text(BEGIN + script)
-        python.write_text(f'#!/bin/sh\nexec "{sys.executable}" "{program}"\n')
+        python.write_text(f'#!/bin/sh\nexec "{sys.executable}" "{program}" "$@"\n')
         python.chmod(0o700)
         made.append(pipe.Pipe(str(python), "module"))
         return made[-1]
@@ -117,3 +118,10 @@ def test_a_no_is_an_answer(opened: Callable[[str], Any]) -> None:
     with pytest.raises(Exception, match="Refused: no"):
         pipe.ask("drive", 20.0)
     assert pipe.ask("drive", 20.0) == ({"well": True}, [])
+
+
+def test_the_process_is_told_whose_end_is_its_own(opened: Callable[[str], Any]) -> None:
+    assert opened("read()\nsay(arguments=sys.argv[1:])\nread()").ask("open", 20.0) == (
+        {"arguments": ["-I", "-m", "module", str(os.getpid())]},
+        [],
+    )

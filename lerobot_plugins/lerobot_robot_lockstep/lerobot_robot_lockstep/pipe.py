@@ -4,6 +4,7 @@ A frame is the length of a JSON map (4 bytes, big-endian), the map, and the byte
 """
 
 import json
+import os
 import select
 import subprocess
 import time
@@ -26,14 +27,15 @@ class Pipe:
     A request that has no whole answer is the last: its answer may still come, and would be taken for the next one's.
     """
 
-    def __init__(self, python: str, module: str, *arguments: str) -> None:
+    def __init__(self, python: str, module: str) -> None:
         """Start the process.
 
         Raises:
             LockstepLost: it cannot be started.
         """
-        # Isolated: the paths of LeRobot's environment are for another Python's packages.
-        command = [python, "-I", "-m", module, *arguments]
+        # Isolated: the paths of LeRobot's environment are for another Python's packages. The process ends with this
+        # one, also if this one ends while it is starting.
+        command = [python, "-I", "-m", module, str(os.getpid())]
         try:
             self._process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, bufsize=0)
         except OSError as error:

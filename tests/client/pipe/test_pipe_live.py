@@ -122,9 +122,10 @@ async def test_what_is_no_frame_ends_it_with_a_reason(data: bytes) -> None:
             assert await pipe.process.wait() == 1
 
 
-@pytest.mark.parametrize(
-    "module", ["lockstep.client.pipe", "lockstep.robot_bridge.robots.lerobot.teleoperator_process"]
-)
+HELPERS = ["lockstep.client.pipe", "lockstep.robot_bridge.robots.lerobot.teleoperator_process"]
+
+
+@pytest.mark.parametrize("module", HELPERS)
 async def test_it_ends_with_a_killed_process_though_a_forked_one_keeps_the_pipe_open(module: str) -> None:
     """LeRobot forks processes that write pictures. A helper that lived on would keep the seat, or the port."""
     end, told = os.pipe()  # the helper alone keeps `told` open
@@ -156,3 +157,24 @@ async def test_it_ends_with_a_killed_process_though_a_forked_one_keeps_the_pipe_
         transport.close()
     finally:
         os.kill(forked, signal.SIGKILL)
+
+
+@pytest.mark.parametrize("module", HELPERS)
+async def test_it_ends_with_a_process_that_ended_while_it_was_starting(module: str) -> None:
+    """The test keeps the pipe open, as a forked process would."""
+    script = (
+        "import os, sys\n"
+        "parent, (living, held) = os.getpid(), os.pipe()\n"
+        "if os.fork(): os._exit(0)\n"
+        "os.close(held)\n"
+        "os.read(living, 1)\n"  # until the parent has ended
+        f"os.execv(sys.executable, [sys.executable, '-I', '-m', {module!r}, str(parent)])\n"
+    )
+    both = asyncio.subprocess.PIPE
+    process = await asyncio.create_subprocess_exec(sys.executable, "-c", script, stdin=both, stdout=both)
+    assert process.stdin is not None
+    assert process.stdout is not None
+    async with asyncio.timeout(SECONDS):
+        assert await process.stdout.read() == b""  # the helper has closed it
+        process.stdin.close()
+        await process.wait()

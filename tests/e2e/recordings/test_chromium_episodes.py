@@ -1,6 +1,7 @@
 """The bar of episodes on the operator's page."""
 
 import os
+from contextlib import AsyncExitStack
 from pathlib import Path
 
 import pytest
@@ -107,3 +108,26 @@ async def test_an_observer_sees_no_bar_and_without_a_recording_there_is_none(tmp
                 await console.until_live()
                 await console.page.locator(".settings, .tabs").first.wait_for(state="attached")
                 await expect(console.page.locator(".episode-bar")).to_be_hidden()
+
+
+async def test_an_episode_that_was_open_when_the_console_ended_is_said_to_be_lost(
+    tmp_path: Path, chromium: Browser
+) -> None:
+    record = ("--record", str(tmp_path / "recordings"))
+    async with AsyncExitStack() as closing:
+        async with running_stack(tmp_path, settings=SETTINGS, extra=record) as first:
+            port = int(first.console.rsplit(":", 1)[1])
+            page_console = await closing.enter_async_context(open_console(chromium, first.supervisor))
+            await page_console.until_live()
+            bar = page_console.page.locator(".episode-bar")
+            await bar.locator(".episode-task").fill("push the box")
+            await bar.locator(".episode-task").press("Enter")
+            await expect(bar.locator(".episode-words")).to_contain_text("Take 1")
+        await expect(bar.locator(".episode-words")).to_have_text("Take 1: the console does not answer")
+        await expect(bar.get_by_role("button", name="Keep")).to_be_disabled()
+        await _shot(page_console.page, "console-ended")
+        async with running_stack(tmp_path, settings=SETTINGS, extra=record, port=port):
+            await expect(bar.locator(".episode-words")).to_have_text(
+                "Episode 1 is lost: the console has ended", timeout=30_000
+            )
+            await _shot(page_console.page, "console-again")

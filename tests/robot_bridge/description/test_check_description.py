@@ -88,6 +88,11 @@ def test_the_planar_robots_description_is_sound() -> None:
         (with_mesh((), ()), "three numbers"),
         (with_mesh((0, 0, 0, 1, 0, 0, 0, 1, math.inf), (0, 1, 2)), "body m: every number"),
         (with_mesh((0.0,) * 30_000, (0,) * 30_003), "60003 numbers of meshes"),
+        (with_mesh((0.0,) * 15_000, (0,) * 15_003), "30003 numbers of meshes, the bound is 30000"),
+        (
+            with_mesh((0.123,) * 9_000, (0,) * 3_000),
+            "fewer triangles, for the meshes have 600",
+        ),
         (with_mesh((0, 0, 0, 1, 0, 0, 0, 1, 0), (0, 1, 2), "box"), "a box has no vertices"),
         (with_change(bodies=(Body(name="a", parent="", position=(0.0, math.nan, 0.0)),)), "body a: every number"),
         (

@@ -2,6 +2,7 @@
 
 import asyncio
 import socket
+import time
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from dataclasses import replace
@@ -12,7 +13,16 @@ import pytest
 
 from lockstep.protocol.actions import Status, StatusItem
 from lockstep.protocol.framing import MAX_MEDIA_FRAME, FrameReader, frame
-from lockstep.protocol.messages import EncodeRequest, Hello, Media, Ping, StreamRequest, decode_message, encode_message
+from lockstep.protocol.messages import (
+    EncodeRequest,
+    Hello,
+    Media,
+    Ping,
+    Pong,
+    StreamRequest,
+    decode_message,
+    encode_message,
+)
 from lockstep.protocol.traces.trace import known_spans
 from lockstep.robot_bridge.bridge import Bridge
 from lockstep.robot_bridge.conformance import CASES, Outcome, Subject, play_all
@@ -28,6 +38,7 @@ from tests.waiting import PATIENCE
 SETTINGS = BridgeSettings(port=0, encode=EncodeSettings(), event_strip=True)
 CAMERAS = ("overview", "front")
 CAMERA = CAMERAS[0]
+BYTES_PER_SECOND = 15_000  # of a slow network
 
 
 @asynccontextmanager
@@ -143,7 +154,7 @@ async def test_a_link_that_hardly_reads_costs_no_picture_that_another_needs() ->
         decoder.event_in(medium)
         async with asyncio.timeout(PATIENCE):
             while not bridge.drops[CAMERA]:
-                await slow.read(20)
+                await slow.read()
                 for medium in await pictures(link, 1):
                     assert decoder.event_in(medium) == medium.stamp
 
@@ -154,8 +165,8 @@ async def test_pictures_are_left_out_before_they_are_encoded_while_no_link_takes
         decoder, shown = Decoder(), 0
         async with asyncio.timeout(PATIENCE):
             while shown < 30 or not bridge.counters.left_out["link_busy"]:
-                await asyncio.sleep(0.01)  # the network's rate
-                for message in await slow.read(150):
+                await asyncio.sleep(0.01)
+                for message in await slow.read():
                     if message.stream == CAMERA:
                         assert decoder.event_in(message) == message.stamp
                         shown += 1
@@ -163,21 +174,36 @@ async def test_pictures_are_left_out_before_they_are_encoded_while_no_link_takes
 
 
 class SlowLink:
-    """A media link whose receiver takes few bytes at a time, and says that it lives."""
+    """A media link whose network brings few bytes a second. `beat` says that its client lives, whatever comes.
+
+    The bridge ends a link on which nothing moves for a second. So the bytes are counted by the clock: on a busy machine
+    fewer calls read more each.
+    """
 
     def __init__(self, own: socket.socket) -> None:
         self._socket = own
         self._reader = FrameReader(MAX_MEDIA_FRAME)
+        self._read_at = time.monotonic()
 
-    async def send(self, message: Hello | EncodeRequest | Ping) -> None:
+    async def send(self, message: Hello | EncodeRequest | Ping | Pong) -> None:
         await asyncio.get_running_loop().sock_sendall(self._socket, frame(encode_message(message)))
 
-    async def read(self, size: int) -> list[Media]:
+    async def beat(self) -> None:
+        while True:
+            await self.send(Ping(id=1))
+            await asyncio.sleep(0.2)
+
+    async def read(self) -> list[Media]:
+        """Read what came since the last call."""
+        before, self._read_at = self._read_at, time.monotonic()
+        size = max(1, int(BYTES_PER_SECOND * (self._read_at - before)))
         data = await asyncio.get_running_loop().sock_recv(self._socket, size)
         assert data, "the bridge has ended the link"
-        await self.send(Ping(id=1))
         self._reader.feed(data)
         messages = [decode_message(bytes(payload)) for payload in self._reader.frames()]
+        for each in messages:
+            if isinstance(each, Ping):
+                await self.send(Pong(id=each.id))
         return [each for each in messages if isinstance(each, Media)]
 
 
@@ -190,7 +216,10 @@ async def slow_link(bridge: Bridge) -> AsyncIterator[SlowLink]:
         link = SlowLink(own)
         await link.send(Hello(role="media"))
         await link.send(EncodeRequest(streams=[StreamRequest(stream=name, bitrate=20_000_000) for name in CAMERAS]))
-        yield link
+        async with asyncio.TaskGroup() as tasks:
+            beating = tasks.create_task(link.beat())
+            yield link
+            beating.cancel()
 
 
 async def test_a_bridge_that_encodes_keeps_to_the_protocol() -> None:

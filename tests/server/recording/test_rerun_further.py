@@ -25,6 +25,7 @@ from tests.server.recording.makers import DESCRIPTION, EPOCH, START
 from tests.server.recording.rrd import Entity, entities
 
 from lockstep.server.recording.export.rerun.further_records import MOST_ENTITIES  # isort: skip  (needs rerun)
+from lockstep.server.recording.export.rerun.further_records import MOST_PEER_ENTITIES  # isort: skip  (needs rerun)
 from lockstep.server.recording.export.rerun.session_log import (  # isort: skip  (needs rerun, which `rrd` looks for)
     Moment,
     SessionLog,
@@ -144,11 +145,32 @@ def test_names_that_peers_make_up_become_no_entities(tmp_path: Path) -> None:
     }
 
 
-def test_however_many_names_come_and_go_an_epoch_has_a_bounded_number_of_entities(tmp_path: Path) -> None:
-    def shadow(name: str) -> ShadowRecord:
-        return ShadowRecord(epoch=EPOCH, event=3, peer="q", name=name, values=[0.5, 0.0], judgement="late")
+def shadow(name: str) -> ShadowRecord:
+    return ShadowRecord(epoch=EPOCH, event=3, peer="q", name=name, values=[0.5, 0.0], judgement="late")
 
-    names = [f"net {number}" for number in range(MOST_ENTITIES + 50)]
+
+def test_however_many_names_come_and_go_an_epoch_has_a_bounded_number_of_entities(tmp_path: Path) -> None:
+    names = [f"net {number}" for number in range(MOST_PEER_ENTITIES + 50)]
     found = logged(tmp_path / "a.rrd", *map(shadow, [*names, names[0]]))
-    assert sum(path.startswith("/shadow/") for path in found) == MOST_ENTITIES
+    assert sum(path.startswith("/shadow/") for path in found) == MOST_PEER_ENTITIES
     assert len(found["/shadow/net\\ 0/wanted"].rows) == 2  # one that is known goes on
+
+
+def test_names_of_peers_use_up_no_room_of_the_robot(tmp_path: Path) -> None:
+    names = [f"net {number}" for number in range(MOST_PEER_ENTITIES + 50)]
+    found = logged(
+        tmp_path / "a.rrd",
+        *map(shadow, names),
+        StatusRecord(epoch=EPOCH, event=4, items=[StatusItem(name="mode", label="Mode", value="docked")]),
+        FeedbackRecord(epoch=EPOCH, event=5, issue=1, time=1.0, axes=[0.0, 0.0], faults=["hot"]),
+        TraceRecord(epoch=EPOCH, event=6, command=CommandSpans(forward_ms=0.5)),
+    )
+    assert found["/status/mode"].column("StateChange:state") == [["docked"]]
+    assert found["/state/faults"].column("StateChange:state") == [["hot"]]
+    assert "/trace/command" in found
+
+
+def test_a_robot_has_a_bounded_number_of_entities_too(tmp_path: Path) -> None:
+    items = [StatusItem(name=f"cell {number}", label="Cell", value=0.5) for number in range(MOST_ENTITIES + 50)]
+    found = logged(tmp_path / "a.rrd", StatusRecord(epoch=EPOCH, event=4, items=items))
+    assert sum(path.startswith("/status/") for path in found) == MOST_ENTITIES

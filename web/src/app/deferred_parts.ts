@@ -20,6 +20,7 @@ export { ActionClient, drawId } from "../robot/action_client";
 export { createPolicyBar } from "../ui/session/policy_bar";
 export { watchPictureClicks } from "../ui/robot/picture_clicks";
 export { createEpisodeBar } from "../ui/session/episode_bar";
+export { lateMisfit } from "../protocol/late_schema";
 export { RESET_WORDS } from "../stop/reset_words";
 export { createAnnouncer } from "../ui/status/announcer";
 export { createLimitsStrip } from "../ui/driving/limits_strip";

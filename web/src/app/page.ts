@@ -60,6 +60,7 @@ export class Page {
       pictureDrawn: () => this.grid.scene?.settle(),
     };
     this.engine = new ConsoleEngine(api, options, name, new TouchSticks(left, right), events, first);
+    this.later.use(({ lateMisfit }) => this.engine.late.read(lateMisfit)); // before there are panels that take messages
     this.panels = this.build(left, right, api);
     this.later.use(({ installHook }) => installHook(this));
     this.later.use(({ RESET_WORDS }) => takeResetWords(RESET_WORDS));

@@ -106,7 +106,9 @@ export class SidePanels {
       mainStream: () => grid.mainStream(),
     });
     engine.tracing = tracing;
-    engine.takeLate["traces"] = (value): void => tracing.told(value);
+    engine.late.take["traces"] = (message): void => {
+      if (message.type === "traces") tracing.book.noteTold(message);
+    };
     engine.streams.traceBy(() => new PictureTrace());
     const ways: WaySource = {
       book: tracing.book,

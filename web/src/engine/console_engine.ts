@@ -42,6 +42,7 @@ import type { ActionClient } from "../robot/action_client";
 import type { ActConditions } from "../robot/actions";
 import { reportOf } from "./report";
 import type { HeadsetStep } from "./headset_statistics";
+import { LateInbox } from "./late_inbox";
 import type { Tracing } from "./tracing";
 import type { GoalDriving } from "../drive/goals/goal_driving";
 import { StopSender } from "./stop_sender";
@@ -68,8 +69,6 @@ export interface ConsoleEngineEvents {
 
 /** An input that is told so late waited behind a page that was held up. */
 const HELD_UP_MS = 50;
-/** Messages whose schema comes with later code. */
-const LATE = /^(episode|episode_answer|navigation|shadow_verdict|traces)$/;
 
 /** What is called at every tick. */
 interface Stepped {
@@ -107,9 +106,7 @@ export class ConsoleEngine {
   private readonly disposal = new Disposal();
   peer: Peer | null = null;
   measuredMs: number | null = null; // when the newest feedback came
-  /** The newest message of each kind whose schema comes with later code, and what that code does with one. */
-  readonly late = new Map<string, { readonly value: unknown; readonly atMs: number }>();
-  readonly takeLate: Record<string, (message: unknown) => void> = {};
+  readonly late = new LateInbox((channel, detail) => this.unreadable(channel, detail));
   statusMs = 0; // when the robot's newest status came
   actionMs = -Infinity; // when the newest news of an action came
   private heardMs = 0;
@@ -333,21 +330,16 @@ export class ConsoleEngine {
     this.streams.close();
     this.heartbeat.end();
     forgetConnection(this.state);
-    this.late.clear();
+    this.late.newest.clear();
     this.measuredMs = null;
   }
 
   private received(channel: ChannelName, data: unknown, at: number): void {
     const parsed = parseServerMessage(data);
     if (parsed.kind !== "message") {
-      if (parsed.kind === "unknown" && LATE.test(parsed.type)) {
-        this.late.set(parsed.type, { value: parsed.value, atMs: at });
-        this.takeLate[parsed.type]?.(parsed.value);
-        return;
-      }
-      this.state.badMessages += 1;
-      const detail = parsed.kind === "unknown" ? parsed.type : parsed.detail;
-      note(this.state, "warning", `Unreadable message on ${channel}: ${detail}`, Date.now());
+      if (parsed.kind === "malformed") this.unreadable(channel, parsed.detail);
+      else if (!this.late.received(channel, parsed.type, parsed.value, at))
+        this.unreadable(channel, parsed.type);
       return;
     }
     this.ticker.catchUp(performance.now());
@@ -361,6 +353,11 @@ export class ConsoleEngine {
     if (forbidden !== null) this.bar(forbidden);
     this.follow(parsed.message, feedback, this.heardMs);
     if (this.state.handOver !== handOver) this.handedOver();
+  }
+
+  private unreadable(channel: ChannelName, detail: string): void {
+    this.state.badMessages += 1;
+    note(this.state, "warning", `Unreadable message on ${channel}: ${detail}`, Date.now());
   }
 
   private follow(message: ServerMessage, before: Feedback | null, now: number): void {

@@ -1,11 +1,8 @@
-import { isRecord, misfit, type Definitions } from "../protocol/schema_check";
-import type { ClientMessage, Traces } from "../protocol/wire";
-import schema from "../protocol/wire_schema_later.json";
+import type { ClientMessage } from "../protocol/wire";
 import type { DrawnPicture } from "../media/picture_trace";
 import type { ChannelName } from "../transport/webrtc/data_channels";
 import { TraceBook, slowestEvents } from "./trace_book";
 
-const definitions: Definitions = schema;
 const REPORT_MS = 500;
 const GOES_ON_MS = 120_000; // after the charts were closed: on a phone they stand over the pictures, and nobody drives
 
@@ -57,12 +54,6 @@ export class Tracing {
 
   noteDrawn(stream: string, picture: DrawnPicture | null): void {
     if (this.asked && picture !== null) this.book.noteDrawn(stream, picture);
-  }
-
-  /** Takes what the console tells; anything else is left out. */
-  told(value: unknown): void {
-    if (!isRecord(value) || misfit(definitions, "Traces", value) !== null) return;
-    this.book.noteTold(value as unknown as Traces); // the schema is generated together with the type
   }
 
   step(now: number): void {

@@ -17,6 +17,7 @@ import {
 } from "../xr/headset_input";
 import type { RobotDescription } from "../protocol/wire";
 import type { HandSettings } from "../xr/hand_mapping";
+import type { ButtonName } from "../xr/headset_buttons";
 import { PoseDevice } from "../xr/pose_drive";
 import type { RigidPose } from "../xr/rigid";
 import { Battery } from "./battery";
@@ -154,7 +155,7 @@ export class HeadsetSession implements HeadsetControls {
       state: this.status?.title ?? "",
       text: this.status?.text ?? "",
       reset: this.reset?.text ?? null,
-      pointed: { left: this.view.buttonAt("left"), right: this.view.buttonAt("right") },
+      pointed: { left: this.buttonAt("left"), right: this.buttonAt("right") },
       way: Object.fromEntries((this.status?.way ?? []).map(({ name, ms }) => [name, ms])),
       battery: this.battery.level,
     };
@@ -291,10 +292,13 @@ export class HeadsetSession implements HeadsetControls {
     if (engine.isArmed()) grab(this.input, side);
   }
 
-  /** A hand that drives presses STOP alone: its trigger is the gripper's, wherever the hand points. */
+  private buttonAt(side: Side): ButtonName | null {
+    return this.view.buttonAt(side, this.input.held.has(side));
+  }
+
+  /** `drives`: with this press, or before it. */
   private press({ side, drives }: { readonly side: Side; readonly drives: boolean }, now: number): void {
-    const button = this.view.buttonAt(side);
-    if (drives && button !== "stop") return;
+    const button = this.view.buttonAt(side, drives);
     if (button === "stop") this.page.engine.stop("headset button");
     else if (button === "recentre") this.recentre();
     else if (button === "leave") this.end();
@@ -306,7 +310,7 @@ export class HeadsetSession implements HeadsetControls {
     const { resetting } = this;
     if (resetting === null) return;
     const isHeld = this.input.hands.get(resetting.side)?.pressed === true;
-    if (!isHeld || this.view.buttonAt(resetting.side) !== "reset") this.resetting = null;
+    if (!isHeld || this.buttonAt(resetting.side) !== "reset") this.resetting = null;
     else if (now - resetting.sinceMs >= HOLD_MS) {
       this.resetting = null;
       this.page.engine.stopping.reset(resetting.sinceMs, now);

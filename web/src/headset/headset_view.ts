@@ -1,5 +1,6 @@
 import { Color, GridHelper, Group, PerspectiveCamera, Scene, type Object3D } from "three";
 import { layoutPanels } from "../xr/panel_layout";
+import { pressable, type ButtonName } from "../xr/headset_buttons";
 import { pairStreams, type PanelStreams } from "../xr/stereo_pairs";
 import { about, heading, type Quaternion, type RigidPose } from "../xr/rigid";
 import type { Side } from "../xr/headset_input";
@@ -9,8 +10,6 @@ import { PicturePanel, type PanelState } from "./picture_panel";
 import { Pointers } from "./pointers";
 import type { HeadsetStatus } from "./status";
 import type { HandReading } from "./xr_hands";
-
-export type ButtonName = "leave" | "recentre" | "reset" | "stop";
 
 /** The content of the view at one frame. */
 export interface ViewState {
@@ -55,7 +54,7 @@ export class HeadsetView {
   private readonly pointers = new Pointers();
   private readonly floor = new GridHelper(10, 20, GRID, GRID);
   private laidOut = "";
-  private pointed = new Map<Side, ButtonName>();
+  private pointed = new Map<Side, ButtonName>(); // also by a hand that may not press it
 
   /** `opaque`: nothing of the real room is seen. */
   constructor(opaque: boolean) {
@@ -93,12 +92,12 @@ export class HeadsetView {
     }
     this.status.show(JSON.stringify(state.status), (...at) => drawStatus(...at, state.status));
     this.point(hands, held, state);
-    this.drawButtons(state);
+    this.drawButtons(state, held);
   }
 
   /** The button that the hand points at and may press; null: none. */
-  buttonAt(side: Side): ButtonName | null {
-    return this.pointed.get(side) ?? null;
+  buttonAt(side: Side, drives: boolean): ButtonName | null {
+    return pressable(this.pointed.get(side) ?? null, drives);
   }
 
   /** How a camera's picture stands in the headset's space; null: it is not shown. */
@@ -160,14 +159,13 @@ export class HeadsetView {
     this.pointed = new Map(
       [...met].flatMap(([side, object]) => {
         const name = nameOf(object);
-        const isLive = name !== undefined && (name === "stop" || !held.has(side));
-        return isLive ? [[side, name] as const] : [];
+        return name === undefined ? [] : [[side, name] as const];
       }),
     );
   }
 
-  private drawButtons(state: ViewState): void {
-    const pointed = new Set(this.pointed.values());
+  private drawButtons(state: ViewState, held: ReadonlySet<Side>): void {
+    const pointed = new Set([...this.pointed.keys()].map((side) => this.buttonAt(side, held.has(side))));
     const looks: Readonly<Record<ButtonName, readonly [string, string, string]>> = {
       stop: ["STOP", state.stop, "#c8102e"],
       recentre: ["Recentre", "", "#1b232b"],

@@ -22,7 +22,6 @@ import {
 } from "./map_geometry";
 import { MapGestures, type Gesture } from "./map_gestures";
 import { MapLoader } from "./map_loader";
-import { readNavigation } from "./map_reader";
 import {
   SILENT_MS,
   ageWords,
@@ -60,7 +59,6 @@ export class MapView {
   private aim: { readonly at: Point; readonly towards: Point | null } | null = null; // m
   private place: Place = { kind: "unknown", why: "" };
   private navigation: Navigation | null = null;
-  private read: unknown = null; // the message that `navigation` was read from
   private fittedTo = ""; // the map and size that the view was fitted to
   private epoch = "";
 
@@ -99,12 +97,13 @@ export class MapView {
     const description = engine.state.robot?.description ?? null;
     this.followEpoch(engine.state.robot?.epoch ?? "");
     this.take(this.gestures.look(now));
-    this.readNavigation();
+    const navigation = engine.late.newest.get("navigation")?.message;
+    this.navigation = navigation?.type === "navigation" ? navigation : null;
     if (description === null || description.map === null) {
       this.showVeil("Not connected");
       return;
     }
-    const sinceMs = now - (engine.late.get("navigation")?.atMs ?? -Infinity);
+    const sinceMs = now - (engine.late.newest.get("navigation")?.atMs ?? -Infinity);
     const isSilent = sinceMs > SILENT_MS || feedbackAge(engine.measuredMs, now) !== null;
     this.place = placeOf(description, engine.state.feedback, this.navigation, isSilent);
     const map = this.loader.map(this.navigation?.map ?? "", now);
@@ -136,13 +135,6 @@ export class MapView {
     this.epoch = epoch;
     this.view = null;
     this.cancelGesture();
-  }
-
-  private readNavigation(): void {
-    const navigation = this.engine.late.get("navigation");
-    if (navigation === undefined) this.navigation = null;
-    else if (navigation.value !== this.read) this.navigation = readNavigation(navigation.value);
-    this.read = navigation?.value ?? null;
   }
 
   private showVeil(words: string): void {

@@ -11,9 +11,14 @@ export type Parsed =
 const definitions: Definitions = schema;
 const MAX_LENGTH = 1_000_000;
 
-const nameByType: ReadonlyMap<string, string> = new Map(
-  Object.entries(definitions).flatMap(([name, shape]) => typesOf(shape).map((type) => [type, name] as const)),
-);
+const nameByType = namesByType(definitions);
+
+/** The names of the messages' definitions, by the value of their field `type`. */
+export function namesByType(from: Definitions): ReadonlyMap<string, string> {
+  return new Map(
+    Object.entries(from).flatMap(([name, shape]) => typesOf(shape).map((type) => [type, name] as const)),
+  );
+}
 
 /** The values of the field `type` of a message. */
 function typesOf(shape: Shape): readonly string[] {

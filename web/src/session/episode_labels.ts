@@ -42,23 +42,100 @@ export function episodeLabels(
     case "keeping":
       return { tone: "wait", text: "Being written", time: "", count };
     case "open":
+      if (isSilent(state, ageSeconds)) return { tone: "bad", text: unknownWords(state), time: "", count };
       return {
         tone: state.problems.length > 0 ? "bad" : "on",
         text: `Take ${state.number}`,
         time: elapsed(seconds),
         count,
       };
-    case "idle":
-      if (recording?.state === "failed")
-        return { tone: "bad", text: `Not recording: ${recording.detail}`, time: "", count };
-      if (recording?.state !== "recording") return { tone: "off", text: "Record first", time: "", count };
-      return { tone: state.last.includes("lost") ? "bad" : "off", text: said(state.last), time: "", count };
+    case "idle": {
+      const isLost = hasLost(state);
+      const hint = recordingHint(recording);
+      if (isLost && recording?.state === "failed") {
+        const text = said(state.last).replace(FAILED, recording.detail); // the line has no room for both
+        return { tone: "bad", text, time: "", count };
+      }
+      const text = [isLost || hint === "" ? said(state.last) : "", hint].filter(Boolean).join(" · ");
+      return { tone: isLost || recording?.state === "failed" ? "bad" : "off", text, time: "", count };
+    }
   }
 }
 
+const FAILED = "the recording failed"; // as the console says it
+const SILENT_SECONDS = 3;
+
+/** Whether nothing was heard of the open episode for longer than that takes: every second. */
+export function isSilent({ phase }: EpisodeState, ageSeconds: number): boolean {
+  return phase === "open" && ageSeconds > SILENT_SECONDS;
+}
+
+/** Nobody knows what becomes of an episode while the console does not answer. */
+export function unknownWords({ number }: Pick<EpisodeState, "number">): string {
+  return `Take ${number}: the console does not answer`;
+}
+
+/** Whether the last episode was lost. */
+export function hasLost({ phase, last }: EpisodeState): boolean {
+  return phase === "idle" && last.includes("lost");
+}
+
+/** Why no episode can begin; "" where one can. */
+function recordingHint(recording: RecordingState | null): string {
+  if (recording?.state === "failed") return `Not recording: ${recording.detail}`;
+  return recording?.state === "recording" ? "" : "Record first";
+}
+
+const NAMES: Readonly<Record<EpisodeProblem["kind"], string>> = {
+  // The worst first: a line that is too short for all leaves out the last.
+  camera_missing: "no picture",
+  records_lost: "records are missing",
+  disk_low: "the disk is almost full",
+  recorder_behind: "the disk is too slow",
+  camera_behind: "pictures are late",
+  camera_slow: "too few pictures",
+  no_events: "nobody drives",
+};
+const ORDER = Object.keys(NAMES);
+
 /** The problems of the open episode, the worst first, in one line. */
 export function problemWords(problems: readonly EpisodeProblem[]): string {
-  return problems.map((each) => each.text).join(" · ");
+  return worstFirst(problems)
+    .map((each) => each.text)
+    .join(" · ");
+}
+
+/** The same without figures, which would be read aloud every second. */
+export function spokenProblems(problems: readonly EpisodeProblem[]): string {
+  return worstFirst(problems)
+    .map(({ kind, stream }) => (stream === "" ? NAMES[kind] : `${stream}: ${NAMES[kind]}`))
+    .join(", ");
+}
+
+function worstFirst(problems: readonly EpisodeProblem[]): EpisodeProblem[] {
+  return problems.toSorted((one, other) => ORDER.indexOf(one.kind) - ORDER.indexOf(other.kind));
+}
+
+/** An episode that was being recorded when the connection ended. */
+export interface LeftEpisode {
+  readonly episode: string;
+  readonly number: number;
+}
+
+/** null: none was. */
+export function leftEpisode(state: EpisodeState | null): LeftEpisode | null {
+  return state?.phase === "open" || state?.phase === "keeping"
+    ? { episode: state.episode, number: state.number }
+    : null;
+}
+
+/**
+ * The state with what became of that episode, where the console does not say it: another process of the console, after
+ * the one before has ended, knows of none.
+ */
+export function withLeftEpisode(state: EpisodeState, left: LeftEpisode | null): EpisodeState {
+  if (left === null || state.last !== "" || state.episode === left.episode) return state;
+  return { ...state, last: `episode ${left.number} is lost: the console has ended` };
 }
 
 function countWords({ kept, discarded, cut }: EpisodeState): string {

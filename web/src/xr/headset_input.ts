@@ -82,15 +82,22 @@ export function isSilent(input: HeadsetInput, now: number): boolean {
 export function takeFrame(input: HeadsetInput, samples: readonly HandSample[], now: number): HeadsetEvent[] {
   const events: HeadsetEvent[] = [];
   const elapsed = now - input.frameMs;
+  const held = new Set(input.held); // what one hand lets go now, the other held when it pressed
   input.frameMs = now;
   for (const side of [...input.hands.keys()])
     if (!samples.some((sample) => sample.side === side)) lose(input, side, events);
-  for (const sample of samples) takeHand(input, sample, elapsed, events);
+  for (const sample of samples) takeHand(input, sample, held, elapsed, events);
   input.inputs = inputsOf(samples);
   return events;
 }
 
-function takeHand(input: HeadsetInput, sample: HandSample, elapsed: number, events: HeadsetEvent[]): void {
+function takeHand(
+  input: HeadsetInput,
+  sample: HandSample,
+  held: ReadonlySet<Side>, // before this frame
+  elapsed: number,
+  events: HeadsetEvent[],
+): void {
   const { side, pose } = sample;
   const before = input.hands.get(side);
   const state: HandState = {
@@ -110,7 +117,7 @@ function takeHand(input: HeadsetInput, sample: HandSample, elapsed: number, even
   for (const kind of ["stop", "layer", "recentre"] as const)
     if (state[kind] && !before[kind]) events.push({ kind });
   const asks = state.squeezed && !before.squeezed;
-  const drives = input.held.has(side) || asks;
+  const drives = held.has(side) || asks;
   if (state.pressed && !before.pressed) events.push({ kind: "press", side, drives });
   if (input.held.has(side)) {
     if (pose === null || hasJumped(before.pose, pose, elapsed)) drop(input, side, "tracking_lost", events);

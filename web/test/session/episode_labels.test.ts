@@ -1,7 +1,12 @@
 import { expect, it } from "vitest";
 import type { EpisodeState, RecordingState } from "../../src/protocol/wire";
-import { episodeLabels, problemWords } from "../../src/session/episode_labels";
-import { readEpisodeMessage } from "../../src/session/episode_reader";
+import {
+  episodeLabels,
+  leftEpisode,
+  problemWords,
+  spokenProblems,
+  withLeftEpisode,
+} from "../../src/session/episode_labels";
 
 const IDLE: EpisodeState = {
   type: "episode",
@@ -65,20 +70,53 @@ it("says why no episode can begin", () => {
   });
 });
 
-it("reads messages about episodes and nothing else", () => {
-  expect(readEpisodeMessage({ ...IDLE })).toEqual(IDLE);
-  expect(
-    readEpisodeMessage({ type: "episode_answer", id: "x", reason: "empty", detail: "", episode: "" }),
-  ).toMatchObject({
-    reason: "empty",
+it("names the worst problem first, and aloud without figures that change", () => {
+  const problems = [
+    { kind: "camera_slow", stream: "front", text: "front: 3 pictures a second instead of 15" },
+    { kind: "no_events", stream: "", text: "nobody has driven for 12 s" },
+    { kind: "disk_low", stream: "", text: "the disk is almost full: 3 MB until the recording ends" },
+    { kind: "camera_missing", stream: "wrist", text: "wrist: no picture for 2 s" },
+  ] as const;
+  expect(problemWords(problems)).toBe(
+    "wrist: no picture for 2 s · the disk is almost full: 3 MB until the recording ends · " +
+      "front: 3 pictures a second instead of 15 · nobody has driven for 12 s",
+  );
+  expect(spokenProblems(problems)).toBe(
+    "wrist: no picture, the disk is almost full, front: too few pictures, nobody drives",
+  );
+});
+
+it("says that an episode is lost also where the recording ended with it", () => {
+  const state = { ...IDLE, last: "episode 2 is lost: the recording failed" };
+  const failed: RecordingState = { ...RECORDING, state: "failed", detail: "no space left" };
+  expect(episodeLabels(state, failed, 0, 0)).toMatchObject({
+    tone: "bad",
+    text: "Episode 2 is lost: no space left",
   });
-  for (const wrong of [
-    null,
-    [],
-    { type: "episode" },
-    { ...IDLE, kept: "3" },
-    { type: "welcome" },
-    { ...IDLE, phase: "x" },
-  ])
-    expect(readEpisodeMessage(wrong)).toBeNull();
+  expect(episodeLabels(state, { ...RECORDING, state: "off" }, 0, 0)).toMatchObject({
+    tone: "bad",
+    text: "Episode 2 is lost: the recording failed · Record first",
+  });
+  expect(episodeLabels({ ...IDLE, last: "episode 1 is kept" }, null, 0, 0).text).toBe("Record first");
+});
+
+it("says that an episode is lost with the console", () => {
+  const left = leftEpisode({ ...IDLE, phase: "open", episode: "a", number: 3 });
+  expect(left).toEqual({ episode: "a", number: 3 });
+  expect(leftEpisode(IDLE)).toBeNull();
+  expect(leftEpisode(null)).toBeNull();
+  expect(withLeftEpisode(IDLE, left).last).toBe("episode 3 is lost: the console has ended");
+  const goesOn = { ...IDLE, phase: "open", episode: "a", number: 3 } as const;
+  expect(withLeftEpisode(goesOn, left)).toEqual(goesOn);
+  const kept = { ...IDLE, last: "episode 3 is kept" };
+  expect(withLeftEpisode(kept, left)).toEqual(kept);
+  expect(withLeftEpisode(IDLE, null)).toEqual(IDLE);
+});
+
+it("says that the console does not answer as soon as nothing is heard of the open episode", () => {
+  const open = { ...IDLE, phase: "open", number: 7 } as const;
+  expect(episodeLabels(open, RECORDING, 2.5, 65).text).toBe("Take 7");
+  const silent = episodeLabels(open, RECORDING, 3.5, 65);
+  expect(silent).toMatchObject({ tone: "bad", text: "Take 7: the console does not answer", time: "" });
+  expect(episodeLabels(IDLE, RECORDING, 60, 0).text).toBe("No episode yet");
 });

@@ -164,6 +164,17 @@ describe("buttons", () => {
     expect(presses(hand({ trigger: 1 }), left(0))).toEqual([{ kind: "press", side: "right", drives: false }]);
   });
 
+  it("are pressed by a hand that drives until this frame for STOP alone, where the other hand is lost in it", () => {
+    const session = new Session();
+    const left = (pose: HandSample["pose"]): HandSample => hand({ side: "left", squeeze: 1, pose });
+    session.frame(hand({ side: "left" }), hand());
+    session.frame(left(PLACE), hand({ squeeze: 1 }));
+    expect(session.frame(left(null), hand({ squeeze: 1, trigger: 1 }))).toEqual([
+      { kind: "lost", why: "tracking_lost" },
+      { kind: "press", side: "right", drives: true },
+    ]);
+  });
+
   it("stop the robot from a hand that is not tracked too", () => {
     const session = new Session();
     session.frame(hand({ pose: null }));

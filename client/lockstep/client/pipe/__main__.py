@@ -1,4 +1,4 @@
-"""Serves the standard input and output until the input ends."""
+"""Serves the standard input and output until the input ends, or the process that wants it: `… [ITS NUMBER]`."""
 
 import asyncio
 import logging
@@ -10,12 +10,12 @@ from contextlib import suppress
 from typing import BinaryIO
 
 from lockstep.client.pipe.server import PipeServer
-from lockstep.protocol.pipe.parent_process import parent_ended
+from lockstep.protocol.pipe.parent_process import parent_ended, parent_of
 from lockstep.protocol.pipe.pipe_frames import BadFrame
 
 
-async def serve(output: BinaryIO) -> None:
-    """Serve. Frames go to `output`; nothing else may write there.
+async def serve(output: BinaryIO, parent: int) -> None:
+    """Serve until the process `parent` ends. Frames go to `output`; nothing else may write there.
 
     Raises:
         BadFrame: the other side does not speak in frames.
@@ -39,7 +39,7 @@ async def serve(output: BinaryIO) -> None:
                 serving = tasks.create_task(_until_gone(server), name="requests")
                 loop.add_signal_handler(signal.SIGTERM, serving.cancel)
                 # Processes that the other side has forked may keep the pipe open beyond its end.
-                ended = tasks.create_task(parent_ended(), name="parent")
+                ended = tasks.create_task(parent_ended(parent), name="parent")
                 await asyncio.wait([serving, ended], return_when=asyncio.FIRST_COMPLETED)
                 for task in (ended, serving):
                     task.cancel()
@@ -57,7 +57,7 @@ def main() -> None:
     output = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)  # a library that prints must not print into the frames
     try:
-        asyncio.run(serve(output))
+        asyncio.run(serve(output, parent_of(sys.argv[1:])))
     except BadFrame as error:
         sys.exit(f"lockstep: {error}")
 

@@ -112,16 +112,24 @@ class Driver:
         return await self.heard(lambda feedback: feedback is not before, "the state, once more")
 
     async def drive(self, values: Sequence[float | None], speed: float = 1.0) -> Feedback:
-        """Send a command and return its feedback. A bridge that was held up first gets the neutral command it needs.
+        """Send a command and return its feedback; raises as `execute` does."""
+        await self.execute(values, speed)
+        return self.feedback
+
+    async def execute(self, values: Sequence[float | None], speed: float = 1.0, *, copies: int = 1) -> Command:
+        """Send a command until it executes, and return it. Its feedback is the newest then.
+
+        A bridge that was held up first gets the neutral command it needs. `copies` are sent at once.
 
         Raises:
             Violation: the command was refused.
         """
         for _ in range(TRIES):
             await self._pace()
-            refusal = await self._executed(self.command(values, speed=speed))
+            command = self.command(values, speed=speed)
+            refusal = await self._executed(command, copies)
             if refusal is None:
-                return self.feedback
+                return command
             expect(
                 refusal.reason in ("not_neutral", "late"),
                 f"a proper command was refused {refusal.reason}: {refusal.detail}",
@@ -185,9 +193,9 @@ class Driver:
                     while self.feedback.stop.stopped:
                         await self.next()
 
-    async def _executed(self, command: Command) -> Refusal | None:
+    async def _executed(self, command: Command, copies: int) -> Refusal | None:
         """Send a command. Return its refusal, or None if it executed."""
-        self.peer.send(command)
+        self.peer.send(*([command] * copies))
         longest = PATIENCE + MOST_AHEAD / self.description.max_event_rate
         async with within(longest, "a proper command was neither executed nor refused"):
             while self.feedback.event != command.event:

@@ -32,13 +32,15 @@ __all__ = ["check_bounds", "check_description"]
 MAX_STREAMS = 32  # cameras and microphones
 MAX_BODIES = 1024
 MAX_GEOMS = 4096
-MAX_MESH_NUMBERS = 60_000  # coordinates of vertices, and corners of triangles
 MAX_LAYERS = 32
 MAX_LIMITS = 256
 MAX_DISTORTION = 14  # coefficients, those of the longest model
 FARTHEST = 1e6  # m, for drawn parts; the bound of their other numbers too
 MAX_NAME = 200  # characters in a name or a label
 MAX_BYTES = 60_000  # of JSON: a peer that declares no maximum takes messages of 65,536 bytes (RFC 8841 6.1)
+# Coordinates of vertices, and corners of triangles. More cannot be in so many bytes: each takes two of them at least.
+# Those of a robot's own meshes are longer, and MAX_BYTES is what bounds them.
+MAX_MESH_NUMBERS = MAX_BYTES // 2
 SIDES = range(1, 8193)  # pixels
 FRAME_RATES = 240.0  # Hz
 SAMPLE_RATES = range(8000, 192_001)  # Hz
@@ -56,8 +58,7 @@ def check_description(description: RobotDescription) -> None:
     if not description.axes:
         raise DescriptionError("a robot needs at least one axis")
     check_bounds(description)
-    if (size := len(msgspec.json.encode(description))) > MAX_BYTES:
-        raise DescriptionError(f"{size} bytes of JSON, the bound is {MAX_BYTES}: fewer geoms or shorter names")
+    _check_size(description)
     if not 0 < description.hold <= 5:
         raise DescriptionError(f"hold must be in (0, 5] s, not {description.hold}")
     if description.watchdog is not None and not 0 < description.watchdog < description.hold:
@@ -89,6 +90,18 @@ def check_description(description: RobotDescription) -> None:
     check_clicks(description)
     check_map(description)
     check_limits(description)
+
+
+def _check_size(description: RobotDescription) -> None:
+    size = len(msgspec.json.encode(description))
+    if size <= MAX_BYTES:
+        return
+    meshes = [(geom.vertices, geom.triangles) for body in description.bodies for geom in body.geoms]
+    of_meshes = len(msgspec.json.encode([each for each in meshes if any(each)]))
+    advice = "fewer geoms or shorter names"
+    if of_meshes > size // 2:
+        advice = f"fewer triangles, for the meshes have {of_meshes} of them"
+    raise DescriptionError(f"{size} bytes of JSON, the bound is {MAX_BYTES}: {advice}")
 
 
 def check_bounds(description: RobotDescription) -> None:

@@ -4,7 +4,6 @@ import asyncio
 import logging
 import time
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from typing import NamedTuple, Protocol
 
@@ -12,9 +11,9 @@ import msgspec
 
 from lockstep.protocol.messages import Media
 from lockstep.protocol.traces.trace import PictureSpans, join_spans, span_ms
+from lockstep.robot_bridge.encoding.encoder_thread import EncoderThread
 from lockstep.robot_bridge.encoding.encoding_requests import EncodingGoal, FrameRateGate, KeyframeSpacing
 from lockstep.robot_bridge.errors import EncodingFailed
-from lockstep.robot_bridge.thread_name import name_thread
 
 __all__ = ["EncodedPicture", "PictureEncoder", "PictureEncoding", "Requests"]
 
@@ -78,19 +77,19 @@ class PictureEncoding:
         self._spacing = KeyframeSpacing()
         self._waiting: Media | None = None  # the newest picture, while the encoder is busy
         self._busy = False
+        self._has_failed = False  # True after the first failure that was not foreseen
         self._loop: asyncio.AbstractEventLoop | None = None  # None: not running
-        self._thread: ThreadPoolExecutor | None = None
+        self._thread: EncoderThread | None = None
 
     async def run(self) -> None:
         """Encode until cancelled."""
-        name = f"encode-{self._stream}"[:15]
-        thread = ThreadPoolExecutor(1, thread_name_prefix=name, initializer=name_thread, initargs=(name,))
+        thread = EncoderThread(f"encode-{self._stream}"[:15])
         self._loop, self._thread = asyncio.get_running_loop(), thread
         try:
             await self._loop.create_future()
         finally:
             self._loop = self._thread = None
-            await asyncio.to_thread(thread.shutdown)
+            await thread.close()
 
     def put(self, media: Media) -> None:
         """Take a picture; a newer one replaces one that still waits."""
@@ -112,8 +111,12 @@ class PictureEncoding:
             self._count("link_busy")
             return
         keyframe = self._requests.wants_keyframe(self._stream) and self._spacing.allows(media.time)
-        self._busy = True
-        thread.submit(self._work, loop, media, goal, keyframe)
+        failure = thread.submit(self._work, loop, media, goal, keyframe)
+        if failure is None:
+            self._busy = True
+        else:
+            self._failed(failure)
+            self._then(media)
 
     def _work(self, loop: asyncio.AbstractEventLoop, media: Media, goal: EncodingGoal, keyframe: bool) -> None:
         """Encode in the thread."""
@@ -132,9 +135,7 @@ class PictureEncoding:
         if self._loop is None:  # ended meanwhile
             return
         if isinstance(result, Exception):
-            if not isinstance(result, EncodingFailed):
-                _logger.error("stream %s: the encoder failed", self._stream, exc_info=result)
-            self._count("encoding_failed")
+            self._failed(result)
         else:
             if result.keyframe:
                 self._requests.keyframe_made(self._stream)
@@ -154,3 +155,10 @@ class PictureEncoding:
             self._emit(encoded)
         self._begin_next()
         self._then(media)
+
+    def _failed(self, error: Exception) -> None:
+        self._count("encoding_failed")
+        if not isinstance(error, EncodingFailed) and not self._has_failed:
+            self._has_failed = True
+            text = "stream %s: the encoder failed; further failures are only counted"
+            _logger.error(text, self._stream, exc_info=error)

@@ -4,13 +4,12 @@ import asyncio
 import logging
 from collections import deque
 from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 
 from lockstep.protocol.messages import Media
+from lockstep.robot_bridge.encoding.encoder_thread import EncoderThread
 from lockstep.robot_bridge.encoding.sound_encoder import OpusEncoder
 from lockstep.robot_bridge.errors import EncodingFailed
-from lockstep.robot_bridge.thread_name import name_thread
 
 __all__ = ["SoundEncoding"]
 
@@ -32,19 +31,19 @@ class SoundEncoding:
         self._count = count
         self._waiting: deque[Media] = deque()
         self._busy = False
+        self._has_failed = False  # True after the first failure that was not foreseen
         self._loop: asyncio.AbstractEventLoop | None = None  # None: not running
-        self._thread: ThreadPoolExecutor | None = None
+        self._thread: EncoderThread | None = None
 
     async def run(self) -> None:
         """Encode until cancelled."""
-        name = f"encode-{self._stream}"[:15]
-        thread = ThreadPoolExecutor(1, thread_name_prefix=name, initializer=name_thread, initargs=(name,))
+        thread = EncoderThread(f"encode-{self._stream}"[:15])
         self._loop, self._thread = asyncio.get_running_loop(), thread
         try:
             await self._loop.create_future()
         finally:
             self._loop = self._thread = None
-            await asyncio.to_thread(thread.shutdown)
+            await thread.close()
 
     def put(self, media: Media) -> None:
         """Take a segment."""
@@ -57,8 +56,11 @@ class SoundEncoding:
     def _begin_next(self) -> None:
         if self._busy or not self._waiting or self._loop is None or self._thread is None:
             return
-        self._busy = True
-        self._thread.submit(self._work, self._loop, self._waiting.popleft())
+        failure = self._thread.submit(self._work, self._loop, self._waiting.popleft())
+        if failure is None:
+            self._busy = True
+        else:
+            self._failed(failure)
 
     def _work(self, loop: asyncio.AbstractEventLoop, media: Media) -> None:
         """Encode in the thread."""
@@ -75,10 +77,15 @@ class SoundEncoding:
         if self._loop is None:  # ended meanwhile
             return
         if isinstance(result, Exception):
-            if not isinstance(result, EncodingFailed):
-                _logger.error("stream %s: the encoder failed", self._stream, exc_info=result)
-            self._count("encoding_failed")
+            self._failed(result)
         else:
             for packet in result:
                 self._emit(packet)
         self._begin_next()
+
+    def _failed(self, error: Exception) -> None:
+        self._count("encoding_failed")
+        if not isinstance(error, EncodingFailed) and not self._has_failed:
+            self._has_failed = True
+            text = "stream %s: the encoder failed; further failures are only counted"
+            _logger.error(text, self._stream, exc_info=error)

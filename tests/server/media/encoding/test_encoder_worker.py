@@ -3,7 +3,6 @@
 import asyncio
 import threading
 from collections.abc import AsyncIterator, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from contextlib import asynccontextmanager, suppress
 from typing import NoReturn
 
@@ -156,17 +155,22 @@ async def test_nothing_passes_after_the_end_and_it_can_run_again() -> None:
     assert world.stamps == [2]
 
 
-async def test_a_picture_for_which_there_was_no_room_for_a_thread_does_not_keep_the_next_ones_out() -> None:
-    world = World()
-    with pytest.MonkeyPatch.context() as patch:
+async def test_a_picture_for_which_there_was_no_room_for_a_thread_is_counted_and_does_not_keep_the_next_ones_out(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    world, asked = World(), list[str]()
+    passed = world.all.add_passed()
+    monkeypatch.setattr(passed, "request_keyframe", lambda cause, *, other: asked.append(cause))
+    async with world.running():
+        with pytest.MonkeyPatch.context() as patch:
 
-        def refuse(*arguments: object) -> NoReturn:
-            raise RuntimeError("can't start new thread")
+            def refuse(thread: threading.Thread) -> NoReturn:
+                raise RuntimeError("can't start new thread")
 
-        async with world.running():
-            patch.setattr(ThreadPoolExecutor, "submit", refuse)
-            with pytest.raises(RuntimeError):
-                arrive(world.worker, picture(1, 0.0))
-            patch.undo()
-            await world.take(2)
-    assert world.stamps == [2]
+            patch.setattr(threading.Thread, "start", refuse)
+            arrive(world.worker, picture(1, 0.0))  # which ends no task of whoever brings pictures
+        assert world.drops("worker_failed") == 1
+        assert asked == ["drop"]
+        await world.take(2)
+        await world.take(3)
+    assert world.stamps == [2, 3]

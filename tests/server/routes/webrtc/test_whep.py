@@ -348,12 +348,12 @@ async def test_an_offer_that_cannot_be_answered_in_time_leaves_no_connection(mon
         silent.bind(("127.0.0.1", 0))
         stun = f"stun:127.0.0.1:{silent.getsockname()[1]}"
         async with running_rig(stun=(stun,), relay_console=True) as rig:
-            monkeypatch.setattr("lockstep.server.routes.webrtc.whep.NEGOTIATION_TIMEOUT", 0.1)
+            monkeypatch.setattr("lockstep.server.routes.webrtc.negotiation.NEGOTIATION_TIMEOUT", 0.1)
             headers = {**rig.token("operator"), "Content-Type": "application/sdp"}
             answer = await rig.http.post("/whep", content=offer(section("0")), headers=headers)
             assert (answer.status_code, answer.json()["error"]) == (400, "bad_sdp")
             assert len(rig.dependencies.console.peers) == 0
-            monkeypatch.setattr("lockstep.server.routes.webrtc.whep.NEGOTIATION_TIMEOUT", 10.0)
+            monkeypatch.setattr("lockstep.server.routes.webrtc.negotiation.NEGOTIATION_TIMEOUT", 10.0)
             answer = await rig.http.post("/whep", content=offer(section("0")), headers=headers)
             assert answer.status_code == 201, "what was given up holds nobody up"
 

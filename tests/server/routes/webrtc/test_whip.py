@@ -386,7 +386,7 @@ async def test_an_offer_for_which_servers_are_asked_too_long_leaves_nothing_behi
         silent.bind(("127.0.0.1", 0))
         stun = f"stun:127.0.0.1:{silent.getsockname()[1]}"
         async with running_rig(whip="phone", relay_console=True, stun=stun) as rig:
-            monkeypatch.setattr("lockstep.server.routes.webrtc.whip.NEGOTIATION_TIMEOUT", 0.2)
+            monkeypatch.setattr("lockstep.server.routes.webrtc.negotiation.NEGOTIATION_TIMEOUT", 0.2)
             assert name(await post(rig, rig.token("operator"))) == (400, "bad_sdp")
             endpoint: Any = rig.dependencies.context.endpoint
             assert endpoint._endpoint._connections == {}

@@ -2,11 +2,21 @@ import type { ConsoleEngine } from "../../engine/console_engine";
 import type { EpisodePress } from "../../gamepad/episode_presses";
 import { drivingKeys } from "../../input/shortcuts";
 import { FIELDS } from "../../input/keyboard";
-import type { EpisodeRequest, EpisodeState } from "../../protocol/wire";
+import type { EpisodeRequest, EpisodeState, ServerMessage } from "../../protocol/wire";
 import { drawId } from "../../robot/action_client";
 import { holdsSeat, isOperator, note } from "../../session/console_state";
-import { EPISODE_REFUSALS, episodeLabels, problemWords } from "../../session/episode_labels";
-import { readEpisodeMessage } from "../../session/episode_reader";
+import {
+  EPISODE_REFUSALS,
+  episodeLabels,
+  hasLost,
+  isSilent,
+  leftEpisode,
+  problemWords,
+  spokenProblems,
+  unknownWords,
+  withLeftEpisode,
+  type LeftEpisode,
+} from "../../session/episode_labels";
 import { button, h, setData, setHidden, setText, type Panel } from "../elements/dom";
 
 type Request = Pick<EpisodeRequest, "do"> & Partial<EpisodeRequest>;
@@ -45,7 +55,9 @@ interface EpisodeButton {
 /** Begins, keeps and discards episodes, and says what would spoil the one that is open. */
 export function createEpisodeBar(engine: ConsoleEngine): Panel {
   let state: EpisodeState | null = null;
+  let left: LeftEpisode | null = null; // open when the connection ended; null: none was, or its fate is known
   let heardMs = 0;
+  let beganMs: number | null = null; // when this page saw the open episode begin; null: it did not
   let refusal = "";
   let refusedMs = -Infinity;
 
@@ -54,7 +66,8 @@ export function createEpisodeBar(engine: ConsoleEngine): Panel {
   const words = h("strong", "episode-words", { role: "status" });
   const time = h("span", "episode-time"); // apart from the words, which are read aloud when they change
   const count = h("span", "episode-count");
-  const problems = h("span", "episode-problems", { role: "alert" });
+  const problems = h("span", "episode-problems", { "aria-hidden": "true" });
+  const spoken = h("span", "unseen", { role: "alert" });
   const task = h("input", "episode-task", {
     "aria-label": "Task of the episode",
     placeholder: "Task, in words",
@@ -83,7 +96,7 @@ export function createEpisodeBar(engine: ConsoleEngine): Panel {
   const group = h("div", "episode-buttons", { role: "group", "aria-label": "Episode" });
   group.append(...buttons.map((each) => each.element));
   const element = h("section", "episode-bar", { "aria-label": "Episodes" });
-  element.append(h("div", "episode-state", {}, lamp, words, time, problems, count), form, group);
+  element.append(h("div", "episode-state", {}, lamp, words, time, problems, spoken, count), form, group);
 
   function make(
     label: string,
@@ -139,22 +152,35 @@ export function createEpisodeBar(engine: ConsoleEngine): Panel {
     note(engine.state, "warning", `Episode: ${refusal}`, Date.now());
   }
 
-  function take(value: unknown): void {
-    const message = readEpisodeMessage(value);
-    if (message?.type === "episode") {
+  function take(said: ServerMessage | undefined): void {
+    if (said?.type === "episode") {
+      const message = withLeftEpisode(said, left ?? leftEpisode(state));
+      left = null;
       if (state?.task !== message.task && document.activeElement !== task && message.task !== "")
         task.value = message.task;
-      if (message.phase === "idle" && message.last !== state?.last && message.last.includes("lost"))
+      if (hasLost(message) && message.last !== state?.last)
         note(engine.state, "error", `Episode: ${message.last}`, Date.now());
+      const isSame = state?.phase === "open" && state.episode === message.episode;
+      if (message.phase === "open" && !isSame) beganMs = state === null ? null : performance.now();
       [state, heardMs] = [message, performance.now()];
-    } else if (message?.type === "episode_answer" && message.reason !== "") {
-      refuse(EPISODE_REFUSALS[message.reason]);
+    } else if (said?.type === "episode_answer" && said.reason !== "") {
+      refuse(EPISODE_REFUSALS[said.reason]);
     }
   }
 
-  take(engine.late.get("episode")?.value);
+  /** The episode that was open when the connection ended. */
+  function showLeft(): void {
+    setHidden(element, left === null);
+    if (left === null) return;
+    setData(element, "tone", "bad");
+    setText(words, unknownWords(left));
+    for (const each of [time, problems, spoken, count]) setText(each, "");
+    for (const each of buttons) each.element.disabled = true;
+  }
+
+  take(engine.late.newest.get("episode")?.message);
   engine.padEpisode = takePress;
-  engine.takeLate["episode"] = engine.takeLate["episode_answer"] = take;
+  engine.late.take["episode"] = engine.late.take["episode_answer"] = take;
   form.addEventListener("submit", (event) => {
     event.preventDefault();
     task.blur(); // keys drive again
@@ -173,20 +199,36 @@ export function createEpisodeBar(engine: ConsoleEngine): Panel {
     element,
     update(now) {
       const { recording, welcome } = engine.state;
-      if (welcome === null) state = null; // of a connection that ended
+      if (welcome === null) {
+        if (!element.hidden) left ??= leftEpisode(state);
+        state = null; // of a connection that ended
+      }
+      if (state === null) {
+        showLeft();
+        return;
+      }
       const records = recording?.state === "recording" || recording?.state === "failed";
-      setHidden(element, state === null || !may() || (!records && state.phase === "idle"));
-      if (state === null || element.hidden) return;
+      setHidden(element, !may() || (!records && state.phase === "idle" && !hasLost(state)));
+      if (element.hidden) return;
       const current = state;
-      const seconds = Math.max(0, Date.now() / 1000 - current.since);
-      const labels = episodeLabels(current, recording, (now - heardMs) / 1000, seconds);
+      // The console's clock may be another: it counts only where the page came later.
+      const seconds = Math.max(
+        0,
+        beganMs === null ? Date.now() / 1000 - current.since : (now - beganMs) / 1000,
+      );
+      const age = (now - heardMs) / 1000;
+      const labels = episodeLabels(current, recording, age, seconds);
+      const known = isSilent(current, age) ? [] : current.problems;
       const isRefused = now - refusedMs < SHOWN_MS;
       setData(element, "tone", isRefused ? "bad" : labels.tone);
       setText(words, isRefused ? `Not done: ${refusal}` : labels.text);
+      words.title = words.textContent;
       setText(time, labels.time);
       setText(count, labels.count);
-      setText(problems, problemWords(current.problems));
-      setHidden(problems, current.problems.length === 0);
+      setText(problems, problemWords(known));
+      problems.title = problemWords(known);
+      setHidden(problems, known.length === 0);
+      setText(spoken, spokenProblems(known));
       setHidden(form, current.phase === "open" || current.phase === "keeping");
       task.disabled = current.phase === "countdown";
       for (const each of buttons) {

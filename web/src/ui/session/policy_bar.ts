@@ -2,13 +2,10 @@ import type { ConsoleEngine } from "../../engine/console_engine";
 import { axesShown } from "../../drive/axes_shown";
 import { drivingKeys } from "../../input/shortcuts";
 import { FIELDS } from "../../input/keyboard";
-import { isRecord, misfit, type Definitions } from "../../protocol/schema_check";
 import type { ShadowVerdict } from "../../protocol/wire";
-import schema from "../../protocol/wire_schema_later.json";
 import { policyView, shadowAxes, shadowWords, type PolicyOffer } from "../../session/policies";
 import { button, h, setData, setHidden, setText, type Panel } from "../elements/dom";
 
-const definitions: Definitions = schema;
 /** The time for which a shadow's last word is shown, in ms. */
 const FRESH_MS = 1500;
 const GIVE_KEY = "F2";
@@ -47,11 +44,9 @@ export function createPolicyBar(engine: ConsoleEngine): Panel {
     offer(wanted.peer, true);
   }
 
-  engine.takeLate["shadow_verdict"] = (value: unknown): void => {
-    if (!isRecord(value) || misfit(definitions, "ShadowVerdict", value) !== null) return;
-    // The schema is generated together with the types.
-    const verdict = value as unknown as ShadowVerdict;
-    shadows.set(verdict.peer, { verdict, heardMs: performance.now() });
+  engine.late.take["shadow_verdict"] = (message): void => {
+    if (message.type === "shadow_verdict")
+      shadows.set(message.peer, { verdict: message, heardMs: performance.now() });
   };
   addEventListener("keydown", (key) => {
     if (key.code !== GIVE_KEY || key.repeat || key.ctrlKey || key.metaKey || key.altKey) return;

@@ -1,7 +1,7 @@
 """The bridge behind LeRobot's teleoperator `lockstep` with `page`: `python -m …teleoperator_process`, asked on a pipe.
 
 A console connects to this bridge as to any robot. LeRobot asks for the applied goals at its own rate. At the end of the
-pipe the bridge ends too.
+pipe, or of the process whose number is the argument, the bridge ends too.
 """
 
 import asyncio
@@ -17,7 +17,7 @@ from msgspec.structs import replace
 from lockstep.protocol.description import RobotDescription
 from lockstep.protocol.errors import SecretError
 from lockstep.protocol.link_secret import LinkSecret
-from lockstep.protocol.pipe.parent_process import parent_ended
+from lockstep.protocol.pipe.parent_process import parent_ended, parent_of
 from lockstep.protocol.pipe.pipe_frames import BadFrame, read_request, to_frame
 from lockstep.robot_bridge.bridge import Bridge
 from lockstep.robot_bridge.errors import BridgeError
@@ -77,7 +77,7 @@ def _places(description: RobotDescription, start: dict[str, float]) -> list[floa
     return places
 
 
-async def serve(output: BinaryIO) -> None:
+async def serve(output: BinaryIO, parent: int) -> None:
     loop = asyncio.get_running_loop()
     loop.add_signal_handler(signal.SIGINT, lambda: None)  # the pipe's end is the end
     reader = asyncio.StreamReader()
@@ -87,7 +87,7 @@ async def serve(output: BinaryIO) -> None:
         output.writelines(to_frame(said))  # a few hundred bytes, which the pipe always has room for
         output.flush()
 
-    said = await read_request(reader)
+    said = await _first_request(reader, parent)
     if said is None:
         return
     try:
@@ -102,14 +102,28 @@ async def serve(output: BinaryIO) -> None:
         )
         async with Bridge(arm, settings) as bridge:
             say({"robot": f"tcp://{bridge.address[0]}:{bridge.address[1]}"})
-            await _answer(reader, arm, bridge, say)
+            await _answer(reader, arm, bridge, say, parent)
     except SettingsPlace as place:
         say({"error": "SettingsError", "text": f"{'.'.join(map(str, place.keys))}: {place.detail}"})
     except (BridgeError, SecretError, OSError, ValueError, msgspec.ValidationError) as error:
         say({"error": type(error).__name__, "text": str(error)})
 
 
-async def _answer(reader: asyncio.StreamReader, arm: VirtualArm, bridge: Bridge, say: Any) -> None:
+async def _first_request(reader: asyncio.StreamReader, parent: int) -> dict[str, Any] | None:
+    """Return the first request; None if the pipe or the process `parent` ends before it."""
+    try:
+        async with asyncio.TaskGroup() as tasks:
+            reading = tasks.create_task(read_request(reader), name="requests")
+            ended = tasks.create_task(parent_ended(parent), name="parent")
+            await asyncio.wait([reading, ended], return_when=asyncio.FIRST_COMPLETED)
+            for task in (reading, ended):
+                task.cancel()
+    except BaseExceptionGroup as errors:  # of `read_request`
+        raise errors.exceptions[0] from None
+    return None if reading.cancelled() else reading.result()
+
+
+async def _answer(reader: asyncio.StreamReader, arm: VirtualArm, bridge: Bridge, say: Any, parent: int) -> None:
     ended = asyncio.Event()
 
     failed: list[Exception] = []
@@ -124,7 +138,7 @@ async def _answer(reader: asyncio.StreamReader, arm: VirtualArm, bridge: Bridge,
         ended.set()
 
     async def watch() -> None:  # processes that LeRobot has forked may keep the pipe open beyond its end
-        await parent_ended()
+        await parent_ended(parent)
         ended.set()
 
     try:
@@ -144,7 +158,7 @@ def main() -> None:
     output = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)  # a library that prints must not print into the frames
     try:
-        asyncio.run(serve(output))
+        asyncio.run(serve(output, parent_of(sys.argv[1:])))
     except BrokenPipeError:
         pass  # the other side has gone
     except BadFrame as error:

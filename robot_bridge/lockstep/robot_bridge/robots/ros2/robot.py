@@ -21,6 +21,7 @@ from lockstep.robot_bridge.robots.ros2.mapping.map_topics import MapReader
 from lockstep.robot_bridge.robots.ros2.ros_side import RosSide
 from lockstep.robot_bridge.robots.ros2.sensing.battery import BatteryTopic
 from lockstep.robot_bridge.robots.ros2.sensing.camera import CameraSource
+from lockstep.robot_bridge.robots.ros2.sensing.camera_info import CameraInfoTopic
 from lockstep.robot_bridge.robots.ros2.sensing.diagnostics import DiagnosticsTopic
 from lockstep.robot_bridge.robots.ros2.sensing.sensors import LockoutTopic, RangeSensor, WrenchTopic
 from lockstep.robot_bridge.robots.ros2.settings import Arm, Ros2Settings
@@ -69,6 +70,11 @@ class Ros2Robot(Robot):
             diagnostics = settings.diagnostics
             self._diagnostics = None if diagnostics is None else DiagnosticsTopic(self._ros, diagnostics)
             self._cameras = [CameraSource(self._ros, camera) for camera in settings.cameras]
+            self._infos = [
+                CameraInfoTopic(self._ros, camera, camera.calibration, camera.info)
+                for camera in settings.cameras
+                if camera.calibration is not None and camera.info
+            ]
             self._ros.start()
             if self._lockout is not None:
                 self._lockout.wait()
@@ -123,6 +129,7 @@ class Ros2Robot(Robot):
     def status(self) -> Sequence[StatusItem]:
         now = clock.now()
         items = [item for battery in self._batteries for item in battery.items(now)]
+        items += [item for info in self._infos for item in info.items()]
         return items + ([] if self._diagnostics is None else self._diagnostics.items(now))
 
     def grid_map(self) -> GridMap | None:

@@ -200,6 +200,7 @@ class CameraTopic(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
     latency: Annotated[float, Meta(ge=0, le=5)] = 0.0  # s, taken off that time besides
     timeout: Timeout = 2.0
     calibration: CameraCalibration | None = None  # None: not known, nothing is drawn on the pictures
+    info: MaybeTopic = ""  # of sensor_msgs/CameraInfo, compared with the calibration; "": nothing is compared
 
 
 class Battery(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):

@@ -3,11 +3,10 @@
 import asyncio
 import logging
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from typing import Generic, NamedTuple, Protocol, TypeVar
 
-from lockstep.robot_bridge.thread_name import name_thread
+from lockstep.robot_bridge.encoding.encoder_thread import EncoderThread
 from lockstep.server.media.encoding.stream_encodings import StreamEncodings
 from lockstep.server.media.encoding.tier_encoding import TierEncoding
 from lockstep.server.media.errors import MediaError, PayloadError
@@ -68,7 +67,7 @@ class EncoderWorker(FrameStage, Generic[Job]):
         self._encodings = encodings
         self._dropped = dropped
         self._turns: CooperativeScheduler | None = None  # None: not running
-        self._thread: ThreadPoolExecutor | None = None  # None: not running
+        self._thread: EncoderThread | None = None  # None: not running
         self._is_busy = False  # True while the thread has a job
         self._has_failed = False  # True after the first failure of the encoder
 
@@ -78,23 +77,26 @@ class EncoderWorker(FrameStage, Generic[Job]):
 
     async def run(self) -> None:
         """Encode until cancelled."""
-        name = f"media-{self._encodings.stream}"
-        thread = ThreadPoolExecutor(1, thread_name_prefix=name, initializer=name_thread, initargs=(name,))
+        thread = EncoderThread(f"media-{self._encodings.stream}")
         self._turns, self._thread = turns_of_loop(), thread
         try:
             self._begin_next()
             await asyncio.get_running_loop().create_future()
         finally:
             self._turns = self._thread = None
-            await asyncio.to_thread(thread.shutdown)
+            await thread.close()
 
     def _begin_next(self) -> None:
         """Give the thread its next job, unless it is busy."""
         if self._thread is None or self._turns is None or self._is_busy:
             return
         if (job := self._queue.next_job()) is not None:
-            self._thread.submit(self._work, job, self._turns)
-            self._is_busy = True  # not if there is no room for a thread: the next run tries again
+            failure = self._thread.submit(self._work, job, self._turns)
+            if failure is None:
+                self._is_busy = True
+            else:
+                self._failed(failure)
+                self._request_passed()  # the pictures that were to be decoded for this job are missing to the next ones
 
     def _work(self, job: Job, turns: CooperativeScheduler) -> None:
         """Do a job in the thread. Its results go out at once, without waiting for a task's turn."""
@@ -129,13 +131,17 @@ class EncoderWorker(FrameStage, Generic[Job]):
         if result.error is not None:
             self._dropped.count(result.error.name)
             result.encoding.keyframes.request()  # it may have been a keyframe that somebody waits for
-            if isinstance(result.error, PayloadError) and self._encodings.passed is not None:
+            if isinstance(result.error, PayloadError):
                 # The robot's next pictures build on one that could not be decoded. The operator's come first.
-                others = all(map(self._encodings.is_other, result.encoding.targets))
-                self._encodings.passed.request_keyframe("drop", other=others)
+                self._request_passed(other=all(map(self._encodings.is_other, result.encoding.targets)))
         else:
             result.encoding.encode_seconds.observe(result.seconds)
         for frame in result.frames:
             self.following.encoded(frame, result.encoding)
         if result.moves:
             self._encodings.move_all(result.encoding.codec)
+
+    def _request_passed(self, *, other: bool = False) -> None:
+        """Request a keyframe of a robot that encodes. `other`: for others than the operator alone."""
+        if self._encodings.passed is not None:
+            self._encodings.passed.request_keyframe("drop", other=other)

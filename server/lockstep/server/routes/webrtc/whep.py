@@ -1,6 +1,5 @@
 """WHEP signalling (draft-ietf-wish-whep): POST an offer, PATCH candidates, DELETE to end."""
 
-import asyncio
 import gzip
 from collections import Counter
 from collections.abc import Callable
@@ -8,23 +7,18 @@ from typing import Annotated, Literal
 
 from fastapi import APIRouter, Depends, HTTPException, Query, Request, Response
 
-from lockstep.rtc.endpoint import TooManyPeers
 from lockstep.rtc.peer import PeerSettings
 from lockstep.rtc.sctp import SctpSettings
-from lockstep.rtc.sdp import SdpError, SessionDescription, write_description, write_fragment
+from lockstep.rtc.sdp import SessionDescription, write_description, write_fragment
 from lockstep.server.auth.tokens import Identity, Right
 from lockstep.server.errors import (
-    BadSdp,
     BadSdpFragment,
-    ConsoleError,
-    InternalFault,
     NotConnected,
     NotFound,
     PreconditionFailed,
     PreconditionRequired,
     RobotUnreachable,
     TooFewSections,
-    TooManyRequests,
 )
 from lockstep.server.http.request_body import read_text
 from lockstep.server.http.static_files import takes_coding
@@ -32,23 +26,14 @@ from lockstep.server.peers.agreed_channels import agreed_channels
 from lockstep.server.peers.peer import Peer
 from lockstep.server.peers.webrtc_transport import WebRtcTransport
 from lockstep.server.routes.webrtc.ice import servers_for
+from lockstep.server.routes.webrtc.negotiation import FRAGMENT, SDP, created_headers, negotiated, own_servers
 from lockstep.server.state.dependencies import Dependencies, authorized, dependencies
-from lockstep.server.webrtc.ice_servers import link_headers
 from lockstep.server.webrtc.ice_session import IceSession
 from lockstep.server.webrtc.sdp_offer import MAX_SECTIONS, parse_fragment, parse_offer
 
-__all__ = [
-    "FRAGMENT",
-    "NEGOTIATION_TIMEOUT",
-    "SDP",
-    "patched",
-    "router",
-]
+__all__ = ["patched", "router"]
 
-SDP = "application/sdp"
-FRAGMENT = "application/trickle-ice-sdpfrag"
 FURTHER_SECTIONS = 2  # besides one for each stream: the data channels, and the operator's voice
-NEGOTIATION_TIMEOUT = 10.0  # s until STUN and TURN servers have told their addresses
 
 # The welcome has the robot's description, which is longer than 16 KiB for an arm with many bodies.
 LARGEST_MESSAGE = 64 * 1024  # bytes; every browser takes that
@@ -94,14 +79,7 @@ async def create(
         peer, transport, answer = await _negotiate(here, caller, identity, offer, trailer=trailer, thumbnail=thumbnail)
         peer.relay = relay if relayed else ""
         here.console.peers.admit(peer)
-    headers = {
-        "Location": f"{request.scope.get('root_path', '')}/whep/{transport.resource}",
-        "Accept-Patch": FRAGMENT,
-        "Cache-Control": "no-store",
-        "ETag": transport.ice.tag,
-    }
-    if ice.ice_servers:
-        headers["Link"] = ", ".join(link_headers(ice))
+    headers = created_headers(request, f"/whep/{transport.resource}", transport.ice.tag, ice)
     body = write_description(answer).encode()
     if takes_coding(request.headers.get("accept-encoding", ""), "gzip"):  # sections repeat each other
         body, headers = gzip.compress(body, mtime=0), headers | {"Content-Encoding": "gzip"}
@@ -183,21 +161,13 @@ async def _negotiate(
     here: Dependencies, caller: Right, identity: Identity, offer: SessionDescription, *, trailer: bool, thumbnail: bool
 ) -> tuple[Peer, WebRtcTransport, SessionDescription]:
     """Return the peer, its transport and its answer. `identity`: the one under which `caller` takes part."""
-    # The console's own candidates are a setting, and a peer's address is learnt from its checks: no server is asked.
-    servers = servers_for(here.settings, identity).ice_servers if here.settings.relay_console else []
     channels = agreed_channels([each for section in offer.accepted for each in section.channel_maps])
     observes = identity.role == "observer"
     turns = here.media.datagrams.create(waits=observes)
-    try:
-        async with asyncio.timeout(NEGOTIATION_TIMEOUT):
-            connection = await here.context.endpoint.connect(
-                turns=turns, servers=servers, settings=OF_OBSERVERS if observes else OF_DRIVERS
-            )
-    except TimeoutError as error:
-        raise BadSdp("the offer cannot be answered in time") from error
-    except TooManyPeers as error:
-        raise TooManyRequests("too many connections at this console") from error
-    try:
+    opening = here.context.endpoint.connect(
+        turns=turns, servers=own_servers(here, identity), settings=OF_OBSERVERS if observes else OF_DRIVERS
+    )
+    async with negotiated(here, opening, "peer offer") as connection:
         line = here.voice.line(identity.role)
         plan = here.media.plan(offer, trailer=trailer, thumbnail=thumbnail, voice=line is not None)
         answer = connection.answer(offer, plan.media)
@@ -215,12 +185,4 @@ async def _negotiate(
             await peer.abandon()
             raise
         connection.listen(transport.heard)
-    except BaseException as error:
-        connection.close()
-        if isinstance(error, SdpError):
-            raise BadSdp(str(error)) from error
-        if isinstance(error, Exception) and not isinstance(error, ConsoleError):
-            here.metrics.faults.caught("peer offer", error)
-            raise InternalFault("the console could not answer; its log says why") from error
-        raise
     return peer, transport, answer

@@ -1,34 +1,29 @@
 """WHIP signalling (RFC 9725): a client with an operator's link publishes one of the console's own cameras."""
 
-import asyncio
 from dataclasses import replace
 from typing import Annotated, cast
 
 from fastapi import APIRouter, Depends, HTTPException, Query, Request, Response
 
 from lockstep.protocol.console import PEOPLE
-from lockstep.rtc.endpoint import TooManyPeers
-from lockstep.rtc.sdp import MID_URI, Codec, LocalMedia, MediaSection, SdpError, SessionDescription, write_description
+from lockstep.rtc.sdp import MID_URI, Codec, LocalMedia, MediaSection, SessionDescription, write_description
 from lockstep.rtc.sdp.codecs import common_codecs, is_same_format
 from lockstep.server.auth.tokens import Right
 from lockstep.server.errors import (
     BadSdp,
-    ConsoleError,
-    InternalFault,
     NotAcceptable,
     NotAllowed,
     NotFound,
     RobotUnreachable,
-    TooManyRequests,
 )
 from lockstep.server.http.request_body import read_text
 from lockstep.server.media.published.depacketise import PictureCodec
 from lockstep.server.media.published.published_camera import PublishedCamera
 from lockstep.server.publishing.publisher import Publisher
 from lockstep.server.routes.webrtc.ice import servers_for
-from lockstep.server.routes.webrtc.whep import FRAGMENT, NEGOTIATION_TIMEOUT, SDP, patched
+from lockstep.server.routes.webrtc.negotiation import FRAGMENT, SDP, created_headers, negotiated, own_servers
+from lockstep.server.routes.webrtc.whep import patched
 from lockstep.server.state.dependencies import Dependencies, authorized, dependencies
-from lockstep.server.webrtc.ice_servers import link_headers
 from lockstep.server.webrtc.sdp_offer import parse_offer
 
 __all__ = ["router"]
@@ -74,14 +69,7 @@ async def create(
     with here.publishers.place(caller.identity, camera) as wanted:
         publisher, answer = await _negotiate(here, caller, offer, section, wanted)
         here.publishers.admit(publisher)
-    headers = {
-        "Location": f"{request.scope.get('root_path', '')}/whip/{publisher.resource}",
-        "Accept-Patch": FRAGMENT,
-        "Cache-Control": "no-store",
-        "ETag": publisher.ice.tag,
-    }
-    if ice.ice_servers:
-        headers["Link"] = ", ".join(link_headers(ice))
+    headers = created_headers(request, f"/whip/{publisher.resource}", publisher.ice.tag, ice)
     return Response(answer, status_code=201, media_type=SDP, headers=headers)
 
 
@@ -166,30 +154,15 @@ async def _negotiate(
     here: Dependencies, caller: Right, offer: SessionDescription, section: MediaSection, camera: PublishedCamera
 ) -> tuple[Publisher, str]:
     """Return the publisher, and its answer. `section`: its pictures are taken; others are answered inactive."""
-    servers = servers_for(here.settings, caller.identity).ice_servers if here.settings.relay_console else []
     publisher = Publisher(camera, caller.identity, here.settings)
-    try:
-        async with asyncio.timeout(NEGOTIATION_TIMEOUT):
-            connection = await here.context.endpoint.connect(
-                publisher.heard, turns=here.media.datagrams.observers, servers=servers
-            )
-    except TimeoutError as error:
-        raise BadSdp("the offer cannot be answered in time") from error
-    except TooManyPeers as error:
-        raise TooManyRequests("too many connections at this console") from error
-    try:
+    opening = here.context.endpoint.connect(
+        publisher.heard, turns=here.media.datagrams.observers, servers=own_servers(here, caller.identity)
+    )
+    async with negotiated(here, opening, "publisher offer") as connection:
         answer = connection.answer(offer, {each.mid: _answered(each, section) for each in offer.sections})
         codec = "VP8" if section.codecs[0].name.lower() == "vp8" else "H264"
         publisher.receives(connection, offer.transport.ufrag, section.mid, cast(PictureCodec, codec))
         caller.identity  # noqa: B018  raises when the link has ended meanwhile
-    except BaseException as error:
-        connection.close()
-        if isinstance(error, SdpError):
-            raise BadSdp(str(error)) from error
-        if isinstance(error, Exception) and not isinstance(error, ConsoleError):
-            here.metrics.faults.caught("publisher offer", error)
-            raise InternalFault("the console could not answer; its log says why") from error
-        raise
     return publisher, write_description(answer)
 
 

@@ -3,12 +3,14 @@
 import math
 import os
 import struct
+import tracemalloc
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from lockstep.robot_bridge.robots.ros2.discovery.meshes import mesh_file, read_mesh, simplified
+from lockstep.robot_bridge.robots.ros2.discovery import meshes
+from lockstep.robot_bridge.robots.ros2.discovery.meshes import MeshReader, mesh_file, read_mesh, simplified
 from lockstep.robot_bridge.robots.ros2.discovery.urdf import Mesh
 
 CORNERS = ((0.0, 0.0, 0.0), (2.0, 0.0, 0.0), (0.0, 4.0, -6.0))
@@ -107,3 +109,34 @@ def test_only_regular_files_of_meshes_are_read(tmp_path: Path) -> None:
         "",
     ):
         assert read_mesh(uri, 8) is None
+
+
+def test_a_large_mesh_needs_memory_for_few_copies_of_its_file(tmp_path: Path) -> None:
+    corners = np.array(ball(200), dtype=np.float32).reshape(-1, 3, 3)
+    triangles = np.zeros(len(corners), [("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
+    triangles["corners"] = corners
+    data = bytes(80) + struct.pack("<I", len(triangles)) + triangles.tobytes()
+    file = tmp_path / "link.stl"
+    file.write_bytes(data)
+    tracemalloc.start()
+    try:
+        mesh = read_mesh(f"file://{file}", 150)
+        _, peak = tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
+    assert mesh is not None
+    assert len(mesh.vertices) <= 150
+    assert peak < 6 * len(data)
+
+
+def test_meshes_above_the_bounds_are_not_read_but_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    size = len(binary())
+    monkeypatch.setattr(meshes, "MAX_BYTES", size)
+    monkeypatch.setattr(meshes, "MAX_ALL_BYTES", 2 * size)
+    for name in ("a", "b", "c"):
+        (tmp_path / f"{name}.stl").write_bytes(binary())
+    (tmp_path / "large.stl").write_bytes(binary() + b"x")
+    read = MeshReader()
+    found = [read(f"file://{tmp_path}/{name}.stl", 8) for name in ("large", "a", "a", "b", "c", "c", "none")]
+    assert [mesh is not None for mesh in found] == [False, True, True, True, False, False, False]
+    assert [each.rpartition("/")[2].partition(":")[0] for each in read.left_out] == ["large.stl", "c.stl"]

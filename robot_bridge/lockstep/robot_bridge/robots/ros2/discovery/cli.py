@@ -91,9 +91,11 @@ def _look_and_draft(seconds: float, domain: int | None, namespace: str | None, a
     finally:
         ros.close()
     from lockstep.robot_bridge.robots.ros2.discovery.drafting.draft import draft
-    from lockstep.robot_bridge.robots.ros2.discovery.meshes import read_mesh
+    from lockstep.robot_bridge.robots.ros2.discovery.meshes import MeshReader
 
-    return draft(graph, ask, namespace, domain, read_mesh)
+    meshes = MeshReader()
+    drafted = draft(graph, ask, namespace, domain, meshes)
+    return drafted._replace(remarks=[*drafted.remarks, *(f"not drawn: {each}" for each in meshes.left_out)])
 
 
 def write(out: Path, drafted: "Draft") -> None:

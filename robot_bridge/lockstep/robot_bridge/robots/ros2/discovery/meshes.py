@@ -1,12 +1,14 @@
 """Reads a mesh of a URDF as few triangles, where its file is on this machine: STL, binary or text.
 
-The name comes from a topic. So only a regular file with the ending of a mesh is read, up to a bound, and nothing of it
-is kept but the numbers of some vertices.
+The name comes from a topic. So only a regular file with the ending of a mesh is read, up to a bound for each and for
+all, and nothing of it is kept but the numbers of some vertices.
 """
 
+import io
 import os
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
+from typing import Any
 from urllib.parse import unquote, urlsplit
 
 import numpy as np
@@ -14,16 +16,19 @@ import numpy.typing as npt
 
 from lockstep.robot_bridge.robots.ros2.discovery.urdf import Mesh
 
-__all__ = ["mesh_file", "read_mesh", "simplified"]
+__all__ = ["MeshReader", "mesh_file", "read_mesh", "simplified"]
 
-MAX_BYTES = 64 << 20
+MAX_BYTES = 64 << 20  # of a file
+MAX_ALL_BYTES = 512 << 20  # of all meshes of a URDF
 MOST_EXTENT = 1e6  # in the mesh's units
 CELLS = (4096, 64, 48, 36, 27, 20, 15, 12, 10, 8, 7, 6, 5, 4, 3, 2)  # along the longest side, first all but exact
-BASE = 8192
+EXACT_CORNERS = 30_000  # a mesh with more of them has no room for all its vertices: the first grid is left out
+DENSE_CELLS = 65**3  # a grid with more of them is numbered by its cells in use
 HEAD, TRIANGLE = 84, 50  # bytes of a binary STL: head with the count, each triangle
 _TRIANGLE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 
-Points = npt.NDArray[np.float64]
+Points = npt.NDArray[Any]  # n x 3, floats of either size
+Numbers = npt.NDArray[np.int64]
 
 
 def mesh_file(uri: str, environment: Mapping[str, str] = os.environ) -> Path | None:
@@ -40,6 +45,40 @@ def mesh_file(uri: str, environment: Mapping[str, str] = os.environ) -> Path | N
     else:
         return None
     return next((place for place in places if place.is_file()), None)
+
+
+class MeshReader:
+    """Reads the meshes of one URDF. A mesh that several links have is read once.
+
+    Attributes:
+        left_out: the names of those that are too large, with the bound
+    """
+
+    def __init__(self) -> None:
+        self.left_out: list[str] = []
+        self._left = MAX_ALL_BYTES
+        self._read: dict[tuple[str, int], Mesh | None] = {}
+
+    def __call__(self, uri: str, most: int) -> Mesh | None:
+        """Return a mesh as at most so many vertices; None if it cannot be read, or is too large."""
+        if (uri, most) not in self._read:
+            self._read[uri, most] = self._within_bounds(uri, most)
+        return self._read[uri, most]
+
+    def _within_bounds(self, uri: str, most: int) -> Mesh | None:
+        try:
+            file = mesh_file(uri)
+            size = 0 if file is None else file.stat().st_size
+        except (OSError, ValueError):
+            return None
+        if size > MAX_BYTES:
+            self.left_out.append(f"{uri}: it has more than {MAX_BYTES >> 20} MiB")
+        elif size > self._left:
+            self.left_out.append(f"{uri}: the meshes have more than {MAX_ALL_BYTES >> 20} MiB together")
+        else:
+            self._left -= size
+            return read_mesh(uri, most)
+        return None
 
 
 def read_mesh(uri: str, most: int) -> Mesh | None:
@@ -61,28 +100,51 @@ def simplified(corners: Points, most: int) -> Mesh | None:
 
     `corners`: of the triangles, three each, n x 3.
     """
-    low, extent = corners.min(axis=0), float((corners.max(axis=0) - corners.min(axis=0)).max())
+    low, high = corners.min(axis=0).astype(np.float64), corners.max(axis=0).astype(np.float64)
+    with np.errstate(over="ignore"):
+        extent = float((high - low).max())
     if not 0 < extent < MOST_EXTENT:
         return None
-    for cells in CELLS:
-        found = _merged(corners, np.floor((corners - low) * (cells / extent)).astype(np.int64))
-        if len(found.vertices) <= most:
+    shares = np.empty(corners.shape, np.float32)  # of the longest side
+    for axis in range(3):
+        shares[:, axis] = (corners[:, axis] - low[axis]) / extent
+    for cells in CELLS if len(corners) <= EXACT_CORNERS else CELLS[1:]:
+        found = _merged(corners, _cell_numbers(shares, cells), most)
+        if found is not None:
             return found if found.triangles else None
     return None
 
 
-def _merged(corners: Points, cells: npt.NDArray[np.int64]) -> Mesh:
-    """Merge the corners in each cell into their mean, and leave out triangles that vanish or come twice."""
-    _, numbers, counts = np.unique(cells @ (BASE**2, BASE, 1), return_inverse=True, return_counts=True)
-    numbers = numbers.reshape(-1)
-    means = np.stack([np.bincount(numbers, corners[:, axis]) for axis in range(3)], axis=1) / counts[:, None]
-    triangles: dict[tuple[int, ...], tuple[int, int, int]] = {}
-    for a, b, c in numbers.reshape(-1, 3).tolist():
-        if a != b and b != c and c != a:
-            triangles.setdefault(tuple(sorted((a, b, c))), (a, b, c))
-    used = {each: at for at, each in enumerate(sorted({each for found in triangles.values() for each in found}))}
-    vertices = [(float(x), float(y), float(z)) for x, y, z in means[list(used)]]
-    return Mesh(vertices, [(used[a], used[b], used[c]) for a, b, c in triangles.values()])
+def _cell_numbers(shares: npt.NDArray[np.float32], cells: int) -> Numbers:
+    """Return the number of each corner's cell, in a grid of so many along the longest side."""
+    numbers = np.zeros(len(shares), np.int64)
+    for axis in range(3):
+        numbers *= cells + 1  # the farthest corner has a cell of its own
+        numbers += (shares[:, axis] * np.float32(cells)).astype(np.int64)
+    if (cells + 1) ** 3 > DENSE_CELLS:
+        numbers = np.unique(numbers, return_inverse=True)[1].reshape(-1).astype(np.int64)
+    return numbers
+
+
+def _merged(corners: Points, numbers: Numbers, most: int) -> Mesh | None:
+    """Merge the corners in each cell into their mean, and leave out triangles that vanish or come twice.
+
+    None: more than `most` vertices are left. `numbers`: of the corners' cells.
+    """
+    a, b, c = numbers[0::3], numbers[1::3], numbers[2::3]
+    triangles = numbers.reshape(-1, 3)[(a != b) & (b != c) & (c != a)]
+    used = np.zeros(int(numbers.max()) + 1, np.bool_)
+    used[triangles] = True
+    count = int(np.count_nonzero(used))
+    if count > most:
+        return None
+    renumbered = (np.cumsum(used) - 1)[triangles]
+    ordered = np.sort(renumbered, axis=1)
+    _, first = np.unique(ordered @ (count**2, count, 1), return_index=True)
+    counts = np.bincount(numbers, minlength=len(used))[used]
+    means = [np.bincount(numbers, corners[:, axis], minlength=len(used))[used] / counts for axis in range(3)]
+    vertices = [(float(x), float(y), float(z)) for x, y, z in zip(*means, strict=True)]
+    return Mesh(vertices, [(int(a), int(b), int(c)) for a, b, c in renumbered[np.sort(first)]])
 
 
 def _points(data: bytes) -> Points:
@@ -94,6 +156,13 @@ def _points(data: bytes) -> Points:
     count = int.from_bytes(data[80:HEAD], "little")
     if len(data) == HEAD + count * TRIANGLE:  # some binary files begin with "solid" too
         triangles = np.frombuffer(data, _TRIANGLE, count=count, offset=HEAD)
-        return triangles["corners"].reshape(-1, 3).astype(np.float64)
-    lines = (line.split() for line in data.splitlines())
-    return np.array([[float(value) for value in line[1:4]] for line in lines if line[:1] == [b"vertex"]]).reshape(-1, 3)
+        return triangles["corners"].reshape(-1, 3)
+    return np.fromiter(_text_coordinates(data), np.float64).reshape(-1, 3)
+
+
+def _text_coordinates(data: bytes) -> Iterator[float]:
+    for line in io.BytesIO(data):  # one by one: a list of all would be many times as large as the file
+        words = line.split()
+        if words[:1] == [b"vertex"]:
+            x, y, z = map(float, words[1:4])
+            yield from (x, y, z)

@@ -7,7 +7,7 @@ from typing import Any
 from lockstep.robot_bridge.robots.ros2.discovery.graph import Heard, Pinhole
 from lockstep.robot_bridge.robots.ros2.sensing.jpeg_size import jpeg_size
 
-__all__ = ["Tally"]
+__all__ = ["Tally", "pinhole_of"]
 
 MAX_TEXT = 100
 MAX_JOINTS = 64
@@ -54,7 +54,7 @@ class Tally:
             said["joints"] = tuple(self._joints)
         if hasattr(message, "range_max") and math.isfinite(message.range_min) and math.isfinite(message.range_max):
             said["range_min"], said["range_max"] = float(message.range_min), float(message.range_max)
-        if (found := _pinhole(message)) is not None:
+        if (found := pinhole_of(message)) is not None:
             said["pinhole"] = found
         if hasattr(message, "encoding"):
             said["width"], said["height"] = int(message.width), int(message.height)
@@ -65,7 +65,7 @@ class Tally:
         return said
 
 
-def _pinhole(message: Any) -> Pinhole | None:
+def pinhole_of(message: Any) -> Pinhole | None:
     """Return what a CameraInfo says; None for another message, without calibration, or for a part of the sensor."""
     if not all(hasattr(message, name) for name in ("k", "p", "d", "binning_x", "roi")):
         return None

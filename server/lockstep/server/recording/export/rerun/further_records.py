@@ -32,14 +32,17 @@ MAP, GRID, PATH, GOAL = "/map", "/map/grid", "/map/path", "/map/goal"
 PEOPLE = "/people"
 REPORTED = ("gap", "largest gap", "discarded", "tolerance")
 DELAYS = ("command to picture, ms", "round trip, ms")
-MOST_ENTITIES = 1000  # of an epoch: people name themselves and their shadows, and may do so anew each time they connect
+# Of an epoch. Peers name themselves and their shadows, and may do so anew each time they connect: they use up no room
+# but their own.
+MOST_ENTITIES = 1000  # of the robot
+MOST_PEER_ENTITIES = 1000
 
 
 class FurtherRecords:
     """Takes those records, in the order of their arrival, and adds their rows to `columns`.
 
     Peers choose some of the names in them. Rerun keeps an entity for ever, so a stream that the robot does not have,
-    and an entity above `MOST_ENTITIES`, are left out.
+    and an entity above `MOST_ENTITIES`, or of peers above `MOST_PEER_ENTITIES`, are left out.
     """
 
     def __init__(self, stream: rr.RecordingStream, columns: Columns) -> None:
@@ -47,7 +50,8 @@ class FurtherRecords:
         self._columns = columns
         self._axes: list[str] = []
         self._streams: frozenset[str] = frozenset()
-        self._entities: set[str] = set()
+        self._own = _Entities(MOST_ENTITIES)
+        self._peers = _Entities(MOST_PEER_ENTITIES)
         self._named: set[str] = set()  # entities whose lines have names
         self._states: dict[str, str] = {}  # by entity, as told last
 
@@ -67,16 +71,17 @@ class FurtherRecords:
                 self._navigation(record, at)
             case ShadowRecord():
                 path = entity("shadow", record.name)
-                self._lines(f"{path}/wanted", self._axes, at, record.values)
+                self._lines(self._peers, f"{path}/wanted", self._axes, at, record.values)
                 if record.difference is not None:
-                    self._lines(f"{path}/difference", ["share of the range"], at, [record.difference])
+                    self._lines(self._peers, f"{path}/difference", ["share of the range"], at, [record.difference])
             case StatusRecord():
                 for item in record.items:
                     path = entity("status", item.name)
                     if isinstance(item.value, str):
                         self.state(path, at, item.value)
                     else:
-                        self._lines(path, [f"{item.label}, {item.unit}".strip(", ")], at, [float(item.value)])
+                        label = f"{item.label}, {item.unit}".strip(", ")
+                        self._lines(self._own, path, [label], at, [float(item.value)])
                     self.state(f"{path}/level", at, item.level)
             case ParticipantsRecord():
                 self.state(PEOPLE, at, ", ".join(f"{each.name} ({each.role})" for each in record.participants))
@@ -87,22 +92,19 @@ class FurtherRecords:
 
     def state(self, path: str, at: Moment, state: str) -> None:
         """Tell a state where it changes; "": none holds."""
-        if self._states.get(path, "") != state and self._has_room(path):
+        if self._states.get(path, "") != state and self._own.has_room(path):
             self._states[path] = state
             self._columns.state(path, at, state)
 
-    def _lines(self, path: str, names: list[str], at: Moment, values: Sequence[float | None]) -> None:
-        if not self._has_room(path):
+    def _lines(
+        self, bound: "_Entities", path: str, names: list[str], at: Moment, values: Sequence[float | None]
+    ) -> None:
+        if not bound.has_room(path):
             return
         if path not in self._named:
             self._named.add(path)
             self._stream.log(path, rr.SeriesLines(names=names), static=True)
         self._columns.scalars(path, at, [math.nan if value is None else value for value in values])
-
-    def _has_room(self, path: str) -> bool:
-        if len(self._entities) < MOST_ENTITIES:
-            self._entities.add(path)
-        return path in self._entities
 
     def _map(self, map: OccupancyMap, at: Moment) -> None:
         try:
@@ -131,11 +133,12 @@ class FurtherRecords:
 
     def _report(self, record: ReportRecord, at: Moment) -> None:
         path, report = entity("reports", record.name), record.report
-        self._lines(f"{path}/delays", list(DELAYS), at, [report.picture_delay_ms, report.round_trip_ms])
+        delays = [report.picture_delay_ms, report.round_trip_ms]
+        self._lines(self._peers, f"{path}/delays", list(DELAYS), at, delays)
         for each in report.streams:
             values = [each.gap, each.max_gap, each.discarded, each.tolerance]
             if each.stream in self._streams:
-                self._lines(f"{path}{entity(each.stream)}", list(REPORTED), at, values)
+                self._lines(self._peers, f"{path}{entity(each.stream)}", list(REPORTED), at, values)
 
     def _trace(self, record: TraceRecord, at: Moment) -> None:
         self._way("/trace/command", COMMAND_WAY, record.command, at)
@@ -146,4 +149,18 @@ class FurtherRecords:
         found: list[Any] = [getattr(spans, each.name) for each in way]
         values = [None if value is msgspec.UNSET else value for value in found]
         if any(value is not None for value in values):
-            self._lines(path, [each.name.removesuffix("_ms") for each in way], at, values)
+            self._lines(self._own, path, [each.name.removesuffix("_ms") for each in way], at, values)
+
+
+class _Entities:
+    """The entities that have rows, up to a bound."""
+
+    def __init__(self, most: int) -> None:
+        self._most = most
+        self._paths: set[str] = set()
+
+    def has_room(self, path: str) -> bool:
+        """Return whether an entity may have rows: one that has some, or a new one below the bound."""
+        if len(self._paths) < self._most:
+            self._paths.add(path)
+        return path in self._paths

@@ -187,6 +187,7 @@ def test_a_camera_has_the_pinhole_of_its_info_and_the_place_of_its_frame(tmp_pat
     assert found is not None
     assert (found.fx, found.cx, found.distortion_model, found.distortion) == (250.0, 160.0, "plumb_bob", (0.1, 0.0))
     assert (found.body, found.position) == ("base_link", (0.2, 0.0, 0.3))
+    assert camera.info == "/cam/camera_info"
     assert "calibration" not in drafted.without_bodies, "the body that it names would not be there"
 
 

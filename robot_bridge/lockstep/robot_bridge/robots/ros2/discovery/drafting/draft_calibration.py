@@ -5,8 +5,9 @@ from lockstep.robot_bridge.robots.ros2.discovery.graph import Graph, Pinhole, To
 from lockstep.robot_bridge.robots.ros2.discovery.kinds import CAMERA_INFO
 from lockstep.robot_bridge.robots.ros2.discovery.pose import Pose
 from lockstep.robot_bridge.robots.ros2.discovery.urdf import Urdf
+from lockstep.robot_bridge.robots.ros2.sensing.camera_info import is_rectified
 
-__all__ = ["Places", "calibration"]
+__all__ = ["Places", "calibration", "info_topic"]
 
 INFO = "camera_info"
 COMPRESSED = "compressed"
@@ -59,10 +60,15 @@ class Places:
         return all(joint.kind == "fixed" or joint.name in self._joints for joint in chain)
 
 
+def info_topic(pictures: str) -> str:
+    """Return the topic of CameraInfo beside a topic of pictures."""
+    parts = parts_of_name(pictures.removesuffix(f"/{COMPRESSED}"))
+    return "/" + "/".join([*parts[:-1], INFO])
+
+
 def calibration(graph: Graph, topic: Topic, width: int, height: int, places: Places) -> dict[str, Plain] | str:
     """Return the setting of a camera, or why there is none: "" if it has no CameraInfo."""
-    parts = parts_of_name(topic.name.removesuffix(f"/{COMPRESSED}"))
-    info = "/" + "/".join([*parts[:-1], INFO])
+    info = info_topic(topic.name)
     if info not in graph.topics or not graph.topics[info].publishes(CAMERA_INFO):
         return ""
     pinhole = graph.said(info).pinhole
@@ -77,7 +83,7 @@ def calibration(graph: Graph, topic: Topic, width: int, height: int, places: Pla
         return (
             f"{info}: where the frame {frame!r} is fixed to the robot is not known, so nothing is drawn on its pictures"
         )
-    return _setting(pinhole, "rect" in parts[-1] and pinhole.rectified[0] > 0, scale, place)
+    return _setting(pinhole, is_rectified(topic.name) and pinhole.rectified[0] > 0, scale, place)
 
 
 def _setting(pinhole: Pinhole, is_rectified: bool, scale: float, place: tuple[str, Pose]) -> dict[str, Plain]:

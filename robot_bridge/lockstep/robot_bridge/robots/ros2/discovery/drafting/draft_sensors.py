@@ -5,7 +5,7 @@ import math
 from lockstep.robot_bridge.robots.ros2.discovery.ask import Ask
 from lockstep.robot_bridge.robots.ros2.discovery.drafting.choice import choose_topic
 from lockstep.robot_bridge.robots.ros2.discovery.drafting.draft_bodies import BASE_BODY
-from lockstep.robot_bridge.robots.ros2.discovery.drafting.draft_calibration import Places, calibration
+from lockstep.robot_bridge.robots.ros2.discovery.drafting.draft_calibration import Places, calibration, info_topic
 from lockstep.robot_bridge.robots.ros2.discovery.drafting.notes import others, rate_of, timeout_for
 from lockstep.robot_bridge.robots.ros2.discovery.drafting.yaml_text import Plain, Section, Value
 from lockstep.robot_bridge.robots.ros2.discovery.graph import Graph, Heard, Topic
@@ -129,6 +129,7 @@ def _camera(
         found = calibration(graph, topic, heard.width, heard.height, places)
         if isinstance(found, dict):
             row["calibration"] = found
+            row["info"] = info_topic(topic.name)
         elif found:
             remarks.append(found)
     note = f"{rate_of(heard, graph.seconds)}, {heard.encoding}"
