@@ -59,4 +59,4 @@ class SessionChecks:
         thread = self._recorder.running
         if thread is None:
             return RecorderFigures(0, 0.0, 0, 0)
-        return RecorderFigures(thread.lost, thread.waiting, thread.free_bytes, self._keeps_free)
+        return RecorderFigures(thread.queue.lost, thread.queue.waiting, thread.parts.free_bytes, self._keeps_free)
