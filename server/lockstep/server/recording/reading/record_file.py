@@ -37,11 +37,14 @@ class RecordFile:
         if self._file.read(len(MAGIC)) != MAGIC:
             raise RecordingDamaged(f"{self._path.name} is not an MCAP file")
         header = self._file.read(HEAD)
-        return Metadata.read(self._record(len(MAGIC) + HEAD + int.from_bytes(header[1:], "little"), Opcode.METADATA))
+        offset = len(MAGIC) + HEAD + int.from_bytes(header[1:], "little")
+        found: Metadata = Metadata.read(self._record(offset, Opcode.METADATA))
+        return found
 
     def chunk(self, offset: int) -> Chunk:
         """Return the chunk at `offset`."""
-        return Chunk.read(self._record(offset, Opcode.CHUNK))
+        found: Chunk = Chunk.read(self._record(offset, Opcode.CHUNK))
+        return found
 
     def attachment(self, name: str) -> bytes | None:
         """Return the first attachment if it has that name; None: it has not, or the file was not closed."""
@@ -74,7 +77,8 @@ class RecordFile:
                 group = content.read1()
                 start = content.read8()
                 if group == Opcode.ATTACHMENT_INDEX:
-                    return AttachmentIndex.read(self._record(start, group))
+                    found: AttachmentIndex = AttachmentIndex.read(self._record(start, group))
+                    return found
         return None
 
     def _record(self, offset: int, opcode: int) -> ReadDataStream:
