@@ -22,7 +22,8 @@ from lockstep.server.recording.format.records import ReportRecord, RobotRecord
 from lockstep.server.recording.format.topics import CAMERA
 from lockstep.server.recording.reading.bookmarks import Mark
 from lockstep.server.recording.reading.raw_records import HEAD, MAGIC, MAX_UNPACKED, chunk_records
-from lockstep.server.recording.reading.reader import FOOTER, RecordingReader
+from lockstep.server.recording.reading.reader import RecordingReader
+from lockstep.server.recording.reading.record_file import FOOTER
 from lockstep.server.recording.reading.scan import scan_file
 from lockstep.server.recording.verify.verify_file import verify_file
 from lockstep.server.recording.writing.writer import Entry, RecordingWriter

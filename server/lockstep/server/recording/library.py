@@ -113,7 +113,7 @@ class ConsoleLibrary:
 
     def _running(self) -> tuple[Path, EventIndex] | None:
         thread = self._recorder.running
-        path, index = (None, None) if thread is None else (thread.path, thread.index())
+        path, index = (None, None) if thread is None else (thread.parts.path, thread.parts.index())
         return None if path is None or index is None else (path, index)
 
 

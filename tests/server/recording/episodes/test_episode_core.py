@@ -45,9 +45,9 @@ def test_an_episode_is_kept_only_when_its_record_is_on_the_disk() -> None:
     assert (begun.kind, begun.first_event, begun.task) == ("start", 100, "stack two cubes")
     (kept,) = records(it.keep("", "success", "Ada", LATER))
     assert (kept.kind, kept.first_event, kept.last_event, kept.outcome) == ("kept", 100, 150, "success")
-    assert (it.phase, it.kept) == ("keeping", 0)
+    assert (it.phase, it.history.kept) == ("keeping", 0)
     assert it.on_disk("id1", 1.0) == [Ended("kept")]
-    assert (it.phase, it.kept, it.last) == ("idle", 1, "episode 1 is kept")
+    assert (it.phase, it.history.kept, it.history.last) == ("idle", 1, "episode 1 is kept")
 
 
 def test_a_redone_episode_is_discarded_and_the_next_one_has_its_task() -> None:
@@ -56,13 +56,13 @@ def test_a_redone_episode_is_discarded_and_the_next_one_has_its_task() -> None:
     first, second = records(it.redo("id1", "Ada", LATER, 1.0))
     assert (first.kind, first.episode) == ("discarded", "id1")
     assert (second.kind, second.episode, second.task, second.first_event) == ("start", "id2", "stack two cubes", 150)
-    assert (it.discarded, it.number, it.phase) == (1, 2, "open")
+    assert (it.history.discarded, it.history.number, it.phase) == (1, 2, "open")
 
 
 def test_an_episode_begins_when_the_count_down_has_ended_and_not_before() -> None:
     it = core(countdown=3.0)
     assert it.start("wipe", "Ada", HERE, 10.0) == []
-    assert (it.phase, it.seconds_left(11.0)) == ("countdown", 2.0)
+    assert (it.phase, it.next.seconds_left(11.0)) == ("countdown", 2.0)
     assert it.tick(HERE, 12.9) == []
     (begun,) = records(it.tick(LATER, 13.0))
     assert begun.first_event == 150
@@ -73,7 +73,7 @@ def test_discarding_in_the_count_down_cancels_it_and_leaves_no_record() -> None:
     it.start("wipe", "Ada", HERE, 10.0)
     assert it.discard("", "Ada", HERE, 11.0) == []
     assert it.tick(HERE, 20.0) == []
-    assert (it.phase, it.discarded) == ("idle", 0)
+    assert (it.phase, it.history.discarded) == ("idle", 0)
 
 
 @pytest.mark.parametrize("resets", [False, True])
@@ -82,12 +82,12 @@ def test_an_episode_that_was_cancelled_before_its_begin_never_begins(resets: boo
     it.start("wipe", "Ada", HERE, 0.0)
     it.tick(HERE, 3.0)
     it.redo("", "Ada", LATER, 4.0)
-    it.cancel("her link has ended")
-    assert it.last == "cancelled before it began: her link has ended"
+    it.next.cancel("her link has ended")
+    assert it.history.last == "cancelled before it began: her link has ended"
     assert it.phase == ("resetting" if resets else "idle")
     it.reset_ended("", LATER, 5.0)
     assert it.tick(LATER, 100.0) == []
-    assert (it.phase, it.number) == ("idle", 1)
+    assert (it.phase, it.history.number) == ("idle", 1)
 
 
 def test_the_reset_runs_after_each_episode_and_the_next_one_waits_for_it() -> None:
@@ -107,7 +107,7 @@ def test_after_a_reset_that_failed_or_took_too_long_nothing_begins(failure: str)
     it.redo("", "Ada", LATER, 1.0)
     assert (it.reset_ended(failure, LATER, 2.0) if failure else it.tick(LATER, 40.0)) == []
     assert it.phase == "idle"
-    assert "the reset failed" in it.last
+    assert "the reset failed" in it.history.last
 
 
 def test_requests_are_refused_by_name() -> None:
@@ -141,7 +141,7 @@ def test_what_cuts_an_episode_is_named_in_its_record_and_it_cannot_be_kept_any_m
     it.start("x", "Ada", HERE, 0.0)
     (cut,) = records(it.cut(why, LATER))  # type: ignore[arg-type]
     assert (cut.kind, cut.why, cut.epoch) == ("cut", why, "e1")
-    assert (it.phase, it.cuts, it.kept) == ("idle", 1, 0)
+    assert (it.phase, it.history.cuts, it.history.kept) == ("idle", 1, 0)
     assert refused(lambda: it.keep("", "", "Ada", LATER)) == "no_episode"
 
 
@@ -152,9 +152,9 @@ def test_an_episode_whose_record_is_on_its_way_survives_the_epoch_but_not_the_di
     assert it.cut("epoch", LATER) == []
     assert it.phase == "keeping"
     assert it.cut("recording_failed", LATER) == [Ended("cut")]
-    assert (it.phase, it.kept, it.cuts) == ("idle", 0, 1)
+    assert (it.phase, it.history.kept, it.history.cuts) == ("idle", 0, 1)
     it.on_disk("id1", 1.0)
-    assert it.kept == 0
+    assert it.history.kept == 0
 
 
 def test_counts_are_those_of_one_recording() -> None:
@@ -162,7 +162,7 @@ def test_counts_are_those_of_one_recording() -> None:
     it.start("x", "Ada", HERE, 0.0)
     it.discard("", "Ada", LATER, 1.0)
     it.start("x", "Ada", HERE._replace(recording="r2"), 2.0)
-    assert (it.number, it.discarded) == (1, 0)
+    assert (it.history.number, it.history.discarded) == (1, 0)
 
 
 STEPS = st.sampled_from(
@@ -220,7 +220,7 @@ def test_whatever_happens_what_is_counted_as_kept_is_what_a_reader_finds_kept(
     states = [each.state for each in book.entries()]
     assert states.count("kept") == on_disk + (it.phase == "keeping")
     assert states.count("open") == (it.phase == "open")
-    assert len(states) >= it.kept + it.discarded
+    assert len(states) >= it.history.kept + it.history.discarded
     assert [ends.count(end) for end in ("kept", "discarded", "cut")] == [
         on_disk,
         states.count("discarded"),

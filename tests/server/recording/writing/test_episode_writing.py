@@ -13,7 +13,7 @@ from lockstep.server.recording.format.info import RecordingInfo
 from lockstep.server.recording.format.records import EpisodeRecord, RobotRecord
 from lockstep.server.recording.reading.reader import RecordingReader
 from lockstep.server.recording.settings import RecordingSettings
-from lockstep.server.recording.writing import writer_thread
+from lockstep.server.recording.writing import recording_queue
 from lockstep.server.recording.writing.queue_items import FeedbackItem, MediaItem, OwnItem, RobotItem
 from lockstep.server.recording.writing.writer_thread import RecordingThread
 from tests.server.recording.makers import CODECS, DESCRIPTION, EPOCH, START
@@ -38,13 +38,13 @@ class Made:
 
     def robot(self, epoch: str = EPOCH) -> None:
         record = RobotRecord(epoch=epoch, event=1, link="up", description=DESCRIPTION)
-        self.thread.put(RobotItem(START, record, CODECS))
+        self.thread.queue.put(RobotItem(START, record, CODECS))
 
     def event(self, event: int, size: int = 1000) -> None:
         feedback = Feedback(event=event, issue=1, time=float(event), axes=[0.0, 0.0], joints=[1.0, 2.0, 3.0])
-        self.thread.put(FeedbackItem(START, START, EPOCH, feedback))
+        self.thread.queue.put(FeedbackItem(START, START, EPOCH, feedback))
         data = b"\0\0\0\1\x65" + os.urandom(size)
-        self.thread.put(MediaItem(START, START, EPOCH, "front", "H264", event, True, data))
+        self.thread.queue.put(MediaItem(START, START, EPOCH, "front", "H264", event, True, data))
 
     def episode(self, id: str, kind: str, event: int) -> None:
         record = EpisodeRecord(
@@ -57,7 +57,7 @@ class Made:
             first_event=1,
             last_event=event,
         )
-        self.thread.put(OwnItem(START, record))
+        self.thread.queue.put(OwnItem(START, record))
 
     def run(self) -> None:
         self.thread.start()
@@ -114,14 +114,14 @@ def test_an_episode_of_the_epoch_before_is_not_kept(tmp_path: Path) -> None:
 def test_records_of_episodes_find_a_place_when_the_disk_is_too_slow_for_the_rest(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(writer_thread, "MAX_WAITING", 5)
+    monkeypatch.setattr(recording_queue, "MAX_WAITING", 5)
     made = Made(tmp_path)
     made.episode("a", "start", 1)
     for event in range(1, 20):
         made.event(event)
     made.episode("a", "kept", 20)
     made.run()
-    assert made.thread.lost > 0
+    assert made.thread.queue.lost > 0
     assert made.said == [("a", True)]
     assert [each.state for each in found(tmp_path / "r.mcap")] == ["kept"]
 
@@ -133,7 +133,7 @@ def test_an_episode_whose_end_the_disk_does_not_take_is_not_kept_nor_in_the_file
     real, fails = os.fdatasync, [True]
 
     def sync(descriptor: int) -> None:
-        if made.thread._is_keeping and fails:
+        if made.thread.parts._is_keeping and fails:
             fails.clear()
             raise OSError(errno.ENOSPC, "No space left on device")
         real(descriptor)

@@ -3,11 +3,17 @@
 import zlib
 
 from lockstep.protocol.maps import Navigation, OccupancyMap
+from lockstep.server.event_clock import EventClock
 from lockstep.server.recording.format.records import MapRecord, NavigationRecord
 from lockstep.server.recording.writing.map_records import INTERVAL, REPEAT, MapRecords
+from lockstep.server.recording.writing.record_sink import RecordSink
 
 MAP = OccupancyMap(id="a" * 32, width=2, height=1, resolution=0.5, cells=zlib.compress(bytes([0, 100])))
 OTHER = OccupancyMap(id="b" * 32, width=2, height=1, resolution=0.5, cells=zlib.compress(bytes([0, 0])))
+
+
+def made() -> MapRecords:
+    return MapRecords(EventClock(), RecordSink())
 
 
 def kinds(maps: MapRecords, now: float, event: int = 7) -> list[str]:
@@ -18,7 +24,7 @@ def kinds(maps: MapRecords, now: float, event: int = 7) -> list[str]:
 
 
 def test_a_map_is_recorded_when_it_changes_and_the_newest_waits_for_the_interval() -> None:
-    maps = MapRecords()
+    maps = made()
     assert kinds(maps, 0.0) == []
     maps.take_map(MAP)
     assert kinds(maps, 0.0) == ["a"]
@@ -31,13 +37,13 @@ def test_a_map_is_recorded_when_it_changes_and_the_newest_waits_for_the_interval
 
 
 def test_a_map_that_stays_is_repeated_for_the_files_that_a_recording_is_cut_into() -> None:
-    maps = MapRecords()
+    maps = made()
     maps.take_map(MAP)
     assert [kinds(maps, now) for now in (0.0, REPEAT - 1, REPEAT, REPEAT + 1)] == [["a"], [], ["a"], []]
 
 
 def test_a_navigation_is_recorded_when_more_than_its_event_and_its_ages_has_changed() -> None:
-    maps = MapRecords()
+    maps = made()
     maps.take(Navigation(event=3, map_age=1.0, frame=(1.0, 0.0, 0.0)))
     assert kinds(maps, 0.0) == ["3"]
     maps.take(Navigation(event=4, map_age=2.0, path_age=1.0, frame=(1.0, 0.0, 0.0)))
@@ -49,7 +55,7 @@ def test_a_navigation_is_recorded_when_more_than_its_event_and_its_ages_has_chan
 
 
 def test_each_recording_begins_with_what_holds_and_another_bridge_with_nothing() -> None:
-    maps = MapRecords()
+    maps = made()
     maps.take_map(MAP)
     maps.take(Navigation(event=3))
     assert kinds(maps, 0.0) == ["a", "3"]

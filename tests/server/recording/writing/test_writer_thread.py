@@ -7,7 +7,6 @@ import threading
 from pathlib import Path
 from typing import Any
 
-import msgspec
 import pytest
 from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey
 
@@ -15,13 +14,13 @@ from lockstep.protocol.messages import Feedback
 from lockstep.server.evidence.signer import Signer
 from lockstep.server.recording.format.info import RecordingInfo
 from lockstep.server.recording.format.payload import own_record
-from lockstep.server.recording.format.records import EpisodeRecord, RobotRecord, SeatRecord, SignatureRecord
+from lockstep.server.recording.format.records import RobotRecord, SeatRecord, SignatureRecord
 from lockstep.server.recording.format.signature import RecordingSigning
 from lockstep.server.recording.format.topics import SIGNATURE
 from lockstep.server.recording.reading.reader import RecordingReader
 from lockstep.server.recording.settings import RecordingSettings
 from lockstep.server.recording.verify.verify_file import verify_file
-from lockstep.server.recording.writing import writer_thread
+from lockstep.server.recording.writing import recording_queue
 from lockstep.server.recording.writing.queue_items import FeedbackItem, MediaItem, OwnItem, RobotItem
 from lockstep.server.recording.writing.writer_thread import RecordingThread
 from tests.server.recording.makers import CODECS, DESCRIPTION, EPOCH, SECOND, START
@@ -50,15 +49,15 @@ class Made:
 
     def robot(self, epoch: str = EPOCH) -> None:
         record = RobotRecord(epoch=epoch, event=1, link="up", description=DESCRIPTION)
-        self.thread.put(RobotItem(self.now, record, CODECS))
+        self.thread.queue.put(RobotItem(self.now, record, CODECS))
 
     def feedback(self, event: int, epoch: str = EPOCH) -> None:
         feedback = Feedback(event=event, issue=1, time=float(event), axes=[0.0, 0.0], joints=[1.0, 2.0, 3.0])
-        self.thread.put(FeedbackItem(self.now, self.now, epoch, feedback))
+        self.thread.queue.put(FeedbackItem(self.now, self.now, epoch, feedback))
 
     def picture(self, event: int, size: int = 1000) -> None:
         data = b"\0\0\0\1\x65" + os.urandom(size)
-        self.thread.put(MediaItem(self.now, self.now, EPOCH, "front", "H264", event, True, data))
+        self.thread.queue.put(MediaItem(self.now, self.now, EPOCH, "front", "H264", event, True, data))
 
     def pass_second(self) -> None:
         self.now += SECOND
@@ -67,7 +66,7 @@ class Made:
 def test_a_part_begins_with_what_holds(tmp_path: Path) -> None:
     made = Made(tmp_path)
     seat = SeatRecord(epoch="", event=1, holder="p1", name="Ada")
-    made.thread.put(OwnItem(made.now, seat))  # before the robot was reached
+    made.thread.queue.put(OwnItem(made.now, seat))  # before the robot was reached
     made.feedback(7)
     made.robot()
     made.thread.start()
@@ -130,12 +129,12 @@ def test_every_part_is_signed_to_its_end_and_names_the_head_of_the_one_before(tm
 def test_nothing_waits_for_a_disk_that_is_too_slow_and_what_is_missing_is_told(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(writer_thread, "MAX_WAITING", 10)
+    monkeypatch.setattr(recording_queue, "MAX_WAITING", 10)
     made = Made(tmp_path)
     made.robot()
     for event in range(1, 31):
         made.feedback(event)
-    assert made.thread.lost == 21
+    assert made.thread.queue.lost == 21
     made.thread.start()
     made.thread.close()
     with RecordingReader(tmp_path / "r.mcap") as reader:
@@ -143,51 +142,11 @@ def test_nothing_waits_for_a_disk_that_is_too_slow_and_what_is_missing_is_told(
         assert b'"lost":21' in next(iter(reader.records(topics={"/lockstep/degraded"}))).data
 
 
-def test_large_pictures_fill_the_queue_before_their_number_does(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(writer_thread, "MAX_BYTES", 1_000_000)
-    made = Made(tmp_path)
-    made.robot()
-    for event in range(1, 21):
-        made.picture(event, 100_000)
-    assert made.thread.lost == 11
-    assert 0.9 < made.thread.waiting <= 1.0
-    made.thread.start()
-    made.thread.close()
-    assert made.thread.waiting == 0.0
-    with RecordingReader(tmp_path / "r.mcap") as reader:
-        assert reader.index.lost == 11
-
-
-def test_a_disk_that_is_too_slow_loses_marks_and_neither_begin_nor_end_of_an_episode(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(writer_thread, "MAX_WAITING", 10)
-    made = Made(tmp_path)
-    made.robot()
-    for event in range(1, 31):
-        made.feedback(event)
-    begun = EpisodeRecord(
-        epoch=EPOCH, event=30, episode="a", number=1, kind="start", task="push", first_event=30, last_event=30
-    )
-    made.thread.put(OwnItem(START, begun))
-    for number in range(1000):
-        made.thread.put(OwnItem(START, msgspec.structs.replace(begun, kind="mark", text=f"{number}")))
-    made.thread.put(OwnItem(START, msgspec.structs.replace(begun, kind="kept", event=31, last_event=31)))
-    assert made.thread.lost == 21 + 1000
-    made.thread.start()
-    made.thread.close()
-    with RecordingReader(tmp_path / "r.mcap") as reader:
-        (found,) = reader.index.episodes
-    assert (found.state, found.marks) == ("kept", [])
-
-
 def test_what_is_missing_is_told_where_it_is_missing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The queue fills once more while the thread writes what it has found."""
-    monkeypatch.setattr(writer_thread, "MAX_WAITING", 10)
+    monkeypatch.setattr(recording_queue, "MAX_WAITING", 10)
     made = Made(tmp_path)
-    real = made.thread._take
+    real = made.thread.parts.take
 
     def take(item: Any) -> None:
         real(item)
@@ -198,7 +157,7 @@ def test_what_is_missing_is_told_where_it_is_missing(tmp_path: Path, monkeypatch
             taken.set()
 
     taken = threading.Event()
-    monkeypatch.setattr(made.thread, "_take", take)
+    monkeypatch.setattr(made.thread.parts, "take", take)
     made.robot()
     made.thread.start()
     assert taken.wait(PATIENCE)
@@ -291,11 +250,11 @@ def test_what_was_put_is_on_the_disk_within_a_second_without_anything_following(
     made.thread.start()
     deadline = threading.Event()
     for _ in range(200):
-        index = made.thread.index()
+        index = made.thread.parts.index()
         if index is not None and index.chunks:
             break
         deadline.wait(0.05)
-    index = made.thread.index()
+    index = made.thread.parts.index()
     assert index is not None
     with RecordingReader(tmp_path / "r.mcap", index) as reader:
         assert reader.index.last_event == 1

@@ -5,9 +5,7 @@ import math
 import secrets
 import time
 from collections.abc import Callable, Mapping
-from typing import Protocol
 
-from lockstep.protocol.console import Seat
 from lockstep.protocol.episodes import (
     EpisodeAnswer,
     EpisodeReason,
@@ -29,9 +27,9 @@ from lockstep.server.recording.episodes.episode_core import (
 )
 from lockstep.server.recording.episodes.open_episode import Place
 from lockstep.server.recording.episodes.reset_action import ResetAction
-from lockstep.server.recording.episodes.session_checks import CheckedRobot, SessionChecks
+from lockstep.server.recording.episodes.session_checks import SessionChecks
+from lockstep.server.recording.episodes.session_place import EpisodeRobot, SessionPlace
 from lockstep.server.recording.episodes.settings import EpisodeSettings
-from lockstep.server.recording.format.records import EpisodeRecord
 from lockstep.server.recording.settings import RecordingSettings
 from lockstep.server.recording.writing.episode_written import EpisodeEnded, EpisodeWritten
 from lockstep.server.recording.writing.recorder import Recorder
@@ -49,7 +47,7 @@ from lockstep.server.session_events import (
 from lockstep.server.util.display_names import printable
 from lockstep.server.util.rate_limits import RateLimits
 
-__all__ = ["EpisodeRobot", "EpisodeService"]
+__all__ = ["EpisodeService"]
 
 TICK_SECONDS = 0.1
 CHECK_TICKS = 5  # between two looks at what may spoil the episode
@@ -57,13 +55,6 @@ NEWS_TICKS = 10  # between two messages while an episode is open
 ASKS, ASK_RATE = 20, 4.0  # Hz, of one link
 
 Answer = Callable[[EpisodeReason, str, str], None]  # reason, detail, episode
-
-
-class EpisodeRobot(CheckedRobot, Protocol):
-    """The part of the connection to the robot that is needed here."""
-
-    @property
-    def up(self) -> bool: ...
 
 
 class EpisodeService:
@@ -94,8 +85,7 @@ class EpisodeService:
         """
         self._clock = clock
         self._events = events
-        self._recorder = recorder
-        self._robot = robot
+        self._place = SessionPlace(clock, recorder, robot)
         self._reset = reset
         self._may_ask = may_ask
         self._has_ended = has_ended
@@ -109,20 +99,17 @@ class EpisodeService:
             reset_seconds=settings.reset_seconds,
         )
         self._checks = SessionChecks(robot, recorder, recorded, recording.free_bytes)
-        self._seat = Seat()
-        self._stop_number, self._is_stopped = 0, False
         self._since = 0.0  # s since 1970
         self._asks = RateLimits(ASK_RATE, ASKS)
-        self._newest_event = 0  # also after the epoch's end
         self._waiting: list[tuple[str, Answer]] = []  # for an episode to be on the disk
         recorder.watched_by(self)
 
     def subscribe(self, events: SessionEvents) -> None:
         events.subscribe(EpisodeAsked, self._asked)
-        events.subscribe(SeatChanged, self._seat_changed)
-        events.subscribe(StopShown, self._stop_shown)
-        events.subscribe(ResetDone, lambda event: self._noted(f"stop {event.number} was reset by {event.by.name}"))
-        events.subscribe(FeedbackReceived, self._fed_back)
+        events.subscribe(SeatChanged, self._happened)
+        events.subscribe(StopShown, self._happened)
+        events.subscribe(ResetDone, self._happened)
+        events.subscribe(FeedbackReceived, self._place.fed_back)
         events.subscribe(EpochBegan, lambda event: self._cut("epoch"))
         events.subscribe(LinkDown, lambda event: self._cut("link_down"))
         events.subscribe(ActionUpdated, self._reset.updated)
@@ -135,36 +122,37 @@ class EpisodeService:
                 await asyncio.sleep(TICK_SECONDS)
                 ticks += 1
                 phase = self._core.phase
-                if self._core.is_about_to_begin and self._has_ended(*self._begins_for):
-                    self._core.cancel("the link that asked for it has ended")
+                if self._core.next.wanted is not None and self._has_ended(*self._begins_for):
+                    self._core.next.cancel("the link that asked for it has ended")
                     self._tell()
                 if phase in ("countdown", "resetting"):
-                    self._act(self._core.tick(self._place(), time.monotonic()), before=phase)
+                    self._act(self._core.tick(self._place.now(), time.monotonic()), before=phase)
                 if self._core.phase == "resetting" and (ended := self._reset.ended()) is not None:
-                    self._act(self._core.reset_ended(ended, self._place(), time.monotonic()), before="resetting")
-                if self._core.phase == "open" and ticks % CHECK_TICKS == 0:
-                    changed = self._check()
+                    self._act(self._core.reset_ended(ended, self._place.now(), time.monotonic()), before="resetting")
+                current = self._core.current if self._core.phase == "open" else None
+                if current is not None and ticks % CHECK_TICKS == 0:
+                    changed = self._checks.look(self._clock.event, current)
                     if changed or ticks % NEWS_TICKS == 0:
                         self._tell()
         finally:
-            self._act(self._core.cut("console_ended", self._place()), tells=False)
+            self._act(self._core.cut("console_ended", self._place.now()), tells=False)
 
     def state(self) -> EpisodeState:
         """Return the state as everyone is told it."""
-        core = self._core
+        core, current, history = self._core, self._core.current, self._core.history
         return EpisodeState(
             phase=core.phase,
             episode=core.episode,
-            number=core.number,
+            number=history.number,
             task=core.task,
             by=core.by,
-            seconds_left=round(core.seconds_left(time.monotonic()), 1),
-            since=self._since if core.episode else 0.0,
-            first_event=core.first_event,
-            kept=core.kept,
-            discarded=core.discarded,
-            cut=core.cuts,
-            last=core.last,
+            seconds_left=round(core.next.seconds_left(time.monotonic()), 1),
+            since=0.0 if current is None else self._since,
+            first_event=0 if current is None else current.first_event,
+            kept=history.kept,
+            discarded=history.discarded,
+            cut=history.cuts,
+            last=history.last,
             reset_action=self._reset.name,
             problems=self._checks.problems if core.phase == "open" else [],
         )
@@ -207,7 +195,7 @@ class EpisodeService:
                 raise EpisodeRefused("not_allowed", "the holder of the seat and supervisors may do this")
             if not self._asks.spend(by.link or by.name, time.monotonic()):
                 raise EpisodeRefused("too_often")
-            effects = self._decide(by, request)
+            effects = _decide(self._core, request, by.name, self._place.now(), time.monotonic())
         except EpisodeRefused as refused:
             answer(refused.reason, refused.detail, episode)
             return
@@ -221,20 +209,6 @@ class EpisodeService:
             self._audit.record("recording", by, what, self._core.episode or episode)
         if request.do != "keep":
             answer("", "", self._core.episode or episode)
-
-    def _decide(self, by: Actor, request: EpisodeRequest) -> list[Effect]:
-        core, place, now = self._core, self._place(), time.monotonic()
-        match request.do:
-            case "start":
-                return core.start(printable(request.task), by.name, place, now)
-            case "keep":
-                return core.keep(request.episode, request.outcome, by.name, place)
-            case "discard":
-                return core.discard(request.episode, by.name, place, now)
-            case "redo":
-                return core.redo(request.episode, by.name, place, now)
-            case "mark":
-                return core.mark(request.episode, printable(request.text), by.name, place)
 
     # RecordingWatcher
 
@@ -256,31 +230,16 @@ class EpisodeService:
 
     # events of the session
 
-    def _fed_back(self, event: FeedbackReceived) -> None:
-        self._newest_event = event.feedback.event
-
-    def _seat_changed(self, event: SeatChanged) -> None:
-        before, self._seat = self._seat, event.seat
-        if event.seat.holder != before.holder:
-            self._noted(f"{event.seat.name or 'nobody'} drives ({event.seat.why})")
-
-    def _stop_shown(self, event: StopShown) -> None:
-        stop = event.stop
-        if stop.stopped and (not self._is_stopped or stop.number > self._stop_number):
-            self._noted(f"stop {stop.number} by {stop.by or 'somebody'}: {stop.reason}".rstrip(": "))
-        self._is_stopped, self._stop_number = stop.stopped, stop.number
-
-    def _noted(self, text: str) -> None:
-        self._act(self._core.noted(text, self._place()), tells=False)
+    def _happened(self, event: SeatChanged | StopShown | ResetDone) -> None:
+        if text := self._place.note(event):
+            self._act(self._core.noted(text, self._place.now()), tells=False)
 
     def _cut(self, why: CutReason) -> None:
         episode, before = self._core.episode, self._core.phase
-        place = self._place()
-        if why == "epoch":
-            place = place._replace(event=self._newest_event or place.event)
+        place = self._place.at_epoch_end() if why == "epoch" else self._place.now()
         self._act(self._core.cut(why, place), before=before)
         if self._core.episode != episode:
-            self._answer_waiting(episode, "not_written", self._core.last)
+            self._answer_waiting(episode, "not_written", self._core.history.last)
 
     # acting
 
@@ -289,27 +248,16 @@ class EpisodeService:
         for effect in effects:
             match effect:
                 case Write(record):
-                    self._write(record)
+                    self._events.publish(EpisodeWritten(record))
+                    if record.kind == "start":
+                        self._since = round(time.time(), 3)
+                        self._checks.begin(record.event)
                 case RunReset():
                     self._reset.begin()
                 case Ended(end):
                     self._events.publish(EpisodeEnded(end))
         if tells and (before is None or before != self._core.phase):
             self._tell()
-
-    def _write(self, record: EpisodeRecord) -> None:
-        self._events.publish(EpisodeWritten(record))
-        if record.kind != "start":
-            return
-        self._since = round(time.time(), 3)
-        self._checks.begin(record.event)
-
-    def _check(self) -> bool:
-        """Return True if something else spoils the episode than before."""
-        changed = self._checks.look(self._clock.event)
-        for each in self._checks.problems:
-            self._core.spoiled(f"{each.kind} {each.stream}".strip())
-        return changed
 
     def _answer_waiting(self, episode: str, reason: EpisodeReason, detail: str) -> None:
         mine = [answer for each, answer in self._waiting if each == episode]
@@ -320,7 +268,16 @@ class EpisodeService:
     def _tell(self) -> None:
         self._peers.announce(self.state())
 
-    def _place(self) -> Place:
-        thread = self._recorder.running
-        recording = "" if thread is None or not thread.running else thread.info.recording
-        return Place(self._clock.epoch, self._clock.event, recording, self._robot.up, self._seat.name)
+
+def _decide(core: EpisodeCore, request: EpisodeRequest, by: str, place: Place, now: float) -> list[Effect]:
+    match request.do:
+        case "start":
+            return core.start(printable(request.task), by, place, now)
+        case "keep":
+            return core.keep(request.episode, request.outcome, by, place)
+        case "discard":
+            return core.discard(request.episode, by, place, now)
+        case "redo":
+            return core.redo(request.episode, by, place, now)
+        case "mark":
+            return core.mark(request.episode, printable(request.text), by, place)

@@ -25,6 +25,7 @@ class OpenEpisode:
 
     Attributes:
         last_event: the newest that belongs to it
+        is_keeping: its record `kept` is on its way to the disk
         drivers: names of all who drove
         problems: kinds that were seen, with the camera
     """
@@ -37,6 +38,7 @@ class OpenEpisode:
         self.epoch = place.epoch
         self.first_event = place.event
         self.last_event = place.event
+        self.is_keeping = False
         self.drivers = [place.driver] if place.driver else []
         self.problems: list[str] = []
 
@@ -44,6 +46,11 @@ class OpenEpisode:
         """Note who drives now; "" is nobody."""
         if name and name not in self.drivers and len(self.drivers) < MAX_DRIVERS:
             self.drivers.append(name)
+
+    def spoiled(self, problem: str) -> None:
+        """Remember a problem for its record."""
+        if problem not in self.problems:
+            self.problems.append(problem)
 
     def record(
         self,

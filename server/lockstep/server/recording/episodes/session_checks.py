@@ -7,6 +7,7 @@ from typing import Protocol
 from lockstep.protocol.description import RobotDescription
 from lockstep.protocol.episodes import EpisodeProblem
 from lockstep.server.recording.episodes.live_checks import LiveChecks, RecorderFigures
+from lockstep.server.recording.episodes.open_episode import OpenEpisode
 from lockstep.server.recording.writing.recorder import Recorder
 
 __all__ = ["CheckedRobot", "SessionChecks"]
@@ -49,14 +50,16 @@ class SessionChecks:
     def picture(self, stream: str, stamp: int) -> None:
         self._checks.picture(stream, stamp, time.monotonic())
 
-    def look(self, event: int) -> bool:
-        """Return True if something else spoils the episode than at the last look."""
+    def look(self, event: int, episode: OpenEpisode) -> bool:
+        """Remember in `episode` what spoils it. Return True if that is something else than at the last look."""
         before = {(each.kind, each.stream) for each in self.problems}
         self.problems = self._checks.problems(event, self._figures(), time.monotonic())
+        for each in self.problems:
+            episode.spoiled(f"{each.kind} {each.stream}".strip())
         return before != {(each.kind, each.stream) for each in self.problems}
 
     def _figures(self) -> RecorderFigures:
         thread = self._recorder.running
         if thread is None:
             return RecorderFigures(0, 0.0, 0, 0)
-        return RecorderFigures(thread.lost, thread.waiting, thread.free_bytes, self._keeps_free)
+        return RecorderFigures(thread.queue.lost, thread.queue.waiting, thread.parts.free_bytes, self._keeps_free)

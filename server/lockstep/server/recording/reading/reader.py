@@ -1,14 +1,11 @@
 """Reads a recording by event: through its index, chunk by chunk. Also one that is still written, or was interrupted."""
 
 from collections.abc import Collection, Iterator
-from io import BytesIO
 from pathlib import Path
 from types import TracebackType
 from typing import NamedTuple, Self
 
-from mcap.data_stream import ReadDataStream
-from mcap.opcode import Opcode
-from mcap.records import Attachment, AttachmentIndex, Chunk, Footer, Message, Metadata
+from mcap.records import Message
 from mcap.stream_reader import CRCValidationError
 
 from lockstep.protocol.description import RobotDescription
@@ -30,13 +27,12 @@ from lockstep.server.recording.format.payload import (
 )
 from lockstep.server.recording.format.records import Degraded, RobotRecord
 from lockstep.server.recording.format.topics import OWN_TOPICS
-from lockstep.server.recording.reading.raw_records import BROKEN, HEAD, MAGIC, MAX_RECORD, chunk_records
+from lockstep.server.recording.reading.raw_records import BROKEN, chunk_records
+from lockstep.server.recording.reading.record_file import RecordFile
 from lockstep.server.recording.reading.scan import scan_file
-from lockstep.server.util.regular_file import open_regular
 
 __all__ = ["Record", "RecordingReader"]
 
-FOOTER = HEAD + 20 + len(MAGIC)
 DEGRADED = OWN_TOPICS[Degraded]
 
 
@@ -87,7 +83,7 @@ class RecordingReader:
     def __init__(self, path: Path, index: EventIndex | None = None) -> None:
         self.path = path
         self.interrupted = False  # neither closed nor still written: the index was built from the records
-        self._file = open_regular(path)
+        self._file = RecordFile(path)
         try:
             self.info = self._read_info()
             self.index = index or self._read_index() or self._scan()
@@ -110,10 +106,6 @@ class RecordingReader:
 
     def close(self) -> None:
         self._file.close()
-
-    @property
-    def size(self) -> int:
-        return self.path.stat().st_size
 
     def description(self) -> RobotDescription:
         """Return the robot's description. Raises RecordingDamaged when the file has none."""
@@ -185,10 +177,7 @@ class RecordingReader:
         if not 0 <= number < len(self.index.chunks):
             raise IndexError(number)
         try:
-            content = Chunk.read(
-                ReadDataStream(BytesIO(self._record_at(self.index.chunks[number].offset, Opcode.CHUNK)))
-            )
-            parts = chunk_records(content)
+            parts = chunk_records(self._file.chunk(self.index.chunks[number].offset))
         except CRCValidationError as error:
             raise RecordingTampered(f"chunk {number} was changed after it was written") from error
         except BROKEN as error:
@@ -199,69 +188,16 @@ class RecordingReader:
                 continue
             yield Record(topic.topic, topic.schema, part.sequence, part.log_time, part.publish_time, part.data, number)
 
-    def _record_at(self, offset: int, opcode: int) -> bytes:
-        """Return the content of one MCAP record, after its opcode and length."""
-        self._seek(offset)
-        head = self._file.read(HEAD)
-        length = int.from_bytes(head[1:], "little")
-        if len(head) < HEAD or head[0] != opcode or length > MAX_RECORD:
-            raise RecordingDamaged(f"no record of kind {opcode} at {offset}")
-        content = self._file.read(length)
-        if len(content) < length:
-            raise RecordingDamaged(f"the record at {offset} is cut off")
-        return content
-
-    def _seek(self, offset: int) -> None:
-        """Seek to an offset that the file names, which may be any number."""
-        if not 0 <= offset <= self.size:
-            raise RecordingDamaged(f"byte {offset} is beyond the end of the file, {self.size} bytes")
-        self._file.seek(offset)
-
     def _read_info(self) -> RecordingInfo:
-        self._file.seek(0)
-        if self._file.read(len(MAGIC)) != MAGIC:
-            raise RecordingDamaged(f"{self.path.name} is not an MCAP file")
-        header = self._file.read(HEAD)
-        offset = len(MAGIC) + HEAD + int.from_bytes(header[1:], "little")
-        metadata = Metadata.read(ReadDataStream(BytesIO(self._record_at(offset, Opcode.METADATA))))
+        metadata = self._file.metadata()
         if metadata.name != METADATA_NAME:
             raise RecordingDamaged(f"{self.path.name} is not a recording of Lockstep")
         return RecordingInfo.parse(metadata.metadata)
 
     def _read_index(self) -> EventIndex | None:
         """Return the index; None if the file was not closed."""
-        end = self._file.seek(0, 2)
-        if end < FOOTER:
-            return None
-        self._file.seek(end - len(MAGIC))
-        if self._file.read() != MAGIC:
-            return None
-        footer = Footer.read(ReadDataStream(BytesIO(self._record_at(end - FOOTER, Opcode.FOOTER))))
-        entry = self._attachment(footer, end)
-        if entry is None:
-            return None
-        attachment = Attachment.read(ReadDataStream(BytesIO(self._record_at(entry.offset, Opcode.ATTACHMENT))))
-        return decode_index(attachment.data)
-
-    def _attachment(self, footer: Footer, end: int) -> AttachmentIndex | None:
-        """Find the index. The summary's last groups are short, so they are read from their own beginning."""
-        self._seek(footer.summary_offset_start or footer.summary_start)
-        length = end - self._file.tell() - FOOTER
-        if length > MAX_RECORD:
-            raise RecordingDamaged(f"a summary of {length} bytes, the bound is {MAX_RECORD}")
-        summary = self._file.read(length)
-        at = 0
-        while at + HEAD <= len(summary):
-            opcode, length = summary[at], int.from_bytes(summary[at + 1 : at + HEAD], "little")
-            content = ReadDataStream(BytesIO(summary[at + HEAD : at + HEAD + length]))
-            at += HEAD + length
-            if opcode == Opcode.SUMMARY_OFFSET:
-                group = content.read1()
-                start = content.read8()
-                if group == Opcode.ATTACHMENT_INDEX:
-                    found = AttachmentIndex.read(ReadDataStream(BytesIO(self._record_at(start, group))))
-                    return found if found.name == INDEX_NAME else None
-        return None
+        text = self._file.attachment(INDEX_NAME)
+        return None if text is None else decode_index(text)
 
     def _scan(self) -> EventIndex:
         self.interrupted = True

@@ -10,17 +10,12 @@ from typing import NamedTuple
 import msgspec
 
 from lockstep.server.recording.format.records import FeedbackRecord, TraceRecord
+from lockstep.server.recording.verify.violation import Violation
 
-__all__ = ["ROOM", "CommandAges", "LateCommand"]
+__all__ = ["ROOM", "CommandAges"]
 
 ROOM = 0.25  # s, on top of max_event_age: for the measurement of the answered feedback, and for the tick
 ROUNDING = 0.001  # s, of spans
-
-
-class LateCommand(NamedTuple):
-    event: int
-    micros: int  # µs since 1970, arrival of its feedback
-    text: str
 
 
 class _Doubt(NamedTuple):
@@ -32,7 +27,7 @@ class _Doubt(NamedTuple):
     most: float  # s
     voided: bool  # the robot rests and needs a neutral command, as after a tick that was held up
 
-    def judged(self, record: TraceRecord | None) -> LateCommand | None:
+    def judged(self, record: TraceRecord | None) -> Violation | None:
         """Return what is wrong; `record`: the bridge's own spans of this command."""
         allowed = f"{self.most:g} s are allowed"
         spans = None if record is None else record.command
@@ -50,7 +45,7 @@ class _Doubt(NamedTuple):
             text = f"executed {ticked:.3f} s after the feedback that it answers, because its tick was late; {allowed}"
         else:
             return None
-        return LateCommand(self.event, self.micros, text)
+        return Violation(self.event, self.micros, text)
 
 
 class CommandAges:
@@ -75,7 +70,7 @@ class CommandAges:
         if not record.peer and not record.stream:
             self._traces.append(record)
 
-    def settle(self) -> LateCommand | None:
+    def settle(self) -> Violation | None:
         """Return the newest event's command if it was, or may have been, too late."""
         doubt, self._doubt = self._doubt, None
         if doubt is None:

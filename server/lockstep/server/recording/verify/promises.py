@@ -10,7 +10,7 @@ import msgspec
 
 from lockstep.protocol.console import StreamReport
 from lockstep.protocol.description import RobotDescription
-from lockstep.protocol.serial import event_after, event_gap, is_event, is_newer
+from lockstep.protocol.serial import event_after, event_gap, is_newer
 from lockstep.server.recording.format.records import (
     ActionRecord,
     CommandRecord,
@@ -26,9 +26,11 @@ from lockstep.server.recording.format.records import (
 )
 from lockstep.server.recording.verify.command_ages import CommandAges
 from lockstep.server.recording.verify.goals import GoalChecks
+from lockstep.server.recording.verify.stamps import StampChecks
 from lockstep.server.recording.verify.verify_signature import SignatureReport
+from lockstep.server.recording.verify.violation import Violation
 
-__all__ = ["CHECKS", "Check", "CheckName", "Verdict", "Verifier", "Violation"]
+__all__ = ["CHECKS", "Check", "CheckName", "Verdict", "Verifier"]
 
 CheckName = Literal[
     "readable",  # the file is whole, and its checksums fit
@@ -58,17 +60,10 @@ CHECKS: tuple[CheckName, ...] = (
     "rendered",
     "signed",
 )
-ROUNDING = 2e-6  # s; times in the file are rounded to ns, capture times of sound to a sample
 LEAVE = 1.0  # s on top of hold until the end of an action is told
 MANY_ACTIONS = 1000  # whose end is remembered
 MANY_PRESSES = 64  # on their way; beyond that some share an answer, and the oldest may have none
 MOST = 50  # violations of a check that are listed
-
-
-class Violation(msgspec.Struct, frozen=True):
-    event: int
-    time: int  # µs since 1970, arrival
-    text: str
 
 
 class Check(msgspec.Struct):
@@ -195,27 +190,28 @@ class Verifier:
         self._description: RobotDescription | None = None
         self._newest: FeedbackRecord | None = None
         self._answered: dict[int, _Answered] = {}  # by event: the newest two
-        self._first_times: dict[int, float] = {}  # by event, s, the bridge's clock
-        self._offset = 0  # ns from the bridge's clock to the recording's
         self._holder: str | None = None  # None: not known yet
         self._stops = _Stops()
         self._actions = _Actions()
         self._ages = CommandAges()
         self._goals = GoalChecks()
+        self._stamps = StampChecks()
         self._stopped = False
         self._in_flight: CommandRecord | None = None
         self._linked = True
-        self._waiting: list[tuple[str, int, int, float]] = []  # stamped with an event whose feedback is not here yet
         self._rendered: dict[tuple[str, str], StreamReport] = {}  # newest, by peer and stream
         self._events = self._commands = self._media = 0
         self._signature = SignatureReport()
 
     def fail(self, check: CheckName, text: str, event: int = 0, time: int = 0) -> None:
         """Note a broken promise."""
-        found = self._checks[check]
-        found.count += 1
-        if len(found.violations) < MOST:
-            found.violations.append(Violation(event, time, text))
+        self._fail(check, Violation(event, time, text))
+
+    def _fail(self, check: CheckName, found: Violation) -> None:
+        broken = self._checks[check]
+        broken.count += 1
+        if len(broken.violations) < MOST:
+            broken.violations.append(found)
 
     def signed(self, report: SignatureReport) -> None:
         """Take the report on the file's signatures."""
@@ -288,9 +284,10 @@ class Verifier:
     def _feedback(self, feedback: FeedbackRecord, micros: int, captured: int) -> None:
         before, in_flight = self._newest, self._in_flight
         self._checks["monotonic"].looked += 1
-        self._offset = captured - round(feedback.time * 1e9)
+        for wrong_stamp in self._stamps.feedback(feedback, captured):
+            self._fail("stamps", wrong_stamp)
         if before is None:
-            self._begin(feedback)
+            self._answered = {feedback.event: _Answered({}, {}, {})}  # the past is not known
         elif feedback.event == before.event:
             self._again(before, feedback, micros)
         elif is_newer(feedback.event, before.event):
@@ -312,13 +309,6 @@ class Verifier:
         known.times[feedback.issue] = feedback.time
         known.stopped[feedback.issue] = feedback.stop.stopped
         known.nonces[feedback.issue] = feedback.nonce
-        self._settle_stamps(feedback.event)
-
-    def _begin(self, feedback: FeedbackRecord) -> None:
-        """Begin with the first feedback of the file: the past is not known."""
-        self._answered = {feedback.event: _Answered({}, {}, {})}
-        if feedback.issue == 1:
-            self._first_times[feedback.event] = feedback.time
 
     def _again(self, before: FeedbackRecord, feedback: FeedbackRecord, micros: int) -> None:
         if feedback.issue <= before.issue:
@@ -346,7 +336,6 @@ class Verifier:
             before.event: self._answered.get(before.event, _Answered({}, {}, {})),
             event: _Answered({}, {}, {}),
         }
-        self._first_times[event] = feedback.time
 
     def _judge_age(self, before: FeedbackRecord, command: CommandRecord, feedback: FeedbackRecord, micros: int) -> None:
         known = self._answered.get(before.event)
@@ -366,37 +355,14 @@ class Verifier:
 
     def _settle_age(self) -> None:
         if (late := self._ages.settle()) is not None:
-            self.fail("in_time", late.text, late.event, late.micros)
+            self._fail("in_time", late)
 
     def medium(self, stream: str, stamp: int, arrived: int, captured: int) -> None:
         """Check a picture or a sound of the robot; times in ns since 1970."""
         self._media += 1
         self._checks["stamps"].looked += 1
-        micros = arrived // 1000
-        if not is_event(stamp):
-            self.fail("stamps", f"{stream}: {stamp} is not an event", stamp, micros)
-            return
-        at = (captured - self._offset) / 1e9
-        if self._newest is None or is_newer(stamp, self._newest.event):
-            if len(self._waiting) < 10_000:
-                self._waiting.append((stream, stamp, micros, at))
-        else:
-            self._judge_stamp(stream, stamp, micros, at)
-
-    def _judge_stamp(self, stream: str, stamp: int, micros: int, at: float) -> None:
-        began = self._first_times.get(stamp)
-        if began is not None and at < began - ROUNDING:
-            text = f"{stream}: captured {1000 * (began - at):.1f} ms before its event began"
-            self.fail("stamps", text, stamp, micros)
-
-    def _settle_stamps(self, event: int) -> None:
-        left = []
-        for waiting in self._waiting:
-            if is_newer(waiting[1], event):
-                left.append(waiting)
-            else:
-                self._judge_stamp(*waiting)
-        self._waiting = left
+        for wrong in self._stamps.medium(stream, stamp, arrived, captured):
+            self._fail("stamps", wrong)
 
     def _report(self, record: ReportRecord, micros: int) -> None:
         for stream in record.report.streams:
@@ -414,9 +380,8 @@ class Verifier:
     def verdict(self, ended: int) -> Verdict:
         """Return the verdict, after the last record, which arrived at `ended` (µs)."""
         self._settle_age()
-        for stream, stamp, micros, _ in self._waiting:
-            if ended - micros > 2_000_000:  # a picture may overtake its feedback, but not by that much
-                self.fail("stamps", f"{stream}: stamped with an event that is not recorded", stamp, micros)
+        for wrong in self._stamps.end(ended):
+            self._fail("stamps", wrong)
         return Verdict(
             ok=all(check.ok for check in self._checks.values()),
             checks=self._checks,

@@ -18,10 +18,11 @@ from lockstep.server.recording.format.event_index import INDEX_NAME
 from lockstep.server.recording.format.info import RecordingInfo
 from lockstep.server.recording.format.payload import own_record
 from lockstep.server.recording.format.records import SignatureRecord
-from lockstep.server.recording.format.signature import RecordingChain, TopicText, is_valid
+from lockstep.server.recording.format.signature import RecordingChain, is_valid
 from lockstep.server.recording.format.topics import SIGNATURE
 from lockstep.server.recording.reading.raw_records import BROKEN, RawRecord, check_packed
 from lockstep.server.recording.reading.scan import Scan
+from lockstep.server.recording.verify.signed_topics import SignedTopics
 from lockstep.server.recording.verify.verify_indexes import IndexChecker
 
 __all__ = ["SignatureChecker", "SignatureFault", "SignatureReport"]
@@ -66,8 +67,7 @@ class SignatureChecker:
         self.index_faults: list[str] = []
         self._key = key
         self._report = SignatureReport()
-        self._schemas: dict[int, Schema] = {}
-        self._channels: dict[int, Channel] = {}
+        self._topics = SignedTopics()
         self._chain: RecordingChain | None = None
         self._last: SignatureRecord | None = None
         self._chunks = 0
@@ -91,9 +91,9 @@ class SignatureChecker:
             self._chunks += 1
             self._chunk(Chunk.read(stream), self._chunks - 1)
         elif raw.opcode == Opcode.SCHEMA:
-            self._schema(Schema.read(stream))
+            self._topic(Schema.read(stream))
         elif raw.opcode == Opcode.CHANNEL:
-            self._channel(Channel.read(stream))
+            self._topic(Channel.read(stream))
         elif raw.opcode == Opcode.DATA_END:
             self._behind_data = True
             if raw.content != NO_CHECKSUM:
@@ -120,17 +120,9 @@ class SignatureChecker:
         if INDEX_NAME.encode() not in content[:64]:
             self._fault("an attachment is not signed")
 
-    def _schema(self, schema: Schema) -> None:
-        if self._schemas.setdefault(schema.id, schema) != schema:
-            self._fault(f"the schema {schema.name} differs from the signed one")
-        elif self._chain is not None and self._schemas[schema.id] is schema:
-            self._fault(f"the schema {schema.name} is not signed")
-
-    def _channel(self, channel: Channel) -> None:
-        if self._channels.setdefault(channel.id, channel) != channel:
-            self._fault(f"the topic {channel.topic} differs from the signed one")
-        elif self._chain is not None and self._channels[channel.id] is channel:
-            self._fault(f"the topic {channel.topic} is not signed")
+    def _topic(self, found: Schema | Channel) -> None:
+        if fault := self._topics.take(found):
+            self._fault(fault)
 
     def _chunk(self, chunk: Chunk, number: int) -> None:
         try:
@@ -142,9 +134,9 @@ class SignatureChecker:
         while stream.count < length:
             opcode, size = stream.read1(), stream.read8()
             if opcode == Opcode.SCHEMA:
-                self._schema(Schema.read(stream))
+                self._topic(Schema.read(stream))
             elif opcode == Opcode.CHANNEL:
-                self._channel(Channel.read(stream))
+                self._topic(Channel.read(stream))
             elif opcode == Opcode.MESSAGE:
                 self._message(Message.read(stream, size))
             else:
@@ -153,17 +145,13 @@ class SignatureChecker:
         self._end_chunk(number)
 
     def _message(self, message: Message) -> None:
-        channel = self._channels[message.channel_id]
+        topic = self._topics.name(message.channel_id)
         if self._chain is None:
-            self._chain = RecordingChain(self._info, map(self._text, self._channels.values()))
-        if channel.topic == SIGNATURE:
+            self._chain = RecordingChain(self._info, self._topics.sign())
+        if topic == SIGNATURE:
             self._signature(self._chain, own_record(SignatureRecord, message.data), message)
             return
-        self._chain.add(channel.topic, message.sequence, message.log_time, message.publish_time, message.data)
-
-    def _text(self, channel: Channel) -> TopicText:
-        schema = self._schemas[channel.schema_id]
-        return TopicText(channel.topic, channel.message_encoding, schema.name, schema.encoding, schema.data)
+        self._chain.add(topic, message.sequence, message.log_time, message.publish_time, message.data)
 
     def _signature(self, chain: RecordingChain, found: SignatureRecord, message: Message) -> None:
         last = self._last

@@ -1,11 +1,15 @@
 """Records of the robot's map and of its navigation: what has changed, and the map again once in a while."""
 
 import math
+import time
 
 import msgspec
 
 from lockstep.protocol.maps import Navigation, OccupancyMap
+from lockstep.server.event_clock import EventClock
 from lockstep.server.recording.format.records import MapRecord, NavigationRecord
+from lockstep.server.recording.writing.record_sink import RecordSink
+from lockstep.server.session_events import MapReceived, NavigationReceived, SessionEvents
 
 __all__ = ["MapRecords"]
 
@@ -14,13 +18,27 @@ REPEAT = 60.0  # s after which a map is recorded again: a recording is cut into 
 
 
 class MapRecords:
-    """Keeps the newest of both, whether something is recorded or not. Call `take_map` and `take`, then `due`."""
+    """Keeps the newest of both, whether something is recorded or not."""
 
-    def __init__(self) -> None:
+    def __init__(self, clock: EventClock, sink: RecordSink) -> None:
+        self._clock = clock
+        self._sink = sink
         self._map: OccupancyMap | None = None
         self._navigation: Navigation | None = None
         self._recorded: tuple[str, float] = ("", -math.inf)  # id of the recorded map, and when
         self._told: NavigationRecord | None = None
+
+    def subscribe(self, events: SessionEvents) -> None:
+        events.subscribe(MapReceived, self._map_received)
+        events.subscribe(NavigationReceived, self._navigation_received)
+
+    def _map_received(self, event: MapReceived) -> None:
+        self.take_map(event.map)
+        self._put_due()
+
+    def _navigation_received(self, event: NavigationReceived) -> None:
+        self.take(event.navigation)
+        self._put_due()
 
     def take_map(self, map: OccupancyMap) -> None:
         self._map = map
@@ -31,11 +49,17 @@ class MapRecords:
     def begin(self) -> None:
         """A recording begins: it has nothing yet."""
         self._recorded, self._told = ("", -math.inf), None
+        self._put_due()
 
     def forget(self) -> None:
         """Another bridge has another map."""
         self._map = self._navigation = None
-        self.begin()
+        self._recorded, self._told = ("", -math.inf), None
+
+    def _put_due(self) -> None:
+        if self._sink.is_open:
+            for record in self.due(self._clock.epoch, self._clock.event, time.monotonic()):
+                self._sink.put_own(record)
 
     def due(self, epoch: str, event: int, now: float) -> list[MapRecord | NavigationRecord]:
         """Return what has to be recorded now, with the current event."""

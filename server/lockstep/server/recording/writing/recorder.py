@@ -19,6 +19,7 @@ from lockstep.server.recording.format.info import RecordingInfo
 from lockstep.server.recording.format.signature import RecordingSigning
 from lockstep.server.recording.format.topics import PICTURE_FORMATS
 from lockstep.server.recording.recording_store import RecordingStore
+from lockstep.server.recording.retention import Retention
 from lockstep.server.recording.settings import RecordingSettings
 from lockstep.server.recording.times import RecordClock
 from lockstep.server.recording.writing.session_records import SessionRecords
@@ -79,6 +80,7 @@ class Recorder:
         self._media = media
         self._tell = tell
         self._audit = audit
+        self._retention = Retention(shelf, audit)
         self._signing = signing
         self._records = SessionRecords(clock, media)
         self._thread: RecordingThread | None = None
@@ -100,7 +102,7 @@ class Recorder:
         """Run until cancelled; the file is closed then."""
         self._loop = asyncio.get_running_loop()
         try:
-            self._tell_pruned(await asyncio.to_thread(self._prepare))
+            await self._retention.prepare()
             ticks = 0
             while True:
                 if self._settings.automatic and self._thread is None and time.monotonic() >= self._again_at:
@@ -117,38 +119,13 @@ class Recorder:
                     self._tell(self.state())
                     ticks += 1
                     if ticks % PRUNE_TICKS == 1:
-                        self._tell_pruned(await asyncio.to_thread(self._prune))
+                        await self._retention.prune()
         finally:
             await asyncio.shield(self.close())
 
-    def _prepare(self) -> list[str]:
-        """Prepare the directory. Return the recordings that were deleted to make room."""
-        try:
-            self.shelf.prepare()
-            self.shelf.recover()
-            return self.shelf.prune()
-        except OSError as error:
-            log.error("the directory of recordings cannot be used", reason=str(error))
-            return []
-
-    def _prune(self) -> list[str]:
-        """Return the recordings that were deleted to make room. A failure is tried again."""
-        try:
-            return self.shelf.prune()
-        except OSError as error:
-            log.error("the directory of recordings cannot be read", reason=str(error))
-            return []
-
-    def _tell_pruned(self, gone: list[str]) -> None:
-        for recording in gone:
-            self._record_act("deleted to make room", recording)
-
-    def _record_act(self, what: str, detail: str) -> None:
-        self._audit.record("recording", what=what, detail=detail)
-
     def _try_again(self) -> None:
         try:
-            self._record_act("started by itself", self.start("", "").recording)
+            self._audit.record("recording", what="started by itself", detail=self.start("", "").recording)
         except RecordingFailed as error:
             self._again_at = time.monotonic() + RETRY_SECONDS
             log.error("the recording cannot start", reason=error.detail)
@@ -160,7 +137,7 @@ class Recorder:
         thread = self._thread
         if thread is None:
             return RecordingState(state="failed" if self._failure else "off", detail=self._failure)
-        path = thread.path
+        path = thread.parts.path
         return RecordingState(
             state="recording",
             id="" if path is None else path.stem,
@@ -168,8 +145,8 @@ class Recorder:
             name=thread.info.name,
             by=thread.info.by,
             since=self._since,
-            bytes=thread.bytes_written,
-            lost=thread.lost,
+            bytes=thread.parts.bytes_written,
+            lost=thread.queue.lost,
             detail="" if path is not None else "waiting for the robot",
         )
 
@@ -212,7 +189,7 @@ class Recorder:
             lambda episode, kept: self._call_soon(lambda: self._episode_written(episode, kept)),
         )
         self._thread = thread
-        self._records.begin(thread, times)
+        self._records.begin(thread.queue, times)
         thread.start()
         self._media.record(self._take_frame, self._settings.keyframe_seconds)
         self._tell(self.state())
@@ -243,13 +220,13 @@ class Recorder:
                 self._thread = None
                 self._records.end()
                 self._failure = thread.failure
-                log.info("recording ended", recording=thread.info.recording, bytes=thread.bytes_written)
+                log.info("recording ended", recording=thread.info.recording, bytes=thread.parts.bytes_written)
 
     async def _give_up(self) -> None:
         await self.close()
         if self._failure:
             self._again_at = time.monotonic() + RETRY_SECONDS
-            self._record_act("failed", self._failure)
+            self._audit.record("recording", what="failed", detail=self._failure)
             self._tell(self.state())
 
     def _take_frame(self, stream: str, codec: str, frame: EncodedFrame, *, attached: bool) -> None:
