@@ -167,6 +167,6 @@ class ConsoleContext:
         """Raise TooManyPeers when there is no place for another peer at any robot."""
         if self._max_peers is None:
             return
-        held = sum(revocation.peers.taken_by(identity.token_id) for revocation in self.revocations)
-        taken = sum(revocation.peers.taken for revocation in self.revocations)
+        held = sum(revocation.peers.places.taken_by(identity.token_id) for revocation in self.revocations)
+        taken = sum(revocation.peers.places.taken for revocation in self.revocations)
         check_place(identity.role, held, taken, self._max_peers, self._reserved)

@@ -23,6 +23,7 @@ from lockstep.server.errors import (
     PreconditionFailed,
     PreconditionRequired,
     RobotUnreachable,
+    ShuttingDown,
     TooFewSections,
     TooManyRequests,
 )
@@ -89,11 +90,15 @@ async def create(
     if thumbnail:
         identity = identity._replace(role="observer")
     relayed = bool(relay) and not thumbnail and identity.role == "observer" and here.relays.arrived(relay)
-    with here.console.peers.place(identity, relayed=relayed, thumbnail=thumbnail):
+    with here.console.peers.places.keep(identity, relayed=relayed, thumbnail=thumbnail):
         trailer = stamp == "trailer"
         peer, transport, answer = await _negotiate(here, caller, identity, offer, trailer=trailer, thumbnail=thumbnail)
         peer.relay = relay if relayed else ""
-        here.console.peers.admit(peer)
+        try:
+            here.console.peers.admit(peer)
+        except ShuttingDown:
+            await peer.close()
+            raise
     headers = {
         "Location": f"{request.scope.get('root_path', '')}/whep/{transport.resource}",
         "Accept-Patch": FRAGMENT,
@@ -212,7 +217,7 @@ async def _negotiate(
             transport.agree_on(channels)
             caller.identity  # noqa: B018  raises when the link has ended meanwhile
         except BaseException:
-            await peer.abandon()
+            await peer.close()
             raise
         connection.listen(transport.heard)
     except BaseException as error:
