@@ -19,6 +19,7 @@ from lockstep.server.errors import (
     NotAllowed,
     NotFound,
     RobotUnreachable,
+    ShuttingDown,
     TooManyRequests,
 )
 from lockstep.server.http.request_body import read_text
@@ -73,7 +74,11 @@ async def create(
     ice = servers_for(here.settings, caller.identity)
     with here.publishers.place(caller.identity, camera) as wanted:
         publisher, answer = await _negotiate(here, caller, offer, section, wanted)
-        here.publishers.admit(publisher)
+        try:
+            here.publishers.admit(publisher)
+        except ShuttingDown:
+            publisher.close()
+            raise
     headers = {
         "Location": f"{request.scope.get('root_path', '')}/whip/{publisher.resource}",
         "Accept-Patch": FRAGMENT,
