@@ -134,14 +134,11 @@ class PeerRegistry:
             try:
                 await peer.run()
             finally:
-                self._left(peer)
+                del self._sessions[peer]
+                self.ended += 1
+                self._metrics.peers.labels(peer.role).dec()
+                self._metrics.peers_ended.labels(peer.ended).inc()
+                self._metrics.dropped.labels("channel").inc(peer.transport.lost)
+                log.info("peer left", peer=peer.id, role=peer.role, name=peer.name, why=peer.ended)
         except Exception as error:
             self._metrics.faults.caught("peer", error, peer=peer.id)
-
-    def _left(self, peer: Peer) -> None:
-        del self._sessions[peer]
-        self.ended += 1
-        self._metrics.peers.labels(peer.role).dec()
-        self._metrics.peers_ended.labels(peer.ended).inc()
-        self._metrics.dropped.labels("channel").inc(peer.transport.lost)
-        log.info("peer left", peer=peer.id, role=peer.role, name=peer.name, why=peer.ended)

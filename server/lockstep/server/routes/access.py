@@ -78,7 +78,7 @@ class AuditPage(msgspec.Struct, frozen=True, kw_only=True):
 async def invitations(request: Request, caller: Caller) -> Response:
     here = dependencies(request)
     _require_inviter(caller)
-    found = _shown(here.state.invitations.known.visible(caller.identity), here.state.invitations.now())
+    found = _shown(here.state.invitations.known.visible(caller.identity), here.state.invitations.clock.now())
     return _json(InvitationList(invitations=_infos(here, found), may_invite=list(may_invite(caller.role))))
 
 
@@ -118,7 +118,7 @@ async def revoke(request: Request, caller: Caller, invitation_id: str) -> Respon
     try:
         revoked = await _update(here, caller.identity, lambda known, by, now: known.revoke(by, invitation_id, now))
     except StateDirUnusable as error:
-        here.state.invitations.write_later(invitation_id)
+        here.state.invitations.unwritten.add(invitation_id)
         here.console.audit.record("revocation", by, "not on the disk yet", invitation_id)
         raise StateUnavailable(f"{await _noted(here)}: {error.reason}") from error
     here.context.enforce(revoked, by)
@@ -128,7 +128,7 @@ async def revoke(request: Request, caller: Caller, invitation_id: str) -> Respon
 async def _noted(here: Dependencies) -> str:
     """Note a revocation that the list of links did not take, and return the outcome in words."""
     try:
-        await asyncio.to_thread(here.state.invitations.note_ended)
+        await asyncio.to_thread(here.state.invitations.unwritten.note)
     except StateDirUnusable:
         return UNWRITTEN
     return NOTED
@@ -159,7 +159,7 @@ async def _update(here: Dependencies, by: Identity, change: Callable[[Invitation
 
     def work(known: Invitations) -> Result:
         store.check(by, known)
-        return change(known, by, store.now())
+        return change(known, by, store.clock.now())
 
     return await asyncio.to_thread(store.update, work)
 
