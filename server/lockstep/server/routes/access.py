@@ -11,7 +11,8 @@ from fastapi import APIRouter, Depends, Query, Request, Response
 from lockstep.protocol.console import Role
 from lockstep.server.audit.records import AuditRecord
 from lockstep.server.auth.invitations import Invitation, Invitations, may_invite
-from lockstep.server.auth.tokens import MAX_ROBOTS, HasRole, Identity, Right, RobotName, require_role
+from lockstep.server.auth.token_signer import MAX_ROBOTS, RobotName
+from lockstep.server.auth.tokens import HasRole, Identity, Right, require_role
 from lockstep.server.errors import NotAllowed, Silenced, StateUnavailable
 from lockstep.server.http.request_body import read_json
 from lockstep.server.state.console_links import console_link
