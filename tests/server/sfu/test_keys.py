@@ -57,7 +57,7 @@ class _Hall:
     async def another(self, known: Publication) -> Publication:
         """The publication that follows."""
         async with asyncio.timeout(20):
-            while self.relays.carrying.get("0", known) is known or not self.coordinator.stations[0].live:  # noqa: ASYNC110
+            while self.relays.carrying.get("0", known) is known or not next(iter(self.coordinator.servers)).live:  # noqa: ASYNC110
                 await asyncio.sleep(0)
         return self.relays.carrying["0"]
 

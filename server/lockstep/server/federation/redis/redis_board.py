@@ -146,7 +146,9 @@ class RedisBoard:
                     tasks.create_task(self._talk(store, backoff), name="board")
                     self._stops.begin(store, tasks)
             except asyncio.CancelledError:
-                await self._farewell(store)
+                with suppress(BoardError, TimeoutError):
+                    async with asyncio.timeout(FAREWELL_SECONDS):
+                        await store.farewell(self.id, pack_news(self._seal, Gone(console=self.id)))
                 raise
             finally:
                 self._store = None
@@ -230,11 +232,6 @@ class RedisBoard:
             owner = self._others.owners([robot], time.monotonic()).get(robot, "")
             why = f"{owner} did not answer" if owner else "no console has this robot"
         return StopAnswer(False, False, 0, f"not confirmed: {why}")
-
-    async def _farewell(self, store: RedisStore) -> None:
-        with suppress(BoardError, TimeoutError):
-            async with asyncio.timeout(FAREWELL_SECONDS):
-                await store.farewell(self.id, pack_news(self._seal, Gone(console=self.id)))
 
 
 def _first(group: BaseExceptionGroup[BoardError]) -> BoardError:
