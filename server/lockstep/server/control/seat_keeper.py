@@ -123,7 +123,7 @@ class SeatKeeper:
         return [
             peer
             for peer in self._peers
-            if peer.identity.token_id == link and peer.role in PEOPLE and peer.connected and not peer.ended
+            if peer.identity.token_id == link and peer.role in PEOPLE and peer.liveness.connected and not peer.ended
         ]
 
     def _act_for_link(self, outcome: SeatOutcome, actor: Peer | Actor) -> None:
