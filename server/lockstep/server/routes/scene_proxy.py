@@ -22,7 +22,7 @@ from lockstep.server.auth.tokens import SceneTicket
 from lockstep.server.errors import BadParameter, ConsoleError, NotFound
 from lockstep.server.http.security_headers import check_origin
 from lockstep.server.scene.view import SceneView
-from lockstep.server.state.dependencies import dependencies
+from lockstep.server.state.dependencies import Dependencies, dependencies
 
 __all__ = ["is_allowed", "router", "scene_query"]
 
@@ -97,7 +97,7 @@ async def stream(websocket: WebSocket, ticket: str) -> None:
         await scene.open()
         here.access.verify_ticket(ticket)  # its link may have ended meanwhile
         with scene.viewer(valid):
-            await _join(websocket, scene, valid)
+            await _join(websocket, here, scene, valid)
     except ConsoleError as error:
         here.metrics.bad_input.labels("scene", type(error).__name__).inc()
         await websocket.close(POLICY_VIOLATION)
@@ -125,7 +125,7 @@ def _subprotocols(websocket: WebSocket) -> list[Subprotocol]:
     return [Subprotocol(each) for each in offered if each.startswith("viser-v")][:1]
 
 
-async def _join(websocket: WebSocket, scene: SceneView, ticket: SceneTicket) -> None:
+async def _join(websocket: WebSocket, here: Dependencies, scene: SceneView, ticket: SceneTicket) -> None:
     subprotocols = _subprotocols(websocket)
     try:
         upstream = await connect(
@@ -145,9 +145,9 @@ async def _join(websocket: WebSocket, scene: SceneView, ticket: SceneTicket) -> 
     async with upstream:
         await websocket.accept(subprotocol=upstream.subprotocol)
         async with asyncio.TaskGroup() as tasks:
-            up = tasks.create_task(_viewer_to_scene(websocket, upstream))
+            up = tasks.create_task(_viewer_to_scene(websocket, here, upstream))
             down = tasks.create_task(_scene_to_viewer(websocket, upstream))
-            ended = tasks.create_task(dependencies(websocket).revocation.ended(ticket.link, ticket.ends))
+            ended = tasks.create_task(here.revocation.ended(ticket.link, ticket.ends))
             await asyncio.wait((up, down, ended), return_when=asyncio.FIRST_COMPLETED)
             if ended.done():
                 await _close(websocket, POLICY_VIOLATION)
@@ -155,8 +155,8 @@ async def _join(websocket: WebSocket, scene: SceneView, ticket: SceneTicket) -> 
                 task.cancel()
 
 
-async def _viewer_to_scene(websocket: WebSocket, upstream: ClientConnection) -> None:
-    here, clock = dependencies(websocket), asyncio.get_running_loop().time
+async def _viewer_to_scene(websocket: WebSocket, here: Dependencies, upstream: ClientConnection) -> None:
+    clock = asyncio.get_running_loop().time
     budget = TokenBucket(UP_RATE, UP_BURST)
     try:
         while True:

@@ -73,6 +73,7 @@ class _Server(uvicorn.Server):
         self._bounded = bounded
         self._listener = listener
         self._accepting: asyncio.Task[None] | None = None
+        self._fault: Exception | None = None  # of accepting connections
 
     async def startup(self, sockets: list[socket.socket] | None = None) -> None:
         try:
@@ -96,7 +97,20 @@ class _Server(uvicorn.Server):
             )
 
         acceptor = Acceptor(self._listener, bounded.places, bounded.turns, make_protocol, self.config.ssl)
-        self._accepting = self._tasks.create_task(acceptor.run(), name="accept")
+        self._accepting = self._tasks.create_task(self._run(acceptor), name="accept")
+
+    async def _run(self, acceptor: Acceptor) -> None:
+        """Accept until cancelled. A fault shuts the server down gracefully; `serve` then raises it."""
+        try:
+            await acceptor.run()
+        except Exception as error:
+            self._fault = error
+            self.should_exit = True
+
+    async def serve(self, sockets: list[socket.socket] | None = None) -> None:
+        await super().serve(sockets)
+        if self._fault is not None:
+            raise self._fault
 
     async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
         if self._accepting is not None:
