@@ -97,7 +97,7 @@ class Peer:
     `end` ends it from outside, with the reason that logs and metrics show. An exception while it is served ends it
     alone: `failed` is told of the stage, and methods that others call raise nothing.
 
-    It is the `TransportEvents` of its transport.
+    It is the `TransportEvents` of its transport. Use its `media` within `contained`.
     """
 
     def __init__(
@@ -130,7 +130,7 @@ class Peer:
         self._loop = asyncio.get_running_loop()
         self._channels: set[ChannelName] = set()  # that are open
         self.asks = TokenBucket(ASK_RATE, ASK_BURST)  # of requests that concern everybody
-        self.answers = RepeatReplyLimiter()
+        self.answers = RepeatReplyLimiter()  # to repeats of its commands
         self.liveness = Liveness(
             limits.peer_connect_timeout if connect_seconds is None else connect_seconds,
             limits.peer_silence if silence_seconds is None else silence_seconds,
