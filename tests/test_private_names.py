@@ -13,10 +13,11 @@ FILES = sorted(path for package in PRODUCT for path in (ROOT / package).rglob("*
 PUBLIC = {"_replace", "_asdict", "_fields", "_exit"}
 BY_STRING = ("getattr", "setattr", "hasattr", "delattr")
 MOST_LISTED = 5
-# redis-py has no bound on what the server may make it read; tests/server/federation/test_redis_private.py looks at it.
+# redis-py has no bound on what the server may make it read:
+# tests/server/federation/redis/test_redis_private.py looks at it.
 LISTED = {
-    ("server/lockstep/server/federation/redis_private.py", "_AsyncRESP2Parser"),
-    ("server/lockstep/server/federation/redis_private.py", "redis._parsers.resp2"),
+    ("server/lockstep/server/federation/redis/redis_private.py", "_AsyncRESP2Parser"),
+    ("server/lockstep/server/federation/redis/redis_private.py", "redis._parsers.resp2"),
 }
 
 

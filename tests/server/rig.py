@@ -21,7 +21,7 @@ from lockstep.protocol.serial import event_after
 from lockstep.robot_bridge.bridge import Bridge
 from lockstep.robot_bridge.robots.registry import create_robot
 from lockstep.robot_bridge.settings import BridgeSettings
-from lockstep.server.auth.invitation_store import InvitationStore
+from lockstep.server.auth.stored_clock import StoredClock
 from lockstep.server.auth.tokens import Access, Identity
 from lockstep.server.composition.robot_app import create_app
 from lockstep.server.http.transport.serve import bind, running
@@ -203,8 +203,8 @@ class TestPeer:
 
 def links_that_expire(monkeypatch: pytest.MonkeyPatch) -> Callable[[], None]:
     """For consoles that start afterwards: return a function that lets more than an hour pass for links at once."""
-    now, passed = InvitationStore.now, [0.0]
-    monkeypatch.setattr(InvitationStore, "now", lambda store: now(store) + passed[-1])
+    now, passed = StoredClock.now, [0.0]
+    monkeypatch.setattr(StoredClock, "now", lambda clock: now(clock) + passed[-1])
     return lambda: passed.append(1.1 * HOUR)
 
 

@@ -13,8 +13,9 @@ from lockstep.protocol.actions import Act, ActionCancel, ActionReason, ActionSta
 from lockstep.protocol.console import decode_client_message
 from lockstep.protocol.description import Action, RobotDescription
 from lockstep.protocol.errors import MessageError
-from lockstep.server.actions import action_service
+from lockstep.server.actions import action_requests, action_service
 from lockstep.server.actions.action_service import ActionService
+from lockstep.server.actions.action_states import KEPT
 from lockstep.server.audit.records import Actor
 from lockstep.server.errors import (
     ActionIdUsed,
@@ -118,13 +119,6 @@ def test_a_newcomer_is_told_how_long_ago_an_action_ended(monkeypatch: pytest.Mon
     assert [(each.id, each.age) for each in bench.service.newest()] == [("old", 55.0), ("a", 5.0), ("b", 0.0)]
     told = [each.update for each in bench.published if isinstance(each, ActionUpdated)]
     assert [(each.id, each.age) for each in told] == [("old", 40.0), ("a", 0.0), ("b", 0.0), ("a", 0.0)]
-
-
-def test_ends_that_nobody_is_told_of_are_not_kept() -> None:
-    bench = Bench()
-    for number in range(1000):
-        bench.service.updated(update(str(number), "done"))
-    assert len(bench.service._since) == len(bench.service.newest()) <= action_service.KEPT
 
 
 def test_the_holders_request_goes_to_the_robot_under_the_holders_name() -> None:
@@ -308,7 +302,7 @@ async def test_over_http_a_repeated_id_gets_the_newest_of_its_action_even_when_n
     bench.service.updated(update("mine", moves=False))
     assert (await asking).state == "running"
     bench.service.updated(update("mine", "done", moves=False))
-    for number in range(action_service.KEPT):
+    for number in range(KEPT):
         bench.service.updated(update(f"n{number}", "done"))
     assert "mine" not in {each.id for each in bench.service.newest()}
     assert (await by_http(bench, id="mine")).state == "done"
@@ -386,7 +380,7 @@ async def test_over_http_the_robots_first_answer_is_returned() -> None:
 async def test_over_http_what_cannot_be_done_is_refused_by_name(
     name: str, up: bool, error: type[ConsoleError], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(action_service, "ANSWER_SECONDS", 0.01)
+    monkeypatch.setattr(action_requests, "ANSWER_SECONDS", 0.01)
     bench = Bench()
     bench.robot.up = up
     with pytest.raises(error):
@@ -394,7 +388,7 @@ async def test_over_http_what_cannot_be_done_is_refused_by_name(
 
 
 async def test_over_http_a_flood_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(action_service, "ANSWER_SECONDS", 0.0)
+    monkeypatch.setattr(action_requests, "ANSWER_SECONDS", 0.0)
     bench = Bench()
     raised = []
     for _ in range(15):

@@ -8,8 +8,9 @@ import pytest
 import structlog
 
 from lockstep.server.auth import invitation_store
-from lockstep.server.auth.invitation_store import ELSEWHERE, FILE, InvitationStore
+from lockstep.server.auth.invitation_store import FILE, InvitationStore
 from lockstep.server.auth.invitations import Invitation, Invitations
+from lockstep.server.auth.revoked_elsewhere import ELSEWHERE
 from lockstep.server.auth.tokens import Identity
 from lockstep.server.errors import LinkExpired, LinkRevoked
 from lockstep.server.util.state_dir import StateDamaged, StateDir, StateDirUnusable
@@ -135,17 +136,6 @@ def test_what_was_invited_here_with_a_link_that_is_revoked_elsewhere_ends_with_i
     assert store.keep_revoked_elsewhere() == []
 
 
-def test_links_revoked_elsewhere_are_forgotten_when_they_would_have_ended_and_never_too_many(
-    directory: StateDir, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("lockstep.server.auth.invitation_store.MAX_ELSEWHERE", 2)
-    store = InvitationStore(directory)
-    now = time.time()
-    store.revoked_elsewhere({"past": now - 1, "soon": now + 10, "later": now + 20})
-    store.keep_revoked_elsewhere()
-    assert InvitationStore(directory).revoked_links().keys() == {"soon", "later"}
-
-
 def test_a_damaged_list_of_links_revoked_elsewhere_stops_the_start(directory: StateDir) -> None:
     directory.write(ELSEWHERE, b'{"revoked": [')
     with pytest.raises(StateDamaged):
@@ -171,7 +161,7 @@ class _Wall:
     def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
         self.ahead = 0.0
         true = time.time
-        monkeypatch.setattr("lockstep.server.auth.invitation_store.time.time", lambda: true() + self.ahead)
+        monkeypatch.setattr("lockstep.server.auth.stored_clock.time.time", lambda: true() + self.ahead)
 
 
 YEAR = 365 * 24 * HOUR
@@ -190,7 +180,7 @@ def test_a_start_with_a_clock_ahead_and_then_right_again_revives_no_revoked_link
     assert made.id not in {each.id for each in wrong.known.all}, "it has ended for so long that it is forgotten"
     wall.ahead = 0.0
     again = InvitationStore(directory)
-    assert again.is_revoked(made.id) or again.now() > made.expires
+    assert again.is_revoked(made.id) or again.clock.now() > made.expires
     with pytest.raises((LinkExpired, LinkRevoked)):
         again.check(made.identity, again.known)
 
@@ -207,9 +197,9 @@ def test_a_clock_that_goes_back_revives_no_expired_link(directory: StateDir, mon
         store.check(made.identity, store.known)
     store.keep_time()
     again = InvitationStore(directory)
-    assert again.now() > made.expires, "over a restart neither"
-    fresh = again.update(lambda known: known.invite(None, "observer", "Bob", HOUR, again.now()))
-    assert fresh.is_good(again.now()), "links can still be given"
+    assert again.clock.now() > made.expires, "over a restart neither"
+    fresh = again.update(lambda known: known.invite(None, "observer", "Bob", HOUR, again.clock.now()))
+    assert fresh.is_good(again.clock.now()), "links can still be given"
 
 
 def test_links_revoked_elsewhere_stay_revoked_whatever_a_clock_says(
@@ -225,7 +215,7 @@ def test_links_revoked_elsewhere_stay_revoked_whatever_a_clock_says(
     InvitationStore(directory).keep_revoked_elsewhere()
     wall.ahead = 0.0
     again = InvitationStore(directory)
-    assert again.is_revoked("far") or again.now() > end
+    assert again.is_revoked("far") or again.clock.now() > end
 
 
 def test_whoever_was_revoked_while_their_request_waited_changes_nothing(directory: StateDir) -> None:
@@ -261,8 +251,8 @@ def test_of_two_processes_the_later_time_is_kept(directory: StateDir, monkeypatc
     store.keep_time()
     wall.ahead = 0.0
     other.keep_time()
-    assert other.now() > time.time() + YEAR - HOUR
-    assert InvitationStore(directory).now() > time.time() + YEAR - HOUR
+    assert other.clock.now() > time.time() + YEAR - HOUR
+    assert InvitationStore(directory).clock.now() > time.time() + YEAR - HOUR
 
 
 def _trouble(store: InvitationStore) -> str:
@@ -315,8 +305,8 @@ def test_a_link_that_was_revoked_while_the_disk_was_full_stays_revoked_after_a_c
         store.end_at_once(boss, made.id)
         with pytest.raises(StateDirUnusable):
             store.update(lambda known: known.revoke(boss, made.id, time.time()))
-        store.write_later(made.id)
-        store.note_ended()
+        store.unwritten.add(made.id)
+        store.unwritten.note()
         beside.refresh()
         assert beside.is_revoked(below.id), "a console that runs hears of what a command beside it has noted"
         fresh = InvitationStore(directory)
@@ -325,14 +315,3 @@ def test_a_link_that_was_revoked_while_the_disk_was_full_stays_revoked_after_a_c
     assert {each.id for each in fresh.keep_ended()} == {made.id, below.id}
     assert InvitationStore(directory).known.revoked() == {made.id, below.id}
     assert not InvitationStore(directory).unwritten, "what was set aside is free again"
-
-
-def test_more_than_was_set_aside_for_revocations_is_not_said_to_be_noted(directory: StateDir) -> None:
-    store = InvitationStore(directory)
-    with pytest.raises(StateDirUnusable):
-        store.note_ended()  # nothing was set aside yet
-    store.keep_time()
-    for number in range(300):
-        store.write_later(f"{number:016x}")
-    with pytest.raises(StateDirUnusable, match="too many"):
-        store.note_ended()

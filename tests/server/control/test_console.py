@@ -1,6 +1,7 @@
 """What cannot be brought about from outside: faults of our own, a robot that contradicts itself."""
 
 import asyncio
+from contextlib import AsyncExitStack
 from pathlib import Path
 from typing import cast
 
@@ -124,6 +125,8 @@ async def test_stop_seat_and_commands_need_no_subscriber_and_survive_subscribers
         console.peers.admit(made)
         return made
 
+    running = AsyncExitStack()
+    await running.enter_async_context(console.peers.running())
     ann, bob, issues = peer("ann"), peer("bob"), list[int]()
 
     def command(by: Peer, event: int, value: float) -> list[LinkMessage]:
@@ -157,7 +160,7 @@ async def test_stop_seat_and_commands_need_no_subscriber_and_survive_subscribers
     sent.clear()
     ann.end("gone")
     assert (console.seat.rules.holder, [type(each) for each in sent]) == ("", [Rest])
-    await console.peers.close()
+    await running.aclose()
     assert (sum(_faults(metrics)) > 0) == subscribers_fail
 
 

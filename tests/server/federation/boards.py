@@ -11,7 +11,7 @@ from lockstep.server.auth.invitations import Invitation
 from lockstep.server.federation.board import StopAnswer
 from lockstep.server.federation.envelope import Seal
 from lockstep.server.federation.metrics import BoardMetrics
-from lockstep.server.federation.redis_board import RedisBoard
+from lockstep.server.federation.redis.redis_board import RedisBoard
 from lockstep.server.federation.robot_summary import Tile
 from lockstep.server.stop.stop_presses import Press
 

@@ -111,10 +111,10 @@ async def test_one_link_cannot_take_all_places_by_way_of_several_robots() -> Non
         robots = cycle([rig.session("left").console.peers, rig.session("right").console.peers])
         with ExitStack() as places:
             for _ in range(6):
-                places.enter_context(next(robots).place(link))
+                places.enter_context(next(robots).places.keep(link))
             with pytest.raises(TooManyPeers, match="this link has all of its 6"):
-                places.enter_context(next(robots).place(link))
-            places.enter_context(next(robots).place(link._replace(token_id="y")))
+                places.enter_context(next(robots).places.keep(link))
+            places.enter_context(next(robots).places.keep(link._replace(token_id="y")))
 
 
 async def test_a_thumbnail_is_counted_and_takes_part_in_nothing() -> None:
@@ -134,7 +134,7 @@ async def test_a_thumbnail_is_counted_and_takes_part_in_nothing() -> None:
             assert refused.json()["error"] == "too_many_peers"
             small.send("stop", Stop(by="", reason="seen"))
             assert (await peer.feedback(lambda each: each.stop.stopped)).stop.reason == "seen"
-        await eventually(lambda: rig.session("left").console.peers.thumbnails == 0)
+        await eventually(lambda: not any(each.thumbnail for each in rig.session("left").console.peers))
         joined = [each.role for each in rig.session("left").audit.tail if each.kind in ("joined", "left")]
         assert joined == ["operator"]
 

@@ -171,7 +171,7 @@ async def _stops_get_through(rig: Rig, url: str, token: dict[str, str]) -> None:
             answer = await http.post(f"{url}/api/stop", headers=token, json={"reason": "a person"})
         assert answer.status_code == 200, answer.text
     assert len(rig.app.state.connection_places) <= PLACES
-    assert rig.dependencies.console.peers.taken == 0
+    assert rig.dependencies.console.peers.places.taken == 0
 
 
 @pytest.mark.parametrize("kind", FLOODS)

@@ -330,7 +330,7 @@ async def test_whoever_has_ended_is_told_nothing_more_while_the_connection_close
         await _id(peer)
         (there,) = rig.webrtc_peers
         there.end("link revoked")
-        rig.dependencies.console.peers.tell("session", Notice(level="info", text="for those who are here"))
+        rig.dependencies.console.peers.announce(Notice(level="info", text="for those who are here"))
         there.send_feedback('{"type": "pong", "id": 77}')
         async with asyncio.timeout(PATIENCE):
             await peer.closed.wait()

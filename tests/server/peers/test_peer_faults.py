@@ -5,6 +5,7 @@ import traceback
 from collections.abc import AsyncIterator, Callable
 from contextlib import AsyncExitStack, asynccontextmanager
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any, NoReturn, cast
 
 import pytest
@@ -84,7 +85,7 @@ async def _raise_later(*_: object, **__: object) -> NoReturn:
 
 
 def _delivery(peer: Peer) -> Any:
-    return cast(Any, peer)._media.deliveries[0]
+    return cast(Any, peer).media.deliveries[0]
 
 
 def _connection(peer: Peer) -> Any:
@@ -153,11 +154,12 @@ def _flushing(rig: Rig, peer: Peer, patch: pytest.MonkeyPatch) -> None:
 
 
 def _showing(rig: Rig, peer: Peer, patch: pytest.MonkeyPatch) -> None:
-    patch.setattr(peer, "participant", _raise)
+    streams = [SimpleNamespace(carrier="trailer")]
+    patch.setattr(peer, "media", SimpleNamespace(streams=streams, close=peer.media.close))
 
 
 def _closing_media(rig: Rig, peer: Peer, patch: pytest.MonkeyPatch) -> None:
-    patch.setattr(cast(Any, peer)._media, "close", _raise_later)
+    patch.setattr(cast(Any, peer).media, "close", _raise_later)
     peer.end("the test ends it")
 
 
@@ -239,7 +241,7 @@ async def _gone(rig: Rig, peer: Peer) -> None:
 
 async def _everything_is_given_back(rig: Rig, others: list[_Viewer]) -> None:
     await eventually(lambda: len(rig.dependencies.console.peers) == len(others))
-    assert rig.dependencies.console.peers.taken == len(others)
+    assert rig.dependencies.console.peers.places.taken == len(others)
     assert rig.dependencies.context.endpoint.connections == len(others)
     for other in others:
         await other.goes_on()

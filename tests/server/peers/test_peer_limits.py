@@ -125,7 +125,7 @@ async def test_one_link_cannot_take_all_places_and_leaves_a_supervisor_one() -> 
             """So many places it gets."""
             for number in range(30):
                 try:
-                    places.enter_context(peers.place(identity))
+                    places.enter_context(peers.places.keep(identity))
                 except TooManyPeers:
                     return number
             return 30
@@ -134,7 +134,7 @@ async def test_one_link_cannot_take_all_places_and_leaves_a_supervisor_one() -> 
             roles: list[Role] = ["observer", "observer", "operator", "operator", "supervisor"]
             got = [taken_by(Identity(role, role, f"link {number}", end), places) for number, role in enumerate(roles)]
             assert got == [12, 4, 2, 1, 1]
-        assert peers.taken == 0
+        assert peers.places.taken == 0
 
 
 async def test_offers_of_one_link_are_limited() -> None:

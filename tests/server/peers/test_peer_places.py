@@ -1,10 +1,17 @@
+"""Who gets a place, over all roles and links."""
+
+from contextlib import ExitStack
+from types import SimpleNamespace
+from typing import Any
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from lockstep.protocol.console import Role
-from lockstep.server.errors import TooManyPeers
-from lockstep.server.peers.peer_places import RESERVED_FOR_LINK, check_place
+from lockstep.server.auth.tokens import Identity
+from lockstep.server.errors import ShuttingDown, TooManyPeers, TooManyRequests
+from lockstep.server.peers.peer_places import RESERVED_FOR_LINK, PeerPlaces, check_place
 
 BOUND, RESERVED = 20, 4
 
@@ -57,3 +64,48 @@ def test_never_more_than_there_are(role: Role, bound: int, reserved: int, taken:
     except TooManyPeers:
         return
     assert taken < bound
+
+
+LIMITS: Any = SimpleNamespace(max_peers=4, max_relayed=8, reserved_places=1, max_unconnected=2, max_thumbnails=2)
+ANN, BOB = (Identity("observer", name, name, 1e12) for name in ("ann", "bob"))
+
+
+def _peer(identity: Identity, *, relay: str = "", connected: bool = True) -> Any:
+    return SimpleNamespace(
+        identity=identity, relay=relay, thumbnail=False, liveness=SimpleNamespace(connected=connected)
+    )
+
+
+def test_a_place_is_taken_by_peers_and_by_those_that_are_being_negotiated_but_not_by_those_of_a_relay() -> None:
+    peers = [_peer(ANN), _peer(ANN, relay="0")]
+    places = PeerPlaces(LIMITS, peers)
+    with places.keep(ANN):
+        assert (places.taken, places.taken_by("ann"), places.taken_by("bob")) == (2, 2, 0)
+        with places.keep(BOB), pytest.raises(TooManyPeers), places.keep(BOB):
+            raise AssertionError
+    assert (places.taken, places.taken_by("ann")) == (1, 1)
+
+
+def test_peers_of_a_link_that_have_not_connected_and_further_bounds_refuse_one_more() -> None:
+    def full(identity: Identity) -> None:
+        raise TooManyPeers("elsewhere")
+
+    peers = [_peer(ANN, connected=False)]
+    with ExitStack() as kept:
+        places = PeerPlaces(LIMITS, peers)
+        kept.enter_context(places.keep(ANN))
+        with pytest.raises(TooManyRequests), places.keep(ANN):
+            raise AssertionError
+        kept.enter_context(places.keep(BOB))
+    bounded = PeerPlaces(LIMITS, [], [full])
+    with pytest.raises(TooManyPeers, match="elsewhere"), bounded.keep(ANN):
+        raise AssertionError
+    with bounded.keep(ANN, relayed=True):
+        pass
+
+
+def test_no_place_is_given_once_they_are_closed() -> None:
+    places = PeerPlaces(LIMITS, [])
+    places.close()
+    with pytest.raises(ShuttingDown), places.keep(ANN):
+        raise AssertionError

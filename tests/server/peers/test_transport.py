@@ -5,7 +5,7 @@ from typing import Any
 
 from lockstep.protocol.messages import Pong, Stop
 from lockstep.server.auth.tokens import Identity
-from lockstep.server.errors import ChannelError
+from lockstep.server.errors import ChannelError, TransportRefused
 from lockstep.server.peers.channels import ChannelName
 from lockstep.server.peers.peer import Peer
 from lockstep.server.peers.transport import Transport, TransportEvents
@@ -113,7 +113,7 @@ async def test_a_transport_that_raises_ends_its_peer_alone_and_the_caller_sees_n
 
 async def test_what_no_transport_can_hold_is_counted_and_ends_the_peer() -> None:
     peer, host = _peer(_Transport())
-    peer.overloaded("too_large")
+    peer.refused("transport", TransportRefused("too_large"))
     assert peer.ended == "too much"
     assert [name for name, _ in host.told] == ["transport", "ended"]
 
@@ -129,8 +129,8 @@ async def test_its_transport_is_closed_once_it_has_ended_and_who_waits_for_that_
     peer, _ = _peer(transport)
     async with asyncio.timeout(PATIENCE), asyncio.TaskGroup() as tasks:
         tasks.create_task(peer.run())
-        waiting = tasks.create_task(peer.until_ended())
-        peer.connection_made()
+        waiting = tasks.create_task(peer.liveness.until_ended())
+        peer.liveness.connect()
         peer.end("link revoked")
         await waiting
     assert transport.closed == 1

@@ -334,15 +334,17 @@ async def test_an_expired_link_invites_nobody_though_its_request_began_before(
 async def test_a_console_writes_down_that_a_link_has_expired(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("lockstep.server.state.console_context.CHECK_SECONDS", 0.05)
     store = InvitationStore(StateDir(tmp_path))
-    soon = store.update(lambda known: known.invite(None, "observer", "x", MIN_SECONDS, store.now() - MIN_SECONDS + 2.0))
+    soon = store.update(
+        lambda known: known.invite(None, "observer", "x", MIN_SECONDS, store.clock.now() - MIN_SECONDS + 2.0)
+    )
     async with running_console(NOWHERE, state_dir=tmp_path):
         wrong = time.time() - 3600
 
         def next_run() -> float:
             """What time a console takes it for whose clock has gone back meanwhile."""
             with pytest.MonkeyPatch.context() as patch:
-                patch.setattr("lockstep.server.auth.invitation_store.time.time", lambda: wrong)
-                return InvitationStore(StateDir(tmp_path)).now()
+                patch.setattr("lockstep.server.auth.stored_clock.time.time", lambda: wrong)
+                return InvitationStore(StateDir(tmp_path)).clock.now()
 
         assert next_run() < soon.expires, "its end is not there yet"
         await eventually(lambda: next_run() >= soon.expires)

@@ -261,11 +261,11 @@ async def test_a_remote_that_does_not_read_is_closed_and_costs_the_others_nothin
             deaf.transport.pause_reading()
             console = rig.dependencies.console
             peer = next(each for each in console.peers if each.identity.token_id != _token_of(reader, rig))
-            await eventually(lambda: peer.connected)
+            await eventually(lambda: peer.liveness.connected)
             async with asyncio.TaskGroup() as tasks:
                 tasks.create_task(reader.until(lambda each: each == Pong(id=3)))  # it reads all the time
                 for number in range(4000):
-                    console.peers.tell("session", _note(number))
+                    console.peers.announce(_note(number))
                     await asyncio.sleep(0)
                 await eventually(lambda: rig.count("lockstep_peers_ended_total", why="does not read") == 1)
                 assert rig.count("lockstep_dropped_total", queue="channel") > 0

@@ -26,7 +26,7 @@ async def test_an_observer_is_served_directly_when_no_relay_can_be_reached() -> 
     async with running_rig(relay=NOWHERE, observers_direct=0) as rig:
         answer = await rig.http.get("/api/relay", headers=rig.token("observer"), timeout=WAIT_SECONDS + 10)
         assert answer.json() == {"relay": None}
-        station = rig.dependencies.relays.stations[0]
+        station = next(iter(rig.dependencies.relays.servers))
         assert station.trouble.startswith("unreachable")
 
 

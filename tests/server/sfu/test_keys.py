@@ -9,6 +9,7 @@ import pytest
 from lockstep.server.auth.tokens import Identity
 from lockstep.server.sfu import coordinator
 from lockstep.server.sfu.coordinator import SfuCoordinator
+from lockstep.server.sfu.key_holders import RENEW_SECONDS, STRAY_SECONDS
 from lockstep.server.sfu.publication import Publication
 from lockstep.server.sfu.settings import RelaySettings
 from lockstep.server.sfu.sfu_server import SfuServer
@@ -57,7 +58,7 @@ class _Hall:
     async def another(self, known: Publication) -> Publication:
         """The publication that follows."""
         async with asyncio.timeout(20):
-            while self.relays.carrying.get("0", known) is known or not self.coordinator.stations[0].live:  # noqa: ASYNC110
+            while self.relays.carrying.get("0", known) is known or not next(iter(self.coordinator.servers)).live:  # noqa: ASYNC110
                 await asyncio.sleep(0)
         return self.relays.carrying["0"]
 
@@ -134,15 +135,15 @@ async def test_who_keeps_the_key_and_leaves_is_shut_out_after_a_while_and_not_ev
         watcher = hall.watch("mallory")
         hall.coordinator.key(watcher)
         hall.here.remove(watcher)
-        hall.now += coordinator.STRAY_SECONDS + 1
+        hall.now += STRAY_SECONDS + 1
         for _ in range(5):
             await asyncio.sleep(coordinator.LOOK_SECONDS)
         assert not first.ended.is_set(), "for one who leaves nobody is disturbed at once"
-        hall.now += coordinator.RENEW_SECONDS
+        hall.now += RENEW_SECONDS
         second = await hall.another(first)
         assert first.why == coordinator.STRAY
         hall.coordinator.key(hall.here[0])
-        hall.now += coordinator.RENEW_SECONDS + coordinator.STRAY_SECONDS
+        hall.now += RENEW_SECONDS + STRAY_SECONDS
         for _ in range(5):
             await asyncio.sleep(coordinator.LOOK_SECONDS)
         assert not second.ended.is_set(), "who has a line to the console is no stray"

@@ -42,7 +42,7 @@ async def test_it_waits_behind_the_crowd_on_its_channel_and_for_nobody_over_http
         rounds = (sum(each.handled for each in crowd) - before) / CROWD
         assert (answer.status_code, answer.json()["press"]) == (200, PRESS)
         assert rounds < 1, "it did not even wait for each of them once"
-        assert rig.dependencies.console.peers.taken == 1
+        assert rig.dependencies.console.peers.places.taken == 1
         for each in crowd:
             each.goes_on = False
         async with asyncio.timeout(PATIENCE):

@@ -7,9 +7,7 @@ right to ask, and cancels whatever moves the robot when the control seat changes
 import asyncio
 import secrets
 import time
-from collections import OrderedDict
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from typing import Protocol
 
 import msgspec
@@ -18,8 +16,10 @@ from lockstep.protocol.actions import Act, ActionCancel, ActionReason, ActionUpd
 from lockstep.protocol.console import PEOPLE
 from lockstep.protocol.description import RobotDescription
 from lockstep.rtc.token_bucket import TokenBucket
+from lockstep.server.actions.action_requests import ActionAnswer, ActionRequests, answered
+from lockstep.server.actions.action_states import ActionStates
 from lockstep.server.audit.records import Actor
-from lockstep.server.errors import ActionIdUsed, LinkDown, NotFound, NotRenewable, TooManyRequests, Unconfirmed
+from lockstep.server.errors import LinkDown, NotFound, NotRenewable, TooManyRequests
 from lockstep.server.event_clock import EventClock
 from lockstep.server.peers.peer import Peer
 from lockstep.server.session_events import (
@@ -37,9 +37,6 @@ __all__ = ["ActionService"]
 ASKS, ASK_RATE = 10, 5.0  # Hz, of one link
 UPDATES, UPDATE_RATE = 100, 50.0  # Hz, of the robot; further updates of progress alone are left out
 STATES, STATE_RATE = 200, 20.0  # Hz, of the robot; of further new states each action's newest is told later
-KEPT = 32  # newest actions whose state newcomers are told
-REMEMBERED = 256  # newest requests, as many as the bridge remembers
-ANSWER_SECONDS = 1.0  # for the robot to answer a request over HTTP
 
 
 class ActionsLink(Protocol):
@@ -52,17 +49,6 @@ class ActionsLink(Protocol):
     @property
     def description(self) -> RobotDescription | None: ...
     def send(self, message: Act | ActionCancel) -> bool: ...
-
-
-@dataclass(slots=True)
-class _Asked:
-    """A request that was passed on."""
-
-    name: str
-    parameters: Mapping[str, ParameterValue]
-    # The first update, or None if the bridge ended without one. None: it came on a data channel.
-    answer: asyncio.Future[ActionUpdate | None] | None
-    newest: ActionUpdate | None = None
 
 
 class ActionService:
@@ -85,23 +71,13 @@ class ActionService:
         self._asks = RateLimits(ASK_RATE, ASKS)
         self._progress = TokenBucket(UPDATE_RATE, UPDATES)
         self._states = TokenBucket(STATE_RATE, STATES)
-        # By id of the request, oldest first; without their age, which changes.
-        self._updates: OrderedDict[str, ActionUpdate] = OrderedDict()
-        self._since: dict[str, float] = {}  # of the same ids: s, when the action came to its state
-        self._owed: dict[str, None] = {}  # ids in `_updates` of which a new state came too fast and is told later
+        self._kept = ActionStates()
         self._is_owing = asyncio.Event()
-        self._asked: OrderedDict[str, _Asked] = OrderedDict()  # by id of the request, oldest first
+        self._requests = ActionRequests()
 
     def newest(self) -> list[ActionUpdate]:
         """Return how the newest actions do, oldest first, with the age of each that has ended."""
-        now = time.monotonic()
-        return [self._aged(each, now) for each in self._updates.values()]
-
-    def _aged(self, update: ActionUpdate, now: float) -> ActionUpdate:
-        """Return an update that was kept with its age as of now."""
-        if update.state == "running":
-            return update
-        return msgspec.structs.replace(update, age=max(0.0, now - self._since[update.id]))
+        return self._kept.newest(time.monotonic())
 
     def act_by_peer(self, peer: Peer, act: Act) -> None:
         """Pass on a request of the seat's holder; refuse that of anyone else."""
@@ -129,14 +105,11 @@ class ActionService:
             return "too_often"
         return None if self._send(msgspec.structs.replace(act, by=peer.name), peer.actor) else "link_down"
 
-    def _send(self, act: Act, by: Actor, answer: asyncio.Future[ActionUpdate | None] | None = None) -> bool:
+    def _send(self, act: Act, by: Actor, answer: ActionAnswer | None = None) -> bool:
         if not self._robot.up or not self._robot.send(act):
             return False
-        if act.id not in self._asked:
-            self._asked[act.id] = _Asked(act.name, act.parameters, answer)
-            if len(self._asked) > REMEMBERED:
-                self._asked.popitem(last=False)
-        if act.id not in self._updates:
+        self._requests.add(act, answer)
+        if self._kept.get(act.id) is None:
             self._events.publish(ActionAsked(by, act))
         return True
 
@@ -157,9 +130,9 @@ class ActionService:
             TooManyRequests: of this link.
             LinkDown, Unconfirmed: the robot cannot be asked, or has not answered.
         """
-        if id in self._asked or id in self._updates:
+        if id in self._requests or self._kept.get(id) is not None:
             self._spend(by)
-            return await self._again(id, name, parameters)
+            return await self._requests.again(id, name, parameters)
         description, feedback = self._robot.description, self._clock.feedback
         if description is None or feedback is None or not self._robot.up:
             raise LinkDown(self._robot.detail)
@@ -169,7 +142,7 @@ class ActionService:
         if action.moves:
             raise NotRenewable(f"{name} moves the robot: it needs armed events on the control channel")
         self._spend(by)
-        answer: asyncio.Future[ActionUpdate | None] = asyncio.get_running_loop().create_future()
+        answer: ActionAnswer = asyncio.get_running_loop().create_future()
         act = Act(
             id=id or secrets.token_hex(16),
             name=name,
@@ -179,18 +152,11 @@ class ActionService:
         )
         if not self._send(act, by, answer):
             raise LinkDown(self._robot.detail)
-        return await _answered(answer)
+        return await answered(answer)
 
     def _spend(self, by: Actor) -> None:
         if not self._asks.spend(by.link or by.name, time.monotonic()):
             raise TooManyRequests("at most five actions a second")
-
-    async def _again(self, id: str, name: str, parameters: Mapping[str, ParameterValue]) -> ActionUpdate:
-        """Answer a repeated request from memory."""
-        asked = self._asked.get(id)
-        if asked is None or asked.answer is None or (asked.name, asked.parameters) != (name, parameters):
-            raise ActionIdUsed("an earlier request with this id asked for something else, or on another way")
-        return await _answered(asked.answer) if asked.newest is None else asked.newest
 
     def act_by_console(self, act: Act) -> bool:
         """Ask for an action that moves nothing, for the console itself. False: there is no link to the robot."""
@@ -211,59 +177,40 @@ class ActionService:
 
     def renews(self, id: str) -> bool:
         """True if a command that names `id` lets an action go on that moves the robot."""
-        update = self._updates.get(id)
+        update = self._kept.get(id)
         return update is not None and update.moves and update.state == "running"
 
     def updated(self, update: ActionUpdate) -> None:
         """Take the robot's news of an action."""
-        now, before, asked = time.monotonic(), self._updates.get(update.id), self._asked.get(update.id)
+        now, before = time.monotonic(), self._kept.get(update.id)
         if msgspec.structs.replace(update, age=0.0) == before:
             return
-        if asked is not None:
-            asked.newest = update
-            if asked.answer is not None and not asked.answer.done():
-                asked.answer.set_result(update)
+        self._requests.updated(update)
         if before is not None and before.state == update.state:
-            if update.id in self._owed:
-                self._keep(update, now)
+            if self._kept.owes(update.id):
+                self._kept.keep(update, now)
             elif self._progress.take(now):
-                self._keep(update, now)
+                self._kept.keep(update, now)
                 self._events.publish(ActionUpdated(update, new_state=False))
-        elif not self._owed and self._states.take(now):
-            self._keep(update, now)
+        elif not self._kept.is_owing and self._states.take(now):
+            self._kept.keep(update, now)
             self._events.publish(ActionUpdated(update, new_state=True))
         else:
             self._events.publish(InputRefused("robot", "too_many_action_states"))
-            if before is not None or asked is not None:  # else it is one that nobody here has asked for
-                self._keep(update, now)
-                self._owed[update.id] = None
+            if before is not None or update.id in self._requests:  # else it is one that nobody here has asked for
+                self._kept.owe(update, now)
                 self._is_owing.set()
-
-    def _keep(self, update: ActionUpdate, now: float) -> None:
-        before = self._updates.get(update.id)
-        if before is None or before.state != update.state:
-            self._since[update.id] = now - update.age
-        self._updates[update.id] = msgspec.structs.replace(update, age=0.0)
-        if len(self._updates) > KEPT:
-            told = (id for id, each in self._updates.items() if each.state != "running" and id not in self._owed)
-            evicted = next(told, next(iter(self._updates)))
-            del self._updates[evicted], self._since[evicted]
-            self._owed.pop(evicted, None)
 
     async def run(self) -> None:
         """Tell the states that came too fast, the newest of each action, until cancelled."""
         while True:
             await self._is_owing.wait()
             await asyncio.sleep(self._states.wait(time.monotonic()))
-            self._tell_owed(time.monotonic())
-
-    def _tell_owed(self, now: float) -> None:
-        while self._owed and self._states.take(now):
-            id = next(iter(self._owed))
-            del self._owed[id]
-            self._events.publish(ActionUpdated(self._aged(self._updates[id], now), new_state=True))
-        if not self._owed:
-            self._is_owing.clear()
+            now = time.monotonic()
+            while self._kept.is_owing and self._states.take(now):
+                self._events.publish(ActionUpdated(self._kept.take_owed(now), new_state=True))
+            if not self._kept.is_owing:
+                self._is_owing.clear()
 
     def link_down(self) -> None:
         """Note what the bridge does without this link: it cancels the action that moves the robot."""
@@ -273,21 +220,5 @@ class ActionService:
 
     def epoch_ends(self) -> None:
         """Forget all actions and requests: the bridge that did them has ended, and the next one knows none of them."""
-        for asked in self._asked.values():
-            if asked.answer is not None and not asked.answer.done():
-                asked.answer.set_result(None)
-        self._asked.clear()
-        self._updates.clear()
-        self._since.clear()
-        self._owed.clear()
-
-
-async def _answered(answer: asyncio.Future[ActionUpdate | None]) -> ActionUpdate:
-    try:
-        async with asyncio.timeout(ANSWER_SECONDS):
-            update = await asyncio.shield(answer)  # a repeat of the request waits for the same answer
-    except TimeoutError:
-        raise Unconfirmed("the robot has not answered yet; GET /api/actions shows whether it does") from None
-    if update is None:
-        raise Unconfirmed("the robot bridge ended before it answered")
-    return update
+        self._requests.clear()
+        self._kept.clear()

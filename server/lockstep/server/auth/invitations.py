@@ -16,7 +16,8 @@ from typing import Annotated
 import msgspec
 
 from lockstep.protocol.console import Role
-from lockstep.server.auth.tokens import MAX_ROBOTS, Identity
+from lockstep.server.auth.token_signer import MAX_ROBOTS
+from lockstep.server.auth.tokens import Identity
 from lockstep.server.errors import BadParameter, NotAllowed, NotFound, TooManyInvitations
 from lockstep.server.util.display_names import clean_name
 from lockstep.server.util.robot_names import BadFleet, check_robot_name

@@ -1,16 +1,15 @@
-"""Access tokens: signed (JWT, HS256, RFC 7519), with a role, a name, an id and an expiry time."""
+"""Access tokens: signed, with a role, a name, an id and an expiry time."""
 
 import math
 import secrets
 import time
 from collections.abc import Callable
-from typing import Annotated, Any, Literal, NamedTuple, Protocol, Self, TypeVar
-
-import jwt
-import msgspec
+from copy import copy
+from typing import NamedTuple, Protocol, Self
 
 from lockstep.protocol.console import Role
 from lockstep.server.audit.records import Actor
+from lockstep.server.auth.token_signer import INVALID, FileClaims, LinkClaims, TicketClaims, TokenSigner
 from lockstep.server.errors import (
     LinkExpired,
     LinkOtherRobot,
@@ -22,23 +21,14 @@ from lockstep.server.errors import (
 )
 
 __all__ = [
-    "MAX_ROBOTS",
     "Access",
     "HasRole",
     "Identity",
     "Right",
-    "RobotName",
     "SceneTicket",
     "bearer_token",
     "require_role",
 ]
-
-ALGORITHM = "HS256"
-MAX_TOKEN = 4096  # characters; the console's have about 200, and 40 more for each robot that they name
-MAX_ROBOTS = 32  # robots that one link may name
-INVALID = "the token is not valid"
-
-RobotName = Annotated[str, msgspec.Meta(max_length=32)]
 
 
 class Identity(NamedTuple):
@@ -109,50 +99,44 @@ class SceneTicket(NamedTuple):
     ends: float  # s since 1970: the link's end, which an open scene does not outlive
 
 
-class _LinkClaims(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
-    aud: Literal["lockstep"]
-    exp: float
-    iat: float
-    role: Role
-    name: Annotated[str, msgspec.Meta(max_length=60)]
-    jti: Annotated[str, msgspec.Meta(min_length=1, max_length=64)]
-    robots: Annotated[tuple[RobotName, ...], msgspec.Meta(max_length=MAX_ROBOTS)] = ()
-
-
-class _TicketClaims(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
-    aud: Literal["lockstep-scene"]
-    exp: float
-    ends: float  # when the link it was made for ends
-    role: Role  # of that link
-    name: Annotated[str, msgspec.Meta(max_length=60)]
-    link: Annotated[str, msgspec.Meta(max_length=64)]  # id of that link
-    robot: RobotName = ""  # the one whose scene it opens
-
-
-class _FileClaims(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
-    aud: Literal["lockstep-file"]
-    exp: float
-    ends: float
-    role: Role
-    name: Annotated[str, msgspec.Meta(max_length=60)]
-    link: Annotated[str, msgspec.Meta(max_length=64)]
-    file: Annotated[str, msgspec.Meta(max_length=200)]  # the one recording that it opens
-    robot: RobotName = ""  # the one whose recording it is
-
-
-Claims = TypeVar("Claims", _LinkClaims, _TicketClaims, _FileClaims)
-
-_decoders: dict[type, msgspec.json.Decoder[Any]] = {
-    kind: msgspec.json.Decoder(kind) for kind in (_LinkClaims, _TicketClaims, _FileClaims)
-}
-
-
 def _nothing_revoked(token_id: str) -> bool:
     return False
 
 
 def _no_trouble() -> str:
     return ""
+
+
+class LinkCheck:
+    """Whether links are good now.
+
+    Args:
+        is_revoked: True for the id of a revoked token
+        trouble: the reason while it is unknown which links are revoked, else ""
+        now: s since 1970
+    """
+
+    def __init__(self, is_revoked: Callable[[str], bool], trouble: Callable[[], str], now: Callable[[], float]) -> None:
+        self._is_revoked = is_revoked
+        self._trouble = trouble
+        self.now = now
+
+    def check(self, identity: Identity) -> None:
+        """Raise LinkExpired, LinkRevoked or StateUnavailable if the link of `identity` is no longer good."""
+        self.check_link(identity.token_id, identity.expires)
+        self.check_list()
+
+    def check_link(self, token_id: str, expires: float) -> None:
+        """Check a link by what is known of it, even while revocations are unknown."""
+        if not expires > self.now():  # also when it is not a number
+            raise LinkExpired("this link has expired; ask for a new one")
+        if self._is_revoked(token_id):
+            raise LinkRevoked("this link was revoked")
+
+    def check_list(self) -> None:
+        """Raise StateUnavailable while it is unknown which links are revoked."""
+        if trouble := self._trouble():
+            raise StateUnavailable(f"the console admits no one: it cannot read the list of revoked links: {trouble}")
 
 
 class Access:
@@ -177,27 +161,26 @@ class Access:
         now: Callable[[], float] = time.time,
     ) -> None:
         self._robot = robot
-        self._trouble = trouble
-        self._now = now
-        self._secret = secret
+        self._links = LinkCheck(is_revoked, trouble, now)
+        self._signer = TokenSigner(secret)
         self._token_seconds = token_seconds
         self._ticket_seconds = ticket_seconds
-        self._is_revoked = is_revoked
 
     def at(self, robot: str | None) -> Self:
         """Return the same access control for another robot."""
-        known = (self._is_revoked, robot, self._trouble, self._now)
-        return type(self)(self._secret, self._token_seconds, self._ticket_seconds, *known)
+        other = copy(self)
+        other._robot = robot
+        return other
 
     def issue(self, role: Role, name: str, robots: tuple[str, ...] = ()) -> str:
         """Return a token with a new id, good for as long as the settings say."""
-        now = self._now()
+        now = self._links.now()
         return self.sign(Identity(role, name, secrets.token_hex(8), now + self._token_seconds, robots), now)
 
     def sign(self, identity: Identity, issued: float) -> str:
         """Return the token of `identity`; the same arguments give the same token."""
         role, name, token_id, expires, robots = identity[:5]
-        return self._encode(_LinkClaims("lockstep", expires, issued, role, name, token_id, robots))
+        return self._signer.encode(LinkClaims("lockstep", expires, issued, role, name, token_id, robots))
 
     def verify(self, token: str) -> Identity:
         """Return the holder of `token`.
@@ -209,13 +192,8 @@ class Access:
             StateUnavailable: it is unknown whether it is revoked.
         """
         identity = self._identity(token)
-        self.check(identity)
+        self._links.check(identity)
         return identity
-
-    def check(self, identity: Identity) -> None:
-        """Raise as `verify` does if the link of `identity` is no longer good."""
-        self._check_link(identity.token_id, identity.expires)
-        self._check_list()
 
     def bearer(self, authorization: str | None) -> Right:
         """Return the right that an Authorization header (RFC 6750 2.1) gives.
@@ -224,7 +202,7 @@ class Access:
             TokenMissing: there is no bearer token.
             AccessError, StateUnavailable: as `verify`.
         """
-        right = Right(self._identity(_required_token(authorization)), self.check)
+        right = Right(self._identity(_required_token(authorization)), self._links.check)
         right.identity  # noqa: B018  raises
         return right
 
@@ -232,7 +210,7 @@ class Access:
         """Return the right as `bearer` does, even while revocations are unknown: a stop must not wait for a disk."""
         right = Right(
             self._identity(_required_token(authorization)),
-            lambda identity: self._check_link(identity.token_id, identity.expires),
+            lambda identity: self._links.check_link(identity.token_id, identity.expires),
         )
         right.identity  # noqa: B018  raises
         return right
@@ -242,71 +220,47 @@ class Access:
 
         It may stand in a path: it opens nothing else.
         """
-        return self._encode(_TicketClaims("lockstep-scene", *self._ticket_for(holder), self._own))
+        return self._signer.encode(TicketClaims("lockstep-scene", *self._ticket_for(holder), self._own))
 
     def verify_ticket(self, ticket: str) -> SceneTicket:
         """Return the link that a ticket was made for; raise as `verify` does."""
-        claims = self._decode(ticket, _TicketClaims)
+        claims = self._signer.decode(ticket, TicketClaims)
         self._check_ticket(claims)
         return SceneTicket(claims.link, claims.role, claims.ends)
 
     def issue_file_ticket(self, file: str, holder: Identity) -> str:
         """Issue a short-lived ticket for one recording's download to the holder of a link."""
-        return self._encode(_FileClaims("lockstep-file", *self._ticket_for(holder), file, self._own))
+        return self._signer.encode(FileClaims("lockstep-file", *self._ticket_for(holder), file, self._own))
 
     def verify_file_ticket(self, ticket: str, file: str) -> Right:
         """Return the right of a ticket's link; raise as `verify` does, also if the ticket is for another file."""
-        claims = self._decode(ticket, _FileClaims)
+        claims = self._signer.decode(ticket, FileClaims)
         self._check_ticket(claims)
         if claims.file != file:
             raise TokenInvalid(INVALID)
-        return Right(Identity(claims.role, claims.name, claims.link, claims.ends), self.check)
+        return Right(Identity(claims.role, claims.name, claims.link, claims.ends), self._links.check)
 
     def _identity(self, token: str) -> Identity:
-        claims = self._decode(token, _LinkClaims)
-        self._check_link(claims.jti, claims.exp)
+        claims = self._signer.decode(token, LinkClaims)
+        self._links.check_link(claims.jti, claims.exp)
         identity = Identity(claims.role, claims.name, claims.jti, claims.exp, claims.robots, claims.iat)
         if self._robot is not None and not identity.may_see(self._robot):
             raise LinkOtherRobot("this link does not admit to this robot")
         return identity
 
     def _ticket_for(self, holder: Identity) -> tuple[float, float, Role, str, str]:
-        expires = min(self._now() + self._ticket_seconds, holder.expires)
+        expires = min(self._links.now() + self._ticket_seconds, holder.expires)
         return expires, holder.expires, holder.role, holder.name, holder.token_id
 
-    def _check_ticket(self, claims: _TicketClaims | _FileClaims) -> None:
-        self._check_link(claims.link, min(claims.exp, claims.ends))
-        self._check_list()
+    def _check_ticket(self, claims: TicketClaims | FileClaims) -> None:
+        self._links.check_link(claims.link, min(claims.exp, claims.ends))
+        self._links.check_list()
         if claims.robot != self._own:
             raise TokenInvalid(INVALID)
 
     @property
     def _own(self) -> str:
         return self._robot or ""
-
-    def _check_link(self, token_id: str, expires: float) -> None:
-        if not expires > self._now():  # also when it is not a number
-            raise LinkExpired("this link has expired; ask for a new one")
-        if self._is_revoked(token_id):
-            raise LinkRevoked("this link was revoked")
-
-    def _check_list(self) -> None:
-        if trouble := self._trouble():
-            raise StateUnavailable(f"the console admits no one: it cannot read the list of revoked links: {trouble}")
-
-    def _encode(self, claims: _LinkClaims | _TicketClaims | _FileClaims) -> str:
-        return jwt.encode(msgspec.to_builtins(claims), self._secret, ALGORITHM)
-
-    def _decode(self, token: str, kind: type[Claims]) -> Claims:
-        """Decode the claims strictly: exactly these, of these types. PyJWT only checks the signature."""
-        try:
-            if len(token) > MAX_TOKEN:
-                raise TokenInvalid(INVALID)
-            payload = jwt.api_jws.decode(token, self._secret, algorithms=[ALGORITHM])
-            claims: Claims = _decoders[kind].decode(payload)
-            return claims
-        except (jwt.InvalidTokenError, msgspec.DecodeError, UnicodeError, RecursionError) as error:
-            raise TokenInvalid(INVALID) from error
 
 
 def bearer_token(authorization: str | None) -> str:

@@ -184,16 +184,15 @@ class Console:
                 ("robot", self.robot.run),
             ):
                 tasks.create_task(keep_running(name, run, self._faults))
-            try:
+            async with self.peers.running():
                 await asyncio.Event().wait()
-            finally:
-                await self.peers.close()
 
     # PeerHost
 
     def peer_joined(self, peer: Peer) -> None:
         peer.silenced = self.silence.holds(peer.identity.token_id)
-        peer.drives(False)
+        with peer.contained("media"):
+            peer.media.drives(False)
         self.people.joined(peer)
 
     def channel_opened(self, peer: Peer, channel: ChannelName) -> None:
@@ -203,9 +202,8 @@ class Console:
         elif channel == "stop":
             peer.send("stop", StopStateNotice(stop=self.clock.stop, event=self.clock.event))
         elif channel == "session":
-            peer.send(
-                "session", Welcome(peer=peer.id, role=peer.role, name=peer.name, streams=peer.streams, voice=peer.voice)
-            )
+            streams, voice = peer.media.streams, peer.media.voice
+            peer.send("session", Welcome(peer=peer.id, role=peer.role, name=peer.name, streams=streams, voice=voice))
             if (state := self.robot.state()) is not None:
                 peer.send("session", state)
             peer.send("session", self.seat.message())
@@ -267,7 +265,7 @@ class Console:
             case TraceRequest():
                 self.traces.request(peer, message.wanted)
             case TraceReport() if self.seat.is_held_by(peer):
-                shown = {each.stream for each in peer.streams}
+                shown = {each.stream for each in peer.media.streams}
                 self._events.publish(EventsTraced(peer.actor, self.traces.reported(message, shown, now)))
 
     def input_refused(self, peer: Peer, channel: str, error: ChannelError) -> None:
@@ -411,7 +409,7 @@ class Console:
         outcome = self._arbiter.command(peer.id, command, now)
         if isinstance(outcome, Forward) and not self._forward(outcome, now):
             outcome = Refuse(Refusal(event=0, reason="link_down", current=self.clock.event))
-        if isinstance(outcome, Answer) and not peer.may_be_answered_again():
+        if isinstance(outcome, Answer) and not peer.answers.allows(now, queues=peer.media.queues):
             outcome = Absorbed()
         match outcome:
             case Forward(forwarded):

@@ -110,7 +110,7 @@ class Notices:
         self._peers.announce(event.navigation)
 
     def _stop_shown(self, event: StopShown) -> None:
-        self._peers.tell("stop", StopStateNotice(stop=event.stop, event=event.event))
+        self._peers.announce(StopStateNotice(stop=event.stop, event=event.event), "stop")
 
     def _stop_sent(self, event: StopSent) -> None:
         if event.alone and not event.delivered:

@@ -18,7 +18,7 @@ from lockstep.server.session_events import (
     PeerRenamed,
     SessionEvents,
 )
-from lockstep.server.util.display_names import unique_names
+from lockstep.server.util.display_names import clean_name, unique_names
 
 __all__ = ["ParticipantList"]
 
@@ -51,7 +51,7 @@ class ParticipantList:
         found = []
         for peer in self._people():
             with peer.contained("participant"):
-                found.append(peer.participant())
+                found.append(_participant(peer))
         everyone = sorted(found, key=lambda each: each.role == "observer")
         return Participants(
             participants=[
@@ -65,7 +65,7 @@ class ParticipantList:
             peer.name = peer.wanted_name  # not in the list, but a stop names its sender
             return
         self._board.joined(time.monotonic())
-        carriers = ", ".join(sorted({stream.carrier for stream in peer.streams}))
+        carriers = ", ".join(sorted({stream.carrier for stream in peer.media.streams}))
         self._events.publish(PeerJoined(peer.actor, carriers))
 
     def left(self, peer: Peer) -> None:
@@ -82,7 +82,7 @@ class ParticipantList:
 
     def rename(self, peer: Peer, name: str) -> None:
         before = peer.name
-        peer.rename(name)
+        peer.wanted_name = clean_name(name, clean_name(peer.identity.name, peer.role))
         self.settle_names()
         if peer.name != before:
             self._events.publish(PeerRenamed(peer.actor, before))
@@ -126,6 +126,22 @@ class ParticipantList:
             if current != shown:
                 shown = current
                 self._events.publish(ParticipantsChanged(current))
+
+
+def _participant(peer: Peer) -> Participant:
+    media, carriers = peer.media, [stream.carrier for stream in peer.media.streams]
+    return Participant(
+        peer=peer.id,
+        name=peer.name,
+        role=peer.role,
+        carrier=carriers[0] if carriers else "trailer" if peer.relay else "none",
+        gap=max((stream.gap for stream in peer.report.streams), key=abs, default=0),
+        picture_delay_ms=peer.report.picture_delay_ms,
+        round_trip_ms=peer.report.round_trip_ms,
+        loss=None if media.loss is None else round(media.loss, 2),
+        tier=media.tier,
+        silenced=peer.silenced,
+    )
 
 
 def _without_values(participant: Participant) -> Participant:

@@ -123,7 +123,7 @@ class SeatKeeper:
         return [
             peer
             for peer in self._peers
-            if peer.identity.token_id == link and peer.role in PEOPLE and peer.connected and not peer.ended
+            if peer.identity.token_id == link and peer.role in PEOPLE and peer.liveness.connected and not peer.ended
         ]
 
     def _act_for_link(self, outcome: SeatOutcome, actor: Peer | Actor) -> None:
@@ -177,7 +177,7 @@ class SeatKeeper:
         return sum(each is not None and each.identity.token_id == link for each in asking) >= LINK_CLAIMS
 
     def heard(self, peer: Peer) -> None:
-        now, round_trip = time.monotonic(), peer.round_trip
+        now, round_trip = time.monotonic(), (peer.media.round_trip_ms or 0.0) / 1000
         self.rules.heard(peer.id, now, round_trip)
         if peer.role in PEOPLE:
             self.rules.attended(peer.identity.token_id, now, round_trip)
@@ -223,7 +223,8 @@ class SeatKeeper:
         if outcome.changed:
             self._publish(_actor(actor))
             for peer in self._peers:
-                peer.drives(self.rules.holds(peer.id))
+                with peer.contained("media"):
+                    peer.media.drives(self.rules.holds(peer.id))
         if outcome.refusal is not None:
             refused = self._peers.by_id(outcome.refusal.peer)
             if refused is not None:

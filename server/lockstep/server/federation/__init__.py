@@ -35,7 +35,7 @@ def make_board(
     if not settings.has_board:
         return MemoryBoard()
     check_board(settings, public_url)
-    from lockstep.server.federation.redis_board import RedisBoard  # an optional extra
+    from lockstep.server.federation.redis.redis_board import RedisBoard  # an optional extra
 
     name = settings.console_name or socket.gethostname()[:MAX_NAME]
     return RedisBoard(

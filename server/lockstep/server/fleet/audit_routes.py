@@ -36,7 +36,7 @@ async def audit(
     here = fleet_of(request)
     shared = await here.board.audit(MAX_RECORDS if caller.identity.robots else limit)
     identity = caller.identity
-    found = {_key(each): each for each in (*shared.records, *_own(here, limit)) if here.may(identity, each.robot)}
+    found = {_key(each): each for each in (*shared.records, *_own(here, limit)) if identity.may_see(each.robot)}
     records = sorted(found.values(), key=lambda each: each.record.time)
     return json_answer(FleetAudit(records=records[-limit:], complete=shared.complete, detail=shared.detail))
 

@@ -5,20 +5,18 @@ import time
 from collections.abc import AsyncIterator, Mapping
 from contextlib import asynccontextmanager
 from pathlib import Path
-from typing import NamedTuple
 
 import structlog
 from starlette.requests import HTTPConnection, Request
 
-from lockstep.server.audit.records import Actor, AuditRecord
-from lockstep.server.auth.invitations import Invitation
+from lockstep.server.audit.records import AuditRecord
 from lockstep.server.auth.tokens import Access, Identity, Right
 from lockstep.server.control.stop.stop_silence import SILENCED
-from lockstep.server.errors import Silenced
-from lockstep.server.federation.board import Board, StopAnswer
+from lockstep.server.federation.board import Board
 from lockstep.server.federation.memory_board import MemoryBoard
 from lockstep.server.federation.robot_summary import Tile
 from lockstep.server.fleet.metrics import FleetMetrics
+from lockstep.server.fleet.robot_stop import Stopped, stop_robot
 from lockstep.server.fleet.session import FleetSession
 from lockstep.server.fleet.summaries import UNREADABLE, absent_tile, tile_of
 from lockstep.server.settings import Settings
@@ -28,25 +26,12 @@ from lockstep.server.stop.stop_presses import Press
 from lockstep.server.telemetry.background import keep_running
 from lockstep.server.util.gc_scheduler import sweep_forever
 
-__all__ = ["Fleet", "Stopped", "fleet_caller", "fleet_of"]
+__all__ = ["Fleet", "fleet_caller", "fleet_of"]
 
 log = structlog.get_logger(__name__)
 
 LOOK_SECONDS = 1.0  # between two looks at every robot
 START_SECONDS = 20.0  # wait of the console for its sessions before it answers
-ELSEWHERE = Actor("another console")
-
-
-class Stopped(NamedTuple):
-    """The outcome of a STOP at one robot."""
-
-    name: str
-    delivered: bool
-    event: int
-    detail: str  # why it was not delivered; "" when it was
-    number: int = 0  # of the stop at that robot; 0 when it was not delivered
-    console: str = ""  # console of the robot; "" is this one
-    kept: bool = False  # on that robot's disk
 
 
 class Fleet:
@@ -106,10 +91,6 @@ class Fleet:
         """False while the revoked links are unknown."""
         return self._context is None or not self._context.state.invitations.trouble
 
-    def may(self, identity: Identity, name: str) -> bool:
-        """True if that link is good for that robot."""
-        return identity.may_see(name)
-
     # overview
 
     def own_tiles(self) -> list[Tile]:
@@ -138,7 +119,10 @@ class Fleet:
         """Stop every robot that this link may see, all at once: this console's, and those of other consoles."""
         self.metrics.stops.inc()
         elsewhere = {tile.name: tile.console for tile in self.board.others() if identity.may_see(tile.name)}
-        stopping = [self._stop(session, press) for name, session in self.sessions.items() if identity.may_see(name)]
+        faults = self.metrics.faults
+        stopping = [
+            stop_robot(session, press, faults) for name, session in self.sessions.items() if identity.may_see(name)
+        ]
         own, others = await asyncio.gather(asyncio.gather(*stopping), self._stop_elsewhere(elsewhere, press))
         self.board.publish(self.own_tiles())
         return sorted([*own, *others])
@@ -154,39 +138,6 @@ class Fleet:
             Stopped(name, answer.delivered, answer.event, answer.detail, answer.number, robots[name], answer.kept)
             for name, answer in answers.items()
         ]
-
-    async def _stop(self, session: FleetSession, press: Press) -> Stopped:
-        """Stop one robot. A fault with it must not keep the stop from the others."""
-        try:
-            answer = await session.stop(press)
-        except Silenced as error:
-            return Stopped(session.name, False, 0, error.detail)
-        except Exception as error:
-            self.metrics.faults.caught("stop", error, robot=session.name)
-            return Stopped(session.name, False, 0, UNREADABLE)
-        outcome = answer.outcome
-        return Stopped(session.name, outcome.delivered, answer.event, outcome.detail, outcome.number, kept=outcome.kept)
-
-    # BoardHost
-
-    async def stop_robot(self, name: str, press: Press) -> StopAnswer:
-        """Stop one robot for somebody at another console."""
-        session = self.sessions.get(name)
-        if session is None:
-            return StopAnswer(True, False, 0, "that console does not have this robot")
-        stopped = await self._stop(session, press)
-        return StopAnswer(True, stopped.delivered, stopped.event, stopped.detail, stopped.number, stopped.kept)
-
-    def silences(self) -> dict[str, float]:
-        return {} if self._context is None else self._context.silences()
-
-    def silenced_elsewhere(self, console: str, links: Mapping[str, float]) -> None:
-        if self._context is not None:
-            self._context.silenced_elsewhere(console, links)
-
-    def links_revoked(self, ended: list[Invitation]) -> None:
-        if self._context is not None:
-            self._context.enforce(ended, ELSEWHERE)
 
     # background tasks
 

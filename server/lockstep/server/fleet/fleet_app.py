@@ -12,6 +12,7 @@ from lockstep.server.composition.app_factory import add_middleware, bare_app, op
 from lockstep.server.errors import NotFound
 from lockstep.server.federation import make_board
 from lockstep.server.fleet import audit_routes, fleet_routes
+from lockstep.server.fleet.board_host import FleetBoardHost
 from lockstep.server.fleet.fleet import Fleet, fleet_of
 from lockstep.server.fleet.openapi import fleet_openapi
 from lockstep.server.http.json_response import json_answer
@@ -34,7 +35,7 @@ def create_fleet_app(settings: Settings, robots: Mapping[str, Settings], state: 
             board = make_board(
                 settings,
                 context.state.signing_key(settings),
-                fleet,
+                FleetBoardHost(fleet.sessions, context, fleet.metrics.faults),
                 context.state.invitations,
                 settings.public_url,
                 fleet.metrics.registry,

@@ -12,7 +12,8 @@ from lockstep.server.auth.tokens import Right
 from lockstep.server.errors import LinkOtherRobot
 from lockstep.server.federation.board import BoardState
 from lockstep.server.federation.robot_summary import Tile
-from lockstep.server.fleet.fleet import Fleet, Stopped, fleet_caller, fleet_of
+from lockstep.server.fleet.fleet import Fleet, fleet_caller, fleet_of
+from lockstep.server.fleet.robot_stop import Stopped
 from lockstep.server.http.json_response import json_answer
 from lockstep.server.routes.stop_body import read_stop
 from lockstep.server.stop.stop_presses import new_press, told_id

@@ -45,7 +45,7 @@ def tile_of(here: Dependencies, meter: EventRateMeter, now: float) -> Tile:
             Person(name=peer.name, role=peer.role, driving=peer is driver) for peer in people[:MAX_PEOPLE]
         ),
         participant_count=len(people),
-        watching=console.peers.thumbnails,
+        watching=sum(peer.thumbnail for peer in console.peers),
         feedback_age_ms=None if feedback is None else _ms(now - clock.heard_at),
         gap=gap,
         tolerance=tolerance,

@@ -1,13 +1,13 @@
 """A response that ends with the link that it was given to, even while it is being sent."""
 
 import asyncio
-from contextlib import suppress
 
 from starlette.responses import Response
 from starlette.types import Receive, Scope, Send
 
 from lockstep.server.auth.tokens import Right
 from lockstep.server.errors import ConsoleError
+from lockstep.server.util.background_tasks import background_tasks
 
 __all__ = ["EndingResponse"]
 
@@ -23,20 +23,26 @@ class EndingResponse(Response):
         self.right = right
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        sending = asyncio.get_running_loop().create_task(self._send(scope, receive, send), name="answer")
+        whole = False
         try:
-            while not sending.done() and self._is_good():
-                await asyncio.wait((sending,), timeout=LOOK_SECONDS)
+            async with asyncio.timeout(None) as bound, background_tasks(self._cut(bound)):
+                if self._is_good():
+                    await self.response(scope, receive, send)
+                    whole = True
+        except TimeoutError:
+            if not bound.expired():
+                raise
         finally:
-            ended = not sending.done()
-            sending.cancel()
-            with suppress(asyncio.CancelledError):
-                await sending
-            if ended:
+            if not whole:
                 await _close_body(self.response)
 
-    async def _send(self, scope: Scope, receive: Receive, send: Send) -> None:
-        await self.response(scope, receive, send)
+    async def _cut(self, sending: asyncio.Timeout) -> None:
+        """End the sending once the link has ended."""
+        while True:
+            await asyncio.sleep(LOOK_SECONDS)
+            if not self._is_good():
+                sending.reschedule(asyncio.get_running_loop().time())
+                return
 
     def _is_good(self) -> bool:
         try:

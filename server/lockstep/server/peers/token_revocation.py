@@ -68,7 +68,7 @@ class TokenRevocation:
     async def ended(self, link: str, expires: float) -> None:
         """Wait until the link with this id is revoked or has expired; return at the next `enforce` at the latest."""
         while not self._invitations.has_ended(link, expires):
-            if self._unknown_for(self._invitations.now()) > UNKNOWN_SECONDS:
+            if self._unknown_for(self._invitations.clock.now()) > UNKNOWN_SECONDS:
                 return
             await self._looked.wait()
 

@@ -8,20 +8,21 @@ from typing import Protocol
 
 from lockstep.server.errors import ChannelError
 from lockstep.server.peers.channels import ChannelName
+from lockstep.server.peers.liveness import Liveness
 
 __all__ = ["Transport", "TransportEvents"]
 
 
 class TransportEvents(Protocol):
-    """Takes what happens on a transport. All methods but `until_ended` are called on the loop and return at once."""
+    """Takes what happens on a transport. All methods are called on the loop and return at once."""
 
     @property
     def ended(self) -> str:
         """The reason that the peer has ended, after which its transport hands on nothing; "" while it lives."""
 
-    async def until_ended(self) -> None: ...
-
-    def connection_made(self) -> None: ...
+    @property
+    def liveness(self) -> Liveness:
+        """The transport tells it of the connection, and may wait for the end."""
 
     def channel_opened(self, channel: ChannelName) -> None: ...
 
@@ -29,10 +30,10 @@ class TransportEvents(Protocol):
         """Take a message. `channel`: None on a WebSocket, which carries all."""
 
     def refused(self, channel: str, error: ChannelError) -> None:
-        """Count input that is no message of a known channel; too much of it ends the peer."""
+        """Count input that is no message of a known channel; too much of it ends the peer.
 
-    def overloaded(self, name: str) -> None:
-        """End the peer: more came, below its messages, than the transport can hold. `name`: of the bound."""
+        TransportRefused ends it at once: more came, below its messages, than the transport can hold.
+        """
 
     def end(self, why: str) -> None:
         """End the peer. Only the first reason counts."""

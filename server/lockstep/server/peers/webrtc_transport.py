@@ -11,7 +11,7 @@ from lockstep.rtc.endpoint import Connection
 from lockstep.rtc.peer_events import Answered, Connected, MediaEvent, PacketReceived, PeerEnded, PeerEvent
 from lockstep.rtc.rtp.stage import StreamEvent
 from lockstep.rtc.sctp import Closed
-from lockstep.server.errors import ChannelError, DuplicateChannel, Flood, TooManyRequests
+from lockstep.server.errors import ChannelError, DuplicateChannel, Flood, TooManyRequests, TransportRefused
 from lockstep.server.peers.agreed_channels import AgreedChannel
 from lockstep.server.peers.channel_writer import ChannelWriter
 from lockstep.server.peers.channels import ChannelName, MessageBudget, channel_name
@@ -123,7 +123,7 @@ class WebRtcTransport:
         elif isinstance(event, Connected):
             with peer.contained("answer"):
                 self._media.connected()
-            peer.connection_made()
+            peer.liveness.connect()
         elif isinstance(event, Answered):
             self._connection.peer.note_round_trip(event.seconds)
         else:
@@ -136,7 +136,7 @@ class WebRtcTransport:
         elif isinstance(event, ChannelClosed) and event.channel in self._names:
             self._channel_closed(peer)
         elif isinstance(event, Closed) and event.reason not in ORDINARY:  # before a channel was opened
-            peer.overloaded(event.reason)
+            peer.refused("transport", TransportRefused(event.reason))
 
     def _channel_closed(self, peer: TransportEvents) -> None:
         """End the peer: it closed the channel, or the association ended for a reason."""
@@ -145,7 +145,7 @@ class WebRtcTransport:
         if closed is None or closed.reason in ORDINARY:
             peer.end("channel closed")
         else:
-            peer.overloaded(closed.reason)
+            peer.refused("transport", TransportRefused(closed.reason))
 
     def _voice(self, event: PacketReceived) -> None:
         packet = event.packet

@@ -11,6 +11,7 @@ from typing import Any, Protocol
 
 from lockstep.protocol.console import Quality, Report, StreamInfo, Tier
 from lockstep.server.auth.tokens import Identity
+from lockstep.server.errors import TransportRefused
 from lockstep.server.media.picture_traces import PictureTraces
 from lockstep.server.peers.channel_queue import ChannelQueue
 from lockstep.server.peers.channels import CHANNELS, ChannelName
@@ -110,14 +111,14 @@ class WebSocketTransport:
         peer = self._peer
         if peer is None:
             raise RuntimeError("call listen() first")
-        peer.connection_made()
+        peer.liveness.connect()
         for channel in CHANNELS:
             peer.channel_opened(channel)
         try:
             async with asyncio.TaskGroup() as tasks:
                 ways = (self._hear(line, peer), self._tell(line, peer))
                 speaking = [tasks.create_task(_try(each, peer)) for each in ways]
-                await peer.until_ended()
+                await peer.liveness.until_ended()
                 for task in speaking:
                     task.cancel()
         finally:
@@ -130,7 +131,7 @@ class WebSocketTransport:
                 peer.received(None, await line.receive())
         except LineEnded as ended:
             if ended.code in TRANSPORT_ERRORS:
-                peer.overloaded(TRANSPORT_ERRORS[ended.code])
+                peer.refused("transport", TransportRefused(TRANSPORT_ERRORS[ended.code]))
             peer.end("shutdown" if ended.code == SERVICE_RESTART else "line closed")
 
     async def _tell(self, line: Line, peer: TransportEvents) -> None:

@@ -47,6 +47,7 @@ class Publishers:
         self._link_ended = link_ended
         self._audit = audit
         self._faults = faults
+        self._tasks: asyncio.TaskGroup | None = None  # of the publishers, while `run` runs
         self._here: dict[Publisher, asyncio.Task[None]] = {}
         self._reserved: dict[PublishedCamera, str] = {}  # links that negotiate for a camera
         self._counted: dict[Publisher, dict[PacketOutcome, int]] = {}  # counts that the metrics have
@@ -116,9 +117,10 @@ class Publishers:
         return free
 
     def admit(self, publisher: Publisher) -> None:
-        """Make it the publisher of its camera."""
-        task = asyncio.get_running_loop().create_task(self._run(publisher), name=f"publisher {publisher.id}")
-        self._here[publisher] = task
+        """Make it the publisher of its camera. Raises ShuttingDown."""
+        if self._tasks is None or self._closing:
+            raise ShuttingDown("the console is shutting down")
+        self._here[publisher] = self._tasks.create_task(self._run(publisher), name=f"publisher {publisher.id}")
         self._publishers.inc()
         publisher.camera.begin(publisher)
         self._audit.record("publication", publisher.actor, "begun", publisher.camera.spec.name)
@@ -144,14 +146,15 @@ class Publishers:
 
     async def run(self) -> None:
         """Run until cancelled."""
-        try:
-            await asyncio.Event().wait()
-        finally:
-            self._closing = True
-            for publisher in self._here:
-                publisher.end("shutdown")
-            if self._here:
-                await asyncio.wait(self._here.values())
+        async with asyncio.TaskGroup() as self._tasks:
+            try:
+                await asyncio.Event().wait()
+            finally:
+                self._closing = True
+                for publisher in self._here:
+                    publisher.end("shutdown")
+                if self._here:
+                    await asyncio.wait(self._here.values())
 
     def _released(self, publisher: Publisher) -> None:
         """Free its camera."""
@@ -159,23 +162,27 @@ class Publishers:
         publisher.camera.end(publisher, reason, WORDS.get(publisher.ended, "the connection to its publisher is lost"))
 
     async def _run(self, publisher: Publisher) -> None:
+        """Run a publisher. Raises nothing: a fault with one publisher must not end anything else."""
         identity = publisher.identity
         try:
-            await publisher.run(lambda: self._link_ended(identity.token_id, identity.expires))
+            try:
+                await publisher.run(lambda: self._link_ended(identity.token_id, identity.expires))
+            finally:
+                self._left(publisher)
         except Exception as error:
-            # A fault with one publisher must not end anything else.
             self._faults.caught("publisher", error, peer=publisher.id)
             with suppress(Exception):
                 publisher.close()
-        finally:
-            self._released(publisher)
-            del self._here[publisher]
-            self._publishers.dec()
-            self._ended.labels(publisher.ended).inc()
-            self._count(publisher)
-            del self._counted[publisher]
-            self._audit.record("publication", publisher.actor, f"ended: {publisher.ended}", publisher.camera.spec.name)
-            log.info("publisher left", peer=publisher.id, name=publisher.name, why=publisher.ended)
+
+    def _left(self, publisher: Publisher) -> None:
+        del self._here[publisher]
+        self._released(publisher)
+        self._publishers.dec()
+        self._ended.labels(publisher.ended).inc()
+        self._count(publisher)
+        del self._counted[publisher]
+        self._audit.record("publication", publisher.actor, f"ended: {publisher.ended}", publisher.camera.spec.name)
+        log.info("publisher left", peer=publisher.id, name=publisher.name, why=publisher.ended)
 
     def _count(self, publisher: Publisher) -> None:
         counts, before = publisher.counts(), self._counted.get(publisher, {})

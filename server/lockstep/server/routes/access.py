@@ -11,7 +11,8 @@ from fastapi import APIRouter, Depends, Query, Request, Response
 from lockstep.protocol.console import Role
 from lockstep.server.audit.records import AuditRecord
 from lockstep.server.auth.invitations import Invitation, Invitations, may_invite
-from lockstep.server.auth.tokens import MAX_ROBOTS, HasRole, Identity, Right, RobotName, require_role
+from lockstep.server.auth.token_signer import MAX_ROBOTS, RobotName
+from lockstep.server.auth.tokens import HasRole, Identity, Right, require_role
 from lockstep.server.errors import NotAllowed, Silenced, StateUnavailable
 from lockstep.server.http.request_body import read_json
 from lockstep.server.state.console_links import console_link
@@ -78,7 +79,7 @@ class AuditPage(msgspec.Struct, frozen=True, kw_only=True):
 async def invitations(request: Request, caller: Caller) -> Response:
     here = dependencies(request)
     _require_inviter(caller)
-    found = _shown(here.state.invitations.known.visible(caller.identity), here.state.invitations.now())
+    found = _shown(here.state.invitations.known.visible(caller.identity), here.state.invitations.clock.now())
     return _json(InvitationList(invitations=_infos(here, found), may_invite=list(may_invite(caller.role))))
 
 
@@ -118,7 +119,7 @@ async def revoke(request: Request, caller: Caller, invitation_id: str) -> Respon
     try:
         revoked = await _update(here, caller.identity, lambda known, by, now: known.revoke(by, invitation_id, now))
     except StateDirUnusable as error:
-        here.state.invitations.write_later(invitation_id)
+        here.state.invitations.unwritten.add(invitation_id)
         here.console.audit.record("revocation", by, "not on the disk yet", invitation_id)
         raise StateUnavailable(f"{await _noted(here)}: {error.reason}") from error
     here.context.enforce(revoked, by)
@@ -128,7 +129,7 @@ async def revoke(request: Request, caller: Caller, invitation_id: str) -> Respon
 async def _noted(here: Dependencies) -> str:
     """Note a revocation that the list of links did not take, and return the outcome in words."""
     try:
-        await asyncio.to_thread(here.state.invitations.note_ended)
+        await asyncio.to_thread(here.state.invitations.unwritten.note)
     except StateDirUnusable:
         return UNWRITTEN
     return NOTED
@@ -159,7 +160,7 @@ async def _update(here: Dependencies, by: Identity, change: Callable[[Invitation
 
     def work(known: Invitations) -> Result:
         store.check(by, known)
-        return change(known, by, store.now())
+        return change(known, by, store.clock.now())
 
     return await asyncio.to_thread(store.update, work)
 

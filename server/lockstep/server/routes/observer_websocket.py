@@ -40,7 +40,7 @@ async def invite(
     here.request_limits.offer(identity.token_id)
     if not here.relays.arrived(relay):
         raise NotFound("no such relay")
-    with here.console.peers.place(identity, relayed=True):
+    with here.console.peers.places.keep(identity, relayed=True):
         turns = here.console.peers.turns
         watcher, transport = peer_beside_relay(relay, identity, here.console, here.settings, turns)
         here.console.peers.admit(watcher)

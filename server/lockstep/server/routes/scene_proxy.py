@@ -7,6 +7,7 @@ needs.
 """
 
 import asyncio
+from contextlib import suppress
 
 import msgspec
 import structlog
@@ -21,7 +22,7 @@ from lockstep.server.auth.tokens import SceneTicket
 from lockstep.server.errors import BadParameter, ConsoleError, NotFound
 from lockstep.server.http.security_headers import check_origin
 from lockstep.server.scene.view import SceneView
-from lockstep.server.state.dependencies import dependencies
+from lockstep.server.state.dependencies import Dependencies, dependencies
 
 __all__ = ["is_allowed", "router", "scene_query"]
 
@@ -36,6 +37,7 @@ TRY_AGAIN_LATER = 1013  # RFC 6455 7.4.1 and the IANA registry
 POLICY_VIOLATION = 1008
 GOING_AWAY = 1001
 UNSUPPORTED_DATA = 1003
+GONE = (WebSocketDisconnect, RuntimeError)  # what starlette raises when the viewer is gone, or was sent away
 
 OPAQUE = "null"  # as a browser names the origin of a sandboxed page (HTML 7.1.1)
 FLAGS = ("darkMode", "hideViserLogo")  # for viser's client, without a value
@@ -95,7 +97,7 @@ async def stream(websocket: WebSocket, ticket: str) -> None:
         await scene.open()
         here.access.verify_ticket(ticket)  # its link may have ended meanwhile
         with scene.viewer(valid):
-            await _join(websocket, scene, valid)
+            await _join(websocket, here, scene, valid)
     except ConsoleError as error:
         here.metrics.bad_input.labels("scene", type(error).__name__).inc()
         await websocket.close(POLICY_VIOLATION)
@@ -123,7 +125,7 @@ def _subprotocols(websocket: WebSocket) -> list[Subprotocol]:
     return [Subprotocol(each) for each in offered if each.startswith("viser-v")][:1]
 
 
-async def _join(websocket: WebSocket, scene: SceneView, ticket: SceneTicket) -> None:
+async def _join(websocket: WebSocket, here: Dependencies, scene: SceneView, ticket: SceneTicket) -> None:
     subprotocols = _subprotocols(websocket)
     try:
         upstream = await connect(
@@ -142,21 +144,19 @@ async def _join(websocket: WebSocket, scene: SceneView, ticket: SceneTicket) -> 
         return
     async with upstream:
         await websocket.accept(subprotocol=upstream.subprotocol)
-        up = asyncio.create_task(_viewer_to_scene(websocket, upstream))
-        down = asyncio.create_task(_scene_to_viewer(websocket, upstream))
-        ended = asyncio.create_task(dependencies(websocket).revocation.ended(ticket.link, ticket.ends))
-        try:
+        async with asyncio.TaskGroup() as tasks:
+            up = tasks.create_task(_viewer_to_scene(websocket, here, upstream))
+            down = tasks.create_task(_scene_to_viewer(websocket, upstream))
+            ended = tasks.create_task(here.revocation.ended(ticket.link, ticket.ends))
             await asyncio.wait((up, down, ended), return_when=asyncio.FIRST_COMPLETED)
             if ended.done():
-                await websocket.close(POLICY_VIOLATION)
-        finally:
+                await _close(websocket, POLICY_VIOLATION)
             for task in (up, down, ended):
                 task.cancel()
-            await asyncio.gather(up, down, ended, return_exceptions=True)
 
 
-async def _viewer_to_scene(websocket: WebSocket, upstream: ClientConnection) -> None:
-    here, clock = dependencies(websocket), asyncio.get_running_loop().time
+async def _viewer_to_scene(websocket: WebSocket, here: Dependencies, upstream: ClientConnection) -> None:
+    clock = asyncio.get_running_loop().time
     budget = TokenBucket(UP_RATE, UP_BURST)
     try:
         while True:
@@ -171,8 +171,8 @@ async def _viewer_to_scene(websocket: WebSocket, upstream: ClientConnection) -> 
     except KeyError:
         # starlette: a text message has no bytes
         here.metrics.bad_input.labels("scene", "text").inc()
-        await websocket.close(UNSUPPORTED_DATA)
-    except (WebSocketDisconnect, ConnectionClosed):
+        await _close(websocket, UNSUPPORTED_DATA)
+    except (*GONE, ConnectionClosed):
         return
 
 
@@ -181,5 +181,10 @@ async def _scene_to_viewer(websocket: WebSocket, upstream: ClientConnection) -> 
         async for data in upstream:
             await websocket.send_bytes(data if isinstance(data, bytes) else data.encode())
         await websocket.close(GOING_AWAY)
-    except (WebSocketDisconnect, ConnectionClosed, RuntimeError):
-        return  # the viewer is gone; starlette raises any of these
+    except (*GONE, ConnectionClosed):
+        return
+
+
+async def _close(websocket: WebSocket, code: int) -> None:
+    with suppress(*GONE):
+        await websocket.close(code)

@@ -103,7 +103,7 @@ async def session(request: Request, caller: Caller) -> Response:
             participants=console.people.current().participants,
             link=LinkInfo(up=console.robot.up, detail=console.robot.detail),
             you={"role": caller.role, "name": caller.name},
-            peers={peer.id: peer.streams for peer in console.peers},
+            peers={peer.id: peer.media.streams for peer in console.peers},
             streams=dependencies(request).media.offers,
             voice=dependencies(request).voice.enabled,
             description=console.robot.description,

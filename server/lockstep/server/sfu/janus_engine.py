@@ -1,6 +1,5 @@
 """The engine for Janus relays: one gets the session from the console and passes it on to the others."""
 
-import asyncio
 import hashlib
 import hmac
 import secrets
@@ -15,6 +14,7 @@ from lockstep.server.sfu.publication import Publication
 from lockstep.server.sfu.settings import RelaySettings
 from lockstep.server.sfu.sfu_server import SfuServer
 from lockstep.server.sfu.tickets import RelayTicket
+from lockstep.server.util.background_tasks import background_tasks
 
 __all__ = ["JanusEngine"]
 
@@ -36,13 +36,9 @@ class JanusEngine:
         async with (
             open_janus(station.url.address) as session,
             publish(session, self._room_of(station), self._endpoint, self._media, feed, self._codec) as publication,
+            background_tasks(_end_with(session, publication)),
         ):
-            watching = asyncio.get_running_loop().create_task(_end_with(session, publication))
-            try:
-                yield publication
-            finally:
-                watching.cancel()
-                await asyncio.gather(watching, return_exceptions=True)
+            yield publication
 
     @asynccontextmanager
     async def pass_on(

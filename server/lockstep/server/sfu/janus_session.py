@@ -14,6 +14,7 @@ from websockets.typing import Subprotocol
 from lockstep.protocol.errors import MessageError
 from lockstep.protocol.janus import JANUS_PROTOCOL, VIDEO_ROOM, Heard, janus_request, parse_janus
 from lockstep.server.sfu.errors import RelayRefused, RelaySilent, RelayUnreachable
+from lockstep.server.util.background_tasks import background_tasks
 
 __all__ = ["JanusSession", "open_janus"]
 
@@ -44,16 +45,9 @@ async def open_janus(url: str) -> AsyncIterator["JanusSession"]:
     try:
         async with socket:
             session = JanusSession(socket)
-            # No TaskGroup: it would wrap exceptions of the caller's block, and these two raise nothing.
-            loop = asyncio.get_running_loop()
-            running = [loop.create_task(session.listen()), loop.create_task(session.keep_alive())]
-            try:
+            async with background_tasks(session.listen(), session.keep_alive()):
                 await session.begin()
                 yield session
-            finally:
-                for task in running:
-                    task.cancel()
-                await asyncio.gather(*running, return_exceptions=True)
     finally:
         socket.transport.abort()  # websockets leaves it open when its close is cancelled
 

@@ -10,7 +10,7 @@ __all__ = ["SfuServer"]
 
 @dataclass
 class SfuServer:
-    """State of one configured relay. Only `SfuCoordinator` changes it."""
+    """State of one configured relay. Only `SfuServers` changes it."""
 
     name: str  # its number among the settings: "0"
     url: RelayUrl

@@ -101,12 +101,12 @@ class ConsoleContext:
     async def _keep_time(self) -> None:
         """Write down the time once in a while, and whenever a link has expired."""
         store, loop = self.state.invitations, asyncio.get_running_loop()
-        looked = store.now()
+        looked = store.clock.now()
         keep_at = loop.time()
         while True:
             await asyncio.sleep(CHECK_SECONDS)
             try:
-                now = store.now()
+                now = store.clock.now()
                 expired = any(looked < each.expires <= now for each in store.known.all)
                 looked = now
                 if expired or loop.time() >= keep_at:
@@ -133,7 +133,7 @@ class ConsoleContext:
 
     def enforce(self, changed: list[Invitation], by: Actor) -> None:
         """Act, at every robot, on links that `by` has invited or revoked, and on links that have expired."""
-        now = self.state.invitations.now()
+        now = self.state.invitations.clock.now()
         for revocation in self.revocations:
             revocation.enforce(changed, by, now)
 
@@ -149,13 +149,13 @@ class ConsoleContext:
 
     def silences(self) -> dict[str, float]:
         """Return the links that other consoles have to silence too, with the ends in s since 1970."""
-        now, ahead = time.monotonic(), self.state.invitations.now() - time.monotonic()
+        now, ahead = time.monotonic(), self.state.invitations.clock.now() - time.monotonic()
         known = [each.id for each in self.state.invitations.known.all]
         return {link: until + ahead for link, until in self.silenced.to_tell(known, now).items()}
 
     def silenced_elsewhere(self, console: str, links: Mapping[str, float]) -> None:
         """Take another console's `silences`, all that it has now."""
-        now, ahead = time.monotonic(), self.state.invitations.now() - time.monotonic()
+        now, ahead = time.monotonic(), self.state.invitations.clock.now() - time.monotonic()
         self.silenced.told_elsewhere(console, {link: until - ahead for link, until in links.items()}, now)
 
     def _end_silences(self) -> None:
@@ -167,6 +167,6 @@ class ConsoleContext:
         """Raise TooManyPeers when there is no place for another peer at any robot."""
         if self._max_peers is None:
             return
-        held = sum(revocation.peers.taken_by(identity.token_id) for revocation in self.revocations)
-        taken = sum(revocation.peers.taken for revocation in self.revocations)
+        held = sum(revocation.peers.places.taken_by(identity.token_id) for revocation in self.revocations)
+        taken = sum(revocation.peers.places.taken for revocation in self.revocations)
         check_place(identity.role, held, taken, self._max_peers, self._reserved)

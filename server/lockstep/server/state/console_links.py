@@ -70,7 +70,7 @@ def listening_url(settings: Settings, listener: socket.socket) -> str:
 
 def console_links(settings: Settings, console: str, state: ConsoleState) -> ConsoleLinks:
     """Return one link for each role of people: those of the last start, while they are good for long enough."""
-    now = state.invitations.now()
+    now = state.invitations.clock.now()
 
     def for_start(known: Invitations) -> dict[Role, Invitation]:
         return {role: known.for_start(role, settings.token_seconds, now) for role in AT_START}

@@ -86,6 +86,6 @@ def _open(settings: Settings, path: Path) -> ConsoleState:
         settings.scene_ticket_seconds,
         invitations.is_revoked,
         trouble=lambda: invitations.trouble,
-        now=invitations.now,
+        now=invitations.clock.now,
     )
     return ConsoleState(directory, invitations, access, evidence_signer(directory), not is_in_memory(path))

@@ -145,7 +145,7 @@ def due_all(rig: Rig) -> None:
 
 
 def media_of(peer: Peer) -> list[Any]:
-    return list(cast(Any, peer)._media.deliveries)
+    return list(cast(Any, peer).media.deliveries)
 
 
 async def test_an_observer_gets_more_than_a_narrow_operator_and_costs_the_first_encoding_nothing(

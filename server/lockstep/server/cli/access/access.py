@@ -62,7 +62,7 @@ def add_access_commands(app: typer.Typer, make_settings: MakeSettings) -> None:
         """Make a link that ends after a while, and print it."""
         settings = make_settings(state_dir=state_dir)
         with_state = _state(settings)
-        now = with_state.invitations.now()
+        now = with_state.invitations.clock.now()
         try:
             wanted = msgspec.convert(role, Role)
             seconds = parse_duration(expires)
@@ -89,7 +89,7 @@ def add_access_commands(app: typer.Typer, make_settings: MakeSettings) -> None:
     def invitations(state_dir: StateDirOption = None, as_json: Json = False) -> None:
         """List the links that were given."""
         store = _state(make_settings(state_dir=state_dir)).invitations
-        now, found = store.now(), store.known.visible(None)
+        now, found = store.clock.now(), store.known.visible(None)
         if as_json:
             _print_json([_described(each, now) for each in found])
             return
@@ -105,7 +105,7 @@ def add_access_commands(app: typer.Typer, make_settings: MakeSettings) -> None:
     ) -> None:
         """End a link, those that were invited with it, and everything that is connected with them."""
         state = _state(make_settings(state_dir=state_dir))
-        now = state.invitations.now()
+        now = state.invitations.clock.now()
         try:
             ended = state.invitations.update(lambda known: known.revoke(None, invitation_id, now))
         except ConsoleError as error:
@@ -225,9 +225,9 @@ def _state(settings: Settings) -> ConsoleState:
 
 def _note_ended(state: ConsoleState, link: str, error: StateDirUnusable) -> None:
     """Note a revocation when the list cannot be written: a full disk still has the space set aside for this."""
-    state.invitations.write_later(link)
+    state.invitations.unwritten.add(link)
     try:
-        state.invitations.note_ended()
+        state.invitations.unwritten.note()
     except StateDirUnusable:
         raise _usage(str(error)) from error
     _say(f"a running console ends the link now and writes the list when the disk accepts it ({error.reason})")

@@ -7,7 +7,7 @@ import json
 import os
 import socket
 import sys
-from collections.abc import Coroutine, Mapping
+from collections.abc import Collection, Mapping
 from contextlib import suppress
 from pathlib import Path
 
@@ -21,7 +21,7 @@ from lockstep.server.composition.robot_app import create_app
 from lockstep.server.fleet.fleet import Fleet
 from lockstep.server.fleet.fleet_app import create_fleet_app
 from lockstep.server.fleet.robots import robot_settings
-from lockstep.server.http.transport.serve import running, wait_for_signal
+from lockstep.server.http.transport.serve import running, stop_signals
 from lockstep.server.http.transport.tls import Certificate, ends_at, fingerprint, own_names, self_signed
 from lockstep.server.http.transport.uvicorn_http_limits import bounded_by
 from lockstep.server.robot.bridge_process import BridgeProcess
@@ -59,39 +59,37 @@ async def run_console(
         ConsoleFailed: the log says why.
     """
     certificate = _certificate(settings, state.directory.path)
-    stopping = asyncio.get_running_loop().create_task(wait_for_signal())
     service = ServiceManager(os.environ)
     try:
-        addresses = await _unless(stopping, _start(bridges))
-        if addresses is None:
-            return
-        settings = _with_addresses(settings, addresses)
-        application = _application(settings, state)
-        http = bounded_by(settings, application)
-        async with running(application, listener, http=http, tls=certificate), asyncio.TaskGroup() as tasks:
-            if certificate is not None:
-                application.state.context.metrics.certificate_end.set(ends_at(certificate))
-            _calm_garbage_collection()
-            background = [tasks.create_task(bridge.watch()) for bridge in bridges.values()]
-            url = listening_url(settings, listener)
-            links = console_links(settings, url, state)
-            with suppress(StateDirUnusable):  # `lockstep invite` then needs --url
-                write_address(state.directory, url)
-            background.append(tasks.create_task(_announce(application, links, as_json)))
-            background.append(tasks.create_task(_report(service)))
-            failed = tasks.create_task(application.state.failed.wait())
-            await asyncio.wait((stopping, failed), return_when=asyncio.FIRST_COMPLETED)
-            service.stopping()
-            for task in (*background, failed):
-                task.cancel()
-        if not stopping.done():
-            raise ConsoleFailed
+        with stop_signals() as asked:
+            addresses = await _start(bridges, asked)
+            if addresses is None:
+                return
+            settings = _with_addresses(settings, addresses)
+            application = _application(settings, state)
+            http = bounded_by(settings, application)
+            async with running(application, listener, http=http, tls=certificate), asyncio.TaskGroup() as tasks:
+                if certificate is not None:
+                    application.state.context.metrics.certificate_end.set(ends_at(certificate))
+                _calm_garbage_collection()
+                background = [tasks.create_task(bridge.watch()) for bridge in bridges.values()]
+                url = listening_url(settings, listener)
+                links = console_links(settings, url, state)
+                with suppress(StateDirUnusable):  # `lockstep invite` then needs --url
+                    write_address(state.directory, url)
+                background.append(tasks.create_task(_announce(application, links, as_json)))
+                background.append(tasks.create_task(_report(service)))
+                stopping = tasks.create_task(asked.wait())
+                failed = tasks.create_task(application.state.failed.wait())
+                await asyncio.wait((stopping, failed), return_when=asyncio.FIRST_COMPLETED)
+                service.stopping()
+                for task in (*background, stopping, failed):
+                    task.cancel()
+            if not asked.is_set():
+                raise ConsoleFailed
     finally:
         service.close()
         listener.close()
-        stopping.cancel()
-        with suppress(asyncio.CancelledError):
-            await stopping
         await asyncio.gather(*(bridge.close() for bridge in bridges.values()))
 
 
@@ -108,15 +106,27 @@ def say(text: str) -> None:
     typer.echo(f"lockstep: {text}", err=True)
 
 
-async def _start(bridges: Mapping[str, BridgeProcess]) -> dict[str, str]:
-    """Start the bridges and return their addresses. One that does not start ends all: the user wants them all."""
-    starting = [asyncio.ensure_future(bridge.start()) for bridge in bridges.values()]
+async def _start(bridges: Mapping[str, BridgeProcess], asked: asyncio.Event) -> dict[str, str] | None:
+    """Start the bridges and return their addresses; None when the signal to stop comes first.
+
+    One that does not start ends all: the user wants them all.
+    """
     try:
-        return dict(zip(bridges, await asyncio.gather(*starting), strict=True))
-    finally:
-        for each in starting:
-            each.cancel()
-        await asyncio.gather(*starting, return_exceptions=True)
+        async with asyncio.TaskGroup() as tasks:
+            starting = {name: tasks.create_task(bridge.start()) for name, bridge in bridges.items()}
+            stopping = tasks.create_task(_cancel_at(asked, starting.values()))
+            if starting:
+                await asyncio.wait(starting.values())
+            stopping.cancel()
+    except BaseExceptionGroup as errors:
+        raise errors.exceptions[0] from None
+    return None if asked.is_set() else {name: each.result() for name, each in starting.items()}
+
+
+async def _cancel_at(asked: asyncio.Event, tasks: Collection[asyncio.Task[str]]) -> None:
+    await asked.wait()
+    for each in tasks:
+        each.cancel()
 
 
 def _with_addresses(settings: Settings, addresses: Mapping[str, str]) -> Settings:
@@ -157,20 +167,6 @@ def _certificate(settings: Settings, directory: Path) -> Certificate | None:
         raise StateDirUnusable(directory, f"{error.filename}: {error.strerror}") from error
     say(f"the console made its certificate itself; the SHA-256 fingerprint is {fingerprint(certificate)}")
     return certificate
-
-
-async def _unless(
-    stopping: asyncio.Task[None], starting: Coroutine[None, None, dict[str, str]]
-) -> dict[str, str] | None:
-    """Return the result of `starting`; None when a signal to stop comes first."""
-    task = asyncio.get_running_loop().create_task(starting)
-    await asyncio.wait((task, stopping), return_when=asyncio.FIRST_COMPLETED)
-    if task.done():
-        return task.result()
-    task.cancel()
-    with suppress(asyncio.CancelledError):
-        await task
-    return None
 
 
 async def _announce(application: FastAPI, links: ConsoleLinks, as_json: bool) -> None:

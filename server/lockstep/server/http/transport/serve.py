@@ -17,7 +17,7 @@ from lockstep.server.http.transport.tls import Certificate
 from lockstep.server.http.transport.uvicorn_http_limits import MAX_HEAD, BoundedConnections
 from lockstep.server.http.transport.uvicorn_websocket_limits import bounded_websocket
 
-__all__ = ["PortTaken", "bind", "running", "wait_for_signal"]
+__all__ = ["PortTaken", "bind", "running", "stop_signals", "wait_for_signal"]
 
 BACKLOG = 1024  # connections that wait to be accepted; a flood of them may come before a STOP
 SHUTDOWN_TIMEOUT = 3  # s for HTTP requests under way
@@ -60,12 +60,20 @@ def bind(host: str, port: int) -> socket.socket:
 class _Server(uvicorn.Server):
     """A uvicorn server that tells when it is ready, and leaves the signals to its caller."""
 
-    def __init__(self, config: uvicorn.Config, bounded: BoundedConnections | None, listener: socket.socket) -> None:
+    def __init__(
+        self,
+        config: uvicorn.Config,
+        bounded: BoundedConnections | None,
+        listener: socket.socket,
+        tasks: asyncio.TaskGroup,
+    ) -> None:
         super().__init__(config)
         self.settled = asyncio.Event()  # set when it answers, or has failed
+        self._tasks: asyncio.TaskGroup = tasks
         self._bounded = bounded
         self._listener = listener
         self._accepting: asyncio.Task[None] | None = None
+        self._fault: Exception | None = None  # of accepting connections
 
     async def startup(self, sockets: list[socket.socket] | None = None) -> None:
         try:
@@ -89,12 +97,25 @@ class _Server(uvicorn.Server):
             )
 
         acceptor = Acceptor(self._listener, bounded.places, bounded.turns, make_protocol, self.config.ssl)
-        self._accepting = loop.create_task(acceptor.run(), name="accept")
+        self._accepting = self._tasks.create_task(self._run(acceptor), name="accept")
+
+    async def _run(self, acceptor: Acceptor) -> None:
+        """Accept until cancelled. A fault shuts the server down gracefully; `serve` then raises it."""
+        try:
+            await acceptor.run()
+        except Exception as error:
+            self._fault = error
+            self.should_exit = True
+
+    async def serve(self, sockets: list[socket.socket] | None = None) -> None:
+        await super().serve(sockets)
+        if self._fault is not None:
+            raise self._fault
 
     async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
         if self._accepting is not None:
             self._accepting.cancel()
-            await asyncio.gather(self._accepting, return_exceptions=True)
+            await asyncio.wait((self._accepting,))
         await super().shutdown(sockets)
 
     @contextlib.contextmanager
@@ -115,6 +136,9 @@ async def running(
     Args:
         http: connections with bounds; None: uvicorn's own, without
         tls: the certificate to encrypt with; None: nothing is encrypted
+
+    Raises:
+        ExceptionGroup: it failed, which cancels the block. An exception of the block comes out as it is.
     """
     config = uvicorn.Config(
         app,
@@ -131,23 +155,35 @@ async def running(
         ssl_certfile=None if tls is None else tls.chain,
         ssl_keyfile=None if tls is None else tls.key,
     )
-    server = _Server(config, http, listener)
-    serving = asyncio.get_running_loop().create_task(server.serve([listener]), name="http")
-    try:
-        settled = asyncio.get_running_loop().create_task(server.settled.wait())
-        await asyncio.wait((serving, settled), return_when=asyncio.FIRST_COMPLETED)
-        settled.cancel()
-        if not server.started:
-            await serving
-            raise RuntimeError("the console did not start")
-        yield
-    finally:
+    failure: BaseException | None = None
+    async with asyncio.TaskGroup() as tasks:
+        server = _Server(config, http, listener, tasks)
+        serving = tasks.create_task(server.serve([listener]), name="http")
+        try:
+            await server.settled.wait()
+            if not server.started:
+                raise RuntimeError("the console did not start")
+            yield
+        except BaseException as error:
+            failure = error  # raised behind the group, which would wrap it
         server.should_exit = True
-        await serving
+        await asyncio.wait((serving,))
+    try:
+        if failure is not None:
+            raise failure
+    finally:
+        del failure  # which refers to this frame
 
 
 async def wait_for_signal() -> None:
-    """Wait for SIGINT, SIGTERM, or the end of the terminal unless that is ignored (`nohup`)."""
+    """Wait for a signal to stop."""
+    with stop_signals() as asked:
+        await asked.wait()
+
+
+@contextlib.contextmanager
+def stop_signals() -> Iterator[asyncio.Event]:
+    """Set the event, while entered, at SIGINT, SIGTERM, or the end of the terminal unless that is ignored (`nohup`)."""
     loop, asked = asyncio.get_running_loop(), asyncio.Event()
     signals = [signal.SIGINT, signal.SIGTERM]
     if signal.getsignal(signal.SIGHUP) is not signal.SIG_IGN:
@@ -155,7 +191,7 @@ async def wait_for_signal() -> None:
     for number in signals:
         loop.add_signal_handler(number, asked.set)
     try:
-        await asked.wait()
+        yield asked
     finally:
         for number in signals:
             loop.remove_signal_handler(number)

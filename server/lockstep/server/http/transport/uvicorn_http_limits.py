@@ -157,23 +157,22 @@ def bounded_http(
             self.app_state[DEADLINE] = self.loop.time() + seconds
             if self._timer is not None:
                 self._timer.cancel()
-            self._look_again(seconds)
-
-        def _look_again(self, after: float) -> None:
-            self._timer = self.loop.call_later(after, self._look)
+            self._timer = self.loop.call_later(seconds, self._look)
 
         def _look(self) -> None:
-            self._timer = None
+            self._timer, after = None, seconds
             now, unread = self.loop.time(), self.transport.get_write_buffer_size()
             if self.conn.their_state is h11.SEND_BODY and now < self.app_state[DEADLINE] + GRACE:
-                self._look_again(GRACE)  # the reader of the body reports by name that it did not come
+                after = GRACE  # the reader of the body reports by name that it did not come
             elif self._awaited and self.conn.their_state in (h11.IDLE, h11.SEND_BODY):
                 self._end("too_slow")
+                return
             elif unread and not self._read and unread > self._unread - LEAST_READ:
                 self._end("does_not_read")
+                return
             else:
                 self._read, self._unread = False, unread
-                self._look_again(seconds)
+            self._timer = self.loop.call_later(after, self._look)
 
         def _end(self, why: str) -> None:
             places.on_refused(why)

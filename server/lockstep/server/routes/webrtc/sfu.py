@@ -29,7 +29,8 @@ async def relay(
     ticket: RelayTicket | None = None
     if caller.role == "observer":
         known = here.console.peers.by_id(peer) if peer else None
-        own = known if known is not None and known.identity.token_id == caller.token_id and known.connected else None
+        is_own = known is not None and known.identity.token_id == caller.token_id and known.liveness.connected
+        own = known if is_own else None
         ticket = here.relays.key(own) if own is not None and not lost else None
         if ticket is None:
             ticket = await here.relays.ticket(own, lost)

@@ -18,6 +18,7 @@ from lockstep.server.errors import (
     PreconditionFailed,
     PreconditionRequired,
     RobotUnreachable,
+    ShuttingDown,
     TooFewSections,
 )
 from lockstep.server.http.request_body import read_text
@@ -74,11 +75,15 @@ async def create(
     if thumbnail:
         identity = identity._replace(role="observer")
     relayed = bool(relay) and not thumbnail and identity.role == "observer" and here.relays.arrived(relay)
-    with here.console.peers.place(identity, relayed=relayed, thumbnail=thumbnail):
+    with here.console.peers.places.keep(identity, relayed=relayed, thumbnail=thumbnail):
         trailer = stamp == "trailer"
         peer, transport, answer = await _negotiate(here, caller, identity, offer, trailer=trailer, thumbnail=thumbnail)
         peer.relay = relay if relayed else ""
-        here.console.peers.admit(peer)
+        try:
+            here.console.peers.admit(peer)
+        except ShuttingDown:
+            await peer.close()
+            raise
     headers = created_headers(request, f"/whep/{transport.resource}", transport.ice.tag, ice)
     body = write_description(answer).encode()
     if takes_coding(request.headers.get("accept-encoding", ""), "gzip"):  # sections repeat each other
@@ -182,7 +187,7 @@ async def _negotiate(
             transport.agree_on(channels)
             caller.identity  # noqa: B018  raises when the link has ended meanwhile
         except BaseException:
-            await peer.abandon()
+            await peer.close()
             raise
         connection.listen(transport.heard)
     return peer, transport, answer

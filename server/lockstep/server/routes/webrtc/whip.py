@@ -15,6 +15,7 @@ from lockstep.server.errors import (
     NotAllowed,
     NotFound,
     RobotUnreachable,
+    ShuttingDown,
 )
 from lockstep.server.http.request_body import read_text
 from lockstep.server.media.published.depacketise import PictureCodec
@@ -68,7 +69,11 @@ async def create(
     ice = servers_for(here.settings, caller.identity)
     with here.publishers.place(caller.identity, camera) as wanted:
         publisher, answer = await _negotiate(here, caller, offer, section, wanted)
-        here.publishers.admit(publisher)
+        try:
+            here.publishers.admit(publisher)
+        except ShuttingDown:
+            publisher.close()
+            raise
     headers = created_headers(request, f"/whip/{publisher.resource}", publisher.ice.tag, ice)
     return Response(answer, status_code=201, media_type=SDP, headers=headers)
 

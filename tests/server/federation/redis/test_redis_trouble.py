@@ -9,10 +9,10 @@ import pytest
 from structlog.testing import capture_logs
 
 from lockstep.server.audit.records import Actor, AuditRecord
-from lockstep.server.federation import redis_board
 from lockstep.server.federation.envelope import Seal
 from lockstep.server.federation.messages import MAX_PUBLISHED, Published, pack_published
-from lockstep.server.federation.redis_private import LARGEST
+from lockstep.server.federation.redis import redis_board, stop_exchange
+from lockstep.server.federation.redis.redis_private import LARGEST
 from lockstep.server.federation.robot_summary import within_bounds
 from lockstep.server.stop.stop_presses import new_press
 from tests.server.federation.boards import KEY, running_board, tile
@@ -22,7 +22,7 @@ from tests.waiting import eventually
 
 ANN = Actor("Ann", "operator")
 NOTE = AuditRecord(n=1, time=1.0, kind="note")
-GUIDE = Path(__file__).parents[3] / "docs" / "fleet.md"
+GUIDE = Path(__file__).parents[4] / "docs" / "fleet.md"
 PASSWORD = "correct-horse-battery-staple"
 STRANGER = "0123456789abcdef"
 
@@ -30,7 +30,7 @@ STRANGER = "0123456789abcdef"
 @pytest.fixture(autouse=True)
 def soon(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(redis_board, "PERIOD", 0.3)
-    monkeypatch.setattr(redis_board, "STOP_PATIENCE", 3.0)
+    monkeypatch.setattr(stop_exchange, "STOP_PATIENCE", 3.0)
 
 
 @pytest.fixture

@@ -9,7 +9,7 @@ import pytest
 from structlog.testing import capture_logs
 
 from lockstep.server.audit.records import Actor, AuditRecord
-from lockstep.server.federation import redis_board
+from lockstep.server.federation.redis import stop_exchange
 from lockstep.server.stop.stop_presses import new_press
 from tests.server.federation.boards import running_board, tile
 from tests.support.redis_server import RedisServer
@@ -62,7 +62,7 @@ async def test_a_stop_reaches_the_robot_of_another_console_once_and_is_answered(
 async def test_a_stop_that_nobody_answers_is_said_to_be_not_confirmed(
     server: RedisServer, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(redis_board, "STOP_PATIENCE", 0.5)
+    monkeypatch.setattr(stop_exchange, "STOP_PATIENCE", 0.5)
     async with running_board(server.url, "two") as two:
         await eventually(lambda: two.state.unknown_since is None)
         answers = await two.stop(["left"], new_press(ANN, "http", ""))
@@ -77,7 +77,7 @@ async def test_a_stop_that_nobody_answers_is_said_to_be_not_confirmed(
 async def test_a_flood_of_stops_keeps_nobody_elses_stop_from_the_robot(
     server: RedisServer, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(redis_board, "MAX_STOPS", 1)
+    monkeypatch.setattr(stop_exchange, "MAX_STOPS", 1)
     async with running_board(server.url, "one", tile("left")) as one, running_board(server.url, "two") as two:
         await eventually(two.others)
         flood = asyncio.create_task(two.stop(["nobodys"], new_press(Actor("Mallory"), "http", "")))

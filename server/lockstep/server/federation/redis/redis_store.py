@@ -10,8 +10,8 @@
 """
 
 import asyncio
-from collections.abc import AsyncIterator, Callable, Iterator, Sequence
-from contextlib import asynccontextmanager, contextmanager
+from collections.abc import AsyncIterator, Callable, Sequence
+from contextlib import asynccontextmanager
 from typing import Any
 from urllib.parse import urlsplit
 
@@ -19,31 +19,14 @@ from redis.asyncio import Redis
 from redis.asyncio.client import Pipeline, PubSub
 from redis.asyncio.retry import Retry
 from redis.backoff import NoBackoff
-from redis.exceptions import (
-    AuthenticationError,
-    AuthorizationError,
-    NoPermissionError,
-    OutOfMemoryError,
-    ReadOnlyError,
-    RedisError,
-    ResponseError,
-)
-from redis.exceptions import TimeoutError as RedisTimeout
+from redis.exceptions import RedisError
 
 from lockstep.server.federation.envelope import SIZE
-from lockstep.server.federation.errors import (
-    BoardError,
-    BoardFull,
-    BoardRefused,
-    BoardSilent,
-    BoardTrouble,
-    BoardUnreachable,
-    BoardWrongType,
-    InputTooLarge,
-)
+from lockstep.server.federation.errors import BoardError, BoardSilent
 from lockstep.server.federation.messages import MAX_PUBLISHED
 from lockstep.server.federation.other_consoles import MAX_CONSOLES
-from lockstep.server.federation.redis_private import AnswerTooLarge, BoundedParser
+from lockstep.server.federation.redis.redis_errors import RedisErrors
+from lockstep.server.federation.redis.redis_private import BoundedParser
 
 __all__ = ["RedisStore"]
 
@@ -68,7 +51,7 @@ class RedisStore:
 
     def __init__(self, url: str, timeout: float = TIMEOUT) -> None:
         self._timeout = timeout
-        self._password = urlsplit(url).password or ""
+        self._errors = RedisErrors(urlsplit(url).password or "", timeout)
         self._redis = Redis.from_url(
             url,
             protocol=2,
@@ -100,7 +83,7 @@ class RedisStore:
 
     async def shown(self, own: str, refused: Callable[[BoardError], None]) -> AsyncIterator[bytes]:
         """Yield the states of the other living consoles; call `refused` with errors of a single one."""
-        with self._named():
+        with self._errors.named():
             async with asyncio.timeout(self._timeout):
                 ids = await self._redis.zrevrange(CONSOLES, 0, MAX_CONSOLES)
         others = [each for each in ids if isinstance(each, bytes) and each != own.encode() and len(each) <= MAX_ID]
@@ -111,7 +94,7 @@ class RedisStore:
             found = await self._execute(commands)
         for each in found:
             try:
-                with self._named():
+                with self._errors.named():
                     if isinstance(each, RedisError):
                         raise each
             except BoardError as error:
@@ -133,7 +116,7 @@ class RedisStore:
 
     async def newest(self, limit: int) -> list[dict[bytes, bytes]]:
         """Return records, newest first."""
-        with self._named():
+        with self._errors.named():
             async with asyncio.timeout(self._timeout):
                 entries: list[Any] = await self._redis.xrevrange(AUDIT, count=limit) or []
         return [fields for _, fields in entries if fields]
@@ -147,13 +130,13 @@ class RedisStore:
             commands.publish(NEWS, news)
 
     async def revoked(self) -> list[bytes]:
-        with self._named():
+        with self._errors.named():
             async with asyncio.timeout(self._timeout):
                 found = await self._redis.zrevrange(REVOKED, 0, MAX_REVOKED - 1)
         return [each for each in found if isinstance(each, bytes)]
 
     async def tell(self, news: bytes) -> None:
-        with self._named():
+        with self._errors.named():
             async with asyncio.timeout(self._timeout):
                 await self._redis.publish(NEWS, news)
 
@@ -161,7 +144,7 @@ class RedisStore:
     async def news(self) -> AsyncIterator[AsyncIterator[bytes]]:
         """Subscribe while entered; yield an endless iterator over the news."""
         async with self._redis.pubsub() as channel:
-            with self._named():
+            with self._errors.named():
                 async with asyncio.timeout(self._timeout):
                     await channel.subscribe(NEWS)
                     await channel.get_message(timeout=self._timeout)  # the answer to the subscription
@@ -170,7 +153,7 @@ class RedisStore:
     async def _messages(self, channel: PubSub) -> AsyncIterator[bytes]:
         asked = False  # True while the answer to a ping is due
         while True:
-            with self._named():
+            with self._errors.named():
                 message = await channel.get_message(timeout=HEARTBEAT)
                 if message is None:
                     if asked:
@@ -184,7 +167,7 @@ class RedisStore:
     @asynccontextmanager
     async def _pipeline(self) -> AsyncIterator[Pipeline]:
         """Send commands together on leaving, for nothing but their effect; raise the first error."""
-        with self._named():
+        with self._errors.named():
             async with self._redis.pipeline(transaction=False) as commands:
                 yield commands
                 for each in await self._execute(commands):
@@ -198,33 +181,3 @@ class RedisStore:
         async with asyncio.timeout(self._timeout):
             answers: list[Any] = await commands.execute(raise_on_error=False)
         return answers
-
-    @contextmanager
-    def _named(self) -> Iterator[None]:
-        """Turn exceptions of redis-py into errors of the board."""
-        try:
-            yield
-        except (TimeoutError, RedisTimeout) as error:
-            raise BoardSilent(f"Redis did not answer within {self._timeout:g} s") from error
-        except AnswerTooLarge as error:
-            raise InputTooLarge(str(error)) from error
-        except (AuthenticationError, AuthorizationError, NoPermissionError) as error:
-            raise BoardRefused(self._words(error)) from error
-        except (OutOfMemoryError, ReadOnlyError) as error:
-            raise BoardFull(self._words(error)) from error
-        except ResponseError as error:
-            raise self._refusal(str(error)) from error
-        except (RedisError, OSError) as error:
-            raise BoardUnreachable(self._words(error)) from error
-
-    def _refusal(self, text: str) -> BoardTrouble:
-        kind = text.split(" ", 1)[0]
-        if kind == "WRONGTYPE":
-            return BoardWrongType("a key of this console holds another kind of value")
-        if kind in ("OOM", "MISCONF", "READONLY"):
-            return BoardFull(self._words(text))
-        return BoardRefused(self._words(text))
-
-    def _words(self, error: object) -> str:
-        text = str(error)[:200]
-        return text.replace(self._password, "…") if self._password else text

@@ -1,4 +1,4 @@
-"""Pins what `server/lockstep/server/federation/redis_private.py` leans on in redis-py."""
+"""Pins what `server/lockstep/server/federation/redis/redis_private.py` leans on in redis-py."""
 
 import inspect
 
@@ -6,7 +6,7 @@ from redis._parsers.base import _AsyncRESPBase
 from redis._parsers.resp2 import _AsyncRESP2Parser
 from redis.asyncio import Redis
 
-from lockstep.server.federation.redis_private import BoundedParser
+from lockstep.server.federation.redis.redis_private import BoundedParser
 
 
 def test_every_string_is_read_by_the_method_that_is_bounded() -> None:

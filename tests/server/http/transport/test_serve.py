@@ -1,0 +1,38 @@
+"""The server runs beside a block, and either may fail."""
+
+import asyncio
+from typing import Any, cast
+
+import pytest
+from starlette.applications import Starlette
+
+from lockstep.server.http.transport.acceptor import Acceptor
+from lockstep.server.http.transport.serve import bind, running
+from lockstep.server.http.transport.uvicorn_http_limits import BoundedConnections
+from tests.waiting import PATIENCE
+
+
+async def test_an_exception_of_the_block_comes_out_as_it_is() -> None:
+    async def run() -> None:
+        async with running(Starlette(), bind("127.0.0.1", 0)):
+            raise KeyError
+
+    async with asyncio.timeout(PATIENCE):
+        with pytest.raises(KeyError):
+            await run()
+
+
+async def test_a_server_that_accepts_nobody_any_more_cancels_the_block(monkeypatch: pytest.MonkeyPatch) -> None:
+    async def fail(acceptor: Acceptor) -> None:
+        raise ZeroDivisionError
+
+    async def run() -> None:
+        bounded = BoundedConnections(cast(Any, asyncio.Protocol), cast(Any, None), cast(Any, None))
+        async with running(Starlette(), bind("127.0.0.1", 0), http=bounded):
+            await asyncio.Event().wait()
+
+    monkeypatch.setattr(Acceptor, "run", fail)
+    async with asyncio.timeout(PATIENCE):
+        with pytest.raises(ExceptionGroup) as raised:
+            await run()
+    assert [type(each) for each in raised.value.exceptions] == [ZeroDivisionError]
