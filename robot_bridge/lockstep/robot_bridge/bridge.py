@@ -166,7 +166,7 @@ class Bridge:
             RobotFailed: the robot adapter raised at its first measurement; the next bridge begins stopped.
         """
         try:
-            self._core.begin(await self._keeper.open(self._now()))
+            self._core.stops.latch = await self._keeper.open(self._now())
             self._log.open()
             if self._lockout is not None:
                 await asyncio.to_thread(self._lockout.start)
@@ -180,7 +180,7 @@ class Bridge:
 
     def _begin(self) -> None:
         self._stops.begin()
-        stop = self._core.stop_state
+        stop = self._core.stops.state
         self._log.record("start", self._core.current, epoch=self.epoch, stopped=stop.stopped, number=stop.number)
         try:
             if self._shaper.has_goals:

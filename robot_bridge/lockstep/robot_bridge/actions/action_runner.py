@@ -144,7 +144,7 @@ class ActionRunner:
         if step.values is not None:
             if id != self._core.moving:
                 raise ValueError("an action that is not declared to move drives axes")
-            if (misfit := self._events.misfit(step.values)) is not None:
+            if (misfit := self._events.values.misfit(step.values)) is not None:
                 raise ValueError(f"an action drives axes with values that do not fit them: {' '.join(misfit)}")
             self._shaper.drive(step.values, self._core.renewed_at)
             self._drives = True
@@ -191,7 +191,12 @@ class ActionRunner:
     def _robot_now(self) -> RobotNow:
         now, events = self._now(), self._events
         return RobotNow(
-            now, events.current, events.stop_state, events.neutral_needed, events.warns(now) > 0, self._shaper.at_rest
+            now,
+            events.current,
+            events.stops.state,
+            events.interlock.needed,
+            events.interlock.warns(now) > 0,
+            self._shaper.at_rest,
         )
 
     # Telling
