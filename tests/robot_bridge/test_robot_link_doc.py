@@ -36,7 +36,7 @@ from lockstep.robot_bridge.link.link_session import (
     SILENCE,
     kind_of,
 )
-from lockstep.robot_bridge.link.outgoing_queues import ORDERED_DEPTH
+from lockstep.robot_bridge.link.sending.outgoing_queues import ORDERED_DEPTH
 from lockstep.robot_bridge.settings import BridgeSettings
 from lockstep.robot_bridge.watchdog.liveness import ALARM, EXIT_HUNG, LIMIT
 from tests.robot_bridge.bridge_helpers import running_bridge

@@ -13,8 +13,8 @@ from lockstep.protocol.link_secret import LinkSecret
 from lockstep.protocol.messages import Goodbye, Hello, LinkMessage, LinkRole, Media
 from lockstep.robot_bridge.link.link_session import BadInput, ClientSession, kind_of
 from lockstep.robot_bridge.link.link_transport import TICK_INTERVAL
-from lockstep.robot_bridge.link.outgoing_queues import MediaOutbox
 from lockstep.robot_bridge.link.pacing.paced_transport import PacedTransport
+from lockstep.robot_bridge.link.sending.outgoing_queues import MediaOutbox
 
 __all__ = ["RobotLink"]
 
@@ -137,7 +137,7 @@ class RobotLink:
 
     def fileno(self) -> int:
         """Return the socket's descriptor, to see whether data has come (select(2)); -1 without a socket."""
-        return self._transport.fileno()
+        return self._transport.output.fileno()
 
     async def deliver(self, take: Callable[[LinkMessage], None]) -> None:
         """Hand each message to `take` as it comes, within its turn of the event loop, until `close`.
@@ -254,7 +254,6 @@ class _ClientTransport(PacedTransport):
         self._link = link
         self.gone = asyncio.Event()
         self.gone.set()
-        self._waits_for_end = False  # of the bridge's side, after the goodbye
 
     def say_goodbye(self) -> None:
         """Say goodbye, and close when the bridge has closed.
@@ -262,19 +261,8 @@ class _ClientTransport(PacedTransport):
         To close with received data unread resets the connection, and the bridge would lose the goodbye that it has not
         read yet: it would keep the robot for this client, as after a broken link.
         """
-        self._waits_for_end = self._transport is not None and self._transport.can_write_eof()
+        self.output.waits_for_end = self._transport is not None and self._transport.can_write_eof()
         self.end("closing")
-
-    def _leave(self, transport: asyncio.Transport) -> None:
-        if self._waits_for_end:
-            try:
-                transport.write_eof()
-            except OSError:  # the bridge has reset the connection: nothing that was sent can still arrive
-                transport.close()
-                return
-            transport.resume_reading()
-        else:
-            super()._leave(transport)
 
     def data_received(self, data: bytes) -> None:
         if self.session.ended is None:
