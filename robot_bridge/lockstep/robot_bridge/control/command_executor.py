@@ -100,7 +100,7 @@ class CommandExecutor:
                 self._stops.reset(peer, message)
             case Act():
                 moved = self._actions.moving
-                self._actions.act(peer, message)
+                self._actions.act(message)
                 if self._actions.moving and not moved:  # the bridge may be killed before the next tick tells it
                     self._watchdogs.ticked(self._now(), moving=True)
             case ActionCancel():
