@@ -215,7 +215,7 @@ def without_the_secret(clock: Clock, data: bytes, code: int) -> None:
     peer = rig.connect()
     play(rig, clock, peer, data, code, MAX_HELLO_FRAME)
     check(peer.session.role is None, "somebody without the secret was admitted")
-    check(rig.bridge.event == 1 and not rig.bridge._core.stop_state.stopped, "somebody without the secret was heard")
+    check(rig.bridge.event == 1 and not rig.bridge._core.stops.state.stopped, "somebody without the secret was heard")
 
 
 def hostile_operator(clock: Clock, data: bytes, code: int) -> None:

@@ -62,16 +62,15 @@ def test_before_the_connection_nothing_is_written_and_there_is_nothing_to_close(
 
 def test_a_full_socket_keeps_messages_before_media_and_has_no_room() -> None:
     output = begun(transport := FakeTransport())
-    assert output.has_room
-    assert output.path_is_clear
+    assert (output.has_room, output.path_is_clear) == (True, True)
     output.pause(0.0)
-    assert not output.has_room
+    assert (output.has_room, output.path_is_clear) == (False, False)
     assert output.write_media(PICTURE, lambda: b"picture")
     output.write("pong", lambda: b"pong")
     assert transport.written == []
     output.resume()
     assert transport.written == [b"pong", b"picture"]
-    assert output.has_room
+    assert (output.has_room, output.path_is_clear) == (True, True)
 
 
 def test_only_a_full_socket_that_takes_nothing_hangs() -> None:
