@@ -30,6 +30,7 @@ TARGETS = {
             "lockstep.robot_bridge.link.link_server",
             "lockstep.robot_bridge.link.link_session",
             "lockstep.robot_bridge.link.link_transport",
+            "lockstep.robot_bridge.link.sending",
             "lockstep.protocol",
         ),
     ),

@@ -118,7 +118,7 @@ class BridgeModel:
         if not self.disk_fails:
             self._disk = Kept(latch=self.core_latch.record, ended=False)
             self._on_disk = version
-        outcome = self.core.written(version, "the disk is full" if self.disk_fails else "")
+        outcome = self.core.stops.written(version, "the disk is full" if self.disk_fails else "")
         out: list[LinkMessage] = []
         if isinstance(outcome, ResetTaken):
             self._released(outcome.number)
@@ -141,13 +141,13 @@ class BridgeModel:
 
     def lock(self, reason: str) -> None:
         self.witness.locked = True
-        given = self.core.lock_out(reason, self.now)
+        given = self.core.stops.lock_out(reason, self.now)
         if given is not None:
             self._note_stop(given.number)
 
     def unlock(self) -> None:
         self.witness.locked = False
-        if self.core.let_in():
+        if self.core.stops.let_in():
             self._cause()
 
     def restart(self, *, in_order: bool, file_lost: bool = False) -> None:
@@ -184,7 +184,7 @@ class BridgeModel:
         self.core = EventCore(AXES, max_event_age=MAX_AGE, first_event=self._first_event, nonces=self._draw)
         if reason:
             self.witness.stop(latch.stop("", "bridge", reason, self.now).number, self.now)
-        self.core.begin(latch)
+        self.core.stops.latch = latch
         self.issued.clear()
         self._cause()
         if self._keeps:  # a bridge does not start where it cannot write
@@ -199,7 +199,7 @@ class BridgeModel:
     def _command(self, command: Command) -> list[LinkMessage]:
         outcome = self.core.command(command, self.now)
         if isinstance(outcome, Executed):
-            moving = self.core.moves(outcome.values)
+            moving = self.core.values.moves(outcome.values)
             assert command.nonce in self.issued, "executed without having seen what it answers"
             self.witness.executed(moving=moving, answers=self.issued[command.nonce])
             self.driven = moving
@@ -212,7 +212,7 @@ class BridgeModel:
         return []
 
     def _stop(self, stop: Stop) -> list[LinkMessage]:
-        given = self.core.stop(stop.press, stop.by, stop.reason, self.now)
+        given = self.core.stops.stop(stop.press, stop.by, stop.reason, self.now)
         if given.is_new:
             self._note_stop(given.number)
         if stop.press:
@@ -230,7 +230,7 @@ class BridgeModel:
         return out
 
     def _reset(self, reset: Reset) -> list[LinkMessage]:
-        outcome = self.core.reset(reset.number, self.now)
+        outcome = self.core.stops.reset(reset.number, self.now)
         if isinstance(outcome, ResetTaken):
             self._released(outcome.number)
         elif isinstance(outcome, ResetRefused):
@@ -251,7 +251,7 @@ class BridgeModel:
 
     def _need_neutral(self) -> None:
         self.driven = False
-        self.core.need_neutral()
+        self.core.interlock.require()
         self._cause()
 
     def _cause(self) -> None:

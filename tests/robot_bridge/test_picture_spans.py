@@ -4,7 +4,7 @@ import msgspec
 
 from lockstep.protocol.messages import Media, decode_message
 from lockstep.protocol.traces.trace import PictureSpans
-from lockstep.robot_bridge.link.link_server import encode_waited
+from lockstep.robot_bridge.link.sending.link_publisher import encode_waited
 from lockstep.robot_bridge.media_sources import with_spans
 
 PICTURE = Media(stream="front", codec="mjpeg", stamp=3, time=10.0, payload=b"")

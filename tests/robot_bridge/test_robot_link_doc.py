@@ -26,17 +26,16 @@ from lockstep.protocol.messages import (
     decode_message,
     encode_message,
 )
+from lockstep.robot_bridge.link.heartbeats import PING_INTERVAL, SILENCE
 from lockstep.robot_bridge.link.link_acceptor import RATE
 from lockstep.robot_bridge.link.link_server import OPERATOR_READ_RATE, READ_BURST, READ_RATE
 from lockstep.robot_bridge.link.link_session import (
     FROM_CLIENT,
     FROM_ROBOT,
     HELLO_TIMEOUT,
-    PING_INTERVAL,
-    SILENCE,
     kind_of,
 )
-from lockstep.robot_bridge.link.outgoing_queues import ORDERED_DEPTH
+from lockstep.robot_bridge.link.sending.outgoing_queues import ORDERED_DEPTH
 from lockstep.robot_bridge.settings import BridgeSettings
 from lockstep.robot_bridge.watchdog.liveness import ALARM, EXIT_HUNG, LIMIT
 from tests.robot_bridge.bridge_helpers import running_bridge

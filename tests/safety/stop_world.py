@@ -280,7 +280,7 @@ class ConsoleModel:
         assert person == self.holder, "somebody drives without the seat"
         assert not self.keeper.presses.pending, "a command passed a stop"
         assert command.nonce in self._world.bridge.issued, "a command passed that has seen nothing"
-        if self._world.bridge.core.moves(outcome.command.values):
+        if self._world.bridge.core.values.moves(outcome.command.values):
             assert self.proven, "the desk let a moving command pass before a neutral one was executed"
         else:
             self._neutral = outcome.command.event

@@ -105,7 +105,7 @@ class StopLife(RuleBasedStateMachine):
         world.pump()
         world.wait(1.1)
         if late:  # the console let it pass when that stop was the newest
-            world.to_bridge["operator"].append(Reset(number=max(0, world.bridge.core.stop_state.number + offset)))
+            world.to_bridge["operator"].append(Reset(number=max(0, world.bridge.core.stops.state.number + offset)))
         else:
             world.reset("sue", offset)
         world.pump()
@@ -124,7 +124,7 @@ class StopLife(RuleBasedStateMachine):
         world.press(person)
         world.arrive("operator")
         world.wait(1.1)
-        world.to_bridge["operator"].append(Reset(number=world.bridge.core.stop_state.number))
+        world.to_bridge["operator"].append(Reset(number=world.bridge.core.stops.state.number))
         world.arrive("operator")
         world.write()
 
@@ -217,7 +217,7 @@ class StopLife(RuleBasedStateMachine):
 
     @rule(offset=st.sampled_from([-1, 0, 1]))
     def a_reset_that_was_held_up_arrives(self, offset: int) -> None:
-        number = max(0, self.world.bridge.core.stop_state.number + offset)
+        number = max(0, self.world.bridge.core.stops.state.number + offset)
         self.world.to_bridge["operator"].append(Reset(number=number))
 
     @rule(person=people)

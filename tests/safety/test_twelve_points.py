@@ -32,7 +32,8 @@ from lockstep.protocol.messages import (
 from lockstep.protocol.serial import event_after
 from lockstep.robot_bridge.control.event_core import Executed, Refused
 from lockstep.robot_bridge.control.limits.axis_shaper import AxisShaper
-from lockstep.robot_bridge.link.link_session import SILENCE, BridgeSession
+from lockstep.robot_bridge.link.heartbeats import SILENCE
+from lockstep.robot_bridge.link.link_session import BridgeSession
 from lockstep.robot_bridge.robots.planar.description import DESCRIPTION
 from tests.robot_bridge.bridge_helpers import (
     DRIVE,

@@ -128,15 +128,15 @@ class Bridge:
         self._dialer = None if settings.console is None else _dialer(settings.console, self._links)
         self._ticks = TickLoop(
             *(robot, description.hold, shaper, executor, self._stops),
-            *(self._watchdogs, self._liveness, self._links, alarm, counters),
+            *(self._watchdogs, self._liveness, self._links.publisher, alarm, counters),
             now,
         )
         self._sources = MediaSources(
-            *(robot, self._core, self._feedback, self._links, counters, self._log),
+            *(robot, self._core, self._feedback, self._links.publisher, counters, self._log),
             event_strip=settings.event_strip,
             encoding=encoding,
         )
-        self._maps = MapSender(robot, description, self._core, self._links, now)
+        self._maps = MapSender(robot, description, self._core, self._links.publisher, now)
         self._running: asyncio.Task[None] | None = None
         self._closed = False
 
@@ -166,7 +166,7 @@ class Bridge:
             RobotFailed: the robot adapter raised at its first measurement; the next bridge begins stopped.
         """
         try:
-            self._core.begin(await self._keeper.open(self._now()))
+            self._core.stops.latch = await self._keeper.open(self._now())
             self._log.open()
             if self._lockout is not None:
                 await asyncio.to_thread(self._lockout.start)
@@ -180,7 +180,7 @@ class Bridge:
 
     def _begin(self) -> None:
         self._stops.begin()
-        stop = self._core.stop_state
+        stop = self._core.stops.state
         self._log.record("start", self._core.current, epoch=self.epoch, stopped=stop.stopped, number=stop.number)
         try:
             if self._shaper.has_goals:
@@ -189,7 +189,7 @@ class Bridge:
         except BaseException as error:  # an adapter may raise one that ends the loop or cancels the task
             self._stops.fail(error)
             raise RobotFailed(named(error)) from error
-        self._links.publish_feedback(feedback)
+        self._links.publisher.publish_feedback(feedback)
         atexit.register(self._ticks.rest_at_exit)
         self._liveness.start(self._keeper.note_end)
         # No group of the caller: the ticks go on while the caller is cancelled, until `close` has brought the robot to
@@ -278,7 +278,7 @@ class Bridge:
 
     def _tell_failure(self) -> None:
         try:
-            self._links.publish_feedback(self._feedback.issue_failed(self._stops.failure))
+            self._links.publisher.publish_feedback(self._feedback.issue_failed(self._stops.failure))
         except Exception as error:
             _logger.error("the bridge cannot report the failure: %s", error, exc_info=error)
 

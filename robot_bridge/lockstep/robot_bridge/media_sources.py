@@ -15,7 +15,7 @@ from lockstep.robot_bridge.control.feedback_issuer import FeedbackIssuer
 from lockstep.robot_bridge.counters import BridgeCounters
 from lockstep.robot_bridge.encoding.media_encoding import MediaEncoding
 from lockstep.robot_bridge.event_log import EventLog
-from lockstep.robot_bridge.link.link_server import LinkServer
+from lockstep.robot_bridge.link.sending.link_publisher import LinkPublisher
 from lockstep.robot_bridge.robots.base import MediaSource, Robot, Stamp
 
 __all__ = ["MediaSources"]
@@ -31,7 +31,7 @@ class MediaSources:
         robot: Robot,
         core: EventCore,
         feedback: FeedbackIssuer,
-        links: LinkServer,
+        publisher: LinkPublisher,
         counters: BridgeCounters,
         log: EventLog,
         *,
@@ -43,13 +43,13 @@ class MediaSources:
         self._times = feedback.times
         self._stamper = _Stamper(core, feedback.times)
         self._feedback = feedback
-        self._links = links
+        self._publisher = publisher
         self._counters = counters
         self._log = log
         self._mark = _marker() if event_strip else None
         self._encoding = encoding
         if encoding is not None:
-            encoding.send_to(links)
+            encoding.send_to(publisher)
 
     async def run(self) -> None:
         """Run the sources until cancelled, or until all have ended."""
@@ -86,7 +86,7 @@ class MediaSources:
             media = with_spans(media, self._times.began(media.stamp), time.monotonic())
         marked = media if self._mark is None else self._mark(media)
         if self._encoding is None:
-            self._links.publish_media(marked)
+            self._publisher.publish_media(marked)
         else:
             self._encoding.put(marked)
 

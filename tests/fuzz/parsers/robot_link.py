@@ -33,9 +33,10 @@ from lockstep.protocol.messages import (
 )
 from lockstep.protocol.serial import event_after, event_gap
 from lockstep.robot_bridge.bridge import Bridge
+from lockstep.robot_bridge.link.heartbeats import SILENCE
 from lockstep.robot_bridge.link.link_acceptor import LinkAcceptor
 from lockstep.robot_bridge.link.link_server import LinkPeer
-from lockstep.robot_bridge.link.link_session import HELLO_TIMEOUT, SILENCE, ClientSession
+from lockstep.robot_bridge.link.link_session import HELLO_TIMEOUT, ClientSession
 from lockstep.robot_bridge.link.link_transport import TICK_INTERVAL
 from lockstep.robot_bridge.robots.planar.robot import PlanarRobot
 from lockstep.robot_bridge.settings import BridgeSettings
@@ -214,7 +215,7 @@ def without_the_secret(clock: Clock, data: bytes, code: int) -> None:
     peer = rig.connect()
     play(rig, clock, peer, data, code, MAX_HELLO_FRAME)
     check(peer.session.role is None, "somebody without the secret was admitted")
-    check(rig.bridge.event == 1 and not rig.bridge._core.stop_state.stopped, "somebody without the secret was heard")
+    check(rig.bridge.event == 1 and not rig.bridge._core.stops.state.stopped, "somebody without the secret was heard")
 
 
 def hostile_operator(clock: Clock, data: bytes, code: int) -> None:

@@ -7,7 +7,8 @@ import pytest
 from lockstep.protocol.actions import Act, ActionUpdate
 from lockstep.protocol.description import Action, ActionParameter
 from lockstep.protocol.messages import StopState
-from lockstep.robot_bridge.actions.action_core import MAX_REMEMBERED, ActionCore, Begun, RobotNow
+from lockstep.robot_bridge.actions.action_core import ActionCore, Begun, RobotNow
+from lockstep.robot_bridge.actions.request_outcomes import MAX_REMEMBERED
 
 HOLD = 0.3
 AGE = 2.0
@@ -44,7 +45,7 @@ def ask(core: ActionCore, request: Act, state: RobotNow | None = None) -> str:
 
 
 def running(core: ActionCore) -> list[str]:
-    return [each.id for each in core.newest() if each.state == "running"]
+    return [each.id for each in core.outcomes.newest() if each.state == "running"]
 
 
 def reasons(updates: list[ActionUpdate]) -> list[str]:
@@ -205,7 +206,7 @@ def test_newcomers_hear_of_all_that_runs_and_of_the_newest_others() -> None:
     ask(core, act("home", "first"))
     for number in range(40):
         ask(core, act("dock", f"n{number}"))
-    newest = core.newest()
+    newest = core.outcomes.newest()
     assert newest[0].id == "first"
     assert newest[-1].id == "n39"
     assert len(newest) == 17

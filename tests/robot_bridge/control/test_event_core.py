@@ -190,7 +190,7 @@ def test_a_stop_is_fed_back_at_once_also_while_an_answer_waits() -> None:
             core.issue(MEASURED, now)
     assert core.pending == 5
     assert not core.issue_due(now + 0.001)
-    core.stop("", "Ada", "", now + 0.001)
+    core.stops.stop("", "Ada", "", now + 0.001)
     assert core.issue_due(now + 0.001)
 
 
@@ -212,14 +212,14 @@ def test_anything_but_one_value_per_axis_is_refused(values: list[float]) -> None
 
 def test_bad_values_are_refused_before_anything_else_is_said() -> None:
     core = core_at()
-    core.stop("", "Ada", "", 90.0)
+    core.stops.stop("", "Ada", "", 90.0)
     assert reason(core.command(command(2, values=[math.nan, 0.0]), 100.0)) == "not_a_number"
     assert reason(core.command(command(2, values=[]), 100.0)) == "wrong_size"
 
 
 def test_while_stopped_every_command_is_refused_neutral_and_repeated_ones_too() -> None:
     core = core_at()
-    core.stop("", "Ada", "smoke", 90.0)
+    core.stops.stop("", "Ada", "smoke", 90.0)
     for event, values in ((1, None), (2, None), (2, NEUTRAL), (7, None)):
         outcome = core.command(command(event, values=values), 100.0)
         assert isinstance(outcome, Refused)
@@ -228,55 +228,55 @@ def test_while_stopped_every_command_is_refused_neutral_and_repeated_ones_too() 
 
 def test_the_stop_is_in_every_feedback_and_causes_one_at_once() -> None:
     core = core_at()
-    core.stop("ab12", "Ada", "smoke", 100.0)
+    core.stops.stop("ab12", "Ada", "smoke", 100.0)
     assert core.issue_due(100.0)
     told = core.issue(MEASURED, 100.0).stop
     assert told == StopState(stopped=True, by="Ada", reason="smoke", number=1, press="ab12", kept=False)
-    assert core.stop_state == told
+    assert core.stops.state == told
 
 
 def test_a_second_stop_has_a_number_of_its_own_and_leaves_the_first_reason() -> None:
     core = core_at()
-    assert core.stop("", "Ada", "smoke", 100.0) == StopGiven(1, is_new=True, latched=True)
+    assert core.stops.stop("", "Ada", "smoke", 100.0) == StopGiven(1, is_new=True, latched=True)
     core.issue(MEASURED, 100.0)
-    assert core.stop("", "Bob", "fire", 100.1) == StopGiven(2, is_new=True, latched=False)
+    assert core.stops.stop("", "Bob", "fire", 100.1) == StopGiven(2, is_new=True, latched=False)
     assert core.issue_due(100.1)
-    assert (core.stop_state.by, core.stop_state.reason, core.stop_state.number) == ("Ada", "smoke", 2)
+    assert (core.stops.state.by, core.stops.state.reason, core.stops.state.number) == ("Ada", "smoke", 2)
 
 
 def test_a_repeat_of_a_press_changes_nothing() -> None:
     core = core_at()
-    core.stop("ab12", "Ada", "smoke", 100.0)
+    core.stops.stop("ab12", "Ada", "smoke", 100.0)
     core.issue(MEASURED, 100.0)
-    assert core.stop("ab12", "Ada", "smoke", 100.1) == StopGiven(1, is_new=False, latched=False)
+    assert core.stops.stop("ab12", "Ada", "smoke", 100.1) == StopGiven(1, is_new=False, latched=False)
     assert not core.issue_due(100.1)
 
 
 def test_a_press_that_was_reset_is_a_repeat_until_the_robot_may_move_and_then_a_new_stop() -> None:
     core = core_at()
-    core.stop("ab12", "Ada", "", 100.0)
+    core.stops.stop("ab12", "Ada", "", 100.0)
     core.issue(MEASURED, 100.0)
-    core.reset(1, 101.0)
+    core.stops.reset(1, 101.0)
     core.issue(MEASURED, 101.0)
-    assert core.stop("ab12", "Ada", "", 101.0) == StopGiven(1, is_new=False, latched=False)
+    assert core.stops.stop("ab12", "Ada", "", 101.0) == StopGiven(1, is_new=False, latched=False)
     core.command(command(2, issue=3, values=NEUTRAL), 101.0)
-    assert core.stop("ab12", "Eve", "", 101.1) == StopGiven(2, is_new=True, latched=True)
-    assert core.stop("ab12", "Eve", "", 101.2) == StopGiven(2, is_new=False, latched=False)
+    assert core.stops.stop("ab12", "Eve", "", 101.1) == StopGiven(2, is_new=True, latched=True)
+    assert core.stops.stop("ab12", "Eve", "", 101.2) == StopGiven(2, is_new=False, latched=False)
 
 
 def test_an_event_that_was_pending_at_the_stop_still_gets_its_feedback() -> None:
     core = core_at()
     core.command(command(2), 100.0)
-    core.stop("", "Ada", "", 100.0)
+    core.stops.stop("", "Ada", "", 100.0)
     feedback = core.issue(MEASURED, 100.0)
     assert (feedback.event, feedback.stop.stopped) == (2, True)
 
 
 def test_reset_releases_the_stop_causes_an_issue_and_moves_nothing_before_a_neutral_command() -> None:
     core = core_at()
-    core.stop("", "Ada", "", 100.0)
+    core.stops.stop("", "Ada", "", 100.0)
     core.issue(MEASURED, 100.0)
-    assert core.reset(1, 101.0) == ResetTaken(1)
+    assert core.stops.reset(1, 101.0) == ResetTaken(1)
     assert core.issue_due(101.0)
     feedback = core.issue(MEASURED, 101.0)
     assert (feedback.stop.stopped, feedback.stop.number, feedback.neutral_needed) == (False, 1, True)
@@ -289,33 +289,33 @@ def test_reset_releases_the_stop_causes_an_issue_and_moves_nothing_before_a_neut
 def test_a_stop_that_no_feedback_has_shown_cannot_be_reset() -> None:
     core = core_at()
     core.issue(MEASURED, 100.0)
-    core.stop("", "Ada", "", 100.0)
-    outcome = core.reset(1, 101.2)
+    core.stops.stop("", "Ada", "", 100.0)
+    outcome = core.stops.reset(1, 101.2)
     assert isinstance(outcome, ResetRefused)
     assert outcome.reason == "too_soon"
     core.issue(MEASURED, 101.2)
-    assert core.reset(1, 101.2) == ResetTaken(1)
+    assert core.stops.reset(1, 101.2) == ResetTaken(1)
 
 
 @pytest.mark.parametrize("tick_first", [True, False])
 def test_a_reset_that_waited_while_the_bridge_was_held_up_has_no_effect(tick_first: bool) -> None:
     core = core_at()
-    core.stop("", "Ada", "", 100.0)
+    core.stops.stop("", "Ada", "", 100.0)
     core.issue(MEASURED, 100.0)
     woken = 4000.0
     if tick_first:
         core.issue(MEASURED, woken)
-    outcome = core.reset(1, woken)
+    outcome = core.stops.reset(1, woken)
     assert isinstance(outcome, ResetRefused)
     assert outcome.reason == "too_soon"
     core.issue(MEASURED, woken)
-    assert isinstance(core.reset(1, woken + 0.9), ResetRefused)
-    assert core.reset(1, woken + 1.1) == ResetTaken(1)
+    assert isinstance(core.stops.reset(1, woken + 0.9), ResetRefused)
+    assert core.stops.reset(1, woken + 1.1) == ResetTaken(1)
 
 
 def test_reset_without_a_stop_changes_nothing() -> None:
     core = core_at()
-    assert core.reset(0, 100.0) == ResetNeedless(0)
+    assert core.stops.reset(0, 100.0) == ResetNeedless(0)
     assert not core.issue_due(100.0)
 
 
@@ -331,25 +331,25 @@ def test_a_robot_that_was_never_told_a_neutral_command_does_not_move() -> None:
 def test_whatever_asks_for_a_neutral_command_is_fed_back_at_once(cause: str) -> None:
     core = core_at()
     if cause == "let_in":
-        core.lock_out("key switch", 100.0)
+        core.stops.lock_out("key switch", 100.0)
         core.issue(MEASURED, 100.0)
     match cause:
         case "need_neutral":
-            core.need_neutral()
+            core.interlock.require()
         case "lock_out":
-            core.lock_out("key switch", 100.0)
+            core.stops.lock_out("key switch", 100.0)
         case "let_in":
-            core.let_in()
+            core.stops.let_in()
         case _:
-            core.stop("", "Ada", "", 100.0)
-    assert core.neutral_needed
+            core.stops.stop("", "Ada", "", 100.0)
+    assert core.interlock.needed
     assert core.issue_due(100.0)
     assert core.issue(MEASURED, 100.0).neutral_needed
 
 
 def test_a_neutral_command_decided_before_the_cause_executes_and_clears_nothing() -> None:
     core = core_at()
-    core.need_neutral()
+    core.interlock.require()
     assert reason(core.command(command(2, values=NEUTRAL), 100.0)) == "executed"
     assert core.issue(MEASURED, 100.0).neutral_needed
     assert reason(core.command(command(3, values=NEUTRAL), 100.0)) == "executed"
@@ -360,7 +360,7 @@ def test_a_neutral_command_that_is_refused_clears_nothing() -> None:
     core = fresh_core()
     assert reason(core.command(command(3, values=NEUTRAL), 100.0)) == "out_of_order"
     assert reason(core.command(command(2, values=NEUTRAL), 110.0)) == "late"
-    assert core.neutral_needed
+    assert core.interlock.needed
 
 
 @pytest.mark.parametrize("nonce", [0, NONCE + 1, 2**53 - 1])

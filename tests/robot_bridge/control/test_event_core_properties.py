@@ -48,7 +48,7 @@ class BridgeLife(RuleBasedStateMachine):
         self.deliver(data.draw(st.sampled_from(self.sent[-12:])))
 
     def deliver(self, command: Command) -> None:
-        stopped, pending, current = self.core.stop_state.stopped, self.core.pending, self.core.current
+        stopped, pending, current = self.core.stops.state.stopped, self.core.pending, self.core.current
         outcome = self.core.command(command, self.now)
         if isinstance(outcome, Answered):
             assert outcome.feedback.event == command.event == current
@@ -82,11 +82,11 @@ class BridgeLife(RuleBasedStateMachine):
 
     @rule()
     def somebody_stops(self) -> None:
-        self.core.stop("", "someone", "", self.now)
+        self.core.stops.stop("", "someone", "", self.now)
 
     @rule()
     def somebody_resets(self) -> None:
-        self.core.reset(self.core.stop_state.number, self.now)
+        self.core.stops.reset(self.core.stops.state.number, self.now)
 
     @rule(copies=st.integers(2, 4), moves=values)
     def the_network_freezes_a_command_and_its_copies(self, copies: int, moves: list[float]) -> None:

@@ -1,4 +1,5 @@
 from lockstep.protocol.description import StartWarning
+from lockstep.robot_bridge.control.issue_schedule import IssueSchedule
 from lockstep.robot_bridge.control.restart_interlock import SILENCE, RestartInterlock
 
 WARNING = StartWarning(seconds=1.5, axis="lamp", value=1.0)
@@ -9,7 +10,7 @@ def armed(interlock: RestartInterlock, now: float) -> None:
 
 
 def test_nothing_moves_before_the_first_neutral_command() -> None:
-    interlock = RestartInterlock()
+    interlock = RestartInterlock(IssueSchedule())
     assert interlock.refuses(1.0) == "not_neutral"
     armed(interlock, 1.0)
     assert interlock.refuses(1.0) is None
@@ -17,22 +18,32 @@ def test_nothing_moves_before_the_first_neutral_command() -> None:
 
 
 def test_a_neutral_command_of_an_earlier_spell_clears_nothing() -> None:
-    interlock = RestartInterlock()
+    interlock = RestartInterlock(IssueSchedule())
     earlier = interlock.spell
     interlock.require()
     interlock.executed(moving=False, spell=earlier, now=1.0)
     assert interlock.refuses(1.0) == "not_neutral"
 
 
+def test_each_cause_wants_a_feedback_that_tells_it() -> None:
+    schedule = IssueSchedule()
+    interlock = RestartInterlock(schedule)
+    schedule.issued(1.0, answers=False)
+    assert not schedule.due(1.1)
+    interlock.require()
+    assert schedule.due(1.1)
+
+
 def test_without_a_warning_silence_asks_for_nothing() -> None:
-    interlock = RestartInterlock()
+    interlock = RestartInterlock(IssueSchedule())
     armed(interlock, 1.0)
-    assert not interlock.look(1000.0)
+    interlock.look(1000.0)
+    assert not interlock.needed
     assert interlock.warns(1.0) == 0
 
 
 def test_a_robot_that_warns_refuses_motion_for_its_seconds_and_says_how_much_is_left() -> None:
-    interlock = RestartInterlock(WARNING)
+    interlock = RestartInterlock(IssueSchedule(), WARNING)
     assert interlock.warns(10.0) == 0, "nobody has armed"
     armed(interlock, 10.0)
     assert interlock.warns(10.5) == 1.0
@@ -42,24 +53,27 @@ def test_a_robot_that_warns_refuses_motion_for_its_seconds_and_says_how_much_is_
 
 
 def test_further_neutral_commands_neither_lengthen_nor_shorten_the_warning() -> None:
-    interlock = RestartInterlock(WARNING)
+    interlock = RestartInterlock(IssueSchedule(), WARNING)
     armed(interlock, 10.0)
     armed(interlock, 11.0)
     assert interlock.refuses(11.5) is None
 
 
 def test_after_two_silent_seconds_a_robot_that_warns_does_so_again() -> None:
-    interlock = RestartInterlock(WARNING)
+    interlock = RestartInterlock(IssueSchedule(), WARNING)
     armed(interlock, 10.0)
     interlock.executed(moving=True, spell=interlock.spell, now=11.6)
-    assert not interlock.look(11.6 + SILENCE)
-    assert interlock.look(11.7 + SILENCE)
+    interlock.look(11.6 + SILENCE)
+    assert not interlock.needed
+    interlock.look(11.7 + SILENCE)
     assert interlock.refuses(11.7 + SILENCE) == "not_neutral"
-    assert not interlock.look(100.0), "said once"
+    spell = interlock.spell
+    interlock.look(100.0)
+    assert interlock.spell == spell, "said once"
 
 
 def test_whatever_comes_during_the_warning_ends_it() -> None:
-    interlock = RestartInterlock(WARNING)
+    interlock = RestartInterlock(IssueSchedule(), WARNING)
     armed(interlock, 10.0)
     interlock.require()
     assert interlock.warns(10.1) == 0

@@ -20,7 +20,8 @@ from lockstep.protocol.messages import (
     Rest,
     encode_message,
 )
-from lockstep.robot_bridge.link.link_client import MAX_INBOX, RobotLink
+from lockstep.robot_bridge.link.link_client import RobotLink
+from lockstep.robot_bridge.link.link_inbox import MAX_INBOX
 from lockstep.robot_bridge.robots.planar.description import DESCRIPTION
 from tests.robot_bridge.bridge_helpers import RecordingRobot, operator, running_bridge
 

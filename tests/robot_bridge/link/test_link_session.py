@@ -20,12 +20,11 @@ from lockstep.protocol.messages import (
     Stop,
     encode_message,
 )
+from lockstep.robot_bridge.link.heartbeats import PING_INTERVAL, SILENCE
 from lockstep.robot_bridge.link.link_session import (
     FROM_CLIENT,
     FROM_ROBOT,
     HELLO_TIMEOUT,
-    PING_INTERVAL,
-    SILENCE,
     BadInput,
     BridgeSession,
     ClientSession,

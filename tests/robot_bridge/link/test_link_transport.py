@@ -111,12 +111,12 @@ def test_while_the_socket_is_full_only_the_newest_of_each_kind_waits() -> None:
     end.pause_writing()
     for event in range(1, 6):
         end.send(feedback(event))
-        end.send_media(picture(event), lambda event=event: frame(encode_message(picture(event))))  # type: ignore[misc]
+        end.output.write_media(picture(event), lambda event=event: frame(encode_message(picture(event))))  # type: ignore[misc]
     end.hear(Ping(id=1), Ping(id=2))
     assert end.tcp.written() == []
     end.resume_writing()
     assert end.tcp.written() == [feedback(5), Pong(id=2), picture(5)]
-    assert end.drops == {"feedback": 4, "pong": 1, "a": 4}
+    assert end.output.drops == {"feedback": 4, "pong": 1, "a": 4}
 
 
 def test_a_peer_that_takes_nothing_for_a_second_is_dropped() -> None:
@@ -148,7 +148,7 @@ def test_the_goodbye_is_the_last_message_and_the_link_is_lost_once() -> None:
     end = opened()
     end.end("closing", "bye")
     end.send(feedback(1))
-    end.send_media(picture(1), lambda: b"")
+    end.output.write_media(picture(1), lambda: b"")
     end.end("again")
     assert end.tcp.written() == [Goodbye(error="closing", detail="bye")]
     assert end.tcp.closed
@@ -215,7 +215,7 @@ def test_a_picture_that_waits_is_encoded_when_the_socket_takes_it() -> None:
         return frame(encode_message(picture(1)))
 
     end.pause_writing()
-    end.send_media(picture(1), make)
+    end.output.write_media(picture(1), make)
     assert made == []
     end.resume_writing()
     assert made == [1]

@@ -68,7 +68,7 @@ class Rig:
         self.shaper.drive([0.4, 0.0, 0.0], self.now)
         self.shaper.step(self.now, 0.1)
         self.stops.stop(self.peer, Stop(by="ann", reason="seen", press=f"press at {self.now}"))
-        return self.core.stop_state.number
+        return self.core.stops.state.number
 
     def reset(self, number: int) -> None:
         for _ in range(20):  # a stop is released only when feedback has shown it for a while
@@ -113,17 +113,17 @@ async def test_a_reset_of_another_stop_is_refused_and_counted() -> None:
     [*_, refused] = rig.client.heard
     assert isinstance(refused, Refusal)
     assert rig.counters.refusals == {refused.reason: 1}
-    assert rig.core.stop_state.stopped
+    assert rig.core.stops.state.stopped
 
 
 async def test_a_lock_at_the_robot_stops_it() -> None:
     rig = Rig()
     rig.robot.lock = "the key switch"
     rig.stops.look(rig.now)
-    assert (rig.core.stop_state.stopped, rig.core.stop_state.locked_out) == (True, "the key switch")
+    assert (rig.core.stops.state.stopped, rig.core.stops.state.locked_out) == (True, "the key switch")
     rig.robot.lock = ""
     rig.stops.look(rig.now)
-    assert (rig.core.stop_state.stopped, rig.core.stop_state.locked_out) == (True, "")
+    assert (rig.core.stops.state.stopped, rig.core.stops.state.locked_out) == (True, "")
 
 
 async def test_only_the_first_failure_counts() -> None:
@@ -131,4 +131,4 @@ async def test_only_the_first_failure_counts() -> None:
     rig.stops.fail(OSError("first"))
     rig.stops.fail(OSError("second"))
     assert rig.stops.failure == "robot failed: OSError: first"
-    assert rig.core.stop_state.reason == rig.stops.failure
+    assert rig.core.stops.state.reason == rig.stops.failure

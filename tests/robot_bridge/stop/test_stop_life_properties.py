@@ -138,15 +138,15 @@ class StopLife(RuleBasedStateMachine):
     @invariant()
     def nothing_moves_while_a_stop_holds(self) -> None:
         assert not (self.bridge.driven and self.bridge.witness.holds)
-        assert self.bridge.core.stop_state.stopped == self.bridge.witness.holds
+        assert self.bridge.core.stops.state.stopped == self.bridge.witness.holds
 
     @invariant()
     def what_is_said_to_be_kept_is_on_the_disk(self) -> None:
-        if self.bridge.core.stop_state.kept:
+        if self.bridge.core.stops.state.kept:
             disk = self.bridge.disk
             assert disk is not None
             assert disk.latch.stopped == self.bridge.witness.holds
-            assert disk.latch.number == self.bridge.core.stop_state.number
+            assert disk.latch.number == self.bridge.core.stops.state.number
 
 
 StopLife.TestCase.settings = settings(max_examples=150, stateful_step_count=60, deadline=None)

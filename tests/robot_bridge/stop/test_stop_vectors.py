@@ -30,15 +30,15 @@ class Player:
                 assert self.core.issue_due(now)
                 self.issues.append(self.core.issue(MEASURED, now))
             case "link":
-                self.core.need_neutral()
+                self.core.interlock.require()
             case "stop":
-                number = self.core.stop(step["press"], "", "", now).number
+                number = self.core.stops.stop(step["press"], "", "", now).number
                 if number not in self.numbers:
                     assert number > self.numbers[-1]
                     self.numbers.append(number)
                 return self.numbers.index(number)
             case "reset":
-                outcome = self.core.reset(self.numbers[step["stop"]], now)
+                outcome = self.core.stops.reset(self.numbers[step["stop"]], now)
                 if isinstance(outcome, ResetRefused):
                     return outcome.reason
                 return "nothing" if isinstance(outcome, ResetNeedless) else "taken"

@@ -2,7 +2,7 @@
 
 from lockstep.protocol.console import Seat, SeatRequest
 from lockstep.protocol.messages import Command, Feedback
-from lockstep.robot_bridge.control.event_core import BURST
+from lockstep.robot_bridge.control.issue_schedule import BURST
 from tests.server.rig import TestPeer, running_rig
 
 COMMANDS = 20

@@ -6,7 +6,6 @@ the run of this action has to be cancelled now. Rules and reasons: docs/robot-li
 """
 
 import math
-from collections import OrderedDict
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -16,14 +15,13 @@ from lockstep.protocol.actions import Act, ActionReason, ActionState, ActionUpda
 from lockstep.protocol.description import Action
 from lockstep.protocol.messages import StopState
 from lockstep.robot_bridge.actions.parameters import parameters_of
+from lockstep.robot_bridge.actions.recent_feedback import RecentFeedback
+from lockstep.robot_bridge.actions.request_outcomes import RequestOutcomes
 from lockstep.robot_bridge.errors import BadParameter
 
 __all__ = ["ActionCore", "Begun", "RobotNow", "Told"]
 
-MAX_REMEMBERED = 256  # requests whose outcome is known
 MAX_RUNNING = 8
-MAX_NONCES = 1024  # of the newest feedbacks; a forgotten one counts as late
-TOLD_TO_NEWCOMERS = 16  # newest requests
 PROGRESS_INTERVAL = 0.2  # s between two updates of progress alone
 SAME_EVERY_TIME = ("unknown_action", "bad_parameter", "late")  # a repeat gets these again without being remembered
 
@@ -53,22 +51,19 @@ class Told(NamedTuple):
     update: ActionUpdate
 
 
-class _Seen(NamedTuple):
-    time: float  # s, when the feedback was issued
-    spell: int
-
-
 class ActionCore:
-    """Each id begins at most once. At most one action that moves the robot runs, and only while it is renewed."""
+    """Each id begins at most once. At most one action that moves the robot runs, and only while it is renewed.
+
+    Attributes:
+        outcomes: what became of each request
+    """
 
     def __init__(self, actions: Sequence[Action], *, hold: float, max_event_age: float) -> None:
         self._actions = {action.name: action for action in actions}
         self._hold = hold
-        self._max_event_age = max_event_age
-        self._updates: OrderedDict[str, tuple[float, ActionUpdate]] = OrderedDict()  # by id, with the time of request
+        self.outcomes = RequestOutcomes(max_event_age)
+        self._feedback = RecentFeedback(max_event_age)
         self._running: dict[str, float] = {}  # ids that run -> s, when their progress was told last
-        self._nonces: OrderedDict[int, _Seen] = OrderedDict()  # oldest first
-        self._spell = 1  # counts the causes that void requests of before
         self._moving = ""
         self._renewed_at = -math.inf
 
@@ -82,30 +77,14 @@ class ActionCore:
         """The time (s) at which the moving action began or was renewed last."""
         return self._renewed_at
 
-    def newest(self) -> list[ActionUpdate]:
-        """Return the updates that a newcomer is told: all that run, and the newest others, oldest first."""
-        known = [update for _, update in self._updates.values()]
-        late = len(known) - TOLD_TO_NEWCOMERS
-        return [each for index, each in enumerate(known) if index >= late or each.id in self._running]
-
-    def remembers(self, id: str) -> bool:
-        """True if a copy of this request is answered with what became of it, and a newcomer may be told."""
-        return id in self._updates
-
     def issued(self, nonce: int, now: float) -> None:
         """Note a feedback: for `max_event_age` requests may answer it."""
-        self._nonces[nonce] = _Seen(now, self._spell)
-        if len(self._nonces) > MAX_NONCES:
-            self._nonces.popitem(last=False)
-
-    def void(self) -> None:
-        """Let no request for a motion begin that was decided before now."""
-        self._spell += 1
+        self._feedback.issued(nonce, now)
 
     def request(self, act: Act, robot: RobotNow) -> Begun | Told:
         """Decide about a request that arrived now."""
-        if (known := self._updates.get(act.id)) is not None:
-            return Told(known[1])
+        if act.id in self.outcomes:
+            return Told(self.outcomes[act.id])
         action = self._actions.get(act.name)
         if action is None:
             return self._refuse(act, robot, "unknown_action")
@@ -113,9 +92,9 @@ class ActionCore:
             parameters = parameters_of(action, act.parameters)
         except BadParameter as error:
             return self._refuse(act, robot, "bad_parameter", error.detail)
-        if not self._make_room(robot.now):
+        if not self.outcomes.make_room(robot.now):
             # Without this, a later copy of a refused request could begin: its id is not remembered.
-            self._nonces.clear()
+            self._feedback.forget()
             return self._refuse(act, robot, "too_often")
         if (reason := self._why_not(act, action, robot)) is not None:
             return self._refuse(act, robot, reason, robot.stop.reason if reason == "stopped" else "")
@@ -128,7 +107,7 @@ class ActionCore:
             began=robot.event,
             by=act.by,
         )
-        self._updates[act.id] = robot.now, update
+        self.outcomes.add(update, robot.now)
         self._running[act.id] = robot.now
         if action.moves:
             self._moving, self._renewed_at = act.id, robot.now
@@ -141,12 +120,9 @@ class ActionCore:
             return "stopped"
         if action.moves and robot.neutral_needed:
             return "not_neutral"
-        seen = self._nonces.get(act.nonce)
-        if seen is None or robot.now - seen.time > self._max_event_age:
+        if not self._feedback.is_answered_in_time(act.nonce, robot.now, moves=action.moves):
             return "late"
-        if action.moves and seen.spell != self._spell:
-            return "late"
-        if len(self._running) >= MAX_RUNNING or any(self._updates[id][1].name == act.name for id in self._running):
+        if len(self._running) >= MAX_RUNNING or any(self.outcomes[id].name == act.name for id in self._running):
             return "busy"
         if action.moves and self._moving:
             return "busy"
@@ -175,7 +151,7 @@ class ActionCore:
 
     def interrupt(self, reason: ActionReason, event: int) -> list[ActionUpdate]:
         """Cancel the moving action, and void requests for a motion that were decided before."""
-        self.void()
+        self._feedback.void()
         return self._end([self._moving] if self._moving else [], "cancelled", reason, event)
 
     def cancel(self, id: str, event: int) -> list[ActionUpdate]:
@@ -188,7 +164,7 @@ class ActionCore:
         """Note how far a running action is. Return the update if it is time to tell it."""
         if id not in self._running:
             return None
-        asked, before = self._updates[id]
+        before = self.outcomes[id]
         progress = min(max(progress, 0.0), 1.0) if math.isfinite(progress) else before.progress
         if (progress, text) == (before.progress, before.text):
             return None
@@ -196,7 +172,7 @@ class ActionCore:
             return None
         self._running[id] = robot.now
         update = msgspec.structs.replace(before, progress=progress, text=text[:500], event=robot.event)
-        self._updates[id] = asked, update
+        self.outcomes.replace(update)
         return update
 
     def finish(
@@ -211,12 +187,12 @@ class ActionCore:
     ) -> list[ActionUpdate]:
         ended = []
         for id in ids:
-            asked, before = self._updates[id]
+            before = self.outcomes[id]
             progress = 1.0 if state == "done" else before.progress
             update = msgspec.structs.replace(
                 before, state=state, reason=reason, progress=progress, text=(text or before.text)[:500], event=event
             )
-            self._updates[id] = asked, update
+            self.outcomes.replace(update)
             del self._running[id]
             if id == self._moving:
                 self._moving = ""
@@ -236,14 +212,5 @@ class ActionCore:
             by=act.by,
         )
         if reason not in SAME_EVERY_TIME and reason != "too_often":
-            self._updates[act.id] = robot.now, update
+            self.outcomes.add(update, robot.now)
         return Told(update)
-
-    def _make_room(self, now: float) -> bool:
-        """Forget an outcome that no copy of its request can ask for any more. False if all may still be asked for."""
-        while len(self._updates) >= MAX_REMEMBERED:
-            oldest = next((id for id in self._updates if id not in self._running), "")
-            if not oldest or now - self._updates[oldest][0] <= self._max_event_age:
-                return False
-            del self._updates[oldest]
-        return True

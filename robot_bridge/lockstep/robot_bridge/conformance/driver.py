@@ -38,7 +38,7 @@ class Motion(Protocol):
 
 
 class Driver:
-    """An operator link, its description and the newest feedback."""
+    """An operator link, its description, the newest feedback, and the motion that the cases may make."""
 
     def __init__(self, peer: Peer, description: RobotDescription, motion: Motion) -> None:
         self.peer = peer
@@ -46,7 +46,7 @@ class Driver:
         self.feedback = Feedback(event=1, issue=1, time=0.0, axes=[])  # until the first has come
         self.began: dict[int, float] = {}  # event -> s of the bridge's clock, when it was first measured
         self.passed_over: deque[ActionUpdate] = deque(maxlen=KEPT)  # heard while a stop was pressed, oldest first
-        self._motion = motion
+        self.motion = motion
         self._next_command = 0.0  # s of the loop's clock: not before that, to keep max_event_rate
 
     @property
@@ -59,11 +59,7 @@ class Driver:
         Raises:
             NotApplicable: no axis of this robot moves.
         """
-        return self._motion.next_values(self.description, self.feedback.goals)
-
-    def next_goal(self, axis: Axis, goal: float) -> float:
-        """Return a goal a small way from the applied one."""
-        return self._motion.next_goal(axis, goal)
+        return self.motion.next_values(self.description, self.feedback.goals)
 
     def command(
         self, values: Sequence[float | None], *, nonce: int | None = None, issue: int | None = None, speed: float = 1.0
@@ -124,8 +120,10 @@ class Driver:
         Raises:
             Violation: the command was refused.
         """
+        loop = asyncio.get_running_loop()
         for _ in range(TRIES):
-            await self._pace()
+            await asyncio.sleep(max(0.0, self._next_command - loop.time()))
+            self._next_command = loop.time() + 1 / self.description.max_event_rate
             command = self.command(values, speed=speed)
             refusal = await self._executed(command, copies)
             if refusal is None:
@@ -170,7 +168,7 @@ class Driver:
 
     async def stop(self, press: str, peer: Peer | None = None) -> int:
         """Press STOP, on this link or another; return the number of the press. `passed_over` gets what actions say."""
-        self._motion.presses.add(press)
+        self.motion.presses.add(press)
         on = peer or self.peer
         on.send(Stop(by=BY, reason="a case of the conformance check", press=press))
         async with within(PATIENCE, "a stop was not answered with stop_taken"):
@@ -206,14 +204,9 @@ class Driver:
                 expect(not jumped, f"event {command.event} was commanded, and event {self.feedback.event} is current")
         return None
 
-    async def _pace(self) -> None:
-        loop = asyncio.get_running_loop()
-        await asyncio.sleep(max(0.0, self._next_command - loop.time()))
-        self._next_command = loop.time() + 1 / self.description.max_event_rate
-
     def _take(self, feedback: Feedback) -> None:
         stop = feedback.stop
-        if stop.stopped and (stop.by != BY or stop.press not in self._motion.presses):
+        if stop.stopped and (stop.by != BY or stop.press not in self.motion.presses):
             raise StoppedByOther(f"somebody stopped the robot: {stop.by or 'nobody named'}: {stop.reason}")
         if wrong := misfit(feedback, self.description):
             raise Violation(wrong)

@@ -15,12 +15,11 @@ from lockstep.protocol.messages import (
     Hello,
     LinkMessage,
     LinkRole,
-    Ping,
-    Pong,
     decode_message,
     encode_message,
 )
 from lockstep.robot_bridge.conformance.errors import Violation
+from lockstep.robot_bridge.conformance.heartbeat import Heartbeat
 from lockstep.robot_bridge.conformance.place import Place
 from lockstep.robot_bridge.conformance.waiting import PATIENCE, within
 
@@ -28,24 +27,25 @@ __all__ = ["Peer", "opened"]
 
 Kind = TypeVar("Kind", bound=LinkMessage)
 
-PING_INTERVAL = 0.2  # s
 MAX_WAITING = 64  # messages that wait for the case; of more, the oldest is forgotten
 
 
 class Peer(asyncio.Protocol):
-    """A connection: `send` and `write` send, `next` and `find` receive. Heartbeats run while `beats` is true."""
+    """A connection: `send` and `write` send, `next` and `find` receive.
+
+    Attributes:
+        heartbeat: begins with the handshake
+        ended: the connection is over
+    """
 
     def __init__(self) -> None:
-        self.beats = True  # False: neither pings nor pongs, so that the bridge should take this side for dead
-        self.ended = False  # the connection is over
-        self.pings: list[int] = []  # ids of the pings that came
+        self.heartbeat = Heartbeat(self.send)
+        self.ended = False
         self._frames = FrameReader(MAX_MEDIA_FRAME)
         self._waiting: deque[LinkMessage] = deque(maxlen=MAX_WAITING)
         self._broken: Violation | None = None  # the bridge sent something that cannot be read
         self._news = asyncio.Event()
         self._transport: asyncio.Transport | None = None
-        self._beat: asyncio.TimerHandle | None = None
-        self._pinged = 0
 
     # Called by cases
 
@@ -96,7 +96,12 @@ class Peer(asyncio.Protocol):
         Raises:
             Violation: it does not, or for another reason.
         """
-        goodbye = await self._goodbye(patience)
+        async with within(patience, f"the link is still open after {patience:g} s"):
+            while not isinstance(goodbye := await self.next(patience + 1), Goodbye):
+                if goodbye is None:
+                    raise Violation("the connection ended without a goodbye")
+                if isinstance(goodbye, Hello):
+                    raise Violation("the bridge admitted the link")
         if goodbye.error not in errors:
             raise Violation(f"the link ended with {goodbye.error!r}, not {' or '.join(map(repr, errors))}")
         if await self.next() is not None:
@@ -111,7 +116,7 @@ class Peer(asyncio.Protocol):
         """
         said = Hello(role=role, name=name, nonce=b"" if secret is None else draw_nonce())
         self.send(said)
-        answer = await self._answer()
+        answer = await self.next()
         nonce = b""
         if isinstance(answer, Challenge) and secret is not None:
             nonce = answer.nonce
@@ -119,7 +124,9 @@ class Peer(asyncio.Protocol):
                 raise Violation(f"a challenge of {len(nonce)} bytes, not {NONCE_BYTES}")
             proof = secret.client_proof(said.nonce, nonce, role)
             self.send(Hello(role=role, name=name, nonce=said.nonce, proof=proof))
-            answer = await self._answer()
+            answer = await self.next()
+        if isinstance(answer, Hello):
+            self.heartbeat.begin()
         if isinstance(answer, Goodbye):
             raise LinkRefused(f"{answer.error}: {answer.detail}")
         if not isinstance(answer, Hello):
@@ -141,21 +148,23 @@ class Peer(asyncio.Protocol):
         """Wait for a number of pings, for at most `patience` seconds; return the number that came."""
         try:
             async with asyncio.timeout(patience):
-                while len(self.pings) < times and not self.ended:
+                while self.heartbeat.pings < times and not self.ended:
                     self._news.clear()
                     await self._news.wait()
         except TimeoutError:
             pass
-        return len(self.pings)
+        return self.heartbeat.pings
 
     def leave(self) -> None:
         """Say goodbye and close."""
         self.send(Goodbye(error="closing"))
-        self._close()
+        self.cut()
 
     def cut(self) -> None:
         """Close without a goodbye, like a link that breaks."""
-        self._close()
+        self.heartbeat.stop()
+        if self._transport is not None:
+            self._transport.close()
 
     async def gone(self) -> None:
         """Wait until the connection is closed."""
@@ -173,54 +182,17 @@ class Peer(asyncio.Protocol):
         self._frames.feed(data)
         try:
             for payload in self._frames.frames():
-                self._take(decode_message(payload))
+                message = decode_message(payload)
+                if not self.heartbeat.take(message):
+                    self._waiting.append(message)
         except (FramingError, MessageError) as error:
             self._broken = self._broken or Violation(f"the bridge sent bytes that are not a message: {error.detail}")
         self._news.set()
 
     def connection_lost(self, error: Exception | None) -> None:
         self.ended = True
-        self._stop_beating()
+        self.heartbeat.stop()
         self._news.set()
-
-    async def _goodbye(self, patience: float) -> Goodbye:
-        async with within(patience, f"the link is still open after {patience:g} s"):
-            while not isinstance(said := await self.next(patience + 1), Goodbye):
-                if said is None:
-                    raise Violation("the connection ended without a goodbye")
-                if isinstance(said, Hello):
-                    raise Violation("the bridge admitted the link")
-        return said
-
-    async def _answer(self) -> LinkMessage | None:
-        answer = await self.next()
-        if isinstance(answer, Hello) and self._beat is None:
-            self._ping()
-        return answer
-
-    def _take(self, message: LinkMessage) -> None:
-        if isinstance(message, Ping):
-            self.pings.append(message.id)
-            if self.beats:
-                self.send(Pong(id=message.id))
-        elif not (isinstance(message, Pong) and 0 < message.id <= self._pinged):  # else a pong to a ping of this side
-            self._waiting.append(message)
-
-    def _ping(self) -> None:
-        if self.beats and not self.ended:
-            self._pinged += 1
-            self.send(Ping(id=self._pinged))
-        self._beat = asyncio.get_running_loop().call_later(PING_INTERVAL, self._ping)
-
-    def _stop_beating(self) -> None:
-        if self._beat is not None:
-            self._beat.cancel()
-        self._beat = None
-
-    def _close(self) -> None:
-        self._stop_beating()
-        if self._transport is not None:
-            self._transport.close()
 
 
 @asynccontextmanager

@@ -100,7 +100,7 @@ class CommandExecutor:
                 self._stops.reset(peer, message)
             case Act():
                 moved = self._actions.moving
-                self._actions.act(peer, message)
+                self._actions.act(message)
                 if self._actions.moving and not moved:  # the bridge may be killed before the next tick tells it
                     self._watchdogs.ticked(self._now(), moving=True)
             case ActionCancel():
@@ -118,7 +118,7 @@ class CommandExecutor:
         now = self._now()
         outcome = self._core.command(command, now)
         if isinstance(outcome, Executed | Refused):
-            moving = len(command.values) == self._axes and self._core.moves(command.values)
+            moving = len(command.values) == self._axes and self._core.values.moves(command.values)
             executed = isinstance(outcome, Executed)
             self._actions.commanded(command.action, moving=moving, executed=executed, now=now)
         if isinstance(outcome, Executed):
@@ -137,7 +137,7 @@ class CommandExecutor:
     def _need_neutral(self) -> None:
         """Bring the axes to rest; they move on only after a neutral command."""
         self._shaper.rest()
-        self._core.need_neutral()
+        self._core.interlock.require()
 
     # The tick
 
@@ -159,7 +159,7 @@ class CommandExecutor:
         self._watchdogs.ticked(now, self._moves)
         if self._places_known():
             self._robot.pursue_poses(self._shaper.pursued_poses)
-            self._robot.apply(self._signal.on(values) if self._core.warns(now) else values)
+            self._robot.apply(self._signal.on(values) if self._core.interlock.warns(now) else values)
         self._robot.tick()
         if self._feedback.timing.waits_for_tick:
             self._feedback.timing.applied(now, self._now())
@@ -188,7 +188,7 @@ class CommandExecutor:
         self._shaper.cut()
         self._feedback.rested_why = "" if known else "not driven: the place of a goal axis is not known"
         if known:
-            self._core.need_neutral()
+            self._core.interlock.require()
         return False
 
     @property
@@ -220,7 +220,7 @@ class CommandExecutor:
         self._shaper.cut()
         if moved and self._robot.rests_from_thread and not held.acted:  # a suspend holds up the thread too
             self._robot.rest_from_thread()
-        self._core.need_neutral()
+        self._core.interlock.require()
         self._counters.stalls += 1
         self._counters.watchdog += held.acted
         why = self._feedback.rested_why = f"came to rest: the bridge was held up for {held.seconds:.2f} s"

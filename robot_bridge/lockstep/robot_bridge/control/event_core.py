@@ -1,8 +1,8 @@
 """The event reference and exactly-once execution. No I/O, no clock: the caller hands in `now`.
 
-Call order: `issue` once (the first feedback), then `command`, `rest`, `stop`, `reset` and the others in any order;
-after every tick, when `issue_due`, measure the robot and call `issue`, which answers the pending command or measures
-the current event again. Rules and reasons: docs/robot-link.md, "Exactly once" and "Coming to rest".
+Call order: `issue` once (the first feedback), then `command`, `rest`, `stops.stop`, `stops.reset` and the others in any
+order; after every tick, when `issue_due`, measure the robot and call `issue`, which answers the pending command or
+measures the current event again. Rules and reasons: docs/robot-link.md, "Exactly once" and "Coming to rest".
 """
 
 import math
@@ -13,18 +13,17 @@ from typing import NamedTuple
 import msgspec
 
 from lockstep.protocol.description import Axis, Pose, StartWarning
-from lockstep.protocol.messages import Command, Feedback, Refusal, RefusalReason, RobotFeedback, StopState
+from lockstep.protocol.messages import Command, Feedback, Refusal, RefusalReason, RobotFeedback
 from lockstep.protocol.serial import FIRST_EVENT, event_after, event_gap, is_event, is_newer
 from lockstep.protocol.traces.trace import CommandSpans
 from lockstep.robot_bridge.control.goals.command_values import CommandValues
+from lockstep.robot_bridge.control.issue_schedule import IssueSchedule
 from lockstep.robot_bridge.control.restart_interlock import RestartInterlock
 from lockstep.robot_bridge.robots.base import Measurement
-from lockstep.robot_bridge.stop.stop_latch import ResetOutcome, ResetTaken, StopGiven, StopLatch, WriteOutcome
+from lockstep.robot_bridge.stop.stop_core import StopCore
 
 __all__ = ["Absorbed", "Answered", "CommandOutcome", "EventCore", "Executed", "Refused", "draw_nonce"]
 
-REFRESH_INTERVAL = 0.5  # s between issues of the same event while nothing is commanded
-BURST = 2  # events that may arrive ahead of the event rate: the network bunches timely commands
 MAX_REMEMBERED_ISSUES = 1024  # of the current event; a forgotten issue counts as late
 MAX_NONCE = 2**53 - 1  # a JavaScript number holds these exactly
 
@@ -74,6 +73,11 @@ class EventCore:
 
     No command executes on the strength of an old feedback or of one not seen, and none moves the robot before a neutral
     command while the interlock asks for one.
+
+    Attributes:
+        values: judges the values of commands
+        interlock: whether moving commands may execute
+        stops: the latched stop; while it holds no command executes
     """
 
     def __init__(
@@ -83,7 +87,6 @@ class EventCore:
         max_event_age: float,
         first_event: int = FIRST_EVENT,
         max_event_rate: float = math.inf,
-        refresh_interval: float = REFRESH_INTERVAL,
         start_warning: StartWarning | None = None,
         poses: Sequence[Pose] = (),
         measured: Callable[[], Sequence[float]] | None = None,
@@ -97,22 +100,18 @@ class EventCore:
         if not is_event(first_event):
             raise ValueError(f"the first event must be a valid reference, not {first_event}")
         signal = "" if start_warning is None else start_warning.axis
-        self._values = CommandValues(axes, poses=poses, signal=signal, measured=measured)
+        self.values = CommandValues(axes, poses=poses, signal=signal, measured=measured)
+        self._schedule = IssueSchedule(max_event_rate)
+        self.interlock = RestartInterlock(self._schedule, start_warning)
+        self.stops = StopCore(self.interlock, self._schedule)
         self._max_event_age = max_event_age
-        self._refresh_interval = refresh_interval
-        self._interval = 1 / max_event_rate  # s between two answers
-        self._answer_at = -math.inf  # s, when an answer would be due if all of them kept that interval
         self._current = first_event  # s: latest executed and answered event, 1
         self._pending: int | None = None  # executed, waiting for its feedback, 2
         self._feedback: Feedback | None = None  # latest issue of the current event; None before the first
-        self._issued_at = -math.inf  # s, when that issue was
         self._issue = 0  # number of the current event's latest issue, 2
         self._issued: dict[int, _Issued] = {}  # issues of the current event, oldest first
         self._nonces = nonces
-        self._issue_wanted = True  # issue again at the end of this tick
         self._rested: int | None = None  # moving commands up to this event are void, 2
-        self._latch = StopLatch()
-        self._interlock = RestartInterlock(start_warning)
 
     @property
     def current(self) -> int:
@@ -129,37 +128,12 @@ class EventCore:
         """The latest issue; None before the first."""
         return self._feedback
 
-    @property
-    def stop_state(self) -> StopState:
-        return self._latch.state
-
-    def begin(self, latch: StopLatch) -> None:
-        """Set the latch, as it was left, before the first issue. From then on change it only through the core."""
-        self._latch = latch
-
-    @property
-    def neutral_needed(self) -> bool:
-        """True while no moving command executes before a neutral one."""
-        return self._interlock.needed
-
-    def warns(self, now: float) -> float:
-        """Return the seconds for which the robot still warns before it may move; 0 if it does not warn."""
-        return self._interlock.warns(now)
-
-    def moves(self, values: Sequence[float | None]) -> bool:
-        """Return whether these values, one per axis, are an intention to move; a light or horn alone is not."""
-        return self._values.moves(values)
-
-    def misfit(self, values: Sequence[float | None], speed: float = 1.0) -> tuple[RefusalReason, str] | None:
-        """Return the reason and detail why these values fit no state of this robot; None if they do."""
-        return self._values.misfit(values, speed)
-
     def command(self, command: Command, now: float) -> CommandOutcome:
         """Decide about a command that arrived now."""
-        if (misfit := self.misfit(command.values, command.speed)) is not None:
+        if (misfit := self.values.misfit(command.values, command.speed)) is not None:
             return self._refuse(command, *misfit)
-        if self._latch.state.stopped:
-            return self._refuse(command, "stopped", self._latch.state.reason)
+        if (stop := self.stops.state).stopped:
+            return self._refuse(command, "stopped", stop.reason)
         if command.event == self._current and self._feedback is not None:
             return Answered(self._feedback)
         if command.event == self._pending:
@@ -171,21 +145,21 @@ class EventCore:
     def _next_command(self, command: Command, now: float) -> CommandOutcome:
         issued = self._issued.get(command.issue)
         if issued is None or now - issued.time > self._max_event_age:
-            self._issue_wanted = True
+            self._schedule.want()
             return self._refuse(command, "late")
         if command.nonce != issued.nonce:
             return self._refuse(command, "unseen")
-        moving = self.moves(command.values)
+        moving = self.values.moves(command.values)
         if moving and self._rested is not None and not is_newer(command.event, self._rested):
             return self._refuse(command, "rested")
-        self._look(now)
-        if moving and (reason := self._interlock.refuses(now)) is not None:
+        self.interlock.look(now)
+        if moving and (reason := self.interlock.refuses(now)) is not None:
             return self._refuse(command, reason)
-        if moving and (far := self._values.jump(command.values)):  # last: it measures the robot
+        if moving and (far := self.values.jump(command.values)):  # last: it measures the robot
             return self._refuse(command, "jump", far)
-        self._interlock.executed(moving=moving, spell=issued.spell, now=now)
-        if not self._interlock.needed:
-            self._latch.may_move()
+        self.interlock.executed(moving=moving, spell=issued.spell, now=now)
+        if not self.interlock.needed:
+            self.stops.latch.may_move()
         self._pending = command.event
         self._rested = None  # every event it could void is now behind; a stale mark must not survive the wrap
         return Executed(command.event, command.values, command.speed)
@@ -210,55 +184,9 @@ class EventCore:
             self._rested = voided
         return True
 
-    def stop(self, press: str, by: str, reason: str, now: float) -> StopGiven:
-        """Latch the stop, or count a further one. The axes come to rest if `is_new`."""
-        given = self._latch.stop(press, by, reason, now)
-        if given.is_new:
-            self.need_neutral()
-        return given
-
-    def reset(self, number: int, now: float) -> ResetOutcome:
-        """Release the stop, now or when the reset is on the disk; moves nothing."""
-        outcome = self._latch.reset(number, now)
-        if isinstance(outcome, ResetTaken):
-            self.need_neutral()
-        return outcome
-
-    def written(self, version: int, error: str = "") -> WriteOutcome:
-        """Note that the latch's record of `version` is on the disk, or could not be; return a reset's outcome."""
-        outcome = self._latch.written(version, error)
-        self._issue_wanted = True  # feedback also says whether the state is kept
-        if isinstance(outcome, ResetTaken):
-            self.need_neutral()
-        return outcome
-
-    def lock_out(self, reason: str, now: float) -> StopGiven | None:
-        """Latch a stop that no reset releases before `let_in`, for a person at the robot who locks it."""
-        given = self._latch.lock_out(reason, now)
-        self._issue_wanted = True
-        if given is not None:
-            self.need_neutral()
-        return given
-
-    def let_in(self) -> bool:
-        """End the lock-out; the stop stays latched. False if the robot was not locked out."""
-        if not self._latch.let_in():
-            return False
-        self.need_neutral()
-        return True
-
-    def need_neutral(self) -> None:
-        """Refuse moving commands from now on until a neutral one. The caller brings the axes to rest."""
-        self._interlock.require()
-        self._issue_wanted = True
-
-    def _look(self, now: float) -> None:
-        if self._interlock.look(now):
-            self._issue_wanted = True
-
     def want_issue(self) -> None:
         """Issue again at the end of this tick, because a client joined."""
-        self._issue_wanted = True
+        self._schedule.want()
 
     def issue_due(self, now: float) -> bool:
         """Return whether to measure and `issue` now.
@@ -266,12 +194,10 @@ class EventCore:
         An answer that comes sooner than the event rate allows waits, and with it the next event: nothing is refused. A
         stop is fed back at once.
         """
-        self._look(now)
-        if self._pending is not None and not self._latch.state.stopped:
-            return now >= self._answer_at - BURST * self._interval
-        if self._pending is not None or self._issue_wanted or self._feedback is None:
-            return True
-        return now - self._issued_at >= self._refresh_interval
+        self.interlock.look(now)
+        if self._pending is None:
+            return self._schedule.due(now)
+        return self.stops.state.stopped or self._schedule.answer_due(now)
 
     def issue(
         self,
@@ -289,17 +215,15 @@ class EventCore:
         `goals`: where the goal axes are commanded to be now, None for a rate axis. `time`: the time of issue, on the
         clock of capture times; None: `now`. `spans`: of the pending command.
         """
+        self._schedule.issued(now, answers=self._pending is not None)
         if self._pending is not None:
             self._current, self._pending = self._pending, None
-            self._answer_at = max(now, self._answer_at) + self._interval
             self._issued.clear()
             self._issue = 0
         self._issue += 1
-        self._issue_wanted = False
-        nonce, stop = self._nonces(), self._latch.state
-        self._remember_issue(_Issued(now, nonce, self._interlock.spell))
-        self._latch.shown(stop, now)
-        self._issued_at = now
+        nonce, stop = self._nonces(), self.stops.state
+        self._remember_issue(_Issued(now, nonce, self.interlock.spell))
+        self.stops.latch.shown(stop, now)
         self._feedback = RobotFeedback(
             event=self._current,
             issue=self._issue,
@@ -315,8 +239,8 @@ class EventCore:
             limits=list(limits),
             unknown=list(unknown),
             nonce=nonce,
-            neutral_needed=self._interlock.needed,
-            warning=self._interlock.warns(now),
+            neutral_needed=self.interlock.needed,
+            warning=self.interlock.warns(now),
             spans=spans,
         )
         return self._feedback

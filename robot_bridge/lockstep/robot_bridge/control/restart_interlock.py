@@ -7,6 +7,7 @@ import math
 from typing import Literal
 
 from lockstep.protocol.description import StartWarning
+from lockstep.robot_bridge.control.issue_schedule import IssueSchedule
 
 __all__ = ["RestartInterlock"]
 
@@ -16,10 +17,13 @@ SILENCE = 2.0  # s without an executed command after which a robot that warns ha
 class RestartInterlock:
     """Decides whether moving commands may execute.
 
-    Call `require` after everything that must not let the robot move on without a new decision of its operator.
+    Call `require` after everything that must not let the robot move on without a new decision of its operator. The
+    caller brings the axes to rest.
     """
 
-    def __init__(self, warning: StartWarning | None = None) -> None:
+    def __init__(self, schedule: IssueSchedule, warning: StartWarning | None = None) -> None:
+        """`schedule`: of the feedback, which tells that a neutral command is needed."""
+        self._schedule = schedule
         self._warning = warning
         self._needed = True
         self._spell = 1  # counts the causes: a neutral command that was decided before a cause does not clear it
@@ -37,17 +41,17 @@ class RestartInterlock:
         return self._spell
 
     def require(self) -> None:
+        """Refuse moving commands from now on until a neutral one."""
         self._needed = True
         self._spell += 1
         self._warns_until = -math.inf
         self._executed_at = math.inf
+        self._schedule.want()
 
-    def look(self, now: float) -> bool:
-        """Require a neutral command after `SILENCE`; call before any decision and once a tick. True if it does."""
-        if self._warning is None or now - self._executed_at <= SILENCE:
-            return False
-        self.require()
-        return True
+    def look(self, now: float) -> None:
+        """Require a neutral command after `SILENCE`; call before any decision and once a tick."""
+        if self._warning is not None and now - self._executed_at > SILENCE:
+            self.require()
 
     def refuses(self, now: float) -> Literal["not_neutral", "warning"] | None:
         """Return why a moving command may not execute; None if it may."""

@@ -19,7 +19,7 @@ from lockstep.robot_bridge.control.tick_alarm import TickAlarm
 from lockstep.robot_bridge.control.ticker import Ticker
 from lockstep.robot_bridge.counters import BridgeCounters
 from lockstep.robot_bridge.errors import RobotFailed, RobotUnavailable, named
-from lockstep.robot_bridge.link.link_server import LinkServer
+from lockstep.robot_bridge.link.sending.link_publisher import LinkPublisher
 from lockstep.robot_bridge.robots.base import Robot
 from lockstep.robot_bridge.stop.stop_handler import StopHandler
 from lockstep.robot_bridge.watchdog.liveness import Liveness
@@ -45,7 +45,7 @@ class TickLoop:
         stops: StopHandler,
         watchdogs: Watchdogs,
         liveness: Liveness,
-        links: LinkServer,
+        publisher: LinkPublisher,
         alarm: TickAlarm,
         counters: BridgeCounters,
         now: Clock,
@@ -58,7 +58,7 @@ class TickLoop:
         self._stops = stops
         self._watchdogs = watchdogs
         self._liveness = liveness
-        self._links = links
+        self._publisher = publisher
         self._alarm = alarm
         self._counters = counters
         self._now = now
@@ -111,9 +111,9 @@ class TickLoop:
         if self._shaper.at_rest:
             self._at_rest.set()
         if feedback is not None:
-            self._links.publish_feedback(feedback)
+            self._publisher.publish_feedback(feedback)
         if (status := self._executor.status(now)) is not None:
-            self._links.publish_status(status)
+            self._publisher.publish_to_operator(status)
 
     async def _tick_on(self) -> None:
         metronome = Ticker(self._robot.tick_seconds, time.monotonic(), catch_up=MAX_CATCH_UP)

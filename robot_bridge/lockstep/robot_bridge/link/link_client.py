@@ -10,16 +10,15 @@ from typing import Self
 
 from lockstep.protocol.errors import HandshakeError, LinkError, LinkLost, LinkRefused
 from lockstep.protocol.link_secret import LinkSecret
-from lockstep.protocol.messages import Goodbye, Hello, LinkMessage, LinkRole, Media
-from lockstep.robot_bridge.link.link_session import BadInput, ClientSession, kind_of
+from lockstep.protocol.messages import Goodbye, Hello, LinkMessage, LinkRole
+from lockstep.robot_bridge.link.link_inbox import LinkInbox
+from lockstep.robot_bridge.link.link_session import BadInput, ClientSession
 from lockstep.robot_bridge.link.link_transport import TICK_INTERVAL
-from lockstep.robot_bridge.link.outgoing_queues import MediaOutbox
 from lockstep.robot_bridge.link.pacing.paced_transport import PacedTransport
 
 __all__ = ["RobotLink"]
 
 CONNECT_TIMEOUT = 5.0  # s
-MAX_INBOX = 256  # messages besides media that may wait for the reader
 
 
 class RobotLink:
@@ -51,20 +50,15 @@ class RobotLink:
         """
         self._connect = connect
         self.role: LinkRole = role
-        self.bad_input: Counter[str] = Counter()  # by name, {"malformed": 1}
-        self.drops: Counter[str] = Counter()  # by message kind, {"feedback": 2}; media are in `media_drops`
         self._host = host
         self._port = port
         self._tls = tls
         self._session = ClientSession(time.monotonic(), role, name, secret)
-        self._transport = _ClientTransport(self, self._session)
-        self._inbox: dict[int, LinkMessage] = {}  # by arrival, oldest first
-        self._arrivals = 0
-        self._media: MediaOutbox[Media] = MediaOutbox()
-        self._news = asyncio.Event()
+        self._inbox = LinkInbox()
+        self._transport = _ClientTransport(self._session, self._inbox)
+        self.bad_input: Counter[str] = self._transport.bad_input  # by name, {"malformed": 1}
+        self.drops: Counter[str] = self._inbox.drops  # by message kind, {"feedback": 2}; media are in `media_drops`
         self._ticker: asyncio.TimerHandle | None = None
-        self._take: Callable[[LinkMessage], None] | None = None  # None: messages wait for the iteration
-        self._failure: Exception | None = None  # the exception that `take` raised
         self._closed = False
 
     @property
@@ -81,7 +75,7 @@ class RobotLink:
     @property
     def media_drops(self) -> Counter[str]:
         """The dropped media by stream."""
-        return self._media.drops
+        return self._inbox.media_drops
 
     @property
     def connected(self) -> bool:
@@ -101,8 +95,7 @@ class RobotLink:
                 await self._open()
                 self._tick()
                 while self._session.hello is None and self._session.ended is None:
-                    self._news.clear()
-                    await self._news.wait()
+                    await self._inbox.changed()
         except (OSError, TimeoutError) as error:
             await self.close()
             raise LinkLost(f"{self._host}:{self._port}: {error or 'no answer'}") from error
@@ -111,7 +104,7 @@ class RobotLink:
             raise
         if self._session.hello is None:
             await self.close()
-            raise self._error()
+            raise error_of(self._session)
 
     async def _open(self) -> None:
         if self._connect is not None:
@@ -132,12 +125,12 @@ class RobotLink:
             LinkError: the link is over.
         """
         if not self.connected:
-            raise self._error()
+            raise error_of(self._session)
         self._transport.send(message)
 
     def fileno(self) -> int:
         """Return the socket's descriptor, to see whether data has come (select(2)); -1 without a socket."""
-        return self._transport.fileno()
+        return self._transport.output.fileno()
 
     async def deliver(self, take: Callable[[LinkMessage], None]) -> None:
         """Hand each message to `take` as it comes, within its turn of the event loop, until `close`.
@@ -148,34 +141,30 @@ class RobotLink:
             LinkError: the link broke.
             Exception: the one that `take` raised; nothing was handed over after that.
         """
-        self._take = take
         try:
-            while self._take is not None and (waits := self._oldest()) is not None:
-                self._hand_over(take, waits)
-            while not self._closed and self._session.ended is None and self._failure is None:
-                self._news.clear()
-                await self._news.wait()
+            self._inbox.hand_over(take)
+            while not self._closed and self._session.ended is None and self._inbox.failure is None:
+                await self._inbox.changed()
         finally:
-            self._take = None
-        if self._failure is not None:
-            raise self._failure
+            self._inbox.keep()
+        if self._inbox.failure is not None:
+            raise self._inbox.failure
         if not self._closed:
-            raise self._error()
+            raise error_of(self._session)
 
     def __aiter__(self) -> Self:
         return self
 
     async def __anext__(self) -> LinkMessage:
         while True:
-            message = self._oldest()
+            message = self._inbox.pop()
             if message is not None:
                 return message
             if self._closed:
                 raise StopAsyncIteration
             if self._session.ended is not None:
-                raise self._error()
-            self._news.clear()
-            await self._news.wait()
+                raise error_of(self._session)
+            await self._inbox.changed()
 
     async def close(self) -> None:
         """Say goodbye and close, in a second at most. May be called again."""
@@ -191,7 +180,7 @@ class RobotLink:
             pass
         finally:  # also when this is cancelled: a bridge that goes on sending would be read for ever
             self._transport.abort()
-            self._news.set()
+            self._inbox.wake()
 
     async def __aenter__(self) -> Self:
         await self.connect()
@@ -207,54 +196,14 @@ class RobotLink:
         if self._session.ended is None:
             self._ticker = asyncio.get_running_loop().call_later(TICK_INTERVAL, self._tick)
 
-    def _oldest(self) -> LinkMessage | None:
-        """Remove and return the oldest waiting message, media last."""
-        return self._inbox.pop(next(iter(self._inbox))) if self._inbox else self._media.pop()
-
-    def _hand_over(self, take: Callable[[LinkMessage], None], message: LinkMessage) -> None:
-        try:
-            take(message)
-        except Exception as error:
-            self._failure = error
-            self._take = None
-            self._news.set()
-
-    def _received(self, event: LinkMessage | BadInput) -> None:
-        if isinstance(event, BadInput):
-            self.bad_input[event.name] += 1
-        elif self._take is not None and not isinstance(event, Hello):
-            self._hand_over(self._take, event)
-            return
-        elif isinstance(event, Media):
-            self._media.put(event, lambda: event)
-        elif not isinstance(event, Hello):
-            self._arrivals += 1
-            self._inbox[self._arrivals] = event
-            if len(self._inbox) > MAX_INBOX:
-                dropped = self._inbox.pop(next(iter(self._inbox)))
-                self.drops[kind_of(dropped)] += 1
-        self._news.set()
-
-    def _ended(self) -> None:
-        self._news.set()
-
-    def _error(self) -> LinkError:
-        ended = self._session.ended or Goodbye(error="lost", detail="not connected")
-        text = f"{ended.error}: {ended.detail}"
-        if self._session.hello is not None or ended.error == "lost":
-            return LinkLost(text)
-        if ended.error in ("handshake", "version", "description", "framing", "silent"):
-            return HandshakeError(text)
-        return LinkRefused(text)
-
 
 class _ClientTransport(PacedTransport):
-    def __init__(self, link: RobotLink, session: ClientSession) -> None:
+    def __init__(self, session: ClientSession, inbox: LinkInbox) -> None:
         super().__init__(session)
-        self._link = link
+        self.bad_input: Counter[str] = Counter()
+        self._inbox = inbox
         self.gone = asyncio.Event()
         self.gone.set()
-        self._waits_for_end = False  # of the bridge's side, after the goodbye
 
     def say_goodbye(self) -> None:
         """Say goodbye, and close when the bridge has closed.
@@ -262,19 +211,8 @@ class _ClientTransport(PacedTransport):
         To close with received data unread resets the connection, and the bridge would lose the goodbye that it has not
         read yet: it would keep the robot for this client, as after a broken link.
         """
-        self._waits_for_end = self._transport is not None and self._transport.can_write_eof()
+        self.output.waits_for_end = self._transport is not None and self._transport.can_write_eof()
         self.end("closing")
-
-    def _leave(self, transport: asyncio.Transport) -> None:
-        if self._waits_for_end:
-            try:
-                transport.write_eof()
-            except OSError:  # the bridge has reset the connection: nothing that was sent can still arrive
-                transport.close()
-                return
-            transport.resume_reading()
-        else:
-            super()._leave(transport)
 
     def data_received(self, data: bytes) -> None:
         if self.session.ended is None:
@@ -289,7 +227,24 @@ class _ClientTransport(PacedTransport):
         self.gone.set()
 
     def received(self, event: LinkMessage | BadInput) -> None:
-        self._link._received(event)
+        if isinstance(event, BadInput):
+            self.bad_input[event.name] += 1
+            self._inbox.wake()
+        elif isinstance(event, Hello):
+            self._inbox.wake()
+        else:
+            self._inbox.put(event)
 
     def lost(self) -> None:
-        self._link._ended()
+        self._inbox.wake()
+
+
+def error_of(session: ClientSession) -> LinkError:
+    """Return the error that says why a link is over, or was never there."""
+    ended = session.ended or Goodbye(error="lost", detail="not connected")
+    text = f"{ended.error}: {ended.detail}"
+    if session.hello is not None or ended.error == "lost":
+        return LinkLost(text)
+    if ended.error in ("handshake", "version", "description", "framing", "silent"):
+        return HandshakeError(text)
+    return LinkRefused(text)

@@ -1,36 +1,26 @@
-"""The bridge's side of all links: admits them, hands their messages on, and sends to them by role."""
+"""The bridge's side of all links: admits them, and hands their messages on."""
 
 import asyncio
 import ssl
 import time
 from collections import Counter
 from collections.abc import Callable
-from functools import cache
 from pathlib import Path
 from typing import Protocol
 
-import msgspec
-
-from lockstep.protocol.actions import Act, ActionCancel, Status
+from lockstep.protocol.actions import Act, ActionCancel
 from lockstep.protocol.description import RobotDescription
-from lockstep.protocol.framing import frame
 from lockstep.protocol.link_secret import LinkSecret
-from lockstep.protocol.maps import Navigation, OccupancyMap
 from lockstep.protocol.messages import (
     Command,
     EncodeRequest,
-    EventNotice,
-    Feedback,
     Goodbye,
     Hello,
     LinkMessage,
-    Media,
     Reset,
     Rest,
     Stop,
-    encode_message,
 )
-from lockstep.protocol.traces.trace import PictureSpans, span_ms
 from lockstep.robot_bridge.counters import BridgeCounters
 from lockstep.robot_bridge.errors import ListenError
 from lockstep.robot_bridge.link.applicants import Strangers
@@ -40,6 +30,7 @@ from lockstep.robot_bridge.link.link_admission import LinkAdmission
 from lockstep.robot_bridge.link.link_session import BadInput, BridgeSession
 from lockstep.robot_bridge.link.link_transport import TICK_INTERVAL, LinkTransport
 from lockstep.robot_bridge.link.message_rate import MessageRate
+from lockstep.robot_bridge.link.sending.link_publisher import LinkPublisher, StreamEncoding
 
 __all__ = ["LinkHandler", "LinkPeer", "LinkServer"]
 
@@ -70,7 +61,7 @@ class LinkHandler(Protocol):
         """The operator link ended, for any reason."""
 
 
-class EncodingSide(Protocol):
+class EncodingSide(StreamEncoding, Protocol):
     """The part of a bridge that encodes media and is asked how. All methods return at once."""
 
     codecs: tuple[str, ...]
@@ -81,12 +72,6 @@ class EncodingSide(Protocol):
 
     def asked(self, link: object, request: EncodeRequest) -> None:
         """A media link says what it wants."""
-
-    def lost(self, stream: str, *, second: bool = False) -> None:
-        """A media link could not take pictures of a stream, or of its second encoding, and needs a keyframe."""
-
-    def takes_second(self, link: object, stream: str) -> bool:
-        """Whether a link has asked for the second encoding of a stream."""
 
     def left(self, link: object) -> None:
         """A link ended, admitted or not."""
@@ -139,7 +124,11 @@ class LinkPeer(LinkTransport):
 
 
 class LinkServer:
-    """Owns the listening socket, if there is one, and every link. `run` accepts links and keeps them alive."""
+    """Owns the listening socket, if there is one, and every link. `run` accepts links and keeps them alive.
+
+    Attributes:
+        publisher: sends to the admitted links
+    """
 
     def __init__(
         self,
@@ -176,8 +165,8 @@ class LinkServer:
         self._clock = clock
         self._connections: set[LinkPeer] = set()  # all sockets, those that are closing included
         self._strangers: Strangers[LinkPeer] = Strangers(max_strangers)
-        self._admitted: LinkAdmission[LinkPeer] = LinkAdmission(max_links=max_links, operator_grace=operator_grace)
-        self._map: Callable[[], bytes] | None = None  # the frame of the newest map; None before the first
+        self._admitted: LinkAdmission[LinkTransport] = LinkAdmission(max_links=max_links, operator_grace=operator_grace)
+        self.publisher = LinkPublisher(self._admitted, encoding)
         self._acceptor: LinkAcceptor | None = None  # None while it does not listen
         self._closed = False
         self._all_gone = asyncio.Event()
@@ -240,60 +229,9 @@ class LinkServer:
             for peer in list(self._connections):
                 peer.abort()
 
-    def publish_feedback(self, feedback: Feedback) -> None:
-        """Send a feedback to the operator link, and its event to the event links."""
-        if self._admitted.operator is not None:
-            self._admitted.operator.send(feedback)
-        if self._admitted.events:
-            notice = encode_once(EventNotice(event=feedback.event, time=feedback.time))
-            for peer in self._admitted.events:
-                peer.send_encoded("event", notice)
-
-    def publish_status(self, status: Status) -> None:
-        """Send the status to the operator link."""
-        if self._admitted.operator is not None:
-            self._admitted.operator.send(status)
-
-    def publish_navigation(self, navigation: Navigation) -> None:
-        """Send where the robot is on its map to the operator link."""
-        if self._admitted.operator is not None:
-            self._admitted.operator.send(navigation)
-
-    def publish_map(self, map: OccupancyMap) -> None:
-        """Send a map to every media link, and to those that open later."""
-        self._map = encode_once(map)
-        for peer in self._admitted.media:
-            peer.send_encoded("map", self._map)
-
-    def publish_media(self, media: Media) -> None:
-        """Send a medium to every media link, of a second encoding to those that take it; newest wins per stream."""
-        encoded = encode_once(media) if media.spans is msgspec.UNSET else encode_waited(media, time.monotonic)
-        peers = self._takers_of_second(media.stream) if media.second else self._admitted.media
-        complete = [peer.send_media(media, encoded) for peer in peers]
-        if self._encoding is not None and not all(complete):
-            self._encoding.lost(media.stream, second=media.second)
-
-    def media_have_room(self) -> bool:
-        """Return whether some media link takes a picture at once. Others that do not miss pictures up to a keyframe."""
-        return any(peer.has_room for peer in self._admitted.media)
-
-    def second_has_room(self, stream: str) -> bool:
-        """Return whether a picture of the second encoding of a stream would wait nowhere on its way to its links.
-
-        So a second encoding takes only what the first leaves, and does not wait for the console to see that.
-        """
-        takers = self._takers_of_second(stream)
-        return bool(takers) and all(peer.path_is_clear for peer in takers)
-
-    def _takers_of_second(self, stream: str) -> list[LinkPeer]:
-        encoding = self._encoding
-        if encoding is None:
-            return []
-        return [peer for peer in self._admitted.media if encoding.takes_second(peer, stream)]
-
     def drops(self) -> Counter[str]:
         """Return the messages that slow links have missed, ended links included."""
-        return sum((peer.drops for peer in self._connections), self._counters.drops)
+        return sum((peer.output.drops for peer in self._connections), self._counters.drops)
 
     # called by the links
 
@@ -309,7 +247,7 @@ class LinkServer:
         if hello.role == "events":
             return Hello(role="robot", name=self._hello.name, epoch=self._hello.epoch)
         if hello.role == "media" and self._encoding is not None:
-            peer.keep_little()
+            peer.output.keep_little()
             self._encoding.joined(peer)
         return self._hello
 
@@ -336,8 +274,7 @@ class LinkServer:
                     self._handler.link_bad_input(peer, event)
             case Hello():
                 self._handler.link_opened(peer)
-                if self._map is not None and peer in self._admitted.media:
-                    peer.send_encoded("map", self._map)
+                self.publisher.link_opened(peer)
             case EncodeRequest():
                 if self._encoding is not None:
                     self._encoding.asked(peer, event)
@@ -358,25 +295,5 @@ class LinkServer:
 
     def disconnected(self, peer: LinkPeer) -> None:
         self._connections.discard(peer)
-        self._counters.drops.update(peer.drops)
+        self._counters.drops.update(peer.output.drops)
         self._all_gone.set()
-
-
-def encode_waited(media: Media, clock: Callable[[], float]) -> Callable[[], bytes]:
-    """As `encode_once`, with the time until that first call, when a link takes the picture, among its spans."""
-    since = clock()
-
-    def make() -> bytes:
-        spans = msgspec.UNSET if media.spans is msgspec.UNSET else _waited(media.spans, clock() - since)
-        return frame(encode_message(msgspec.structs.replace(media, spans=spans)))
-
-    return cache(make)
-
-
-def _waited(spans: PictureSpans, seconds: float) -> PictureSpans:
-    return msgspec.structs.replace(spans, link_wait_ms=span_ms(seconds))
-
-
-def encode_once(message: LinkMessage) -> Callable[[], bytes]:
-    """Return a function that encodes the message's frame at the first call and returns the same frame at the others."""
-    return cache(lambda: frame(encode_message(message)))

@@ -4,7 +4,6 @@ Call order: `receive` with bytes as they come, `tick` every 50 ms or so, `end` t
 the messages that `take_outgoing` returns and, once `ended` is set, close. An ended session stays ended.
 """
 
-from collections import OrderedDict
 from collections.abc import Callable, Generator
 from contextlib import closing
 from enum import Enum
@@ -49,15 +48,11 @@ from lockstep.protocol.messages import (
 from lockstep.robot_bridge.control.feedback_fit import misfit
 from lockstep.robot_bridge.description.check_description import check_description
 from lockstep.robot_bridge.errors import DescriptionError
+from lockstep.robot_bridge.link.heartbeats import Heartbeats
 from lockstep.robot_bridge.link.message_rate import MessageRate
 
 __all__ = ["BadInput", "BridgeSession", "ClientSession", "LinkSession", "LinkState", "kind_of"]
 
-PING_INTERVAL = 0.2  # s
-SILENCE = 1.0  # s without a valid message, and `ROUND_TRIPS` more, after which the other side is taken for dead
-ROUND_TRIPS = 4  # in which TCP has found out about a loss and repaired it, though the repair may be lost too
-MOST_SILENCE = 5.0  # s, even when the other side lengthens the round trip by late pongs
-PINGS_OUT = 64  # pings without a pong whose time of sending is remembered
 HELLO_TIMEOUT = 2.0  # s
 OWN_STALL = 0.5  # s between two ticks; more means that this side did not look, not that the other side was silent
 
@@ -101,19 +96,12 @@ class LinkSession:
         self._opened = now
         self._last_valid = now
         self._last_tick = now
-        self._last_ping = now
-        self._ping_id = 0
-        self._pings: OrderedDict[int, float] = OrderedDict()  # id -> when it was sent, of those without a pong
-        self._round_trip = 0.0  # s, smoothed; 0 before it was measured
+        self._heartbeats = Heartbeats(now)
 
     @property
     def patience(self) -> float:
-        """The seconds of silence after which the other side is taken for dead.
-
-        A loss holds back everything behind it until TCP has repeated it, which takes round trips: on a long path a link
-        that waited for only a second would end with nearly every loss.
-        """
-        return min(SILENCE + ROUND_TRIPS * self._round_trip, MOST_SILENCE)
+        """The seconds of silence after which the other side is taken for dead."""
+        return self._heartbeats.patience
 
     @property
     def missing(self) -> int:
@@ -177,9 +165,7 @@ class LinkSession:
                 return None
             case Pong(id=number):
                 self._last_valid = now
-                sent = self._pings.pop(number, None)
-                if sent is not None:
-                    self._measured(now - sent)
+                self._heartbeats.pong(number, now)
                 return None
             case Goodbye():
                 self.left = message.error == "closing"
@@ -198,11 +184,6 @@ class LinkSession:
         self.role, self._allowed, self._last_valid = role, allowed, now
         self.state = LinkState.OPEN
 
-    def _measured(self, round_trip: float) -> None:
-        """Smooth one more round trip into the mean, as TCP does (RFC 6298 2.3)."""
-        before = self._round_trip
-        self._round_trip = round_trip if before == 0.0 else before + (round_trip - before) / 8
-
     def tick(self, now: float) -> None:
         """Send heartbeats that are due; end a silent session."""
         gap, self._last_tick = now - self._last_tick, now
@@ -216,13 +197,8 @@ class LinkSession:
                 self.end("silent", f"no hello within {HELLO_TIMEOUT:g} s")
         elif now - self._last_valid > self.patience:
             self.end("silent", f"nothing valid received for {self.patience:.1f} s")
-        elif now - self._last_ping >= PING_INTERVAL:
-            self._last_ping = now
-            self._ping_id += 1
-            self._pings[self._ping_id] = now
-            if len(self._pings) > PINGS_OUT:
-                self._pings.popitem(last=False)
-            self._outgoing.append(Ping(id=self._ping_id))
+        elif (ping := self._heartbeats.ping(now)) is not None:
+            self._outgoing.append(ping)
 
     def end(self, error: str, detail: str = "") -> None:
         """Say goodbye; nothing is received afterwards."""
@@ -277,7 +253,7 @@ class BridgeSession(LinkSession):
             return self._open_for(message, b"", now)
         if self._challenged is None:
             return self._challenge(message, now)
-        self._measured(now - self._challenged_at)
+        self._heartbeats.measured(now - self._challenged_at)
         return self._check(message, self._challenged, self._secret, now)
 
     def _challenge(self, hello: Hello, now: float) -> BadInput | None:
@@ -348,7 +324,7 @@ class ClientSession(LinkSession):
         except DescriptionError as error:
             return self._reject("description", f"the bridge's description is invalid: {error}")
         assert self.role is not None  # set by __init__
-        self._measured(now - self._opened)
+        self._heartbeats.measured(now - self._opened)
         self._open(self.role, FROM_ROBOT[self.role], now)
         self._reader.max_frame = MAX_MEDIA_FRAME if self.role == "media" else MAX_CONTROL_FRAME
         self.hello = message

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from lockstep.protocol.description import RobotDescription
 from lockstep.protocol.maps import OccupancyMap
 from lockstep.robot_bridge.control.event_core import EventCore
-from lockstep.robot_bridge.link.link_server import LinkServer
+from lockstep.robot_bridge.link.sending.link_publisher import LinkPublisher
 from lockstep.robot_bridge.maps.navigation_issuer import NavigationIssuer
 from lockstep.robot_bridge.robots.base import Robot
 from lockstep.robot_bridge.robots.navigation import GridMap
@@ -27,13 +27,13 @@ class MapSender:
         robot: Robot,
         description: RobotDescription,
         core: EventCore,
-        links: LinkServer,
+        publisher: LinkPublisher,
         now: Callable[[], float],
     ) -> None:
         self._robot = robot
         self._has_map = description.map is not None
         self._core = core
-        self._links = links
+        self._publisher = publisher
         self._now = now
         self._issuer = NavigationIssuer()
         self._refused: GridMap | None = None  # could not be packed, and that was logged
@@ -49,7 +49,7 @@ class MapSender:
             await self._look_at_map()
             message = self._issuer.look(self._robot.navigation(), self._now(), self._core.current)
             if message is not None:
-                self._links.publish_navigation(message)
+                self._publisher.publish_to_operator(message)
 
     async def _look_at_map(self) -> None:
         grid = self._robot.grid_map()
@@ -63,7 +63,7 @@ class MapSender:
             return
         message = self._issuer.packed(grid, packed, self._now())
         if message is not None:
-            self._links.publish_map(message)
+            self._publisher.publish_map(message)
 
 
 def _packed(grid: GridMap) -> OccupancyMap:

@@ -61,16 +61,16 @@ class StopHandler:
     def begin(self) -> None:
         """Write stops to the disk from now on; call the robot's own stop if it begins stopped."""
         self._keeper.start(self._written)
-        self._stop_due = self._core.stop_state.stopped
+        self._stop_due = self._core.stops.state.stopped
 
     def stop(self, peer: LinkTransport, stop: Stop) -> None:
         """Take a press; it is answered when it is on the disk."""
-        given = self._core.stop(stop.press, stop.by, stop.reason, self._now())
+        given = self._core.stops.stop(stop.press, stop.by, stop.reason, self._now())
         self._note(given, stop.by, stop.reason, stop.press)
         self._keeper.answer(peer, stop.press, given.number)
 
     def reset(self, peer: LinkTransport, reset: Reset) -> None:
-        outcome = self._core.reset(reset.number, self._now())
+        outcome = self._core.stops.reset(reset.number, self._now())
         if isinstance(outcome, ResetTaken):
             self._released(outcome, reset.by)
         elif isinstance(outcome, ResetWaits):
@@ -85,7 +85,7 @@ class StopHandler:
             return
         self.failure = f"robot failed: {named(error)}"[:500]
         _logger.error("%s", self.failure, exc_info=error)
-        self._note(self._core.stop("", "", self.failure, self._now()), "", self.failure)
+        self._note(self._core.stops.stop("", "", self.failure, self._now()), "", self.failure)
 
     def look(self, now: float) -> None:
         """Check the lock-out file and the robot's own input: a person at the robot comes before a remote one.
@@ -98,14 +98,14 @@ class StopHandler:
         file = "" if self._lockout is None else self._lockout.reason
         pressed = HARDWARE_STOP if self._robot.hardware_stop() else ""
         reason = " · ".join(filter(None, (file, pressed, self._robot.locked_out())))[:500]
-        if reason == self._core.stop_state.locked_out:
+        if reason == self._core.stops.state.locked_out:
             return
         if not reason:
-            self._core.let_in()
+            self._core.stops.let_in()
             self._log.record("let_in", self._core.current)
             return
         self._log.record("locked_out", self._core.current, reason=reason)
-        if (given := self._core.lock_out(reason, now)) is not None:
+        if (given := self._core.stops.lock_out(reason, now)) is not None:
             self._note(given, "at the robot", reason)
 
     def rests(self) -> None:
@@ -128,7 +128,7 @@ class StopHandler:
 
     def _written(self, version: int, error: str) -> None:
         """Tell the core that the latch was written to the disk, or could not be, and answer a waiting reset."""
-        outcome = self._core.written(version, error)
+        outcome = self._core.stops.written(version, error)
         if outcome is None or self._resetting is None:
             return
         (peer, reset), self._resetting = self._resetting, None

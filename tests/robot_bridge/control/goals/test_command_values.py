@@ -134,7 +134,7 @@ def test_what_is_refused_for_another_reason_is_not_measured() -> None:
     assert operator.send(far, now=10.0) == "late"
     operator.core.rest(operator.feedback.event + 1)
     assert operator.send(far) == "rested"
-    operator.core.stop("", "", "", 0.0)
+    operator.core.stops.stop("", "", "", 0.0)
     assert operator.send(far) == "stopped"
     assert operator.asked == 0
 
@@ -142,7 +142,7 @@ def test_what_is_refused_for_another_reason_is_not_measured() -> None:
 def test_a_jump_does_not_count_as_the_neutral_command_that_is_needed() -> None:
     operator = Operator()
     assert operator.send(values(shoulder=9.0)) == "not_neutral"
-    assert operator.core.neutral_needed
+    assert operator.core.interlock.needed
 
 
 def test_the_feedback_has_the_applied_goals() -> None:

@@ -78,7 +78,7 @@ class GoalLife(RuleBasedStateMachine):
             values[number] = None if offset is None or goal is None else goal + offset
         self.send(answered, values, speed)
 
-    @precondition(lambda self: not self.core.stop_state.stopped)
+    @precondition(lambda self: not self.core.stops.state.stopped)
     @rule(
         which=st.sampled_from(SETS), to=st.tuples(st.floats(-2.5, 2.5), st.floats(-2.5, 2.5), st.floats(-9, 9)),
         speed=st.floats(0.1, 1), times=st.integers(1, 20), gap=st.sampled_from([DT, 2 * DT, 0.05]),
@@ -134,7 +134,7 @@ class GoalLife(RuleBasedStateMachine):
         self.shaper.drive(outcome.values, self.now, outcome.speed)
         self.executed_at = self.now
 
-        self.moved += self.core.moves(outcome.values)
+        self.moved += self.core.values.moves(outcome.values)
 
     @rule()
     def arm(self) -> None:
@@ -152,7 +152,7 @@ class GoalLife(RuleBasedStateMachine):
     @rule()
     def another_operator_comes(self) -> None:
         self.shaper.rest()
-        self.core.need_neutral()
+        self.core.interlock.require()
 
     @rule()
     def the_bridge_was_held_up(self) -> None:
@@ -160,21 +160,21 @@ class GoalLife(RuleBasedStateMachine):
         self.shaper.take_back()
         assert self.shaper.values[1:] == self.applied[1:], "it moves in a tick that was not applied"
         self.shaper.cut()
-        self.core.need_neutral()
+        self.core.interlock.require()
         self.was_cut = True
 
     @rule()
     def somebody_stops(self) -> None:
-        if self.core.stop("", "someone", "", self.now).is_new:
+        if self.core.stops.stop("", "someone", "", self.now).is_new:
             self.shaper.rest()
 
-    @precondition(lambda self: self.core.stop_state.stopped and self.shaper.at_rest)
+    @precondition(lambda self: self.core.stops.state.stopped and self.shaper.at_rest)
     @rule(fallen=st.floats(0, 1.5), holds=st.booleans())
     def the_arm_falls_while_it_is_stopped_and_the_stop_is_reset(self, fallen: float, holds: bool) -> None:
         self.now += 1.1
         self.tick(DT)
         self.robot.sag += fallen
-        if isinstance(self.core.reset(self.core.stop_state.number, self.now), ResetTaken):
+        if isinstance(self.core.stops.reset(self.core.stops.state.number, self.now), ResetTaken):
             measured = self.robot.measured_axes()
             self.shaper.begin(measured, self.robot.goals() if holds else measured)
             for axis, goal, place in zip(ARM_AXES[1:], self.shaper.goals[1:], measured[1:], strict=True):

@@ -38,8 +38,8 @@ def test_a_ball_is_seen_where_the_calibration_says(tmp_path: Path) -> None:
     middle = np.array(place.position) + from_quaternion(place.orientation) @ found.position
     x, y, z = turn.T @ (np.array(BALL) - middle)
     told = (found.cx + found.fx * x / z, found.cy + found.fy * y / z)
-    renderer = mujoco.Renderer(robot.model, camera.height, camera.width)
-    renderer.update_scene(robot.data, "eye")
+    renderer = mujoco.Renderer(robot.simulation.model, camera.height, camera.width)
+    renderer.update_scene(robot.simulation.data, "eye")
     bright = np.argwhere(renderer.render().sum(axis=2) > 600)
     renderer.close()
     robot.close()

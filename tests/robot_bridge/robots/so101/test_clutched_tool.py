@@ -147,13 +147,13 @@ class ClutchedTool(RuleBasedStateMachine):
 
     @rule()
     def somebody_stops_and_resets(self) -> None:
-        if self.core.stop("", "someone", "", self.world.now).is_new:
+        if self.core.stops.stop("", "someone", "", self.world.now).is_new:
             self.world.shaper.rest()
         self.must_end(0.0)
         self.ticks_pass(round((HOLD + 1.2) / TICK))
         assert self.world.shaper.at_rest
         stood = self.world.drive.goals
-        assert isinstance(self.core.reset(self.core.stop_state.number, self.world.now), ResetTaken)
+        assert isinstance(self.core.stops.reset(self.core.stops.state.number, self.world.now), ResetTaken)
         self.world.shaper.begin(self.world.drive.pursued(), self.world.drive.pursued())
         self.world.drive.restart()
         self.ticks_pass(3)
@@ -166,7 +166,7 @@ class ClutchedTool(RuleBasedStateMachine):
         self.hand = self.led = self.kept_still = None
         self.up.clear()
         self.world.shaper.rest()
-        self.core.need_neutral()
+        self.core.interlock.require()
         self.issue()
         for pan in (None, self.world.drive.goals[0] + way):
             newest = self.core.feedback
@@ -176,13 +176,13 @@ class ClutchedTool(RuleBasedStateMachine):
             self.execute(Command(event=event, issue=newest.issue, nonce=newest.nonce, values=values))
             self.ticks_pass(ticks)
         self.world.shaper.rest()
-        self.core.need_neutral()
+        self.core.interlock.require()
         self.sender.seated()
         self.issue()
 
     @rule(since=st.floats(0.1, 0.6))
     def the_bridge_is_held_up(self, since: float) -> None:
-        self.core.need_neutral()
+        self.core.interlock.require()
         self.tick(since, held_up=True)
 
     @rule(ticks=st.integers(1, 120))

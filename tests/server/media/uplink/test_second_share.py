@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lockstep.robot_bridge.link.link_transport import CLEAR
+from lockstep.robot_bridge.link.sending.link_output import CLEAR
 from lockstep.server.media.uplink.second_share import (
     CUT,
     KEEP,
@@ -57,7 +57,7 @@ class Run:
     """A robot behind an uplink, the estimator and the share; the operator gets `first` bit/s as 30 pictures a second.
 
     The bridge sends no second picture while the round trip that its kernel has smoothed is 0.06 s longer than the
-    shortest, as `LinkTransport.path_is_clear` has it; `gate` False: it does not know, as behind a proxy.
+    shortest, as `LinkOutput.path_is_clear` has it; `gate` False: it does not know, as behind a proxy.
     """
 
     first: float = FIRST

@@ -45,7 +45,7 @@ class _Goal:
 
     def near(self) -> float:
         """Return a goal a small way away."""
-        return self._driver.next_goal(self.axis, self.place)
+        return self._driver.motion.next_goal(self.axis, self.place)
 
     def is_at(self, goal: float) -> bool:
         return abs(self.place - goal) <= SAME * self.axis.reach

@@ -201,7 +201,7 @@ async def _silent_link(subject: Subject) -> None:
     """Each notice, which comes every 0.5 s, is answered with bytes that are no message and no sign of life."""
     loop = asyncio.get_running_loop()
     async with subject.link("events") as (peer, _):
-        peer.beats = False
+        peer.heartbeat.beats = False
         began, longest = loop.time(), MOST_SILENCE + PATIENCE / 2
         while True:
             said = await peer.next(longest)

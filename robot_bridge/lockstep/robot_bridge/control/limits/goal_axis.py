@@ -122,7 +122,9 @@ class GoalAxis:
                 self.goal = self._end
             else:
                 goal = self.goal + way
-                self.goal = goal if self._minimum <= goal <= self._maximum else self._within(goal)
+                if self._wrap is None and not self._minimum <= goal <= self._maximum:
+                    goal = inwards(goal, self.goal, self._minimum, self._maximum)
+                self.goal = goal
         return self.goal
 
     def take_back(self) -> None:
@@ -144,20 +146,11 @@ class GoalAxis:
         self.goal = self._before = place if math.isfinite(place) else math.nan
         self.cut()
 
-    def _within(self, goal: float) -> float:
-        """Return a goal within the axis' limits; one that is outside of them may only move back."""
-        if self._wrap is None:
-            if goal > self._maximum:
-                return min(goal, max(self._maximum, self.goal))
-            if goal < self._minimum:
-                return max(goal, min(self._minimum, self.goal))
-        return goal
-
     def _towards_target(self, dt: float) -> float:
         if self._wrap is None:
             end = self._target
             if not self._minimum <= end <= self._maximum:
-                end = self._within(end)
+                end = inwards(end, self.goal, self._minimum, self._maximum)
             self._end = end
             self._gap = gap = end - self.goal
         else:
@@ -179,6 +172,13 @@ class GoalAxis:
             return min(max(wanted, lowest), rate + faster)
         highest = rate + slower if -rate > stands_next else max(0.0, rate + faster)
         return max(min(wanted, highest), rate - faster)
+
+
+def inwards(goal: float, before: float, minimum: float, maximum: float) -> float:
+    """Return the limit that a goal is beyond; from a goal that was beyond it before, it may only move back."""
+    if goal > maximum:
+        return min(goal, max(maximum, before))
+    return max(goal, min(minimum, before))
 
 
 def stopping_speed(distance: float, braking: float, dt: float) -> float:

@@ -46,7 +46,7 @@ class Ros2Robot(Robot):
         try:
             tick = self.tick_seconds
             base = None if settings.base is None else BaseDrive(self._ros, settings.base, tick)
-            arm = None if settings.arm is None else self._arm_drive(settings.arm)
+            arm = None if settings.arm is None else arm_drive(self._ros, settings.arm, description, tick)
             servo = None if settings.servo is None else ServoDrive(self._ros, settings.servo, tick)
             self._drives: list[Drive] = [drive for drive in (base, arm, servo) if drive is not None]
             frames = FrameListener(self._ros) if needs_frames(settings) else None
@@ -56,9 +56,9 @@ class Ros2Robot(Robot):
             self._actions = RosActions(self._ros, settings)
             self.rest_arguments = rest_arguments(
                 settings,
-                base=None if base is None else base.full_topic,
-                arm=None if arm is None else arm.full_topic,
-                servo=None if servo is None else servo.full_topic,
+                base=None if base is None else base.topic.full_name,
+                arm=None if arm is None else arm.topic.full_name,
+                servo=None if servo is None else servo.topic.full_name,
                 actions=self._actions.moving,
             )
             if self.rest_arguments:
@@ -165,16 +165,18 @@ class Ros2Robot(Robot):
     def sources(self) -> Sequence[MediaSource]:
         return self._cameras
 
-    def _arm_drive(self, arm: Arm) -> ArmDrive | GoalArmDrive:
-        if is_goal_arm(arm):
-            return GoalArmDrive(self._ros, arm, self._description, self.tick_seconds)
-        return ArmDrive(self._ros, arm, self.tick_seconds)
-
     def close(self) -> None:
         try:
             call_all([*(drive.end for drive in self._drives), self._actions.settle])
         finally:
             self._ros.close()
+
+
+def arm_drive(ros: RosSide, arm: Arm, description: RobotDescription, tick_seconds: float) -> ArmDrive | GoalArmDrive:
+    """Return the drive of an arm by goals or by velocities, as its settings say."""
+    if is_goal_arm(arm):
+        return GoalArmDrive(ros, arm, description, tick_seconds)
+    return ArmDrive(ros, arm, tick_seconds)
 
 
 def needs_frames(settings: Ros2Settings) -> bool:

@@ -69,16 +69,17 @@ class RosSide:
         """Start the callbacks, after all subscriptions were made."""
         self._thread.start()
 
-    def message(self, package: str, name: str) -> Any:
-        """Import and return a message class.
+    def interface(self, name: str) -> Any:
+        """Import and return the class of a message, a service or an action, "std_msgs/msg/Bool".
 
         Raises:
-            RobotUnavailable: the message is not installed.
+            RobotUnavailable: it is not installed.
         """
+        package, _, kind = name.rpartition("/")
         try:
-            return getattr(import_module(f"{package}.msg"), name)
+            return getattr(import_module(package.replace("/", ".")), kind)
         except (ImportError, AttributeError) as error:
-            raise RobotUnavailable(f"ROS 2 messages {package}/{name} are missing: {error}") from error
+            raise RobotUnavailable(f"the ROS 2 interface {name} is missing: {error}") from error
 
     def publisher(self, kind: Any, topic: str) -> Any:
         """Return a publisher for commands: reliable, the newest only, nothing for subscribers that come later."""
@@ -86,39 +87,16 @@ class RosSide:
         self._publishers.append(publisher)
         return publisher
 
-    def subscribe_kept(self, kind: Any, topic: str, callback: Callable[[Any], None], *, depth: int = 1) -> None:
-        """Subscribe to a topic whose publishers keep their newest message for subscribers that come later."""
-        self._node.create_subscription(kind, topic, callback, self._profile("RELIABLE", depth, "TRANSIENT_LOCAL"))
-
-    def subscribe(self, kind: Any, topic: str, callback: Callable[[Any], None], *, depth: int = 1) -> None:
+    def subscribe(
+        self, kind: Any, topic: str, callback: Callable[[Any], None], *, depth: int = 1, kept: bool = False
+    ) -> None:
         """Subscribe to a sensor: the newest message only, from reliable and best-effort publishers alike.
 
-        `depth`: more, for a topic on which several nodes publish different things at once.
+        `depth`: more, for a topic on which several nodes publish different things at once. `kept`: its publishers keep
+        their newest message for subscribers that come later.
         """
-        self._node.create_subscription(kind, topic, callback, self._profile("BEST_EFFORT", depth))
-
-    def service(self, name: str, package: str = "std_srvs") -> Any:
-        """Import and return the class of a service.
-
-        Raises:
-            RobotUnavailable: it is not installed.
-        """
-        try:
-            return getattr(import_module(f"{package}.srv"), name)
-        except (ImportError, AttributeError) as error:
-            raise RobotUnavailable(f"ROS 2 services {package}/{name} are missing: {error}") from error
-
-    def action(self, type: str) -> Any:
-        """Import and return an action class, "package/Name".
-
-        Raises:
-            RobotUnavailable: it is not installed.
-        """
-        package, _, name = type.partition("/")
-        try:
-            return getattr(import_module(f"{package}.action"), name.rpartition("/")[2])
-        except (ImportError, AttributeError) as error:
-            raise RobotUnavailable(f"the ROS 2 action {type} is missing: {error}") from error
+        profile = self._profile("RELIABLE", depth, "TRANSIENT_LOCAL") if kept else self._profile("BEST_EFFORT", depth)
+        self._node.create_subscription(kind, topic, callback, profile)
 
     def action_client(self, kind: Any, name: str) -> Any:
         """Return a client of an action, whose answers come on the node's thread. Make it before `start`."""

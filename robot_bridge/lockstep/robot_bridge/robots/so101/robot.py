@@ -1,6 +1,5 @@
 """The SO-101 arm: its drive, sense and cameras around one simulation."""
 
-import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Final
@@ -20,6 +19,7 @@ from lockstep.robot_bridge.robots.so101.arm_drive import ArmDrive
 from lockstep.robot_bridge.robots.so101.contact_force import ContactForce
 from lockstep.robot_bridge.robots.so101.controls import RATES
 from lockstep.robot_bridge.robots.so101.description import CAMERAS, describe
+from lockstep.robot_bridge.robots.so101.grip_drive import GripDrive
 from lockstep.robot_bridge.robots.so101.model import ARM, GRIPPER
 from lockstep.robot_bridge.robots.so101.postures import FOLDED, GoTo
 from lockstep.robot_bridge.robots.so101.reach import arm_chain, arm_solver
@@ -53,8 +53,7 @@ class So101(Robot):
         self._chain = arm_chain(self._description)
         solver = arm_solver(self._description, self._chain)
         self._drive = ArmDrive(self._chain, solver, RATES[ARM], HOME[ARM])
-        self._grip = self._grip_goal = HOME[GRIPPER]  # rad
-        self._grip_before: float | None = None  # value of the tick before
+        self._grip = GripDrive(RATES[GRIPPER], HOME[GRIPPER])
         self._contact = ContactForce(model)
         self._stopped = False  # the arm holds its posture, at any applied value
         self._values: Sequence[float] | None = None
@@ -77,7 +76,7 @@ class So101(Robot):
 
     def goals(self) -> Sequence[float]:
         *joints, x, y, z, rx, ry, rz = self._drive.pursued()
-        return [*joints, self._grip, x, y, z, rx, ry, rz]
+        return [*joints, self._grip.goal, x, y, z, rx, ry, rz]
 
     def tick(self) -> None:
         simulation, seconds = self.simulation, self.tick_seconds
@@ -85,13 +84,13 @@ class So101(Robot):
         rates = np.zeros(len(RATES))
         if self._values is not None:
             values, self._values = list(self._values), None
-            rates[GRIPPER] = self._drive_grip(values.pop(GRIPPER))
+            rates[GRIPPER] = self._grip.drive(values.pop(GRIPPER), seconds)
             since, joints = self._ticked_at - before, simulation.joints()[ARM]
             rates[ARM] = self._drive.drive(values, seconds, since, joints, pursues=self._pursues)
-        simulation.aim((*self._drive.goals, self._grip), rates)
+        simulation.aim((*self._drive.goals, self._grip.goal), rates)
         if not simulation.step(STEPS_PER_TICK):
             self._drive.hold(HOME[ARM])
-            self._grip = self._grip_goal = HOME[GRIPPER]
+            self._grip.hold(HOME[GRIPPER])
         self._contact.update(simulation.data, seconds)
 
     def measure(self) -> Measurement:
@@ -141,7 +140,7 @@ class So101(Robot):
     def reset(self) -> None:
         self._stopped = False
         self._drive.restart()
-        self._grip_before = None
+        self._grip.restart()
 
     def sources(self) -> Sequence[MediaSource]:
         return self._sources
@@ -152,21 +151,11 @@ class So101(Robot):
     def _hold(self) -> None:
         self._values = None
         self._drive.hold()
-        self._grip_goal = self._grip
+        self._grip.hold()
 
     def _go_to(self, goals: Mapping[int, float], text: str) -> GoTo:
         axes = len(self._description.axes)
         return GoTo(goals, axes, self.simulation.joints, self.tick_seconds, text)
-
-    def _drive_grip(self, value: float) -> float:
-        """Take the gripper's applied goal, rad, when it changes; return the rate of the goal that is pursued, rad/s."""
-        before, self._grip_before = self._grip_before, value
-        if before is not None and value != before and math.isfinite(value):
-            self._grip_goal = value
-        most = RATES[GRIPPER] * self.tick_seconds
-        step = min(max(self._grip_goal - self._grip, -most), most)
-        self._grip += step
-        return step / self.tick_seconds
 
     def _faults(self) -> list[str]:
         restarts = self.simulation.restarts

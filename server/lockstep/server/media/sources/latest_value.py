@@ -3,7 +3,7 @@
 import threading
 from collections import deque
 
-from lockstep.robot_bridge.link.outgoing_queues import StreamQueue
+from lockstep.robot_bridge.link.sending.outgoing_queues import StreamQueue
 from lockstep.server.media.sources.source_wire import Captured, Said
 
 __all__ = ["LatestValue"]

@@ -61,12 +61,14 @@ def server() -> Server:
 @pytest.fixture
 def goals(server: Server) -> GoalClient:
     request = SimpleNamespace(goal_info=SimpleNamespace(goal_id=None))
+
+    class Interface(SimpleNamespace):
+        Request = staticmethod(lambda: request)
+
     ros = SimpleNamespace(
-        action=lambda type: type,
         full_name=str,
         action_client=lambda kind, action: server,
-        message=lambda package, name: SimpleNamespace,
-        service=lambda name, package: SimpleNamespace(Request=lambda: request),
+        interface=lambda name: Interface,
         client=lambda kind, service: server,
     )
     return GoalClient(cast(RosSide, ros), "x/Y", "/dock", timeout=5.0)

@@ -15,11 +15,11 @@ TOPIC = "/key_switch"
 class OneTopic:
     """Stands for the side of ROS: keeps what would be called with a message."""
 
-    def message(self, package: str, name: str) -> str:
-        return f"{package}/{name}"
+    def interface(self, name: str) -> str:
+        return name
 
     def subscribe(self, message: str, topic: str, take: Callable[[Any], None]) -> None:
-        assert (message, topic) == ("std_msgs/Bool", TOPIC)
+        assert (message, topic) == ("std_msgs/msg/Bool", TOPIC)
         self.take = take
 
     def says(self, *, locked: bool) -> None:

@@ -15,8 +15,8 @@ TOPIC = "/servo_node/status"
 class OneTopic:
     """Stands for the side of ROS: keeps what would be called with a message."""
 
-    def message(self, package: str, name: str) -> str:
-        return f"{package}/{name}"
+    def interface(self, name: str) -> str:
+        return name
 
     def subscribe(self, message: str, topic: str, take: Callable[[Any], None]) -> None:
         self.message_name = message
@@ -30,7 +30,7 @@ def status(settings: ServoStatus) -> tuple[OneTopic, ServoStatusTopic]:
 
 def test_a_warning_is_shown_in_servos_own_words_until_all_is_well() -> None:
     ros, topic = status(ServoStatus())
-    assert ros.message_name == "moveit_msgs/ServoStatus"
+    assert ros.message_name == "moveit_msgs/msg/ServoStatus"
     ros.take(SimpleNamespace(code=2, message="Very close\nto a singularity"))
     assert topic.faults(clock.now()) == [f"{TOPIC}: Very close to a singularity"]
     ros.take(SimpleNamespace(code=0, message="No warnings"))
@@ -39,7 +39,7 @@ def test_a_warning_is_shown_in_servos_own_words_until_all_is_well() -> None:
 
 def test_a_number_alone_is_shown_as_it_is() -> None:
     ros, topic = status(ServoStatus(message="Int8"))
-    assert ros.message_name == "std_msgs/Int8"
+    assert ros.message_name == "std_msgs/msg/Int8"
     ros.take(SimpleNamespace(data=-1))
     assert topic.faults(clock.now()) == [f"{TOPIC}: MoveIt Servo reports status -1"]
 

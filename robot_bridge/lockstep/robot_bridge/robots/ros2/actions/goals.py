@@ -43,12 +43,13 @@ class GoalClient:
     """One action server. Call `tick` often: it cancels what has to end."""
 
     def __init__(self, ros: RosSide, type: str, action: str, timeout: float) -> None:
-        """Make the client.
+        """Make the client. `type`: "package/Name" or "package/action/Name".
 
         Raises:
             RobotUnavailable: the action is not installed.
         """
-        self.kind = ros.action(type)
+        package, _, name = type.partition("/")
+        self.kind = ros.interface(f"{package}/action/{name.rpartition('/')[2]}")
         self.action = action
         self.full_name = ros.full_name(action)
         self.timeout = timeout

@@ -26,8 +26,8 @@ class IdCancels:
         Raises:
             RobotUnavailable: action_msgs is not installed.
         """
-        self._id = ros.message("unique_identifier_msgs", "UUID")
-        self._kind = ros.service("CancelGoal", "action_msgs")
+        self._id = ros.interface("unique_identifier_msgs/msg/UUID")
+        self._kind = ros.interface("action_msgs/srv/CancelGoal")
         self._client = ros.client(self._kind, f"{server}/_action/cancel_goal")
 
     def new_id(self) -> Any:

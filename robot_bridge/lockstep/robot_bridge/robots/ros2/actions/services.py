@@ -44,7 +44,7 @@ class Services:
 
 
 def _client(ros: RosSide, settings: Service) -> tuple[Any, Any]:
-    kind = ros.service(settings.type)
+    kind = ros.interface(f"std_srvs/srv/{settings.type}")
     return ros.client(kind, settings.service), kind
 
 

@@ -81,7 +81,7 @@ class GraphSide(RosSide):
 
     def _action_fields(self, kind: str) -> ActionFields | None:
         try:
-            found = self.action(kind)
+            found = self.interface(kind)
         except RobotUnavailable:
             return None
         parts = (found.Goal, found.Result, found.Feedback)

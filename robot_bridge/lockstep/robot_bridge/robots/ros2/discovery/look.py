@@ -72,8 +72,7 @@ class _Listening:
                 self._listen(DESCRIPTION, topic.name, partial(self._take_text, topic.name), kept=True)
 
     def _listen(self, kind: str, topic: str, callback: Callable[[Any], None], kept: bool = False) -> None:
-        package, _, name = kind.partition("/msg/")
-        self._ros.listen(self._ros.message(package, name), topic, callback, kept)
+        self._ros.listen(self._ros.interface(kind), topic, callback, kept)
 
     def _follow_frames(self, topic: str) -> None:
         if topic in self._follows_frames:

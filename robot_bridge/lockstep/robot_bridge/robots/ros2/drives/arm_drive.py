@@ -37,7 +37,7 @@ class ArmDrive(Drive):
 
     def __init__(self, ros: RosSide, settings: Arm, tick_seconds: float) -> None:
         command = settings.command
-        kind = ros.message(PACKAGES[command.message], command.message)
+        kind = ros.interface(f"{PACKAGES[command.message]}/msg/{command.message}")
         super().__init__(ros, kind, command.topic, command.rate, len(settings.joints), tick_seconds)
         self._names = [joint.name for joint in settings.joints]
         self._horizon = command.horizon
@@ -62,7 +62,7 @@ class ArmDrive(Drive):
         if said is Said.NOTHING:
             return None
         if self._takes_velocities:
-            return velocities_message(self._kind, values)
+            return velocities_message(self.topic.kind, values)
         return self._messages.make(self._points(said, values), values)
 
     def sense(self, now: float) -> Sensed:

@@ -54,7 +54,7 @@ class BaseDrive(Drive):
         super().__init__(ros, self._twists.kind, command.topic, command.rate, sum(self._has), tick_seconds)
         self._still = settings.odometry.still
         self._odometry: Newest[BaseState] = Newest(settings.odometry.topic, settings.odometry.timeout)
-        ros.subscribe(ros.message("nav_msgs", "Odometry"), settings.odometry.topic, self._take)
+        ros.subscribe(ros.interface("nav_msgs/msg/Odometry"), settings.odometry.topic, self._take)
 
     def seen(self, now: float) -> bool:
         return self._odometry.fresh(now) is not None

@@ -7,11 +7,10 @@ from typing import Any, NamedTuple
 
 from lockstep.robot_bridge.control import clock
 from lockstep.robot_bridge.robots.ros2.drives.command_stream import CommandStream, Said
+from lockstep.robot_bridge.robots.ros2.drives.command_topic import CommandTopic
 from lockstep.robot_bridge.robots.ros2.ros_side import RosSide
 
 __all__ = ["Drive", "Sensed"]
-
-LOOK_INTERVAL = 0.2  # s between looks for subscribers
 
 
 class Sensed(NamedTuple):
@@ -23,43 +22,32 @@ class Sensed(NamedTuple):
 
 
 class Drive(ABC):
-    """One command topic, and the topic that reports the state that the commands lead to."""
+    """One command topic, and the topic that reports the state that the commands lead to.
+
+    Attributes:
+        size: number of axes
+        topic: the command topic
+    """
 
     def __init__(self, ros: RosSide, kind: Any, topic: str, rate: float, size: int, tick_seconds: float) -> None:
-        """`size`: number of axes."""
         self.size = size
+        self.topic = CommandTopic(ros, kind, topic)
         self._ros = ros
-        self._kind = kind
-        self._topic = topic
-        self._publisher = ros.publisher(kind, topic)
+        self._name = topic
         self._stream = CommandStream(rate, [0.0] * size, tick_seconds)
-        self._owes_zero = False  # the last published message was not zero
         self._stopped = False
-        self._heard = False  # a node listens
-        self._looked = float("-inf")  # s, time of that look
-
-    @property
-    def full_topic(self) -> str:
-        """The name of the command topic, with namespace and node resolved."""
-        return str(self._publisher.topic_name)
 
     def step(self, values: Sequence[float], dt: float) -> None:
         """Run one tick with these values."""
         now = clock.now()
         lost = self.lost(now)
         step = self._stream.step(values, lost, now)
-        self._say(step.said, step.values, dt)
+        self.topic.publish(self.advance(step.said, step.values, dt), step.said)
 
     def lost(self, now: float) -> bool:
         """Look whether a node listens; return whether the part must not move."""
-        if now - self._looked >= LOOK_INTERVAL:
-            self._heard, self._looked = self._publisher.get_subscription_count() > 0, now
-        return self._stopped or not (self._heard and self.seen(now))
-
-    @property
-    def withheld(self) -> bool:
-        """True if values are kept from the robot because its side was lost."""
-        return self._stream.withheld
+        is_heard = self.topic.look(now)
+        return self._stopped or not (is_heard and self.seen(now))
 
     def goals(self, now: float) -> list[float]:
         """Return the goal that each axis pursues; NaN for one that has none."""
@@ -72,13 +60,13 @@ class Drive(ABC):
     def end(self) -> None:
         """Publish zero if the last message was another, because the bridge closes."""
         self._stream.end()
-        if self._owes_zero:
-            self._say(Said.ZERO, [0.0] * self.size, 0.0)
+        if self.topic.owes_zero:
+            self.topic.publish(self.advance(Said.ZERO, [0.0] * self.size, 0.0), Said.ZERO)
 
     def rest_from_thread(self) -> None:
         """Publish zero if the last message was another; the bridge's own tick may hang anywhere in `step`."""
-        if self._owes_zero:
-            self._publisher.publish(self.advance(Said.ZERO, [0.0] * self.size, 0.0))
+        if self.topic.owes_zero:
+            self.topic.publish_from_thread(self.advance(Said.ZERO, [0.0] * self.size, 0.0))
 
     def stop(self) -> None:
         """Publish zero if the last message was another, and no moving values until `reset`."""
@@ -88,20 +76,11 @@ class Drive(ABC):
     def reset(self) -> None:
         self._stopped = False
 
-    def _say(self, said: Said, values: list[float], dt: float) -> None:
-        message = self.advance(said, values, dt)
-        if message is not None:
-            self._owes_zero = True  # also when publishing raises
-            self._publisher.publish(message)
-            self._owes_zero = said is not Said.ZERO
-
     def faults(self, now: float) -> list[str]:
         """Return the faults that keep this part from being driven, in words for a person."""
-        found = self.sensor_faults(now)
-        if not self._heard:
-            found.append(f"{self._topic}: no subscriber for {self._kind.__name__}")
+        found = self.sensor_faults(now) + self.topic.faults()
         if self._stream.withheld and not self._stopped and not found:
-            found.append(f"{self._topic}: let go of the controls once; the robot's subscriber was lost during motion")
+            found.append(f"{self._name}: let go of the controls once; the robot's subscriber was lost during motion")
         return found
 
     @abstractmethod

@@ -29,7 +29,7 @@ class GoalArmDrive(Drive):
 
     def __init__(self, ros: RosSide, settings: Arm, description: RobotDescription, tick_seconds: float) -> None:
         command = settings.command
-        kind = ros.message(PACKAGES[command.message], command.message)
+        kind = ros.interface(f"{PACKAGES[command.message]}/msg/{command.message}")
         count = len(settings.joints)
         size = count + sum(len((*pose.position, *pose.rotation)) for pose in description.poses)
         super().__init__(ros, kind, command.topic, command.rate, size, tick_seconds)
@@ -60,12 +60,12 @@ class GoalArmDrive(Drive):
         changed = any(abs(a - b) > SAME for a, b in zip(values, self._before, strict=False))
         self._before = list(values)
         lost = self.lost(now)
-        held = lost or self.withheld
+        held = lost or self._stream.withheld
         rates = self._advance(values, dt, since, now, held)
         if held and changed:  # goals that move have to end before the arm is driven again; nothing of this is published
             rates = [1.0] * self.size
         step = self._stream.step(rates, lost, now)
-        self._say(step.said, step.values, dt)
+        self.topic.publish(self.advance(step.said, step.values, dt), step.said)
 
     def advance(self, said: Said, values: list[float], dt: float) -> Any:
         if said is Said.NOTHING or self._goals is None:

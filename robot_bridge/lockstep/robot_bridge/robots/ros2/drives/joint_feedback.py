@@ -19,7 +19,7 @@ class JointFeedback:
         self._timeout, self._still = settings.timeout, settings.still
         self._book = JointCache(names)
         self._states: Newest[None] = Newest(settings.topic, settings.timeout)
-        ros.subscribe(ros.message("sensor_msgs", "JointState"), settings.topic, self._take)
+        ros.subscribe(ros.interface("sensor_msgs/msg/JointState"), settings.topic, self._take)
 
     def is_complete(self, now: float) -> bool:
         """Return whether the state of every joint is fresh."""

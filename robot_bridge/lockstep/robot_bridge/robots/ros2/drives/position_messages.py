@@ -28,7 +28,7 @@ class PositionMessages:
         """Return a trajectory of positions alone: controllers refuse one that ends with a velocity."""
         message = self._kind()
         message.joint_names = self._names
-        point = self._ros.message("trajectory_msgs", "JointTrajectoryPoint")()
+        point = self._ros.interface("trajectory_msgs/msg/JointTrajectoryPoint")()
         point.positions = points
         point.time_from_start = self._ros.span_message(self._horizon)
         message.points = [point]

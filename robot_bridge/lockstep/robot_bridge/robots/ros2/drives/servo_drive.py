@@ -32,7 +32,7 @@ class ServoDrive(Drive):
 
     def __init__(self, ros: RosSide, settings: Servo, tick_seconds: float) -> None:
         command = settings.command
-        kind = ros.message("geometry_msgs", "TwistStamped")
+        kind = ros.interface("geometry_msgs/msg/TwistStamped")
         super().__init__(ros, kind, command.topic, command.rate, len(SERVO_AXES), tick_seconds)
         self._command = command
         self._feedback = JointFeedback(ros, settings.states, settings.joints)
@@ -42,7 +42,7 @@ class ServoDrive(Drive):
         return self._feedback.is_complete(now)
 
     def advance(self, said: Said, values: list[float], dt: float) -> Any:
-        return None if said is Said.NOTHING else tool_twist(self._ros, self._kind, self._command, values)
+        return None if said is Said.NOTHING else tool_twist(self._ros, self.topic.kind, self._command, values)
 
     def sense(self, now: float) -> Sensed:
         known = self._feedback.known(now)

@@ -16,7 +16,7 @@ class TwistMaker:
     """
 
     def __init__(self, ros: RosSide, command: TwistCommand) -> None:
-        self.kind = ros.message("geometry_msgs", command.message)
+        self.kind = ros.interface(f"geometry_msgs/msg/{command.message}")
         self._ros = ros
         self._stamped = command.message == "TwistStamped"
         self._frame = command.frame

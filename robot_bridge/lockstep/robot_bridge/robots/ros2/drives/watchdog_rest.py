@@ -74,15 +74,15 @@ def prepare(encoded: str) -> Act:
         twists = TwistMaker(ros, settings.base.command)
         zeros.append((ros.publisher(twists.kind, settings.base.command.topic), partial(twists.make, 0.0, 0.0, 0.0)))
     if settings.arm is not None:
-        kind = ros.message(PACKAGES[settings.arm.command.message], settings.arm.command.message)
+        kind = ros.interface(f"{PACKAGES[settings.arm.command.message]}/msg/{settings.arm.command.message}")
         still = [0.0] * len(settings.arm.joints)
         zeros.append((ros.publisher(kind, settings.arm.command.topic), partial(velocities_message, kind, still)))
     if settings.servo is not None:
-        command, kind = settings.servo.command, ros.message("geometry_msgs", "TwistStamped")
+        command, kind = settings.servo.command, ros.interface("geometry_msgs/msg/TwistStamped")
         still = [0.0] * len(SERVO_AXES)
         zeros.append((ros.publisher(kind, command.topic), partial(tool_twist, ros, kind, command, still)))
 
-    cancels = ros.service("CancelGoal", "action_msgs")
+    cancels = ros.interface("action_msgs/srv/CancelGoal")
     cancelling = [ros.client(cancels, f"{action.action}/_action/cancel_goal") for action in settings.actions]
 
     def rest() -> bool:

@@ -22,9 +22,9 @@ class FrameListener:
             RobotUnavailable: tf2_msgs is not installed.
         """
         self._tree = TransformTree()
-        kind = ros.message("tf2_msgs", "TFMessage")
+        kind = ros.interface("tf2_msgs/msg/TFMessage")
         ros.subscribe(kind, "/tf", self._take, depth=DEPTH)
-        ros.subscribe_kept(kind, "/tf_static", self._take_static, depth=DEPTH)
+        ros.subscribe(kind, "/tf_static", self._take_static, depth=DEPTH, kept=True)
 
     def pose(self, frame: str, child: str, now: float, timeout: float) -> PlanarPose | None:
         """As `TransformTree.pose`."""

@@ -67,13 +67,13 @@ class MapReader:
         self._frames = frames
         self._place: tuple[PlanarPose, float] | None = None  # of the odometry's frame on the map, and when that came
         self._path: Newest[Points] = Newest(settings.path, math.inf)
-        subscribe = ros.subscribe_kept if settings.durable else ros.subscribe
-        subscribe(ros.message("nav_msgs", "OccupancyGrid"), settings.topic, self._take_map)
+        grids = ros.interface("nav_msgs/msg/OccupancyGrid")
+        ros.subscribe(grids, settings.topic, self._take_map, kept=settings.durable)
         if settings.path:
-            ros.subscribe(ros.message("nav_msgs", "Path"), settings.path, self._take_path)
+            ros.subscribe(ros.interface("nav_msgs/msg/Path"), settings.path, self._take_path)
         place = settings.place
         if place.source == "topic":
-            ros.subscribe(ros.message("geometry_msgs", place.message), place.topic, self._take_place)
+            ros.subscribe(ros.interface(f"geometry_msgs/msg/{place.message}"), place.topic, self._take_place)
 
     def grid_map(self) -> GridMap | None:
         return self._map

@@ -46,7 +46,7 @@ class BatteryTopic:
     def __init__(self, ros: RosSide, settings: Battery) -> None:
         self._settings = settings
         self._charges: Newest[Charge] = Newest(settings.topic, settings.timeout)
-        ros.subscribe(ros.message("sensor_msgs", "BatteryState"), settings.topic, self._take)
+        ros.subscribe(ros.interface("sensor_msgs/msg/BatteryState"), settings.topic, self._take)
 
     def items(self, now: float) -> list[StatusItem]:
         """Return its item; none before the first message. An old reading has its age."""

@@ -37,7 +37,7 @@ class CameraSource(MediaSource):
         self._shots: Newest[_Shot] = Newest(settings.topic, settings.timeout)
         self._loop: asyncio.AbstractEventLoop | None = None
         self._came = asyncio.Event()
-        ros.subscribe(ros.message("sensor_msgs", settings.message), settings.topic, self._take)
+        ros.subscribe(ros.interface(f"sensor_msgs/msg/{settings.message}"), settings.topic, self._take)
 
     @property
     def newest(self) -> Newest[Any]:

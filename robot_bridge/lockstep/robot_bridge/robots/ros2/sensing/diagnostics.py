@@ -76,7 +76,9 @@ class DiagnosticsTopic:
     def __init__(self, ros: RosSide, settings: Diagnostics) -> None:
         self._components = Components(settings.most, settings.timeout)
         self._lock = threading.Lock()  # the node's thread takes, the bridge's loop reads
-        ros.subscribe(ros.message("diagnostic_msgs", "DiagnosticArray"), settings.topic, self._take, depth=PUBLISHERS)
+        ros.subscribe(
+            ros.interface("diagnostic_msgs/msg/DiagnosticArray"), settings.topic, self._take, depth=PUBLISHERS
+        )
 
     def items(self, now: float) -> list[StatusItem]:
         with self._lock:

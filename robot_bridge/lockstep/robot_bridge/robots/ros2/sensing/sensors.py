@@ -27,7 +27,7 @@ class RangeSensor:
         self._frame = settings.frame
         self._sectors = Sectors(settings.count, settings.range_min, settings.range_max, settings.yaw)
         self._scans: Newest[list[float]] = Newest(settings.topic, settings.timeout)
-        ros.subscribe(ros.message("sensor_msgs", "LaserScan"), settings.topic, self._take)
+        ros.subscribe(ros.interface("sensor_msgs/msg/LaserScan"), settings.topic, self._take)
 
     def values(self, now: float) -> list[float]:
         """Return the ranges; empty if they are too old."""
@@ -58,7 +58,7 @@ class WrenchTopic:
 
     def __init__(self, ros: RosSide, settings: Wrench) -> None:
         self._wrenches: Newest[list[float]] = Newest(settings.topic, settings.timeout)
-        ros.subscribe(ros.message("geometry_msgs", "WrenchStamped"), settings.topic, self._take)
+        ros.subscribe(ros.interface("geometry_msgs/msg/WrenchStamped"), settings.topic, self._take)
 
     def values(self, now: float) -> list[float]:
         """Return the wrench; empty if it is too old."""
@@ -85,7 +85,7 @@ class LockoutTopic:
         self._topic = settings.topic
         self._said: Newest[bool] = Newest(settings.topic, settings.timeout)
         self._heard = threading.Event()
-        ros.subscribe(ros.message("std_msgs", "Bool"), settings.topic, self._take)
+        ros.subscribe(ros.interface("std_msgs/msg/Bool"), settings.topic, self._take)
 
     def wait(self) -> None:
         """Block until the first message, at most for `FIRST_WORD`: a bridge that starts is not locked out early."""

@@ -18,7 +18,7 @@ class ServoStatusTopic:
     def __init__(self, ros: RosSide, settings: ServoStatus) -> None:
         package = "moveit_msgs" if settings.message == "ServoStatus" else "std_msgs"
         self._said: Newest[str] = Newest(settings.topic, settings.timeout)
-        ros.subscribe(ros.message(package, settings.message), settings.topic, self._take)
+        ros.subscribe(ros.interface(f"{package}/msg/{settings.message}"), settings.topic, self._take)
 
     def faults(self, now: float) -> list[str]:
         said = self._said.fresh(now)

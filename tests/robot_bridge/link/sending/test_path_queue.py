@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from lockstep.robot_bridge.link.path_queue import BEHIND_AT, LENGTH, RTT_AT, UNKNOWN, PathQueue, path_queue
+from lockstep.robot_bridge.link.sending.path_queue import BEHIND_AT, LENGTH, RTT_AT, UNKNOWN, PathQueue, path_queue
 
 
 class Kernel:

@@ -1,5 +1,5 @@
 from lockstep.protocol.messages import Media, MediaCodec
-from lockstep.robot_bridge.link.outgoing_queues import ORDERED_DEPTH, MediaOutbox, NewestOutbox
+from lockstep.robot_bridge.link.sending.outgoing_queues import ORDERED_DEPTH, MediaOutbox, NewestOutbox
 
 
 def medium(stamp: int, stream: str = "camera", codec: MediaCodec = "yuv420p", keyframe: bool = True) -> Media:
