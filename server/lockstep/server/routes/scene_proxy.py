@@ -127,7 +127,7 @@ async def _join(websocket: WebSocket, scene: SceneView, ticket: SceneTicket) -> 
     subprotocols = _subprotocols(websocket)
     try:
         upstream = await connect(
-            f"ws://127.0.0.1:{scene.port}/",
+            f"ws://127.0.0.1:{scene.renderer.port}/",
             subprotocols=subprotocols or None,
             compression=None,
             max_size=MAX_DOWN,
