@@ -138,4 +138,4 @@ class EncoderWorker(FrameStage, Generic[Job]):
         for frame in result.frames:
             self.following.encoded(frame, result.encoding)
         if result.moves:
-            self._encodings.move_all(result.encoding.codec)
+            self._encodings.own.move_all(result.encoding.codec)

@@ -164,7 +164,7 @@ class QualityController:
         members = [peer for peer in observers if peer.in_crowd]
         if self._crowd.watch(len(members), now) > 1:
             for stream in _streams(members):
-                for encoding in stream.encodings.of_tier("crowd"):
+                for encoding in stream.encodings.own.of_tier("crowd"):
                     encoding.plan = self._plan_of(stream, "crowd")
 
     def _encoded_as(self, peer: PeerQuality, shared: bool) -> PictureTier:
@@ -199,7 +199,7 @@ class QualityController:
         limited = any(peer.path.limited for peer in leaders)
         pause = max(peer.path.paused_until for peer in leaders)
         for stream in streams:
-            for encoding in stream.encodings.of_tier("operator"):
+            for encoding in stream.encodings.own.of_tier("operator"):
                 encoding.paused_until = pause
                 encoding.keyframes.sparing = limited
         whole = not limited and all(
@@ -233,7 +233,7 @@ class QualityController:
             ladder = self._ladders.setdefault((tier, stream.name), Adaptation())
             plan = ladder.plan(bps, stream.frame_rate / divisor, stream.size, now)
             self._plans[tier, stream.name] = plan
-            for encoding in stream.encodings.of_tier(tier):
+            for encoding in stream.encodings.own.of_tier(tier):
                 encoding.plan = plan
 
     def _shares(self, total_bps: float, streams: list[VideoStream]) -> dict[VideoStream, float]:
@@ -249,7 +249,7 @@ class QualityController:
         peer.encoded_as = encoded_as
         for camera in peer.cameras:
             camera.stream.encodings.move(camera.codec, camera.target, encoded_as)
-            for encoding in camera.stream.encodings.of_tier(encoded_as):
+            for encoding in camera.stream.encodings.own.of_tier(encoded_as):
                 encoding.plan = self._plan_of(camera.stream, encoded_as)
 
     def _sound_for(self, peer: PeerQuality) -> None:
