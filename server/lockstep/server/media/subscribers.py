@@ -13,7 +13,7 @@ from lockstep.server.media.pipeline.fanout import FanOut
 from lockstep.server.media.pipeline.rtp_sender import RtpSender
 from lockstep.server.media.pipeline.stream import AudioStream, VideoStream
 from lockstep.server.media.planning import MediaPlan, PlannedStream
-from lockstep.server.media.quality.bandwidth_estimator import RateLimits
+from lockstep.server.media.quality.path.bandwidth_estimator import RateLimits
 from lockstep.server.media.quality.peer_quality import CameraLink, PeerQuality, SoundLink
 from lockstep.server.media.quality.quality_controller import QualityController
 from lockstep.server.media.settings import MediaSettings

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, NamedTuple
 from lockstep.protocol.console import Quality, Report, StreamQuality, Tier
 from lockstep.protocol.serial import event_gap
 from lockstep.server.media.pipeline.rtp_sender import SenderStats
-from lockstep.server.media.quality.bandwidth_estimator import BandwidthEstimator, RateLimits, Reason
 from lockstep.server.media.quality.encoding_target import PictureTier
 from lockstep.server.media.quality.observer_tier import ObserverTier
+from lockstep.server.media.quality.path.bandwidth_estimator import BandwidthEstimator, RateLimits, Reason
 from lockstep.server.media.subscription import Subscription
 
 if TYPE_CHECKING:
@@ -134,7 +134,7 @@ class PeerQuality:
     def decide(self, now: float) -> Reason | None:
         """Evaluate the path; return the reason if its rate was lowered."""
         before = self.path.rate
-        self.path.sent(sum(stats.octets for stats in self.stats()), now)
+        self.path.sending.add(sum(stats.octets for stats in self.stats()), now)
         self.path.decide(now)
         self.pace(self.path.rate if self.path.limited else None)
         return self.path.reason if self.path.rate < before else None
