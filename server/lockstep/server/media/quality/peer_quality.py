@@ -139,6 +139,22 @@ class PeerQuality:
         self.pace(self.path.rate if self.path.limited else None)
         return self.path.reason if self.path.rate < before else None
 
+    def move_pictures(self, tier: PictureTier) -> bool:
+        """Get the pictures of `tier`; return whether that is another one."""
+        if self.encoded_as == tier:
+            return False
+        self.encoded_as = tier
+        for camera in self.cameras:
+            camera.stream.encodings.move(camera.codec, camera.target, tier)
+        return True
+
+    def move_sound(self, tier: PictureTier) -> None:
+        """Get the sound packets of `tier`."""
+        if self.hears_as != tier:
+            self.hears_as = tier
+            for sound in self.sounds:
+                sound.stream.encodings.move(sound.codec, sound.target, tier)
+
     def tell(self, streams: list[StreamQuality], crowd: int) -> None:
         """Tell the peer its quality if that has changed; `crowd` as in `Quality`."""
         quality = Quality(streams=streams, reason=self.path.reason, crowd=crowd)
