@@ -14,7 +14,7 @@ from lockstep.server.media.pipeline.rtp_sender import RtpSender
 from lockstep.server.media.pipeline.stream import AudioStream, VideoStream
 from lockstep.server.media.planning import MediaPlan, PlannedStream
 from lockstep.server.media.quality.path.bandwidth_estimator import RateLimits
-from lockstep.server.media.quality.peer_quality import CameraLink, PeerQuality, SoundLink
+from lockstep.server.media.quality.peer_quality import CameraDelivery, PeerQuality, SoundDelivery
 from lockstep.server.media.quality.quality_controller import QualityController
 from lockstep.server.media.sending_priority import SendingPriority
 from lockstep.server.media.settings import MediaSettings
@@ -124,9 +124,9 @@ class Subscribers:
         self._peers[peer] = None
         for each in peer.deliveries:
             if isinstance(each.stream, VideoStream):
-                peer.quality.cameras.append(CameraLink(each.stream, each.info.codec, each.target))
+                peer.quality.cameras.append(CameraDelivery(each.stream, each.info.codec, each.target))
             elif isinstance(each.stream, AudioStream):
-                peer.quality.sounds.append(SoundLink(each.stream, each.info.codec, each.target))
+                peer.quality.sounds.append(SoundDelivery(each.stream, each.info.codec, each.target))
         if peer.deliveries:
             self._quality.join(peer.quality)
         self._spread_reports()

@@ -15,13 +15,13 @@ from lockstep.server.media.subscription import Subscription
 if TYPE_CHECKING:
     from lockstep.server.media.pipeline.stream import AudioStream, VideoStream
 
-__all__ = ["CameraLink", "PeerQuality", "SoundLink"]
+__all__ = ["CameraDelivery", "PeerQuality", "SoundDelivery"]
 
 CALM_RATE = 25.0  # events a second up to which each event of a gap counts in full
 WIRE_SHARE = 0.92  # share of payload in the bytes that a receiver counts; the rest are headers
 
 
-class CameraLink(NamedTuple):
+class CameraDelivery(NamedTuple):
     """The delivery of one camera to this peer."""
 
     stream: "VideoStream"
@@ -29,7 +29,7 @@ class CameraLink(NamedTuple):
     target: Subscription
 
 
-class SoundLink(NamedTuple):
+class SoundDelivery(NamedTuple):
     """The delivery of one microphone to this peer."""
 
     stream: "AudioStream"
@@ -47,8 +47,8 @@ class PeerQuality:
         self.drives = False  # holds the control seat
         self.stays_low = False  # a thumbnail: never more than the lowest tier
         self.relays = False  # a relay, with many peers behind it
-        self.cameras: list[CameraLink] = []  # the main one first
-        self.sounds: list[SoundLink] = []
+        self.cameras: list[CameraDelivery] = []  # the main one first
+        self.sounds: list[SoundDelivery] = []
         self.pace: Callable[[float | None], None] = lambda rate: None  # bit/s that the path carries; None: no limit
         self.path = BandwidthEstimator(limits, clock())
         self.choice = ObserverTier(clock())
