@@ -13,10 +13,12 @@ class EventGap:
     """Takes a peer's reports of the gap.
 
     Attributes:
+        newest: the last report's gap, in events
         reports_near: consecutive reports in which the gap was near the tolerance, and had been smaller before
     """
 
     def __init__(self) -> None:
+        self.newest = 0
         self.reports_near = 0
         self._recent: list[int] = []  # gaps of the last reports
         self._tries: list[int] = []  # gap at each decrease for it
@@ -28,6 +30,7 @@ class EventGap:
         near = tolerance > 0 and gap >= NEAR_TOLERANCE * tolerance and gap > usual
         self.reports_near = self.reports_near + 1 if near else 0
         self._recent = [*self._recent[1 - KEPT_REPORTS :], gap]
+        self.newest = gap
 
     def is_near(self, now: float) -> bool:
         """Return whether the gap is near the tolerance and may be caused by the rate."""
@@ -35,12 +38,11 @@ class EventGap:
 
     def try_decrease(self, now: float) -> bool:
         """Return whether to decrease the rate for the gap, which is near; if decreases did not narrow it, ignore it."""
-        gap = self._recent[-1]
-        narrowed = bool(self._tries) and gap < self._tries[0]
+        narrowed = bool(self._tries) and self.newest < self._tries[0]
         if len(self._tries) >= TRIES and not narrowed:
             self._rests_until = now + REST
             self._tries = []
             return False
-        self._tries = [gap] if narrowed else [*self._tries, gap]
+        self._tries = [self.newest] if narrowed else [*self._tries, self.newest]
         self.reports_near = 0
         return True
