@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 import pytest
 import uvloop
 
-SHELLS = ("test_endpoint.py", "test_server_links.py", "test_tcp_port.py", "test_udp_socket.py")
+SHELLS = ("test_endpoint.py", "test_turn_client.py", "test_tcp_port.py", "test_udp_socket.py")
 
 
 def pytest_asyncio_loop_factories(

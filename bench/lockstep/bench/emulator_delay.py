@@ -1,8 +1,8 @@
-"""Measures the relay's own delay: `python -m lockstep.bench.emulator_delay [--clients N]`.
+"""Measures the emulator's own delay: `python -m lockstep.bench.emulator_delay [--clients N]`.
 
-The relay runs in this process, as it does in `lockstep network`; both ends of every connection are in another one. Each
-client gets 3 Mbit/s of media, thirty bursts of ten packets a second, over a path of 50 ms. A packet carries the time at
-which it was sent; both processes read the same monotonic clock.
+The forwarder runs in this process, as it does in `lockstep network`; both ends of every connection are in another one.
+Each client gets 3 Mbit/s of media, thirty bursts of ten packets a second, over a path of 50 ms. A packet carries the
+time at which it was sent; both processes read the same monotonic clock.
 """
 
 import asyncio
@@ -39,7 +39,7 @@ OFFER, ANSWER = "client", "console"
 
 
 async def measure(clients: int, seconds: float) -> dict[str, Any]:
-    """Return the delay of packets besides the path's, in ms; the same without a relay; the relay's share of a core."""
+    """Return the delay of packets besides the path's, in ms; the same without a forwarder; its share of a core."""
     command = [
         sys.executable,
         "-m",
@@ -57,14 +57,14 @@ async def measure(clients: int, seconds: float) -> dict[str, Any]:
     ):
         doors = [_lead(network.open_forwarder(), client, console) for client, console in ready["ports"]]
         began, used = time.monotonic(), time.process_time()
-        relayed = await ends.ask(json.dumps(doors), seconds + PATIENCE)
+        forwarded = await ends.ask(json.dumps(doors), seconds + PATIENCE)
         core = (time.process_time() - used) / (time.monotonic() - began)
     return {
-        "packets": relayed["sent"],
-        "lost": relayed["sent"] - len(relayed["took"]),
-        "late_ms": _spread([each - DELAY * 1000 for each in relayed["took"]]),
+        "packets": forwarded["sent"],
+        "lost": forwarded["sent"] - len(forwarded["took"]),
+        "late_ms": _spread([each - DELAY * 1000 for each in forwarded["took"]]),
         "direct_ms": _spread(direct["took"]),
-        "relay_core_percent": round(100 * core, 1),
+        "forwarder_core_percent": round(100 * core, 1),
     }
 
 
@@ -73,10 +73,10 @@ def _spread(values: list[float]) -> dict[str, float]:
     return {name: round(quantile(values, share), 3) for name, share in shares.items()}
 
 
-def _lead(relay: UdpForwarder, client: int, console: int) -> int:
-    """Lead a client and a console through the relay, and return the port at which the client finds it."""
-    relay.offer(_description(OFFER, client))
-    return int(relay.answer(_description(ANSWER, console)).split(" typ host")[0].rsplit(" ", 1)[1])
+def _lead(forwarder: UdpForwarder, client: int, console: int) -> int:
+    """Lead a client and a console through the forwarder, and return the port at which the client finds it."""
+    forwarder.offer(_description(OFFER, client))
+    return int(forwarder.answer(_description(ANSWER, console)).split(" typ host")[0].rsplit(" ", 1)[1])
 
 
 def _description(name: str, port: int) -> str:
@@ -108,7 +108,7 @@ class _Ends:
         await self._play(behind, seconds)
 
     async def run_directly(self, seconds: float) -> None:
-        """Send without a relay, for the delay of the two ends and the system."""
+        """Send without a forwarder, for the delay of the two ends and the system."""
         await self._play([(console, client.getsockname()) for client, console in self._pairs], seconds)
 
     async def _play(self, behind: list[tuple[socket.socket, tuple[str, int]]], seconds: float) -> None:
@@ -148,7 +148,7 @@ def _socket() -> socket.socket:
 
 async def _be_the_ends(clients: int, seconds: float) -> None:
     ends = _Ends(clients)
-    prefer_this_process()  # so that the relay is what limits the figures
+    prefer_this_process()  # so that the forwarder is what limits the figures
     print(json.dumps({"ports": ends.ports}), flush=True)
     doors = json.loads(await asyncio.to_thread(sys.stdin.readline))
     await (ends.run(doors, seconds) if doors else ends.run_directly(seconds))

@@ -65,7 +65,7 @@ class Console:
         tls_ca: file with a certificate to trust instead of the system's, such as a console's own (tls-cert.pem)
         relay_only: connect through the console's TURN server or not at all
         through_relay: an observer watches through a relay (docs/relay.md) if the console has one for it
-        route: passes the connection through a relay; for measurements
+        route: passes the connection through a forwarder; for measurements
 
     Raises:
         LinkFormatError: the link is not one that `lockstep up` prints.

@@ -156,7 +156,7 @@ class Endpoint:
         """Ask STUN servers for the mapped address, and TURN servers for relayed ones; `candidates` has the answers.
 
         Earlier relayed addresses that carry no data are given back. Return the errors of servers without an answer:
-        `OSError`, of which `RelayRefused` has the server's reason, and anything else for a fault of this endpoint.
+        `OSError`, of which `TurnRefused` has the server's reason, and anything else for a fault of this endpoint.
         """
         self._servers.give_back_unused(self._local_in_use())
         return await self._servers.ask(servers, [base for base in self._sockets if base[0] in self._hosts])
@@ -264,11 +264,11 @@ class Endpoint:
         return found is not None and found.is_full
 
     def _send_relayed(self, datagram: Datagram) -> None:
-        link = self._servers.relay(datagram.local)
-        if link is None:
+        client = self._servers.client(datagram.local)
+        if client is None:
             self.counts["no_socket"] += 1
         else:
-            link.send(datagram.data, datagram.remote)
+            client.send(datagram.data, datagram.remote)
 
     def _send_probes(self, datagrams: Sequence[Datagram]) -> None:
         self.send(datagrams, urgent=False)

@@ -76,6 +76,6 @@ async def test_without_credentials_that_are_still_good_there_is_no_way_and_the_p
     ):
         await page.page.add_init_script(EXPIRE)
         await page.page.goto(f"{stack.operator}&relay=only")
-        await page.page.get_by_text("No path through the relay").first.wait_for(timeout=30_000)
+        await page.page.get_by_text("No path through the TURN server").first.wait_for(timeout=30_000)
         assert not (await page.stats())["connected"]
         assert turn.says("401")

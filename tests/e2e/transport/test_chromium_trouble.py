@@ -63,7 +63,7 @@ async def test_blocked_udp_and_a_missing_relay_are_told_apart(own_stack: Stack, 
         await blocked.page.goto(own_stack.operator)
         await relayed.page.goto(own_stack.observer + "&relay=only")
         await _says(blocked.page, "No path for pictures and commands", "A firewall blocks UDP")
-        await _says(relayed.page, "No path through the relay", "Remove relay=only from the link")
+        await _says(relayed.page, "No path through the TURN server", "Remove relay=only from the link")
         await blocked.page.unroute_all(behavior="ignoreErrors")
 
 

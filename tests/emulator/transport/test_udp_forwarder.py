@@ -182,7 +182,7 @@ async def test_an_outage_holds_packets_until_its_end_and_the_first_packet_starts
         assert time.monotonic() >= began + 0.1
 
 
-async def test_a_closed_relay_passes_nothing_and_its_ports_are_free() -> None:
+async def test_a_closed_forwarder_passes_nothing_and_its_ports_are_free() -> None:
     async with forwarder_for(even_profile("x", PERFECT)) as (forwarder, _), sockets(2) as (client, console):
         door = join(forwarder, client, console)
         forwarder.close()

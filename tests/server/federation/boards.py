@@ -45,7 +45,7 @@ class FakeHost:
         self.stops.append((name, press.by.name, press.reason))
         self.presses.append(press.id)
         if name in self.away:
-            return StopAnswer(True, False, 7, "the robot cannot be reached now; it is sent first when the link is back")
+            return StopAnswer(True, False, 7, "the robot is away; it is sent first when the robot link is back")
         return StopAnswer(True, True, 7, "", 3, kept=True)
 
     def links_revoked(self, ended: list[Invitation]) -> None:

@@ -133,10 +133,9 @@ async def test_sender_reports_reach_the_peer_and_its_answers_come_back() -> None
         await stream(hub, viewer, "video", picture, 2)
         peer = cast(Any, viewer.pc.getTransceivers()[0].receiver)
         await viewer.until(lambda: bool(peer._RTCRtpReceiver__lsr))
-        mid = viewer.media.streams[0].mid
-        await viewer.until(lambda: viewer.media.stats[mid].round_trip_ms is not None)
-        assert 0 <= cast(float, viewer.media.stats[mid].round_trip_ms) < 2000
-        assert viewer.media.stats[mid].packets_lost == 0
+        await viewer.until(lambda: viewer.stats.round_trip_ms is not None)
+        assert 0 <= cast(float, viewer.stats.round_trip_ms) < 2000
+        assert viewer.stats.packets_lost == 0
 
 
 async def test_a_new_epoch_gets_new_streams_and_starts_its_stamps_afresh() -> None:
@@ -153,11 +152,11 @@ async def test_a_new_epoch_gets_new_streams_and_starts_its_stamps_afresh() -> No
 async def test_a_peer_is_told_once_when_an_epoch_ends_its_streams_and_also_when_it_asks_late() -> None:
     told: list[str] = []
     async with running_plane() as hub, viewing(hub, ["video"]) as viewer, viewing(hub, ["video"]) as leaver:
-        viewer.media.on_ended(lambda: told.append("early"))
-        leaver.media.on_ended(lambda: told.append("left"))
+        viewer.media.ending.on_ended(lambda: told.append("early"))
+        leaver.media.ending.on_ended(lambda: told.append("left"))
         await leaver.media.close()
         hub.configure(description())
-        viewer.media.on_ended(lambda: told.append("late"))
+        viewer.media.ending.on_ended(lambda: told.append("late"))
         assert told == ["early", "late"]
 
 

@@ -149,7 +149,7 @@ async def test_malformed_packets_of_a_peer_are_counted_and_media_flow_on() -> No
         await peer.transport._send(b"\x80" + bytes(40))  # not SRTP
         nack = RtcpRtpfbPacket(fmt=1, ssrc=1, media_ssrc=viewer.ssrc, lost=[1, 2, 3])
         await peer._send_rtp(bytes(nack))
-        await viewer.until(lambda: viewer.media.stats[viewer.media.streams[0].mid].not_retransmitted == 3)
+        await viewer.until(lambda: viewer.stats.not_retransmitted == 3)
         dropped = viewer.connection.peer.dropped
         assert (dropped["rtcp_malformed"], dropped["srtp_malformed"] + dropped["srtp_authentication"]) == (1, 2)
         await stream(hub, viewer, "video", picture, 2, first=3)
@@ -195,7 +195,7 @@ async def test_a_failure_is_told_to_a_later_listener_too_and_is_not_an_end() -> 
     told: list[str] = []
     async with running_plane() as hub, viewing(hub, ["video"]) as viewer:
         viewer.media.failed("planted", RuntimeError("planted"))
-        viewer.media.on_ended(lambda: told.append("ended"))
+        viewer.media.ending.on_ended(lambda: told.append("ended"))
         viewer.media.on_failed(lambda stage, error: told.append(stage))
         assert told == ["planted"]
         hub.configure(description())

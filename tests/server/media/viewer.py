@@ -19,7 +19,7 @@ from lockstep.rtc.endpoint import Connection, Endpoint
 from lockstep.rtc.peer_events import Connected, MediaEvent, PeerEvent
 from lockstep.rtc.sdp import parse_description, write_description
 from lockstep.server.media.hub import MediaHub, MediaSettings, Subscriptions
-from lockstep.server.media.pipeline.rtp_sender import RtpSender
+from lockstep.server.media.pipeline.rtp_sender import RtpSender, SenderStats
 
 WIDTH, HEIGHT = 160, 120
 TIMEOUT = 10.0
@@ -139,6 +139,16 @@ class Viewer:
         streams = self.connection.peer.streams
         assert streams is not None
         return streams.outgoing[self.media.streams[0].mid].parameters.ssrc
+
+    @property
+    def stats(self) -> SenderStats:
+        """Of the first stream."""
+        return self.media.deliveries[0].target.sender.stats
+
+    @property
+    def dropped(self) -> int:
+        """Frames that it did not get because it could not keep up."""
+        return sum(delivery.target.dropped for delivery in self.media.deliveries)
 
     def of(self, kind: str) -> list[Received]:
         """Packets of the first section of a kind, without retransmissions."""

@@ -107,7 +107,7 @@ async def test_a_shape_that_cannot_be_built_is_counted_and_the_next_robot_is_sho
         events.publish(EpochBegan(bad))
         await eventually(lambda: failures() == 1)
         events.publish(EpochBegan(msgspec.structs.replace(MICRO, joints=MICRO.joints)))
-        await eventually(lambda: scene._model is not None and "holder" in scene._model.frames)
+        await eventually(lambda: scene.renderer.model is not None and "holder" in scene.renderer.model.frames)
         assert not running.done()
     finally:
         running.cancel()

@@ -73,9 +73,9 @@ async def test_viser_is_started_once_for_the_first_who_open_the_scene(monkeypatc
     monkeypatch.setattr(server, "start_viser", count)
     async with running_rig(scene=True) as rig:
         view = rig.dependencies.scene_or_error()
-        assert (view.port, starts) == (0, [])
+        assert (view.renderer.port, starts) == (0, [])
         await asyncio.gather(*(_scene_url(rig) for _ in range(5)))
-        assert view.port
+        assert view.renderer.port
         assert len(starts) == 1
 
 
@@ -190,7 +190,7 @@ async def test_a_scene_that_is_open_ends_when_its_link_expires_and_no_other_open
 async def test_the_page_of_the_scene_comes_from_memory_and_asks_nobody() -> None:
     async with running_rig(scene=True) as rig:
         path, _ = await _scene_url(rig)
-        rig.dependencies.scene_or_error().port = 1  # where nobody listens
+        rig.dependencies.scene_or_error().renderer.port = 1  # where nobody listens
         for encoding in ("gzip", "identity"):
             answer = await rig.http.get(path, headers={"Accept-Encoding": encoding})
             assert (answer.status_code, answer.headers["cache-control"]) == (200, "no-store")

@@ -17,7 +17,7 @@ const SPAN_LABELS: Record<SpanName, SpanLabel> = {
   camera_wait_ms: { label: "camera's beat", about: "from the feedback to the next capture" },
   capture_ms: { label: "capture", about: "from the moment that the picture shows until it is whole" },
   bridge_encode_ms: { label: "encode at the robot", about: "where the robot encodes its pictures" },
-  link_wait_ms: { label: "wait for the link", about: "until the robot link takes it" },
+  link_wait_ms: { label: "wait for the robot link", about: "until the robot link takes it" },
   encoder_wait_ms: { label: "wait for the encoder", about: "from its arrival until its encoder begins" },
   encode_ms: { label: "encode", about: "decoding and resizing the source included" },
   packetise_ms: { label: "packetise", about: "cutting it into packets" },

@@ -16,7 +16,7 @@ const ADVICE: Readonly<Record<StopFate, string | null>> = {
   not_kept:
     "The robot is stopped, but could not save the stop: if it restarts it may move again. Switch it off with its hardware stop.",
   waiting:
-    "Your STOP has not reached the robot. Use the hardware stop now. The console keeps your STOP and sends it first when the link is back.",
+    "Your STOP has not reached the robot. Use the hardware stop now. The console keeps your STOP and sends it first when the robot link is back.",
   unconfirmed: "The robot has not confirmed your STOP. Use the hardware stop now.",
   silenced:
     "Your STOP had no effect: a supervisor silenced your link. Use the hardware stop, or call the supervisor.",

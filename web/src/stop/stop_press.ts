@@ -10,7 +10,7 @@ const SAVE_MS = 1000; // that the robot's disk may take until a stop counts as n
 
 /**
  * What became of a press. `confirmed`: the robot has it on its disk. `not_kept`: the robot has it, its disk has not.
- * `waiting`: the console keeps it until the robot's link is back. `unconfirmed`: nobody has said anything for too long.
+ * `waiting`: the console keeps it until the robot link is back. `unconfirmed`: nobody has said anything for too long.
  */
 export type StopFate = "sending" | "confirmed" | "not_kept" | "waiting" | "unconfirmed" | "silenced";
 

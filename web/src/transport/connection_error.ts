@@ -4,7 +4,7 @@ export type ConnectionErrorKind =
   | "console_unreachable"
   | "lost"
   | "no_path"
-  | "no_relay"
+  | "no_turn_path"
   | "origin_refused"
   | "refused"
   | "relay_lost"
@@ -52,9 +52,9 @@ export const CONNECTION_ERROR_LABELS: Readonly<Record<ConnectionErrorKind, Conne
     title: "No path for pictures and commands",
     text: "The console answers, but its UDP packets do not get through. A firewall blocks UDP, or the console needs a TURN server. Try another network, or show this to the person who runs the console.",
   },
-  no_relay: {
-    title: "No path through the relay",
-    text: "This link allows only a TURN relay, and none could be used: the console names no TURN server, or this device cannot reach it. Remove relay=only from the link to try a direct path.",
+  no_turn_path: {
+    title: "No path through the TURN server",
+    text: "This link allows only a way through a TURN server, and none could be used: the console names none, or this device cannot reach it. Remove relay=only from the link to try a direct path.",
   },
   origin_refused: {
     title: "Opened at a wrong address",

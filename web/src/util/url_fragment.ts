@@ -2,7 +2,7 @@
 export interface PageLink {
   readonly token: string | null;
   readonly trailer: boolean; // `stamp=trailer` forces the trailer carrier
-  readonly relayOnly: boolean; // `relay=only`: media and data through TURN or not at all
+  readonly turnOnly: boolean; // `relay=only`: media and data through TURN or not at all
   readonly name: string | null; // what others see
   readonly watches: boolean; // the token is an observer's, as far as can be read here
 }
@@ -13,7 +13,7 @@ export function readFragment(hash: string): PageLink {
     token: fields.get("token") || null,
     watches: roleOf(fields.get("token") ?? "") === "observer",
     trailer: fields.get("stamp") === "trailer",
-    relayOnly: fields.get("relay") === "only",
+    turnOnly: fields.get("relay") === "only",
     name: fields.get("name") || null,
   };
 }

@@ -104,7 +104,7 @@ function observer(): Far {
     streams: () => undefined,
     ended: ({ why }: TransportEnd) => ends.push(why),
   };
-  const options = { trailer: false, relayOnly: false, watches: true };
+  const options = { trailer: false, turnOnly: false, watches: true };
   const peer = new Peer(api as unknown as ConsoleApi, null, options, events);
   return { queries, ended, ends, peer };
 }

@@ -61,7 +61,7 @@ const API: WebRtcApi = {
 };
 
 function webRtc(events: TransportEvents): FarSide {
-  const options = { trailer: false, relayOnly: false };
+  const options = { trailer: false, turnOnly: false };
   const transport = new WebRtcTransport(API, new PendingConnection(null, options), options, events);
   transport.listen();
   const { newest } = FakeConnection;

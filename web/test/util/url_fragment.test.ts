@@ -5,7 +5,7 @@ it("reads the token, the carrier and the name", () => {
   expect(readFragment("#token=a.b-c_d&stamp=trailer&name=Ada")).toEqual({
     token: "a.b-c_d",
     trailer: true,
-    relayOnly: false,
+    turnOnly: false,
     name: "Ada",
     watches: false,
   });
@@ -15,15 +15,15 @@ it.each(["", "#", "#token=", "#stamp=native"])("%j has no token and no trailer",
   expect(readFragment(hash)).toEqual({
     token: null,
     trailer: false,
-    relayOnly: false,
+    turnOnly: false,
     name: null,
     watches: false,
   });
 });
 
 it("relay=only, and nothing else, keeps media off direct paths", () => {
-  expect(readFragment("#token=a&relay=only").relayOnly).toBe(true);
-  expect(readFragment("#token=a&relay=yes").relayOnly).toBe(false);
+  expect(readFragment("#token=a&relay=only").turnOnly).toBe(true);
+  expect(readFragment("#token=a&relay=yes").turnOnly).toBe(false);
 });
 
 it("knows an observer's token, which alone asks where to watch, and no other", () => {

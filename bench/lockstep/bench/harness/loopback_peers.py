@@ -1,4 +1,4 @@
-"""Connects two plain aiortc peers in this process through a relay."""
+"""Connects two plain aiortc peers in this process through a forwarder."""
 
 import asyncio
 

@@ -1,1 +1,1 @@
-"""Relays that lead UDP, TCP, HTTP and WebSockets over a path."""
+"""Forwarders and proxies that lead UDP, TCP, HTTP and WebSockets over a path."""

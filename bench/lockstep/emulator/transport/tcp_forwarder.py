@@ -1,4 +1,4 @@
-"""Relays the robot link between the console and a robot bridge over a stream path for each direction.
+"""Forwards the robot link between the console and a robot bridge over a stream path for each direction.
 
 The first frame of a connection, the hello, tells its path (docs/robot-link.md). A message is one frame: a picture is
 late as a whole.

@@ -57,7 +57,7 @@ def _read_line(section: Section, line: str) -> None:
 
 def replace_candidates(sdp: str, host: str, port: int) -> str:
     """Return the description with one host candidate, `host:port`, in place of each section's candidates, so that a
-    relay can stand between."""
+    forwarder can stand between."""
     lines: list[str] = []
     replaced = False  # in the current section
     for line in sdp.splitlines():

@@ -41,7 +41,7 @@ ENDS = {
 
 
 class Route(Protocol):
-    """Changes the descriptions on their way, so that the connection passes a relay."""
+    """Changes the descriptions on their way, so that the connection passes a forwarder."""
 
     def offer(self, sdp: str) -> str: ...
 

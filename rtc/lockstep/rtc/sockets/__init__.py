@@ -1,1 +1,1 @@
-"""The shells of the endpoint: UDP, TCP, links to STUN and TURN servers, and the connections with their clock."""
+"""The shells of the endpoint: UDP, TCP, sockets to STUN and TURN servers, and the connections with their clock."""

@@ -1,4 +1,4 @@
-"""Asks STUN and TURN servers for addresses, and keeps the links to the relays that gave one."""
+"""Asks STUN and TURN servers for addresses, and keeps the clients of the TURN servers that gave one."""
 
 import asyncio
 import secrets
@@ -10,7 +10,7 @@ from lockstep.rtc.addresses import Address, Datagram, Path
 from lockstep.rtc.ice.check_list import LocalCandidate
 from lockstep.rtc.ice.gathering import reflexive, relayed
 from lockstep.rtc.sockets.endpoint_settings import EndpointSettings
-from lockstep.rtc.sockets.server_links import RelayLink, open_relay
+from lockstep.rtc.sockets.turn_client import TurnClient, open_turn_client
 from lockstep.rtc.turn.servers import IceServer, MappedAddress, ServerUri, server_uris
 
 __all__ = ["AddressServers"]
@@ -33,7 +33,7 @@ class AddressServers:
         send: Callable[[Sequence[Datagram]], None],
         on_data: Callable[[bytes, Path], None],
     ) -> None:
-        """`send`: sends from the endpoint's sockets; `on_data`: takes a datagram that came through a relay."""
+        """`send`: sends from the endpoint's sockets; `on_data`: takes a datagram that came through a TURN server."""
         self.told: list[LocalCandidate] = []
         self.probes: dict[Path, MappedAddress] = {}
         self._settings = settings
@@ -41,7 +41,7 @@ class AddressServers:
         self._send = send
         self._on_data = on_data
         self._loop = asyncio.get_running_loop()
-        self._relays: list[RelayLink] = []
+        self._clients: list[TurnClient] = []
         self._probed = asyncio.Event()  # one of the probes has received something
 
     async def ask(self, servers: Sequence[IceServer], bases: Iterable[Address]) -> list[Exception]:
@@ -82,10 +82,10 @@ class AddressServers:
             return error
 
     async def _ask_turn(self, uri: ServerUri, server: IceServer) -> list[LocalCandidate]:
-        link = await open_relay(uri, server, self._on_data)
-        self._relays.append(link)
-        address = link.relayed
-        return [] if address is None else [relayed(address, link.mapped, len(self._relays))]
+        client = await open_turn_client(uri, server, self._on_data)
+        self._clients.append(client)
+        address = client.relayed
+        return [] if address is None else [relayed(address, client.mapped, len(self._clients))]
 
     async def _ask_stun(self, uri: ServerUri, bases: Sequence[Address]) -> list[LocalCandidate]:
         found = await self._loop.getaddrinfo(uri.host, uri.port, type=socket.SOCK_DGRAM)
@@ -130,17 +130,17 @@ class AddressServers:
 
     # Relayed addresses
 
-    def relay(self, address: Address) -> RelayLink | None:
-        """Return the link to the relay that gave this address."""
-        return next((each for each in self._relays if each.relayed == address), None)
+    def client(self, address: Address) -> TurnClient | None:
+        """Return the client of the TURN server that gave this address."""
+        return next((each for each in self._clients if each.relayed == address), None)
 
     def give_back_unused(self, in_use: set[Address]) -> None:
-        for link in [each for each in self._relays if each.relayed not in in_use]:
-            link.close()
-            self._relays.remove(link)
+        for client in [each for each in self._clients if each.relayed not in in_use]:
+            client.close()
+            self._clients.remove(client)
 
     def close(self) -> None:
         """Give all relayed addresses back. Idempotent."""
-        for link in self._relays:
-            link.close()
-        self._relays.clear()
+        for client in self._clients:
+            client.close()
+        self._clients.clear()

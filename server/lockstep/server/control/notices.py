@@ -26,7 +26,7 @@ from lockstep.server.session_events import (
 __all__ = ["Notices"]
 
 TAKEN = "Another console has taken the robot. This console cannot drive it; STOP works while its media link is up."
-UNDELIVERED = "The stop was not delivered: there is no link to the robot. The stop is sent first when the link is back."
+UNDELIVERED = "The stop was not delivered: the robot link is down. The stop is sent first when it is back."
 STOPS_UNWRITTEN = "Stops cannot be kept on this console's disk ({}). They are kept in memory, until this console ends."
 STOPS_WRITTEN = "Stops can be kept on this console's disk again."
 AUDIT_UNWRITTEN = (

@@ -13,9 +13,10 @@ from lockstep.server.media.pipeline.fanout import FanOut
 from lockstep.server.media.pipeline.rtp_sender import RtpSender
 from lockstep.server.media.pipeline.stream import AudioStream, VideoStream
 from lockstep.server.media.planning import MediaPlan, PlannedStream
-from lockstep.server.media.quality.bandwidth_estimator import RateLimits
-from lockstep.server.media.quality.peer_quality import CameraLink, PeerQuality, SoundLink
+from lockstep.server.media.quality.path.bandwidth_estimator import RateLimits
+from lockstep.server.media.quality.peer_quality import CameraDelivery, PeerQuality, SoundDelivery
 from lockstep.server.media.quality.quality_controller import QualityController
+from lockstep.server.media.sending_priority import SendingPriority
 from lockstep.server.media.settings import MediaSettings
 from lockstep.server.media.subscription import Subscription
 from lockstep.server.media.subscriptions import Delivery, Subscriptions
@@ -64,22 +65,23 @@ class Subscribers:
         return self._joined(peer)
 
     def end_all(self) -> None:
-        """Detach all peers, because their streams have ended."""
+        """End what all peers get, because another epoch has begun, which has other streams."""
         for peer in list(self._peers):
-            peer.detach()
+            peer.leave()
+            peer.ending.end()
 
     def _create(
         self, connection: Connection, plan: MediaPlan, *, priority: bool, turns: Turns | None = None
     ) -> Subscriptions:
         deliveries: list[Delivery] = []
+        quality = self._quality_of(sum(each.stream.kind == "video" for each in plan.streams), priority)
         peer = Subscriptions(
-            connection,
             deliveries,
-            self._quality_of(sum(each.stream.kind == "video" for each in plan.streams), priority),
+            quality,
+            SendingPriority(connection, quality, turns if isinstance(turns, DriverQueue) else None),
             on_close=self._detached,
             on_connected=self._quality.tick if self._settings.quality else lambda: None,
             on_paced=self._fan_out.serve_again,
-            turns=turns if isinstance(turns, DriverQueue) else None,
         )
         deliveries += [self._delivery(connection, peer, each, priority) for each in plan.streams]
         peer.traces = PictureTraces([each.target.traced for each in deliveries if each.info.kind == "video"])
@@ -122,9 +124,9 @@ class Subscribers:
         self._peers[peer] = None
         for each in peer.deliveries:
             if isinstance(each.stream, VideoStream):
-                peer.quality.cameras.append(CameraLink(each.stream, each.info.codec, each.target))
+                peer.quality.cameras.append(CameraDelivery(each.stream, each.info.codec, each.target))
             elif isinstance(each.stream, AudioStream):
-                peer.quality.sounds.append(SoundLink(each.stream, each.info.codec, each.target))
+                peer.quality.sounds.append(SoundDelivery(each.stream, each.info.codec, each.target))
         if peer.deliveries:
             self._quality.join(peer.quality)
         self._spread_reports()
@@ -138,4 +140,4 @@ class Subscribers:
     def _spread_reports(self) -> None:
         """Send reports more rarely to a crowd (RFC 3550 6.2)."""
         for peer in self._peers:
-            peer.report_every(float(max(1, -(-len(self._peers) // REPORTED))))
+            peer.priority.report_every(float(max(1, -(-len(self._peers) // REPORTED))))

@@ -1,22 +1,18 @@
 """The media streams that one peer receives, and their statistics."""
 
-import logging
 from collections.abc import Callable
 from typing import NamedTuple
 
 from lockstep.protocol.console import Quality, Report, StreamInfo, Tier
-from lockstep.rtc.endpoint import Connection
 from lockstep.rtc.rtp.stage import BandwidthEstimate, KeyframeRequested, PacketsLeft, Reception, StreamEvent
 from lockstep.server.media.picture_traces import PictureTraces
-from lockstep.server.media.pipeline.rtp_sender import SenderStats
 from lockstep.server.media.pipeline.stream import Stream
 from lockstep.server.media.quality.peer_quality import PeerQuality
+from lockstep.server.media.sending_priority import SendingPriority
+from lockstep.server.media.stream_ending import StreamEnding
 from lockstep.server.media.subscription import Subscription
-from lockstep.server.webrtc.datagram_queue import DriverQueue
 
 __all__ = ["Delivery", "Subscriptions"]
-
-logger = logging.getLogger(__name__)
 
 
 class Delivery(NamedTuple):
@@ -27,58 +23,40 @@ class Delivery(NamedTuple):
     target: Subscription
 
 
-REPORTS_OFTEN = 1 / 3  # s
-
-
 class Subscriptions:
     """One peer's subscriptions. Its connection calls `connected`, then `heard` for stream events; `close` ends it.
 
     Attributes:
         traces: of the pictures that are sent to this peer, while it asks for them
+        ending: tells of a failure, and of the end of the streams
     """
 
     def __init__(
         self,
-        connection: Connection,
         deliveries: list[Delivery],
         quality: PeerQuality,
+        priority: SendingPriority,
         *,
         on_close: Callable[["Subscriptions"], None],
         on_connected: Callable[[], None] = lambda: None,
         on_paced: Callable[[Subscription], None] = lambda target: None,
-        turns: DriverQueue | None = None,
     ) -> None:
-        """`on_paced` is called when a stream may send more; `turns` is told whether this peer drives."""
+        """`on_paced` is called when a stream may send more."""
         self.quality = quality
+        self.priority = priority
+        self.ending = StreamEnding()
         self.voice = ""  # mid of the section that receives the peer's own sound; "" without one
         self.deliveries = deliveries
         self.traces = PictureTraces()
-        self._connection = connection
         self._on_close = on_close
         self._on_connected = on_connected
         self._on_paced = on_paced
-        self._turns = turns
-        self._report_seconds = 1.0  # between two sender reports, unless this peer comes first
         self._has_left = False
-        self._failure: tuple[str, Exception] | None = None  # stage and error of the first failure
-        self._has_ended = False  # another epoch has begun
-        self._tell_failed: Callable[[str, Exception], None] = _log_failure
-        self._tell_ended: Callable[[], None] = lambda: None
 
     @property
     def streams(self) -> list[StreamInfo]:
         """The negotiated streams, in the order of the answer's sections. Inactive sections have none."""
         return [delivery.info for delivery in self.deliveries]
-
-    @property
-    def stats(self) -> dict[str, SenderStats]:
-        """Counters and the peer's reports, by mid."""
-        return {delivery.info.mid: delivery.target.sender.stats for delivery in self.deliveries}
-
-    @property
-    def dropped(self) -> int:
-        """Frames that this peer did not get because it could not keep up."""
-        return sum(delivery.target.dropped for delivery in self.deliveries)
 
     @property
     def tier(self) -> Tier | None:
@@ -106,7 +84,7 @@ class Subscriptions:
 
     def connected(self) -> None:
         """Start sending media: the connection is up."""
-        self._set_pace()
+        self.priority.apply()
         for delivery in () if self._has_left else self.deliveries:
             delivery.target.sends = True
             encoded_as = self.quality.encoded_as if delivery.info.kind == "video" else self.quality.hears_as
@@ -135,89 +113,40 @@ class Subscriptions:
         self.quality.drives = holds_seat
         for delivery in self.deliveries:
             delivery.target.priority = holds_seat
-        if self._turns is not None:
-            self._turns.drives = holds_seat
-        self._set_pace()
-
-    def report_every(self, seconds: float) -> None:
-        """Send a sender report every `seconds`, unless this peer comes first."""
-        if seconds != self._report_seconds:
-            self._report_seconds = seconds
-            self._set_pace()
-
-    def _set_pace(self) -> None:
-        """Set the interval of sender reports and the urgency of this peer's datagrams.
-
-        A round trip shows the queue that the last report met, so a peer on whom the operator's pictures depend gets
-        three reports a second: a queue of a few hundred milliseconds has to show before it has grown to a second.
-        On the narrowest paths that is a hundredth of the traffic; RTCP may take a twentieth (RFC 4585 3.4).
-        """
-        quality = self.quality
-        comes_first = quality.drives or quality.operator or quality.relays
-        self._connection.urgent = quality.drives or quality.operator
-        self._connection.peer.report_every(REPORTS_OFTEN if comes_first else self._report_seconds)
+        self.priority.apply()
 
     def on_quality(self, tell: Callable[[Quality], None]) -> None:
         """Call `tell` whenever the quality of this peer's pictures changes."""
         self.quality.on_quality = tell
 
-    def request_keyframe(self, mid: str) -> None:
-        """Request a keyframe for somebody behind this peer who cannot decode."""
-        for delivery in self.deliveries:
-            if delivery.info.mid == mid:
-                delivery.stream.encodings.request_keyframe(delivery.target, "pli")
-
     def on_failed(self, tell: Callable[[str, Exception], None]) -> None:
-        """Call `tell` with the stage and the exception once this peer cannot be served, at once if it is so already;
-        `tell` raises nothing."""
-        self._tell_failed = tell
-        if self._failure is not None:
-            tell(*self._failure)
-
-    def on_ended(self, tell: Callable[[], None]) -> None:
-        """Call `tell` once the streams have ended, at once if they have; `tell` raises nothing."""
-        self._tell_ended = tell
-        if self._has_ended:
-            tell()
+        """Call `tell` with the stage and the exception once this peer cannot be served; see `StreamEnding`."""
+        self.ending.on_failed(tell)
 
     def failed(self, stage: str, error: Exception) -> None:
         """Stop serving this peer, because doing so raised `error`. Only the first error is told. Raises nothing."""
-        if self._failure is None:
-            self._failure = stage, error
-            self._leave_all()
-            self._tell_failed(stage, error)
+        if self.ending.failure is None:
+            self.leave((stage, error))
 
-    def detach(self) -> None:
-        """Take no more frames, because the streams have ended. Raises nothing."""
-        self._has_ended = True
-        self._leave()
-        self._tell_ended()
+    def leave(self, failure: tuple[str, Exception] | None = None) -> None:
+        """Leave every stream and tell the media hub, even if some of that raises; then tell of the first error.
 
-    def _leave(self) -> None:
-        error = self._leave_all()
-        if error is not None:
-            self.failed("forget", error)
-
-    def _leave_all(self) -> Exception | None:
-        """Leave every stream and tell the media hub, even if some of that raises; return the first error."""
+        `failure`: stage and error that are the reason. Idempotent; raises nothing.
+        """
         self._has_left = True
-        first: Exception | None = None
         for delivery in self.deliveries:
             delivery.target.sends = False
             try:
                 delivery.stream.encodings.leave(delivery.target)
             except Exception as error:
-                first = first or error
+                failure = failure or ("forget", error)
         try:
             self._on_close(self)
         except Exception as error:
-            first = first or error
-        return first
+            failure = failure or ("forget", error)
+        if failure is not None:
+            self.ending.fail(*failure)
 
     async def close(self) -> None:
         """Stop sending to this peer. Idempotent; does not close its connection."""
-        self._leave()
-
-
-def _log_failure(stage: str, error: Exception) -> None:
-    logger.error("media failed in stage %s", stage, exc_info=error)
+        self.leave()

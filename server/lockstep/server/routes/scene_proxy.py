@@ -129,7 +129,7 @@ async def _join(websocket: WebSocket, here: Dependencies, scene: SceneView, tick
     subprotocols = _subprotocols(websocket)
     try:
         upstream = await connect(
-            f"ws://127.0.0.1:{scene.port}/",
+            f"ws://127.0.0.1:{scene.renderer.port}/",
             subprotocols=subprotocols or None,
             compression=None,
             max_size=MAX_DOWN,

@@ -80,7 +80,7 @@ async def publish(
         publication = Publication(feed, given.streams, writer.send_newest)
         line = _Line(connection, given, writer, publication)
         given.on_failed(publication.failed)
-        given.on_ended(line.streams_ended)
+        given.ending.on_ended(line.streams_ended)
         found.append(publication)
         connection.listen(line.heard)
         await _connected(line, publication)

@@ -15,8 +15,8 @@ __all__ = ["KEPT", "KEPT_IN_MEMORY", "StopKeeper"]
 log = structlog.get_logger(__name__)
 
 RETRY_SECONDS = 2.0  # after a write that failed
-KEPT = "the stop is kept and sent first when the link is back"
-KEPT_IN_MEMORY = "the stop is kept until this console ends and sent first when the link is back"
+KEPT = "the stop is kept and sent first when the robot link is back"
+KEPT_IN_MEMORY = "the stop is kept until this console ends and sent first when the robot link is back"
 WRITE_PATIENCE = 0.5  # s that the sender of a press waits for the disk
 
 

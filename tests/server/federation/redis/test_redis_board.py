@@ -56,7 +56,7 @@ async def test_a_stop_reaches_the_robot_of_another_console_once_and_is_answered(
         assert answers["left"] == (True, True, 7, "", 3, True)
         assert one.host.presses == [PRESS, PRESS], "the press of whoever asked"
         assert (answers["right"].confirmed, answers["right"].delivered) == (True, False)
-        assert "sent first when the link is back" in answers["right"].detail
+        assert "sent first when the robot link is back" in answers["right"].detail
 
 
 async def test_a_stop_that_nobody_answers_is_said_to_be_not_confirmed(

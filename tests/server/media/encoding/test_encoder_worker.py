@@ -67,7 +67,7 @@ class World(Counted):
     def __init__(self) -> None:
         super().__init__()
         self.all = self.encodings("H264", "VP8")
-        self.encoder = Stamps(self.all.get("H264", "operator"))
+        self.encoder = Stamps(self.all.own.get("H264", "operator"))
         self.end = End()
         self.worker = EncoderWorker(self.end, NewestFirst(), self.encoder, self.all, self.dropped)
 

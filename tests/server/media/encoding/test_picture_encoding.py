@@ -54,7 +54,7 @@ def test_when_the_encoders_are_too_slow_the_tier_that_waited_longest_comes_next(
 
 def test_no_picture_is_encoded_for_a_tier_whose_path_is_busy() -> None:
     world = World("operator")
-    world.all.get("H264", "operator").paused_until = 1.0
+    world.all.own.get("H264", "operator").paused_until = 1.0
     world.put(1)
     assert world.next() is None
     assert world.drops("path_busy") == 1
@@ -66,7 +66,7 @@ def test_an_encoding_that_everybody_has_left_meanwhile_is_not_made() -> None:
     world = World("operator", "low")
     world.put(1)
     assert world.next() == (1, "operator")
-    low = world.all.get("H264", "low")
+    low = world.all.own.get("H264", "low")
     for target in list(low.targets):
         world.all.leave(target)
     assert world.next() is None
@@ -74,7 +74,7 @@ def test_an_encoding_that_everybody_has_left_meanwhile_is_not_made() -> None:
 
 def test_pictures_that_build_on_each_other_are_taken_with_the_job_that_decodes_them() -> None:
     world = World("operator")
-    (target,) = world.all.get("H264", "operator").targets
+    (target,) = world.all.own.get("H264", "operator").targets
 
     def put(stamp: int) -> None:
         media = picture(stamp, stamp / 30, codec="h264", keyframe=stamp == 1)

@@ -14,7 +14,7 @@ def test_a_peer_that_moves_gets_its_old_tier_until_the_new_one_has_a_keyframe() 
     encodings, target = counted.encodings("H264", "VP8"), counted.subscription()
     encodings.join("H264", target, "high")
     encodings.move("H264", target, "low")
-    high, low = encodings.get("H264", "high"), encodings.get("H264", "low")
+    high, low = encodings.own.get("H264", "high"), encodings.own.get("H264", "low")
     low.publishing(frame(keyframe=False))
     assert (list(high.targets), list(low.targets), high.needed, low.needed) == ([target], [], True, True)
     low.publishing(frame(keyframe=True))
@@ -27,9 +27,9 @@ def test_a_move_that_is_taken_back_in_time_changes_nothing() -> None:
     encodings.join("H264", target, "high")
     encodings.move("H264", target, "low")
     encodings.move("H264", target, "high")
-    low = encodings.get("H264", "low")
+    low = encodings.own.get("H264", "low")
     low.publishing(frame(keyframe=True))
-    assert (low.needed, list(encodings.get("H264", "high").targets)) == (False, [target])
+    assert (low.needed, list(encodings.own.get("H264", "high").targets)) == (False, [target])
 
 
 def test_sound_moves_only_when_all_of_its_codec_have_got_the_same() -> None:
@@ -37,11 +37,11 @@ def test_sound_moves_only_when_all_of_its_codec_have_got_the_same() -> None:
     encodings, target = counted.encodings("opus", "PCMU", video=False), counted.subscription()
     encodings.join("opus", target)
     encodings.move("opus", target, "crowd")
-    crowd = encodings.get("opus", "crowd")
+    crowd = encodings.own.get("opus", "crowd")
     crowd.publishing(frame(keyframe=True))
-    encodings.move_all("PCMU")
+    encodings.own.move_all("PCMU")
     assert list(crowd.targets) == []
-    encodings.move_all("opus")
+    encodings.own.move_all("opus")
     assert list(crowd.targets) == [target]
 
 
@@ -63,10 +63,10 @@ def test_a_peer_of_the_cameras_own_encoding_that_lost_a_picture_returns_to_the_t
     encodings, target = counted.encodings("H264"), counted.subscription()
     passed = encodings.add_passed()
     encodings.join("H264", target, "high")
-    encodings.get("H264", "high").leave(target)
+    encodings.own.get("H264", "high").leave(target)
     passed.targets[target] = None
     encodings.move("H264", target, "low")
     encodings.request_keyframe(target, "pli")
     assert list(passed.targets) == [target]
-    encodings.get("H264", "low").publishing(frame(keyframe=True))
-    assert (list(passed.targets), list(encodings.get("H264", "low").targets)) == ([], [target])
+    encodings.own.get("H264", "low").publishing(frame(keyframe=True))
+    assert (list(passed.targets), list(encodings.own.get("H264", "low").targets)) == ([], [target])

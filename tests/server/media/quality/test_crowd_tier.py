@@ -202,8 +202,8 @@ async def test_what_is_recorded_is_not_thinned() -> None:
         assert far.media.quality.hears_as == "crowd"
         await taken.feed(hub, [picture(i, i / 30) for i in range(1, 21)])
         assert taken.stamps == list(range(1, 21))
-        assert len(cast(Any, hub)._streams["camera0"].encodings.get("H264", "high").targets) == 0
-        assert cast(Any, hub)._streams["camera0"].encodings.get("H264", "high").recorded
+        assert len(cast(Any, hub)._streams["camera0"].encodings.own.get("H264", "high").targets) == 0
+        assert cast(Any, hub)._streams["camera0"].encodings.own.get("H264", "high").recorded
 
 
 async def test_pictures_that_the_camera_encoded_reach_a_crowd_as_they_come() -> None:

@@ -1,5 +1,5 @@
-from lockstep.server.media.quality.bandwidth_estimator import BandwidthEstimator, RateLimits
 from lockstep.server.media.quality.observer_tier import MOST_PATIENCE, PATIENCE, ObserverTier
+from lockstep.server.media.quality.path.bandwidth_estimator import BandwidthEstimator, RateLimits
 
 HIGH = 1_000_000.0
 LIMITS = RateLimits(80_000, HIGH, HIGH)
@@ -26,7 +26,7 @@ class Observer:
             queue = self._queue
             for part in range(2):
                 self.path.received(0, 20, 0.04 + queue, now + part / 4)
-            self.path.sent(int(self._octets), now + 0.3)
+            self.path.sending.add(int(self._octets), now + 0.3)
             self.path.decide(now + 0.3)
             if self.choice.decide(self.path, HIGH, now + 0.3) != tier:
                 self.moves.append((now, self.choice.tier))

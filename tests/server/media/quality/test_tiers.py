@@ -9,7 +9,7 @@ import pytest
 from lockstep.protocol.console import Quality, Report, StreamReport
 from lockstep.server.media.hub import MediaHub
 from lockstep.server.media.quality.encoding_target import EncodingTarget
-from lockstep.server.media.quality.quality_controller import LOW_FLOOR_BPS
+from lockstep.server.media.quality.tier_plans import LOW_FLOOR_BPS
 from tests.server.media.feeding import timestamps, value
 from tests.server.media.viewer import HEIGHT, TIMEOUT, WIDTH, Viewer, description, noise, running_plane, viewing
 
@@ -77,7 +77,7 @@ async def test_a_peer_that_changes_its_tier_misses_no_picture_and_decodes_the_ne
     async with running_plane() as hub, viewing(hub, ["video"], codecs=[codec]) as viewer:
         await show(hub, [viewer], 1, 3)
         quality = viewer.media.quality
-        controller(hub)._ladders["low", "camera0"] = HalfSize()
+        controller(hub)._plans._ladders["low", "camera0"] = HalfSize()
         quality.path.rate = 100_000
         for _ in range(11):
             controller(hub).tick()
@@ -152,7 +152,7 @@ async def test_a_clients_report_of_its_gap_reaches_the_controller() -> None:
         for lag in (1, 1, 4, 4):
             stream = StreamReport(stream="camera0", carrier="none", stamp=100 - lag, tolerance=4, lag=lag)
             viewer.media.report(Report(event=100, streams=[stream]), 1.0)
-        assert cast(Any, path)._gap_near == 2
+        assert path.gap.reports_near == 2
 
 
 @pytest.mark.parametrize(("events", "near"), [(12, 2), (30, 0)])
@@ -165,7 +165,7 @@ async def test_a_gap_counts_less_where_it_grew_because_events_follow_one_another
             event = number * events
             stream = StreamReport(stream="camera0", carrier="none", stamp=event - lag, tolerance=4, lag=lag)
             viewer.media.report(Report(event=event, streams=[stream]), number * 0.5)
-        assert cast(Any, path)._gap_near == near
+        assert path.gap.reports_near == near
 
 
 async def test_receiver_reports_give_loss_and_round_trip() -> None:
@@ -213,7 +213,7 @@ async def test_a_thumbnail_gets_the_first_camera_alone_in_the_lowest_tier_and_st
             controller(hub).tick()
         assert (good.media.tier, small.media.tier) == ("high", "low")
         assert encoders(hub) == 2
-        plan = controller(hub)._plans["low", "camera0"]
+        plan = controller(hub)._plans._plans["low", "camera0"]
         assert plan.bitrate_bps <= LOW_FLOOR_BPS
 
 
@@ -227,7 +227,7 @@ async def test_thumbnails_do_not_lower_the_tier_of_who_watches_over_a_bad_path()
         for _ in range(11):
             controller(hub).tick()
         assert bad.media.tier == "low"
-        assert controller(hub)._plans["low", "camera0"].bitrate_bps > LOW_FLOOR_BPS
+        assert controller(hub)._plans._plans["low", "camera0"].bitrate_bps > LOW_FLOOR_BPS
 
 
 class Later:
@@ -243,7 +243,7 @@ class Later:
 def bits(hub: MediaHub, tier: str) -> list[int]:
     """Bits per second that the tier's plans give to two cameras."""
     controller(hub).tick()
-    return [controller(hub)._plans[tier, name].bitrate_bps for name in ("camera0", "camera1")]
+    return [controller(hub)._plans._plans[tier, name].bitrate_bps for name in ("camera0", "camera1")]
 
 
 async def test_the_share_of_a_camera_that_gives_nothing_is_the_others_until_it_gives() -> None:
@@ -289,7 +289,7 @@ async def test_the_gap_of_a_camera_that_gives_nothing_says_nothing_of_the_path()
         running_plane(description(cameras=2)) as hub,
         viewing(hub, ["video", "video"], priority=True) as viewer,
     ):
-        path = cast(Any, viewer.media.quality.path)
+        path = viewer.media.quality.path
         hub.feed(noise(1, 1.0), 1.0)
         for event in range(10, 60, 10):
             now = 10.0 + event
@@ -297,4 +297,4 @@ async def test_the_gap_of_a_camera_that_gives_nothing_says_nothing_of_the_path()
             old = StreamReport(stream="camera0", carrier="none", stamp=1, tolerance=4, lag=0)
             new = StreamReport(stream="camera1", carrier="none", stamp=event, tolerance=4, lag=0)
             viewer.media.report(Report(event=event, streams=[old, new]), now)
-        assert path._lag == 0
+        assert path.gap.newest == 0

@@ -43,7 +43,7 @@ async def test_a_shadow_that_is_judged_is_drawn_by_its_name_until_it_is_old() ->
         events.publish(FeedbackReceived(feedback, 0.0, None))
 
     def names() -> list[str]:
-        drawn = [] if scene._model is None else scene._model.shadows.drawn
+        drawn = [] if scene.renderer.model is None else scene.renderer.model.shadows.drawn
         return [each.arm.label.text for each in drawn if each.root.visible]
 
     try:
@@ -86,7 +86,7 @@ async def test_a_turn_that_no_sine_takes_leaves_out_that_policy_alone() -> None:
         for name, values in (("bad", bad), ("good", good)):
             verdict = ShadowVerdict(peer=name, name=name, event=2, values=values, judgement="out_of_limits")
             events.publish(ShadowJudged(Actor(), verdict))
-        shadows = [] if scene._model is None else scene._model.shadows.drawn
+        shadows = [] if scene.renderer.model is None else scene.renderer.model.shadows.drawn
         return [each.arm.label.text for each in shadows if each.root.visible] == ["good (shadow)"]
 
     try:

@@ -31,8 +31,8 @@ export function iceServersOf(links: string): IceServer[] {
   return found.flatMap(parseServer).slice(0, LIMIT);
 }
 
-/** Whether a connection can be relayed. */
-export function hasRelay(servers: readonly IceServer[]): boolean {
+/** Whether a TURN server is among them. */
+export function hasTurn(servers: readonly IceServer[]): boolean {
   return servers.some((server) => server.urls.some((url) => url.startsWith("turn")));
 }
 

@@ -10,7 +10,7 @@ import type { WhepAnswer } from "../signalling/whep";
 /** What a link asks of its connections to the console. */
 export interface PendingConnectionOptions {
   readonly trailer: boolean; // the event reference travels in trailers
-  readonly relayOnly: boolean; // through TURN or not at all
+  readonly turnOnly: boolean; // through TURN or not at all
 }
 
 export interface OfferedSection extends MediaSection {
@@ -148,7 +148,7 @@ export class PendingConnection {
 
   private configuration(servers: readonly IceServer[]): RTCConfiguration {
     const iceServers = servers.map((server) => ({ ...server, urls: [...server.urls] }));
-    const iceTransportPolicy = this.options.relayOnly ? "relay" : "all";
+    const iceTransportPolicy = this.options.turnOnly ? "relay" : "all";
     return { bundlePolicy: "max-bundle", iceServers, iceTransportPolicy };
   }
 }

@@ -1,5 +1,5 @@
 import { iceCandidates, iceFragment, restartedAnswer } from "../signalling/ice_fragment";
-import { hasRelay, type IceServer } from "../signalling/ice_servers";
+import { hasTurn, type IceServer } from "../signalling/ice_servers";
 import { ConsoleError, type ConsoleApi } from "../signalling/console_api";
 import { TransportEnd, type Transport, type TransportEvents } from "../transport";
 import type { ChannelName } from "./data_channels";
@@ -188,10 +188,10 @@ export class WebRtcTransport implements Transport {
   }
 
   private noPath(): TransportEnd {
-    if (this.options.relayOnly) return new TransportEnd("no_relay", "");
+    if (this.options.turnOnly) return new TransportEnd("no_turn_path", "");
     return new TransportEnd(
       "no_path",
-      hasRelay(this.servers) ? "The console's TURN server gave no path either" : "",
+      hasTurn(this.servers) ? "The console's TURN server gave no path either" : "",
     );
   }
 

@@ -1,13 +1,13 @@
 import { expect, it } from "vitest";
-import { hasRelay, iceServersOf, parseIceServers } from "../../../src/transport/signalling/ice_servers";
+import { hasTurn, iceServersOf, parseIceServers } from "../../../src/transport/signalling/ice_servers";
 
 const TURN = { urls: ["turn:turn.example:3478?transport=udp"], username: "1:a", credential: "secret" };
 
 it("takes STUN and TURN servers as the console names them", () => {
   const found = parseIceServers({ ice_servers: [{ urls: "stun:stun.example" }, TURN], expires: 1 });
   expect(found).toEqual([{ urls: ["stun:stun.example"] }, TURN]);
-  expect(hasRelay(found)).toBe(true);
-  expect(hasRelay(found.slice(0, 1))).toBe(false);
+  expect(hasTurn(found)).toBe(true);
+  expect(hasTurn(found.slice(0, 1))).toBe(false);
 });
 
 it("leaves out what a browser would refuse, and takes none from an answer that is none", () => {

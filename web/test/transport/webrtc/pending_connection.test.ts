@@ -47,7 +47,7 @@ class FakeConnection {
   }
 }
 
-const PLAIN = { trailer: false, relayOnly: false };
+const PLAIN = { trailer: false, turnOnly: false };
 const TURN: IceServer = { urls: ["turn:a"], username: "b", credential: "c" };
 
 beforeEach(() => vi.stubGlobal("RTCPeerConnection", FakeConnection));
@@ -119,6 +119,6 @@ test("more of what all counts than there can be ends the connection instead of g
 });
 
 test("a link that asks for a relay goes through one or not at all", () => {
-  new PendingConnection(null, { ...PLAIN, relayOnly: true });
+  new PendingConnection(null, { ...PLAIN, turnOnly: true });
   expect(FakeConnection.newest.configuration.iceTransportPolicy).toBe("relay");
 });

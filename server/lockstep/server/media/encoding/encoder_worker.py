@@ -139,7 +139,7 @@ class EncoderWorker(FrameStage, Generic[Job]):
         for frame in result.frames:
             self.following.encoded(frame, result.encoding)
         if result.moves:
-            self._encodings.move_all(result.encoding.codec)
+            self._encodings.own.move_all(result.encoding.codec)
 
     def _request_passed(self, *, other: bool = False) -> None:
         """Request a keyframe of a robot that encodes. `other`: for others than the operator alone."""

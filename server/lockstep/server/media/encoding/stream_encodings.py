@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 
-from lockstep.server.media.encoding.keyframes import KeyframeScheduler
+from lockstep.server.media.encoding.own_encodings import OwnEncodings
 from lockstep.server.media.encoding.tier_encoding import TierEncoding
 from lockstep.server.media.metrics import MediaMetrics
 from lockstep.server.media.quality.encoding_target import EncodingTarget, PictureTier
@@ -21,6 +21,7 @@ class StreamEncodings:
     Attributes:
         codecs: what the console can encode, the best first
         full: the best encoding target that a tier can get
+        own: the encodings that the console makes
         passed: the encoding that the camera itself makes; None for a microphone
         second: the second encoding that a robot makes of it for observers; None for a microphone
         passes: True while the camera makes it
@@ -40,12 +41,9 @@ class StreamEncodings:
         self.stream = stream
         self.codecs = codecs
         self.full = full
+        self.own = OwnEncodings(stream, full, settings, metrics, video=video)
         self.passes = False
         self.follows = False
-        self._settings = settings
-        self._metrics = metrics
-        self._video = video
-        self._own: dict[tuple[str, PictureTier], TierEncoding] = {}
         self._subscriptions: dict[Subscription, None] = {}  # an ordered set
         self._peers = metrics.peers.labels(stream)
         self.passed: TierEncoding | None = None
@@ -56,57 +54,30 @@ class StreamEncodings:
             yield self.passed
         if self.second is not None:
             yield self.second
-        yield from self._own.values()
+        yield from self.own
 
     @property
     def is_taken(self) -> bool:
         """True if some peer gets this stream."""
         return bool(self._subscriptions)
 
-    @property
-    def own(self) -> list[TierEncoding]:
-        """The existing encodings that the console makes."""
-        return list(self._own.values())
-
     def add_passed(self) -> TierEncoding:
         """Create the encoding of pictures that are passed on as the camera encoded them."""
-        self.passed = self._create(PASSED, "operator")
+        self.passed = self.own.create(PASSED, "operator")
         return self.passed
 
     def add_second(self) -> TierEncoding:
         """Create the encoding of pictures that a robot encodes a second time, for observers."""
-        self.second = self._create(PASSED, "high")
+        self.second = self.own.create(PASSED, "high")
         return self.second
 
     def is_passed_to(self, target: Subscription) -> bool:
         """Return whether `target` gets what the camera or its robot encoded."""
         return any(each is not None and target in each.targets for each in (self.passed, self.second))
 
-    def find(self, codec: str, tier: PictureTier) -> TierEncoding | None:
-        """Return an encoding of the console if it exists."""
-        return self._own.get((codec, tier))
-
-    def get(self, codec: str, tier: PictureTier) -> TierEncoding:
-        """Return an encoding of the console, created by the first call; it costs nothing while nobody needs it."""
-        found = self._own.get((codec, tier))
-        if found is None:
-            found = self._own[codec, tier] = self._create(codec, tier)
-        return found
-
-    def _create(self, codec: str, tier: PictureTier) -> TierEncoding:
-        settings = self._settings
-        keyframes = KeyframeScheduler(settings.keyframe_interval_seconds, settings.keyframe_spacing_seconds)
-        return TierEncoding(
-            self.stream, codec, tier, self.full, keyframes, self._metrics, moves_at_keyframes=self._video
-        )
-
-    def of_tier(self, tier: PictureTier) -> list[TierEncoding]:
-        """Return the existing encodings of the console for a tier, in all codecs."""
-        return [each for each in self._own.values() if each.tier == tier]
-
     def join(self, codec: str, target: Subscription, tier: PictureTier = "operator") -> None:
         target.tier = tier
-        self.get(codec, tier).join(target)
+        self.own.get(codec, tier).join(target)
         self._subscriptions[target] = None
         self._peers.inc()
 
@@ -126,16 +97,10 @@ class StreamEncodings:
             if tier not in SECOND_TIERS:
                 self.return_to_own(target)
             return
-        for each in self._own.values():
+        for each in self.own:
             each.arriving.pop(target, None)
         if source.tier != tier:
-            self.get(codec, tier).expect(target, source)
-
-    def move_all(self, codec: str) -> None:
-        """Complete the pending moves between the console's encodings of a codec."""
-        for each in self._own.values():
-            if each.codec == codec:
-                each.arrive()
+            self.own.get(codec, tier).expect(target, source)
 
     def request_keyframe(self, target: Subscription, cause: str) -> None:
         """Request a keyframe for `target`; see `TierEncoding.request_keyframe`.
@@ -155,8 +120,9 @@ class StreamEncodings:
     def return_to_own(self, target: Subscription) -> None:
         """Move `target` from the camera's encoding to the console's with its next keyframe; it misses nothing."""
         source = self.second if self.second is not None and target in self.second.targets else self.passed
-        if source is not None and target not in self.get("H264", target.tier).arriving:
-            self.get("H264", target.tier).expect(target, source)
+        own = self.own.get("H264", target.tier)
+        if source is not None and target not in own.arriving:
+            own.expect(target, source)
 
     def leave(self, target: Subscription) -> None:
         """Remove a target. Idempotent."""

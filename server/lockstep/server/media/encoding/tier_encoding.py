@@ -30,7 +30,7 @@ class TierEncoding:
         *,
         moves_at_keyframes: bool,
     ) -> None:
-        """`moves_at_keyframes`: False for sound, see `StreamEncodings.move_all`."""
+        """`moves_at_keyframes`: False for sound, see `OwnEncodings.move_all`."""
         self.codec = codec
         self.tier = tier
         self.plan = plan

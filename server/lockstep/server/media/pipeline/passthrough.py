@@ -12,11 +12,11 @@ on from the beginning, and after a lost picture the bridge is asked instead.
 """
 
 from collections import deque
-from collections.abc import Callable
 
 from lockstep.protocol.messages import Media
 from lockstep.server.media.codecs.group_of_pictures import GroupOfPictures
 from lockstep.server.media.codecs.h264 import Profile, accepts, holds_slice, inspect
+from lockstep.server.media.encoding.robot_keyframes import RobotKeyframes
 from lockstep.server.media.encoding.stream_encodings import StreamEncodings
 from lockstep.server.media.encoding.tier_encoding import TierEncoding
 from lockstep.server.media.errors import PayloadError
@@ -29,12 +29,14 @@ from lockstep.server.media.subscription import Subscription
 __all__ = ["Passthrough"]
 
 MEASURED_SECONDS, MOST_MEASURED = 2.0, 240
-ANSWER_SECONDS = 3.0  # for a keyframe that was asked for; without it the camera counts as one that takes no requests
-DISTRUST_SECONDS = 30.0  # for which it then counts so
 
 
 class Passthrough(FrameStage):
-    """Makes encoded frames of a camera's H.264, and passes the pictures on only if the console has to encode them."""
+    """Makes encoded frames of a camera's H.264, and passes the pictures on only if the console has to encode them.
+
+    Attributes:
+        keyframes: requests of keyframes from a robot bridge that encodes
+    """
 
     def __init__(
         self,
@@ -47,6 +49,7 @@ class Passthrough(FrameStage):
     ) -> None:
         """`passed`: the camera's own encoding. `group` keeps its pictures for the decoder."""
         super().__init__(following)
+        self.keyframes = RobotKeyframes(encodings, passed)
         self._encodings = encodings
         self._passed = passed
         self._clock = clock
@@ -55,53 +58,6 @@ class Passthrough(FrameStage):
         self._profile: Profile | None = None  # of the camera's pictures; None while it gives no H.264
         self._recent: deque[tuple[float, int]] = deque()  # time of capture and bytes
         self._broken = False  # a picture is missing: those up to the next keyframe cannot be decoded
-        self._ask: Callable[[float], None] = lambda now: None
-        self._asked_at: float | None = None  # when a keyframe was asked for that has not come; None: none is owed
-        self._does = False  # the robot's bridge says that it does as it is asked to
-        self._distrusted_until = 0.0
-        self._waiting: frozenset[Subscription] = frozenset()  # targets of the console's encodings, at the last look
-        self._operators: frozenset[Subscription] = frozenset()  # those of them who drove
-
-    def ask_by(self, ask: Callable[[float], None]) -> None:
-        """Set how the robot is asked for a keyframe; called with the time."""
-        self._ask = ask
-
-    def follow(self, does: bool, now: float) -> None:
-        """Set whether the robot's bridge encodes this camera as it is asked to."""
-        self._does = does
-        self._decide_following(now)
-
-    def _decide_following(self, now: float) -> None:
-        follows = self._does and self._profile is not None and now >= self._distrusted_until
-        if follows == self._encodings.follows:
-            return
-        self._encodings.follows = follows
-        self._asked_at = None
-        if not follows:
-            self._waiting = self._operators = frozenset()
-
-    def serve_requests(self, now: float) -> None:
-        """Ask the robot for a keyframe if somebody needs one, unless one is on its way."""
-        if not self._encodings.follows:
-            return
-        if self._asked_at is not None:
-            if now - self._asked_at > ANSWER_SECONDS:
-                self._distrusted_until = now + DISTRUST_SECONDS
-                self._decide_following(now)
-            return
-        # A keyframe moves those here that can take it; for the others the console then has few pictures to decode.
-        waiting = frozenset(
-            target for encoding in self._encodings.own for target in (*encoding.targets, *encoding.arriving)
-        )
-        if new := waiting - self._waiting:
-            self._passed.keyframes.join(other=all(map(self._encodings.is_other, new)))
-        operators = frozenset(target for target in waiting if target.priority)
-        if operators - self._operators:
-            self._passed.keyframes.join()
-        self._waiting, self._operators = waiting, operators
-        if self._passed.keyframes.take(now):
-            self._asked_at = now
-            self._ask(now)
 
     def lost(self) -> None:
         """A picture was dropped before this stage: pass none on that may build on it."""
@@ -113,7 +69,7 @@ class Passthrough(FrameStage):
             if not self._is_whole(frame.media):
                 return
             self._pass(frame)
-            self.serve_requests(frame.arrived_at)
+            self.keyframes.serve(frame.arrived_at)
             if not holds_slice(frame.media.payload):
                 return  # the decoder gets it with the next picture
             if not any(self._needs_console(each) for each in self._encodings.own):
@@ -146,9 +102,7 @@ class Passthrough(FrameStage):
         media = frame.media
         if media.keyframe:
             self._begin(media)
-            self._decide_following(frame.arrived_at)
-            self._asked_at = None
-            self._passed.keyframes.served(frame.arrived_at)
+            self.keyframes.came(frame.arrived_at)
         self._group.add(media)
         self._measure(media)
         if not self._passed.needed:

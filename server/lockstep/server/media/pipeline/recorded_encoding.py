@@ -110,7 +110,7 @@ class RecordedEncoding(FrameStage):
         encoding.request_keyframe("record")
 
     def _best(self) -> TierEncoding:
-        operators = self._encodings.find(self.codecs[0], "operator")
+        operators = self._encodings.own.find(self.codecs[0], "operator")
         if operators is not None and operators.targets:
             return operators
         if self._encodings.passed is not None and self._encodings.passes:
@@ -121,10 +121,10 @@ class RecordedEncoding(FrameStage):
         """Return an encoding of the console that somebody takes; without one, an encoding for the recording."""
         for codec in self.codecs:
             for tier in TIERS:
-                found = self._encodings.find(codec, tier)
+                found = self._encodings.own.find(codec, tier)
                 if found is not None and found.targets:  # all pictures, not a crowd's
-                    return self._encodings.get(codec, "high") if tier == "crowd" else found
-        return self._encodings.get(self.codecs[0], self._own_tier)
+                    return self._encodings.own.get(codec, "high") if tier == "crowd" else found
+        return self._encodings.own.get(self.codecs[0], self._own_tier)
 
     def encoded(self, frame: EncodedFrame, encoding: TierEncoding) -> None:
         super().encoded(frame, encoding)

@@ -8,7 +8,7 @@
 """
 
 from lockstep.protocol.console import Tier
-from lockstep.server.media.quality.bandwidth_estimator import BandwidthEstimator
+from lockstep.server.media.quality.path.bandwidth_estimator import BandwidthEstimator
 
 __all__ = ["ObserverTier"]
 

@@ -7,21 +7,21 @@ from typing import TYPE_CHECKING, NamedTuple
 from lockstep.protocol.console import Quality, Report, StreamQuality, Tier
 from lockstep.protocol.serial import event_gap
 from lockstep.server.media.pipeline.rtp_sender import SenderStats
-from lockstep.server.media.quality.bandwidth_estimator import BandwidthEstimator, RateLimits, Reason
 from lockstep.server.media.quality.encoding_target import PictureTier
 from lockstep.server.media.quality.observer_tier import ObserverTier
+from lockstep.server.media.quality.path.bandwidth_estimator import BandwidthEstimator, RateLimits, Reason
 from lockstep.server.media.subscription import Subscription
 
 if TYPE_CHECKING:
     from lockstep.server.media.pipeline.stream import AudioStream, VideoStream
 
-__all__ = ["CameraLink", "PeerQuality", "SoundLink"]
+__all__ = ["CameraDelivery", "PeerQuality", "SoundDelivery"]
 
 CALM_RATE = 25.0  # events a second up to which each event of a gap counts in full
 WIRE_SHARE = 0.92  # share of payload in the bytes that a receiver counts; the rest are headers
 
 
-class CameraLink(NamedTuple):
+class CameraDelivery(NamedTuple):
     """The delivery of one camera to this peer."""
 
     stream: "VideoStream"
@@ -29,7 +29,7 @@ class CameraLink(NamedTuple):
     target: Subscription
 
 
-class SoundLink(NamedTuple):
+class SoundDelivery(NamedTuple):
     """The delivery of one microphone to this peer."""
 
     stream: "AudioStream"
@@ -47,8 +47,8 @@ class PeerQuality:
         self.drives = False  # holds the control seat
         self.stays_low = False  # a thumbnail: never more than the lowest tier
         self.relays = False  # a relay, with many peers behind it
-        self.cameras: list[CameraLink] = []  # the main one first
-        self.sounds: list[SoundLink] = []
+        self.cameras: list[CameraDelivery] = []  # the main one first
+        self.sounds: list[SoundDelivery] = []
         self.pace: Callable[[float | None], None] = lambda rate: None  # bit/s that the path carries; None: no limit
         self.path = BandwidthEstimator(limits, clock())
         self.choice = ObserverTier(clock())
@@ -134,10 +134,26 @@ class PeerQuality:
     def decide(self, now: float) -> Reason | None:
         """Evaluate the path; return the reason if its rate was lowered."""
         before = self.path.rate
-        self.path.sent(sum(stats.octets for stats in self.stats()), now)
+        self.path.sending.add(sum(stats.octets for stats in self.stats()), now)
         self.path.decide(now)
         self.pace(self.path.rate if self.path.limited else None)
         return self.path.reason if self.path.rate < before else None
+
+    def move_pictures(self, tier: PictureTier) -> bool:
+        """Get the pictures of `tier`; return whether that is another one."""
+        if self.encoded_as == tier:
+            return False
+        self.encoded_as = tier
+        for camera in self.cameras:
+            camera.stream.encodings.move(camera.codec, camera.target, tier)
+        return True
+
+    def move_sound(self, tier: PictureTier) -> None:
+        """Get the sound packets of `tier`."""
+        if self.hears_as != tier:
+            self.hears_as = tier
+            for sound in self.sounds:
+                sound.stream.encodings.move(sound.codec, sound.target, tier)
 
     def tell(self, streams: list[StreamQuality], crowd: int) -> None:
         """Tell the peer its quality if that has changed; `crowd` as in `Quality`."""

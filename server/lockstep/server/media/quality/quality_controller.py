@@ -17,27 +17,24 @@ packets. Nothing changes for peers that may drive, relays, recordings and thumbn
 
 import asyncio
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 
 from lockstep.protocol.console import StreamQuality, Tier
 from lockstep.server.media.pipeline.stream import AudioStream, VideoStream
-from lockstep.server.media.quality.adaptation import Adaptation
-from lockstep.server.media.quality.budget import CameraNeed, share_out
-from lockstep.server.media.quality.encoding_target import EncodingTarget, PictureTier
+from lockstep.server.media.quality.encoding_target import PictureTier
 from lockstep.server.media.quality.load_shedding import LoadShedding
+from lockstep.server.media.quality.loop_load import LoopLoad
 from lockstep.server.media.quality.metrics import QualityMetrics
 from lockstep.server.media.quality.peer_quality import PeerQuality
+from lockstep.server.media.quality.tier_plans import TierPlans, cameras_of
 from lockstep.server.media.settings import MediaSettings
 
 __all__ = ["QualityController"]
 
 TICK = 0.1  # s
 LATE = 0.03  # s by which a tick may be late
-LOAD_SECONDS = 1.0  # between two measurements of the loop's load
 OBSERVER_TICKS = 10  # an observer is evaluated once in so many
 SHARE_AFTER = 5.0  # s of an operator's path without a limit
-LOW_FLOOR_BPS = 120_000
-LOW_SHARE = 0.5  # of the high tier, at most
 
 
 class QualityController:
@@ -56,13 +53,10 @@ class QualityController:
         self._metrics = metrics
         self._clock = clock
         self._peers: dict[PeerQuality, None] = {}  # an ordered set
-        self._ladders: dict[tuple[Tier, str], Adaptation] = {}
-        self._plans: dict[tuple[Tier, str], EncodingTarget] = {}
         self._crowd = LoadShedding(settings.crowd_observers)
-        self._low_divisor = 1  # the low tier gets one of so many pictures
-        self._busy_seconds = busy_seconds
+        self._plans = TierPlans(float(settings.video_bitrate_bps), self._crowd)
+        self._load = LoopLoad(busy_seconds, clock())
         self._on_fault = on_fault
-        self._load_at = clock(), busy_seconds()  # time and busy seconds of the last measurement
         self._ticks = 0
         self._common: object = None  # the state that decides for all observers, at the last tick
         self._whole_since: float | None = None  # time from which the operator's pictures are whole; None: they are not
@@ -86,16 +80,13 @@ class QualityController:
             if (now := self._clock()) > due + LATE:
                 for peer in list(self._peers):
                     peer.path.late(now)
-            if self._peers:
-                self._try_tick()
-
-    def _try_tick(self) -> None:
-        try:
-            self.tick()
-        except Exception as error:
-            if self._on_fault is None:
-                raise
-            self._on_fault(error)
+            try:
+                if self._peers:
+                    self.tick()
+            except Exception as error:
+                if self._on_fault is None:
+                    raise
+                self._on_fault(error)
 
     def tick(self) -> None:
         """Evaluate the paths, plan the tiers, move peers between tiers and tell them about changes."""
@@ -107,16 +98,10 @@ class QualityController:
                 self._metrics.lowered(reason)
         self._plan_operator(leaders, now)
         observers = [peer for peer in self._peers if peer not in leaders]
-        for peer in observers:
-            if peer.tier == "operator":  # it drove until now
-                self._step_back(peer, now)
         turn = observers[-self._ticks % OBSERVER_TICKS :: OBSERVER_TICKS]
-        for peer in turn:
-            peer.decide(now)
-            peer.tier = "low" if peer.stays_low else peer.choice.decide(peer.path, self._needs(peer), now)
-        self._plan_low([peer for peer in observers if peer.tier == "low"], now)
-        self._look_at_load(now)
-        self._thin(observers, now)
+        self._choose_tiers(observers, turn, now)
+        self._plans.plan_low([peer for peer in observers if peer.tier == "low"], now)
+        self._plan_crowd(observers, now)
         shared = self._whole_since is not None and now - self._whole_since >= SHARE_AFTER
         for peer in leaders:
             self._settle(peer, "operator", "operator")
@@ -129,7 +114,8 @@ class QualityController:
         for peer in turn:
             self._tell(peer)
         for peer in (*leaders, *settled):
-            self._sound_for(peer)
+            # A crowd gets longer sound packets, in the low tier too: their headers are a third of a narrow path.
+            peer.move_sound("crowd" if peer.in_crowd and not peer.drives and self._crowd.divisor > 1 else "operator")
             held_back = peer.path.limited or peer.tier == "low"
             for camera in peer.cameras:
                 # A robot that encodes as it is asked to makes what the operator's path carries.
@@ -138,34 +124,38 @@ class QualityController:
         if self._ticks % OBSERVER_TICKS == 0:
             for peer in leaders:
                 self._tell(peer)
-            self._protect_sound(leaders or observers, now)
+            _protect_sound(leaders or observers, now)
             self._measure(leaders, observers)
 
     def planned_bps(self, stream: VideoStream) -> int:
         """Return the bits per second of a camera that the operators' paths carry; all without an operator."""
-        return (
-            self._plans.get(("operator", stream.name), stream.encodings.full).bitrate_bps
-            if self.leaders()
-            else (stream.encodings.full.bitrate_bps)
-        )
+        plan = self._plans.of(stream, "operator") if self.leaders() else stream.encodings.full
+        return plan.bitrate_bps
 
     def operator_limited(self) -> bool:
         """Return whether an operator's path has shown a limit within the last minute."""
         return any(peer.path.limited for peer in self.leaders())
 
-    def _look_at_load(self, now: float) -> None:
-        (since, before), busy = self._load_at, self._busy_seconds()
-        if now - since >= LOAD_SECONDS:
-            self._load_at = now, busy
-            self._crowd.loaded((busy - before) / (now - since), now)
+    def _choose_tiers(self, observers: list[PeerQuality], turn: list[PeerQuality], now: float) -> None:
+        """Evaluate the paths of the observers in `turn`. A former operator without a limit is on trial in full."""
+        for peer in observers:
+            if peer.tier == "operator":  # it drove until now
+                needed = self._plans.needed_bps(peer, now)
+                if not peer.path.limited:
+                    peer.path.assume(needed, now)
+                peer.tier = peer.choice.decide(peer.path, needed, now)
+        for peer in turn:
+            peer.decide(now)
+            needed = self._plans.needed_bps(peer, now)
+            peer.tier = "low" if peer.stays_low else peer.choice.decide(peer.path, needed, now)
 
-    def _thin(self, observers: list[PeerQuality], now: float) -> None:
+    def _plan_crowd(self, observers: list[PeerQuality], now: float) -> None:
         """Count the crowd and, if there is one, plan its pictures."""
+        if (load := self._load.measure(now)) is not None:
+            self._crowd.loaded(load, now)
         members = [peer for peer in observers if peer.in_crowd]
         if self._crowd.watch(len(members), now) > 1:
-            for stream in _streams(members):
-                for encoding in stream.encodings.of_tier("crowd"):
-                    encoding.plan = self._plan_of(stream, "crowd")
+            self._plans.apply(cameras_of(members), "crowd")
 
     def _encoded_as(self, peer: PeerQuality, shared: bool) -> PictureTier:
         """Return the tier whose pictures an observer gets; `shared`: the operator's pictures serve the high tier."""
@@ -179,104 +169,43 @@ class QualityController:
         """Return the peers of the operator's tier."""
         return [peer for peer in self._peers if peer.drives] or [peer for peer in self._peers if peer.operator]
 
-    def _step_back(self, peer: PeerQuality, now: float) -> None:
-        """Make a former operator an observer; if its path has shown no limit, on trial with full quality."""
-        if not peer.path.limited:
-            peer.path.assume(self._needs(peer), now)
-        peer.tier = peer.choice.decide(peer.path, self._needs(peer), now)
-
-    def _needs(self, peer: PeerQuality) -> float:
-        whole = len(_giving(_streams([peer]), self._clock())) * float(self._settings.video_bitrate_bps)
-        return whole / self._crowd.divisor if peer.in_crowd else whole
-
     def _plan_operator(self, leaders: list[PeerQuality], now: float) -> None:
         if not leaders:
             self._whole_since = None
             return
         tightest = min(leaders, key=lambda peer: peer.path.rate)
-        streams = _streams(leaders)
-        self._plan("operator", streams, tightest.path.rate, now)
+        streams = cameras_of(leaders)
+        self._plans.plan("operator", streams, tightest.path.rate, now)
         limited = any(peer.path.limited for peer in leaders)
         pause = max(peer.path.paused_until for peer in leaders)
         for stream in streams:
-            for encoding in stream.encodings.of_tier("operator"):
+            for encoding in stream.encodings.own.of_tier("operator"):
                 encoding.paused_until = pause
                 encoding.keyframes.sparing = limited
         whole = not limited and all(
-            plan.scale == 1.0 and plan.frame_rate >= stream.frame_rate
+            (plan := self._plans.of(stream, "operator")).scale == 1.0 and plan.frame_rate >= stream.frame_rate
             for stream in streams
-            if (plan := self._plans.get(("operator", stream.name))) is not None
         )
         if not whole:
             self._whole_since = None
         elif self._whole_since is None:
             self._whole_since = now
 
-    def _plan_low(self, members: list[PeerQuality], now: float) -> None:
-        if members:
-            watched = [peer for peer in members if not peer.stays_low]
-            least = min((peer.path.rate for peer in watched), default=LOW_FLOOR_BPS)
-            most = LOW_SHARE * max(self._needs(peer) for peer in members)
-            # A crowd's member whose path is too slow for the crowd's pictures gets no more of them than the crowd. The
-            # tier has one encoder: while it has a member outside the crowd, which is due all pictures, all get them.
-            self._low_divisor = self._crowd.divisor if all(peer.in_crowd for peer in members) else 1
-            self._plan("low", _streams(members), min(most, max(LOW_FLOOR_BPS, least)), now, self._low_divisor)
-
-    def _plan(self, tier: Tier, streams: list[VideoStream], total_bps: float, now: float, divisor: int = 1) -> None:
-        """Plan the cameras of a tier. `divisor`: the tier gets one picture of so many, at most.
-
-        A camera without pictures keeps the plan that it would have, so that it begins with no more than its share;
-        until then the others share the whole bitrate.
-        """
-        shares = self._shares(total_bps, streams) | self._shares(total_bps, _giving(streams, now))
-        for stream, bps in shares.items():
-            ladder = self._ladders.setdefault((tier, stream.name), Adaptation())
-            plan = ladder.plan(bps, stream.frame_rate / divisor, stream.size, now)
-            self._plans[tier, stream.name] = plan
-            for encoding in stream.encodings.of_tier(tier):
-                encoding.plan = plan
-
-    def _shares(self, total_bps: float, streams: list[VideoStream]) -> dict[VideoStream, float]:
-        """Return the bits per second of each of these cameras, the main one first."""
-        maximum = float(self._settings.video_bitrate_bps)
-        needs = [CameraNeed(stream.size[0] * stream.size[1] * stream.frame_rate, maximum) for stream in streams]
-        return dict(zip(streams, share_out(total_bps, needs), strict=True))
-
     def _settle(self, peer: PeerQuality, tier: Tier, encoded_as: PictureTier) -> None:
         peer.tier = tier
-        if peer.encoded_as == encoded_as:
-            return
-        peer.encoded_as = encoded_as
-        for camera in peer.cameras:
-            camera.stream.encodings.move(camera.codec, camera.target, encoded_as)
-            for encoding in camera.stream.encodings.of_tier(encoded_as):
-                encoding.plan = self._plan_of(camera.stream, encoded_as)
-
-    def _sound_for(self, peer: PeerQuality) -> None:
-        """Give a crowd longer sound packets, in the low tier too: their headers are a third of a narrow path."""
-        hears_as: PictureTier = "crowd" if peer.in_crowd and not peer.drives and self._crowd.divisor > 1 else "operator"
-        if peer.hears_as != hears_as:
-            peer.hears_as = hears_as
-            for sound in peer.sounds:
-                sound.stream.encodings.move(sound.codec, sound.target, hears_as)
-
-    def _plan_of(self, stream: VideoStream, tier: PictureTier) -> EncodingTarget:
-        if tier == "crowd":
-            return stream.encodings.full.thinned(self._crowd.divisor)
-        return stream.encodings.full if tier == "high" else self._plans.get((tier, stream.name), stream.encodings.full)
+        if peer.move_pictures(encoded_as):
+            self._plans.apply(cameras_of([peer]), encoded_as)
 
     def _tell(self, peer: PeerQuality) -> None:
         streams, thinned = [], False
         for camera in peer.cameras:
-            plan = self._plan_of(camera.stream, peer.encoded_as)
+            plan = self._plans.of(camera.stream, peer.encoded_as)
             width, height = plan.size(*camera.stream.size)
             rate, bps = plan.frame_rate, float(plan.bitrate_bps)
             if (passed := camera.stream.passthrough.measured(camera.target)) is not None:  # as the camera made it
                 (width, height), (rate, bps) = camera.stream.size, passed
             else:
-                thinned |= (
-                    self._low_divisor if peer.encoded_as == "low" else self._crowd.divisor
-                ) > 1 and peer.in_crowd
+                thinned |= self._plans.is_thinned(peer)
             streams.append(
                 StreamQuality(
                     stream=camera.stream.name,
@@ -290,16 +219,6 @@ class QualityController:
             )
         peer.tell(streams, self._crowd.size if thinned else 0)
 
-    @staticmethod
-    def _protect_sound(peers: list[PeerQuality], now: float) -> None:
-        """Protect sound, encoded once for all, against the operator's loss, or the worst observer's without one."""
-        losses: dict[AudioStream, float] = {}
-        for peer in peers:
-            for sound in peer.sounds:
-                losses[sound.stream] = max(losses.get(sound.stream, 0.0), peer.loss or 0.0)
-        for stream, loss in losses.items():
-            stream.expected_loss.update(loss, now)
-
     def _measure(self, leaders: list[PeerQuality], observers: list[PeerQuality]) -> None:
         tiers: dict[PictureTier, list[PeerQuality]] = {
             "operator": leaders,
@@ -309,15 +228,15 @@ class QualityController:
         }
         for tier, peers in tiers.items():
             self._metrics.paths(tier, peers)
-            for stream in _streams(peers):
-                self._metrics.plan(stream.name, tier, self._plan_of(stream, tier), stream.size)
+            for stream in cameras_of(peers):
+                self._metrics.plan(stream.name, tier, self._plans.of(stream, tier), stream.size)
 
 
-def _streams(peers: Iterable[PeerQuality]) -> list[VideoStream]:
-    """The cameras of these peers, the main one first."""
-    return list({camera.stream: None for peer in peers for camera in peer.cameras})
-
-
-def _giving(streams: list[VideoStream], now: float) -> list[VideoStream]:
-    """Return the streams that deliver pictures; all if none does, as before the first picture."""
-    return [stream for stream in streams if stream.is_giving(now)] or streams
+def _protect_sound(peers: list[PeerQuality], now: float) -> None:
+    """Protect sound, encoded once for all, against the operator's loss, or the worst observer's without one."""
+    losses: dict[AudioStream, float] = {}
+    for peer in peers:
+        for sound in peer.sounds:
+            losses[sound.stream] = max(losses.get(sound.stream, 0.0), peer.loss or 0.0)
+    for stream, loss in losses.items():
+        stream.expected_loss.update(loss, now)

@@ -76,7 +76,7 @@ class RobotEncoding:
         self._second = SecondRequests(self._settings, [each.stream for each in self._cameras])
         self._uplink = self._new_uplink()
         for camera in self._cameras:
-            camera.stream.passthrough.ask_by(self._keyframe_asker(camera))
+            camera.stream.passthrough.keyframes.ask_by(self._keyframe_asker(camera))
 
     def arrived(self, media: Media, now: float) -> None:
         """Take the arrival of a robot's medium."""
@@ -100,7 +100,7 @@ class RobotEncoding:
             if camera.stream.encodings.passed is not None:
                 # The operator pays for each, on both paths.
                 camera.stream.encodings.passed.keyframes.sparing = limited or self._operator_limited()
-            camera.stream.passthrough.serve_requests(now)
+            camera.stream.passthrough.keyframes.serve(now)
         changed = any(_differs(camera.asked, target) for camera, target in zip(self._cameras, targets, strict=True))
         sounds = self._sounds * SOUND_BPS
         changed |= self._second.tick(
@@ -155,7 +155,7 @@ class RobotEncoding:
         self._metrics.second_rate.set(self._second.bps if follows else 0.0)
         self._metrics.uplink_wait.set((self._uplink.waits(now) or 0.0) if follows else 0.0)
         for camera in self._cameras:
-            camera.stream.passthrough.follow(follows, now)
+            camera.stream.passthrough.keyframes.follow(follows, now)
 
     def _frame_rate(self, stream: VideoStream, target: EncodingTarget) -> float:
         """Return the rate to ask for; 0, all pictures, where nothing asks for fewer than the camera gives."""

@@ -24,7 +24,7 @@ SPAN_WORDS = {
     "camera_wait_ms": "camera's beat",
     "capture_ms": "capture",
     "bridge_encode_ms": "encode at the robot",
-    "link_wait_ms": "wait for the link",
+    "link_wait_ms": "wait for the robot link",
     "encoder_wait_ms": "wait for the encoder",
     "encode_ms": "encode",
     "packetise_ms": "packetise",

@@ -1,6 +1,5 @@
 """Messages of ROS 2 of a session. Times in ns since 1970; the stamps in headers are times of capture."""
 
-import math
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, Final
 
@@ -11,6 +10,7 @@ from rosbags.typesys.store import Typestore
 from lockstep.protocol.description import Body, Camera, PlanarBase, RangeRing, RobotDescription, WrenchSensor
 from lockstep.protocol.description import CameraCalibration as Calibration
 from lockstep.protocol.maps import OccupancyMap, PlanarPose, map_cells
+from lockstep.server.recording.export.rosbag2.message_parts import MessageParts, about_z
 from lockstep.server.recording.format.map_messages import MAP_FRAME, in_world
 from lockstep.server.recording.format.records import FeedbackRecord
 from lockstep.server.recording.format.robot_frames import WORLD, base_body, camera_frames
@@ -18,7 +18,6 @@ from lockstep.server.scene.kinematics import body_pose
 
 __all__ = ["COMPRESSED_VIDEO", "RosMessages", "ros_types"]
 
-SECOND: Final = 1_000_000_000
 COMPRESSED_VIDEO: Final = "foxglove_msgs/msg/CompressedVideo"
 # foxglove_msgs/msg/CompressedVideo: ROS' own messages have none for a stream whose pictures need those before them.
 VIDEO_DEFINITION: Final = "builtin_interfaces/Time timestamp\nstring frame_id\nuint8[] data\nstring format\n"
@@ -35,33 +34,15 @@ class RosMessages:
     """Makes messages, as objects of the type store."""
 
     def __init__(self, store: Typestore) -> None:
-        self._types = store.types
-
-    def _make(self, name: str, /, **fields: Any) -> Any:
-        package, _, kind = name.partition("/")
-        return self._types[f"{package}/msg/{kind}"](**fields)
-
-    def _stamp(self, time: int) -> Any:
-        return self._make("builtin_interfaces/Time", sec=time // SECOND, nanosec=time % SECOND)
-
-    def _header(self, time: int, frame: str) -> Any:
-        return self._make("std_msgs/Header", stamp=self._stamp(time), frame_id=frame)
-
-    def _vector(self, vector: Sequence[float]) -> Any:
-        x, y, z = vector
-        return self._make("geometry_msgs/Vector3", x=float(x), y=float(y), z=float(z))
-
-    def _quaternion(self, orientation: Sequence[float]) -> Any:
-        w, x, y, z = orientation
-        return self._make("geometry_msgs/Quaternion", x=float(x), y=float(y), z=float(z), w=float(w))
+        self._parts = MessageParts(store)
 
     def text(self, text: str) -> Any:
-        return self._make("std_msgs/String", data=text)
+        return self._parts.make("std_msgs/String", data=text)
 
     def video(self, camera: str, time: int, picture: bytes, picture_format: str) -> Any:
-        return self._make(
+        return self._parts.make(
             "foxglove_msgs/CompressedVideo",
-            timestamp=self._stamp(time),
+            timestamp=self._parts.stamp(time),
             frame_id=camera,
             data=np.frombuffer(picture, dtype=np.uint8),
             format=picture_format,
@@ -72,9 +53,9 @@ class RosMessages:
         wide, high = size[0] / camera.width, size[1] / camera.height
         fx, fy, cx, cy = found.fx * wide, found.fy * high, found.cx * wide, found.cy * high
         none = {"x_offset": 0, "y_offset": 0, "height": 0, "width": 0, "do_rectify": False}
-        return self._make(
+        return self._parts.make(
             "sensor_msgs/CameraInfo",
-            header=self._header(time, camera.name),
+            header=self._parts.header(time, camera.name),
             width=size[0],
             height=size[1],
             distortion_model=found.distortion_model or "plumb_bob",
@@ -84,13 +65,13 @@ class RosMessages:
             p=np.array((fx, 0, cx, 0, 0, fy, cy, 0, 0, 0, 1, 0), dtype=np.float64),
             binning_x=0,
             binning_y=0,
-            roi=self._make("sensor_msgs/RegionOfInterest", **none),
+            roi=self._parts.make("sensor_msgs/RegionOfInterest", **none),
         )
 
     def joints(self, names: list[str], positions: Sequence[float], time: int) -> Any:
-        return self._make(
+        return self._parts.make(
             "sensor_msgs/JointState",
-            header=self._header(time, ""),
+            header=self._parts.header(time, ""),
             name=names,
             position=np.array(positions, dtype=np.float64),
             velocity=np.zeros(0),
@@ -98,9 +79,9 @@ class RosMessages:
         )
 
     def scan(self, ring: RangeRing, ranges: Sequence[float], time: int) -> Any:
-        return self._make(
+        return self._parts.make(
             "sensor_msgs/LaserScan",
-            header=self._header(time, ring.body or WORLD),
+            header=self._parts.header(time, ring.body or WORLD),
             angle_min=ring.angle_min,
             angle_max=ring.angle_min + ring.angle_increment * (len(ranges) - 1),
             angle_increment=ring.angle_increment,
@@ -113,45 +94,34 @@ class RosMessages:
         )
 
     def wrench(self, sensor: WrenchSensor, values: Sequence[float], time: int) -> Any:
-        wrench = self._make("geometry_msgs/Wrench", force=self._vector(values[:3]), torque=self._vector(values[3:]))
-        return self._make("geometry_msgs/WrenchStamped", header=self._header(time, sensor.body or WORLD), wrench=wrench)
+        wrench = self._parts.make(
+            "geometry_msgs/Wrench", force=self._parts.vector(values[:3]), torque=self._parts.vector(values[3:])
+        )
+        return self._parts.make(
+            "geometry_msgs/WrenchStamped", header=self._parts.header(time, sensor.body or WORLD), wrench=wrench
+        )
 
     def grid(self, map: OccupancyMap, time: int) -> Any:
         """Return the map as a nav_msgs/OccupancyGrid, in MAP_FRAME. Raises MessageError: its cells make no sense."""
         x, y, yaw = map.origin
-        info = self._make(
+        info = self._parts.make(
             "nav_msgs/MapMetaData",
-            map_load_time=self._stamp(time),
+            map_load_time=self._parts.stamp(time),
             resolution=map.resolution,
             width=map.width,
             height=map.height,
-            origin=self._planar_pose(x, y, yaw),
+            origin=self._parts.planar_pose(x, y, yaw),
         )
         cells = np.frombuffer(map_cells(map), np.int8)  # 255, not known, is -1 there
-        return self._make("nav_msgs/OccupancyGrid", header=self._header(time, MAP_FRAME), info=info, data=cells)
+        return self._parts.make(
+            "nav_msgs/OccupancyGrid", header=self._parts.header(time, MAP_FRAME), info=info, data=cells
+        )
 
     def map_frame(self, frame: PlanarPose, time: int) -> Any:
         """Return where MAP_FRAME is in WORLD. `frame`: the pose of the other in the one."""
         x, y, yaw = in_world(frame)
-        transform = self._make(
-            "geometry_msgs/Transform",
-            translation=self._vector((x, y, 0.0)),
-            rotation=self._quaternion((math.cos(yaw / 2), 0.0, 0.0, math.sin(yaw / 2))),
-        )
-        stamped = self._make(
-            "geometry_msgs/TransformStamped",
-            header=self._header(time, WORLD),
-            child_frame_id=MAP_FRAME,
-            transform=transform,
-        )
-        return self._make("tf2_msgs/TFMessage", transforms=[stamped])
-
-    def _planar_pose(self, x: float, y: float, yaw: float) -> Any:
-        return self._make(
-            "geometry_msgs/Pose",
-            position=self._make("geometry_msgs/Point", x=x, y=y, z=0.0),
-            orientation=self._quaternion((math.cos(yaw / 2), 0.0, 0.0, math.sin(yaw / 2))),
-        )
+        stamped = self._parts.transform(time, WORLD, MAP_FRAME, (x, y, 0.0), about_z(yaw))
+        return self._parts.make("tf2_msgs/TFMessage", transforms=[stamped])
 
     def odometry(
         self,
@@ -164,19 +134,19 @@ class RosMessages:
         """Return the pose of the base in WORLD, and its measured twist in its own frame; covariances are zero."""
         axes = dict(zip((axis.name for axis in description.axes), feedback.axes, strict=False))
         yaw = joints[base.yaw]
-        pose = self._planar_pose(joints[base.x], joints[base.y], yaw)
-        twist = self._make(
+        pose = self._parts.planar_pose(joints[base.x], joints[base.y], yaw)
+        twist = self._parts.make(
             "geometry_msgs/Twist",
-            linear=self._vector((axes.get(base.forward, 0.0), axes.get(base.left, 0.0), 0.0)),
-            angular=self._vector((0.0, 0.0, axes.get(base.turn, 0.0))),
+            linear=self._parts.vector((axes.get(base.forward, 0.0), axes.get(base.left, 0.0), 0.0)),
+            angular=self._parts.vector((0.0, 0.0, axes.get(base.turn, 0.0))),
         )
         unknown = np.zeros(36)
-        return self._make(
+        return self._parts.make(
             "nav_msgs/Odometry",
-            header=self._header(time, WORLD),
+            header=self._parts.header(time, WORLD),
             child_frame_id=base_body(description, base),
-            pose=self._make("geometry_msgs/PoseWithCovariance", pose=pose, covariance=unknown),
-            twist=self._make("geometry_msgs/TwistWithCovariance", twist=twist, covariance=unknown),
+            pose=self._parts.make("geometry_msgs/PoseWithCovariance", pose=pose, covariance=unknown),
+            twist=self._parts.make("geometry_msgs/TwistWithCovariance", twist=twist, covariance=unknown),
         )
 
     def moving_transforms(self, description: RobotDescription, joints: Mapping[str, float], time: int) -> Any:
@@ -193,17 +163,5 @@ class RosMessages:
             if body.name == parent:
                 continue  # a frame in itself
             pose = body_pose(body, joints)
-            transform = self._make(
-                "geometry_msgs/Transform",
-                translation=self._vector(pose.position),
-                rotation=self._quaternion(pose.orientation),
-            )
-            found.append(
-                self._make(
-                    "geometry_msgs/TransformStamped",
-                    header=self._header(time, parent),
-                    child_frame_id=body.name,
-                    transform=transform,
-                )
-            )
-        return self._make("tf2_msgs/TFMessage", transforms=found)
+            found.append(self._parts.transform(time, parent, body.name, pose.position, pose.orientation))
+        return self._parts.make("tf2_msgs/TFMessage", transforms=found)

@@ -5,7 +5,7 @@ from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-from lockstep.server.media.quality.bandwidth_estimator import BandwidthEstimator, RateLimits
+from lockstep.server.media.quality.path.bandwidth_estimator import BandwidthEstimator, RateLimits
 
 STEP = 0.01  # s
 DECIDE = 0.1
@@ -83,7 +83,7 @@ class SimulatedPath:
             if self.lag is not None and step % 50 == 0 and self.reports(now):
                 path.lagged(self.lag(now), 4, now)
             if step % int(DECIDE / STEP) == 0:
-                path.sent(int(octets), now)
+                path.sending.add(int(octets), now)
                 path.decide(now)
                 course.note(now, path.rate, delay, video, capacity)
         return course

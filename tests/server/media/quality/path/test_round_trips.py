@@ -1,5 +1,5 @@
-from lockstep.server.media.quality.loss_window import ENOUGH, LossWindow
-from lockstep.server.media.quality.round_trips import LEAST_QUEUE, WINDOW, RoundTrips
+from lockstep.server.media.quality.path.loss_window import ENOUGH, LossWindow
+from lockstep.server.media.quality.path.round_trips import LEAST_QUEUE, WINDOW, RoundTrips
 
 
 def after(samples: list[float], step: float = 0.3) -> RoundTrips:

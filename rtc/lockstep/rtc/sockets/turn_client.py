@@ -11,12 +11,12 @@ from lockstep.rtc.turn.allocation import Allocated, Allocation
 from lockstep.rtc.turn.messages import TurnStream
 from lockstep.rtc.turn.servers import IceServer, ServerUri
 
-__all__ = ["RelayLink", "RelayRefused", "open_relay"]
+__all__ = ["TurnClient", "TurnRefused", "open_turn_client"]
 
 MAX_UNSENT = 256 * 1024  # bytes that wait on a TCP connection to a server; further data is lost, as UDP would lose it
 
 
-class RelayRefused(ConnectionError):
+class TurnRefused(ConnectionError):
     """The server gives no address. `code` is STUN's (RFC 8656 19): 401 for bad credentials, 408 for silence."""
 
     def __init__(self, code: int, reason: str) -> None:
@@ -28,7 +28,7 @@ class RelayRefused(ConnectionError):
         return f"{self.code} {self.reason}".strip()
 
 
-class RelayLink(asyncio.Protocol, asyncio.DatagramProtocol):
+class TurnClient(asyncio.Protocol, asyncio.DatagramProtocol):
     """One allocation and the socket to its server. `relayed` is the address for peers; None before and after the
     allocation. `counts` has dropped datagrams, by reason.
     """
@@ -88,7 +88,7 @@ class RelayLink(asyncio.Protocol, asyncio.DatagramProtocol):
     def connection_lost(self, exc: Exception | None) -> None:
         self._core.close(self._loop.time())
         if not self.answered.done():
-            self.answered.set_exception(RelayRefused(408, "the connection was closed"))
+            self.answered.set_exception(TurnRefused(408, "the connection was closed"))
         self._set_timer()
 
     # Inside
@@ -110,7 +110,7 @@ class RelayLink(asyncio.Protocol, asyncio.DatagramProtocol):
                 self.mapped = event.mapped
                 self.answered.set_result(None)
             else:
-                self.answered.set_exception(RelayRefused(event.error.code, event.error.reason))
+                self.answered.set_exception(TurnRefused(event.error.code, event.error.reason))
         for message in self._core.data_to_send():
             self._write(message)
         self._set_timer()
@@ -134,22 +134,22 @@ class RelayLink(asyncio.Protocol, asyncio.DatagramProtocol):
             self._timer = self._loop.call_at(due, self._due)
 
 
-async def open_relay(uri: ServerUri, server: IceServer, on_data: Callable[[bytes, Path], None]) -> RelayLink:
+async def open_turn_client(uri: ServerUri, server: IceServer, on_data: Callable[[bytes, Path], None]) -> TurnClient:
     """Return an address on a TURN server. `on_data` gets the datagrams that arrive there, with their path.
 
     Raises:
-        RelayRefused: the server refuses, or does not answer.
+        TurnRefused: the server refuses, or does not answer.
         OSError: it cannot be reached.
     """
     loop = asyncio.get_running_loop()
-    link = RelayLink(uri, server, on_data)
+    client = TurnClient(uri, server, on_data)
     try:
         if uri.transport == "udp":
-            await loop.create_datagram_endpoint(lambda: link, remote_addr=(uri.host, uri.port))
+            await loop.create_datagram_endpoint(lambda: client, remote_addr=(uri.host, uri.port))
         else:
-            await loop.create_connection(lambda: link, uri.host, uri.port, ssl=True if uri.tls else None)
-        await link.answered
+            await loop.create_connection(lambda: client, uri.host, uri.port, ssl=True if uri.tls else None)
+        await client.answered
     except BaseException:
-        link.close()
+        client.close()
         raise
-    return link
+    return client

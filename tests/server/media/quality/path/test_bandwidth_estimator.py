@@ -6,8 +6,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from lockstep.server.media.quality.bandwidth_estimator import BandwidthEstimator, RateLimits
-from tests.server.media.quality.simulated_path import LIMITS, SimulatedPath, steady
+from lockstep.server.media.quality.path.bandwidth_estimator import BandwidthEstimator, RateLimits
+from tests.server.media.quality.path.simulated_path import LIMITS, SimulatedPath, steady
 
 NARROW = steady(512_000)
 FOR_PICTURES = 312_000  # of 512 kbit/s, beside sound and feedback
@@ -62,7 +62,7 @@ def test_a_path_that_became_longer_is_not_starved() -> None:
     for _ in range(100):  # from now on every round trip takes 150 ms more
         now += 0.33
         path.received(0, 40, 0.19, now)
-        path.sent(round(now * path.rate / 8), now)
+        path.sending.add(round(now * path.rate / 8), now)
         path.decide(now)
     assert path.round_trips.base == pytest.approx(0.19)
     assert path.rate > 0.25 * LIMITS.maximum
@@ -80,7 +80,7 @@ def test_sudden_loss_without_a_queue_costs_half_the_rate_at_most() -> None:
     for step in range(1, 40):
         now = 0.5 + step
         path.received(30, 100, 0.04, now)
-        path.sent(step * 125_000, now)
+        path.sending.add(step * 125_000, now)
         path.decide(now)
         rates.append(path.rate)
     assert 500_000 <= min(rates) < 900_000
@@ -103,8 +103,8 @@ def test_a_peer_that_never_reports_gets_the_least() -> None:
 
 def test_nobody_is_called_silent_while_nothing_is_sent() -> None:
     path = BandwidthEstimator(LIMITS, 0.0)
-    path.sent(0, 0.0)
-    path.sent(0, 10.0)
+    path.sending.add(0, 0.0)
+    path.sending.add(0, 10.0)
     path.decide(10.0)
     assert path.rate == LIMITS.start
 
@@ -187,7 +187,7 @@ def test_no_report_breaks_it(inputs: list[tuple[str, float]]) -> None:
         if kind == "r":
             path.received(int(value), int(value), value, now)
         elif kind == "s":
-            path.sent(int(value), now)
+            path.sending.add(int(value), now)
         elif kind == "e":
             path.estimated(value, now)
         elif kind == "l":

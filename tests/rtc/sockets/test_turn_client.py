@@ -15,7 +15,7 @@ from lockstep.rtc.channels import ChannelMessage
 from lockstep.rtc.endpoint import Connection, Endpoint, EndpointSettings
 from lockstep.rtc.peer_events import Connected, PeerEvent, Restarted
 from lockstep.rtc.sdp import parse_description, write_description
-from lockstep.rtc.sockets.server_links import RelayRefused, open_relay
+from lockstep.rtc.sockets.turn_client import TurnRefused, open_turn_client
 from lockstep.rtc.stun import Kind, Message, parse, serialize
 from lockstep.rtc.turn.servers import IceServer, ServerUri
 from tests.support.turn_server import TURN_SECRET, TurnServer, running_turn_server
@@ -76,7 +76,7 @@ async def test_a_server_that_refuses_or_is_not_there_is_named_and_the_others_cou
         nobody = IceServer([f"turn:{HOST}:9?transport=tcp"], "user", "password")
         troubles = await endpoint.ask([server(turn, secret="another"), nobody, server(turn, "tcp")])
         assert [each.candidate.type for each in endpoint.candidates] == ["host", "relay"]
-        refused = [each for each in troubles if isinstance(each, RelayRefused)]
+        refused = [each for each in troubles if isinstance(each, TurnRefused)]
         assert len(troubles) == 2
         assert [each.code for each in refused] == [401]
         assert str(refused[0]).startswith("401")
@@ -88,9 +88,9 @@ async def test_a_fault_in_the_questions_to_one_server_is_named_and_the_others_co
     async def fails_once(uri: ServerUri, *rest: Any) -> Any:
         if uri.transport == "udp":
             raise ValueError("planted")
-        return await open_relay(uri, *rest)
+        return await open_turn_client(uri, *rest)
 
-    monkeypatch.setattr("lockstep.rtc.sockets.address_servers.open_relay", fails_once)
+    monkeypatch.setattr("lockstep.rtc.sockets.address_servers.open_turn_client", fails_once)
     async with Endpoint([HOST]) as endpoint:
         troubles = await endpoint.ask([server(turn), server(turn, "tcp")])
         assert [each.candidate.type for each in endpoint.candidates] == ["host", "relay"]
@@ -104,10 +104,10 @@ async def test_addresses_that_carry_nothing_are_given_back(turn: TurnServer) -> 
         await endpoint.ask([server(turn)])
         [second] = [each for each in endpoint.candidates if each.candidate.type == "relay"]
         assert first.base != second.base
-        link = endpoint._servers.relay(second.base)
-        assert link is not None
+        client = endpoint._servers.client(second.base)
+        assert client is not None
         await endpoint.ask([])
-        assert link.relayed is None
+        assert client.relayed is None
         assert [each.candidate.type for each in endpoint.candidates] == ["host"]
 
 

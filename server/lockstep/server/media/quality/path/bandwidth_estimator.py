@@ -31,33 +31,31 @@ from abs-send-time) detect the standing queue, loss is only the last resort, and
 
 from typing import Literal, NamedTuple
 
-from lockstep.server.media.quality.loss_window import LossWindow
-from lockstep.server.media.quality.round_trips import RoundTrips
+from lockstep.server.media.quality.path.event_gap import EventGap
+from lockstep.server.media.quality.path.feedback_timeout import FeedbackTimeout
+from lockstep.server.media.quality.path.loss_window import LossWindow
+from lockstep.server.media.quality.path.round_trips import RoundTrips
+from lockstep.server.media.quality.path.sending_rate import SendingRate
+from lockstep.server.media.quality.path.standing_queue import StandingQueue
 
 __all__ = ["BandwidthEstimator", "RateLimits", "Reason"]
 
 Reason = Literal["", "no feedback", "round trip", "bandwidth", "gap", "loss"]
 
-SILENCE = 2.0  # s
-FIRST_ANSWER = 5.0  # s; a browser takes its time to start
 SILENT_STEP = 1.0  # s between two decreases in silence
 REACTION = 0.5  # s on top of a round trip until a decrease shows
 FRESH = 0.3  # s after a decrease until round trips show its effect
 LOSS_EVERY = 2.0  # s
 LATENESS = 0.3  # s
-DRAINS = 0.8  # share of its former length below which a queue drains
 EPISODE = 4.0  # s; decreases that follow one another so closely belong to one queue
 CALM = 1.0  # s without any sign of a limit before an increase
 RAISE_EVERY = 1.0  # s
 HIGH_LOSS, SOME_LOSS = 0.10, 0.02
 FALL = 0.97  # an estimate below this share of the one before has fallen
-NEAR_TOLERANCE = 0.75
 MOST_PAUSE = 1.0  # s
 START_GROWTH, FAR_GROWTH, NEAR_GROWTH = 1.35, 1.12, 1.04
 NEAR_LIMIT = 0.85
 USED = 0.7  # share of the rate that has to be sent for it to count as used
-GAP_TRIES, LENGTH_TRIES = 2, 3
-GAP_REST = 30.0  # s
 LIMIT_MEMORY = 60.0  # s that a limit is remembered
 
 
@@ -82,26 +80,19 @@ class BandwidthEstimator:
         self.paused_until = 0.0  # no picture may leave before
         self.round_trips = RoundTrips()
         self.losses = LossWindow()
-        self.sent_bps = 0.0  # over the last second or so
+        self.gap = EventGap()
+        self.sending = SendingRate()
         self.limited_at: float | None = None  # last time that the path showed a limit
         self._ceiling: float | None = None  # rate at that limit
-        self._heard_at = now
+        self._timeout = FeedbackTimeout(now)
         self._heard = False  # True after feedback since the last increase
-        self._answered = False  # True after the peer's first feedback
         self._silent_from: float | None = None  # rate before the silence
         self._lowered_at = now - CALM
         self._raised_at = now
         self._sign_at = now - CALM  # of the last sign of a limit
-        self._sent: tuple[int, float] | None = None  # total octets, and the time
         self._estimate: float | None = None
         self._estimate_fell = False
-        self._gap_base: list[int] = []  # the last reports' lags
-        self._gap_near = 0  # consecutive reports
-        self._lag = 0
-        self._gap_tries: list[int] = []  # lag at each decrease for the gap
-        self._gap_rests_until = 0.0
-        self._length_tries: list[float] = []  # queue at each decrease for the queue
-        self._queue_then = 0.0  # at the last decrease
+        self._queue = StandingQueue(self.round_trips)
         self._loss_floor: float | None = None
         self._late_at = float("-inf")
 
@@ -112,8 +103,8 @@ class BandwidthEstimator:
         if self._silent_from is not None:
             self.rate = max(self.rate, min(self.limits.maximum, self._silent_from / 2))
             self._silent_from = None
-        self._heard_at = now
-        self._heard = self._answered = True
+        self._timeout.restart(now)
+        self._heard = True
 
     def received(self, lost: int, expected: int, round_trip: float | None, now: float) -> None:
         """Take a receiver report: packets since the last one, and the round trip in s if it contains one."""
@@ -126,7 +117,7 @@ class BandwidthEstimator:
         """Take the peer's own estimate of the bitrate that it can receive (REMB)."""
         self.heard(now)
         # aiortc gives its first estimate when it finds the path overused.
-        before = self.sent_bps if self._estimate is None else self._estimate
+        before = self.sending.bps if self._estimate is None else self._estimate
         if bitrate_bps < FALL * before:
             self._estimate_fell = True
         self._estimate = bitrate_bps
@@ -134,35 +125,22 @@ class BandwidthEstimator:
     def lagged(self, lag: int, tolerance: int, now: float) -> None:
         """Take the largest gap of pictures since the last report, and the tolerance; both in events."""
         self.heard(now)
-        usual = min(self._gap_base, default=lag)
-        near = tolerance > 0 and lag >= NEAR_TOLERANCE * tolerance and lag > usual
-        self._gap_near = self._gap_near + 1 if near else 0
-        self._lag = lag
-        self._gap_base = [*self._gap_base[-19:], lag]
+        self.gap.report(lag, tolerance)
 
     def late(self, now: float) -> None:
         """Note that this computer was busy: round trips measured now say nothing about the network."""
         self._late_at = self._sign_at = now
 
-    def sent(self, octets: int, now: float) -> None:
-        """Take the total number of bytes of pictures that have been sent."""
-        if self._sent is None:
-            self._sent = octets, now
-            return
-        passed = now - self._sent[1]
-        if passed < 0.05:
-            return
-        rate = max(0, octets - self._sent[0]) * 8 / passed
-        self.sent_bps += (rate - self.sent_bps) * min(1.0, passed / 0.7)
-        self._sent = octets, now
-
     # decisions
 
     def decide(self, now: float) -> None:
         """Apply the rules."""
-        if self._silent(now):
-            self._in_silence(now)
-        elif not self._lower(now) and self._may_raise(now):
+        if self.sending.bps > 0 and self._timeout.is_over(self.round_trips.base, now):
+            if self._silent_from is None:
+                self._silent_from = self.rate
+            if now - self._lowered_at >= SILENT_STEP:
+                self._set(0.7 * self.rate, "no feedback", now)
+        elif not self._lower(now):
             self._raise(now)
         if self.limited_at is not None and now - self.limited_at > LIMIT_MEMORY:
             self.limited_at = self._ceiling = None
@@ -183,25 +161,16 @@ class BandwidthEstimator:
         self.rate = max(self.limits.minimum, rate)  # a peer without a camera needs nothing, and may get one
         self._raised_at = self._lowered_at = self._sign_at = now
 
-    def _silent(self, now: float) -> bool:
-        patience = SILENCE if self._answered else FIRST_ANSWER
-        return self.sent_bps > 0 and now - self._heard_at > patience + self.round_trips.base
-
-    def _in_silence(self, now: float) -> None:
-        if self._silent_from is None:
-            self._silent_from = self.rate
-        if now - self._lowered_at >= SILENT_STEP:
-            self._set(0.7 * self.rate, "no feedback", now)
-
     def _lower(self, now: float) -> bool:
         """Make the decrease that is due, if any; True if something speaks against an increase."""
         queued = self.round_trips.queued and self.round_trips.at > self._lowered_at + FRESH
         loss = self.losses.unusual(now)
         fell, self._estimate_fell = self._estimate_fell, False
-        near = self._gap_near >= 2 and now >= self._gap_rests_until
+        near = self.gap.is_near(now)
         queue_begins = self.round_trips.queue > self.round_trips.limit
         if not (queued or fell or near or loss > SOME_LOSS or queue_begins):
             self._loss_floor = None
+            self._queue.gone()
             return False
         self._sign_at = now
         if now - self._lowered_at < self.round_trips.base + REACTION:
@@ -213,48 +182,23 @@ class BandwidthEstimator:
             if self._estimate < self.rate:
                 self._limit(self._estimate, "bandwidth", now)
         elif near:
-            self._for_gap(now)
+            if self.gap.try_decrease(now):
+                self._limit(0.8 * min(self.rate, max(self.sending.bps, 0.5 * self.rate)), "gap", now)
         elif loss > HIGH_LOSS and now - self._lowered_at >= LOSS_EVERY:
-            self._for_loss(loss, now)
+            self._loss_floor = self.rate / 2 if self._loss_floor is None else self._loss_floor
+            if (wanted := self.rate * (1 - loss / 2)) > self._loss_floor:
+                self._set(wanted, "loss", now)
         return True
 
     def _for_queue(self, now: float) -> None:
-        trips = self.round_trips
+        trips, lossy = self.round_trips, self.losses.fraction(now) > SOME_LOSS
         self.paused_until = now + min(MOST_PAUSE, trips.queue)
-        recent = now - self._lowered_at < EPISODE
-        if recent and trips.growth == 0 and trips.queue < DRAINS * self._queue_then:
+        if not self._queue.try_decrease(recently=now - self._lowered_at < EPISODE, lossy=lossy):
             return
-        if self._length_tries and trips.queue < DRAINS * self._length_tries[0]:
-            self._length_tries = []
-        if self.losses.fraction(now) <= SOME_LOSS:  # an overflowing queue is not a longer path
-            self._length_tries.append(trips.queue)
-        if len(self._length_tries) > LENGTH_TRIES:
-            trips.accept()
-            self._length_tries = []
-            return
-        self._queue_then = trips.queue
-        carried = min(self.rate, self.sent_bps or self.rate) / (1 + trips.growth)
+        carried = min(self.rate, self.sending.bps or self.rate) / (1 + trips.growth)
         # A rate that an undemanding picture left unused says little of the path, unless its queue grows or overflows.
-        sure = trips.growth > 0.2 or self.losses.fraction(now) > SOME_LOSS
+        sure = trips.growth > 0.2 or lossy
         self._limit(max(0.85 * carried, (0.4 if sure else 0.65) * self.rate), "round trip", now)
-
-    def _for_gap(self, now: float) -> None:
-        if len(self._gap_tries) >= GAP_TRIES and self._lag >= self._gap_tries[0]:
-            self._gap_rests_until = now + GAP_REST
-            self._gap_tries = []
-            return
-        if self._gap_tries and self._lag < self._gap_tries[0]:
-            self._gap_tries = []
-        self._gap_tries.append(self._lag)
-        self._gap_near = 0
-        self._limit(0.8 * min(self.rate, max(self.sent_bps, 0.5 * self.rate)), "gap", now)
-
-    def _for_loss(self, loss: float, now: float) -> None:
-        if self._loss_floor is None:
-            self._loss_floor = self.rate / 2
-        wanted = self.rate * (1 - loss / 2)
-        if wanted > self._loss_floor:
-            self._set(wanted, "loss", now)
 
     def _limit(self, rate: float, reason: Reason, now: float) -> None:
         """Lower the rate: the path carries no more than about `rate`."""
@@ -268,17 +212,16 @@ class BandwidthEstimator:
         self.reason = reason
         self._lowered_at = now
 
-    def _may_raise(self, now: float) -> bool:
-        self._length_tries = []
-        return (
+    def _raise(self, now: float) -> None:
+        """Increase the rate, if it is time: nothing speaks against it."""
+        if not (
             self.rate < self.limits.maximum
             and self._heard
             and now - self._sign_at >= CALM
             and now - self._raised_at >= RAISE_EVERY
-            and self.sent_bps >= USED * self.rate
-        )
-
-    def _raise(self, now: float) -> None:
+            and self.sending.bps >= USED * self.rate
+        ):
+            return
         if self._ceiling is None:
             growth = START_GROWTH
         else:
