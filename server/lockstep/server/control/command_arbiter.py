@@ -40,7 +40,7 @@ from lockstep.protocol.description import Axis, RobotDescription
 from lockstep.protocol.messages import Command, Feedback, Refusal, RefusalReason, Rest, StopTaken
 from lockstep.protocol.neutral import has_goals, neutral_value
 from lockstep.protocol.serial import event_after, is_newer
-from lockstep.server.control.seat import ControlSeat
+from lockstep.server.control.seat.control_seat import ControlSeat
 from lockstep.server.control.speed_cap import SpeedCap, within_share
 from lockstep.server.event_clock import EventClock
 from lockstep.server.stop.stop_presses import StopPresses
