@@ -61,6 +61,7 @@ from lockstep.server.control.speed_cap import SpeedCap
 from lockstep.server.control.stop.reset_service import ResetService
 from lockstep.server.control.stop.stop_service import StopService
 from lockstep.server.control.stop.stop_silence import StopSilence
+from lockstep.server.control.stop.stops_disk import StopsDisk
 from lockstep.server.control.trace_service import TraceService
 from lockstep.server.errors import ChannelError, Flood, Silenced
 from lockstep.server.event_clock import EventClock
@@ -146,6 +147,7 @@ class Console:
         arbiter = CommandArbiter(clock, seat, stops.presses, self.speed_cap)
         self.silence = silence
         self.stops = StopService(self.robot, stops, peers, clock, silence, events)
+        self._stops_disk = StopsDisk(stops, events)
         self.resets = ResetService(self.robot, self.stops, peers, clock, seat, events)
         self.actions = ActionService(self.robot, clock, self.seat.is_held_by, self.seat.may_move, events)
         self._commands = CommandService(arbiter, self.robot, self.seat, self.actions, clock, self._refusals, events)
@@ -168,7 +170,7 @@ class Console:
                 ("feedback", self._fanout.run),
                 ("seat", self.seat.watch),
                 ("stops", self.stops.run),
-                ("disk of stops", self.stops.watch_disk),
+                ("disk of stops", self._stops_disk.run),
                 ("resets", self.resets.run),
                 ("actions", self.actions.run),
                 ("audit", self.audit.run),
