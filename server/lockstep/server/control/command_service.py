@@ -41,7 +41,7 @@ class MovingSeat(Protocol):
 class RenewedActions(Protocol):
     """The part of the actions that the service uses."""
 
-    def renews(self, action: str) -> bool: ...
+    def renews(self, id: str) -> bool: ...
 
 
 class CommandService:

@@ -115,7 +115,8 @@ class SessionAudit:
                 audit.again("action", event.by, "cancel" if event.by.peer else "cancel, the seat changes")
             case ActionRefused():
                 audit.refused(event.by, event.update.reason)
-            case ActionUpdated(update=update):
+            case ActionUpdated():
+                update = event.update
                 if event.new_state and update.state != "running":
                     outcome = f"{update.state}, {update.reason}" if update.reason else update.state
                     audit.record("action", what=outcome, detail=f"{update.name}, by {update.by}")
