@@ -50,7 +50,7 @@ class GoalDriving(RuleBasedStateMachine):
         self.bound_at: dict[float, int] = {}  # losses of the feedback that a goal's engagement was bound to
         # console
         self.clock, self.seat = EventClock(), ControlSeat(SeatTimes())
-        self.rules = SeatRules(self.seat)
+        self.seat_rules = SeatRules(self.seat)
         self.arbiter = CommandArbiter(self.clock, self.seat)
         self.clock.begin("e")
         self.arbiter.link_up(ARM)
@@ -67,7 +67,7 @@ class GoalDriving(RuleBasedStateMachine):
 
     @initialize()
     def begin(self) -> None:
-        self.rules.request("me", "operator", 0.0)
+        self.seat_rules.request("me", "operator", 0.0)
         self.measure()
 
     # Robot and console
@@ -115,15 +115,15 @@ class GoalDriving(RuleBasedStateMachine):
     def boss_drives(self, where: float) -> None:
         """Take the seat, send a neutral command, move the arm, and give the seat back."""
         self.losses += 1
-        self.rules.take("boss", "supervisor", self.now)
+        self.seat_rules.take("boss", "supervisor", self.now)
         self.sender.unseated()
         self.step()
         self.event = event_after(self.event)
         self.issue = 1
         self.applied += where
         self.measure()
-        self.rules.release("boss", self.now)
-        self.rules.request("me", "operator", self.now)
+        self.seat_rules.release("boss", self.now)
+        self.seat_rules.request("me", "operator", self.now)
         self.sender.seated()
         self.step()
 

@@ -3,7 +3,6 @@
 import asyncio
 
 import pytest
-from lockstep.server.control.seat_keeper import LINK_CLAIMS
 
 from lockstep.protocol.console import (
     Note,
@@ -20,6 +19,7 @@ from lockstep.protocol.console import (
 )
 from lockstep.protocol.messages import Command, Feedback, Refusal, Reset
 from lockstep.protocol.serial import event_after
+from lockstep.server.control.seat.seat_keeper import LINK_CLAIMS
 from tests.server.rig import TestPeer, eventually, running_rig
 
 
