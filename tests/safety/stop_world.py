@@ -22,7 +22,10 @@ from lockstep.server.audit.records import Actor
 from lockstep.server.auth.silenced_links import SilencedLinks
 from lockstep.server.auth.tokens import Identity
 from lockstep.server.control.command_arbiter import CommandArbiter, Forward, ForwardRest
-from lockstep.server.control.seat import ControlSeat, SeatOutcome, SeatTimes
+from lockstep.server.control.seat.control_seat import ControlSeat
+from lockstep.server.control.seat.seat_rules import SeatRules
+from lockstep.server.control.seat.seat_table import SeatOutcome
+from lockstep.server.control.seat.seat_times import SeatTimes
 from lockstep.server.control.stop import reset_service, stop_service, stop_silence
 from lockstep.server.control.stop.reset_service import ResetService
 from lockstep.server.control.stop.stop_service import StopService
@@ -176,6 +179,7 @@ class ConsoleModel:
         self._world = world
         self.people = People(self._told)
         self.clock, self.seat = EventClock(), ControlSeat(SeatTimes())
+        self.rules = SeatRules(self.seat)
         self.keeper = MemoryKeeper(disk)
         world.loop.run_until_complete(self.keeper.load())
         self.arbiter = CommandArbiter(self.clock, self.seat, self.keeper.presses)
@@ -224,12 +228,12 @@ class ConsoleModel:
 
     def sit(self, person: str) -> None:
         who, now = self.people.all[person], self._world.now
-        step = self.seat.take if who.role == "supervisor" else self.seat.request
+        step = self.rules.take if who.role == "supervisor" else self.rules.request
         self._seated(step(who.id, who.role, now))
 
     def release(self) -> None:
         if self.seat.holder:
-            self._seated(self.seat.release(self.seat.holder, self._world.now))
+            self._seated(self.rules.release(self.seat.holder, self._world.now))
 
     def _seated(self, outcome: SeatOutcome) -> None:
         if outcome.rest and isinstance(found := self.arbiter.abandon(), ForwardRest):

@@ -14,7 +14,9 @@ from lockstep.protocol.messages import Command, Feedback, Refusal, Rest, StopSta
 from lockstep.protocol.neutral import neutral_values
 from lockstep.protocol.serial import event_after
 from lockstep.server.control.command_arbiter import Answer, CommandArbiter, Forward, ForwardRest, Refuse
-from lockstep.server.control.seat import ControlSeat, SeatTimes
+from lockstep.server.control.seat.control_seat import ControlSeat
+from lockstep.server.control.seat.seat_rules import SeatRules
+from lockstep.server.control.seat.seat_times import SeatTimes
 from lockstep.server.event_clock import EventClock
 
 pytestmark = pytest.mark.slow
@@ -48,6 +50,7 @@ class GoalDriving(RuleBasedStateMachine):
         self.bound_at: dict[float, int] = {}  # losses of the feedback that a goal's engagement was bound to
         # console
         self.clock, self.seat = EventClock(), ControlSeat(SeatTimes())
+        self.seat_rules = SeatRules(self.seat)
         self.arbiter = CommandArbiter(self.clock, self.seat)
         self.clock.begin("e")
         self.arbiter.link_up(ARM)
@@ -64,7 +67,7 @@ class GoalDriving(RuleBasedStateMachine):
 
     @initialize()
     def begin(self) -> None:
-        self.seat.request("me", "operator", 0.0)
+        self.seat_rules.request("me", "operator", 0.0)
         self.measure()
 
     # Robot and console
@@ -112,15 +115,15 @@ class GoalDriving(RuleBasedStateMachine):
     def boss_drives(self, where: float) -> None:
         """Take the seat, send a neutral command, move the arm, and give the seat back."""
         self.losses += 1
-        self.seat.take("boss", "supervisor", self.now)
+        self.seat_rules.take("boss", "supervisor", self.now)
         self.sender.unseated()
         self.step()
         self.event = event_after(self.event)
         self.issue = 1
         self.applied += where
         self.measure()
-        self.seat.release("boss", self.now)
-        self.seat.request("me", "operator", self.now)
+        self.seat_rules.release("boss", self.now)
+        self.seat_rules.request("me", "operator", self.now)
         self.sender.seated()
         self.step()
 

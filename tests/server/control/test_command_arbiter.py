@@ -20,7 +20,9 @@ from lockstep.server.control.command_arbiter import (
     Refuse,
     RestOutcome,
 )
-from lockstep.server.control.seat import ControlSeat, SeatTimes
+from lockstep.server.control.seat.control_seat import ControlSeat
+from lockstep.server.control.seat.seat_rules import SeatRules
+from lockstep.server.control.seat.seat_times import SeatTimes
 from lockstep.server.event_clock import EventClock
 from lockstep.server.stop.stop_presses import Press, StopPresses
 
@@ -61,10 +63,11 @@ class Bench:
 
     def __init__(self, *, held: bool = True, up: bool = True, stopped: bool = False) -> None:
         self.clock, self.seat, self.presses = EventClock(), ControlSeat(SeatTimes()), StopPresses()
+        self.rules = SeatRules(self.seat)
         self.arbiter = CommandArbiter(self.clock, self.seat, self.presses)
         self.clock.begin("e")
         if held:
-            self.seat.request("me", "operator", 0.0)
+            self.rules.request("me", "operator", 0.0)
         if up:
             self.arbiter.link_up(ROBOT)
             self.hear(_feedback(7, stopped=stopped))
@@ -95,7 +98,7 @@ NEUTRAL = [0.0, 0.0]
 
 def test_a_new_holder_sends_a_neutral_command_before_a_moving_one() -> None:
     bench = Bench()
-    bench.seat.take("next", "supervisor", 0.0)
+    bench.rules.take("next", "supervisor", 0.0)
     assert _reason(bench.arbiter.command("next", _command(8))) == "not_neutral"
     assert bench.arbiter.in_flight is None
     assert bench.arbiter.command("next", _command(8, NEUTRAL)) == Forward(_command(8, NEUTRAL))
@@ -105,15 +108,15 @@ def test_a_new_holder_sends_a_neutral_command_before_a_moving_one() -> None:
     assert not bench.seat.may_move("next"), "it counts when it was executed"
     bench.hear(_feedback(8))
     assert bench.arbiter.command("next", _command(9)) == Forward(_command(9))
-    bench.seat.take("last", "supervisor", 0.0)
-    bench.seat.take("next", "supervisor", 0.0)
+    bench.rules.take("last", "supervisor", 0.0)
+    bench.rules.take("next", "supervisor", 0.0)
     bench.hear(_feedback(9))
     assert _reason(bench.arbiter.command("next", _command(10))) == "not_neutral", "also one who drove before"
 
 
 def test_a_neutral_command_that_is_refused_proves_nothing() -> None:
     bench = Bench()
-    bench.seat.take("next", "supervisor", 0.0)
+    bench.rules.take("next", "supervisor", 0.0)
     bench.arbiter.command("next", _command(20, NEUTRAL))
     bench.arbiter.command("other", _command(8, NEUTRAL))
     assert _reason(bench.arbiter.command("next", _command(8))) == "not_neutral"
@@ -122,7 +125,7 @@ def test_a_neutral_command_that_is_refused_proves_nothing() -> None:
 def test_what_the_last_holder_executed_is_not_taken_for_the_new_ones() -> None:
     bench = Bench()
     bench.arbiter.command("me", _command(8))
-    bench.seat.take("next", "supervisor", 0.0)
+    bench.rules.take("next", "supervisor", 0.0)
     bench.arbiter.abandon()
     assert _reason(bench.arbiter.command("next", _command(8, NEUTRAL))) == "out_of_order", "it is in flight still"
     bench.hear(_feedback(8))
@@ -199,7 +202,7 @@ def test_a_refusal_of_something_else_goes_to_the_holder() -> None:
     bench.arbiter.command("me", _command(8))
     assert bench.arbiter.refused(Refusal(event=5, reason="late", current=7)) == "me"
     assert bench.arbiter.in_flight is not None
-    bench.seat.release("me", 0.0)
+    bench.rules.release("me", 0.0)
     assert bench.arbiter.refused(Refusal(event=5, reason="late", current=7)) == ""
 
 
@@ -248,7 +251,7 @@ def test_others_cannot_rest_the_robot() -> None:
 def test_when_the_holder_is_gone_the_next_event_is_void_too() -> None:
     bench = Bench()
     bench.arbiter.command("me", _command(8))
-    bench.seat.gone("me", 0.0)
+    bench.rules.gone("me", 0.0)
     assert bench.arbiter.abandon() == ForwardRest(Rest(event=8))
 
 
@@ -315,9 +318,9 @@ def test_a_neutral_command_of_before_the_seat_was_given_up_proves_nothing_after_
     bench = Bench()
     bench.seat.neutral_needed()
     bench.arbiter.command("me", _command(8, NEUTRAL))
-    bench.seat.release("me", 0.0)
+    bench.rules.release("me", 0.0)
     bench.arbiter.abandon()
-    bench.seat.request("me", "operator", 0.0)
+    bench.rules.request("me", "operator", 0.0)
     bench.hear(_feedback(8))
     assert _reason(bench.arbiter.command("me", _command(9))) == "not_neutral"
 
@@ -348,6 +351,7 @@ class DeskMachine(RuleBasedStateMachine):
     @initialize(event=st.sampled_from([1, 2, MAX_EVENT - 2, MAX_EVENT]))
     def start(self, event: int) -> None:
         self.clock, self.seat = EventClock(), ControlSeat(SeatTimes())
+        self.seat_rules = SeatRules(self.seat)
         self.presses = StopPresses()
         self.arbiter = CommandArbiter(self.clock, self.seat, self.presses)
         self.up = self.stopped = False
@@ -369,11 +373,11 @@ class DeskMachine(RuleBasedStateMachine):
 
     @rule(peer=peers, operator=st.booleans())
     def request(self, peer: str, operator: bool) -> None:
-        self.seat.request(peer, "operator" if operator else "observer", 0.0)
+        self.seat_rules.request(peer, "operator" if operator else "observer", 0.0)
 
     @rule(peer=peers)
     def leave(self, peer: str) -> None:
-        if self.seat.gone(peer, 0.0).rest:
+        if self.seat_rules.gone(peer, 0.0).rest:
             self.arbiter.abandon()
             self.proven = ""
 

@@ -26,7 +26,9 @@ from lockstep.server.audit.audit_trail import AuditTrail
 from lockstep.server.auth.silenced_links import SilencedLinks
 from lockstep.server.auth.tokens import Identity
 from lockstep.server.control.console import Console
-from lockstep.server.control.seat import ControlSeat, SeatOutcome, SeatTimes
+from lockstep.server.control.seat.control_seat import ControlSeat
+from lockstep.server.control.seat.seat_table import SeatOutcome
+from lockstep.server.control.seat.seat_times import SeatTimes
 from lockstep.server.control.stop.stop_silence import StopSilence
 from lockstep.server.event_clock import EventClock
 from lockstep.server.peers.peer import Peer
@@ -159,7 +161,7 @@ async def test_stop_seat_and_commands_need_no_subscriber_and_survive_subscribers
     feedback(3, StopState(number=1))
     sent.clear()
     ann.end("gone")
-    assert (console.seat.rules.holder, [type(each) for each in sent]) == ("", [Rest])
+    assert (console.seat.state.holder, [type(each) for each in sent]) == ("", [Rest])
     await running.aclose()
     assert (sum(_faults(metrics)) > 0) == subscribers_fail
 
@@ -185,11 +187,10 @@ class FakeHost:
     def feedback_received(self, feedback: Feedback) -> None:
         self.calls.append(f"feedback {feedback.event}")
 
-    def refusal_received(self, refusal: Refusal) -> None:
-        self.calls.append("refusal")
-
-    def stop_taken(self, taken: StopTaken) -> None:
-        self.calls.append(f"taken {taken.press}")
+    def link_message_received(self, message: LinkMessage) -> None:
+        self.calls.append(
+            f"taken {message.press}" if isinstance(message, StopTaken) else type(message).__name__.lower()
+        )
 
     def feed(self, media: Media, now: float) -> None:
         self.calls.append("media")
@@ -197,7 +198,7 @@ class FakeHost:
 
 def _connection() -> tuple[RobotConnection, FakeHost]:
     host = FakeHost()
-    return RobotConnection(Settings(), cast(RobotHost, host), host), host
+    return RobotConnection(Settings(), cast(RobotHost, host), host, Metrics(process=False).faults), host
 
 
 def test_whichever_link_meets_the_new_bridge_first_begins_the_epoch() -> None:

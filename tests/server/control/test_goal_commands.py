@@ -12,7 +12,9 @@ from lockstep.protocol.console import Report
 from lockstep.protocol.description import Axis, RobotDescription, StartWarning
 from lockstep.protocol.messages import Command, Feedback, StopState
 from lockstep.server.control.command_arbiter import CommandArbiter, Forward, Refuse
-from lockstep.server.control.seat import ControlSeat, SeatTimes
+from lockstep.server.control.seat.control_seat import ControlSeat
+from lockstep.server.control.seat.seat_rules import SeatRules
+from lockstep.server.control.seat.seat_times import SeatTimes
 from lockstep.server.control.speed_cap import SpeedCap
 from lockstep.server.event_clock import EventClock
 
@@ -32,9 +34,10 @@ class Bench:
 
     def __init__(self, cap: SpeedCap | None = None, robot: RobotDescription = ROBOT) -> None:
         self.clock, self.seat = EventClock(), ControlSeat(SeatTimes())
+        self.rules = SeatRules(self.seat)
         self.arbiter = CommandArbiter(self.clock, self.seat, None, cap)
         self.clock.begin("e")
-        self.seat.request("me", "operator", 0.0)
+        self.rules.request("me", "operator", 0.0)
         self.arbiter.link_up(robot)
         self.hear(7)
 
@@ -120,7 +123,7 @@ def test_after_a_take_over_a_stop_and_a_new_link_goals_wait_for_the_holders_own_
     bench = Bench()
     bench.executed(8, NEUTRAL)
     bench.executed(9, (0.0, 0.3, 0.0))
-    bench.seat.take("boss", "supervisor", 1.0)
+    bench.rules.take("boss", "supervisor", 1.0)
     assert bench.send(10, (0.0, 0.25, 0.0), "boss") == "not_neutral"
     bench.executed(10, NEUTRAL, "boss")
     bench.executed(11, (0.0, 0.25, 0.0), "boss")

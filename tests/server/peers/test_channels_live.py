@@ -21,7 +21,8 @@ from lockstep.protocol.console import (
 from lockstep.protocol.messages import Command, Feedback, Ping, Pong, Refusal, Reset, Rest, Stop
 from lockstep.protocol.serial import event_after
 from lockstep.rtc.token_bucket import TokenBucket
-from lockstep.server.control.seat import ControlSeat, SeatOutcome
+from lockstep.server.control.seat.seat_rules import SeatRules
+from lockstep.server.control.seat.seat_table import SeatOutcome
 from lockstep.server.peers.channels import MAX_MESSAGE
 from tests.server.rig import PATIENCE, TestPeer, eventually, running_rig
 
@@ -223,14 +224,14 @@ class _SeatClock:
     def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
         self.now = 1000.0
         self.looked_at = 0.0
-        expire = ControlSeat.expire
+        expire = SeatRules.expire
 
-        def look(rules: ControlSeat, now: float) -> Iterator[SeatOutcome]:
+        def look(rules: SeatRules, now: float) -> Iterator[SeatOutcome]:
             yield from expire(rules, now)
             self.looked_at = now
 
-        monkeypatch.setattr(ControlSeat, "expire", look)
-        monkeypatch.setattr("lockstep.server.control.seat_keeper.time", self)
+        monkeypatch.setattr(SeatRules, "expire", look)
+        monkeypatch.setattr("lockstep.server.control.seat.seat_keeper.time", self)
 
     def monotonic(self) -> float:
         return self.now

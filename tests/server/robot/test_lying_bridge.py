@@ -101,13 +101,14 @@ async def test_whatever_a_bridge_says_the_console_has_no_fault_and_keeps_the_lin
         answer = await rig.http.post("/api/recordings", headers=rig.token("operator"), json={})
         console = rig.dependencies.console
         ended: list[int] = []
-        take = console.stop_taken
+        take = console.link_message_received
 
-        def heard(taken: StopTaken) -> None:
-            take(taken)
-            ended.append(taken.number)
+        def heard(message: LinkMessage) -> None:
+            take(message)
+            if isinstance(message, StopTaken):
+                ended.append(message.number)
 
-        console.stop_taken = heard  # type: ignore[method-assign]
+        console.link_message_received = heard  # type: ignore[method-assign]
         await eventually(lambda: ended.count(LAST) == 2)
         assert answer.status_code in (201, 409), answer.text
         assert console.robot.up

@@ -11,7 +11,8 @@ from lockstep.server.audit.audit_trail import AuditTrail
 from lockstep.server.audit.records import Actor
 from lockstep.server.control.console import Console
 from lockstep.server.control.notices import Notices
-from lockstep.server.control.seat import ControlSeat, SeatTimes
+from lockstep.server.control.seat.control_seat import ControlSeat
+from lockstep.server.control.seat.seat_times import SeatTimes
 from lockstep.server.control.session_audit import SessionAudit
 from lockstep.server.control.session_metrics import SessionMetrics
 from lockstep.server.control.stop.stop_silence import StopSilence

@@ -40,14 +40,13 @@ from lockstep.protocol.description import Axis, RobotDescription
 from lockstep.protocol.messages import Command, Feedback, Refusal, RefusalReason, Rest, StopTaken
 from lockstep.protocol.neutral import has_goals, neutral_value
 from lockstep.protocol.serial import event_after, is_newer
-from lockstep.server.control.seat import ControlSeat
+from lockstep.server.control.known_issues import KnownIssues
+from lockstep.server.control.seat.control_seat import ControlSeat
 from lockstep.server.control.speed_cap import SpeedCap, within_share
 from lockstep.server.event_clock import EventClock
 from lockstep.server.stop.stop_presses import StopPresses
 
 __all__ = ["Absorbed", "Answer", "CommandArbiter", "CommandOutcome", "Forward", "ForwardRest", "Refuse", "RestOutcome"]
-
-KNOWN_ISSUES = 64  # of the current event; at two a second the oldest was issued long before any `max_event_age`
 
 
 class Forward(NamedTuple):
@@ -85,7 +84,8 @@ RestOutcome = ForwardRest | Refuse | Absorbed
 class CommandArbiter:
     """Decides on commands and rests. Tell it of the link (`link_up`, `link_down`) and of every message of the bridge.
 
-    `presses`: presses of STOP; no command passes while one of them is unanswered.
+    Attributes:
+        in_flight: the command that was forwarded and not answered yet; None: there is none
     """
 
     def __init__(
@@ -95,25 +95,21 @@ class CommandArbiter:
         presses: StopPresses | None = None,
         speed_cap: SpeedCap | None = None,
     ) -> None:
+        """`presses`: presses of STOP; no command passes while one of them is unanswered."""
         self._clock = clock
         self._seat = seat
         self._presses = presses or StopPresses()
         self._speed_cap = speed_cap or SpeedCap("off")
         self._description: RobotDescription | None = None
         self._link_is_up = False
-        self._in_flight: Command | None = None
+        self.in_flight: Command | None = None
         self._sender = ""  # peer whose command was forwarded last
         self._sent_event = 0  # of that command; 0 before the first of this epoch
         self._abandoned = False  # its sender has given up the seat since
         self._resting: Rest | None = None  # forwarded and not yet followed by a feedback
-        self._nonces: dict[int, int] = {}  # issue of the current event -> its nonce, oldest first
-        self._issued_event = 0  # event of these nonces; 0 before the first feedback
+        self._issues = KnownIssues()
         self._shown_stop = 0  # number of the newest stop that a feedback has shown
         self._newest_stop = 0  # number of the newest stop that the bridge has latched
-
-    @property
-    def in_flight(self) -> Command | None:
-        return self._in_flight
 
     def link_up(self, description: RobotDescription) -> None:
         self._description = description
@@ -127,7 +123,7 @@ class CommandArbiter:
     def epoch_ends(self) -> None:
         """Forget this epoch: nothing known of it holds in the next. Call before the clock begins another one."""
         self._sent_event = self._shown_stop = self._newest_stop = 0
-        self._nonces.clear()
+        self._issues.clear()
         self._forget()
 
     def command(self, peer: str, command: Command, now: float = math.inf) -> CommandOutcome:
@@ -141,21 +137,23 @@ class CommandArbiter:
             return self._refuse(command, "wrong_size", f"{len(description.axes)} values are needed")
         if not all(map(_is_number, command.values, description.axes)):
             return self._refuse(command, "not_a_number")
-        if self._stop_is_coming or feedback.stop.stopped:
+        # A stop is on its way to the bridge, or has arrived and no feedback has shown it.
+        stop_is_coming = bool(self._presses.pending) or self._newest_stop > self._shown_stop
+        if stop_is_coming or feedback.stop.stopped:
             return self._refuse(command, "stopped")
         is_repeat = self._sender == peer and self._sent_event == command.event
         if is_repeat and command.event == feedback.event:
             return Answer(feedback)
-        if is_repeat and self._in_flight is not None:
+        if is_repeat and self.in_flight is not None:
             return Absorbed()
-        if self._in_flight is not None or command.event != event_after(feedback.event):
+        if self.in_flight is not None or command.event != event_after(feedback.event):
             return self._refuse(command, "out_of_order")
         return self._next(peer, command, description, feedback.event, now)
 
     def _next(
         self, peer: str, command: Command, description: RobotDescription, event: int, now: float
     ) -> CommandOutcome:
-        nonce = self._nonces.get(command.issue)
+        nonce = self._issues.nonce(command.issue)
         if nonce is None:
             return self._refuse(command, "late")
         if nonce != command.nonce:
@@ -163,15 +161,10 @@ class CommandArbiter:
         self._speed_cap.answered(peer, event, command, now)
         if self.moves(command) and not self._seat.may_move(peer):
             return self._refuse(command, "not_neutral", "send a neutral command first")
-        self._in_flight = self._clamped(command, description, self._speed_cap.share(now))
+        self.in_flight = _clamped(command, description, self._speed_cap.share(now))
         self._sender, self._sent_event, self._abandoned = peer, command.event, False
         self._resting = None  # an earlier rest does not void this command
-        return Forward(self._in_flight)
-
-    @property
-    def _stop_is_coming(self) -> bool:
-        """True if a stop is on its way to the bridge, or has arrived and no feedback has shown it."""
-        return bool(self._presses.pending) or self._newest_stop > self._shown_stop
+        return Forward(self.in_flight)
 
     def moves(self, command: Command) -> bool:
         """True if `command` is meant to move the robot; a light or horn that warns before motion does not count."""
@@ -202,15 +195,10 @@ class CommandArbiter:
 
     def feedback(self, feedback: Feedback) -> None:
         """Take a feedback that the event clock accepted."""
-        if feedback.event != self._issued_event:
-            self._nonces.clear()
-        self._issued_event = feedback.event
-        self._nonces[feedback.issue] = feedback.nonce
-        if len(self._nonces) > KNOWN_ISSUES:
-            del self._nonces[next(iter(self._nonces))]
-        answered = self._in_flight
+        self._issues.add(feedback)
+        answered = self.in_flight
         if answered is not None and not is_newer(answered.event, feedback.event):
-            self._in_flight = None
+            self.in_flight = None
         else:
             answered = None
         self._resting = None
@@ -222,13 +210,13 @@ class CommandArbiter:
 
     def refused(self, refusal: Refusal) -> str:
         """Take a refusal of the bridge. Return the peer to tell, or "" for none."""
-        if self._in_flight is not None and refusal.event in (0, self._in_flight.event):
-            self._in_flight = None
+        if self.in_flight is not None and refusal.event in (0, self.in_flight.event):
+            self.in_flight = None
             return self._sender
         return self._seat.holder
 
     def _forget(self) -> None:
-        self._in_flight = None
+        self.in_flight = None
         self._resting = None
         self._seat.neutral_needed()
 
@@ -240,17 +228,18 @@ class CommandArbiter:
         self._resting = rest
         return ForwardRest(rest)
 
-    def _clamped(self, command: Command, description: RobotDescription, share: float) -> Command:
-        values = [
-            value if value is None or axis.kind == "goal" else within_share(axis, value, share)
-            for value, axis in zip(command.values, description.axes, strict=True)
-        ]
-        speed = min(command.speed, share) if has_goals(description.axes) else command.speed
-        return msgspec.structs.replace(command, values=values, speed=speed)
-
     def _refuse(self, message: Command | Rest, reason: RefusalReason, detail: str = "") -> Refuse:
         refusal = Refusal(event=message.event, reason=reason, current=self._clock.event, detail=detail)
         return Refuse(refusal)
+
+
+def _clamped(command: Command, description: RobotDescription, share: float) -> Command:
+    values = [
+        value if value is None or axis.kind == "goal" else within_share(axis, value, share)
+        for value, axis in zip(command.values, description.axes, strict=True)
+    ]
+    speed = min(command.speed, share) if has_goals(description.axes) else command.speed
+    return msgspec.structs.replace(command, values=values, speed=speed)
 
 
 def _is_number(value: float | None, axis: Axis) -> bool:

@@ -29,7 +29,7 @@ from lockstep.protocol.maps import Navigation, OccupancyMap
 from lockstep.protocol.messages import (
     Command,
     Feedback,
-    LinkRole,
+    LinkMessage,
     Ping,
     Pong,
     Refusal,
@@ -48,24 +48,21 @@ from lockstep.server.actions.navigation_service import NavigationService
 from lockstep.server.actions.status_service import StatusService
 from lockstep.server.audit.audit_trail import AuditTrail
 from lockstep.server.audit.records import Actor
-from lockstep.server.control.command_arbiter import (
-    Absorbed,
-    Answer,
-    CommandArbiter,
-    Forward,
-    ForwardRest,
-    Refuse,
-    RestOutcome,
-)
+from lockstep.server.control.command_arbiter import CommandArbiter
+from lockstep.server.control.command_service import CommandService
 from lockstep.server.control.participants import ParticipantList
 from lockstep.server.control.policies.shadow_service import ShadowService
-from lockstep.server.control.seat import ControlSeat, SeatRefusal
-from lockstep.server.control.seat_keeper import SeatKeeper
+from lockstep.server.control.refusals import Refusals
+from lockstep.server.control.seat.control_seat import ControlSeat
+from lockstep.server.control.seat.seat_by_link import SeatByLink
+from lockstep.server.control.seat.seat_keeper import SeatKeeper
+from lockstep.server.control.seat.seat_table import SeatInput
 from lockstep.server.control.speed_cap import SpeedCap
 from lockstep.server.control.stop.reset_service import ResetService
 from lockstep.server.control.stop.stop_service import StopService
 from lockstep.server.control.stop.stop_silence import StopSilence
-from lockstep.server.control.trace_service import TraceService, command_spans
+from lockstep.server.control.stop.stops_disk import StopsDisk
+from lockstep.server.control.trace_service import TraceService
 from lockstep.server.errors import ChannelError, Flood, Silenced
 from lockstep.server.event_clock import EventClock
 from lockstep.server.peers.channels import ChannelName
@@ -75,9 +72,6 @@ from lockstep.server.peers.peer_registry import PeerRegistry
 from lockstep.server.robot.dial_in import DialIn
 from lockstep.server.robot.robot_connection import MediaSink, RobotConnection
 from lockstep.server.session_events import (
-    CommandForwarded,
-    CommandRefused,
-    CommandRepeated,
     EpisodeAsked,
     EpochBegan,
     EventsTraced,
@@ -89,7 +83,6 @@ from lockstep.server.session_events import (
     NavigationReceived,
     NewcomerWelcomed,
     Refused,
-    RestForwarded,
     RobotTaken,
     SessionBegan,
     SessionEvents,
@@ -145,15 +138,19 @@ class Console:
         self._events = events
         self._faults = faults
         self._media = media
-        self.robot = RobotConnection(settings, self, media, dial_in)
-        self.seat = SeatKeeper(seat, peers, self, events)
+        self.robot = RobotConnection(settings, self, media, faults, dial_in)
+        self._refusals = Refusals(clock, events)
+        self.seat = SeatKeeper(seat, peers, self, self._refusals, events)
+        self.seat_by_link = SeatByLink(self.seat, peers)
         self.people = ParticipantList(peers, clock, events, self.seat.renamed)
         self.speed_cap = SpeedCap(settings.speed_cap)
-        self._arbiter = CommandArbiter(clock, seat, stops.presses, self.speed_cap)
+        arbiter = CommandArbiter(clock, seat, stops.presses, self.speed_cap)
         self.silence = silence
         self.stops = StopService(self.robot, stops, peers, clock, silence, events)
+        self._stops_disk = StopsDisk(stops, events)
         self.resets = ResetService(self.robot, self.stops, peers, clock, seat, events)
         self.actions = ActionService(self.robot, clock, self.seat.is_held_by, self.seat.may_move, events)
+        self._commands = CommandService(arbiter, self.robot, self.seat, self.actions, clock, self._refusals, events)
         self.status = StatusService()
         self.navigation = NavigationService()
         self.shadows = ShadowService(peers, events)
@@ -161,8 +158,6 @@ class Console:
             settings.observer_feedback_hz, self.seat.is_held_by, peers.drivers, peers.observers, relays
         )
         self.traces = TraceService()
-        self._forwarded_at = 0.0  # departure of the command in flight
-        self._forward_seconds = 0.0  # from its arrival to its departure
         self._shown_stop = StopState()  # state that was published last
         self._link_was_up = False
         self._robot_is_taken = False  # another console has the robot, and this was published
@@ -175,7 +170,7 @@ class Console:
                 ("feedback", self._fanout.run),
                 ("seat", self.seat.watch),
                 ("stops", self.stops.run),
-                ("disk of stops", self.stops.watch_disk),
+                ("disk of stops", self._stops_disk.run),
                 ("resets", self.resets.run),
                 ("actions", self.actions.run),
                 ("audit", self.audit.run),
@@ -222,15 +217,20 @@ class Console:
         self.seat.heard(peer)
         match message:
             case Command():
-                self._command(peer, message, now)
+                self._commands.command(peer, message, now)
             case Rest():
-                self._rest(peer, self._arbiter.rest(peer.id, message))
+                self._commands.rest(peer, message)
             case Ping():
                 peer.send("control", Pong(id=message.id))
             case Stop():
-                self._stop(peer, channel, message)
+                try:
+                    self.stops.stop(new_press(peer.actor, channel, message.reason, message.press), message.press)
+                except Silenced as error:
+                    self._refusals.refuse(peer, "stop", "silenced", error.detail)
             case Shadow():
-                self._shadow(peer, message, now)
+                refused = self.shadows.shadow(peer, message, drives=self.seat.is_held_by(peer))
+                if refused in ("not_allowed", "too_often") and peer.asks.take(now):
+                    self._refusals.refuse(peer, "session", refused, "shadow")
             case Act():
                 self.actions.act_by_peer(peer, message)
             case ActionCancel():
@@ -241,7 +241,7 @@ class Console:
                 self.seat.handle(peer, message)
             case Note():
                 if (reason := self.people.write(peer, message.text)) is not None:
-                    self._refuse_request(peer, reason, "note")
+                    self._refusals.refuse(peer, "session", reason, "note")
             case Reset():
                 self.resets.reset_by_peer(peer, message.number)
             case SeatRequest() | SeatTake() | SeatOffer() if self.seat.waits_for_nothing(peer, message):
@@ -249,11 +249,13 @@ class Console:
             case SeatRequest() | SeatGrant() | SeatDecline() | SeatTake() | SeatOffer() | SilenceStops() | Rename() if (
                 not peer.asks.take(now)
             ):
-                self._refuse_request(peer, "too_often")
+                self._refusals.refuse(peer, "session", "too_often")
             case SeatOffer(offered=True) if (reason := self.why_no_offer()) is not None:
-                self._refuse_request(peer, reason, "no policy may drive now")
+                self._refusals.refuse(peer, "session", reason, "no policy may drive now")
             case SilenceStops():
-                self._silence(peer, message)
+                if (reason := self.silence.silence(peer, message.peer, silent=message.silent)) is not None:
+                    detail = "a supervisor can silence only operators and observers"
+                    self._refusals.refuse(peer, "session", reason, detail)
             case SeatRequest() | SeatGrant() | SeatDecline() | SeatTake() | SeatOffer():
                 self.seat.handle(peer, message)
             case Rename():
@@ -261,7 +263,11 @@ class Console:
             case Report():  # the peer keeps it
                 if message.ping is not None:
                     peer.send("control", Pong(id=message.ping))
-                self._report_speed(peer, message)
+                if self.seat.is_held_by(peer):
+                    self._events.publish(SpeedReported(peer.actor, message))
+                    self.speed_cap.reported(peer.id, message, now)
+                    if (news := self.speed_cap.news(now)) is not None:
+                        self._events.publish(SpeedCapChanged(news))
             case TraceRequest():
                 self.traces.request(peer, message.wanted)
             case TraceReport() if self.seat.is_held_by(peer):
@@ -289,11 +295,9 @@ class Console:
     # SeatHost
 
     def rest_robot(self, why: str) -> None:
-        """Rest the robot before anybody else drives: the last holder's command in flight is void too."""
+        """Rest the robot before anybody else drives."""
         self.actions.cancel("", Actor())
-        outcome = self._arbiter.abandon()
-        if isinstance(outcome, ForwardRest) and self.robot.send(outcome.rest):
-            self._events.publish(RestForwarded(Actor(), outcome.rest, why))
+        self._commands.abandon(why)
 
     def why_no_offer(self) -> RefusalReason | None:
         """Return why no policy may be let drive now: after a stop or an outage a person decides anew."""
@@ -301,16 +305,13 @@ class Console:
             return "link_down"
         return "stopped" if self.clock.stop.stopped or self.stops.unconfirmed else None
 
-    def refuse(self, peer: Peer, refusal: SeatRefusal) -> None:
-        self._refuse_request(peer, refusal.reason, refusal.detail)
-
     # RobotHost
 
     def epoch_began(self, epoch: str, description: RobotDescription) -> None:
         """Begin an epoch. References of different epochs are never compared, so every peer starts anew."""
         self.stops.epoch_ends(self.clock.stop)
         self.resets.link_down("the robot bridge has restarted")
-        self._arbiter.epoch_ends()
+        self._commands.arbiter.epoch_ends()
         self.actions.epoch_ends()
         self.shadows.epoch_ends()
         self.status.forget()
@@ -328,14 +329,14 @@ class Console:
             raise TypeError("a link is up only after its hello")
         self._link_was_up = True
         self.stops.link_up()
-        self._arbiter.link_up(self.robot.description)
+        self._commands.arbiter.link_up(self.robot.description)
         self.shadows.link_up(self.robot.description)
         self._events.publish(LinkUp(self.robot.state()))
 
     def link_down(self, detail: str) -> None:
         was_up, self._link_was_up = self._link_was_up, False
-        self.seat.link_lost()
-        self._arbiter.link_down()
+        self.seat.end_offer(SeatInput.LINK_LOST)
+        self._commands.arbiter.link_down()
         self.stops.link_down()
         self.resets.link_down(detail)
         self.actions.link_down()
@@ -352,17 +353,15 @@ class Console:
             return
         self._fanout.publish(encode_console_message(feedback))  # first: the operator's next command waits for it
         back = time.monotonic() - now
-        command = self._arbiter.in_flight
         stopped = feedback.stop.stopped or feedback.stop.number > self._shown_stop.number
-        self._arbiter.feedback(feedback)
+        executed = self._commands.feedback(feedback)
         if stopped:
-            self.seat.stopped()
+            self.seat.end_offer(SeatInput.STOPPED)
         self.resets.feedback(feedback.stop)
         self.speed_cap.fed_back(feedback, now)
-        executed = command if self._arbiter.in_flight is None else None
         if executed is not None:
-            turnaround = now - self._forwarded_at
-            spans = command_spans(robot, forward=self._forward_seconds, link=turnaround, back=back)
+            turnaround = self._commands.turnaround(now)
+            spans = self._commands.spans(robot, turnaround, back)
             self.traces.executed(feedback.event, spans)
             self._events.publish(FeedbackReceived(feedback, now, turnaround, spans))
         else:
@@ -372,107 +371,27 @@ class Console:
             self._shown_stop = feedback.stop
             self._events.publish(StopShown(feedback.stop, feedback.event))
 
-    def refusal_received(self, refusal: Refusal) -> None:
-        if self.resets.refused(refusal):
-            return
-        peer = self.peers.by_id(self._arbiter.refused(refusal))
-        if peer is not None:
-            peer.send("control", refusal)
-        self._events.publish(Refused(Actor() if peer is None else peer.actor, "control", refusal, "robot"))
-
-    def stop_taken(self, taken: StopTaken) -> None:
-        self.seat.stopped()
-        self._arbiter.stop_taken(taken)
-        self.stops.taken(taken)
-
-    def action_updated(self, update: ActionUpdate) -> None:
-        self.actions.updated(update)
-
-    def status_received(self, status: Status) -> None:
-        if self.status.take(status, time.monotonic()):
-            self._events.publish(StatusReceived(status))
-
-    def navigation_received(self, navigation: Navigation) -> None:
-        if self.navigation.take(navigation, time.monotonic()):
-            self._events.publish(NavigationReceived(navigation))
-
-    def map_received(self, map: OccupancyMap) -> None:
-        self.navigation.take_map(map)
-        self._events.publish(MapReceived(map))
-
-    def link_failed(self, role: LinkRole, error: Exception) -> None:
-        self._faults.caught(f"robot link {role}", error)
-
-    # acting on outcomes
-
-    def _command(self, peer: Peer, command: Command, now: float) -> None:
-        outcome = self._arbiter.command(peer.id, command, now)
-        if isinstance(outcome, Forward) and not self._forward(outcome, now):
-            outcome = Refuse(Refusal(event=0, reason="link_down", current=self.clock.event))
-        if isinstance(outcome, Answer) and not peer.answers.allows(now, queues=peer.media.queues):
-            outcome = Absorbed()
-        match outcome:
-            case Forward(forwarded):
-                if self._arbiter.moves(forwarded) or self.actions.renews(forwarded.action):
-                    self.seat.moved(peer)
-                self._events.publish(CommandForwarded(peer.actor, forwarded))
-            case Refuse(refusal):
-                self._refuse(peer, "control", refusal)
-                if refusal.reason in ("out_of_order", "unseen", "late") and self.clock.feedback is not None:
-                    peer.send_feedback(encode_console_message(self.clock.feedback))
-                self._events.publish(CommandRefused(peer.actor, command, refusal.reason))
-            case Answer(feedback):
-                peer.send_feedback(encode_console_message(feedback))
-                self._events.publish(CommandRepeated(peer.actor, command, answered=True))
-            case Absorbed():
-                self._events.publish(CommandRepeated(peer.actor, command, answered=False))
-
-    def _shadow(self, peer: Peer, shadow: Shadow, now: float) -> None:
-        reason = self.shadows.shadow(peer, shadow, drives=self.seat.is_held_by(peer))
-        if reason in ("not_allowed", "too_often") and peer.asks.take(now):
-            self._refuse_request(peer, reason, "shadow")
-
-    def _rest(self, peer: Peer, outcome: RestOutcome) -> None:
-        if isinstance(outcome, ForwardRest):
-            if self.robot.send(outcome.rest):
-                self._events.publish(RestForwarded(peer.actor, outcome.rest, ""))
-                return
-            outcome = Refuse(Refusal(event=0, reason="link_down", current=self.clock.event))
-        if isinstance(outcome, Refuse):
-            self._refuse(peer, "control", outcome.refusal)
-
-    def _stop(self, peer: Peer, channel: ChannelName, stop: Stop) -> None:
-        try:
-            self.stops.stop(new_press(peer.actor, channel, stop.reason, stop.press), stop.press)
-        except Silenced as error:
-            self._refuse(
-                peer, "stop", Refusal(event=0, reason="silenced", current=self.clock.event, detail=error.detail)
-            )
-
-    def _silence(self, peer: Peer, message: SilenceStops) -> None:
-        reason = self.silence.silence(peer, message.peer, silent=message.silent)
-        if reason is not None:
-            self._refuse_request(peer, reason, "a supervisor can silence only operators and observers")
-
-    def _refuse_request(self, peer: Peer, reason: RefusalReason, detail: str = "") -> None:
-        self._refuse(peer, "session", Refusal(event=0, reason=reason, current=self.clock.event, detail=detail))
-
-    def _refuse(self, peer: Peer, channel: ChannelName, refusal: Refusal) -> None:
-        peer.send(channel, refusal)
-        self._events.publish(Refused(peer.actor, channel, refusal, "console"))
-
-    def _forward(self, outcome: Forward, arrived: float) -> bool:
-        self._forwarded_at = time.monotonic()
-        is_sent = self.robot.send(outcome.command)
-        self._forward_seconds = self._forwarded_at - arrived
-        return is_sent
-
-    def _report_speed(self, peer: Peer, report: Report) -> None:
-        if not self.seat.is_held_by(peer):
-            return
-        self._events.publish(SpeedReported(peer.actor, report))
+    def link_message_received(self, message: LinkMessage) -> None:
         now = time.monotonic()
-        self.speed_cap.reported(peer.id, report, now)
-        news = self.speed_cap.news(now)
-        if news is not None:
-            self._events.publish(SpeedCapChanged(news))
+        match message:
+            case Refusal():
+                if not self.resets.refused(message):
+                    peer = self.peers.by_id(self._commands.arbiter.refused(message))
+                    if peer is not None:
+                        peer.send("control", message)
+                    self._events.publish(Refused(Actor() if peer is None else peer.actor, "control", message, "robot"))
+            case StopTaken():
+                self.seat.end_offer(SeatInput.STOPPED)
+                self._commands.arbiter.stop_taken(message)
+                self.stops.taken(message)
+            case ActionUpdate():
+                self.actions.updated(message)
+            case Status():
+                if self.status.take(message, now):
+                    self._events.publish(StatusReceived(message))
+            case Navigation():
+                if self.navigation.take(message, now):
+                    self._events.publish(NavigationReceived(message))
+            case OccupancyMap():
+                self.navigation.take_map(message)
+                self._events.publish(MapReceived(message))

@@ -1,6 +1,7 @@
 """Tells everyone of the events of a session, and newcomers of what they have missed."""
 
 from collections.abc import Callable, Iterator, Sequence
+from typing import assert_never, get_args
 
 from lockstep.protocol.console import Notice, ServerMessage, StopStateNotice
 from lockstep.server.audit.records import AuditTrouble
@@ -34,6 +35,23 @@ AUDIT_UNWRITTEN = (
 )
 AUDIT_WRITTEN = "The audit log is written again."
 
+Told = (
+    LinkUp
+    | LinkDown
+    | RobotTaken
+    | SeatChanged
+    | SpeedCapChanged
+    | ParticipantsChanged
+    | NoteWritten
+    | ActionUpdated
+    | StatusReceived
+    | NavigationReceived
+    | StopShown
+    | StopSent
+    | StopsDiskChanged
+    | AuditTrouble
+)
+
 
 class Notices:
     """A subscriber to the events of a session.
@@ -53,20 +71,8 @@ class Notices:
 
     def subscribe(self, events: SessionEvents) -> None:
         events.subscribe(NewcomerWelcomed, self._newcomer_welcomed)
-        events.subscribe(LinkUp, self._link_changed)
-        events.subscribe(LinkDown, self._link_changed)
-        events.subscribe(RobotTaken, self._robot_taken)
-        events.subscribe(SeatChanged, self._seat_changed)
-        events.subscribe(SpeedCapChanged, self._speed_cap_changed)
-        events.subscribe(ParticipantsChanged, self._participants_changed)
-        events.subscribe(NoteWritten, self._note_written)
-        events.subscribe(ActionUpdated, self._action_updated)
-        events.subscribe(StatusReceived, self._status_received)
-        events.subscribe(NavigationReceived, self._navigation_received)
-        events.subscribe(StopShown, self._stop_shown)
-        events.subscribe(StopSent, self._stop_sent)
-        events.subscribe(StopsDiskChanged, self._stops_disk_changed)
-        events.subscribe(AuditTrouble, self._audit_trouble_changed)
+        for kind in get_args(Told):
+            events.subscribe(kind, self._tell)
 
     def _newcomer_welcomed(self, event: NewcomerWelcomed) -> None:
         if (peer := self._peers.by_id(event.peer.peer)) is not None:
@@ -81,51 +87,44 @@ class Notices:
         if self._audit_trouble:
             yield Notice(level="warning", text=AUDIT_UNWRITTEN.format(self._audit_trouble))
 
-    def _link_changed(self, event: LinkUp | LinkDown) -> None:
-        if event.state is not None:
-            self._peers.announce(event.state)
+    def _tell(self, event: Told) -> None:
+        announce = self._peers.announce
+        match event:
+            case LinkUp() | LinkDown():
+                if event.state is not None:
+                    announce(event.state)
+            case RobotTaken():
+                announce(Notice(level="error", text=TAKEN))
+            case SeatChanged():
+                announce(event.seat)
+            case SpeedCapChanged():
+                announce(event.state)
+            case ParticipantsChanged():
+                announce(event.participants)
+            case NoteWritten():
+                announce(event.note)
+            case ActionUpdated():
+                announce(event.update)
+            case StatusReceived():
+                announce(event.status)
+            case NavigationReceived():
+                announce(event.navigation)
+            case StopShown():
+                announce(StopStateNotice(stop=event.stop, event=event.event), "stop")
+            case StopSent():
+                if event.alone and not event.delivered:
+                    announce(Notice(level="error", text=UNDELIVERED))
+            case StopsDiskChanged():
+                self._stops_trouble = event.trouble
+                announce(_disk_notice(event.trouble, STOPS_UNWRITTEN, STOPS_WRITTEN))
+            case AuditTrouble():
+                self._audit_trouble = event.trouble
+                announce(_disk_notice(event.trouble, AUDIT_UNWRITTEN, AUDIT_WRITTEN))
+            case _:
+                assert_never(event)
 
-    def _robot_taken(self, event: RobotTaken) -> None:
-        self._peers.announce(Notice(level="error", text=TAKEN))
 
-    def _seat_changed(self, event: SeatChanged) -> None:
-        self._peers.announce(event.seat)
-
-    def _speed_cap_changed(self, event: SpeedCapChanged) -> None:
-        self._peers.announce(event.state)
-
-    def _participants_changed(self, event: ParticipantsChanged) -> None:
-        self._peers.announce(event.participants)
-
-    def _note_written(self, event: NoteWritten) -> None:
-        self._peers.announce(event.note)
-
-    def _action_updated(self, event: ActionUpdated) -> None:
-        self._peers.announce(event.update)
-
-    def _status_received(self, event: StatusReceived) -> None:
-        self._peers.announce(event.status)
-
-    def _navigation_received(self, event: NavigationReceived) -> None:
-        self._peers.announce(event.navigation)
-
-    def _stop_shown(self, event: StopShown) -> None:
-        self._peers.announce(StopStateNotice(stop=event.stop, event=event.event), "stop")
-
-    def _stop_sent(self, event: StopSent) -> None:
-        if event.alone and not event.delivered:
-            self._peers.announce(Notice(level="error", text=UNDELIVERED))
-
-    def _stops_disk_changed(self, event: StopsDiskChanged) -> None:
-        self._stops_trouble = event.trouble
-        self._tell_of_disk(event.trouble, STOPS_UNWRITTEN, STOPS_WRITTEN)
-
-    def _audit_trouble_changed(self, event: AuditTrouble) -> None:
-        self._audit_trouble = event.trouble
-        self._tell_of_disk(event.trouble, AUDIT_UNWRITTEN, AUDIT_WRITTEN)
-
-    def _tell_of_disk(self, trouble: str, unwritten: str, written: str) -> None:
-        if trouble:
-            self._peers.announce(Notice(level="warning", text=unwritten.format(trouble)))
-        else:
-            self._peers.announce(Notice(level="info", text=written))
+def _disk_notice(trouble: str, unwritten: str, written: str) -> Notice:
+    if trouble:
+        return Notice(level="warning", text=unwritten.format(trouble))
+    return Notice(level="info", text=written)

@@ -20,7 +20,7 @@ def absent_tile(name: str, trouble: str = FAILED) -> Tile:
 def tile_of(here: Dependencies, meter: EventRateMeter, now: float) -> Tile:
     """Return the tile of a robot whose session runs. `now` is on the monotonic clock."""
     console, clock, robot = here.console, here.console.clock, here.console.robot
-    driver = console.peers.by_id(console.seat.rules.holder)
+    driver = console.peers.by_id(console.seat.state.holder)
     people = [peer for peer in console.peers if not peer.thumbnail]
     people.sort(key=lambda peer: (peer is not driver, peer.role == "observer"))
     description, feedback = robot.description, clock.feedback

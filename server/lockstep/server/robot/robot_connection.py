@@ -10,10 +10,9 @@ from typing import Protocol
 import msgspec
 import structlog
 
-from lockstep.protocol.actions import Act, ActionCancel, ActionUpdate, Status
+from lockstep.protocol.actions import Act, ActionCancel
 from lockstep.protocol.console import RobotState
 from lockstep.protocol.description import RobotDescription
-from lockstep.protocol.maps import Navigation, OccupancyMap
 from lockstep.protocol.messages import (
     Command,
     EncodeRequest,
@@ -21,16 +20,15 @@ from lockstep.protocol.messages import (
     LinkMessage,
     LinkRole,
     Media,
-    Refusal,
     Reset,
     Rest,
     Stop,
-    StopTaken,
 )
 from lockstep.server.robot.console_name import console_name
 from lockstep.server.robot.credentials import LinkSettings, link_access
 from lockstep.server.robot.dial_in import DialIn
 from lockstep.server.robot.reconnecting_link import ReconnectingLink
+from lockstep.server.telemetry.faults import Faults
 from lockstep.server.util.backoff import Backoff
 
 __all__ = ["MediaSink", "RobotConnection", "RobotHost", "RobotSettings"]
@@ -60,13 +58,7 @@ class RobotHost(Protocol):
     def link_up(self) -> None: ...
     def link_down(self, detail: str) -> None: ...
     def feedback_received(self, feedback: Feedback) -> None: ...
-    def refusal_received(self, refusal: Refusal) -> None: ...
-    def stop_taken(self, taken: StopTaken) -> None: ...
-    def action_updated(self, update: ActionUpdate) -> None: ...
-    def status_received(self, status: Status) -> None: ...
-    def navigation_received(self, navigation: Navigation) -> None: ...
-    def map_received(self, map: OccupancyMap) -> None: ...
-    def link_failed(self, role: LinkRole, error: Exception) -> None: ...
+    def link_message_received(self, message: LinkMessage) -> None: ...  # neither feedback nor media
 
 
 class MediaSink(Protocol):
@@ -86,7 +78,12 @@ class RobotConnection:
     """
 
     def __init__(
-        self, settings: RobotSettings, host: RobotHost, media: MediaSink, dial_in: DialIn | None = None
+        self,
+        settings: RobotSettings,
+        host: RobotHost,
+        media: MediaSink,
+        faults: Faults,
+        dial_in: DialIn | None = None,
     ) -> None:
         """`dial_in`: where the robot connects to this console; None: the console connects to it."""
         self.epoch = ""
@@ -95,6 +92,7 @@ class RobotConnection:
         self.detail = "not connected yet"
         self._host = host
         self._media = media
+        self._faults = faults
         self._epochs: dict[LinkRole, str] = {}  # of each link, open now or last
         access = link_access(settings)
         # A robot that dials in paces its tries itself, and is taken as soon as it comes.
@@ -178,7 +176,7 @@ class RobotConnection:
             self._host.link_down(detail)
 
     def link_failed(self, role: LinkRole, error: Exception) -> None:
-        self._host.link_failed(role, error)
+        self._faults.caught(f"robot link {role}", error)
 
     def link_received(self, role: LinkRole, message: LinkMessage) -> None:
         if self._epochs.get(role) != self.epoch:
@@ -187,15 +185,5 @@ class RobotConnection:
             self._media.feed(message, time.monotonic())
         elif isinstance(message, Feedback):
             self._host.feedback_received(message)
-        elif isinstance(message, Refusal):
-            self._host.refusal_received(message)
-        elif isinstance(message, StopTaken):
-            self._host.stop_taken(message)
-        elif isinstance(message, ActionUpdate):
-            self._host.action_updated(message)
-        elif isinstance(message, Status):
-            self._host.status_received(message)
-        elif isinstance(message, Navigation):
-            self._host.navigation_received(message)
-        elif isinstance(message, OccupancyMap):
-            self._host.map_received(message)
+        else:
+            self._host.link_message_received(message)

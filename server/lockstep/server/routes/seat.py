@@ -33,9 +33,9 @@ async def seat(request: Request, caller: Caller) -> Response:
 @router.post("/api/seat/take_over")
 async def take_over(request: Request, caller: Caller) -> Response:
     """An operator or a supervisor; the body is not read: the press of a person waits for nothing."""
-    keeper = dependencies(request).console.seat
-    keeper.take_with(caller.token_id, caller.actor)
-    return json_answer(keeper.message())
+    console = dependencies(request).console
+    console.seat_by_link.take(caller.token_id, caller.actor)
+    return json_answer(console.seat.message())
 
 
 @router.post("/api/seat/offer")
@@ -45,12 +45,12 @@ async def offer(request: Request, caller: Caller) -> Response:
     caller = await authorized(request)
     console = dependencies(request).console
     if not wanted.offered:
-        console.seat.withdraw_with(caller.actor)
+        console.seat_by_link.withdraw(caller.actor)
         return json_answer(console.seat.message())
     match console.why_no_offer():
         case "link_down":
             raise LinkDown(console.robot.detail)
         case "stopped":
             raise NotAllowed("the robot is stopped")
-    console.seat.offer_with(caller.token_id, caller.actor, policy=wanted.peer)
+    console.seat_by_link.offer(caller.token_id, caller.actor, policy=wanted.peer)
     return json_answer(console.seat.message())

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import structlog
 
+from lockstep.server.stop.broadcast import Broadcast
 from lockstep.server.stop.stop_presses import Press, StopPresses
 from lockstep.server.stop.stop_store import KeptStops, kept_stops_place
 from lockstep.server.util.uncancelled import in_thread
@@ -42,7 +43,7 @@ class StopKeeper:
         self._wanted: dict[str, Press] = {}  # presses that belong on the disk
         self._written: set[str] = set()
         self._wake = asyncio.Event()
-        self._news = asyncio.Event()  # something was written, or could not be; replaced each time
+        self._news = Broadcast()  # something was written, or could not be
 
     async def load(self) -> None:
         """Make the presses that an earlier run has kept pending again."""
@@ -137,7 +138,6 @@ class StopKeeper:
 
     def _tell(self, trouble: str) -> None:
         changed, self.trouble = trouble != self.trouble, trouble
-        self._news.set()
-        self._news = asyncio.Event()
+        self._news.send()
         if changed and trouble:
             log.error("stops cannot be kept on disk", error="stops_unwritable", detail=trouble)

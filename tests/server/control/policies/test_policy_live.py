@@ -59,7 +59,7 @@ async def _policy_drives(rig: Rig, person: TestPeer, policy: TestPeer) -> None:
     await policy.feedback()
     await policy.drive([0.0, 0.0, 0.0])
     await policy.drive([0.2, 0.0, 0.0])
-    assert rig.dependencies.console.seat.rules.policy_drives
+    assert rig.dependencies.console.seat.state.policy_drives
 
 
 async def test_a_policy_drives_in_a_seat_that_a_person_offers_and_loses_it_to_one_press() -> None:
@@ -119,7 +119,7 @@ async def test_a_page_that_only_looks_for_a_free_seat_does_not_take_it_from_a_po
         await _policy_drives(rig, person, policy)
         another.send("session", SeatRequest(only_if_free=True))
         await _refused(another, "seat_taken")
-        assert rig.dependencies.console.seat.rules.policy_drives
+        assert rig.dependencies.console.seat.state.policy_drives
 
 
 async def test_a_policy_may_stop_the_robot_which_ends_its_turn_and_may_not_reset_it() -> None:
@@ -157,7 +157,7 @@ async def test_no_policy_is_let_drive_while_the_robot_is_stopped() -> None:
         await _refused(person, "stopped")
         policy.send("session", SeatRequest(only_if_free=True))
         await _refused(policy, "not_allowed")
-        assert rig.dependencies.console.seat.rules.offer is None
+        assert rig.dependencies.console.seat.state.offer is None
 
 
 async def test_what_a_policy_may_not_do() -> None:
@@ -175,7 +175,7 @@ async def test_what_a_policy_may_not_do() -> None:
             policy.heard.clear()
             policy.send("session", message)
             await _refused(policy, "not_allowed")
-        assert rig.dependencies.console.seat.rules.policy_drives
+        assert rig.dependencies.console.seat.state.policy_drives
         headers = rig.token("policy")
         for path, body in (
             ("/api/actions/home", {}),
@@ -198,7 +198,7 @@ async def test_the_turn_of_a_policy_ends_when_the_person_who_let_it_drive_has_go
     async with running_rig(**PATIENT) as rig, rig.peer("operator") as another, rig.peer("policy") as policy:
         async with rig.peer("operator") as person:
             await _policy_drives(rig, person, policy)
-        await eventually(lambda: rig.dependencies.console.seat.rules.holder == "")
+        await eventually(lambda: rig.dependencies.console.seat.state.holder == "")
         await _seat(another, holder="", why="nobody attends", offered=False)
 
 
@@ -209,7 +209,7 @@ async def test_the_turn_of_a_policy_ends_when_that_person_is_silent() -> None:
         policy.send("session", SeatRequest(only_if_free=True))
         await _seat(policy, holder=await _id(policy))
         seen = await policy.feedback()
-        while rig.dependencies.console.seat.rules.policy_drives:  # its own heartbeat does not stand in for the person's
+        while rig.dependencies.console.seat.state.policy_drives:  # its own heartbeat does not stand in for the person's
             policy.send("control", Ping(id=seen.issue))
             before = seen
             seen = await policy.feedback(lambda each, before=before: each.issue > before.issue)  # type: ignore[misc]
@@ -307,7 +307,7 @@ async def test_over_http_a_person_takes_over_and_gives_back() -> None:
             for path, body in (("take_over", {}), ("offer", {}), ("offer", {"offered": False})):
                 answer = await rig.http.post(f"/api/seat/{path}", headers=stranger, json=body)
                 assert (answer.status_code, answer.json()["error"]) == (403, "not_allowed")
-        assert rig.dependencies.console.seat.rules.policy_drives
+        assert rig.dependencies.console.seat.state.policy_drives
         taken = (await rig.http.post("/api/seat/take_over", headers=person.headers)).json()
         assert (taken["holder"], taken["why"], taken["kind"]) == (await _id(person), "taken", "human")
         absent = rig.token("operator")

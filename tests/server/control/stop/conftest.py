@@ -12,7 +12,7 @@ from tests.server.control.stop.stop_bench import StopBench
 @pytest.fixture
 async def bench(tmp_path: Path) -> AsyncIterator[StopBench]:
     made = StopBench(tmp_path)
-    parts = (made.keeper.run, made.service.run, made.service.watch_disk, made.resets.run)
+    parts = (made.keeper.run, made.service.run, made.disk.run, made.resets.run)
     tasks = [asyncio.create_task(part()) for part in parts]
     yield made
     for task in tasks:

@@ -19,6 +19,7 @@ from lockstep.server.control.session_audit import SessionAudit
 from lockstep.server.control.stop.reset_service import ResetService
 from lockstep.server.control.stop.stop_service import StopService
 from lockstep.server.control.stop.stop_silence import StopSilence
+from lockstep.server.control.stop.stops_disk import StopsDisk
 from lockstep.server.errors import (
     ConsoleError,
 )
@@ -114,6 +115,7 @@ class StopBench:
             self.silence,
             events,
         )
+        self.disk = StopsDisk(self.keeper, events)
         self.resets = ResetService(self.robot, self.service, peers, self.clock, self, events)
 
     def press(self, who: str, id_: str, where: str = "stop") -> Press:

@@ -217,7 +217,7 @@ async def test_who_starts_and_ends_a_recording_is_audited_and_an_automatic_one_e
         assert (refused.status_code, refused.json()["error"]) == (403, "not_allowed")
         assert recorder.state().state == "recording"
         peer.send("session", SeatRequest())
-        await eventually(lambda: bool(rig.dependencies.console.seat.rules.holder))
+        await eventually(lambda: bool(rig.dependencies.console.seat.state.holder))
         assert (await rig.http.post("/api/recordings/stop", headers=rig.token("operator"))).status_code == 403
         assert (await rig.http.post("/api/recordings/stop", headers=peer.headers)).json()["state"] == "off"
         started = (await rig.http.post("/api/recordings", headers=rig.token("operator"))).json()["recording"]

@@ -24,11 +24,11 @@ from lockstep.protocol.console import Shadow, ShadowJudgement
 from lockstep.protocol.description import Axis, RobotDescription
 from lockstep.protocol.messages import Command, Feedback, RefusalReason
 from lockstep.protocol.serial import event_after, is_newer
+from lockstep.server.control.known_issues import KnownIssues
 
 __all__ = ["MAX_SHADOWS", "JudgedShadow", "ShadowJudge"]
 
 MAX_SHADOWS = 8  # peers at once whose shadows are kept
-KNOWN_ISSUES = 64  # of the current event, as the arbiter knows
 
 
 class JudgedShadow(NamedTuple):
@@ -47,7 +47,7 @@ class ShadowJudge:
     def __init__(self) -> None:
         self._description: RobotDescription | None = None
         self._feedback: Feedback | None = None
-        self._nonces: dict[int, int] = {}  # issue of the current event -> its nonce, oldest first
+        self._issues = KnownIssues()
         self._waiting: dict[str, tuple[Shadow, ShadowJudgement]] = {}  # newest of each peer, for the next event
         self._judged: dict[str, int] = {}  # peer -> the newest event for which a shadow of it was judged
 
@@ -57,7 +57,7 @@ class ShadowJudge:
     def epoch_ends(self) -> None:
         """Forget this epoch: its event references mean nothing in the next."""
         self._feedback = None
-        self._nonces.clear()
+        self._issues.clear()
         self._waiting.clear()
         self._judged.clear()
 
@@ -90,11 +90,7 @@ class ShadowJudge:
     def feedback(self, feedback: Feedback, executed: Command | None) -> list[JudgedShadow]:
         """Take a feedback, and the command that became its event; return what is judged by it."""
         before, self._feedback = self._feedback, feedback
-        if before is None or before.event != feedback.event:
-            self._nonces.clear()
-        self._nonces[feedback.issue] = feedback.nonce
-        if len(self._nonces) > KNOWN_ISSUES:
-            del self._nonces[next(iter(self._nonces))]
+        self._issues.add(feedback)
         if before is None or before.event == feedback.event:
             return []
         waiting, self._waiting = self._waiting, {}
@@ -106,7 +102,7 @@ class ShadowJudge:
         ]
 
     def _judgement(self, shadow: Shadow, description: RobotDescription) -> ShadowJudgement:
-        nonce, axes = self._nonces.get(shadow.issue), description.axes
+        nonce, axes = self._issues.nonce(shadow.issue), description.axes
         if nonce is None:
             return "late"
         if nonce != shadow.nonce:

@@ -21,11 +21,12 @@ from lockstep.server.session_events import (
     StopAnswered,
     StopAsked,
     StopRepeated,
-    StopsDiskChanged,
     StopSent,
     StopSilenced,
     StopUndelivered,
 )
+from lockstep.server.stop.broadcast import Broadcast
+from lockstep.server.stop.press_deadlines import PressDeadlines
 from lockstep.server.stop.press_listeners import PressListeners
 from lockstep.server.stop.stop_keeper import StopKeeper
 from lockstep.server.stop.stop_presses import AlreadyTaken, Held, NewPress, Press, Settled, told_id
@@ -85,7 +86,7 @@ class StopAnswer(NamedTuple):
 
 
 class StopService:
-    """Handles the stops of one robot. Run `run` and `watch_disk` as tasks.
+    """Handles the stops of one robot. Run `run` as a task.
 
     Everything else but `outcome` is called on the loop and returns at once.
     """
@@ -110,15 +111,13 @@ class StopService:
         self._link_repeats = RateLimits(PRESS_RATE, PRESSES)
         self._logged = RateLimits(LINE_RATE, LINES)
         self._listeners = PressListeners()
-        self._late = {press.id for press in self._presses.pending}  # "not delivered yet" is in the audit
-        self._deadlines: dict[str, float] = {}  # press -> end of the wait for its answer
+        self._deadlines = PressDeadlines(press.id for press in self._presses.pending)  # late: published as undelivered
         self._newest: Settled | None = None  # newest stop of this epoch that was sent from here
         self._sent_at = 0.0  # last time that all pending presses were sent
         self._wake = asyncio.Event()
-        if self._late:
+        if self._presses.pending:
             self._wake.set()  # another console may have the link for commands: then nothing else sends these
-        self._news = asyncio.Event()  # replaced at every answer
-        self._disk_trouble = keeper.trouble  # as it was published last
+        self._news = Broadcast()  # of answers, and of presses that are late
 
     @property
     def unconfirmed(self) -> bool:
@@ -136,13 +135,13 @@ class StopService:
         Raises:
             Silenced: a supervisor has silenced the stops of this link.
         """
-        press = msgspec.structs.replace(press, by=self._named(press.by))
+        press = msgspec.structs.replace(press, by=_named(press.by, self._peers))
         by, where = press.by, press.where
         self._events.publish(StopAsked(by, where))
         if self._silence.holds(by.link):
             self._events.publish(StopSilenced(by))
             raise Silenced(SILENCED)
-        if (taken := self._presses.outcome(press.id)) is not None and self._is_released(taken):
+        if (taken := self._presses.outcome(press.id)) is not None and _is_released(self._clock.stop, taken):
             self._presses.forget(press.id)  # the robot may move: it decides whether this is a repeat or a new stop
         rate = self._link_repeats if self._presses.knows(press.id) else self._link_presses
         too_fast = bool(by.link) and not rate.spend(by.link, time.monotonic())
@@ -161,23 +160,18 @@ class StopService:
             case _:
                 self._events.publish(StopRepeated(by, where))
 
-    def _named(self, by: Actor) -> Actor:
-        """Return `by` with its name here, if only one person has the link: a request over HTTP carries no name."""
-        if by.peer or not by.link:
-            return by
-        names = {peer.name for peer in self._peers if peer.identity.token_id == by.link}
-        return by._replace(name=names.pop()) if len(names) == 1 else by
-
     def _await(self, press: Press, replaced: Press | None) -> None:
         """Set a deadline for its answer, after which the press counts as undelivered: silence is not delivery."""
         now = time.monotonic()
-        self._deadlines[press.id] = now + CONFIRM_SECONDS
+        self._deadlines.begin(press.id, now + CONFIRM_SECONDS)
         if len(self._presses.pending) == 1:
             self._sent_at = now
         self._wake.set()
         if replaced is not None:
             self._keeper.settled(replaced.id)
-            self._forget_settled()
+            # Some presses are no longer pending: there are so many that some share an outcome.
+            self._deadlines.keep(self._presses.is_pending)
+            self._listeners.keep(self._presses.is_pending)
 
     def _send_new(self, press: Press) -> None:
         sent = self._robot.send_stop(press.message())
@@ -187,41 +181,27 @@ class StopService:
         if not sent:
             self._not_delivered(press)
 
-    def _forget_settled(self) -> None:
-        """Forget presses that are no longer pending: there are so many that some share an outcome."""
-        pending = self._presses.is_pending
-        self._late = {press for press in self._late if pending(press)}
-        self._deadlines = {press: until for press, until in self._deadlines.items() if pending(press)}
-        self._listeners.keep(pending)
-
     def _not_delivered(self, press: Press) -> None:
         self._keeper.keep(press)
-        self._deadlines.pop(press.id, None)
-        if press.id not in self._late:
-            self._late.add(press.id)
+        if self._deadlines.miss(press.id):
             self._events.publish(StopUndelivered(press))
 
     async def outcome(self, press: str) -> StopOutcome:
         """Return the outcome of a press. Waits a second for the bridge, and for the disk if the robot is away."""
         try:
             async with asyncio.timeout(CONFIRM_SECONDS):
-                while (taken := self._presses.outcome(press)) is None and self._robot_may_answer(press):
+                while (taken := self._presses.outcome(press)) is None:
+                    if not self._robot.up and self._deadlines.is_late(press):
+                        break  # the robot cannot answer
                     await self._news.wait()
         except TimeoutError:
             taken = None
         if taken is not None:
-            return StopOutcome(press, taken, released=self._is_released(taken))
+            return StopOutcome(press, taken, released=_is_released(self._clock.stop, taken))
         self._keeper.keep(*(each for each in self._presses.pending if each.id == press))
         kept = await self._keeper.kept_words(press)
         why = "the robot has not confirmed the stop" if self._robot.up else "the robot cannot be reached now"
         return StopOutcome(press, self._presses.outcome(press), f"{why}; {kept}")
-
-    def _is_released(self, taken: StopTaken) -> bool:
-        held = self._clock.stop
-        return not held.stopped and held.number >= taken.number
-
-    def _robot_may_answer(self, press: str) -> bool:
-        return self._robot.up or press not in self._late
 
     def _answer(self, press: str, taken: StopTaken) -> None:
         """Tell those who wait for it of the robot's answer, by the id that each knows."""
@@ -244,7 +224,7 @@ class StopService:
         for press in self._presses.pending:
             if not self._robot.send_stop(press.message()):
                 self._not_delivered(press)
-        self._spread()
+        self._news.send()
 
     def epoch_ends(self, held: StopState) -> None:
         """Tell the next bridge of a stop that held at the last one, in case it does not remember.
@@ -252,17 +232,17 @@ class StopService:
         Also of a stop that the last bridge took, and that no feedback has shown.
         """
         newest, self._newest = self._newest, None
+        told = []
         if held.stopped and held.press:
             by = Actor(held.by)
-            self._say_again(Press(id=held.press, by=by, where="epoch", reason=held.reason, time=time.time()))
+            told.append(Press(id=held.press, by=by, where="epoch", reason=held.reason, time=time.time()))
         if newest is not None and newest.taken.number > held.number:
-            self._say_again(newest.press)
-
-    def _say_again(self, press: Press) -> None:
-        if self._presses.again(press):
-            self._late.add(press.id)
-            self._keeper.keep(press)
-            self._wake.set()
+            told.append(newest.press)
+        for press in told:
+            if self._presses.again(press):
+                self._deadlines.miss(press.id)
+                self._keeper.keep(press)
+                self._wake.set()
 
     def taken(self, taken: StopTaken) -> None:
         """Take the bridge's answer to a stop."""
@@ -271,12 +251,10 @@ class StopService:
             self._newest = settled[0]
         for press, answer in settled:
             self._keeper.settled(press.id)
-            self._deadlines.pop(press.id, None)
-            late = press.id in self._late
-            self._late.discard(press.id)
-            self._events.publish(StopAnswered(press, answer, again=late, released=self._is_released(answer)))
+            late, released = self._deadlines.end(press.id), _is_released(self._clock.stop, answer)
+            self._events.publish(StopAnswered(press, answer, again=late, released=released))
             self._answer(press.id, answer)
-        self._spread()
+        self._news.send()
 
     # background
 
@@ -293,21 +271,23 @@ class StopService:
         """Act on missing answers. True if anything is left to wait for."""
         for press in self._presses.take_held():
             self._send_new(press)
-        late = [press for press in self._presses.pending if now >= self._deadlines.get(press.id, now + 1)]
+        late = self._deadlines.overdue(self._presses.pending, now)
         for press in late:
             self._not_delivered(press)
         if late:
-            self._spread()
+            self._news.send()
         if now - self._sent_at >= AGAIN_SECONDS and self._presses.pending:
             self.link_up()
         return bool(self._presses.pending)
 
-    async def watch_disk(self) -> None:
-        """Publish whether stops can be kept on disk, whenever that changes, until cancelled."""
-        while True:
-            self._disk_trouble = await self._keeper.trouble_other_than(self._disk_trouble)
-            self._events.publish(StopsDiskChanged(self._disk_trouble))
 
-    def _spread(self) -> None:
-        self._news.set()
-        self._news = asyncio.Event()
+def _named(by: Actor, peers: PeerRegistry) -> Actor:
+    """Return `by` with its name here, if only one person has the link: a request over HTTP carries no name."""
+    if by.peer or not by.link:
+        return by
+    names = {peer.name for peer in peers if peer.identity.token_id == by.link}
+    return by._replace(name=names.pop()) if len(names) == 1 else by
+
+
+def _is_released(held: StopState, taken: StopTaken) -> bool:
+    return not held.stopped and held.number >= taken.number

@@ -19,7 +19,7 @@ from lockstep.protocol.console import (
 )
 from lockstep.protocol.messages import Command, Feedback, Refusal, Reset
 from lockstep.protocol.serial import event_after
-from lockstep.server.control.seat_keeper import LINK_CLAIMS
+from lockstep.server.control.seat.seat_keeper import LINK_CLAIMS
 from tests.server.rig import TestPeer, eventually, running_rig
 
 
@@ -89,7 +89,7 @@ async def test_who_drives_is_not_idle() -> None:
         while loop.time() - begun < 2.2:
             await driver.drive([moving] + [0.0] * (len(driver.newest_feedback().axes) - 1))
             moving = 0.1
-        assert rig.dependencies.console.seat.rules.holder == await _id(driver)
+        assert rig.dependencies.console.seat.state.holder == await _id(driver)
 
 
 async def test_a_moving_command_of_a_new_driver_is_refused_until_a_neutral_one_came() -> None:

@@ -11,7 +11,11 @@ from lockstep.protocol.description import Axis, RobotDescription
 from lockstep.protocol.messages import Command, Feedback, Rest
 from lockstep.protocol.serial import event_after
 from lockstep.server.control.command_arbiter import CommandArbiter, Forward, ForwardRest
-from lockstep.server.control.seat import MAX_CLAIMS, ControlSeat, SeatInput, SeatOutcome, SeatTimes
+from lockstep.server.control.seat.claims import MAX_CLAIMS
+from lockstep.server.control.seat.control_seat import ControlSeat
+from lockstep.server.control.seat.seat_rules import SeatRules
+from lockstep.server.control.seat.seat_table import SeatInput, SeatOutcome
+from lockstep.server.control.seat.seat_times import SeatTimes
 from lockstep.server.event_clock import EventClock
 
 TIMES = SeatTimes(heartbeat=3.0, idle=5.0, claim=6.0)
@@ -31,6 +35,7 @@ class SeatMachine(RuleBasedStateMachine):
         self.now = 0.0
         self.clock = EventClock()
         self.seat = ControlSeat(TIMES)
+        self.seat_rules = SeatRules(self.seat)
         self.arbiter = CommandArbiter(self.clock, self.seat)
         self.clock.begin("epoch")
         self.arbiter.link_up(ROBOT)
@@ -65,7 +70,7 @@ class SeatMachine(RuleBasedStateMachine):
     @rule(peer=peers, only_if_free=st.booleans())
     def request(self, peer: str, only_if_free: bool) -> None:
         before = self.seat.holder
-        self.act(self.seat.request(peer, PEERS[peer], self.now, only_if_free=only_if_free))  # type: ignore[arg-type]
+        self.act(self.seat_rules.request(peer, PEERS[peer], self.now, only_if_free=only_if_free))  # type: ignore[arg-type]
         if before in POLICIES and peer in PEOPLE and not only_if_free:
             assert self.seat.holder == peer, "a person's one press takes the robot from a policy"
         else:
@@ -77,7 +82,7 @@ class SeatMachine(RuleBasedStateMachine):
     @rule(peer=peers)
     def take(self, peer: str) -> None:
         before = self.seat.holder
-        self.act(self.seat.take(peer, PEERS[peer], self.now))  # type: ignore[arg-type]
+        self.act(self.seat_rules.take(peer, PEERS[peer], self.now))  # type: ignore[arg-type]
         if PEERS[peer] == "supervisor" or (PEERS[peer] == "operator" and before in ("", peer, *POLICIES)):
             assert self.seat.holder == peer
             self.moved_at = self.now
@@ -87,8 +92,8 @@ class SeatMachine(RuleBasedStateMachine):
 
     @rule(peer=peers, to=st.sampled_from(["", "p", "q"]))
     def offer(self, peer: str, to: str) -> None:
-        before, claims = self.seat.holder, self.seat.claims(self.now)
-        outcome = self.seat.offer_to_policies(peer, PEERS[peer], f"link of {peer}", self.now, to=to)  # type: ignore[arg-type]
+        before, claims = self.seat.holder, self.seat.claims.seconds_left(self.now)
+        outcome = self.seat_rules.offer_to_policies(peer, PEERS[peer], f"link of {peer}", self.now, to=to)  # type: ignore[arg-type]
         self.act(outcome)
         self.watched(before)
         if peer in PEOPLE and before in ("", peer, *POLICIES) and not claims:
@@ -102,21 +107,21 @@ class SeatMachine(RuleBasedStateMachine):
     @rule(peer=peers)
     def withdraw(self, peer: str) -> None:
         before = self.seat.holder
-        self.act(self.seat.withdraw_offer(peer, PEERS[peer], self.now))  # type: ignore[arg-type]
+        self.act(self.seat_rules.withdraw_offer(peer, PEERS[peer], self.now))  # type: ignore[arg-type]
         self.watched(before)
         self.offer_is_over(before, ends=peer in PEOPLE)
 
     @rule(what=st.sampled_from([SeatInput.STOPPED, SeatInput.LINK_LOST]))
     def end_offer(self, what: SeatInput) -> None:
         before = self.seat.holder
-        self.act(self.seat.end_offer(what, self.now))
+        self.act(self.seat_rules.end_offer(what, self.now))
         self.watched(before)
         self.offer_is_over(before, ends=True)
 
     @rule(peer=st.sampled_from(PEOPLE))
     def person_leaves(self, peer: str) -> None:
         before, offer = self.seat.holder, self.seat.offer
-        self.act(self.seat.person_left(f"link of {peer}", self.now))
+        self.act(self.seat_rules.person_left(f"link of {peer}", self.now))
         self.watched(before)
         self.offer_is_over(before, ends=offer is not None and offer.by == peer)
 
@@ -136,8 +141,8 @@ class SeatMachine(RuleBasedStateMachine):
 
     @rule(peer=peers, claimant=peers, grant=st.booleans())
     def answer_claim(self, peer: str, claimant: str, grant: bool) -> None:
-        before, claims = self.seat.holder, self.seat.claims(self.now)
-        self.act(self.seat.answer(peer, claimant, self.now, grant=grant))
+        before, claims = self.seat.holder, self.seat.claims.seconds_left(self.now)
+        self.act(self.seat_rules.answer(peer, claimant, self.now, grant=grant))
         if self.seat.holder != before:
             assert (peer, grant) == (before, True)
             assert claimant in claims
@@ -145,10 +150,10 @@ class SeatMachine(RuleBasedStateMachine):
 
     @rule(peer=peers, gone=st.booleans())
     def leave(self, peer: str, gone: bool) -> None:
-        before, claims = self.seat.holder, list(self.seat.claims(self.now))
-        self.act(self.seat.gone(peer, self.now) if gone else self.seat.release(peer, self.now))
+        before, claims = self.seat.holder, list(self.seat.claims.seconds_left(self.now))
+        self.act(self.seat_rules.gone(peer, self.now) if gone else self.seat_rules.release(peer, self.now))
         assert not self.seat.holds(peer)
-        assert peer not in self.seat.claims(self.now)
+        assert peer not in self.seat.claims.seconds_left(self.now)
         if before == peer:
             assert self.seat.holder == (claims[0] if claims else "")
         self.watched(before)
@@ -159,9 +164,9 @@ class SeatMachine(RuleBasedStateMachine):
         if alive:
             self.hear(self.seat.holder)
             for person in PEOPLE:
-                self.seat.attended(f"link of {person}", self.now)
+                self.seat_rules.attended(f"link of {person}", self.now)
         before = self.seat.holder
-        for outcome in self.seat.expire(self.now):
+        for outcome in self.seat_rules.expire(self.now):
             self.act(outcome)
         if before and self.seat.holder != before:
             overdue = self.now - self.heard[before] >= TIMES.heartbeat or self.now - self.moved_at >= TIMES.idle
@@ -170,7 +175,7 @@ class SeatMachine(RuleBasedStateMachine):
 
     @rule(peer=peers)
     def hear(self, peer: str) -> None:
-        self.seat.heard(peer, self.now)
+        self.seat_rules.heard(peer, self.now)
         self.heard[peer] = self.now
 
     @rule(peer=peers, value=st.sampled_from([0.0, 0.5]), answered=st.booleans())
@@ -184,7 +189,7 @@ class SeatMachine(RuleBasedStateMachine):
             if value:
                 own = [message for sender, message in self.since_rest_of_hand_over() if sender == peer]
                 assert any(isinstance(each, Command) and each.values == [0.0] for each in own)
-                self.act(self.seat.moved(peer, self.now))
+                self.act(self.seat_rules.moved(peer, self.now))
                 self.moved_at = self.now
             self.sent.append((peer, outcome.command))
             if answered:
@@ -216,7 +221,7 @@ class SeatMachine(RuleBasedStateMachine):
     def a_policy_drives_only_while_a_person_lets_it(self) -> None:
         if not hasattr(self, "seat"):
             return
-        assert not set(self.seat.claims(self.now)) & set(POLICIES), "a policy waits for no seat"
+        assert not set(self.seat.claims.seconds_left(self.now)) & set(POLICIES), "a policy waits for no seat"
         if self.seat.holder in POLICIES:
             assert self.seat.policy_drives
             assert self.seat.offer is not None
@@ -230,8 +235,8 @@ class SeatMachine(RuleBasedStateMachine):
         """Neither by the silent nor by the idle, and nobody waits for a free one."""
         if not hasattr(self, "seat"):
             return
-        assert len(self.seat.claims(self.now)) <= MAX_CLAIMS
-        assert self.seat.holder or not self.seat.claims(self.now)
+        assert len(self.seat.claims.seconds_left(self.now)) <= MAX_CLAIMS
+        assert self.seat.holder or not self.seat.claims.seconds_left(self.now)
         if self.seat.holder:
             assert self.now - self.heard[self.seat.holder] < TIMES.heartbeat + 1e-6
             assert self.now - self.moved_at < TIMES.idle + 1e-6
@@ -240,14 +245,14 @@ class SeatMachine(RuleBasedStateMachine):
         """If nobody says anything from now on it is free within bounded time, whoever waits for it."""
         if not hasattr(self, "seat"):
             return
-        claims = len(self.seat.claims(self.now))
+        claims = len(self.seat.claims.seconds_left(self.now))
         for _ in range(claims + 1):
             self.now += TIMES.heartbeat + 1e-6
-            list(self.seat.expire(self.now))
+            list(self.seat_rules.expire(self.now))
         assert self.seat.holder == ""
-        assert not self.seat.claims(self.now)
+        assert not self.seat.claims.seconds_left(self.now)
         self.now += TIMES.claim
-        list(self.seat.expire(self.now))
+        list(self.seat_rules.expire(self.now))
         assert self.seat.offer is None
 
 

@@ -1,0 +1,1 @@
+"""The control seat: who drives, who asks for it, and who may let a policy drive."""
