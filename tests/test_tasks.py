@@ -33,20 +33,6 @@ NOT_YET = {
     "server/lockstep/server/routes/scene_proxy.py": 3,
     "server/lockstep/server/sfu/janus_engine.py": 1,
     "server/lockstep/server/sfu/janus_session.py": 2,
-    "bench/lockstep/bench/browsers/console_page.py": 1,
-    "bench/lockstep/bench/experiment/browser_stick.py": 1,
-    "bench/lockstep/bench/experiment/endurance/endurance_run.py": 2,
-    "bench/lockstep/bench/experiment/judge/outage.py": 1,
-    "bench/lockstep/bench/harness/processes.py": 2,
-    "bench/lockstep/bench/harness/tcp_path.py": 1,
-    "bench/lockstep/bench/hostile/crowd.py": 1,
-    "bench/lockstep/bench/interoperability/visitor.py": 1,
-    "bench/lockstep/bench/relay/packets.py": 1,
-    "bench/lockstep/bench/soak/crowd.py": 1,
-    "bench/lockstep/emulator/cli.py": 3,
-    "bench/lockstep/emulator/transport/delayed.py": 1,
-    "bench/lockstep/emulator/transport/tcp_forwarder.py": 1,
-    "bench/lockstep/emulator/transport/websocket_proxy.py": 2,
 }
 
 

@@ -3,7 +3,8 @@
 import pytest
 from playwright.async_api import Browser
 
-from lockstep.bench.browsers.console_page import FORWARD, LEFT_Y, RB, START, ConsolePage, open_console
+from lockstep.bench.browsers.console_page import ConsolePage, open_console
+from lockstep.bench.browsers.pad import FORWARD, LEFT_Y, RB, START
 from tests.support.stack import Stack
 
 pytestmark = pytest.mark.browser
@@ -55,7 +56,7 @@ async def test_driving_moves_the_robot_and_nothing_outside_the_tolerance_is_rend
         # Sound that piled up while the sound device opened must not keep it behind the events for long.
         await console.until("s.streams.microphone.rendered > 60 && s.streams.overview.rendered > 30")
         _no_violation(await console.stats())
-        await console.press(RB, False)
+        await console.pad.press(RB, False)
         await console.until("!s.driving && s.at_rest === true")
     executed = [record["event"] for record in await stack.events("executed")]
     assert len(executed) >= 60
@@ -116,7 +117,7 @@ async def test_blur_disarms_and_the_robot_comes_to_rest(stack: Stack, chromium: 
         # The stick is still tilted and the deadman still held: that must not arm it again.
         event = (await console.stats())["event"]
         await console.page.evaluate("window.dispatchEvent(new Event('focus'))")
-        await console.press(START)
+        await console.pad.press(START)
         await console.until("s.streams.overview.rendered > 0")
         assert not (await console.stats())["armed"]
         assert (await console.stats())["event"] <= event + 1
@@ -156,4 +157,4 @@ async def test_contact_is_felt_as_rumble(own_stack: Stack, chromium: Browser) ->
         await console.until_live()
         async with console.driving(FORWARD):
             await console.until("window.testPad.rumbles.length > 0")
-        await console.tilt(LEFT_Y, 0)
+        await console.pad.tilt(LEFT_Y, 0)

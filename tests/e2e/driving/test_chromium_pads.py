@@ -7,7 +7,8 @@ from typing import Any
 import pytest
 from playwright.async_api import Browser, expect
 
-from lockstep.bench.browsers.console_page import FORWARD, LEFT_Y, RB, START, ConsolePage, open_console
+from lockstep.bench.browsers.console_page import ConsolePage, open_console
+from lockstep.bench.browsers.pad import FORWARD, LEFT_Y, RB, START
 from tests.support.stack import Stack
 
 pytestmark = pytest.mark.browser
@@ -156,15 +157,15 @@ async def test_another_pad_cannot_take_over_but_can_stop(stack: Stack, chromium:
         await console.until_live()
         other = await _plug(console, id="Other pad")
         await console.arm()
-        await other.tilt(LEFT_Y, -1)
+        await other.pad.tilt(LEFT_Y, -1)
         await other.hold(RB, True)
-        await other.press(START)
+        await other.pad.press(START)
         await other.seen()
         statistics = await console.stats()
         assert (statistics["armed"], statistics["driving"], statistics["at_rest"]) == (True, False, True)
         assert statistics["pad"]["id"].startswith("Test pad")
         await console.drive_forward()
-        await other.press(1)
+        await other.pad.press(1)
         await console.until("s.stop.stopped && !s.armed && s.at_rest === true")
 
 
@@ -188,17 +189,17 @@ async def test_a_pulled_pad_disarms_and_the_next_one_has_to_arm_anew(stack: Stac
     async with open_console(chromium, stack.operator) as console:
         await console.until_live()
         other = await _plug(console, id="Other pad")
-        await other.tilt(LEFT_Y, -1)
+        await other.pad.tilt(LEFT_Y, -1)
         await other.hold(RB, True)
         await console.arm()
         await console.drive_forward()
         await console.page.evaluate("testPad.unplug(0)")
         await console.until("!s.armed && s.at_rest === true && s.pad.id === 'Other pad'")
-        await other.press(START)
+        await other.pad.press(START)
         assert not (await console.stats())["armed"]
         await other.hold(RB, False)
         await other.seen()
-        await other.press(START)
+        await other.pad.press(START)
         await console.until("s.armed && !s.driving")
 
 
@@ -219,9 +220,9 @@ async def test_turbo_drives_as_fast_as_the_limits_allow_and_the_settings_move_to
         async with console.driving(FORWARD):
             event = (await console.stats())["event"]
             await console.until(f"s.event > {event + 8}", 40)
-            await console.press(10)
+            await console.pad.press(10)
             await console.until(f"s.event > {event + 22}", 40)
-        await console.press(RB, False)
+        await console.pad.press(RB, False)
         await console.until("s.at_rest === true")
     fastest = [max(map(abs, record["values"])) for record in await stack.events("executed") if any(record["values"])]
     assert fastest[0] == pytest.approx(0.4)
