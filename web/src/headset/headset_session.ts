@@ -70,7 +70,7 @@ export class HeadsetSession implements HeadsetControls {
     private readonly handSettings: () => HandSettings,
   ) {
     this.view = new HeadsetView(mode === "immersive-vr");
-    this.battery = new Battery(() => page.engine.disarm("battery_low"));
+    this.battery = new Battery(() => page.engine.driving.disarm("battery_low"));
   }
 
   /** Shows the page in `session` until it ends. Rejects, with the session ended, where the browser cannot draw it. */
@@ -128,7 +128,7 @@ export class HeadsetSession implements HeadsetControls {
       return;
     }
     const { engine } = this.page;
-    if (engine.isArmed()) engine.disarm("headset_silent");
+    if (engine.driving.isArmed()) engine.driving.disarm("headset_silent");
     engine.display.frame(now);
     this.silentSinceMs ??= now;
     // A fault in what draws it: no frame follows, and what is shown there would stand.
@@ -165,7 +165,7 @@ export class HeadsetSession implements HeadsetControls {
     const { engine } = this.page;
     const { session, renderer } = this;
     renderer.xr.setFoveation(0); // what is at the edge of the view is text
-    engine.disarm("operator"); // who puts a headset on arms anew, in it
+    engine.driving.disarm("operator"); // who puts a headset on arms anew, in it
     const seen = {
       get visible(): boolean {
         return session.visibilityState === "visible";
@@ -194,12 +194,13 @@ export class HeadsetSession implements HeadsetControls {
   private ended(): void {
     const { engine } = this.page;
     this.isEnded = true;
-    engine.disarm("headset_left");
+    engine.driving.disarm("headset_left");
     this.renderer.setAnimationLoop(null);
     if (engine.headset === this) {
       engine.headset = null;
       engine.controls.headset = null;
-      if (engine.goals?.device === this.poses?.device && engine.goals !== null) engine.goals.device = null;
+      const { goals } = engine.driving;
+      if (goals !== null && goals.device === this.poses?.device) goals.device = null;
       engine.display.leave();
       engine.tracing?.show(false, performance.now(), "headset");
     }
@@ -211,19 +212,19 @@ export class HeadsetSession implements HeadsetControls {
 
   /** A view that is not drawn any more would go on showing its last picture as if it were the present one. */
   private end(): void {
-    this.page.engine.disarm("headset_left");
+    this.page.engine.driving.disarm("headset_left");
     this.session.end().catch(() => undefined); // it has ended
   }
 
   private visibilityChanged(): void {
     const { visibilityState } = this.session;
-    if (visibilityState === "hidden") this.page.engine.disarm("headset_off");
-    else if (visibilityState === "visible-blurred") this.page.engine.disarm("headset_blurred");
+    if (visibilityState === "hidden") this.page.engine.driving.disarm("headset_off");
+    else if (visibilityState === "visible-blurred") this.page.engine.driving.disarm("headset_blurred");
   }
 
   /** The headset calls another place its origin: every pose that was known means another place. */
   private spaceReset(): void {
-    this.page.engine.disarm("tracking_lost");
+    this.page.engine.driving.disarm("tracking_lost");
     this.isPlaced = false;
   }
 
@@ -249,7 +250,7 @@ export class HeadsetSession implements HeadsetControls {
 
   private read(frame: XRFrame, space: XRReferenceSpace, now: number): void {
     this.viewer = trackedPose(frame.getViewerPose(space));
-    if (this.viewer === null) this.page.engine.disarm("tracking_lost");
+    if (this.viewer === null) this.page.engine.driving.disarm("tracking_lost");
     else if (!this.isPlaced) this.recentre();
     this.hands = readHands(frame, space, this.session.inputSources);
     const samples = this.hands.map(({ sample }) => sample);
@@ -260,7 +261,8 @@ export class HeadsetSession implements HeadsetControls {
 
   /** The hands lead the poses of the robot that is there now. */
   private takePoses(): void {
-    const { goals, state } = this.page.engine;
+    const { driving, state } = this.page.engine;
+    const { goals } = driving;
     const description = state.robot?.description;
     if (goals === null || description === undefined || this.poses?.description === description) return;
     const device = new PoseDevice(description, {
@@ -277,9 +279,9 @@ export class HeadsetSession implements HeadsetControls {
     const { engine } = this.page;
     if (event.kind === "arm") this.arm(event.side);
     else if (event.kind === "press") this.press(event, now);
-    else if (event.kind === "lost") engine.disarm(event.why);
+    else if (event.kind === "lost") engine.driving.disarm(event.why);
     else if (event.kind === "stop") engine.stop("headset button");
-    else if (event.kind === "layer") engine.nextLayer();
+    else if (event.kind === "layer") engine.driving.selectLayer();
     else this.recentre();
   }
 
@@ -287,8 +289,8 @@ export class HeadsetSession implements HeadsetControls {
   private arm(side: Side): void {
     const { engine } = this.page;
     if (this.viewer === null) return;
-    if (!engine.isArmed()) engine.toggleArmed();
-    if (engine.isArmed()) grab(this.input, side);
+    if (!engine.driving.isArmed()) engine.toggleArmed();
+    if (engine.driving.isArmed()) grab(this.input, side);
   }
 
   /** A hand that drives presses STOP alone: its trigger is the gripper's, wherever the hand points. */

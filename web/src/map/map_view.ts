@@ -36,6 +36,7 @@ import {
   scanOf,
   type Place,
 } from "./map_state";
+import { actConditions } from "../engine/act_conditions";
 
 const STEP = 1.4; // of a press on a zoom button
 const WHEEL = 0.0015; // per pixel of a wheel
@@ -225,7 +226,7 @@ export class MapView {
     const { engine } = this;
     const action = goalAction(description);
     if (action === null || !mayDrive(engine.state)) return "";
-    const refusal = actRefusal(action, engine.state.actions, engine.actConditions(now, false));
+    const refusal = actRefusal(action, engine.state.actions, actConditions(engine, now, false));
     return refusal === null ? "" : `${action.label}: ${ACT_REFUSAL_LABELS[refusal]}`;
   }
 
@@ -240,7 +241,7 @@ export class MapView {
     const description = engine.state.robot?.description;
     const action = description ? goalAction(description) : null;
     if (action === null || !mayDrive(engine.state)) return;
-    const refusal = actRefusal(action, engine.state.actions, engine.actConditions(performance.now(), false));
+    const refusal = actRefusal(action, engine.state.actions, actConditions(engine, performance.now(), false));
     const robot = this.place.kind === "known" ? this.place.pose : null;
     const parameters = goalParameters(action, at, towards, robot);
     const why =

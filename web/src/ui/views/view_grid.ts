@@ -102,7 +102,7 @@ export class ViewGrid {
   }
 
   update(engine: ConsoleEngine, now: number): void {
-    this.element.classList.toggle("is-locked", engine.isArmed());
+    this.element.classList.toggle("is-locked", engine.driving.isArmed());
     this.followEpoch(engine.state.robot?.epoch ?? null);
     if (this.scene !== null && this.sceneView !== null)
       this.updateScene(this.scene, this.sceneView, engine, now);
