@@ -213,21 +213,12 @@ export class MapView {
       (running !== null || (state.actions.at(-1) === update && now - engine.actionMs < SHOWN_MS));
     setText(
       this.words,
-      action !== null && isShown ? actionWords(action, update) : this.whyNot(description, now),
+      action !== null && isShown ? actionWords(action, update) : whyNoGoal(engine, description, now),
     );
     setData(this.words, "tone", isShown ? actionTone(update) : "off");
     setHidden(this.cancel, running === null || !(holdsSeat(state) || state.welcome?.role === "supervisor"));
     setData(this.element, "aims", String(this.aim !== null));
     setData(this.element, "goals", String(action !== null && mayDrive(state)));
-  }
-
-  /** Why no goal can be set now; "" where one can, or for whoever only watches. */
-  private whyNot(description: RobotDescription, now: number): string {
-    const { engine } = this;
-    const action = goalAction(description);
-    if (action === null || !mayDrive(engine.state)) return "";
-    const refusal = actRefusal(action, engine.state.actions, actConditions(engine, now, false));
-    return refusal === null ? "" : `${action.label}: ${ACT_REFUSAL_LABELS[refusal]}`;
   }
 
   private cancelGoal(): void {
@@ -314,6 +305,14 @@ function tool(sign: string, label: string, onclick: () => void): HTMLButtonEleme
   made.setAttribute("aria-label", label);
   made.title = label;
   return made;
+}
+
+/** Why no goal can be set now; "" where one can, or for whoever only watches. */
+function whyNoGoal(engine: ConsoleEngine, description: RobotDescription, now: number): string {
+  const action = goalAction(description);
+  if (action === null || !mayDrive(engine.state)) return "";
+  const refusal = actRefusal(action, engine.state.actions, actConditions(engine, now, false));
+  return refusal === null ? "" : `${action.label}: ${ACT_REFUSAL_LABELS[refusal]}`;
 }
 
 /** Pixels at the upper and the lower edge that words cover, on a phone the robot's actions too. */
