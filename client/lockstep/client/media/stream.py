@@ -175,7 +175,7 @@ class Stream:
     async def read(self, bound: int) -> AsyncGenerator[tuple[Decoded, int | None]]:
         """Yield the media that still pass the gate when they are taken, and their gaps.
 
-        `bound`: media that may wait for a slow reader, which loses the oldest
+        `bound`: media that may wait for a slow reader, which loses the oldest.
 
         Raises:
             QueueClosed: no more media will arrive.
