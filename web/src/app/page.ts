@@ -108,7 +108,7 @@ export class Page {
     const episodes = later.panel((parts) => parts.createEpisodeBar(engine));
     const policies = later.panel((parts) => parts.createPolicyBar(engine));
     const event = createEventPanel(engine);
-    grid.card = event.element;
+    grid.cardPlace.card = event.element;
     const force = later.panel((parts) => parts.createForceGauge(engine, false));
     const contact = later.panel((parts) => parts.createForceGauge(engine, true));
     const radar = later.panel((parts) => parts.createRangeRadar(engine));
