@@ -4,6 +4,7 @@ import pytest
 from playwright.async_api import Browser
 
 from lockstep.bench.browsers.console_page import ConsolePage, open_console
+from lockstep.bench.browsers.event_strip import drawn_event
 from lockstep.bench.browsers.pad import FORWARD, LEFT_Y, RB, START
 from tests.support.stack import Stack
 
@@ -78,7 +79,7 @@ async def test_the_event_drawn_into_a_picture_is_the_stamp_it_was_rendered_by(
             while len(compared) < 20:
                 event = (await console.stats())["event"]
                 for stream in ("overview", "front"):
-                    read = await console.strip(stream)
+                    read = await drawn_event(console.page, stream)
                     if read is not None and read[1] is not None:
                         assert read[0] == read[1], stream
                         compared.add(read[1])

@@ -102,7 +102,10 @@ export class Page {
     const alarm = createAlarmStrip(engine);
     const banner = createBanner(engine);
     const robot = later.panel((parts) => {
-      engine.actions = new parts.ActionClient((message) => engine.connection.tell("session", message), parts.drawId);
+      engine.actions = new parts.ActionClient(
+        (message) => engine.connection.tell("session", message),
+        parts.drawId,
+      );
       return (this.robot = parts.createRobotStrip(engine));
     });
     const episodes = later.panel((parts) => parts.createEpisodeBar(engine));

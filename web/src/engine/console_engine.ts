@@ -41,13 +41,7 @@ import type { HeadsetStep } from "./headset_statistics";
 import type { Tracing } from "./tracing";
 import { StopSender } from "./stop_sender";
 import type { Talkback } from "../talkback/talkback";
-import type {
-  Action,
-  Feedback,
-  ServerMessage,
-  StreamInfo,
-  Welcome,
-} from "../protocol/wire";
+import type { Action, Feedback, ServerMessage, StreamInfo, Welcome } from "../protocol/wire";
 
 export interface ConsoleEngineEvents {
   canvas(info: StreamInfo): HTMLCanvasElement;

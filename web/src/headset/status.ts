@@ -90,7 +90,8 @@ function stateWords(engine: ConsoleEngine, now: number): Pick<HeadsetStatus, "te
   return { tone: "calm", title: "Disarmed", text };
 }
 
-function calmWords({ arming: { reason } }: ConsoleEngine): string {
+function calmWords({ driving }: ConsoleEngine): string {
+  const { reason } = driving.arming;
   const squeeze = HEADSET_DISARM_LABELS.squeeze_released;
   if (reason === "start" || reason === "operator" || reason === "squeeze_released") return squeeze;
   const why = disarmLabel(reason).replace(/^Disarmed: (.)/, (_all, first: string) => first.toUpperCase());

@@ -14,6 +14,7 @@ import msgspec
 
 from lockstep.bench.browsers.chromium import open_page, running_chromium
 from lockstep.bench.browsers.console_page import ConsolePage
+from lockstep.bench.browsers.event_strip import drawn_event
 from lockstep.bench.browsers.pad import RB
 from lockstep.bench.browsers.page_clock import PageClock, read_page_clock
 from lockstep.bench.browsers.sound_card import running_sound_card
@@ -114,7 +115,7 @@ class BrowserClient:
         """Check at intervals that the canvas shows the event of its stamp."""
         while True:
             await asyncio.sleep(STRIP_STEP)
-            found = await self._page.strip(self._camera)
+            found = await drawn_event(self._page.page, self._camera)
             if found is None:
                 continue
             stamp, drawn = found

@@ -222,8 +222,7 @@ export class FleetPage {
       robot === null || state === null ? [] : [{ robot, kind: state.kind }],
     );
     const isNew = ranked.some(({ robot }) => this.tiles.get(robot.name)?.element.parentNode !== this.grid);
-    const isHeld =
-      performance.now() - this.pointedMs < HOLD_MS || this.grid.contains(document.activeElement);
+    const isHeld = performance.now() - this.pointedMs < HOLD_MS || this.grid.contains(document.activeElement);
     if (!atOnce && !isNew && isHeld) return;
     const order = sortFleet(ranked, this.tools.sorting).flatMap((name) => this.tiles.get(name) ?? []);
     for (const [index, tile] of order.entries())
@@ -279,7 +278,9 @@ export class FleetPage {
     const { trouble } = this.pollState;
     const [robots, shown] = [this.robots.length, this.shown.length];
     const message =
-      this.link.token === null ? NO_LINK : messageOf(phase, { trouble, robots, shown, query: this.tools.query });
+      this.link.token === null
+        ? NO_LINK
+        : messageOf(phase, { trouble, robots, shown, query: this.tools.query });
     const key = message?.key ?? (phase === "loading" ? "loading" : "");
     if (key === this.messageKey) return;
     this.messageKey = key;

@@ -138,5 +138,8 @@ export class WebRtcTransport implements Transport {
 
 function noPath({ relayOnly }: PendingConnectionOptions, servers: readonly IceServer[]): TransportEnd {
   if (relayOnly) return new TransportEnd("no_relay", "");
-  return new TransportEnd("no_path", hasRelay(servers) ? "The console's TURN server gave no path either" : "");
+  return new TransportEnd(
+    "no_path",
+    hasRelay(servers) ? "The console's TURN server gave no path either" : "",
+  );
 }

@@ -166,7 +166,8 @@ export function createEpisodeBar(engine: ConsoleEngine): Panel {
     if (event.target instanceof Element && event.target.matches(FIELDS)) return;
     const request = KEYS.get(event.code);
     if (request === undefined) return;
-    if (engine.driving.isArmed() && drivingKeys(engine.state.robot?.description ?? null).has(event.code)) return;
+    if (engine.driving.isArmed() && drivingKeys(engine.state.robot?.description ?? null).has(event.code))
+      return;
     ask(request);
   });
 

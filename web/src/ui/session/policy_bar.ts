@@ -57,7 +57,8 @@ export function createPolicyBar(engine: ConsoleEngine): Panel {
     if (key.code !== GIVE_KEY || key.repeat || key.ctrlKey || key.metaKey || key.altKey) return;
     if (key.target instanceof Element && key.target.matches(FIELDS)) return;
     if (shown.length !== 1) return; // with several the person says which
-    if (engine.driving.isArmed() && drivingKeys(engine.state.robot?.description ?? null).has(key.code)) return;
+    if (engine.driving.isArmed() && drivingKeys(engine.state.robot?.description ?? null).has(key.code))
+      return;
     key.preventDefault();
     give(shown[0]);
   });

@@ -266,10 +266,7 @@ function showSceneVeil(
   if (words !== null) setText(view.veilWords, words);
   const { video } = engine.state.settings.tolerance;
   const unknown = scene.lacksJoints ? " · not all joints measured" : "";
-  setText(
-    view.detail,
-    event === null || gap === null ? "" : `s ${event} · gap ${gap} of ${video}${unknown}`,
-  );
+  setText(view.detail, event === null || gap === null ? "" : `s ${event} · gap ${gap} of ${video}${unknown}`);
   setData(view.element, "gap", words === null ? "good" : "bad");
   setHidden(view.swap, isLarge && scene.full.isOpen);
 }
