@@ -157,15 +157,15 @@ async def test_another_pad_cannot_take_over_but_can_stop(stack: Stack, chromium:
         await console.until_live()
         other = await _plug(console, id="Other pad")
         await console.arm()
-        await other.pad.tilt(LEFT_Y, -1)
+        await other.tilt(LEFT_Y, -1)
         await other.hold(RB, True)
-        await other.pad.press(START)
+        await other.press(START)
         await other.seen()
         statistics = await console.stats()
         assert (statistics["armed"], statistics["driving"], statistics["at_rest"]) == (True, False, True)
         assert statistics["pad"]["id"].startswith("Test pad")
         await console.drive_forward()
-        await other.pad.press(1)
+        await other.press(1)
         await console.until("s.stop.stopped && !s.armed && s.at_rest === true")
 
 
@@ -189,17 +189,17 @@ async def test_a_pulled_pad_disarms_and_the_next_one_has_to_arm_anew(stack: Stac
     async with open_console(chromium, stack.operator) as console:
         await console.until_live()
         other = await _plug(console, id="Other pad")
-        await other.pad.tilt(LEFT_Y, -1)
+        await other.tilt(LEFT_Y, -1)
         await other.hold(RB, True)
         await console.arm()
         await console.drive_forward()
         await console.page.evaluate("testPad.unplug(0)")
         await console.until("!s.armed && s.at_rest === true && s.pad.id === 'Other pad'")
-        await other.pad.press(START)
+        await other.press(START)
         assert not (await console.stats())["armed"]
         await other.hold(RB, False)
         await other.seen()
-        await other.pad.press(START)
+        await other.press(START)
         await console.until("s.armed && !s.driving")
 
 
