@@ -23,23 +23,6 @@ ALLOWED = {
     "rtc/lockstep/rtc/sockets/tcp_port.py": 1,  # made by a callback of the loop; `close` cancels it
     "server/lockstep/server/util/uncancelled.py": 3,  # survive the cancellation of their caller, or count their own
 }
-# Tasks that are to move into groups. This list only shrinks: never add a file, nor raise a number.
-NOT_YET = {
-    "bench/lockstep/bench/browsers/console_page.py": 1,
-    "bench/lockstep/bench/experiment/browser_stick.py": 1,
-    "bench/lockstep/bench/experiment/endurance/endurance_run.py": 2,
-    "bench/lockstep/bench/experiment/judge/outage.py": 1,
-    "bench/lockstep/bench/harness/processes.py": 2,
-    "bench/lockstep/bench/harness/tcp_path.py": 1,
-    "bench/lockstep/bench/hostile/crowd.py": 1,
-    "bench/lockstep/bench/interoperability/visitor.py": 1,
-    "bench/lockstep/bench/relay/packets.py": 1,
-    "bench/lockstep/bench/soak/crowd.py": 1,
-    "bench/lockstep/emulator/cli.py": 3,
-    "bench/lockstep/emulator/transport/delayed.py": 1,
-    "bench/lockstep/emulator/transport/tcp_forwarder.py": 1,
-    "bench/lockstep/emulator/transport/websocket_proxy.py": 2,
-}
 
 
 def bare_tasks(source: str) -> Iterator[int]:
@@ -78,7 +61,7 @@ def test_no_task_of_the_product_is_bare_but_those_in_the_list() -> None:
         for path in (ROOT / part / "lockstep").rglob("*.py"):
             found[path.relative_to(ROOT).as_posix()] += len(list(bare_tasks(path.read_text())))
     assert {name: found[name] for name in ALLOWED} == ALLOWED
-    assert found - Counter(ALLOWED) <= Counter(NOT_YET)
+    assert found == Counter(ALLOWED)
 
 
 @pytest.mark.parametrize(

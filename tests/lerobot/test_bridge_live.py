@@ -90,7 +90,7 @@ async def test_an_arm_that_fails_or_hangs_ends_the_bridge_which_begins_anew_stop
 async def test_the_bridge_leaves_the_torque_on_although_lerobot_would_switch_it_off(tmp_path: Path) -> None:
     async with running_arm(tmp_path) as arm:
         pass
-    assert any("disconnected, torque on" in line for line in arm.stack.running.lines)
+    assert any("disconnected, torque on" in line for line in arm.stack.running.output.lines)
 
 
 async def test_the_torque_goes_at_the_end_where_the_settings_say_so(tmp_path: Path) -> None:
@@ -112,7 +112,7 @@ async def test_the_torque_goes_at_the_end_where_the_settings_say_so(tmp_path: Pa
             assert console.feedback is not None
             assert console.feedback.axes[1] <= fallen.axes[1] + 1.0  # it does not leap back up
             assert (await reach(console, {"lift.pos": -20.0})).axes[1] == pytest.approx(-20.0, abs=2.0)
-    assert any("disconnected, torque off" in line for line in arm.stack.running.lines)
+    assert any("disconnected, torque off" in line for line in arm.stack.running.output.lines)
 
 
 @pytest.mark.parametrize(

@@ -55,7 +55,7 @@ def pilot_after_driving() -> tuple[CommandSender, float]:
     """A client's pilot that has driven event 2 and got its feedback, and now."""
     sender = CommandSender(CommandGate("feedback", 4, 0.0), NEUTRAL)
     sender.feedback(Feedback(event=1, issue=1, time=0.0, axes=NEUTRAL), 0.0)
-    sender.ready = True
+    sender.readiness.ready = True
     sender.intend(DRIVE, 0.0)
     assert [message.values for message in sender.due(0.0) if isinstance(message, Command)] == [DRIVE]
     sender.feedback(Feedback(event=2, issue=1, time=0.0, axes=DRIVE, at_rest=False), 0.05)

@@ -106,12 +106,10 @@ def _explain(network: Network, link: str) -> None:
 
 async def _until_signal(network: Impaired) -> None:
     """Obeys orders meanwhile."""
-    obeying = asyncio.get_running_loop().create_task(obey(network, print))
-    try:
+    async with asyncio.TaskGroup() as tasks:
+        obeying = tasks.create_task(obey(network, print))
         await wait_for_signal()
-    finally:
         obeying.cancel()
-        await asyncio.gather(obeying, return_exceptions=True)
 
 
 async def _run_namespaces(profile: Profile, seed: int, robot_side: str, operator_side: str, as_json: bool) -> int:
@@ -120,18 +118,15 @@ async def _run_namespaces(profile: Profile, seed: int, robot_side: str, operator
         spaces = await stack.enter_async_context(Namespaces(profile, seed=seed))
         first = await spaces.start("robot", shlex.split(robot_side), stdin=subprocess.DEVNULL)
         second = await spaces.start("operator", shlex.split(operator_side), stdin=subprocess.DEVNULL)
-        loop = asyncio.get_running_loop()
         print(
             f"robot's side     {ROBOT_ADDRESS}  enter it with nsenter --net=/proc/{first.pid}/ns/net", file=sys.stderr
         )
         print(f"operator's side  {OPERATOR_ADDRESS}  nsenter --net=/proc/{second.pid}/ns/net", file=sys.stderr)
-        ending = {loop.create_task(_until_signal(spaces)), loop.create_task(_wait(second))}
-        try:
+        async with asyncio.TaskGroup() as tasks:
+            ending = {tasks.create_task(_until_signal(spaces)), tasks.create_task(_wait(second))}
             await asyncio.wait(ending, return_when=asyncio.FIRST_COMPLETED)
-        finally:
             for each in ending:
                 each.cancel()
-            await asyncio.gather(*ending, return_exceptions=True)
         if as_json:
             print(json.dumps(spaces.statistics().fields()), flush=True)
         return second.returncode or 0

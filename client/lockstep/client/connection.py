@@ -8,14 +8,12 @@ from dataclasses import replace
 
 from lockstep.client.connection_options import ConnectionOptions
 from lockstep.client.control.driving import Driving
-from lockstep.client.episodes import Episodes
 from lockstep.client.errors import ConnectFailed, ConsoleLost
 from lockstep.client.heartbeat import Heartbeat
 from lockstep.client.media.media_receiver import MediaReceiver
 from lockstep.client.message_dispatcher import MessageDispatcher
-from lockstep.client.robot_actions import RobotActions, RobotNews
+from lockstep.client.requests.requests import Requests
 from lockstep.client.session import Session
-from lockstep.client.session_requests import SessionRequests
 from lockstep.client.shielded_close import cancel_all, finish
 from lockstep.client.statistics import ConsoleStatistics, percentiles
 from lockstep.client.transport.open_transport import open_transport
@@ -37,6 +35,7 @@ class Connection:
         session: seat, participants, notes and STOP
         driving: the robot
         media: pictures and sound
+        news: of the robot's actions, status and place
         relay: the source of the media; None: the console
     """
 
@@ -48,12 +47,11 @@ class Connection:
         self.relay: RelayMedia | None = None
         self._heartbeat = Heartbeat(self.session, self.driving, options.silence_seconds)
         self._messages = MessageDispatcher(self.session, self.driving, self.media, self._heartbeat)
+        self.news = self._messages.news
         self._loop = asyncio.get_running_loop()
         self._has_media = asyncio.Event()  # `media` is prepared
         self._transport: Transport | None = None
-        self._requests: SessionRequests | None = None
-        self._actions: RobotActions | None = None
-        self._episodes: Episodes | None = None
+        self._requests: Requests | None = None
         self._running: asyncio.Task[None] | None = None
 
     @property
@@ -63,26 +61,10 @@ class Connection:
         return self._transport
 
     @property
-    def requests(self) -> SessionRequests:
+    def requests(self) -> Requests:
         if self._requests is None:
             raise ConsoleLost("not connected yet")
         return self._requests
-
-    @property
-    def actions(self) -> RobotActions:
-        if self._actions is None:
-            raise ConsoleLost("not connected yet")
-        return self._actions
-
-    @property
-    def episodes(self) -> Episodes:
-        if self._episodes is None:
-            raise ConsoleLost("not connected")
-        return self._episodes
-
-    @property
-    def news(self) -> RobotNews:
-        return self._messages.news
 
     @property
     def lost(self) -> ConsoleLost | None:
@@ -115,9 +97,7 @@ class Connection:
             options, beside = replace(options, video=0, audio=False, carrier="trailer"), ticket.relay
         transport, sections = await open_transport(options, self._messages.received, deadline, beside=beside)
         self._transport = transport
-        self._requests = SessionRequests(transport, self.session, self.driving, self._messages.until)
-        self._actions = RobotActions(transport, self.session, self.driving, self.news, self._messages.until)
-        self._episodes = Episodes(transport, self._messages.episodes, self._messages.until)
+        self._requests = Requests.over(transport, self.session, self.driving, self._messages)
         if ticket is None and transport.packets is not None:
             self.media.prepare(transport.packets, sections, options.decode)
         await transport.connect(deadline - self._loop.time())
@@ -213,9 +193,9 @@ class Connection:
             picture_delay_p95_ms=delay.p95,
             command_to_picture_ms=delay,
             round_trip_ms=round_trip * 1000 if round_trip is not None else None,
-            command_to_feedback_ms=percentiles(sender.samples, 1000),
+            command_to_feedback_ms=percentiles(sender.retransmission.samples, 1000),
             event_rate=self.driving.event_rate.rate(now),
             bad_messages=self._messages.malformed,
-            repeats=sender.repeats,
-            echoes=sender.echoes,
+            repeats=sender.retransmission.repeats,
+            echoes=sender.retransmission.echoes,
         )

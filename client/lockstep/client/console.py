@@ -1,27 +1,28 @@
 """The console without a browser: connect, watch, drive."""
 
 import asyncio
-import math
-from collections.abc import AsyncGenerator, Callable, Mapping, Sequence
-from contextlib import suppress
+from collections.abc import AsyncGenerator, Callable, Iterator, Mapping
+from contextlib import aclosing, contextmanager, suppress
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Self
+from typing import Self, cast
 
+from av import AudioFrame, VideoFrame
 from msgspec.structs import replace
 
 from lockstep.client.connection import Connection
 from lockstep.client.connection_options import ConnectionOptions
 from lockstep.client.console_url import parse_link
+from lockstep.client.control.axis_values import Values, command_values
 from lockstep.client.control.clutch import Clutch
 from lockstep.client.control.command_gate import GateState, Pacing
 from lockstep.client.control.goal_move import GoalMove
 from lockstep.client.episodes import Episodes
-from lockstep.client.errors import ActionRefused, CommandError, CommandRefused, ConsoleError, ConsoleLost, NotArmed
+from lockstep.client.errors import ActionRefused, CommandError, ConsoleError, ConsoleLost
 from lockstep.client.media.media_gate import GateMode
-from lockstep.client.media.newest_queue import NewestQueue, QueueClosed
+from lockstep.client.media.newest_queue import QueueClosed
 from lockstep.client.media.render_log import FeedbackArrival, Rendering
-from lockstep.client.media.stream import Picture, Sound, Stream
+from lockstep.client.media.stream import Picture, Sound
 from lockstep.client.policies import Policies
 from lockstep.client.statistics import ConsoleStatistics
 from lockstep.client.transport.webrtc_transport import Route
@@ -31,8 +32,8 @@ from lockstep.protocol.console import Participant, Role, Seat, SharedNote
 from lockstep.protocol.description import RobotDescription
 from lockstep.protocol.maps import Navigation, OccupancyMap
 from lockstep.protocol.messages import Feedback, StopState
-from lockstep.protocol.neutral import neutral_value, neutral_values
-from lockstep.protocol.traces.trace_messages import Traces
+from lockstep.protocol.neutral import neutral_values
+from lockstep.protocol.traces.trace_messages import TraceRequest, Traces
 
 __all__ = ["Console"]
 
@@ -145,7 +146,7 @@ class Console:
             pass  # the bridge brings the robot to rest when its operator is gone
         finally:
             if connection.session.holds_seat:
-                connection.requests.release_seat()
+                connection.requests.seat.release()
             await connection.close()
 
     # Known state
@@ -211,15 +212,13 @@ class Console:
     @property
     def episodes(self) -> Episodes:
         """The episodes of the console's recording: `await console.episodes.start("pick up the cube")`."""
-        return self._live().episodes
+        return self._live().requests.episodes
 
     @property
     def policies(self) -> Policies:
         """Policies: offering them the seat, and what a policy itself calls (docs/policies.md)."""
         connection = self._live()
-        return Policies(
-            connection.transport, connection.session, connection.driving, connection.requests, self._command
-        )
+        return Policies(connection.transport, connection.session, connection.driving, connection.requests.seat)
 
     @property
     def status(self) -> list[StatusItem]:
@@ -274,7 +273,7 @@ class Console:
         Args:
             wanted: False ends the traces; a new connection has none
         """
-        self._live().requests.trace(wanted=wanted)
+        self._live().transport.send("session", TraceRequest(wanted=wanted))
 
     def traces(self) -> Traces:
         """Return the last thousand pictures' and commands' spans at the robot and the console, oldest first.
@@ -304,14 +303,16 @@ class Console:
     async def take_seat(self) -> None:
         """Take the control seat, an operator when it is free, a supervisor from any holder; then `arm`.
 
-        While the robot is stopped or away, only the seat is taken; call `arm` later.
+        While the robot is stopped or away, only the seat is taken; call `arm` later. Arming answers a feedback, so the
+        first one is waited for.
 
         Raises:
             SeatRefused: another peer holds the seat, or this link is an observer's.
+            NoFeedback: the seat is taken, but no feedback came within 5 s from a robot that is not away.
         """
-        connection = self._live()
-        await connection.requests.take_seat()
-        await self._arm_if_possible(connection)
+        seat = self._live().requests.seat
+        await seat.take()
+        await seat.arm_if_possible()
 
     async def take_over(self) -> None:
         """Take the seat from the policy that drives, at once, or a free one; then `arm`, as `take_seat` does.
@@ -320,10 +321,11 @@ class Console:
 
         Raises:
             SeatRefused: another person holds the seat, or this link is an observer's or a policy's.
+            NoFeedback: as for `take_seat`.
         """
-        connection = self._live()
-        await connection.requests.take_over()
-        await self._arm_if_possible(connection)
+        seat = self._live().requests.seat
+        await seat.take_over()
+        await seat.arm_if_possible()
 
     async def request_seat(self, seconds: float = 65.0) -> None:
         """Ask the holder for the control seat and wait until it is granted; a free seat is granted at once.
@@ -335,17 +337,11 @@ class Console:
 
         Raises:
             SeatRefused: the holder declined or did not answer, or this link is an observer's.
+            NoFeedback: as for `take_seat`.
         """
-        connection = self._live()
-        await connection.requests.request_seat(seconds)
-        await self._arm_if_possible(connection)
-
-    async def _arm_if_possible(self, connection: Connection) -> None:
-        newest = connection.driving.driver.sender.newest
-        if newest is None or newest.stop.stopped or connection.driving.robot.link == "down":
-            return
-        with suppress(CommandRefused):
-            await connection.driving.driver.arm()
+        seat = self._live().requests.seat
+        await seat.request(seconds)
+        await seat.arm_if_possible()
 
     async def arm(self) -> Feedback:
         """Let the robot move again: send one neutral command and return the feedback that answers it.
@@ -365,7 +361,7 @@ class Console:
         Args:
             peer: the id of one of `seat.claims`
         """
-        self._live().requests.answer(peer, grant=True)
+        self._live().requests.seat.answer(peer, grant=True)
 
     def decline(self, peer: str) -> None:
         """Refuse a peer that asked for the control seat.
@@ -373,15 +369,13 @@ class Console:
         Args:
             peer: the id of one of `seat.claims`
         """
-        self._live().requests.answer(peer, grant=False)
+        self._live().requests.seat.answer(peer, grant=False)
 
     def release_seat(self) -> None:
         """Release the control seat, or withdraw a request for it."""
-        self._live().requests.release_seat()
+        self._live().requests.seat.release()
 
-    async def drive(
-        self, values: Mapping[str, float | None] | Sequence[float | None], *, speed: float = 1.0
-    ) -> Feedback:
+    async def drive(self, values: Values, *, speed: float = 1.0) -> Feedback:
         """Send one command as soon as the gate is open; return the feedback that answers it.
 
         The first call arms: from then on, whenever 200 ms pass without another call, the console sends neutral values,
@@ -402,38 +396,12 @@ class Console:
             CommandRefused: the robot is stopped, this console does not hold the seat, …
             ConsoleLost: the connection ended.
         """
-        command = self._command(values)
+        driving = self._live().driving
+        command = command_values(driving.robot.description.axes, values)
         if not 0 <= speed <= 1:
             raise CommandError("the speed is not from 0 to 1")
-        self._check_ready()
-        return await self._live().driving.driver.drive(command, speed)
-
-    def _check_ready(self) -> None:
-        """Raise CommandRefused unless the robot may move, as far as this connection knows."""
-        connection = self._live()
-        pilot = connection.driving.driver.sender
-        if connection.session.holds_seat and not pilot.ready:
-            if pilot.newest is not None and pilot.newest.stop.stopped:
-                raise CommandRefused("stopped", pilot.newest.stop.reason)
-            raise NotArmed
-
-    def _command(self, values: Mapping[str, float | None] | Sequence[float | None]) -> list[float | None]:
-        axes = self.description.axes
-        if isinstance(values, Mapping):
-            unknown = values.keys() - {axis.name for axis in axes}
-            if unknown:
-                known = ", ".join(axis.name for axis in axes)
-                raise CommandError(f"no axis {', '.join(sorted(unknown))}; there are {known}")
-            values = [values.get(axis.name, neutral_value(axis)) for axis in axes]
-        command = [None if value is None else float(value) for value in values]
-        if len(command) != len(axes):
-            raise CommandError(f"{len(command)} values for {len(axes)} axes")
-        for axis, value in zip(axes, command, strict=True):
-            if value is None and axis.kind == "rate":
-                raise CommandError(f"{axis.name} has no value, and only a goal axis stays without one")
-            if value is not None and not math.isfinite(value):
-                raise CommandError("a value is NaN or infinite")
-        return command
+        driving.check_ready()
+        return await driving.driver.drive(command, speed)
 
     async def move_to(
         self,
@@ -514,7 +482,7 @@ class Console:
             ActionFailed: the robot failed at the action.
             ConsoleLost: the connection ended; the robot has ended every action that moves it.
         """
-        return await self._live().actions.act(name, parameters or {}, progress)
+        return await self._live().requests.actions.act(name, parameters or {}, progress)
 
     async def go_to(
         self, x: float, y: float, yaw: float | None = None, *, progress: Callable[[ActionUpdate], None] | None = None
@@ -555,7 +523,7 @@ class Console:
             StopUnconfirmed: the robot has not confirmed it; the console keeps the stop if it was reached.
         """
         connection = self._live()
-        return await connection.requests.stop(connection.options.name, reason)
+        return await connection.requests.stop.stop(connection.options.name, reason)
 
     async def reset(self, number: int | None = None) -> StopState:
         """Release a stop. Moves nothing; `arm` comes next.
@@ -570,7 +538,7 @@ class Console:
         """
         connection = self._live()
         wanted = connection.session.newest_stop if number is None else number
-        return await connection.requests.reset(connection.options.name, wanted)
+        return await connection.requests.stop.reset(connection.options.name, wanted)
 
     async def note(self, text: str) -> SharedNote:
         """Write a note to everyone and return it; it keeps the event reference of that moment.
@@ -581,7 +549,7 @@ class Console:
         Raises:
             CommandRefused: there are too many notes, or nothing in this one can be printed.
         """
-        return await self._live().requests.note(text)
+        return await self._live().requests.notes.write(text)
 
     # Watching
 
@@ -592,17 +560,9 @@ class Console:
             ConsoleLost: the connection ended.
         """
         connection = self._live()
-        queue: NewestQueue[Feedback] = NewestQueue(1)
-        connection.driving.readers.append(queue)
-        if connection.lost is not None:
-            queue.close()
-        try:
+        with _ending_with(connection), connection.driving.readers.open(1) as queue:
             while True:
                 yield await queue.get()
-        except QueueClosed:
-            self._raise_lost(connection)
-        finally:
-            connection.driving.readers.remove(queue)
 
     async def pictures(self, camera: str = "", *, keep: int = 2) -> AsyncGenerator[Picture]:
         """Yield the pictures of a camera that pass the gate; each is checked again when it is taken.
@@ -616,8 +576,11 @@ class Console:
             NoSuchStream: this camera is not received.
         """
         connection = self._live()
-        async for stream, medium in self._media(connection, connection.media.stream("video", camera), keep):
-            yield Picture(stream.name, medium.stamp, stream.check(medium)[1], medium.frame)
+        stream = connection.media.stream("video", camera)
+        with _ending_with(connection):
+            async with aclosing(stream.read(keep)) as media:
+                async for medium, gap in media:
+                    yield Picture(stream.name, medium.stamp, gap, cast(VideoFrame, medium.frame))
 
     async def sounds(self, microphone: str = "", *, keep: int = 50) -> AsyncGenerator[Sound]:
         """Yield the segments of a microphone that pass the gate, as `pictures` does.
@@ -631,29 +594,23 @@ class Console:
             NoSuchStream: this microphone is not received.
         """
         connection = self._live()
-        async for stream, medium in self._media(connection, connection.media.stream("audio", microphone), keep):
-            yield Sound(stream.name, medium.stamp, stream.check(medium)[1], medium.frame)
-
-    async def _media(self, connection: Connection, stream: Stream, keep: int) -> AsyncGenerator[tuple[Stream, Any]]:
-        reader = stream.open_reader(keep)
-        try:
-            while True:
-                medium = await reader.get()
-                if stream.check(medium)[0] == "render":
-                    yield stream, medium
-                else:
-                    reader.dropped += 1
-        except QueueClosed:
-            self._raise_lost(connection)
-        finally:
-            stream.close_reader(reader)
-
-    @staticmethod
-    def _raise_lost(connection: Connection) -> None:
-        if connection.lost is not None:
-            raise connection.lost
+        stream = connection.media.stream("audio", microphone)
+        with _ending_with(connection):
+            async with aclosing(stream.read(keep)) as media:
+                async for medium, gap in media:
+                    yield Sound(stream.name, medium.stamp, gap, cast(AudioFrame, medium.frame))
 
     def _live(self) -> Connection:
         if self._connection is None:
             raise ConsoleLost("not connected: use `async with Console(link) as console`")
         return self._connection
+
+
+@contextmanager
+def _ending_with(connection: Connection) -> Iterator[None]:
+    """End when the queue that is read inside ends. Raises ConsoleLost: the connection ended."""
+    try:
+        yield
+    except QueueClosed:
+        if connection.lost is not None:
+            raise connection.lost from None

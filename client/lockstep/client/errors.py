@@ -7,6 +7,7 @@ ConsoleError
 ├── SignallingRefused       the console answered WHEP with an error
 ├── ConnectFailed           the console, or the way to it, did not work within the time allowed
 ├── ConsoleLost             an established connection ended; terminal, make a new Console
+├── NoFeedback              the robot sent no feedback in time: its bridge, or the way to it, does not work now
 ├── GoalNotReached          `move_to`: the robot came no nearer: something is in its way, or a load pulls it
 ├── StopUnconfirmed         the robot has not confirmed a stop; it is not lost, but do not rely on it
 ├── ActionCancelled         an action began and was cancelled: a stick, a stop, a lost seat, no armed events, …
@@ -33,6 +34,7 @@ __all__ = [
     "EpisodeRefused",
     "GoalNotReached",
     "LinkFormatError",
+    "NoFeedback",
     "NoSuchStream",
     "NotArmed",
     "Refused",
@@ -99,6 +101,10 @@ class ConnectFailed(ConsoleError):
 
 class ConsoleLost(ConsoleError):
     """The connection ended. The bridge brings the robot to rest; a new Console connects again."""
+
+
+class NoFeedback(ConsoleError):
+    """No feedback came from a robot that is there, in the time allowed."""
 
 
 class GoalNotReached(ConsoleError):

@@ -1,11 +1,10 @@
 """Policies of a console: offering them the seat, waiting for it, and shadows (docs/policies.md)."""
 
-from collections.abc import Callable, Mapping, Sequence
-
+from lockstep.client.control.axis_values import Values, command_values
 from lockstep.client.control.driving import Driving
 from lockstep.client.errors import SeatRefused
+from lockstep.client.requests.seat_requests import SeatRequests
 from lockstep.client.session import Session
-from lockstep.client.session_requests import SessionRequests
 from lockstep.client.transport.transport import Transport
 from lockstep.protocol.console import Shadow, ShadowVerdict
 from lockstep.protocol.messages import Feedback
@@ -13,7 +12,6 @@ from lockstep.protocol.serial import event_after
 
 __all__ = ["Policies"]
 
-Values = Mapping[str, float | None] | Sequence[float | None]
 LOST_TO_OTHERS = ("seat_taken", "not_allowed")  # the offer was another's, or has ended meanwhile
 
 
@@ -25,20 +23,11 @@ class Policies:
     they raise CommandRefused, or calls `shadow` while somebody else drives.
     """
 
-    def __init__(
-        self,
-        transport: Transport,
-        session: Session,
-        driving: Driving,
-        requests: SessionRequests,
-        values_of: Callable[[Values], list[float | None]],
-    ) -> None:
-        """`values_of`: returns one value per axis."""
+    def __init__(self, transport: Transport, session: Session, driving: Driving, requests: SeatRequests) -> None:
         self._transport = transport
         self._session = session
         self._driving = driving
         self._requests = requests
-        self._values_of = values_of
 
     @property
     def offered(self) -> bool:
@@ -81,7 +70,7 @@ class Policies:
         while not self._session.holds_seat:
             await self._requests.offered_here()
             try:
-                await self._requests.take_seat()
+                await self._requests.take()
             except SeatRefused as refused:
                 if self._session.role != "policy" or refused.reason not in LOST_TO_OTHERS:
                     raise
@@ -106,6 +95,6 @@ class Policies:
             event=event_after(answered.event),
             issue=answered.issue,
             nonce=answered.nonce,
-            values=self._values_of(values),
+            values=command_values(self._driving.robot.description.axes, values),
         )
         self._transport.send("control", shadow)

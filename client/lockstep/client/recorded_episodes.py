@@ -10,7 +10,7 @@ from urllib.parse import quote
 import httpx
 import msgspec
 
-from lockstep.client.console_url import parse_link
+from lockstep.client.console_url import ConsoleLink, parse_link
 from lockstep.client.errors import ConnectFailed, EditRefused, SignallingRefused
 from lockstep.protocol.episodes import EpisodeOutcome
 
@@ -87,6 +87,36 @@ _recording = msgspec.json.Decoder(RecordingWithEpisodes)
 _problem = msgspec.json.Decoder(_Problem)
 
 
+class _ConsoleHttp:
+    """Asks a console over HTTP with the token of a link."""
+
+    def __init__(self, link: ConsoleLink, tls_ca: Path | None) -> None:
+        self._base = link.base
+        self._client = httpx.AsyncClient(
+            headers={"Authorization": f"Bearer {link.token}"},
+            timeout=TIMEOUT,
+            trust_env=not link.loopback,
+            verify=ssl.create_default_context(cafile=tls_ca) if link.secure and tls_ca is not None else link.secure,
+        )
+
+    async def close(self) -> None:
+        await self._client.aclose()
+
+    async def request(self, method: str, path: str, *, json: object = None, seconds: float = TIMEOUT) -> httpx.Response:
+        """Return the answer. Raises SignallingRefused and ConnectFailed."""
+        try:
+            answer = await self._client.request(method, self._base + path, json=json, timeout=seconds)
+        except httpx.HTTPError as error:
+            raise ConnectFailed(f"no answer from {self._base} ({error or type(error).__name__})") from error
+        if answer.is_error:
+            try:
+                problem = _problem.decode(answer.content)
+            except msgspec.DecodeError:
+                problem = _Problem(detail=answer.text[:200])
+            raise SignallingRefused(answer.status_code, problem.error, problem.detail)
+        return answer
+
+
 class RecordedEpisodes:
     """`async with RecordedEpisodes(link) as recorded:`. Needs no robot, no seat and no connection to the session.
 
@@ -96,14 +126,7 @@ class RecordedEpisodes:
 
     def __init__(self, link: str, tls_ca: Path | None = None) -> None:
         """`tls_ca`: a file with a certificate to trust instead of the system's. Raises LinkFormatError."""
-        parsed = parse_link(link)
-        self._base = parsed.base
-        self._client = httpx.AsyncClient(
-            headers={"Authorization": f"Bearer {parsed.token}"},
-            timeout=TIMEOUT,
-            trust_env=not parsed.loopback,
-            verify=ssl.create_default_context(cafile=tls_ca) if parsed.secure and tls_ca is not None else parsed.secure,
-        )
+        self._console = _ConsoleHttp(parse_link(link), tls_ca)
 
     async def __aenter__(self) -> Self:
         return self
@@ -111,29 +134,29 @@ class RecordedEpisodes:
     async def __aexit__(
         self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
     ) -> None:
-        await self._client.aclose()
+        await self._console.close()
 
     async def recordings(self) -> list[RecordingWithEpisodes]:
         """Return the recordings, the one that changed last first, when the console has read all of them."""
         while True:
-            found = _list.decode((await self._request("GET", "/api/episodes")).content)
+            found = _list.decode((await self._console.request("GET", "/api/episodes")).content)
             if not found.pending:
                 return found.recordings
             await asyncio.sleep(PENDING_SECONDS)
 
     async def of(self, recording: str) -> RecordingWithEpisodes:
         """Return one recording, by its id."""
-        return _recording.decode((await self._request("GET", self._path(recording, "episodes"))).content)
+        return _recording.decode((await self._console.request("GET", _path(recording, "episodes"))).content)
 
     async def picture(self, recording: str, camera: str, event: int, width: int = 320) -> EpisodePicture:
         """Return the picture that belongs to an event, as a dataset's row has it. `width`: 160, 320 or 640 pixels."""
         query = f"?camera={quote(camera, safe='')}&event={event}&width={width}"
-        answer = await self._request("GET", self._path(recording, "picture") + query)
+        answer = await self._console.request("GET", _path(recording, "picture") + query)
         return EpisodePicture(int(answer.headers.get("Lockstep-Event", "0")), answer.content)
 
     async def report(self, recording: str) -> bytes:
         """Return a report of a closed recording, an HTML page."""
-        return (await self._request("GET", self._path(recording, "report"), seconds=REPORT_TIMEOUT)).content
+        return (await self._console.request("GET", _path(recording, "report"), seconds=REPORT_TIMEOUT)).content
 
     # changes; all return the recording as it is then
 
@@ -178,27 +201,13 @@ class RecordedEpisodes:
     async def _change(self, recording: RecordingWithEpisodes, **change: str | int | bool) -> RecordingWithEpisodes:
         body = {"revision": recording.revision, **change}
         try:
-            answer = await self._request("POST", self._path(recording.info.id, "episodes"), json=body)
+            answer = await self._console.request("POST", _path(recording.info.id, "episodes"), json=body)
         except SignallingRefused as refused:
             if refused.error in ("stale_edit", "edit_refused"):
                 raise EditRefused(refused.error, refused.detail) from refused
             raise
         return _recording.decode(answer.content)
 
-    def _path(self, recording: str, what: str) -> str:
-        return f"/api/recordings/{quote(recording, safe='')}/{what}"
 
-    async def _request(
-        self, method: str, path: str, *, json: object = None, seconds: float = TIMEOUT
-    ) -> httpx.Response:
-        try:
-            answer = await self._client.request(method, self._base + path, json=json, timeout=seconds)
-        except httpx.HTTPError as error:
-            raise ConnectFailed(f"no answer from {self._base} ({error or type(error).__name__})") from error
-        if answer.is_error:
-            try:
-                problem = _problem.decode(answer.content)
-            except msgspec.DecodeError:
-                problem = _Problem(detail=answer.text[:200])
-            raise SignallingRefused(answer.status_code, problem.error, problem.detail)
-        return answer
+def _path(recording: str, what: str) -> str:
+    return f"/api/recordings/{quote(recording, safe='')}/{what}"

@@ -88,9 +88,9 @@ class RobotActions:
         sender = self._driving.driver.sender
         if sender.newest is not None and sender.newest.stop.stopped:
             raise ActionRefused("stopped", sender.newest.stop.reason)
-        if action.moves and not sender.ready:
+        if action.moves and not sender.readiness.ready:
             raise NotArmed
-        if action.moves and sender.action:
+        if action.moves and sender.intention.action:
             raise ActionRefused("busy", "this connection moves the robot by another action")
         nonce = 0 if sender.newest is None else sender.newest.nonce
         id = secrets.token_hex(16)
@@ -120,8 +120,8 @@ class RobotActions:
 
     async def _renewed(self, id: str, progress: Callable[[ActionUpdate], None] | None) -> ActionUpdate:
         """Send armed events that name the action until it has ended."""
-        driver = self._driving.driver
-        driver.sender.action = id
+        intention = self._driving.driver.sender.intention
+        intention.action = id
         try:
             async with asyncio.TaskGroup() as tasks:
                 renewing = tasks.create_task(self._renew())
@@ -131,8 +131,8 @@ class RobotActions:
         except BaseExceptionGroup as errors:
             raise errors.exceptions[0] from None
         finally:
-            if driver.sender.action == id:
-                driver.sender.action = ""
+            if intention.action == id:
+                intention.action = ""
 
     async def _renew(self) -> None:
         """Send neutral commands as fast as answers come. Where they are refused, the robot ends the action itself."""

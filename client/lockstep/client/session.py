@@ -18,8 +18,8 @@ class Session:
 
     Attributes:
         welcome: this connection's id and role; None before the console sent it
-        seated: called when this connection becomes the holder of the seat
-        unseated: called when it is the holder no longer
+        seat_changed: called with True when this connection becomes the holder of the seat, and with False when it is
+            the holder no longer
         refusals: the last refusals of requests, not of commands
     """
 
@@ -34,8 +34,7 @@ class Session:
         self.traced_pictures: deque[PictureTrace] = deque(maxlen=KEPT_TRACES)
         self.traced_commands: deque[CommandTrace] = deque(maxlen=KEPT_TRACES)
         self.verdicts: deque[ShadowVerdict] = deque(maxlen=KEPT_TRACES)
-        self.seated: Callable[[], None] = _ignore
-        self.unseated: Callable[[], None] = _ignore
+        self.seat_changed: Callable[[bool], None] = _ignore
         self.refusals: deque[Refusal] = deque(maxlen=16)
 
     @property
@@ -74,10 +73,8 @@ class Session:
                 self.notes.append(message)
             case Seat():
                 held, self.seat = self.holds_seat, message
-                if self.holds_seat and not held:
-                    self.seated()
-                elif held and not self.holds_seat:
-                    self.unseated()
+                if self.holds_seat is not held:
+                    self.seat_changed(self.holds_seat)
 
     def stop_shown(self, stop: StopState) -> None:
         """Take the robot's present stop state."""
@@ -103,5 +100,5 @@ class Session:
         self.refusals.append(refusal)
 
 
-def _ignore() -> None:
+def _ignore(holds_seat: bool) -> None:
     pass

@@ -10,9 +10,9 @@ async def test_a_process_is_ready_after_its_first_line_and_gone_on_leaving() -> 
     script = "import sys; print('{\"ready\": 1}', flush=True); print('{\"said\": %s}' % input()); sys.stdin.read()"
     async with running_process(sys.executable, "-c", script) as (process, ready):
         assert ready == {"ready": 1}
-        assert process.cpu_seconds() >= 0
+        assert process.usage.cpu_seconds() >= 0
     with pytest.raises(FileNotFoundError):
-        process.cpu_seconds()
+        process.usage.cpu_seconds()
 
 
 async def test_a_question_gets_the_next_line_as_its_answer() -> None:
@@ -25,16 +25,16 @@ async def test_a_question_gets_the_next_line_as_its_answer() -> None:
 async def test_processor_time_grows_with_work() -> None:
     script = "print('{}', flush=True); input(); sum(range(20_000_000)); print('{}', flush=True); input()"
     async with running_process(sys.executable, "-c", script) as (process, _):
-        before = process.cpu_seconds()
+        before = process.usage.cpu_seconds()
         await process.ask("", 30)
-        assert process.cpu_seconds() > before
+        assert process.usage.cpu_seconds() > before
 
 
 async def test_a_paused_process_is_ended_too() -> None:
     async with running_process(sys.executable, "-c", "print('{}', flush=True); input()") as (process, _):
         process.pause()
     with pytest.raises(FileNotFoundError):
-        process.cpu_seconds()
+        process.usage.cpu_seconds()
 
 
 async def test_a_process_that_ends_before_it_is_ready_says_why() -> None:
@@ -49,8 +49,8 @@ async def test_a_line_is_awaited_wherever_it_is_written_and_errors_are_kept_apar
     async with started([sys.executable, "-c", script]) as process:
         assert await process.line("^t.o$") == "two"
         assert await process.line("one") == "one {"
-        assert process.errors == ["two"]
-        assert list(process.unread) == ["one {"]
+        assert process.output.errors == ["two"]
+        assert list(process.output.unread) == ["one {"]
         with pytest.raises(ProcessFailed):
             await process.line("three", 0.05)
 
@@ -59,7 +59,7 @@ async def test_what_a_process_has_said_when_it_ended_is_whole() -> None:
     script = "for number in range(300): print('{\"number\": %d}' % number)"
     async with started([sys.executable, "-c", script]) as process:
         assert await process.wait() == 0
-        assert [each["number"] for each in process.said()] == list(range(300))
+        assert [each["number"] for each in process.output.said()] == list(range(300))
         with pytest.raises(ProcessFailed, match="did not do its work"):
             await process.line("300")
 

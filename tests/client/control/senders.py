@@ -12,7 +12,7 @@ NEUTRAL = [0.0]
 def new_sender(event: int = 1, min_interval: float = 0.0) -> CommandSender:
     sender = CommandSender(CommandGate("feedback", 4, min_interval), NEUTRAL)
     sender.feedback(feedback(event), 0.0)
-    sender.ready = True
+    sender.readiness.ready = True
     return sender
 
 

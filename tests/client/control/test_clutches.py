@@ -26,7 +26,7 @@ class Side:
         self.clutches = Clutches(self.sender, AGE)
         self.clutch = Clutch(ARM, {"j": 1.0})
         self.hear(measured(1, at_rest=True), 0.0)
-        self.sender.ready = True
+        self.sender.readiness.ready = True
         self.clutches.add(self.clutch, 0.0)
 
     def hear(self, feedback: Feedback, now: float) -> None:
@@ -111,6 +111,6 @@ def test_after_a_gap_of_feedback_the_goal_that_waits_is_void_and_a_rest_leaves()
 def test_a_lost_seat_releases_it() -> None:
     side = Side()
     side.clutch.engage([0.0])
-    side.sender.unseated()
+    side.sender.seat_changed(False)
     side.clutches.settle()
     assert not side.clutch.engaged

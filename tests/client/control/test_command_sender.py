@@ -22,7 +22,7 @@ def test_an_intention_leaves_at_once_and_its_feedback_is_its_outcome() -> None:
     assert sender.feedback(answer, 0.03)
     assert [(each.ticket, each.feedback) for each in sender.outcomes()] == [(ticket, answer)]
     assert sender.outcomes() == []
-    assert list(sender.samples) == [0.03]
+    assert list(sender.retransmission.samples) == [0.03]
 
 
 def test_before_the_first_feedback_nothing_leaves() -> None:
@@ -50,7 +50,7 @@ def test_a_stick_that_is_let_go_does_not_wait_for_the_sound_that_its_command_mak
     sender.feedback(feedback(20), 0.0)
     flying(sender)
     sender.feedback(feedback(21, at_rest=False), 0.01)
-    sender.heard("microphone", 16, 0.01)
+    sender.gate.heard("microphone", 16, 0.01)
     sender.intend(FAST, 0.01)
     assert sender.wake_at(0.01) == 0.2
     assert sender.due(0.04) == []
@@ -62,8 +62,8 @@ def test_a_stick_that_is_let_go_does_not_wait_for_the_sound_that_its_command_mak
 def test_a_sender_that_waits_for_sound_wakes_when_none_has_been_heard_for_a_while() -> None:
     sender = CommandSender(CommandGate("media", 4, 0.0, sound_tolerance=4), NEUTRAL)
     sender.feedback(feedback(20), 0.0)
-    sender.shown(20)
-    sender.heard("microphone", 16, 0.0)
+    sender.gate.shown(20)
+    sender.gate.heard("microphone", 16, 0.0)
     sender.intend(FAST, 0.05)
     assert sender.due(0.05) == []
     assert sender.wake_at(0.05) == 0.6
@@ -78,7 +78,7 @@ def test_an_unanswered_command_is_repeated_with_the_newest_intention_and_the_new
     sender.intend([0.5], 0.06)
     assert sender.due(0.09) == []
     assert sender.due(INITIAL) == [Command(event=2, issue=2, values=[0.5])]
-    assert sender.repeats == 1
+    assert sender.retransmission.repeats == 1
 
 
 def test_an_intention_that_came_while_another_was_in_flight_gets_an_event_of_its_own() -> None:
@@ -183,22 +183,22 @@ def test_an_event_voided_by_a_rest_is_used_up_by_a_neutral_command_first() -> No
 
 def test_arming_sends_one_neutral_command_and_is_done_with_its_feedback() -> None:
     sender = new_sender()
-    sender.seated()
-    assert not sender.ready
+    sender.seat_changed(True)
+    assert not sender.readiness.ready
     assert sender.due(0.0) == []
     ticket = sender.arm()
     assert [(each.event, each.values) for each in commands(sender.due(0.0))] == [(2, NEUTRAL)]
     assert [(each.event, each.values) for each in commands(sender.due(INITIAL))] == [(2, NEUTRAL)], "its repeat as well"
     sender.feedback(feedback(2), INITIAL)
     assert [each.ticket for each in sender.outcomes() if each.feedback is not None] == [ticket]
-    assert (sender.ready, sender.armed) == (True, False), "nothing more leaves by itself"
+    assert (sender.readiness.ready, sender.armed) == (True, False), "nothing more leaves by itself"
     assert sender.due(10.0) == []
 
 
 @pytest.mark.parametrize("what", ["arm", "drive"])
 def test_an_event_that_somebody_else_executed_is_no_answer_to_a_command_without_the_seat(what: str) -> None:
     sender = new_sender()
-    sender.unseated()
+    sender.seat_changed(False)
     sender.outcomes()
     ticket = sender.arm() if what == "arm" else sender.intend(FAST, 0.0)
     assert [each.event for each in commands(sender.due(0.0))] == [2]
@@ -207,7 +207,7 @@ def test_an_event_that_somebody_else_executed_is_no_answer_to_a_command_without_
     assert (outcome.ticket, outcome.feedback) == (ticket, None)
     assert outcome.refusal is not None
     assert outcome.refusal.reason == "no_seat"
-    assert not sender.ready
+    assert not sender.readiness.ready
     assert sender.due(10.0) == []
 
 
@@ -215,24 +215,24 @@ def test_whoever_loses_the_seat_hears_at_once_that_a_command_in_flight_was_not_t
     sender = new_sender()
     ticket = sender.intend(FAST, 0.0)
     sender.due(0.0)
-    sender.unseated()
+    sender.seat_changed(False)
     assert [(each.ticket, each.refusal and each.refusal.reason) for each in sender.outcomes()] == [(ticket, "no_seat")]
     assert sender.due(10.0) == []
 
 
 def test_arming_goes_on_over_a_refusal_that_fresh_feedback_cures_and_until_the_robot_asks_for_nothing_more() -> None:
     sender = new_sender()
-    sender.seated()
+    sender.seat_changed(True)
     sender.arm()
     sender.due(0.0)
     sender.refusal(refusal(2, "late"))
     sender.feedback(feedback(1, 2, neutral_needed=True), 0.01)
     assert [each.event for each in commands(sender.due(0.01))] == [2]
     sender.feedback(feedback(2, neutral_needed=True), 0.02)
-    assert not sender.ready
+    assert not sender.readiness.ready
     assert [each.event for each in commands(sender.due(0.02))] == [3]
     sender.feedback(feedback(3), 0.03)
-    assert sender.ready
+    assert sender.readiness.ready
 
 
 def _again(what: str) -> Feedback:
@@ -256,7 +256,7 @@ def test_after_a_stop_or_whatever_else_asks_for_it_nothing_leaves_by_itself_that
     sender.feedback(_again(what), 0.02)
     if doing == "resting":
         sender.rest(0.02)
-    assert not sender.ready
+    assert not sender.readiness.ready
     assert not sender.armed
     refused = [each for each in sender.outcomes() if each.refusal is not None]
     assert refused
@@ -279,7 +279,7 @@ def test_what_is_wanted_while_the_robot_may_still_move_is_given_up_when_it_asks_
         (ticket, "not_neutral")
     ]
     sender.feedback(feedback(neutral.event), 0.03)  # it is executed after the robot asked
-    assert not sender.ready
+    assert not sender.readiness.ready
     assert commands(sender.due(1.0)) == []
 
 
@@ -293,7 +293,7 @@ def test_a_refusal_for_want_of_a_neutral_command_is_an_outcome_and_no_reason_to_
 
 def test_a_stop_ends_arming() -> None:
     sender = new_sender()
-    sender.seated()
+    sender.seat_changed(True)
     ticket = sender.arm()
     sender.feedback(_again("stopped"), 0.0)
     assert [(each.ticket, each.refusal.reason) for each in sender.outcomes() if each.refusal][-1] == (ticket, "stopped")
@@ -408,7 +408,7 @@ def test_media_pacing_waits_for_the_picture() -> None:
     sender.intend(FAST, 0.0)
     assert sender.due(0.0) == []
     assert sender.wake_at(0.0) == float("inf")
-    sender.shown(5)
+    sender.gate.shown(5)
     assert len(sender.due(0.1)) == 1
 
 
@@ -493,7 +493,7 @@ class TestGoals:
     def sender(self) -> CommandSender:
         sender = CommandSender(CommandGate("feedback", 4, 0.0), self.NEUTRAL)
         sender.feedback(feedback(1), 0.0)
-        sender.ready = True
+        sender.readiness.ready = True
         return sender
 
     def test_a_command_and_its_repeats_carry_the_goals_and_the_speed(self) -> None:
@@ -507,11 +507,11 @@ class TestGoals:
         sender = self.sender()
         sender.intend([0.5, 0.0], 0.0)
         [moving] = commands(sender.due(0.0))
-        assert not sender.moves_nothing(moving)
+        assert not sender.intention.moves_nothing(moving)
         sender.feedback(feedback(2), 0.01)
         [idle] = commands(sender.due(IDLE + TURN))
         assert (idle.values, idle.speed) == (list(self.NEUTRAL), 1.0)
-        assert sender.moves_nothing(idle)
+        assert sender.intention.moves_nothing(idle)
 
     def test_arming_and_resting_let_goal_axes_stay(self) -> None:
         sender = self.sender()
@@ -536,4 +536,4 @@ class TestGoals:
         assert outcome.refusal is not None
         assert outcome.refusal.reason == "jump"
         assert sender.due(10.0) == []
-        assert not sender.ready
+        assert not sender.readiness.ready

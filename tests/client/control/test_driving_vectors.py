@@ -20,7 +20,7 @@ class Person:
 
     def __init__(self) -> None:
         self.sender = CommandSender(CommandGate("feedback", 4, 0.0), NEUTRAL)
-        self.sender.seated()
+        self.sender.seat_changed(True)
         self.wants: list[float] | None = None
         self._sent = 0
 
@@ -35,7 +35,7 @@ class Person:
         elif do == "arm":
             sender.arm()
         elif do == "seat":
-            sender.seated()
+            sender.seat_changed(True)
         elif do == "let_go":
             self.wants = None
             sender.rest(now)
@@ -44,7 +44,7 @@ class Person:
 
     def leaving(self, now: float) -> list[list[object]]:
         """`Console.drive` asks for nothing before the robot may move."""
-        if self.wants is not None and self.sender.ready:
+        if self.wants is not None and self.sender.readiness.ready:
             self.sender.intend(self.wants, now)
         found: list[list[object]] = []
         for message in self.sender.due(now):

@@ -116,7 +116,7 @@ class GoalDriving(RuleBasedStateMachine):
         """Take the seat, send a neutral command, move the arm, and give the seat back."""
         self.losses += 1
         self.seat_rules.take("boss", "supervisor", self.now)
-        self.sender.unseated()
+        self.sender.seat_changed(False)
         self.step()
         self.event = event_after(self.event)
         self.issue = 1
@@ -124,7 +124,7 @@ class GoalDriving(RuleBasedStateMachine):
         self.measure()
         self.seat_rules.release("boss", self.now)
         self.seat_rules.request("me", "operator", self.now)
-        self.sender.seated()
+        self.sender.seat_changed(True)
         self.step()
 
     @rule(pushed=st.floats(-1.0, 1.0))
@@ -221,7 +221,7 @@ class GoalDriving(RuleBasedStateMachine):
         if not isinstance(message, Command) or message.values[1] is None:
             return
         # The robot refuses what is under way when it asks for a neutral command.
-        assert self.clutch.engaged or not self.sender.ready, "a goal left without an engaged clutch"
+        assert self.clutch.engaged or not self.sender.readiness.ready, "a goal left without an engaged clutch"
 
     @rule(seconds=st.sampled_from([0.01, 0.05, 0.3, 3.0]))
     def wait(self, seconds: float) -> None:
@@ -237,7 +237,7 @@ class GoalDriving(RuleBasedStateMachine):
     def engage(self, where: float) -> None:
         """Anywhere; the first goal is the applied goal of the newest feedback."""
         self.device = where
-        if self.sender.ready and self.clutch.engage([where]):
+        if self.sender.readiness.ready and self.clutch.engage([where]):
             newest = self.sender.newest
             assert newest is not None
             assert self.clutch.goals([where]) == [newest.goals[1]]
@@ -257,7 +257,7 @@ class GoalDriving(RuleBasedStateMachine):
     @rule()
     def let_go(self) -> None:
         self.clutch.release()
-        if self.sender.ready:
+        if self.sender.readiness.ready:
             self.sender.intend(NEUTRAL, self.now)
         self.step()
 
@@ -269,7 +269,7 @@ class GoalDriving(RuleBasedStateMachine):
 
     def drive(self) -> None:
         """As a program does: what the clutch says, once `ready`."""
-        if self.sender.ready:
+        if self.sender.readiness.ready:
             (goal,) = self.clutch.goals([self.device])
             if goal is not None:
                 self.bound_at[goal] = max(self.engaged_at, self.bound_at.get(goal, 0))
@@ -278,7 +278,7 @@ class GoalDriving(RuleBasedStateMachine):
 
     @invariant()
     def engaged_only_where_the_robot_may_move(self) -> None:
-        assert not self.clutch.engaged or self.sender.ready
+        assert not self.clutch.engaged or self.sender.readiness.ready
 
 
 TestGoalDriving = GoalDriving.TestCase

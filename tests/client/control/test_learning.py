@@ -33,11 +33,11 @@ def test_what_is_learnt_and_copied_follows_the_shared_table(case: dict[str, Any]
     for step in case["steps"]:
         at = step["at_ms"] / 1000
         if "ping_ms" in step:
-            sender.ping_answered(step["ping_ms"] / 1000)
+            sender.retransmission.ping_answered(step["ping_ms"] / 1000)
         if step.get("loss"):
-            sender.loss(at)
+            sender.retransmission.loss(at)
         if "command" in step:
             event += 1
             sends = command(sender, event, at, step["command"]["answer_ms"] / 1000)
             assert sends == pytest.approx(step["command"]["sends_ms"], abs=1e-6)
-        assert sender.timer.interval * 1000 == pytest.approx(step["interval_ms"], abs=1e-3)
+        assert sender.retransmission.timer.interval * 1000 == pytest.approx(step["interval_ms"], abs=1e-3)

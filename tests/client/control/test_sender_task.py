@@ -21,7 +21,7 @@ class Wire:
         self.answering = answering
         self.driver = Driver(CommandSender(CommandGate("feedback", 4, 0.0), [0.0]), self.send)
         self.driver.feedback(feedback(1))
-        self.driver.sender.ready = True
+        self.driver.sender.readiness.ready = True
 
     def send(self, message: Command | Rest) -> None:
         self.sent.append(message)

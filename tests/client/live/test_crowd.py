@@ -30,14 +30,14 @@ class Steps:
         self._last: int | None = None  # in 90 kHz
 
     async def watch(self, console: Console, changed: asyncio.Condition) -> None:
-        pictures = cast(Any, console)._live().media.stream("video", "").open_reader(50)
-        while True:
-            time = (await pictures.get()).timestamp
-            if self._last is not None:
-                self._steps.append((time - self._last) % 2**32 / 90_000)
-            self._last = time
-            async with changed:
-                changed.notify_all()
+        with cast(Any, console)._live().media.stream("video", "").readers.open(50) as pictures:
+            while True:
+                time = (await pictures.get()).timestamp
+                if self._last is not None:
+                    self._steps.append((time - self._last) % 2**32 / 90_000)
+                self._last = time
+                async with changed:
+                    changed.notify_all()
 
     @property
     def thinned(self) -> bool:

@@ -2,7 +2,7 @@ import asyncio
 
 import pytest
 
-from lockstep.client.media.newest_queue import NewestQueue, QueueClosed
+from lockstep.client.media.newest_queue import NewestQueue, QueueClosed, Readers
 
 
 async def test_a_full_queue_loses_its_oldest_item_and_counts_it() -> None:
@@ -55,3 +55,23 @@ async def test_what_is_cleared_counts_as_dropped() -> None:
     queue.put(2)
     assert queue.clear() == 2
     assert (len(queue), queue.dropped) == (0, 2)
+
+
+async def test_each_reader_has_its_own_pace_and_what_they_lost_is_counted_after_they_are_gone() -> None:
+    readers: Readers[int] = Readers()
+    with readers.open(1) as slow, readers.open(2) as quick:
+        readers.put(1)
+        readers.put(2)
+        assert [await slow.get(), await quick.get(), await quick.get()] == [2, 1, 2]
+        assert (len(readers), readers.dropped) == (2, 1)
+    assert (len(readers), readers.dropped) == (0, 1)
+
+
+async def test_readers_of_a_closed_source_end_also_later_ones() -> None:
+    readers: Readers[int] = Readers()
+    with readers.open(2) as early:
+        readers.close()
+        with pytest.raises(QueueClosed):
+            await early.get()
+    with readers.open(2) as late, pytest.raises(QueueClosed):
+        await late.get()

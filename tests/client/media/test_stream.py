@@ -39,13 +39,11 @@ def packet(sequence: int, data: bytes, stamp: int | None) -> MediaPacket:
 
 @asynccontextmanager
 async def running(stream: Stream, bound: int = 50) -> AsyncIterator[NewestQueue[Decoded]]:
-    reader = stream.open_reader(bound)
-    with ThreadPoolExecutor(1) as executor:
+    with stream.readers.open(bound) as reader, ThreadPoolExecutor(1) as executor:
         async with asyncio.TaskGroup() as group, asyncio.timeout(20):
             task = group.create_task(stream.run(executor))
             yield reader
             task.cancel()
-    stream.close_reader(reader)
 
 
 async def test_pictures_come_out_decoded_and_gated() -> None:
@@ -131,11 +129,12 @@ async def test_packets_of_an_unknown_payload_type_are_left_out() -> None:
 
 async def test_a_closed_stream_ends_its_readers_and_opens_no_more() -> None:
     stream = new_stream(Shown())
-    early = stream.open_reader(2)
-    stream.close()
-    for reader in (early, stream.open_reader(2)):
-        with pytest.raises(QueueClosed):
-            await reader.get()
+    with stream.readers.open(2) as early:
+        stream.close()
+        with stream.readers.open(2) as late:
+            for reader in (early, late):
+                with pytest.raises(QueueClosed):
+                    await reader.get()
 
 
 async def test_what_a_reader_lost_is_counted_after_it_is_gone() -> None:
@@ -177,7 +176,6 @@ async def test_sound_that_plays_or_is_too_old_is_noted_and_sound_that_overtook_t
     stream = Stream("microphone", "audio", {0: "PCMU"}, "native", gate, Shown(), on_heard=on_heard)
     stream.feedback(10)
     async with running(stream):
-        stream.open_reader(50)
         for number, stamp in enumerate([1, 8, 20, 12]):
             stream.packet(0, MediaPacket(number, number * 160, True, b"\xff" * 160, stamp))
         await last.wait()
@@ -204,8 +202,8 @@ async def test_sound_that_nobody_reads_is_not_heard() -> None:
             stream.packet(0, MediaPacket(0, 0, True, b"\xff" * 160, 10))
             await rendered.wait()
             rendered.clear()
-            stream.open_reader(50)
-            stream.packet(0, MediaPacket(1, 160, True, b"\xff" * 160, 9))
-            await rendered.wait()
+            with stream.readers.open(50):
+                stream.packet(0, MediaPacket(1, 160, True, b"\xff" * 160, 9))
+                await rendered.wait()
             task.cancel()
     assert heard == [9]

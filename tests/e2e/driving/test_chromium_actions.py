@@ -6,7 +6,8 @@ from typing import Any
 import pytest
 from playwright.async_api import Browser, Locator, expect
 
-from lockstep.bench.browsers.console_page import RB, ConsolePage, open_console
+from lockstep.bench.browsers.console_page import ConsolePage, open_console
+from lockstep.bench.browsers.pad import RB
 from tests.client.live.truth import until_logged
 from tests.support.stack import Stack
 
@@ -39,7 +40,7 @@ async def _away(console: ConsolePage) -> None:
     await console.until_live()
     for _ in range(TRIES):
         await console.drive_on_until("Math.abs(s.joints?.[0] ?? 0) > 0.4")
-        await console.let_go()
+        await console.pad.let_go()
         await console.until("s.at_rest === true")
         if (await console.stats())["armed"]:
             await console.page.evaluate(WATCH_HOME)
@@ -114,20 +115,20 @@ async def test_a_pad_asks_for_nothing_under_a_window_or_in_a_page_that_is_not_in
         await console.until_live()
         await console.page.keyboard.press("h")
         await expect(console.page.get_by_role("dialog")).to_be_visible()
-        await console.press(X)
-        await console.press(X, False)
+        await console.pad.press(X)
+        await console.pad.press(X, False)
         said = console.page.get_by_text("First close the window over the picture")
         await expect(said.first).to_be_attached()
         await console.page.get_by_role("dialog").get_by_role("button", name="Close").click()
         await expect(console.page.get_by_role("dialog")).to_be_hidden()
         await console.page.evaluate("document.hasFocus = () => false")
-        await console.press(X)
-        await console.press(X, False)
+        await console.pad.press(X)
+        await console.pad.press(X, False)
         await expect(console.page.get_by_text("The page is not in front").first).to_be_attached()
         assert not await stack.events("action")
         await console.page.evaluate("document.hasFocus = () => true")
-        await console.press(X)
-        await console.press(X, False)
+        await console.pad.press(X)
+        await console.pad.press(X, False)
         await expect(_action(console, "light")).to_have_attribute("data-state", "done")
 
 
@@ -135,8 +136,8 @@ async def test_a_pad_asks_for_nothing_under_a_window_or_in_a_page_that_is_not_in
 async def test_the_pad_and_the_keyboard_ask_and_cancel_too(stack: Stack, chromium: Browser, how: str) -> None:
     async def ask() -> None:
         if how == "pad":
-            await console.press(A)
-            await console.press(A, False)
+            await console.pad.press(A)
+            await console.pad.press(A, False)
         else:
             await console.page.keyboard.press("1")
 
@@ -177,8 +178,8 @@ async def test_what_moves_ends_with_everything_that_ends_driving(
                 continue
             await _end(console, how)
             ended = await _ended(stack, since)
-            await console.press(RB, False)
-            await console.tilt(1, 0)
+            await console.pad.press(RB, False)
+            await console.pad.tilt(1, 0)
             if ended["state"] == "cancelled":
                 break
             if how == "stop":
@@ -196,8 +197,8 @@ async def _end(console: ConsolePage, how: str) -> None:
         case "cancel":
             await _action(console, "home").get_by_role("button").click()
         case "stick":
-            await console.press(RB)
-            await console.tilt(1, -0.5)
+            await console.pad.press(RB)
+            await console.pad.tilt(1, -0.5)
         case "disarm":
             await console.page.get_by_role("button", name="Disarm").click()
         case "stop":

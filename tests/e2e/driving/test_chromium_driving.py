@@ -3,7 +3,9 @@
 import pytest
 from playwright.async_api import Browser
 
-from lockstep.bench.browsers.console_page import FORWARD, LEFT_Y, RB, START, ConsolePage, open_console
+from lockstep.bench.browsers.console_page import ConsolePage, open_console
+from lockstep.bench.browsers.event_strip import drawn_event
+from lockstep.bench.browsers.pad import FORWARD, LEFT_Y, RB, START
 from tests.support.stack import Stack
 
 pytestmark = pytest.mark.browser
@@ -55,7 +57,7 @@ async def test_driving_moves_the_robot_and_nothing_outside_the_tolerance_is_rend
         # Sound that piled up while the sound device opened must not keep it behind the events for long.
         await console.until("s.streams.microphone.rendered > 60 && s.streams.overview.rendered > 30")
         _no_violation(await console.stats())
-        await console.press(RB, False)
+        await console.pad.press(RB, False)
         await console.until("!s.driving && s.at_rest === true")
     executed = [record["event"] for record in await stack.events("executed")]
     assert len(executed) >= 60
@@ -77,7 +79,7 @@ async def test_the_event_drawn_into_a_picture_is_the_stamp_it_was_rendered_by(
             while len(compared) < 20:
                 event = (await console.stats())["event"]
                 for stream in ("overview", "front"):
-                    read = await console.strip(stream)
+                    read = await drawn_event(console.page, stream)
                     if read is not None and read[1] is not None:
                         assert read[0] == read[1], stream
                         compared.add(read[1])
@@ -116,7 +118,7 @@ async def test_blur_disarms_and_the_robot_comes_to_rest(stack: Stack, chromium: 
         # The stick is still tilted and the deadman still held: that must not arm it again.
         event = (await console.stats())["event"]
         await console.page.evaluate("window.dispatchEvent(new Event('focus'))")
-        await console.press(START)
+        await console.pad.press(START)
         await console.until("s.streams.overview.rendered > 0")
         assert not (await console.stats())["armed"]
         assert (await console.stats())["event"] <= event + 1
@@ -156,4 +158,4 @@ async def test_contact_is_felt_as_rumble(own_stack: Stack, chromium: Browser) ->
         await console.until_live()
         async with console.driving(FORWARD):
             await console.until("window.testPad.rumbles.length > 0")
-        await console.tilt(LEFT_Y, 0)
+        await console.pad.tilt(LEFT_Y, 0)

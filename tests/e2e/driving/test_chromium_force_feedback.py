@@ -8,7 +8,8 @@ import pytest
 from playwright.async_api import Browser, Page, expect
 
 from lockstep.bench.browsers.chromium import PAD
-from lockstep.bench.browsers.console_page import FORWARD, RB, SMALL_WINDOW, START, STOP_BUTTON, ConsolePage
+from lockstep.bench.browsers.console_page import SMALL_WINDOW, ConsolePage
+from lockstep.bench.browsers.pad import FORWARD, RB, START, STOP_BUTTON
 from tests.e2e.accessibility import findings
 from tests.support.stack import Stack, running_stack
 
@@ -77,7 +78,7 @@ async def _is_free(console: ConsolePage) -> None:
 
 async def _let_go(console: ConsolePage) -> None:
     """Seen by the page, on a busy machine too: arming needs it."""
-    await console.press(RB, False)
+    await console.pad.press(RB, False)
     await console.until("!s.driving")
 
 
@@ -95,14 +96,14 @@ async def test_a_stick_is_chosen_pushes_back_at_a_wall_and_is_free_with_everythi
         # the deadman is let go
         await _let_go(console)
         await _is_free(console)
-        await console.press(START)
+        await console.pad.press(START)
         await console.until("!s.armed")
-        await console.press(START, False)
+        await console.pad.press(START, False)
         # disarmed
         await _until_it_pushes(console)
-        await console.press(START)
+        await console.pad.press(START)
         await _is_free(console)
-        await console.press(START, False)
+        await console.pad.press(START, False)
         await _let_go(console)
         # the page is hidden
         await _until_it_pushes(console)
@@ -112,9 +113,9 @@ async def test_a_stick_is_chosen_pushes_back_at_a_wall_and_is_free_with_everythi
         await _let_go(console)
         # STOP
         await _until_it_pushes(console)
-        await console.press(STOP_BUTTON)
+        await console.pad.press(STOP_BUTTON)
         await _is_free(console)
-        await console.press(STOP_BUTTON, False)
+        await console.pad.press(STOP_BUTTON, False)
         await _let_go(console)
         await console.until("s.stop.stopped")
         await console.reset()

@@ -8,7 +8,8 @@ import pytest
 import pytest_asyncio
 from playwright.async_api import Browser, Locator, Page, expect
 
-from lockstep.bench.browsers.console_page import LEFT_X, RB, START, ConsolePage, open_console
+from lockstep.bench.browsers.console_page import ConsolePage, open_console
+from lockstep.bench.browsers.pad import LEFT_X, RB, START
 from tests.e2e.accessibility import findings
 from tests.e2e.driving.goal_arm import AXES, ELBOW, LAYERS, PAN, ROLL
 from tests.support.stack import Stack, running_stack
@@ -176,19 +177,19 @@ async def test_a_pad_reaches_all_six_joints_by_two_layers_and_one_that_turns_on_
     async with open_console(chromium, arm.operator) as console:
         await console.until_live()
         await console.arm()
-        await console.press(Y)
-        await console.press(Y, False)
+        await console.pad.press(Y)
+        await console.pad.press(Y, False)
         await console.until("s.layer === 'wrist'")
-        await console.press(RB)
-        await console.tilt(LEFT_X, 1.0)
+        await console.pad.press(RB)
+        await console.pad.tilt(LEFT_X, 1.0)
         await console.until(
             "s.goals.roll > 3.3 || s.goals.roll < -2.5", 60
         )  # past the border, whose other side is -3.1
-        await console.tilt(LEFT_X, 0.0)
+        await console.pad.tilt(LEFT_X, 0.0)
         await _comes_to_rest(console, "roll")
-        await console.press(RB, False)
-        await console.press(START)
-        await console.press(START, False)
+        await console.pad.press(RB, False)
+        await console.pad.press(START)
+        await console.pad.press(START, False)
         await console.until("!s.armed")
         values = [value for value in await _executed(arm, 4) if value is not None]
         assert max(values) - min(values) < 2 * (ROLL.wrap or 0)

@@ -5,7 +5,8 @@ from pathlib import Path
 import pytest
 from playwright.async_api import Browser, expect
 
-from lockstep.bench.browsers.console_page import LEFT_X, LEFT_Y, RB, open_console
+from lockstep.bench.browsers.console_page import open_console
+from lockstep.bench.browsers.pad import LEFT_X, LEFT_Y, RB
 from tests.support.stack import running_stack
 
 pytestmark = pytest.mark.browser
@@ -26,8 +27,8 @@ async def test_a_geofence_and_the_speed_cap_are_shown_and_the_consoles_cap_canno
             await console.until("s.driving && s.limits.includes('charger')")
             strip = console.page.get_by_label("Limits of the robot")
             await strip.get_by_text("Keep out: Charging corner").wait_for()
-        await console.tilt(LEFT_X, 0)
-        await console.tilt(LEFT_Y, 1)
+        await console.pad.tilt(LEFT_X, 0)
+        await console.pad.tilt(LEFT_Y, 1)
         await console.until("s.limits.length === 0")
-        await console.press(RB, False)
+        await console.pad.press(RB, False)
         await console.until("!s.driving && s.at_rest === true")

@@ -7,7 +7,8 @@ from typing import Any
 import pytest
 from playwright.async_api import Browser, expect
 
-from lockstep.bench.browsers.console_page import FORWARD, LEFT_Y, RB, START, ConsolePage, open_console
+from lockstep.bench.browsers.console_page import ConsolePage, open_console
+from lockstep.bench.browsers.pad import FORWARD, LEFT_Y, RB, START
 from tests.support.stack import Stack
 
 pytestmark = pytest.mark.browser
@@ -219,9 +220,9 @@ async def test_turbo_drives_as_fast_as_the_limits_allow_and_the_settings_move_to
         async with console.driving(FORWARD):
             event = (await console.stats())["event"]
             await console.until(f"s.event > {event + 8}", 40)
-            await console.press(10)
+            await console.pad.press(10)
             await console.until(f"s.event > {event + 22}", 40)
-        await console.press(RB, False)
+        await console.pad.press(RB, False)
         await console.until("s.at_rest === true")
     fastest = [max(map(abs, record["values"])) for record in await stack.events("executed") if any(record["values"])]
     assert fastest[0] == pytest.approx(0.4)

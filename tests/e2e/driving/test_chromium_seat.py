@@ -12,7 +12,8 @@ import pytest
 from playwright.async_api import Browser, Locator, expect
 from playwright.async_api import TimeoutError as PlaywrightTimeoutError
 
-from lockstep.bench.browsers.console_page import RB, START, ConsolePage, open_console
+from lockstep.bench.browsers.console_page import ConsolePage, open_console
+from lockstep.bench.browsers.pad import RB, START
 from tests.e2e.tamper import open_tampered
 from tests.support.stack import Stack, running_stack
 
@@ -114,7 +115,7 @@ async def test_a_supervisor_takes_control_with_one_click_and_drives_after_arming
         await _all_say((ann, "Sue took control from you"), (sue, "You took control from Ann. Arm to drive"))
         await _lost_the_seat(ann)
         await _drives_after_arming(sue)
-        await sue.press(RB, False)
+        await sue.pad.press(RB, False)
         await sue.until("s.at_rest === true")
 
 
@@ -135,9 +136,9 @@ async def _stays(console: ConsolePage) -> bool:
     if not (await console.stats())["seat"]["mine"]:
         await _button(console, "Request control").click()
         await console.until("s.seat.mine")
-    await console.press(START)
+    await console.pad.press(START)
     await console.until("s.armed || !s.seat.mine")
-    await console.press(START, False)
+    await console.pad.press(START, False)
     await console.page.evaluate("window.seatSaid.length = 0")
     await console.until(f"!s.seat.mine || {WARNED}")
     await console.page.evaluate("window.seatSaid.splice(0, window.seatSaid.length - 1)")

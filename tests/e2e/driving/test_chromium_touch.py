@@ -3,7 +3,8 @@
 import pytest
 from playwright.async_api import Browser
 
-from lockstep.bench.browsers.console_page import FORWARD, RB, START, STOP_BUTTON, ConsolePage, open_console
+from lockstep.bench.browsers.console_page import ConsolePage, open_console
+from lockstep.bench.browsers.pad import FORWARD, RB, START, STOP_BUTTON
 from tests.support.stack import Stack
 
 pytestmark = pytest.mark.browser
@@ -17,7 +18,7 @@ async def _feel_a_contact(console: ConsolePage) -> None:
 
 async def _let_go(console: ConsolePage) -> None:
     """Seen by the page, on a busy machine too: arming needs it."""
-    await console.press(RB, False)
+    await console.pad.press(RB, False)
     await console.until("!s.driving")
 
 
@@ -49,10 +50,10 @@ async def test_a_contact_is_felt_no_later_than_it_is_seen_and_rumble_ends_with_e
         assert event >= shown
         # let go and disarmed
         await _let_go(console)
-        await console.press(START)
+        await console.pad.press(START)
         await console.until("!s.armed")
         await _is_still(console)
-        await console.press(START, False)
+        await console.pad.press(START, False)
         # the page is hidden
         await _feel_a_contact(console)
         await page.evaluate(HIDE, True)
@@ -61,9 +62,9 @@ async def test_a_contact_is_felt_no_later_than_it_is_seen_and_rumble_ends_with_e
         await _let_go(console)
         # STOP
         await _feel_a_contact(console)
-        await console.press(STOP_BUTTON)
+        await console.pad.press(STOP_BUTTON)
         await _is_still(console)
-        await console.press(STOP_BUTTON, False)
+        await console.pad.press(STOP_BUTTON, False)
         await _let_go(console)
         await console.until("s.stop.stopped")
         await console.reset()

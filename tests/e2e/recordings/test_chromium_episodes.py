@@ -7,7 +7,8 @@ from pathlib import Path
 import pytest
 from playwright.async_api import Browser, Page, expect
 
-from lockstep.bench.browsers.console_page import RB, ConsolePage, open_console
+from lockstep.bench.browsers.console_page import ConsolePage, open_console
+from lockstep.bench.browsers.pad import RB
 from lockstep.bench.harness.driving import drive_on
 from lockstep.client import Console
 from lockstep.server.recording.reading.reader import RecordingReader
@@ -28,7 +29,7 @@ async def _shot(page: Page, name: str) -> None:
 
 async def _press(console: ConsolePage, button: int) -> None:
     for pressed in (True, False):
-        await console.press(button, pressed)
+        await console.pad.press(button, pressed)
 
 
 async def test_a_supervisor_begins_and_keeps_episodes_with_keys_and_pad_while_an_operator_drives(
@@ -66,21 +67,21 @@ async def test_a_supervisor_begins_and_keeps_episodes_with_keys_and_pad_while_an
         await bar.get_by_role("button", name="Discard").click()
         await expect(bar.locator(".episode-count")).to_have_text("1 kept · 2 discarded")
         await expect(bar.locator(".episode-words")).to_have_text("Episode 3 is discarded")
-        await page_console.press(RIGHT_STICK, True)
+        await page_console.pad.press(RIGHT_STICK, True)
         await _press(page_console, A)
         await expect(bar.locator(".episode-words")).to_contain_text("Take 4")
-        await page_console.press(RB, True)
+        await page_console.pad.press(RB, True)
         for button in (X, LB):
             await _press(page_console, button)
             await expect(bar.locator(".episode-words")).to_have_text("Not done: let go of the button to hold first")
         await expect(bar.locator(".episode-count")).to_have_text("1 kept · 2 discarded")
-        await page_console.press(RB, False)
+        await page_console.pad.press(RB, False)
         await _press(page_console, CROSS_UP)
         for _ in range(3):
             await drive_on(driver, [0.2, 0.0, 0.0])
         await _press(page_console, X)
         await expect(bar.locator(".episode-count")).to_have_text("2 kept · 2 discarded")
-        await page_console.press(RIGHT_STICK, False)
+        await page_console.pad.press(RIGHT_STICK, False)
         await page.set_viewport_size({"width": 390, "height": 844})
         await _shot(page, "phone-idle")
         await page.keyboard.press("b")

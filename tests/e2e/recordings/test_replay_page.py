@@ -10,7 +10,8 @@ import pytest
 from playwright.async_api import Browser, Page, expect
 
 from lockstep.bench.browsers.chromium import open_page
-from lockstep.bench.browsers.console_page import READ_STRIP, ConsolePage, open_console
+from lockstep.bench.browsers.console_page import ConsolePage, open_console
+from lockstep.bench.browsers.event_strip import READ_STRIP
 from lockstep.emulator import Network
 from lockstep.server.recording.reading.reader import Record, RecordingReader
 from tests.support.stack import Stack

@@ -11,7 +11,8 @@ import pytest
 from playwright.async_api import Browser, Page, expect
 
 from lockstep.bench.browsers.chromium import open_page
-from lockstep.bench.browsers.console_page import READ_STRIP, ConsolePage
+from lockstep.bench.browsers.console_page import ConsolePage
+from lockstep.bench.browsers.event_strip import READ_STRIP
 from lockstep.bench.harness.driving import drive_on
 from lockstep.client import Console
 from lockstep.server.recording.reading.reader import RecordingReader

@@ -8,7 +8,8 @@ from typing import Any
 import pytest
 from playwright.async_api import Browser
 
-from lockstep.bench.browsers.console_page import RB, STOP_BUTTON, ConsolePage, open_console
+from lockstep.bench.browsers.console_page import ConsolePage, open_console
+from lockstep.bench.browsers.pad import RB, STOP_BUTTON
 from tests.e2e.so101 import SO101, needs_so101
 from tests.support.c_robot import running_c_robot
 from tests.support.ros2 import EXAMPLES, have_ros, ros_python, running_ros_robot
@@ -111,11 +112,11 @@ async def _drive(console: ConsolePage, robot: Any, binding: Any, driven: set[str
     direction = -sign if binding["invert_pad"] else sign
     rendered = await _rendered(console)
     for _ in range(TRIES):
-        await console.press(RB)
+        await console.pad.press(RB)
         if binding["pad"] in STICKS:
-            await console.tilt(STICKS[binding["pad"]], direction)
+            await console.pad.tilt(STICKS[binding["pad"]], direction)
         else:
-            await console.press(BUTTONS[binding["pad"]][direction > 0])
+            await console.pad.press(BUTTONS[binding["pad"]][direction > 0])
         await console.until(f"!s.armed || ({moved})")
         if not await console.was_held_up():
             break
@@ -148,10 +149,10 @@ async def _moved(console: ConsolePage, axis: Any, scale: float, *, again: bool) 
 
 async def _let_go(console: ConsolePage, binding: Any, direction: int) -> None:
     if binding["pad"] in STICKS:
-        await console.tilt(STICKS[binding["pad"]], 0)
+        await console.pad.tilt(STICKS[binding["pad"]], 0)
     else:
-        await console.press(BUTTONS[binding["pad"]][direction > 0], False)
-    await console.press(RB, False)
+        await console.pad.press(BUTTONS[binding["pad"]][direction > 0], False)
+    await console.pad.press(RB, False)
 
 
 async def _rendered(console: ConsolePage) -> dict[str, int]:
@@ -172,9 +173,9 @@ async def _saw_every_camera(console: ConsolePage, robot: Any) -> None:
 
 
 async def _stop_and_reset(console: ConsolePage) -> None:
-    await console.press(STOP_BUTTON)
+    await console.pad.press(STOP_BUTTON)
     await console.until("s.stop.stopped && !s.armed && s.at_rest === true")
-    await console.press(STOP_BUTTON, False)
+    await console.pad.press(STOP_BUTTON, False)
     await console.reset()
     await console.until("!s.stop.stopped && s.at_rest === true")
 

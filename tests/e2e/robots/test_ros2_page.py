@@ -7,7 +7,9 @@ import pytest
 import pytest_asyncio
 from playwright.async_api import Browser, expect
 
-from lockstep.bench.browsers.console_page import LEFT_Y, RB, open_console
+from lockstep.bench.browsers.console_page import open_console
+from lockstep.bench.browsers.event_strip import drawn_event
+from lockstep.bench.browsers.pad import LEFT_Y, RB
 from tests.support.ros2 import EXAMPLES, RosRobot, have_ros, ros_python, running_ros_robot
 from tests.support.stack import Stack, running_stack
 
@@ -37,21 +39,21 @@ async def test_the_page_drives_the_node_and_shows_what_it_says(base: Stack, node
         await console.drive_forward()
         await console.until("s.axes['base.vx'] > 0.45", 30)  # by its odometry
         await expect(console.page.locator(".radar")).to_be_visible()  # by its laser scan
-        read = await console.strip("front")  # the number that the camera drew into its picture
+        read = await drawn_event(console.page, "front")  # the number that the camera drew into its picture
         assert read is not None
         assert read[1] in {note["number"] for note in node.notes("picture")}
-        await console.press(RB, False)
+        await console.pad.press(RB, False)
         await console.until("!s.driving && s.at_rest === true")  # so is a robot that still has a last 1 cm/s to go
         twists = [note["values"] for note in await node.ended_in_one_zero()]
         assert 0.45 < max(forward for forward, _ in twists) < 0.501, "the stick's full travel, or nearly"
 
-        await console.press(RB)
+        await console.pad.press(RB)
         await console.until("s.driving && s.at_rest === false")
         await node.tell("hush /odom")
         await console.until("s.axes['base.vx'] === null && s.faults.some((x) => x.startsWith('/odom: no message'))")
         await expect(console.page.get_by_text("/odom: no message for").first).to_be_visible()
-        await console.press(RB, False)
-        await console.tilt(LEFT_Y, 0)
+        await console.pad.press(RB, False)
+        await console.pad.tilt(LEFT_Y, 0)
         await node.tell("speak /odom")
         await console.until("s.axes['base.vx'] === 0 && s.faults.length === 0")
         await node.ended_in_one_zero(motions=2)

@@ -10,7 +10,8 @@ import msgspec
 import pytest
 from playwright.async_api import Browser, Locator, expect
 
-from lockstep.bench.browsers.console_page import RB, ConsolePage, open_console
+from lockstep.bench.browsers.console_page import ConsolePage, open_console
+from lockstep.bench.browsers.pad import RB
 from lockstep.bench.harness.processes import running_process
 from lockstep.protocol.description import Axis, RobotDescription, StartWarning
 from lockstep.robot_bridge.bridge import Bridge
@@ -80,7 +81,7 @@ async def test_a_lock_at_the_robot_stops_it_for_everybody_and_takes_no_reset_unt
         await operator.until(f"s.streams.overview.rendered > {rendered + 10}")
         after = await operator.stats()
         assert (after["armed"], after["at_rest"]) == (False, True)
-        await operator.press(RB, False)
+        await operator.pad.press(RB, False)
         await operator.arm()
         await operator.drive_forward()
 
@@ -138,8 +139,8 @@ async def test_before_the_first_motion_the_robot_warns_and_the_page_counts_down(
         await operator.arm()
         for page in (operator, observer):
             await _warned(page).wait_for()
-        await operator.press(RB)
-        await operator.tilt(1, -1)
+        await operator.pad.press(RB)
+        await operator.pad.tilt(1, -1)
         await operator.until("s.driving && s.at_rest === false")
         assert (await operator.stats())["armed"], "the warning has not disarmed"
         await _warned(operator).wait_for(state="hidden")

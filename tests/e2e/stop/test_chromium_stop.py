@@ -3,7 +3,8 @@
 import pytest
 from playwright.async_api import Browser, expect
 
-from lockstep.bench.browsers.console_page import RB, STOP_BUTTON, ConsolePage, open_console
+from lockstep.bench.browsers.console_page import ConsolePage, open_console
+from lockstep.bench.browsers.pad import RB, STOP_BUTTON
 from lockstep.server.scene.page import HOOK
 from tests.support.stack import Stack
 
@@ -45,8 +46,8 @@ async def test_the_stop_button_stops_a_driven_robot_and_it_stays_stopped(stack: 
         await console.drive_forward()
         await console.page.get_by_role("button", name="Stop the robot").click()
         await _stopped(console)
-        await console.press(RB, False)
-        await console.press(9)
+        await console.pad.press(RB, False)
+        await console.pad.press(9)
         rendered = (await console.stats())["streams"]["overview"]["rendered"]
         await console.until(f"s.streams.overview.rendered > {rendered + 10}")  # pictures go on while it is stopped
         assert not (await console.stats())["armed"]
@@ -64,7 +65,7 @@ async def test_a_key_stops_without_the_pointer(stack: Stack, chromium: Browser, 
 async def test_the_pads_stop_button_stops(stack: Stack, chromium: Browser) -> None:
     async with open_console(chromium, stack.operator) as console:
         await console.until_live()
-        await console.press(STOP_BUTTON)
+        await console.pad.press(STOP_BUTTON)
         await _stopped(console)
 
 
@@ -88,7 +89,7 @@ async def _press_key(observer: ConsolePage) -> None:
 
 
 async def _press_pad(observer: ConsolePage) -> None:
-    await observer.press(STOP_BUTTON)
+    await observer.pad.press(STOP_BUTTON)
 
 
 async def _press_button(observer: ConsolePage) -> None:
@@ -130,8 +131,8 @@ async def test_an_observer_stops_by_key_pad_button_and_http_and_all_see_who_and_
             await _stopped(operator)
             for console in (operator, observer):
                 await console.page.locator(".plate").get_by_text(f"By observer: {reason}").wait_for()
-            await observer.press(STOP_BUTTON, False)
-            await operator.press(RB, False)
+            await observer.pad.press(STOP_BUTTON, False)
+            await operator.pad.press(RB, False)
             await operator.reset()
     assert await _executed_after_the_stop(stack) == []
 
@@ -226,6 +227,6 @@ async def test_reset_moves_nothing_and_driving_needs_arming_again(stack: Stack, 
         reset_at = (await stack.events("reset"))[0]["time"]
         moving = [each for each in await stack.events("executed") if each["time"] > reset_at and any(each["values"])]
         assert moving == []
-        await console.press(RB, False)
+        await console.pad.press(RB, False)
         await console.arm()
         await console.drive_forward()

@@ -79,7 +79,7 @@ async def test_a_held_deadman_ends_disarmed_by_a_stop_that_was_reset_between_two
             await console.until(f"s.streams.overview.rendered > {rendered + 6}")
             assert await console.page.evaluate(COMMANDS) == commands
             assert (await console.stats())["event"] - event <= 1, "the command that was in flight at most"
-            await console.let_go()
+            await console.pad.let_go()
 
 
 async def test_a_hand_that_is_on_reset_does_not_release_the_stop_that_another_page_presses_meanwhile(

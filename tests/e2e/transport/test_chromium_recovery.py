@@ -7,7 +7,8 @@ from pathlib import Path
 import pytest
 from playwright.async_api import Browser
 
-from lockstep.bench.browsers.console_page import RB, ConsolePage, open_console
+from lockstep.bench.browsers.console_page import ConsolePage, open_console
+from lockstep.bench.browsers.pad import RB
 from lockstep.client import Console
 from tests.support.stack import Stack, running_stack
 
@@ -31,7 +32,7 @@ async def test_a_killed_bridge_is_shown_and_the_page_goes_on_with_its_next_epoch
         await console.page.evaluate("window.notReloaded = true")
         os.kill(own_stack.bridge_pid(), signal.SIGKILL)
         await console.until("!s.armed")
-        await console.let_go()
+        await console.pad.let_go()
         await console.until(f"s.connected && s.epoch !== {epoch!r} && s.streams.overview?.rendered > 3", 60)
         assert (await console.stats())["event"] < 10, "references start anew with the epoch"
         await console.until("s.stop.stopped && s.stop.reason.includes('did not shut down cleanly')")
@@ -76,7 +77,7 @@ async def test_a_bridge_that_hangs_is_started_again_stopped_and_the_page_says_th
         epoch = (await console.stats())["epoch"]
         hang.touch()
         await console.until("!s.armed")
-        await console.let_go()
+        await console.pad.let_go()
         await console.until(f"s.connected && s.epoch !== {epoch!r}", 60)
         await console.until("s.stop.stopped && s.stop.reason === 'The robot bridge hung: no control tick for 1 s'")
         await console.page.get_by_text("The robot bridge hung").first.wait_for()
@@ -97,7 +98,7 @@ async def test_a_frozen_bridge_counts_as_a_dead_link_and_resumes_in_the_same_epo
         with own_stack.frozen_bridge():
             await console.until("!s.armed")
             await console.page.get_by_text("Robot unreachable").first.wait_for()
-        await console.let_go()
+        await console.pad.let_go()
         await console.until("s.connected && s.at_rest === true && s.seat && s.seat.mine", 60)
         await console.arm()
         await console.drive_forward()
@@ -117,6 +118,6 @@ async def test_a_restarted_console_is_found_again_without_a_reload(tmp_path: Pat
             await console.arm()
             await console.drive_forward()
             await _nothing_wrong(console)
-            await console.press(RB, False)
+            await console.pad.press(RB, False)
     finally:
         await page.__aexit__(None, None, None)

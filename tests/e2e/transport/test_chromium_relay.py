@@ -5,7 +5,8 @@ from pathlib import Path
 import pytest
 from playwright.async_api import Browser
 
-from lockstep.bench.browsers.console_page import RB, open_console
+from lockstep.bench.browsers.console_page import open_console
+from lockstep.bench.browsers.pad import RB
 from tests.support.stack import running_stack
 from tests.support.turn_server import TURN_SECRET, TurnServer, running_turn_server
 
@@ -61,7 +62,7 @@ async def test_pictures_pass_the_gate_and_the_robot_is_driven_through_the_relay(
         before = (await page.stats())["event"]
         async with page.driving():
             await page.until(f"s.event > {before} + 20 && {NOTHING_WRONG}")
-        await page.press(RB, False)
+        await page.pad.press(RB, False)
         await page.until("s.at_rest")
         assert (await page.page.evaluate(SELECTED_PAIR))[0] == "relay"
 

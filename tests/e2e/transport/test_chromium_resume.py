@@ -21,7 +21,7 @@ pytestmark = pytest.mark.browser
 
 async def _drives_again(console: ConsolePage, stack: Stack) -> None:
     """The seat is back by itself, and the operator arms and drives; the bridge's log has nothing twice."""
-    await console.let_go()
+    await console.pad.let_go()
     await console.until("s.connected && s.at_rest === true && s.seat && s.seat.mine")
     async with console.driving():
         event = (await console.stats())["event"]
@@ -31,7 +31,7 @@ async def _drives_again(console: ConsolePage, stack: Stack) -> None:
     assert await console.page.evaluate("window.notReloaded")
     executed = [record["event"] for record in await stack.events("executed")]
     assert len(executed) == len(set(executed)), "an event was executed twice"
-    await console.let_go()
+    await console.pad.let_go()
 
 
 async def test_a_silent_console_is_called_silent_and_what_it_measured_last_is_shown_as_old(
@@ -110,7 +110,7 @@ async def test_a_page_that_was_suspended_while_the_deadman_is_held_moves_nothing
                 before = await _moved(stack)
             await console.until("!s.armed && s.connected && s.at_rest === true && s.seat && s.seat.mine")
             assert await _moved(stack) == before, "the robot moved on when the page woke up"
-            await console.let_go()
+            await console.pad.let_go()
 
 
 async def _rests(stack: Stack) -> None:

@@ -8,6 +8,7 @@ import pytest
 import pytest_asyncio
 
 from lockstep.bench.browsers.console_page import ConsolePage, open_console
+from lockstep.bench.browsers.event_strip import drawn_event
 from lockstep.bench.relay.stage import FIRST_PORT, RelayStage, relay_stage
 from lockstep.emulator.errors import NamespacesUnavailable
 
@@ -54,7 +55,7 @@ async def test_pictures_keep_their_events_through_two_relays_and_come_back_when_
         assert sorted(relays) == ["0", "1"]
         watching = near if relays[0] == "1" else far
         await watching.until("s.streams.overview.rendered > 60", 60)
-        shown = await watching.strip("overview")  # noqa: B005  # not of a string
+        shown = await drawn_event(watching.page, "overview")
         statistics = await watching.stats()
         await stage.janus[1].kill()
         await watching.until("s.relay === '0' && s.streams.overview?.rendered > 3", 60)

@@ -7,7 +7,8 @@ import pytest
 from playwright.async_api import Browser
 
 from lockstep.bench.browsers.chromium import PAD
-from lockstep.bench.browsers.console_page import RB, ConsolePage
+from lockstep.bench.browsers.console_page import ConsolePage
+from lockstep.bench.browsers.pad import RB
 from lockstep.rtc.interfaces import own_addresses
 from tests.support.stack import running_stack
 from tests.waiting import PATIENCE
@@ -41,7 +42,7 @@ async def test_a_self_signed_console_can_be_driven_with_a_pad_and_shows_the_3d_s
             assert await tab.evaluate("window.isSecureContext")
             await page.arm()
             await page.drive_forward()
-            await page.press(RB, False)
+            await page.pad.press(RB, False)
             await page.until("s.at_rest")
             token = stack.operator.partition("#token=")[2]
             path = await tab.evaluate(

@@ -27,7 +27,7 @@ async def test_with_bursts_of_loss_the_page_drives_and_shows_nothing_outside_the
             counts = network.statistics().paths
             if counts["media"]["to_operator"].lost > 10 and counts["control"]["to_robot"].lost > 0:
                 break  # else none of the bursts was long enough
-            await console.let_go()
+            await console.pad.let_go()
             await console.until("s.at_rest === true")
             await console.page.evaluate("window.dispatchEvent(new Event('blur'))")
             await console.until("!s.armed")

@@ -10,7 +10,8 @@ from typing import Any
 import pytest
 from playwright.async_api import Browser, Error, Locator, expect
 
-from lockstep.bench.browsers.console_page import RB, ConsolePage, open_console
+from lockstep.bench.browsers.console_page import ConsolePage, open_console
+from lockstep.bench.browsers.pad import RB
 from tests.client.live.truth import until_logged
 from tests.e2e.accessibility import findings
 from tests.support.stack import Stack
@@ -51,7 +52,7 @@ def _words(console: ConsolePage) -> Locator:
 
 async def _armed(console: ConsolePage) -> None:
     await console.until_live()
-    await console.let_go()
+    await console.pad.let_go()
     for _ in range(TRIES):
         if not (await console.stats())["armed"]:
             await console.arm()
@@ -148,8 +149,8 @@ async def _end(console: ConsolePage, how: str) -> None:
             with suppress(Error):  # the goal has ended meanwhile, as the record says: nothing is left to cancel
                 await console.page.locator(".map-cancel").click(timeout=5_000)
         case "stick":
-            await console.press(RB)
-            await console.tilt(1, -0.5)
+            await console.pad.press(RB)
+            await console.pad.tilt(1, -0.5)
         case "stop":
             await console.page.get_by_role("button", name="Stop the robot").click()
         case "close":

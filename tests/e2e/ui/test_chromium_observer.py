@@ -14,7 +14,7 @@ async def test_an_observer_sees_gated_pictures_and_has_no_way_to_arm(stack: Stac
         await observer.until_live()
         await observer.until("s.role === 'observer'")
         await expect(observer.page.get_by_role("button", name="Arm", exact=True)).to_have_count(0)
-        await observer.press(9)
+        await observer.pad.press(9)
         await observer.until("s.streams.overview.rendered > 30")
         assert not (await observer.stats())["armed"]
     assert await stack.events("executed") == []

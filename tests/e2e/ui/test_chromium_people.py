@@ -73,7 +73,7 @@ async def test_writing_a_note_lets_go_of_the_robot_and_its_keys_do_not_drive(sta
         executed = len(await stack.events("executed"))
         await console.page.keyboard.press("Enter")  # arms elsewhere
         await console.page.keyboard.type(" wasd ")
-        await console.press(9)  # START: refused while a text field has the keyboard
+        await console.pad.press(9)  # START: refused while a text field has the keyboard
         await console.page.keyboard.press("Backspace")  # stops elsewhere
         statistics = await console.stats()
         assert not statistics["armed"]

@@ -82,7 +82,7 @@ async def test_the_scene_drawn_by_the_page_shows_no_newer_event_than_the_picture
             assert each["event"] <= each["picture"] or abs(each["gap"]) <= tolerance, each
             assert each["veiled"] or abs(each["gap"]) <= tolerance, each
         assert sum(each["event"] == each["picture"] for each in seen) > len(seen) / 2
-        await console.let_go()
+        await console.pad.let_go()
         async with console.driving():
             await console.page.evaluate("void (window.requestAnimationFrame = () => 1)")  # nothing is drawn any more
             await console.page.locator('[data-view="3D scene"] .veil-words').get_by_text("events behind").wait_for()

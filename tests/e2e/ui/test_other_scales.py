@@ -6,6 +6,7 @@ import pytest
 from playwright.async_api import Browser, expect
 
 from lockstep.bench.browsers.console_page import open_console
+from lockstep.bench.browsers.event_strip import drawn_event
 from tests.support.stack import running_stack
 
 pytestmark = [pytest.mark.browser, pytest.mark.full_rate]
@@ -21,7 +22,7 @@ async def test_the_page_is_in_micrometres_when_the_robot_is(tmp_path: Path, chro
         await expect(console.page.locator(".scale-words")).to_have_text("50 µm")
         await expect(console.page.get_by_label("Nearest obstacle")).to_be_hidden()
         for stream in ("microscope", "side"):
-            read = await console.strip(stream)
+            read = await drawn_event(console.page, stream)
             assert read is not None
             assert read[1] in (None, read[0]), stream
         streams = (await console.stats())["streams"]

@@ -36,7 +36,7 @@ async def test_a_session_takes_the_page_over_and_gives_it_back(stack: Stack, chr
         await headset.leave()
         await console.arm()
         await console.drive_forward()
-        await console.let_go()
+        await console.pad.let_go()
         await console.until("s.at_rest === true")
 
 

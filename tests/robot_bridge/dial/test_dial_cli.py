@@ -77,7 +77,7 @@ async def test_a_robot_pairs_by_a_code_and_comes_back_without_it_until_it_is_for
             await api.until("connected")
             await api.ask("DELETE", "/api/dial-in/robot")
             await api.until("unpaired")
-            await eventually(lambda: any("robot_unknown" in line for line in robot.errors))
+            await eventually(lambda: any("robot_unknown" in line for line in robot.output.errors))
 
 
 async def test_a_command_that_cannot_be_meant_says_what_to_do_and_ends_with_2(tmp_path: Path) -> None:

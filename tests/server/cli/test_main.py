@@ -57,7 +57,7 @@ async def test_up_prints_one_line_that_works_and_leaves_nothing_running(tmp_path
             assert session.json()["link"]["up"] is True
             assert session.json()["you"]["role"] == "operator"
         assert await stack.events("start")
-    assert not stack.running.unread, "nothing but the one line"
+    assert not stack.running.output.unread, "nothing but the one line"
     assert stack.process.returncode == 0
     port = int(stack.robot.rpartition(":")[2])
     with socket.socket() as probe:

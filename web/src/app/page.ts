@@ -103,13 +103,16 @@ export class Page {
     const alarm = createAlarmStrip(engine);
     const banner = createBanner(engine);
     const robot = later.panel((parts) => {
-      engine.actions = new parts.ActionClient((message) => engine.tell("session", message), parts.drawId);
+      engine.actions = new parts.ActionClient(
+        (message) => engine.connection.tell("session", message),
+        parts.drawId,
+      );
       return (this.robot = parts.createRobotStrip(engine));
     });
     const episodes = later.panel((parts) => parts.createEpisodeBar(engine));
     const policies = later.panel((parts) => parts.createPolicyBar(engine));
     const event = createEventPanel(engine);
-    grid.card = event.element;
+    grid.cardPlace.card = event.element;
     const force = later.panel((parts) => parts.createForceGauge(engine, false));
     const contact = later.panel((parts) => parts.createForceGauge(engine, true));
     const radar = later.panel((parts) => parts.createRangeRadar(engine));
@@ -203,7 +206,7 @@ export class Page {
     this.drawnMs = now;
     const { engine, root } = this;
     if (engine.firstPictureMs !== null || this.waitsForNoPicture(now)) this.later.load(now);
-    setData(root, "armed", engine.arming.state);
+    setData(root, "armed", engine.driving.arming.state);
     setData(root, "role", engine.state.welcome === null ? "" : this.drives() ? "operator" : "observer");
     setData(root, "link", engine.connectionState.kind);
     setData(root, "stale", String(feedbackAge(engine.measuredMs, now) !== null));

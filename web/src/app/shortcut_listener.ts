@@ -7,7 +7,7 @@ export function watchPageKeys(engine: ConsoleEngine, act: (action: PageAction) =
   addEventListener("keydown", (event) => {
     if (event.repeat || event.ctrlKey || event.metaKey || event.altKey) return;
     if (event.target instanceof Element && event.target.matches(FIELDS)) return;
-    const action = pageAction(event.code, engine.isArmed(), engine.state.robot?.description ?? null);
+    const action = pageAction(event.code, engine.driving.isArmed(), engine.state.robot?.description ?? null);
     if (action !== null) act(action);
   });
 }

@@ -100,7 +100,7 @@ export class SidePanels {
     const sampler = new ChartSampler(engine);
     engine.charts = sampler;
     const tracing = new Tracing({
-      tell: (channel, message) => engine.tell(channel, message),
+      tell: (channel, message) => engine.connection.tell(channel, message),
       isConnected: () => engine.state.welcome !== null,
       drivesRecorded: () => engine.state.recording?.state === "recording" && holdsSeat(engine.state),
       mainStream: () => grid.mainStream(),

@@ -11,7 +11,7 @@ const ROW_MS = 100;
 /** What the charts show. */
 export interface ChartSource {
   readonly state: Pick<ConsoleState, "feedback" | "robot" | "roundTripMs" | "settings">;
-  readonly driver: { readonly latency: Latency } | null;
+  readonly driving: { readonly driver: { readonly latency: Latency } | null };
   readonly events: RateMeter;
   readonly streams: {
     readonly videos: ReadonlyMap<string, VideoStream>;
@@ -37,7 +37,8 @@ export class ChartSampler {
 
   private addRow(since: number, now: number): void {
     const { source } = this;
-    const { state, driver } = source;
+    const { state } = source;
+    const { driver } = source.driving;
     const hears = source.hears(now);
     const latency = driver?.latency;
     addRow(this.ring, {

@@ -1,5 +1,4 @@
-import { axisValues, neutralValues } from "../drive/axis_mapping";
-import * as arming from "../drive/arming";
+import type { ArmConditions } from "../drive/arming";
 import * as driver from "../drive/driver";
 import {
   applyMessage,
@@ -10,20 +9,17 @@ import {
   note,
   robotIsUp,
 } from "../session/console_state";
-import { capHolds, cappedShare, viewDelay } from "../drive/speed_cap";
 import { STALE_MS } from "../drive/feedback_age";
 import { notePicture } from "../drive/latency";
-import { CALM_INTERVAL_MS, noteHeard, noteShown, setPacing } from "../drive/command_gate";
+import { noteShown, setPacing } from "../drive/command_gate";
 import { restartInterlock, snapshotOf } from "../drive/restart_interlock";
 import type { EpisodePress } from "../gamepad/episode_presses";
 import { createRateMeter, noteOccurrence } from "../util/samples";
 import { parseServerMessage } from "../protocol/wire_parser";
-import { ARM_REFUSAL_LABELS } from "../drive/labels/labels";
-import { Controls, type ControlSample } from "../input/controls";
+import { Controls } from "../input/controls";
 import { Display } from "../input/display";
 import { Disposal } from "../input/disposal";
 import { keepKeyboardFree } from "../input/pointer_focus";
-import { SendTimer } from "../input/send_timer";
 import { Ticker } from "../input/ticker";
 import { watchPage } from "../input/page_lifecycle";
 import type { TouchSticks } from "../input/touch_sticks";
@@ -39,23 +35,14 @@ import type { ChannelName, Peer, PeerOptions } from "../transport/peer";
 import type { StampReader } from "../transport/encoded_transform/stamp_reader";
 import { SessionClient } from "../session/session_client";
 import type { ActionClient } from "../robot/action_client";
-import type { ActConditions } from "../robot/actions";
+import { Driving } from "./driving";
 import { reportOf } from "./report";
 import type { HeadsetStep } from "./headset_statistics";
 import { LateInbox } from "./late_inbox";
 import type { Tracing } from "./tracing";
-import type { GoalDriving } from "../drive/goals/goal_driving";
 import { StopSender } from "./stop_sender";
 import type { Talkback } from "../talkback/talkback";
-import type {
-  Action,
-  ClientMessage,
-  Feedback,
-  RobotState,
-  ServerMessage,
-  StreamInfo,
-  Welcome,
-} from "../protocol/wire";
+import type { Action, Feedback, ServerMessage, StreamInfo, Welcome } from "../protocol/wire";
 
 export interface ConsoleEngineEvents {
   canvas(info: StreamInfo): HTMLCanvasElement;
@@ -67,7 +54,10 @@ export interface ConsoleEngineEvents {
   pictureDrawn(): void; // of the main stream
 }
 
-/** An input that is told so late waited behind a page that was held up. */
+/**
+ * A key or a finger that is told so late waited behind a page that was held up: it is not what is held now, and the
+ * tick that follows takes that. That nothing is held any more counts at once, however late it is told.
+ */
 const HELD_UP_MS = 50;
 
 /** What is called at every tick. */
@@ -78,7 +68,7 @@ interface Stepped {
 /** The page's engine: connection, driving and media. What it shows is read from its fields. */
 export class ConsoleEngine {
   readonly state = createConsoleState();
-  readonly arming = arming.createArming();
+  readonly driving: Driving;
   readonly streams: MediaStreams;
   readonly connection: Connection;
   readonly stopping: StopSender;
@@ -93,12 +83,6 @@ export class ConsoleEngine {
   headset: HeadsetStep | null = null; // while its session lasts
   talkback: Talkback | null = null; // likewise
   connectionState: ConnectionState = { kind: "connecting" };
-  driver: driver.Driver | null = null;
-  layer = 0;
-  values: readonly (number | null)[] = []; // commanded now
-  goals: GoalDriving | null = null; // until its code is there; goal axes stay where they are before
-  viewDelayMs: number | null = null; // how late the pictures are now; null: not known
-  speedShare = 1; // of full speed that the cap leaves
   firstPictureMs: number | null = null;
   readonly haptics = new Haptics(this);
   tracing: Tracing | null = null; // until its code is there, after the first picture
@@ -109,12 +93,11 @@ export class ConsoleEngine {
   readonly late = new LateInbox((channel, detail) => this.unreadable(channel, detail));
   statusMs = 0; // when the robot's newest status came
   actionMs = -Infinity; // when the newest news of an action came
-  private heardMs = 0;
-  private readonly sendTimer = new SendTimer(() => this.takeInput(performance.now()));
+  heardMs = 0; // the console's last message
   private readonly heartbeat = new Heartbeat({
-    tell: (message) => this.tell("control", message),
+    tell: (message) => this.connection.tell("control", message),
     report: () => reportOf(this),
-    lost: (now) => this.driver !== null && driver.driverLoss(this.driver, now),
+    lost: (now) => this.driving.driver !== null && driver.driverLoss(this.driving.driver, now),
   });
 
   constructor(
@@ -139,11 +122,11 @@ export class ConsoleEngine {
       closed: () => this.connectionClosed(),
     });
     this.stopping = new StopSender(api, this.connection);
-    this.session = new SessionClient(this.state, name, (message) => this.tell("session", message));
+    this.session = new SessionClient(this.state, name, (message) => this.connection.tell("session", message));
     this.controls = new Controls(sticks, {
       stop: () => this.stop("stop key"),
       arm: () => this.toggleArmed(),
-      nextLayer: () => this.nextLayer(),
+      nextLayer: () => this.driving.selectLayer(),
       action: (index) => page.actionPressed(index),
       episode: (press) => this.padEpisode?.(press),
       actionKey: (index, code) => {
@@ -155,45 +138,70 @@ export class ConsoleEngine {
         page.actionPressed(index);
         return true;
       },
-      isArmed: () => this.isArmed(),
+      isArmed: () => this.driving.isArmed(),
       answerClaim: (grant) => this.session.answerShown(grant),
-      lost: () => this.disarm("pad_lost"),
-      silent: () => this.disarm("pad_silent"),
-      changed: (at) => this.inputChanged(at),
+      lost: () => this.driving.disarm("pad_lost"),
+      silent: () => this.driving.disarm("pad_silent"),
+      changed: (at) => {
+        const now = performance.now();
+        if (!this.driving.isArmed()) return;
+        const isFresh = now - at < HELD_UP_MS && !this.ticker.isLate(now);
+        if (isFresh || !this.controls.deadman) this.driving.take(now);
+      },
       plugged: (words) => note(this.state, "info", words, Date.now()),
+    });
+    this.driving = new Driving(this.state, this.controls, {
+      conditions: (now) => this.conditions(now),
+      heard: () => this.streams.heard(),
+      action: (now) => this.actions?.renewed(now) ?? "",
+      armedChanged: () => page.armedChanged(),
+      disarmed: () => {
+        this.haptics.still();
+        this.actions?.forget();
+      },
+      intended: (now, deadmanChanged) => {
+        this.tracing?.noteIntention(this.driving.values, now);
+        if (deadmanChanged) this.haptics.stick?.stop();
+      },
+      delayKnown: () => this.connection.tell("control", reportOf(this)),
+      send: (message, now) => {
+        this.connection.tell("control", message);
+        this.tracing?.noteSent(message, now);
+      },
     });
     if (this.reader === null)
       note(this.state, "error", "This browser cannot read stamps: no picture passes the gate", Date.now());
-    this.watchPage();
+    watchPage(this.disposal, {
+      // Without the window's focus nobody knows which keys are held. A headset's controllers need no focus.
+      blurred: () => {
+        if (this.display.isImmersive && !this.controls.usesWindow) this.controls.keyboard.release();
+        else this.driving.disarm("blur");
+      },
+      left: () => {
+        this.driving.disarm("hidden");
+        this.connection.close();
+      },
+      visibilityChanged: () => {
+        if (!this.display.visible) this.driving.disarm("hidden");
+        this.streams.listen();
+      },
+      networkChanged: () => this.connection.alarm(),
+    });
     keepKeyboardFree(this.disposal);
     this.ticker = new Ticker(this.disposal, {
       tick: (now) => this.tick(now),
       poll: (now) => {
-        if (this.controls.hasPadNews) this.takeInput(now);
+        if (this.controls.hasPadNews) this.driving.take(now);
       },
     });
   }
 
-  isArmed(): boolean {
-    return this.arming.state !== "disarmed";
-  }
-
   /** Whether the console is connected and speaks. */
   hears(now: number): boolean {
-    return this.state.welcome !== null && this.silentMs(now) < STALE_MS;
+    return this.state.welcome !== null && now - this.heardMs < STALE_MS;
   }
 
-  /** Whether no message to and from the console is lost: it is connected by a WebSocket. */
-  get isReliable(): boolean {
-    return this.peer?.isReliable === true;
-  }
-
-  /** Since the console's last message. */
-  silentMs(now: number): number {
-    return now - this.heardMs;
-  }
-
-  conditions(now = performance.now()): arming.ArmConditions {
+  conditions(now = performance.now()): ArmConditions {
     const { state } = this;
     return {
       operator: mayDrive(state),
@@ -208,90 +216,34 @@ export class ConsoleEngine {
     };
   }
 
-  /** `remote`: asked by a pad or a key, which work wherever the eyes are; a click is on a button that is seen. */
-  actConditions(now: number, remote: boolean): ActConditions {
-    const all = this.conditions(now);
-    const { operator, connected, robotUp, holdsSeat, lockedOut, stopped, stopPressed } = all;
-    return {
-      visible: !remote || (all.visible && document.hasFocus()),
-      occupied: remote && all.occupied,
-      ...{ operator, connected, robotUp, holdsSeat, lockedOut },
-      stopped: stopped || stopPressed,
-      armed: this.isArmed(),
-      proven: this.driver?.unproven === false,
-      deadman: this.arming.state === "driving",
-    };
-  }
-
   /** Asks for an action once. Armed commands let it go on until it ends, or this page disarms. */
   act(action: Action, parameters: Readonly<Record<string, boolean | number | string>>): void {
     const now = performance.now();
     const nonce = this.state.feedback?.nonce ?? 0;
-    if (this.actions?.act(action, parameters, nonce, now) === true) this.drive(now);
+    if (this.actions?.act(action, parameters, nonce, now) === true) this.driving.step(now);
   }
 
   toggleArmed(): void {
-    if (this.isArmed()) {
-      this.disarm("operator");
-      return;
-    }
-    if (this.session.takeOver()) return; // armed by the next press, once the seat is here
-    const refusal = arming.arm(this.arming, this.conditions(), this.controls.deadman);
-    if (refusal !== null) note(this.state, "warning", ARM_REFUSAL_LABELS[refusal], Date.now());
-    else if (this.driver !== null) driver.driverArm(this.driver);
-    this.page.armedChanged();
-  }
-
-  disarm(reason: arming.DisarmReason): void {
-    if (!arming.disarm(this.arming, reason)) return;
-    this.controls.release();
-    this.haptics.still();
-    this.actions?.forget();
-    if (this.driver !== null) driver.driverDisarm(this.driver, performance.now());
-    this.drive(performance.now());
-    this.page.armedChanged();
+    if (this.driving.isArmed()) this.driving.disarm("operator");
+    else if (!this.session.takeOver()) this.driving.arm(); // else by the next press, once the seat is here
   }
 
   stop(reason: string): void {
     this.stopping.stop(reason, performance.now());
-    this.bar("stop_pressed");
-  }
-
-  /** Nothing moves before the person arms again, not even by the neutral command that would let it. */
-  private bar(reason: arming.DisarmReason): void {
-    if (this.driver !== null) driver.driverBar(this.driver);
-    this.disarm(reason);
-  }
-
-  nextLayer(): void {
-    this.selectLayer((this.layer + 1) % Math.max(1, this.state.robot?.description.layers.length ?? 1));
-  }
-
-  /** The layers' inputs mean different axes, so switching brings the robot to rest first. */
-  selectLayer(layer: number): void {
-    if (layer === this.layer) return;
-    this.layer = layer;
-    if (this.arming.state === "driving" && this.driver !== null)
-      driver.driverRelease(this.driver, performance.now());
-  }
-
-  releaseSeat(): void {
-    this.disarm("operator");
-    this.session.release();
+    this.driving.bar("stop_pressed");
   }
 
   /** A setting changed: the gates take it at once. */
   settingsChanged(): void {
     const { pacing, tolerance } = this.state.settings;
-    if (this.driver !== null) setPacing(this.driver.gate, pacing, tolerance.video);
+    if (this.driving.driver !== null) setPacing(this.driving.driver.gate, pacing, tolerance.video);
     this.streams.changed();
   }
 
   async close(): Promise<void> {
-    this.disarm("operator");
+    this.driving.close();
     this.talkback?.close();
     this.disposal.close();
-    this.sendTimer.set(null);
     this.controls.close();
     this.connection.close();
     this.streams.close();
@@ -300,33 +252,12 @@ export class ConsoleEngine {
     await this.audio.close();
   }
 
-  private watchPage(): void {
-    watchPage(this.disposal, {
-      blurred: () => this.blurred(),
-      left: () => {
-        this.disarm("hidden");
-        this.connection.close();
-      },
-      visibilityChanged: () => {
-        if (!this.display.visible) this.disarm("hidden");
-        this.streams.listen();
-      },
-      networkChanged: () => this.connection.alarm(),
-    });
-  }
-
-  /** Without the window's focus nobody knows which keys are held. A headset's controllers need no focus. */
-  private blurred(): void {
-    if (this.display.isImmersive && !this.controls.usesWindow) this.controls.keyboard.release();
-    else this.disarm("blur");
-  }
-
   private connectionClosed(): void {
-    this.disarm("connection_lost");
+    this.driving.disarm("connection_lost");
     this.haptics.forget();
     this.tracing?.connectionClosed();
     this.peer = null;
-    this.driver = null;
+    this.driving.driver = null;
     this.streams.close();
     this.heartbeat.end();
     forgetConnection(this.state);
@@ -348,11 +279,14 @@ export class ConsoleEngine {
     const snapshot = snapshotOf(this.state);
     applyMessage(this.state, parsed.message, Date.now());
     this.stopping.took(parsed.message, this.state, this.heardMs);
-    const awaits = this.driver !== null && driver.driverAwaitsNeutral(this.driver, parsed.message);
+    const { driving } = this;
+    const awaits = driving.driver !== null && driver.driverAwaitsNeutral(driving.driver, parsed.message);
     const forbidden = restartInterlock(snapshot, this.state, parsed.message, awaits);
-    if (forbidden !== null) this.bar(forbidden);
+    if (forbidden !== null) driving.bar(forbidden);
     this.follow(parsed.message, feedback, this.heardMs);
-    if (this.state.handOver !== handOver) this.handedOver();
+    if (this.state.handOver === handOver) return;
+    driving.handedOver(holdsSeat(this.state));
+    if (this.state.handOver?.fromMe === true) this.session.lostSeat();
   }
 
   private unreadable(channel: ChannelName, detail: string): void {
@@ -361,17 +295,23 @@ export class ConsoleEngine {
   }
 
   private follow(message: ServerMessage, before: Feedback | null, now: number): void {
+    const { driving } = this;
     if (message.type === "feedback" && this.state.feedback === message)
       this.tookFeedback(message, before, now);
-    else if (message.type === "refusal" && this.driver !== null) {
-      driver.driverRefusal(this.driver, message, this.isArmed());
-      this.goals?.refused(message, now);
+    else if (message.type === "refusal" && driving.driver !== null) {
+      driver.driverRefusal(driving.driver, message, driving.isArmed());
+      driving.goals?.refused(message, now);
       this.tracing?.book.noteRefused(message.event);
-      this.drive(now);
-    } else if (message.type === "pong") this.tookPong(message.id, now);
-    else if (message.type === "welcome") this.welcomed(message);
-    else if (message.type === "robot") this.robotChanged(message, now);
-    else if (message.type === "seat") this.session.seatMs = now;
+      driving.step(now);
+    } else if (message.type === "pong") {
+      const roundTripMs = this.heartbeat.answered(message.id, now);
+      if (roundTripMs === null) return;
+      this.state.roundTripMs = roundTripMs;
+      if (driving.driver !== null) driver.driverPingAnswered(driving.driver, roundTripMs);
+    } else if (message.type === "welcome") this.welcomed(message);
+    else if (message.type === "robot") {
+      if (driving.robotChanged(message, now)) this.heartbeat.begin();
+    } else if (message.type === "seat") this.session.seatMs = now;
     else if (message.type === "status") this.statusMs = now;
     else if (message.type === "action") {
       this.actionMs = Math.max(this.actionMs, now - message.age * 1000);
@@ -379,31 +319,14 @@ export class ConsoleEngine {
     }
   }
 
-  /** Whoever drives next has to arm, and nothing of the one before is executed. */
-  private handedOver(): void {
-    this.disarm("seat_lost");
-    if (this.state.handOver?.fromMe === true) this.session.lostSeat();
-    if (holdsSeat(this.state)) arming.startAfresh(this.arming);
-    else if (this.driver !== null) driver.driverSilence(this.driver);
-  }
-
   private tookFeedback(feedback: Feedback, before: Feedback | null, now: number): void {
     if (before?.event !== feedback.event) noteOccurrence(this.events, now);
     this.measuredMs = now;
     this.haptics.took(feedback, now);
-    if (this.driver !== null) driver.driverFeedback(this.driver, feedback, this.canCommand(), now);
-    if (this.isArmed() && this.controls.hasPadNews) this.takeInput(now);
-    else this.drive(now);
+    this.driving.tookFeedback(feedback, now);
     this.streams.changed();
     this.page.feedbackTaken(now);
     this.tracing?.book.noteAnswered(feedback.event, now, performance.now());
-  }
-
-  private tookPong(id: number, now: number): void {
-    const roundTripMs = this.heartbeat.answered(id, now);
-    if (roundTripMs === null) return;
-    this.state.roundTripMs = roundTripMs;
-    if (this.driver !== null) driver.driverPingAnswered(this.driver, roundTripMs);
   }
 
   private welcomed(welcome: Welcome): void {
@@ -419,32 +342,9 @@ export class ConsoleEngine {
     this.session.welcomed(welcome);
   }
 
-  private robotChanged(robot: RobotState, now: number): void {
-    if (robot.link === "down" && this.driver !== null) driver.driverSilence(this.driver);
-    if (this.driver !== null) return;
-    const { axes, layers, hold, max_event_rate: rate } = robot.description;
-    const { settings, feedback } = this.state;
-    const { pacing, tolerance } = settings;
-    this.driver = driver.createDriver(
-      pacing,
-      tolerance.video,
-      1000 / rate,
-      neutralValues(axes),
-      CALM_INTERVAL_MS,
-      hold * 1000,
-    );
-    this.heartbeat.begin();
-    this.layer = Math.min(this.layer, Math.max(0, layers.length - 1));
-    if (feedback !== null) driver.driverFeedback(this.driver, feedback, this.canCommand(), now);
-  }
-
-  private canCommand(): boolean {
-    return arming.mayCommand(this.conditions());
-  }
-
   private tick(now: number): void {
-    this.takeInput(now, true);
-    this.ticker.hurry(this.isArmed() && this.controls.hasPad);
+    this.driving.take(now, true);
+    this.ticker.hurry(this.driving.isArmed() && this.controls.hasPad);
     this.streams.listen();
     this.talkback?.step(now);
     this.stopping.step(now);
@@ -456,90 +356,15 @@ export class ConsoleEngine {
     this.connection.step(now);
   }
 
-  /**
-   * A key or a finger did something. What waited behind a page that was held up is not what is held now: the tick that
-   * follows takes that. That nothing is held any more counts at once, however late it is told.
-   */
-  private inputChanged(at: number): void {
-    const now = performance.now();
-    if (!this.isArmed()) return;
-    const isFresh = now - at < HELD_UP_MS && !this.ticker.isLate(now);
-    if (isFresh || !this.controls.deadman) this.takeInput(now);
-  }
-
-  /** Takes what the operator holds now, and sends what follows from it. */
-  private takeInput(now: number, isTick = false): void {
-    const sample = this.controls.sample(isTick);
-    const lost = arming.lostCondition(this.conditions(now));
-    if (lost !== null) this.disarm(lost);
-    const change = arming.sampleDeadman(this.arming, sample.deadman, sample.signature, now);
-    this.capSpeed(now);
-    this.takeValues(sample, now);
-    this.tracing?.noteIntention(this.values, now);
-    if (change !== null) this.haptics.stick?.stop();
-    if (this.driver !== null && change === "released") driver.driverRelease(this.driver, now);
-    if (this.driver !== null && change === "taped_down") driver.driverDisarm(this.driver, now);
-    if (change === "taped_down") this.page.armedChanged();
-    this.drive(now);
-  }
-
-  private takeValues({ held, slowShare }: ControlSample, now: number): void {
-    const { robot, feedback } = this.state;
-    if (robot === null) {
-      this.values = [];
-      return;
-    }
-    const { description } = robot;
-    const { axes } = description;
-    const layer = description.layers[this.layer];
-    const share = slowShare * this.speedShare;
-    const drives = this.arming.state === "driving";
-    const values = drives ? axisValues(axes, layer, held, share) : neutralValues(axes);
-    const moves = drives && this.driver !== null && driver.driverMayMove(this.driver);
-    const inputs = { description, layer, held, share, feedback, moves };
-    this.values = this.goals?.take(values, inputs, now) ?? values;
-  }
-
-  /** The console learns at once when the delay becomes known: until then it keeps the robot slow. */
-  private capSpeed(now: number): void {
-    const { state } = this;
-    const delay = this.driver === null ? null : viewDelay(this.driver.latency, now);
-    const wasKnown = this.viewDelayMs !== null;
-    this.viewDelayMs = delay;
-    this.speedShare = this.isArmed() ? cappedShare(state.speedCap, state.settings.speedCap, delay) : 1;
-    if (!wasKnown && delay !== null && capHolds(state.speedCap, state.settings.speedCap))
-      this.tell("control", reportOf(this));
-  }
-
-  private drive(now: number): void {
-    if (this.driver === null || this.state.welcome === null) return;
-    noteHeard(this.driver.gate, this.streams.heard(), now);
-    const intention = {
-      armed: this.isArmed(),
-      values: this.values,
-      speed: this.goals?.speed ?? 1,
-      action: this.actions?.renewed(now) ?? "",
-    };
-    const messages = driver.driverStep(this.driver, intention, this.canCommand(), now);
-    for (const message of messages) {
-      this.tell("control", message);
-      this.tracing?.noteSent(message, now);
-    }
-    this.sendTimer.set(this.isArmed() ? driver.driverOpensIn(this.driver, intention, now) : null);
-  }
-
-  tell(channel: ChannelName, message: ClientMessage): boolean {
-    return this.connection.send(channel, JSON.stringify(message));
-  }
-
   private drawn(stream: VideoStream, stamp: number | null, at: number): void {
+    const { driving } = this;
     this.firstPictureMs ??= at;
     this.tracing?.noteDrawn(stream.info.stream, stream.drawn);
-    if (stamp === null || stream.info.stream !== this.page.mainStream() || this.driver === null) return;
-    notePicture(this.driver.latency, stamp, at);
-    noteShown(this.driver.gate, stamp);
+    if (stamp === null || stream.info.stream !== this.page.mainStream() || driving.driver === null) return;
+    notePicture(driving.driver.latency, stamp, at);
+    noteShown(driving.driver.gate, stamp);
     this.page.pictureDrawn();
     this.ticker.catchUp(performance.now());
-    this.drive(at);
+    driving.step(at);
   }
 }

@@ -7,6 +7,6 @@ export function addGoalControls(engine: ConsoleEngine): GoalSliders {
   const sliders = new GoalSliders();
   sliders.onchange = (at) => engine.controls.events.changed(at);
   engine.controls.sliders = sliders;
-  engine.goals = new GoalDriving();
+  engine.driving.goals = new GoalDriving();
   return sliders;
 }

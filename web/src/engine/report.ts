@@ -11,12 +11,14 @@ import type { Report, StreamReport } from "../protocol/wire";
 /** What a report is made of. */
 export interface ReportSource {
   readonly state: Pick<ConsoleState, "feedback" | "roundTripMs" | "settings">;
-  readonly arming: { readonly state: ArmState };
   readonly streams: {
     readonly videos: ReadonlyMap<string, VideoStream>;
     readonly sounds: ReadonlyMap<string, SoundStream>;
   };
-  readonly viewDelayMs: number | null; // how late the pictures are now
+  readonly driving: {
+    readonly arming: { readonly state: ArmState };
+    readonly viewDelayMs: number | null; // how late the pictures are now
+  };
 }
 
 /** Why a view must not be trusted; null when it may. */
@@ -34,7 +36,7 @@ export function reportOf(source: ReportSource): Report {
   return {
     type: "report",
     event: source.state.feedback?.event ?? 0,
-    armed: source.arming.state !== "disarmed",
+    armed: source.driving.arming.state !== "disarmed",
     streams: [
       ...[...source.streams.videos.values()].map((stream) =>
         streamReport(stream, settings.tolerance.video, settings.gate),
@@ -43,7 +45,7 @@ export function reportOf(source: ReportSource): Report {
         streamReport(stream, settings.tolerance.audio, settings.gate),
       ),
     ],
-    picture_delay_ms: source.viewDelayMs,
+    picture_delay_ms: source.driving.viewDelayMs,
     round_trip_ms: source.state.roundTripMs,
     speed_cap: settings.speedCap,
   };

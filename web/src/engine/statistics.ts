@@ -75,7 +75,8 @@ export interface Statistics {
 }
 
 export function statisticsOf(engine: ConsoleEngine, mainStream: string | null): Statistics {
-  const { state, driver, arming } = engine;
+  const { state } = engine;
+  const { driver, arming } = engine.driving;
   const now = performance.now();
   const main = mainStream === null ? undefined : engine.streams.videos.get(mainStream);
   const { seat, settings } = state;
@@ -83,7 +84,7 @@ export function statisticsOf(engine: ConsoleEngine, mainStream: string | null): 
     peer: state.welcome?.peer ?? null,
     role: state.welcome?.role ?? null,
     relay: engine.streams.relay,
-    line: engine.isReliable,
+    line: engine.peer?.isReliable === true,
     connected: state.welcome !== null,
     event: state.feedback?.event ?? null,
     epoch: state.robot?.epoch ?? null,
@@ -111,7 +112,7 @@ export function statisticsOf(engine: ConsoleEngine, mainStream: string | null): 
       maximum: driver === null ? null : quantile(driver.latency.toPicture, 1),
     },
     event_rate: rateOf(engine.events, now),
-    speed_share: engine.speedShare,
+    speed_share: engine.driving.speedShare,
     limits: state.feedback?.limits ?? [],
     stop: { ...state.stop },
     stop_press: engine.stopping.fate(now),
@@ -120,8 +121,8 @@ export function statisticsOf(engine: ConsoleEngine, mainStream: string | null): 
     joints: state.feedback?.joints ?? [],
     axes: axesOf(engine),
     goals: byAxis(engine, state.feedback?.goals ?? [], "goal"),
-    commanded: byAxis(engine, engine.values),
-    layer: state.robot?.description.layers[engine.layer]?.name ?? null,
+    commanded: byAxis(engine, engine.driving.values),
+    layer: state.robot?.description.layers[engine.driving.layer]?.name ?? null,
     faults: state.feedback?.faults ?? [],
     first_picture_ms: engine.firstPictureMs,
     sound: engine.streams.isAudible() ? "on" : "off",
@@ -134,7 +135,7 @@ export function statisticsOf(engine: ConsoleEngine, mainStream: string | null): 
 function gateOf(engine: ConsoleEngine, now: number): Statistics["gate"] {
   const block = gateReason(engine.state, engine.hears(now), engine.stopping.outranks(engine.state.stop, now));
   if (block !== null) return { state: block, reason: GATE_REASON_LABELS[block] };
-  const state = engine.driver === null ? "no_feedback" : gateState(engine.driver.gate, now);
+  const state = engine.driving.driver === null ? "no_feedback" : gateState(engine.driving.driver.gate, now);
   return { state, reason: GATE_LABELS[state] };
 }
 

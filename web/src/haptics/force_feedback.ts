@@ -39,7 +39,7 @@ const FILTERS: readonly HidFilter[] = [
 /** Who drives, with what, and what was measured last. */
 export interface ForceContext {
   readonly state: Pick<ConsoleState, "robot" | "feedback">;
-  readonly arming: { readonly state: ArmState };
+  readonly driving: { readonly arming: { readonly state: ArmState } };
   readonly controls: {
     readonly pad: {
       readonly state: { readonly id: string; readonly ready: boolean; readonly deadman: boolean } | null;
@@ -141,13 +141,13 @@ export class ForceFeedback {
    * would be moved by the force, and the robot with it. No force outlives the event that it belongs to.
    */
   private wanted(strength: number, now: number): Wanted | null {
-    const { arming, controls, measuredMs, state } = this.context;
+    const { driving, controls, measuredMs, state } = this.context;
     const { stick } = this;
     const { robot, feedback } = state;
     const pad = controls.pad?.state ?? null;
     if (stick === null || robot === null || feedback === null || measuredMs === null) return null;
     const holdSeconds = robot.description.hold;
-    if (now - measuredMs > 1000 * holdSeconds || arming.state !== "driving") return null;
+    if (now - measuredMs > 1000 * holdSeconds || driving.arming.state !== "driving") return null;
     if (pad?.ready !== true || !pad.deadman || !isSameDevice(pad.id, stick.device)) return null;
     return { force: stickForce(feedback.wrench, strength), holdSeconds };
   }

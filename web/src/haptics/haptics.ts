@@ -15,7 +15,7 @@ export interface HapticsContext {
   readonly controls: { readonly felt: Gamepad | null };
   readonly streams: { isAudible(): boolean };
   readonly measuredMs: number | null; // when the newest feedback came
-  isArmed(): boolean;
+  readonly driving: { isArmed(): boolean };
   conditions(now: number): Pick<ArmConditions, "connected" | "stopped" | "visible">;
 }
 
@@ -75,7 +75,7 @@ export class Haptics {
     const { settings } = context.state;
     const by = this.feeling(now);
     const strength = by === null ? 0 : contactStrength(this.force, by);
-    const felt = settings.rumble && context.isArmed() ? context.controls.felt : null;
+    const felt = settings.rumble && context.driving.isArmed() ? context.controls.felt : null;
     this.rumble?.feel(felt, strength, now);
     this.tone?.sound(settings.contactTone && context.streams.isAudible() ? strength : 0);
     this.stick?.feel(by === null ? null : strength, now);

@@ -61,7 +61,7 @@ export class HeadsetEntry {
     const { engine } = this.page;
     if (xr === undefined || this.isOpening || engine.display.isImmersive) return;
     this.isOpening = true;
-    engine.disarm("operator"); // the window may stand still from now on
+    engine.driving.disarm("operator"); // the window may stand still from now on
     const asked = xr.requestSession(mode, FEATURES);
     try {
       const [session, { HeadsetSession }] = await Promise.all([asked, import("./headset_session")]);

@@ -1,29 +1,21 @@
 import { WebGLRenderer } from "three";
 import type { ConsoleEngine } from "../engine/console_engine";
 import type { HeadsetStatistics } from "../engine/headset_statistics";
-import type { HeadsetControls } from "../input/controls";
-import type { PadInputs } from "../gamepad/mapping";
 import { robotIsUp } from "../session/console_state";
 import { pressedStopLabel, restingStopLabel } from "../stop/stop_labels";
 import { veilWords, type PlacedPicture } from "../ui/views/view_grid";
-import {
-  createHeadsetInput,
-  grab,
-  isSilent,
-  letGo,
-  takeFrame,
-  type HeadsetEvent,
-  type Side,
-} from "../xr/headset_input";
+import { grab, isSilent, type HeadsetEvent, type Side } from "../xr/headset_input";
 import type { RobotDescription } from "../protocol/wire";
 import type { HandSettings } from "../xr/hand_mapping";
 import type { ButtonName } from "../xr/headset_buttons";
 import { PoseDevice } from "../xr/pose_drive";
 import type { RigidPose } from "../xr/rigid";
 import { Battery } from "./battery";
+import { Hands } from "./hands";
 import { HeadsetView, type ViewCamera } from "./headset_view";
+import { ResetHold } from "./reset_hold";
 import { headsetStatus, resetWords, type FrameFigures } from "./status";
-import { readHands, trackedPose, type HandReading } from "./xr_hands";
+import { readHands, trackedPose } from "./xr_hands";
 
 export type HeadsetMode = "immersive-ar" | "immersive-vr";
 
@@ -35,30 +27,28 @@ export interface HeadsetPage {
 
 const STATUS_MS = 100; // between two readings of what the panel says
 const DEAD_MS = 10_000; // a visible session without frames ends
-const HOLD_MS = 1000; // the reset is held this long
 const SMOOTH = 0.1; // share of the newest frame in the shown times
 
 /**
  * One immersive session. Its frames are the page's frames, and whether it is visible says whether the page is: arming,
  * gate and veils go on with the window silent. Each of its ends leaves the robot at rest and the page disarmed.
  */
-export class HeadsetSession implements HeadsetControls {
+export class HeadsetSession {
   readonly frame: { -readonly [Name in keyof FrameFigures]: FrameFigures[Name] } = {
     intervalMs: null,
     workMs: null,
     waitedMs: null,
   };
-  private readonly input = createHeadsetInput();
+  private readonly hands = new Hands();
   private readonly view: HeadsetView;
   private readonly battery: Battery;
-  private hands: readonly HandReading[] = [];
   private viewer: RigidPose | null = null;
   private frames = 0;
   private poses: { readonly description: RobotDescription; readonly device: PoseDevice } | null = null;
   private isEnded = false;
   private isPlaced = false;
   private silentSinceMs: number | null = null; // a visible session without frames; null: it has some
-  private resetting: { readonly side: Side; readonly sinceMs: number } | null = null;
+  private readonly resetHold = new ResetHold();
   private status: ReturnType<typeof headsetStatus> | null = null;
   private statusMs = -Infinity;
   private reset: ReturnType<typeof resetWords> = null;
@@ -71,7 +61,7 @@ export class HeadsetSession implements HeadsetControls {
     private readonly handSettings: () => HandSettings,
   ) {
     this.view = new HeadsetView(mode === "immersive-vr");
-    this.battery = new Battery(() => page.engine.disarm("battery_low"));
+    this.battery = new Battery(() => page.engine.driving.disarm("battery_low"));
   }
 
   /** Shows the page in `session` until it ends. Rejects, with the session ended, where the browser cannot draw it. */
@@ -98,38 +88,14 @@ export class HeadsetSession implements HeadsetControls {
     }
   }
 
-  get deadman(): boolean {
-    return this.input.held.size > 0;
-  }
-
-  get inputs(): PadInputs {
-    return this.input.inputs;
-  }
-
-  get gamepad(): Gamepad | null {
-    return this.hands.find(({ sample }) => this.input.held.has(sample.side))?.gamepad ?? null;
-  }
-
-  /** The places of the hands, to the centimetre: one that holds still for a minute is no hand. */
-  get signature(): string {
-    const places = this.hands.map(({ sample }) =>
-      sample.pose?.position.map((part) => part.toFixed(2)).join(),
-    );
-    return places.join(" ");
-  }
-
-  release(): void {
-    letGo(this.input);
-  }
-
   /** With every tick of the page, frames or not. A window that is seen beside a silent headset is still judged. */
   step(now: number): void {
-    if (!isSilent(this.input, now)) {
+    if (!isSilent(this.hands.input, now)) {
       this.silentSinceMs = null;
       return;
     }
     const { engine } = this.page;
-    if (engine.isArmed()) engine.disarm("headset_silent");
+    if (engine.driving.isArmed()) engine.driving.disarm("headset_silent");
     engine.display.frame(now);
     this.silentSinceMs ??= now;
     // A fault in what draws it: no frame follows, and what is shown there would stand.
@@ -145,8 +111,8 @@ export class HeadsetSession implements HeadsetControls {
       frame_ms: this.frame.intervalMs,
       work_ms: this.frame.workMs,
       picture_wait_ms: this.frame.waitedMs,
-      held: [...this.input.held],
-      hands: this.hands.map(({ sample }) => ({ side: sample.side, tracked: sample.pose !== null })),
+      held: [...this.hands.input.held],
+      hands: this.hands.readings.map(({ sample }) => ({ side: sample.side, tracked: sample.pose !== null })),
       panels: this.view.pictures.map(({ streams, veil }) => ({
         left: streams.left,
         right: streams.right,
@@ -166,18 +132,25 @@ export class HeadsetSession implements HeadsetControls {
     const { engine } = this.page;
     const { session, renderer } = this;
     renderer.xr.setFoveation(0); // what is at the edge of the view is text
-    engine.disarm("operator"); // who puts a headset on arms anew, in it
+    engine.driving.disarm("operator"); // who puts a headset on arms anew, in it
     const seen = {
       get visible(): boolean {
         return session.visibilityState === "visible";
       },
     };
     engine.display.enter(seen);
-    engine.controls.headset = this;
+    engine.controls.headset = this.hands;
     engine.headset = this;
     engine.tracing?.show(true, performance.now(), "headset");
-    session.addEventListener("visibilitychange", () => this.visibilityChanged());
-    renderer.xr.getReferenceSpace()?.addEventListener("reset", () => this.spaceReset());
+    session.addEventListener("visibilitychange", () => {
+      if (session.visibilityState === "hidden") engine.driving.disarm("headset_off");
+      else if (session.visibilityState === "visible-blurred") engine.driving.disarm("headset_blurred");
+    });
+    renderer.xr.getReferenceSpace()?.addEventListener("reset", () => {
+      // The headset calls another place its origin: every pose that was known means another place.
+      engine.driving.disarm("tracking_lost");
+      this.isPlaced = false;
+    });
     renderer.domElement.addEventListener("webglcontextlost", () => this.end());
     const loop = (_time: number, frame?: XRFrame): void => {
       if (frame === undefined) return;
@@ -195,12 +168,13 @@ export class HeadsetSession implements HeadsetControls {
   private ended(): void {
     const { engine } = this.page;
     this.isEnded = true;
-    engine.disarm("headset_left");
+    engine.driving.disarm("headset_left");
     this.renderer.setAnimationLoop(null);
     if (engine.headset === this) {
       engine.headset = null;
       engine.controls.headset = null;
-      if (engine.goals?.device === this.poses?.device && engine.goals !== null) engine.goals.device = null;
+      const { goals } = engine.driving;
+      if (goals !== null && goals.device === this.poses?.device) goals.device = null;
       engine.display.leave();
       engine.tracing?.show(false, performance.now(), "headset");
     }
@@ -212,27 +186,17 @@ export class HeadsetSession implements HeadsetControls {
 
   /** A view that is not drawn any more would go on showing its last picture as if it were the present one. */
   private end(): void {
-    this.page.engine.disarm("headset_left");
+    this.page.engine.driving.disarm("headset_left");
     this.session.end().catch(() => undefined); // it has ended
-  }
-
-  private visibilityChanged(): void {
-    const { visibilityState } = this.session;
-    if (visibilityState === "hidden") this.page.engine.disarm("headset_off");
-    else if (visibilityState === "visible-blurred") this.page.engine.disarm("headset_blurred");
-  }
-
-  /** The headset calls another place its origin: every pose that was known means another place. */
-  private spaceReset(): void {
-    this.page.engine.disarm("tracking_lost");
-    this.isPlaced = false;
   }
 
   private draw(frame: XRFrame): void {
     const began = performance.now();
     const space = this.renderer.xr.getReferenceSpace();
     if (space === null) return;
-    this.noteFrame(began);
+    this.frames += 1;
+    if (this.frames > 1)
+      this.frame.intervalMs = smooth(this.frame.intervalMs, began - this.hands.input.frameMs);
     this.read(frame, space, began);
     const { engine } = this.page;
     engine.controls.events.changed(began);
@@ -243,29 +207,31 @@ export class HeadsetSession implements HeadsetControls {
     this.frame.workMs = smooth(this.frame.workMs, performance.now() - began);
   }
 
-  private noteFrame(now: number): void {
-    this.frames += 1;
-    if (this.frames > 1) this.frame.intervalMs = smooth(this.frame.intervalMs, now - this.input.frameMs);
-  }
-
   private read(frame: XRFrame, space: XRReferenceSpace, now: number): void {
     this.viewer = trackedPose(frame.getViewerPose(space));
-    if (this.viewer === null) this.page.engine.disarm("tracking_lost");
+    if (this.viewer === null) this.page.engine.driving.disarm("tracking_lost");
     else if (!this.isPlaced) this.recentre();
-    this.hands = readHands(frame, space, this.session.inputSources);
-    const samples = this.hands.map(({ sample }) => sample);
-    for (const event of takeFrame(this.input, samples, now)) this.carryOut(event, now);
-    this.goOnResetting(now);
+    const readings = readHands(frame, space, this.session.inputSources);
+    for (const event of this.hands.take(readings, now)) this.carryOut(event, now);
+    const { hands } = this.hands.input;
+    const isOnReset = (side: Side): boolean =>
+      hands.get(side)?.pressed === true && this.buttonAt(side) === "reset";
+    const heldMs = this.resetHold.step(isOnReset, now);
+    if (heldMs !== null) this.page.engine.stopping.reset(heldMs, now);
     this.takePoses();
   }
 
   /** The hands lead the poses of the robot that is there now. */
   private takePoses(): void {
-    const { goals, state } = this.page.engine;
+    const { driving, state } = this.page.engine;
+    const { goals } = driving;
     const description = state.robot?.description;
     if (goals === null || description === undefined || this.poses?.description === description) return;
     const device = new PoseDevice(description, {
-      pose: (side) => (this.input.held.has(side) ? (this.input.hands.get(side)?.pose ?? null) : null),
+      pose: (side) => {
+        const { held, hands } = this.hands.input;
+        return held.has(side) ? (hands.get(side)?.pose ?? null) : null;
+      },
       forward: () => this.view.forward,
       panel: (camera) => this.view.panelOf(camera),
       settings: () => this.handSettings(),
@@ -278,9 +244,9 @@ export class HeadsetSession implements HeadsetControls {
     const { engine } = this.page;
     if (event.kind === "arm") this.arm(event.side);
     else if (event.kind === "press") this.press(event, now);
-    else if (event.kind === "lost") engine.disarm(event.why);
+    else if (event.kind === "lost") engine.driving.disarm(event.why);
     else if (event.kind === "stop") engine.stop("headset button");
-    else if (event.kind === "layer") engine.nextLayer();
+    else if (event.kind === "layer") engine.driving.selectLayer();
     else this.recentre();
   }
 
@@ -288,12 +254,12 @@ export class HeadsetSession implements HeadsetControls {
   private arm(side: Side): void {
     const { engine } = this.page;
     if (this.viewer === null) return;
-    if (!engine.isArmed()) engine.toggleArmed();
-    if (engine.isArmed()) grab(this.input, side);
+    if (!engine.driving.isArmed()) engine.toggleArmed();
+    if (engine.driving.isArmed()) grab(this.hands.input, side);
   }
 
   private buttonAt(side: Side): ButtonName | null {
-    return this.view.buttonAt(side, this.input.held.has(side));
+    return this.view.buttonAt(side, this.hands.input.held.has(side));
   }
 
   /** `drives`: with this press, or before it. */
@@ -302,19 +268,7 @@ export class HeadsetSession implements HeadsetControls {
     if (button === "stop") this.page.engine.stop("headset button");
     else if (button === "recentre") this.recentre();
     else if (button === "leave") this.end();
-    else if (button === "reset") this.resetting = { side, sinceMs: now };
-  }
-
-  /** As the page's own button: held for a second on a stop that was looked at first. */
-  private goOnResetting(now: number): void {
-    const { resetting } = this;
-    if (resetting === null) return;
-    const isHeld = this.input.hands.get(resetting.side)?.pressed === true;
-    if (!isHeld || this.buttonAt(resetting.side) !== "reset") this.resetting = null;
-    else if (now - resetting.sinceMs >= HOLD_MS) {
-      this.resetting = null;
-      this.page.engine.stopping.reset(resetting.sinceMs, now);
-    }
+    else if (button === "reset") this.resetHold.press(side, now);
   }
 
   private recentre(): void {
@@ -334,7 +288,7 @@ export class HeadsetSession implements HeadsetControls {
     const heard = engine.hears(now) && robotIsUp(engine.state);
     const fate = engine.stopping.fate(now);
     const state = {
-      cameras: grid.pictures().map((picture) => this.camera(picture, now)),
+      cameras: grid.pictures().map((picture) => viewCamera(engine, picture, now)),
       main,
       status: this.status,
       stop:
@@ -345,26 +299,25 @@ export class HeadsetSession implements HeadsetControls {
           : pressedStopLabel(fate, heard),
       reset: (this.reset = resetWords(engine, now)),
     };
-    this.view.update(state, this.hands, this.input.held, now);
+    this.view.update(state, this.hands.readings, this.hands.input.held, now);
     for (const panel of this.view.pictures)
       if (panel.streams.left === main && panel.waitedMs !== null && panel.uploadedMs === now)
         this.frame.waitedMs = smooth(this.frame.waitedMs, panel.waitedMs);
   }
+}
 
-  private camera({ name, label, canvas }: PlacedPicture, now: number): ViewCamera {
-    const { engine } = this.page;
-    const video = engine.streams.videos.get(name);
-    const gap = video?.gate.counts.gap ?? null;
-    const tolerance = engine.state.settings.tolerance.video;
-    return {
-      name,
-      label,
-      canvas,
-      drawnMs: video?.lastDrawnMs ?? null,
-      gap: gap === null ? "" : `gap ${gap} of ${tolerance}`,
-      veil: veilWords(engine, name, now),
-    };
-  }
+function viewCamera(engine: ConsoleEngine, { name, label, canvas }: PlacedPicture, now: number): ViewCamera {
+  const video = engine.streams.videos.get(name);
+  const gap = video?.gate.counts.gap ?? null;
+  const tolerance = engine.state.settings.tolerance.video;
+  return {
+    name,
+    label,
+    canvas,
+    drawnMs: video?.lastDrawnMs ?? null,
+    gap: gap === null ? "" : `gap ${gap} of ${tolerance}`,
+    veil: veilWords(engine, name, now),
+  };
 }
 
 function smooth(before: number | null, value: number): number {

@@ -74,12 +74,12 @@ function stateWords(engine: ConsoleEngine, now: number): Pick<HeadsetStatus, "te
     const text = [grave.warning ?? "", grave.text].filter((each) => each !== "").join(" ");
     return { tone: grave.tone === "stopped" ? "stopped" : grave.tone, title: grave.title, text };
   }
-  const { arming } = engine;
+  const { arming } = engine.driving;
   const warned = warningSeconds(engine.state.feedback, engine.measuredMs, now);
-  if (engine.isArmed() && warned > 0)
+  if (engine.driving.isArmed() && warned > 0)
     return { tone: "armed", title: "Armed", text: `The robot warns first: ${warned} s` };
   if (arming.state === "driving") {
-    const waits = engine.goals?.saysWhatItWaitsFor(now) === true;
+    const waits = engine.driving.goals?.saysWhatItWaitsFor(now) === true;
     const text = waits ? WAITS_LABEL : "Let go of the grip to bring the robot to rest";
     return { tone: "driving", title: "Driving", text };
   }
@@ -90,7 +90,8 @@ function stateWords(engine: ConsoleEngine, now: number): Pick<HeadsetStatus, "te
   return { tone: "calm", title: "Disarmed", text };
 }
 
-function calmWords({ arming: { reason } }: ConsoleEngine): string {
+function calmWords({ driving }: ConsoleEngine): string {
+  const { reason } = driving.arming;
   const squeeze = HEADSET_DISARM_LABELS.squeeze_released;
   if (reason === "start" || reason === "operator" || reason === "squeeze_released") return squeeze;
   const why = disarmLabel(reason).replace(/^Disarmed: (.)/, (_all, first: string) => first.toUpperCase());
@@ -110,7 +111,7 @@ function figuresOf(engine: ConsoleEngine, stream: string | null, now: number): F
   const age = feedbackAge(engine.measuredMs, now);
   const gap = stream === null ? null : (engine.streams.videos.get(stream)?.gate.counts.gap ?? null);
   const tolerance = settings.tolerance.video;
-  const layer = robot?.description.layers[engine.layer];
+  const layer = robot?.description.layers[engine.driving.layer];
   const figures: Figure[] = [
     {
       label: age === null ? "Event" : `Event, ${ageLabel(now - (engine.measuredMs ?? now))} old`,
@@ -126,9 +127,9 @@ function figuresOf(engine: ConsoleEngine, stream: string | null, now: number): F
     },
     {
       label: "Delay",
-      value: milliseconds(engine.viewDelayMs),
+      value: milliseconds(engine.driving.viewDelayMs),
       unit: "ms",
-      tone: engine.viewDelayMs === null ? "off" : "good",
+      tone: engine.driving.viewDelayMs === null ? "off" : "good",
     },
   ];
   if (robot !== null && robot.description.wrench !== null)
@@ -140,10 +141,10 @@ function figuresOf(engine: ConsoleEngine, stream: string | null, now: number): F
     });
   if ((robot?.description.layers.length ?? 0) > 1 && layer !== undefined)
     figures.push({ label: "Layer", value: layer.label, unit: "", tone: "good" });
-  if (engine.speedShare < 1)
+  if (engine.driving.speedShare < 1)
     figures.push({
       label: "Speed",
-      value: String(Math.round(engine.speedShare * 100)),
+      value: String(Math.round(engine.driving.speedShare * 100)),
       unit: "%",
       tone: "good",
     });

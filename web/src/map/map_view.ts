@@ -35,6 +35,7 @@ import {
   scanOf,
   type Place,
 } from "./map_state";
+import { actConditions } from "../engine/act_conditions";
 
 const STEP = 1.4; // of a press on a zoom button
 const WHEEL = 0.0015; // per pixel of a wheel
@@ -204,21 +205,12 @@ export class MapView {
       (running !== null || (state.actions.at(-1) === update && now - engine.actionMs < SHOWN_MS));
     setText(
       this.words,
-      action !== null && isShown ? actionWords(action, update) : this.whyNot(description, now),
+      action !== null && isShown ? actionWords(action, update) : whyNoGoal(engine, description, now),
     );
     setData(this.words, "tone", isShown ? actionTone(update) : "off");
     setHidden(this.cancel, running === null || !(holdsSeat(state) || state.welcome?.role === "supervisor"));
     setData(this.element, "aims", String(this.aim !== null));
     setData(this.element, "goals", String(action !== null && mayDrive(state)));
-  }
-
-  /** Why no goal can be set now; "" where one can, or for whoever only watches. */
-  private whyNot(description: RobotDescription, now: number): string {
-    const { engine } = this;
-    const action = goalAction(description);
-    if (action === null || !mayDrive(engine.state)) return "";
-    const refusal = actRefusal(action, engine.state.actions, engine.actConditions(now, false));
-    return refusal === null ? "" : `${action.label}: ${ACT_REFUSAL_LABELS[refusal]}`;
   }
 
   private cancelGoal(): void {
@@ -232,7 +224,7 @@ export class MapView {
     const description = engine.state.robot?.description;
     const action = description ? goalAction(description) : null;
     if (action === null || !mayDrive(engine.state)) return;
-    const refusal = actRefusal(action, engine.state.actions, engine.actConditions(performance.now(), false));
+    const refusal = actRefusal(action, engine.state.actions, actConditions(engine, performance.now(), false));
     const robot = this.place.kind === "known" ? this.place.pose : null;
     const parameters = goalParameters(action, at, towards, robot);
     const why =
@@ -305,6 +297,14 @@ function tool(sign: string, label: string, onclick: () => void): HTMLButtonEleme
   made.setAttribute("aria-label", label);
   made.title = label;
   return made;
+}
+
+/** Why no goal can be set now; "" where one can, or for whoever only watches. */
+function whyNoGoal(engine: ConsoleEngine, description: RobotDescription, now: number): string {
+  const action = goalAction(description);
+  if (action === null || !mayDrive(engine.state)) return "";
+  const refusal = actRefusal(action, engine.state.actions, actConditions(engine, now, false));
+  return refusal === null ? "" : `${action.label}: ${ACT_REFUSAL_LABELS[refusal]}`;
 }
 
 /** Pixels at the upper and the lower edge that words cover, on a phone the robot's actions too. */

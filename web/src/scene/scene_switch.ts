@@ -64,7 +64,7 @@ export class SceneSwitch {
       megabits: network?.downlink ?? null,
       limited: (state.quality?.reason ?? "") !== "",
       pictureAgeMs: this.pictureAge(engine, now),
-      armed: engine.isArmed(),
+      armed: engine.driving.isArmed(),
       renderer: this.renderer,
     };
   }

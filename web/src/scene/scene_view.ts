@@ -1,26 +1,22 @@
-import { createSceneGate, resetSceneGate, sceneStaleness, settleScene } from "../gate/scene_gate";
+import { sceneStaleness } from "../gate/scene_gate";
 import { eventGap } from "../gate/serial";
 import type { GateContext } from "../gate/gate_counters";
 import type { ConsoleApi } from "../transport/signalling/console_api";
 import type { Feedback, RobotDescription } from "../protocol/wire";
 import type { Display } from "../input/display";
 import { h, setData, setText } from "../ui/elements/dom";
+import { FullScene } from "./full_scene";
 import { SceneDrawing } from "./scene_drawing";
-import { gateScene, type ForeignKey } from "./scene_frame";
+import type { SceneFrameEvents } from "./scene_frame";
 
-type FrameState = "off" | "loading" | "on" | "failed";
 /** What is to be seen. `full`: viser's, in its frame. `drawn`: the page's own. */
 type SceneState = "away" | "loading" | "drawn" | "full" | "failed";
 
 /** What the page knows that the scene has to keep to. */
-export interface SceneSurroundings {
-  /** Newest event that the scene may show. */
-  due(): number | "all" | null;
+export interface SceneSurroundings extends SceneFrameEvents {
   context(): GateContext;
   /** Whose frames it draws in. */
   readonly display: Display;
-  /** Keys pressed while the frame has the focus, which the page itself never sees. */
-  onkey(key: ForeignKey): void;
 }
 
 /** `window.lockstep.scene()` */
@@ -33,12 +29,6 @@ export interface SceneStatistics {
 }
 
 const FAILED = "This browser cannot draw the 3D scene";
-const FRAME_WORDS: Readonly<Record<FrameState, string>> = {
-  off: "",
-  loading: "Opening the full 3D scene…",
-  on: "Opening the full 3D scene…",
-  failed: "The full 3D scene is not available now",
-};
 const SETTLE_MS = 5000;
 
 /**
@@ -47,21 +37,20 @@ const SETTLE_MS = 5000;
  */
 export class SceneView {
   readonly element = h("div", "scene");
-  readonly gate = createSceneGate();
+  readonly full: FullScene;
   private readonly drawing: SceneDrawing;
   private readonly words = h("p", "scene-words");
-  private frame: HTMLIFrameElement | null = null;
-  private frameState: FrameState = "off";
   private feedback: Feedback | null = null; // newest that was taken
   private openedMs = 0;
+  private epoch: string | null = null;
 
   constructor(
-    private readonly api: ConsoleApi,
+    api: ConsoleApi,
     private readonly page: SceneSurroundings,
   ) {
     this.drawing = new SceneDrawing(() => page.due(), page.display);
     this.element.append(this.drawing.element, this.words);
-    gateScene(this.gate, () => this.frame?.contentWindow ?? null, page);
+    this.full = new FullScene(api, this.element, page);
   }
 
   /** Begins to draw the robot. */
@@ -73,42 +62,20 @@ export class SceneView {
 
   /** Ends it; what it drew is gone with it. */
   close(): void {
-    this.unload();
+    this.full.close();
     this.drawing.close();
   }
 
-  /** Opens the full scene unless it is open. */
-  load(): void {
-    if (this.frameState === "on" || this.frameState === "loading") return;
-    this.frameState = "loading";
-    this.api.scene().then(
-      (path) => this.embed(path),
-      () => {
-        if (this.frameState === "loading") this.frameState = "failed";
-      },
-    );
-  }
-
-  /** Ends the full scene. */
-  unload(): void {
-    this.frame?.remove();
-    this.frame = null;
-    this.frameState = "off";
-    this.openedMs = performance.now();
-    resetSceneGate(this.gate);
-  }
-
-  /** Another bridge, whose robot may have another shape. */
-  renew(): void {
-    const wasLoaded = this.isFull;
+  /** It lives as long as the bridge whose robot it shows: the robot of another one may have another shape. */
+  follow(epoch: string | null): void {
+    if (epoch === null || epoch === this.epoch) return;
+    const isFirst = this.epoch === null;
+    this.epoch = epoch;
+    if (isFirst) return;
+    const wasOpen = this.full.isOpen;
     this.close();
     this.drawing.forget();
-    if (wasLoaded) this.load();
-  }
-
-  /** Whether the full scene is open, or opening. */
-  get isFull(): boolean {
-    return this.frameState === "on" || this.frameState === "loading";
+    if (wasOpen) this.full.open();
   }
 
   /** Whether there is nothing to be seen, and will not be. */
@@ -118,8 +85,8 @@ export class SceneView {
 
   /** Whether it has run long enough that its loading no longer holds the page up. */
   hasSettled(now: number): boolean {
-    const runs = this.frameState === "on" || this.drawing.state === "on";
-    return runs && now - this.openedMs > SETTLE_MS;
+    const runs = this.full.state === "on" || this.drawing.state === "on";
+    return runs && now - Math.max(this.openedMs, this.full.changedMs) > SETTLE_MS;
   }
 
   /** Takes the newest feedback, and goes on to the event of the picture that is now on screen. */
@@ -130,31 +97,34 @@ export class SceneView {
   }
 
   settle(): void {
-    if (this.frameState === "on") settleScene(this.gate, this.page.due());
-    if (!this.showsFull) this.drawing.settle();
+    this.full.settle();
+    if (!this.full.isShown) this.drawing.settle();
   }
 
   /** Writes what stands in it. */
   update(): void {
     const state = this.state();
     setData(this.element, "state", state);
-    setText(this.words, this.drawing.state === "failed" && !this.isFull ? FAILED : this.frameWords());
+    const { full, drawing } = this;
+    if (drawing.state === "failed" && !full.isOpen) setText(this.words, FAILED);
+    else if (full.isShown) setText(this.words, "");
+    else setText(this.words, drawing.state === "loading" ? "Opening the 3D scene…" : full.words);
   }
 
   /** Why it must not be trusted; null when it may, or shows nothing. `age`: of the feedback, once that is too old. */
   staleness(age: string | null): string | null {
     const { shown } = this;
-    const showsNothing = this.frameState !== "on" && this.drawing.state !== "on";
+    const showsNothing = this.full.state !== "on" && this.drawing.state !== "on";
     return showsNothing ? null : sceneStaleness({ shown }, this.page.context(), age);
   }
 
   /** Whether joints of what is shown were not measured. */
   get lacksJoints(): boolean {
-    return !this.showsFull && this.drawing.lacksJoints;
+    return !this.full.isShown && this.drawing.lacksJoints;
   }
 
   statistics(): SceneStatistics {
-    const { held, forced } = this.gate;
+    const { held, forced } = this.full.gate;
     const { feedback } = this.page.context();
     const { shown } = this;
     const gap = shown === null || feedback === null ? null : eventGap(feedback, shown);
@@ -162,34 +132,13 @@ export class SceneView {
   }
 
   private state(): SceneState {
-    if (this.showsFull) return "full";
+    if (this.full.isShown) return "full";
     if (this.drawing.state === "on") return this.drawing.shown === null ? "loading" : "drawn";
-    if (this.drawing.state === "failed") return this.isFull ? "loading" : "failed";
-    return this.drawing.state === "loading" || this.isFull ? "loading" : "away";
-  }
-
-  /** Whether what is to be seen is the frame's. */
-  private get showsFull(): boolean {
-    return this.frameState === "on" && this.gate.shown !== null;
+    if (this.drawing.state === "failed") return this.full.isOpen ? "loading" : "failed";
+    return this.drawing.state === "loading" || this.full.isOpen ? "loading" : "away";
   }
 
   private get shown(): number | null {
-    return this.showsFull ? this.gate.shown : this.drawing.shown;
-  }
-
-  private frameWords(): string {
-    if (this.showsFull) return "";
-    return this.drawing.state === "loading" ? "Opening the 3D scene…" : FRAME_WORDS[this.frameState];
-  }
-
-  private embed(path: string): void {
-    if (this.frameState !== "loading") return;
-    resetSceneGate(this.gate);
-    // Whatever runs in there has an origin that is nobody's; the console says the same of it (server/lockstep/server/http/security_headers.py).
-    const attributes = { src: path, title: "3D scene of the robot", sandbox: "allow-scripts" };
-    this.frame = h("iframe", "scene-frame", attributes);
-    this.element.append(this.frame);
-    this.openedMs = performance.now();
-    this.frameState = "on";
+    return this.full.isShown ? this.full.gate.shown : this.drawing.shown;
   }
 }

@@ -13,7 +13,7 @@ import { ConsoleError, type ConsoleApi } from "./signalling/console_api";
 import type { Preconnection } from "./webrtc/preconnection";
 import { Peer, type ChannelName, type PeerEvents, type PeerOptions } from "./peer";
 import { TransportEnd } from "./transport";
-import type { StreamInfo } from "../protocol/wire";
+import type { ClientMessage, StreamInfo } from "../protocol/wire";
 import type { StampReader } from "./encoded_transform/stamp_reader";
 
 /** How the page stands with the console. */
@@ -76,6 +76,11 @@ export class Connection {
 
   send(channel: ChannelName, text: string): boolean {
     return this.peer?.send(channel, text) ?? false;
+  }
+
+  /** As `send`. */
+  tell(channel: ChannelName, message: ClientMessage): boolean {
+    return this.send(channel, JSON.stringify(message));
   }
 
   /** To be called many times a second: notices silence, which WebRTC takes seconds to notice. */

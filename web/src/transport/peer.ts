@@ -56,10 +56,10 @@ export class Peer {
     const signal = AbortSignal.any([this.abort.signal, AbortSignal.timeout(SIGNALLING_LIMIT_MS)]);
     // Without an answer about relays there is still the console.
     const ticket = options.watches ? await this.ticket(signal).catch(() => null) : null;
-    if (options.thumbnail === true) await webrtc.connectForThumbnail(signal);
+    if (options.thumbnail === true) await webrtc.connect({ kind: "thumbnail" }, signal);
     else if (ticket !== null) await this.connectBeside(ticket, signal);
-    else if (first !== null) await webrtc.connectFirst(first, signal);
-    else await webrtc.connectForMedia(!options.watches, signal);
+    else if (first !== null) await webrtc.connect({ kind: "first", first }, signal);
+    else await webrtc.connect({ kind: "media", voice: !options.watches }, signal);
   }
 
   /** Whether messages could be sent at some time. */
@@ -131,7 +131,7 @@ export class Peer {
     const relay = new Watch(
       this.api,
       this.reader,
-      () => this.webrtc.servers,
+      () => this.webrtc.session.servers,
       () => this.id,
       {
         feedback: (data) => this.events.message("control", data, performance.now()),
@@ -141,7 +141,7 @@ export class Peer {
     );
     this.relay = relay; // before the welcome, whose reader asks
     const socket = await openWebSocketTransport(this.api, ticket.relay, signal, this.transportEvents());
-    if (socket === null) await this.webrtc.connectBeside(ticket.relay, signal);
+    if (socket === null) await this.webrtc.connect({ kind: "beside", relay: ticket.relay }, signal);
     else this.use(socket);
     void relay.watch();
   }

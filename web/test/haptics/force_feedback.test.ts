@@ -15,7 +15,7 @@ class Driving {
   readonly hid = new HidFake(this.fake);
   readonly context = {
     state: { robot: { description: { hold: 0.3 } }, feedback: { wrench: [-80, 0, 0, 0, 0, 0] } },
-    arming: { state: "driving" },
+    driving: { arming: { state: "driving" } },
     controls: { pad: { state: { id: ID, ready: true, deadman: true } } },
     measuredMs: 1000,
   } as unknown as Mutable<ForceContext>;
@@ -57,8 +57,8 @@ describe("forces", () => {
   });
 
   const ENDS: readonly (readonly [name: string, end: (rig: Driving) => void])[] = [
-    ["the page disarms", (rig) => (rig.context.arming.state = "disarmed")],
-    ["the deadman is let go", (rig) => (rig.context.arming.state = "armed")],
+    ["the page disarms", (rig) => (rig.context.driving.arming.state = "disarmed")],
+    ["the deadman is let go", (rig) => (rig.context.driving.arming.state = "armed")],
     [
       "the deadman of the stick is let go while another is held",
       (rig) => {

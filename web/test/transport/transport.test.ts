@@ -1,7 +1,8 @@
 /** What holds for every transport of the page: both run the same cases. */
 import { afterEach, beforeEach, describe, expect, it, vi } from "vitest";
 import { WebSocketTransport, type Socket } from "../../src/transport/websocket_transport";
-import { WebRtcTransport, type WebRtcApi } from "../../src/transport/webrtc/webrtc_transport";
+import type { WhepApi } from "../../src/transport/signalling/whep_session";
+import { WebRtcTransport } from "../../src/transport/webrtc/webrtc_transport";
 import { PendingConnection } from "../../src/transport/webrtc/pending_connection";
 import type { Transport, TransportEvents } from "../../src/transport/transport";
 
@@ -52,7 +53,7 @@ const THERE = '{"type":"note","text":"there"}';
 const LATE = '{"type":"note","text":"late"}';
 const NOW = '{"type":"note","text":"now"}';
 
-const API: WebRtcApi = {
+const API: WhepApi = {
   end: () => Promise.resolve(),
   media: () => expect.unreachable(),
   offer: () => expect.unreachable(),

@@ -2,23 +2,20 @@
 
 import asyncio
 from collections.abc import AsyncIterator, Mapping, Sequence
-from contextlib import asynccontextmanager
+from contextlib import asynccontextmanager, suppress
 from pathlib import Path
-from types import MappingProxyType
 from typing import Any
 
-from playwright.async_api import Browser, Page
+from playwright.async_api import Browser, Error, Page
 
 from lockstep.bench.browsers.chromium import missed_in_page, open_page
+from lockstep.bench.browsers.pad import FORWARD, LEFT_Y, RB, ROUND, START, Pad
+from lockstep.bench.harness.background import background
 
-__all__ = ["FORWARD", "LEFT_X", "LEFT_Y", "RB", "SMALL_WINDOW", "START", "ConsolePage", "open_console"]
+__all__ = ["SMALL_WINDOW", "ConsolePage", "open_console"]
 
 # The smallest size that shows all of the page at once: where the processor draws, each pixel of the window costs.
 SMALL_WINDOW = (1024, 640)
-START, RB, STOP_BUTTON = 9, 5, 1  # W3C standard mapping
-LEFT_X, LEFT_Y, RIGHT_X = 0, 1, 2
-FORWARD = MappingProxyType({LEFT_Y: -1.0})
-ROUND = MappingProxyType({LEFT_Y: -1.0, RIGHT_X: -1.0})  # the planar robot in a circle of half a metre: it stays near
 ARM_TRIES, ARM_SECONDS = 3, 5.0
 # The page's reasons for disarming after a busy machine held up the robot, the console or the page.
 HELD_UP = (
@@ -31,33 +28,6 @@ HELD_UP = (
 )
 HOLD_SECONDS, RESET_SECONDS = 10.0, 60.0  # for one hold of the button to take effect; for all holds
 
-# The true event, read from the strip that the planar robot draws into its pictures (robots/event_strip.py), together
-# with the stamp that the page believes it has. It is one expression, so no picture is drawn in between.
-READ_STRIP = """(name) => {
-  const canvas = document.querySelector(`canvas[data-stream="${name}"]`);
-  const rendered = window.lockstep.rendered(name).at(-1);
-  if (!canvas || !rendered || canvas.width === 0) return null;
-  const rows = Math.floor(canvas.height / 20);
-  const pixels = canvas.getContext("2d").getImageData(0, 0, canvas.width, rows).data;
-  let event = 0, parity = 0, last = 0;
-  for (let cell = 0; cell < 32; cell++) {
-    const left = Math.floor(cell * canvas.width / 32), right = Math.floor((cell + 1) * canvas.width / 32);
-    const quarter = Math.floor((right - left) / 4), edge = Math.floor(rows / 4);
-    let sum = 0, count = 0;
-    for (let y = edge; y < rows - edge; y++) for (let x = left + quarter; x < right - quarter; x++) {
-      const at = 4 * (y * canvas.width + x);
-      sum += 0.299 * pixels[at] + 0.587 * pixels[at + 1] + 0.114 * pixels[at + 2];
-      count++;
-    }
-    const mean = sum / count;
-    if (mean >= 90 && mean <= 160) return { stamp: rendered.stamp, event: null };
-    const bit = mean > 160 ? 1 : 0;
-    if (cell < 31) { event = event * 2 + bit; parity ^= bit; } else last = bit;
-  }
-  return { stamp: rendered.stamp, event: parity === last ? event : null };
-}"""
-
-
 # The hook is in the code that the page loads after its first picture.
 STATISTICS = """new Promise((resolve) => {
   const look = () => (window.lockstep ? resolve(window.lockstep.stats()) : setTimeout(look, 20));
@@ -66,10 +36,15 @@ STATISTICS = """new Promise((resolve) => {
 
 
 class ConsolePage:
-    """One open page. Each wait is for something that the page reports, never for time to pass."""
+    """One open page. Each wait is for something that the page reports, never for time to pass.
+
+    Attributes:
+        pad: the gamepad that it has, if it was opened with one
+    """
 
     def __init__(self, page: Page) -> None:
         self.page = page
+        self.pad = Pad(page)
 
     async def stats(self) -> dict[str, Any]:
         """Return `window.lockstep.stats()`, as soon as it is there."""
@@ -105,28 +80,18 @@ class ConsolePage:
         # A machine that is starting other programs may leave a browser without a turn for half a minute.
         await self.until(f"s.connected && {videos}.length > 0 && {videos}.every((x) => x.rendered > 3)", 45)
 
-    async def press(self, button: int, pressed: bool = True) -> None:
-        """Press as a finger does: no shorter than the page's sampling can see."""
-        await self.page.evaluate(
-            "([button, pressed]) => { window.testPad.press(button, pressed); return window.testPad.seen(); }",
-            [button, pressed],
-        )
-
-    async def tilt(self, axis: int, value: float) -> None:
-        await self.page.evaluate("([axis, value]) => window.testPad.tilt(axis, value)", [axis, value])
-
     async def arm(self) -> None:
         """Press the pad's START, as an operator does: let go and press again if nothing happens."""
         await self.until("s.seat && s.seat.mine")
         for _ in range(ARM_TRIES - 1):
-            await self.press(START)
+            await self.pad.press(START)
             missed = await self._missed("s.armed", ARM_SECONDS)
-            await self.press(START, False)
+            await self.pad.press(START, False)
             if missed is None:
                 return
-        await self.press(START)
+        await self.pad.press(START)
         await self.until("s.armed", 20)
-        await self.press(START, False)
+        await self.pad.press(START, False)
 
     async def arm_by_key(self) -> None:
         """Press Enter where the keyboard is the robot's; again if nothing happens."""
@@ -141,9 +106,9 @@ class ConsolePage:
     async def drive_forward(self, tilts: Mapping[int, float] = FORWARD) -> None:
         """Hold the deadman and tilt the sticks; arm again if a busy machine ended that."""
         for _ in range(ARM_TRIES):
-            await self.press(RB)
+            await self.pad.press(RB)
             for axis, value in tilts.items():
-                await self.tilt(axis, value)
+                await self.pad.tilt(axis, value)
             await self.until("!s.armed || (s.driving && s.at_rest === false)")
             if not await self.was_held_up():
                 break
@@ -158,33 +123,24 @@ class ConsolePage:
         """
         await self.arm()
         await self.drive_forward(tilts)
-        going_on = asyncio.create_task(self._go_on(tilts))
-        try:
+        async with background(self._go_on(tilts)):
             yield
-        finally:
-            going_on.cancel()
-            await asyncio.gather(going_on, return_exceptions=True)
 
     async def _go_on(self, tilts: Mapping[int, float]) -> None:
-        while True:
-            await self._missed("!s.armed", 600)
-            if not await self.was_held_up():
-                return
-            await self._arm_anew(tilts)
-            await self.drive_forward(tilts)
+        with suppress(AssertionError, Error):  # the block's own waits tell what is wrong, or has closed the page
+            while True:
+                await self._missed("!s.armed", 600)
+                if not await self.was_held_up():
+                    return
+                await self._arm_anew(tilts)
+                await self.drive_forward(tilts)
 
     async def _arm_anew(self, tilts: Mapping[int, float]) -> None:
-        await self.press(RB, False)
+        await self.pad.press(RB, False)
         for axis in tilts:
-            await self.tilt(axis, 0)
+            await self.pad.tilt(axis, 0)
         await self.until("s.connected")
         await self.arm()
-
-    async def let_go(self) -> None:
-        """Let go of the deadman and the sticks."""
-        await self.press(RB, False)
-        for axis in ROUND:
-            await self.tilt(axis, 0)
 
     async def was_held_up(self) -> bool:
         """Return whether the page is disarmed because this machine held something up."""
@@ -199,12 +155,12 @@ class ConsolePage:
         async with asyncio.timeout(seconds):
             while True:
                 await self.arm()
-                await self.press(RB)
-                await self.tilt(LEFT_Y, -1)
+                await self.pad.press(RB)
+                await self.pad.tilt(LEFT_Y, -1)
                 await self.until(f"!s.armed || ({condition})", seconds)
                 if await self._missed(condition, 0) is None:
                     return
-                await self.let_go()
+                await self.pad.let_go()
 
     async def open_full_scene(self) -> None:
         """Open the 3D scene as the large view; ask for it first if it is not shown."""
@@ -222,11 +178,6 @@ class ConsolePage:
                 await self.page.mouse.down()
                 await self._missed("!s.stop.stopped", HOLD_SECONDS)
                 await self.page.mouse.up()
-
-    async def strip(self, stream: str) -> tuple[int, int | None] | None:
-        """Return the stamp the page believes its picture has, and the event drawn into it; None before the first."""
-        found = await self.page.evaluate(READ_STRIP, stream)
-        return None if found is None else (found["stamp"], found["event"])
 
 
 @asynccontextmanager

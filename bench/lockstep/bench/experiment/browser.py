@@ -13,7 +13,9 @@ import httpx
 import msgspec
 
 from lockstep.bench.browsers.chromium import open_page, running_chromium
-from lockstep.bench.browsers.console_page import RB, ConsolePage
+from lockstep.bench.browsers.console_page import ConsolePage
+from lockstep.bench.browsers.event_strip import drawn_event
+from lockstep.bench.browsers.pad import RB
 from lockstep.bench.browsers.page_clock import PageClock, read_page_clock
 from lockstep.bench.browsers.sound_card import running_sound_card
 from lockstep.bench.experiment.choices import Choices
@@ -113,7 +115,7 @@ class BrowserClient:
         """Check at intervals that the canvas shows the event of its stamp."""
         while True:
             await asyncio.sleep(STRIP_STEP)
-            found = await self._page.strip(self._camera)
+            found = await drawn_event(self._page.page, self._camera)
             if found is None:
                 continue
             stamp, drawn = found
@@ -136,12 +138,12 @@ class BrowserClient:
             await page.evaluate("(tilts) => tilts.forEach(([axis, value]) => window.testPad.tilt(axis, value))", tilts)
             if held == move.pause:
                 held = not move.pause
-                await self._page.press(RB, held)
+                await self._page.pad.press(RB, held)
             await asyncio.sleep(PAD_STEP)
-        await self._page.press(RB, False)
+        await self._page.pad.press(RB, False)
 
     async def rest(self) -> None:
-        await self._page.press(RB, False)
+        await self._page.pad.press(RB, False)
 
 
 @asynccontextmanager

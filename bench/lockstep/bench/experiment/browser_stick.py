@@ -8,8 +8,10 @@ from contextlib import asynccontextmanager
 from playwright.async_api import Error
 
 from lockstep.bench.browsers.chromium import open_page, running_chromium
-from lockstep.bench.browsers.console_page import LEFT_Y, RB, START, ConsolePage
+from lockstep.bench.browsers.console_page import ConsolePage
+from lockstep.bench.browsers.pad import LEFT_Y, RB, START
 from lockstep.bench.experiment.browser import robot_description
+from lockstep.bench.harness.background import background
 from lockstep.protocol.description import RobotDescription
 
 __all__ = ["BrowserStick", "browser_stick"]
@@ -28,6 +30,11 @@ class BrowserStick:
         self._page = page
 
     async def run(self) -> None:
+        """Drive until cancelled, or until the page is gone."""
+        with contextlib.suppress(Error):
+            await self._hold()
+
+    async def _hold(self) -> None:
         while True:
             found = await self._page.stats()
             seat = found["seat"]
@@ -47,22 +54,17 @@ class BrowserStick:
 
     async def _arm(self) -> None:
         """Arm, after the deadman was seen released."""
-        await self._page.press(RB, False)
-        await self._page.press(START)
-        await self._page.press(START, False)
-        await self._page.press(RB)
-        await self._page.tilt(LEFT_Y, -0.4)
-        await self._page.tilt(RIGHT_X, 0.6)
+        await self._page.pad.press(RB, False)
+        await self._page.pad.press(START)
+        await self._page.pad.press(START, False)
+        await self._page.pad.press(RB)
+        await self._page.pad.tilt(LEFT_Y, -0.4)
+        await self._page.pad.tilt(RIGHT_X, 0.6)
 
 
 @asynccontextmanager
 async def browser_stick(link: str) -> AsyncIterator[tuple[BrowserStick, RobotDescription]]:
     async with running_chromium() as browser, open_page(browser, link, pad=True) as page:
         stick = BrowserStick(ConsolePage(page))
-        task = asyncio.get_running_loop().create_task(stick.run())
-        try:
+        async with background(stick.run()):
             yield stick, await robot_description(link)
-        finally:
-            task.cancel()
-            with contextlib.suppress(asyncio.CancelledError, Error):
-                await task

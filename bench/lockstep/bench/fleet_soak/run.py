@@ -62,13 +62,13 @@ class _Soak:
             async with asyncio.timeout(START_SECONDS):
                 for driver in self._drivers.values():
                     await driver.driving.wait()
-            began, cpu = time.monotonic(), self._world.console.cpu_seconds()
+            began, cpu = time.monotonic(), self._world.console.usage.cpu_seconds()
             self._say(f"all {plan.robots} robots are driven; the calm phase lasts {CALM_SHARE * plan.seconds:.0f} s")
             await asyncio.sleep(CALM_SHARE * plan.seconds)
             calm = Span(began, time.monotonic(), "")
             await self._kill_until(began + plan.seconds)
-            spent, lasted = self._world.console.cpu_seconds() - cpu, time.monotonic() - began
-            memory = self._world.console.resident_bytes()
+            spent, lasted = self._world.console.usage.cpu_seconds() - cpu, time.monotonic() - began
+            memory = self._world.console.usage.resident_bytes()
             for task in (*driving, watching):
                 task.cancel()
         robots = {name: robot_verdict(driver, self._world.records(name)) for name, driver in self._drivers.items()}

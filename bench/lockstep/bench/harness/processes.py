@@ -7,11 +7,13 @@ import re
 import shutil
 import signal
 import ssl
-from collections import deque
 from collections.abc import AsyncIterator, Mapping, Sequence
 from contextlib import asynccontextmanager, suppress
-from pathlib import Path
 from typing import Any, Protocol
+
+from lockstep.bench.harness.background import background
+from lockstep.bench.harness.process.output import ProcessOutput
+from lockstep.bench.harness.process.usage import ProcessUsage
 
 __all__ = ["ProcessFailed", "Running", "Spawn", "running_process", "spawn_here", "started"]
 
@@ -20,9 +22,7 @@ STOP_SECONDS = 15.0
 LOOK_SECONDS = 0.05  # between two tries to connect
 OUTPUT_SECONDS = 5.0  # to read the rest of what an ended process has written
 LINE_LIMIT = 1 << 20  # bytes
-KEPT_LINES = 400
 TOLD_LINES = 30
-TICKS = os.sysconf("SC_CLK_TCK")
 
 
 class Spawn(Protocol):
@@ -55,48 +55,19 @@ class Running:
 
     Attributes:
         process: the process itself
-        lines: the last lines of its output
-        errors: those of them on standard error
-        unread: those of them on standard output that `read` has not returned
-        grew: set when a line comes, and at the end
+        output: what it has written
+        usage: its processor time and memory
     """
 
-    def __init__(self, process: asyncio.subprocess.Process, command: Sequence[str]) -> None:
+    def __init__(self, process: asyncio.subprocess.Process, command: Sequence[str], output: ProcessOutput) -> None:
         self.process = process
-        self.lines: list[str] = []
-        self.errors: list[str] = []
-        self.unread = deque[str](maxlen=KEPT_LINES)
-        self.grew = asyncio.Event()
+        self.output = output
+        self.usage = ProcessUsage(process.pid)
         self._command = command
-        self._has_said_all = False
-        loop = asyncio.get_running_loop()
-        self._readers = [loop.create_task(self._read_output()), loop.create_task(self._read_errors())]
 
     @property
     def pid(self) -> int:
         return self.process.pid
-
-    def cpu_seconds(self) -> float:
-        """Return the processor time used so far, all threads, user and system (proc(5), fields 14 and 15)."""
-        fields = Path(f"/proc/{self.pid}/stat").read_text().rpartition(")")[2].split()
-        return (int(fields[11]) + int(fields[12])) / TICKS
-
-    def thread_seconds(self) -> dict[str, float]:
-        """Return the same by name of threads, without ended threads; the main thread is called "main".
-
-        From the scheduler's own account, which is finer than the ticks in `stat`.
-        """
-        found: dict[str, float] = {}
-        for task in Path(f"/proc/{self.pid}/task").iterdir():
-            with suppress(OSError):  # it has just ended
-                nanoseconds = int((task / "schedstat").read_text().split()[0])
-                name = "main" if task.name == str(self.pid) else (task / "comm").read_text().strip()
-                found[name] = found.get(name, 0.0) + nanoseconds / 1e9
-        return found
-
-    def resident_bytes(self) -> int:
-        """Return its memory in use (proc(5), statm field 2)."""
-        return int(Path(f"/proc/{self.pid}/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE")
 
     async def line(self, pattern: str, seconds: float = READY_SECONDS) -> str:
         """Wait for the first line that matches, and return it.
@@ -107,12 +78,12 @@ class Running:
         try:
             async with asyncio.timeout(seconds):
                 while True:
-                    for line in self.lines:
+                    for line in self.output.lines:
                         if re.search(pattern, line):
                             return line
                     await self._grown()
         except TimeoutError as error:
-            raise ProcessFailed(self._command, self.lines) from error
+            raise ProcessFailed(self._command, self.output.lines) from error
 
     async def read(self, seconds: float) -> dict[str, Any]:
         """Return the next line of its standard output, which is JSON.
@@ -122,11 +93,11 @@ class Running:
         """
         try:
             async with asyncio.timeout(seconds):
-                while not self.unread:
+                while not self.output.unread:
                     await self._grown()
         except TimeoutError as error:
-            raise ProcessFailed(self._command, self.lines) from error
-        found: dict[str, Any] = json.loads(self.unread.popleft())
+            raise ProcessFailed(self._command, self.output.lines) from error
+        found: dict[str, Any] = json.loads(self.output.unread.popleft())
         return found
 
     async def ask(self, question: str, seconds: float) -> dict[str, Any]:
@@ -138,10 +109,6 @@ class Running:
         if self.process.stdin is not None:
             self.process.stdin.write(question.encode() + b"\n")
         return await self.read(seconds)
-
-    def said(self) -> list[dict[str, Any]]:
-        """Return its lines that are JSON, as far as they are kept."""
-        return [json.loads(line) for line in self.lines if line.startswith("{")]
 
     async def listening(self, port: int, *, context: ssl.SSLContext | None = None) -> None:
         """Wait until it takes connections on this port of localhost. `context`: and TLS, with any certificate.
@@ -155,7 +122,7 @@ class Running:
                 while True:
                     if self.process.returncode is not None:
                         await self.wait()
-                        raise ProcessFailed(self._command, self.lines)
+                        raise ProcessFailed(self._command, self.output.lines)
                     try:
                         _, writer = await asyncio.open_connection("127.0.0.1", port, ssl=context, server_hostname=name)
                     except OSError:
@@ -164,12 +131,14 @@ class Running:
                     writer.close()
                     return
         except TimeoutError as error:
-            raise ProcessFailed(self._command, self.lines) from error
+            raise ProcessFailed(self._command, self.output.lines) from error
 
     async def wait(self) -> int:
         """Wait until it has ended and its output is read; return its status."""
         status = await self.process.wait()
-        await asyncio.wait(self._readers, timeout=OUTPUT_SECONDS)
+        with suppress(TimeoutError):
+            async with asyncio.timeout(OUTPUT_SECONDS):
+                await self.output.complete.wait()
         return status
 
     def pause(self) -> None:
@@ -196,9 +165,7 @@ class Running:
         except TimeoutError:
             is_gentle = False
             await self.kill()
-        await asyncio.wait(self._readers, timeout=OUTPUT_SECONDS)
-        for reader in self._readers:
-            reader.cancel()
+        await self.wait()
         return is_gentle
 
     def signal(self, number: signal.Signals) -> None:
@@ -209,33 +176,11 @@ class Running:
 
     async def _grown(self) -> None:
         """Wait for another line. Raises ProcessFailed if none can come."""
-        if self._has_said_all:
+        if self.output.ended:
             await self.wait()
-            raise ProcessFailed(self._command, self.lines)
-        self.grew.clear()
-        await self.grew.wait()
-
-    async def _read_output(self) -> None:
-        if self.process.stdout is not None:
-            async for line in self.process.stdout:
-                text = line.decode(errors="replace").rstrip()
-                self.unread.append(text)
-                self._keep(text)
-        self._has_said_all = True
-        self.grew.set()
-
-    async def _read_errors(self) -> None:
-        if self.process.stderr is not None:
-            async for line in self.process.stderr:
-                text = line.decode(errors="replace").rstrip()
-                self.errors.append(text)
-                del self.errors[:-KEPT_LINES]
-                self._keep(text)
-
-    def _keep(self, line: str) -> None:
-        self.lines.append(line)
-        del self.lines[:-KEPT_LINES]
-        self.grew.set()
+            raise ProcessFailed(self._command, self.output.lines)
+        self.output.grew.clear()
+        await self.output.grew.wait()
 
 
 @asynccontextmanager
@@ -247,11 +192,13 @@ async def started(
     process = await spawn(
         command, stdin=pipe, stdout=pipe, stderr=pipe, limit=LINE_LIMIT, env=os.environ | dict(environment or {})
     )
-    running = Running(process, command)
-    try:
-        yield running
-    finally:
-        await running.end()
+    output = ProcessOutput()
+    async with background(output.read(process)):
+        running = Running(process, command, output)
+        try:
+            yield running
+        finally:
+            await running.end()
 
 
 @asynccontextmanager

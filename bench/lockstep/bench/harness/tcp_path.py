@@ -24,7 +24,8 @@ class TcpPath:
         self.away = False
         self._delay = delay
         self._ends: set[asyncio.StreamWriter] = set()
-        self._tasks: set[asyncio.Task[None]] = set()
+        self._tasks: asyncio.TaskGroup = asyncio.TaskGroup()
+        self._joins: set[asyncio.Task[None]] = set()
         self._server: asyncio.Server | None = None
 
     @property
@@ -34,6 +35,7 @@ class TcpPath:
         return int(self._server.sockets[0].getsockname()[1])
 
     async def __aenter__(self) -> Self:
+        await self._tasks.__aenter__()
         self._server = await asyncio.start_server(self._accept, "127.0.0.1", 0)
         return self
 
@@ -44,9 +46,9 @@ class TcpPath:
             self._server.close()
         self.away = True
         self.cut()
-        for task in self._tasks:
-            task.cancel()
-        await asyncio.gather(*self._tasks, return_exceptions=True)
+        for join in self._joins:
+            join.cancel()
+        await self._tasks.__aexit__(None, None, None)
 
     def cut(self) -> None:
         """Break all connections at once."""
@@ -54,9 +56,12 @@ class TcpPath:
             end.transport.abort()
 
     def _accept(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-        task = asyncio.get_running_loop().create_task(self._join(reader, writer), name="TCP path")
-        self._tasks.add(task)
-        task.add_done_callback(self._tasks.discard)
+        if self._server is None or not self._server.is_serving():
+            writer.transport.abort()
+            return
+        join = self._tasks.create_task(self._join(reader, writer), name="TCP path")
+        self._joins.add(join)
+        join.add_done_callback(self._joins.discard)
 
     async def _join(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         self._ends.add(writer)

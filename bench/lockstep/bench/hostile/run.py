@@ -60,10 +60,10 @@ async def hostile(
             )
             async with running_process(*command) as (crowd, _):
                 say(f"{peers} misbehaving peers ({kind or 'all kinds'}, {front}) for {seconds:g} s")
-                used = stack.console.cpu_seconds()
+                used = stack.console.usage.cpu_seconds()
                 disturbed = await _drive(console, seconds)
-                used = stack.console.cpu_seconds() - used
-                took = crowd.cpu_seconds()
+                used = stack.console.usage.cpu_seconds() - used
+                took = crowd.usage.cpu_seconds()
                 seen = await crowd.ask("", CROWD_SECONDS)
                 memory_during = memory_of(stack.console)
                 places = 0.0 if front == "tls" else await _peers(stack)

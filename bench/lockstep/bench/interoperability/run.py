@@ -73,9 +73,9 @@ async def _last_json(world: World, command: list[str], seconds: float) -> dict[s
     visitor = await world.visit(command)
     async with asyncio.timeout(seconds + SLACK_SECONDS):
         status = await visitor.wait()
-    said = visitor.said()
+    said = visitor.output.said()
     if status != 0 or not said:
-        raise RuntimeError(visitor.lines[-1] if visitor.lines else f"it ended with {status}")
+        raise RuntimeError(visitor.output.lines[-1] if visitor.output.lines else f"it ended with {status}")
     return said[-1]
 
 
@@ -87,16 +87,16 @@ async def _gstreamer(world: World, link: str, seconds: float) -> dict[str, Any]:
     shown = violations = newest = 0
     end = time.monotonic() + seconds
     while time.monotonic() < end and visitor.process.returncode is None:
-        said = [match for line in visitor.lines if (match := PICTURE.fullmatch(line)) is not None]
-        visitor.lines.clear()
+        said = [match for line in visitor.output.lines if (match := PICTURE.fullmatch(line)) is not None]
+        visitor.output.lines.clear()
         for event, gap, fate in (match.groups() for match in said):
             newest = int(event)
             shown += fate == "shown"
             violations += fate == "shown" and abs(int(gap)) > TOLERANCE
-        visitor.grew.clear()
+        visitor.output.grew.clear()
         with suppress(TimeoutError):
             async with asyncio.timeout(1.0):
-                await visitor.grew.wait()
+                await visitor.output.grew.wait()
     if visitor.process.returncode is not None:
         raise RuntimeError(f"it ended with {visitor.process.returncode}")
     visitor.signal(signal.SIGINT)

@@ -17,6 +17,7 @@ from typing import Any
 from lockstep.bench.experiment.choices import Choices
 from lockstep.bench.experiment.endurance.endurance import Endurance
 from lockstep.bench.experiment.endurance.endurance_run import Driven, HeadlessHands
+from lockstep.bench.harness.background import background
 from lockstep.bench.harness.tcp_path import TcpPath
 from lockstep.client import Console
 
@@ -48,12 +49,8 @@ async def _drive(client: str, link: str, seconds: float) -> dict[str, Any]:
         async with asyncio.timeout(LIVE_SECONDS):
             await driven.until_live()
         began = time.monotonic()
-        running = asyncio.ensure_future(driven.run(endurance, lambda: time.monotonic() - began))
-        done, _ = await asyncio.wait([running], timeout=seconds)
-        running.cancel()
-        await asyncio.gather(running, return_exceptions=True)
-        for task in done:
-            task.result()
+        async with background(driven.run(endurance, lambda: time.monotonic() - began)):
+            await asyncio.sleep(seconds)
     found = endurance.fields()
     return {
         "pictures": found["pictures"],

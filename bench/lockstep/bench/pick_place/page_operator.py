@@ -14,8 +14,9 @@ from typing import Any, Final
 from playwright.async_api import Error
 
 from lockstep.bench.browsers.chromium import running_chromium
-from lockstep.bench.browsers.console_page import RB, START, ConsolePage, open_console
+from lockstep.bench.browsers.console_page import ConsolePage, open_console
 from lockstep.bench.browsers.headset_page import Headset, open_headset
+from lockstep.bench.browsers.pad import RB, START
 from lockstep.bench.experiment.browser import robot_description
 from lockstep.bench.pick_place.controller_hand import ControllerHand
 from lockstep.bench.pick_place.operator import OperatorFailed, PageHandName, Pictures
@@ -160,10 +161,10 @@ class PadOperator(PageOperator):
         await page.get_by_role("button", name="Close").click()
 
     async def arm(self) -> None:
-        await self.console.press(START)
+        await self.console.pad.press(START)
         await self.console.until("s.armed", ARM_TRY_SECONDS)
-        await self.console.press(START, False)
-        await self.console.press(RB)
+        await self.console.pad.press(START, False)
+        await self.console.pad.press(RB)
 
     async def why_disarmed(self, seen: Mapping[str, Any]) -> str:
         await self.console.until("document.querySelector('.arm').dataset.state === 'disarmed'")  # it is drawn later

@@ -34,11 +34,11 @@ async def hop_delays(folder: Path, seconds: float) -> dict[str, list[float]]:
         await stage.add_driver("robot")
         watchers = [await _delays(stage, "direct"), await _delays(stage, "relay"), await _delays(stage, "relay")]
         await asyncio.sleep(SETTLE)
-        skipped = [len(watcher.said()) for watcher in watchers]
+        skipped = [len(watcher.output.said()) for watcher in watchers]
         await asyncio.sleep(seconds)
         found: dict[str, list[float]] = {}
         for watcher, skip in zip(watchers, skipped, strict=True):
-            for said in watcher.said()[skip:]:
+            for said in watcher.output.said()[skip:]:
                 found.setdefault(said["relay"] or "direct", []).extend(said["ages_ms"])
         return found
 
@@ -111,16 +111,16 @@ async def _look(stage: RelayStage, driver: Running, audience: Running | None, co
     if stage.console is None:
         raise RuntimeError("no console")
     processes = [stage.console, *stage.janus, *([audience] if audience else [])]
-    driven, heard = len(driver.said()), len(audience.said()) if audience else 0
-    began, used = time.monotonic(), [process.cpu_seconds() for process in processes]
+    driven, heard = len(driver.output.said()), len(audience.output.said()) if audience else 0
+    began, used = time.monotonic(), [process.usage.cpu_seconds() for process in processes]
     await asyncio.sleep(seconds)
     spent = time.monotonic() - began
-    shares = [(each.cpu_seconds() - before) / spent * 100 for each, before in zip(processes, used, strict=True)]
-    trips = [trip for said in driver.said()[driven:] for trip in said["trips_ms"]]
+    shares = [(each.usage.cpu_seconds() - before) / spent * 100 for each, before in zip(processes, used, strict=True)]
+    trips = [trip for said in driver.output.said()[driven:] for trip in said["trips_ms"]]
     packets = least = connected = 0.0
     lost: dict[str, int] = {}
     if audience is not None:
-        said = audience.said()
+        said = audience.output.said()
         connected = said[0]["connected"]
         first, last = said[max(1, heard)], said[-1]
         between = max(1e-3, last["at"] - first["at"])
@@ -179,12 +179,12 @@ async def _watching(page: ConsolePage) -> None:
 async def _kill(stage: RelayStage, driver: Running, page: ConsolePage, seconds: float) -> Killing:
     relay = str((await page.stats())["relay"])
     number = int(relay)
-    driven, began = len(driver.said()), time.monotonic()
+    driven, began = len(driver.output.said()), time.monotonic()
     await stage.janus[number].kill()
     await page.until(f"s.relay !== {relay!r} && s.streams.overview?.rendered > 0", BACK_SECONDS)
     back = time.monotonic() - began
     await asyncio.sleep(seconds)
-    said = driver.said()
+    said = driver.output.said()
     before = [trip for each in said[:driven][-round(seconds) :] for trip in each["trips_ms"]]
     after = [trip for each in said[driven:] for trip in each["trips_ms"]]
     await stage.restart_janus("robot" if number == 0 else "operator", number)

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from prometheus_client import CollectorRegistry
 
+from lockstep.bench.harness.background import background
 from lockstep.bench.harness.processes import Running, started
 from lockstep.bench.relay.janus import JANUS_READY, janus_command
 from lockstep.client.transport.sfu_media import RelayMedia, RelayTicket
@@ -88,22 +89,18 @@ async def measure(host: str, janus: Running) -> list[tuple[int, float]]:
         open_janus(url) as session,
         publish(session, lambda each: JanusRoom(each, ROOM, KEYS), _Connect(endpoint), hub, FEED, "VP8") as publication,
     ):
-        running = (hub.run(), feed(hub, camera.name), _talk(publication))
-        feeding = [asyncio.create_task(each) for each in running]
         ticket = RelayTicket(
             engine="janus", relay="0", url=url, room=ROOM, pin=KEYS.pin, feed=FEED, streams=publication.streams
         )
-        for step in STEPS:
-            while len(watchers) < step:
-                watchers.append(await subscribe(ticket, counts))
-            await asyncio.sleep(2.0)
-            before, used = counts[0], janus.cpu_seconds()
-            await asyncio.sleep(SECONDS)
-            found.append((counts[0] - before, janus.cpu_seconds() - used))
-            print(f"{step} subscribers: {found[-1][0]} packets, {found[-1][1]:.2f} s of processor", flush=True)
-        for task in feeding:
-            task.cancel()
-        await asyncio.gather(*feeding, return_exceptions=True)
+        async with background(hub.run(), feed(hub, camera.name), _talk(publication)):
+            for step in STEPS:
+                while len(watchers) < step:
+                    watchers.append(await subscribe(ticket, counts))
+                await asyncio.sleep(2.0)
+                before, used = counts[0], janus.usage.cpu_seconds()
+                await asyncio.sleep(SECONDS)
+                found.append((counts[0] - before, janus.usage.cpu_seconds() - used))
+                print(f"{step} subscribers: {found[-1][0]} packets, {found[-1][1]:.2f} s of processor", flush=True)
         for watcher in watchers:
             await watcher.close()
     return found

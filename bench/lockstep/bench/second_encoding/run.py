@@ -103,7 +103,7 @@ async def run(
                     people = (operator, observer)
 
                     def look() -> tuple[int, float, float]:
-                        return sites.sent_bytes("robot", "to_operator"), robot_end.cpu_seconds(), time.monotonic()
+                        return sites.sent_bytes("robot", "to_operator"), robot_end.usage.cpu_seconds(), time.monotonic()
 
                     before = look()
                     for client in people:

@@ -21,7 +21,8 @@ from typing import Any, NamedTuple
 from playwright.async_api import Browser, Page
 
 from lockstep.bench.browsers.chromium import PAD, running_chromium
-from lockstep.bench.browsers.console_page import LEFT_Y, RB, ConsolePage
+from lockstep.bench.browsers.console_page import ConsolePage
+from lockstep.bench.browsers.pad import LEFT_Y, RB
 from lockstep.bench.browsers.page_clock import PageClock, read_page_clock
 from lockstep.bench.browsers.probed_page import DRAW_PROBE, open_probed_page
 from lockstep.bench.browsers.window_trace import WindowTrace, traced_window
@@ -128,12 +129,12 @@ async def _sent(stack: Stack) -> float:
 async def driving_in_circles(console: ConsolePage) -> AsyncIterator[None]:
     """Drive in circles with a held stick."""
     await console.arm()
-    await console.press(RB)
-    await console.tilt(LEFT_Y, -0.4)
-    await console.tilt(RIGHT_X, 0.6)
+    await console.pad.press(RB)
+    await console.pad.tilt(LEFT_Y, -0.4)
+    await console.pad.tilt(RIGHT_X, 0.6)
     await console.until("s.driving && s.at_rest === false")
     yield
-    await console.press(RB, False)
+    await console.pad.press(RB, False)
 
 
 async def bare_page(bridge: Bridge, seconds: float) -> Delays:

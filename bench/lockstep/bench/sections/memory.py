@@ -110,7 +110,7 @@ async def _samples(processes: list[Running], seconds: float, context: Context) -
     end = time.monotonic() + seconds
     while time.monotonic() < end:
         for samples, process in zip(found, processes, strict=True):
-            samples.append(float(process.resident_bytes()))
+            samples.append(float(process.usage.resident_bytes()))
         if len(found[0]) % 60 == 0:
             context.say(f"{len(found[0]) // 60} min: " + ", ".join(f"{each[-1] / MEGABYTE:.0f} MB" for each in found))
         await asyncio.sleep(SAMPLE_SECONDS)

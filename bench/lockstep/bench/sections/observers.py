@@ -126,10 +126,12 @@ async def _watched_by(count: int, stack: Stack, operator: Console, events: int, 
 
 async def _drive(stack: Stack, audiences: list[Running], operator: Console, events: int) -> Spell:
     processes = [stack.console, *audiences]
-    began, used = time.monotonic(), [process.cpu_seconds() for process in processes]
+    began, used = time.monotonic(), [process.usage.cpu_seconds() for process in processes]
     trips = await console_trips(operator, events)
     seconds = time.monotonic() - began
-    shares = [(process.cpu_seconds() - before) / seconds * 100 for process, before in zip(processes, used, strict=True)]
+    shares = [
+        (process.usage.cpu_seconds() - before) / seconds * 100 for process, before in zip(processes, used, strict=True)
+    ]
     await operator.rest()
     return Spell([trip.seconds * 1000 for trip in trips], shares[0], sum(shares[1:]))
 
@@ -187,9 +189,9 @@ async def _bare(bridge: Bridge, seconds: float) -> dict[int, float]:
 
 
 async def _share(process: Running, seconds: float) -> float:
-    before, began = process.cpu_seconds(), time.monotonic()
+    before, began = process.usage.cpu_seconds(), time.monotonic()
     await asyncio.sleep(seconds)
-    return (process.cpu_seconds() - before) / (time.monotonic() - began) * 100
+    return (process.usage.cpu_seconds() - before) / (time.monotonic() - began) * 100
 
 
 def missed_between(before: Counts, after: Counts) -> Missed:

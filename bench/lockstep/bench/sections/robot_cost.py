@@ -97,7 +97,7 @@ async def _pictures(stack: Stack, camera: str) -> float:
 
 def _spent(stack: Stack, microphones: Collection[str]) -> tuple[float, float, float, float, float]:
     """Return the processor seconds so far, in the order of `Cost`."""
-    bridge, console = stack.bridge.process.thread_seconds(), stack.console.thread_seconds()
+    bridge, console = stack.bridge.process.usage.thread_seconds(), stack.console.usage.thread_seconds()
     drawing = sum(seconds for name, seconds in bridge.items() if name.startswith("render"))
     sounding = {f"media-{name}"[:THREAD_NAME] for name in microphones}
     encoding = {name: seconds for name, seconds in console.items() if name.startswith("media-")}

@@ -17,7 +17,7 @@ BACKWARDS = -0.5  # value of the first axis with which only intruders drive
 
 
 class Crowd:
-    """Keeps `size` observers connected, some leaving and others coming, until closed."""
+    """Keeps `size` observers connected, some leaving and others coming, from `fill` to `close`."""
 
     def __init__(self, link: str, size: int, seed: int) -> None:
         self.joined = self.lost = 0
@@ -25,11 +25,14 @@ class Crowd:
         self._size = size
         self._chance = random.Random(seed)
         self._guests: list[asyncio.Task[None]] = []
+        self._tasks: asyncio.TaskGroup | None = None
 
     def __len__(self) -> int:
         return len(self._guests)
 
-    def fill(self) -> None:
+    def fill(self, tasks: asyncio.TaskGroup) -> None:
+        """Connect them, as tasks of this group."""
+        self._tasks = tasks
         while len(self._guests) < self._size:
             self._join()
 
@@ -49,7 +52,9 @@ class Crowd:
             await _ended(self._guests.pop())
 
     def _join(self) -> None:
-        self._guests.append(asyncio.get_running_loop().create_task(self._attend()))
+        if self._tasks is None:
+            raise RuntimeError("fill the crowd first")
+        self._guests.append(self._tasks.create_task(self._attend()))
 
     async def _attend(self) -> None:
         while True:

@@ -2,13 +2,13 @@
 
 import asyncio
 import time
-from collections.abc import Callable
 from typing import Any, Protocol
 
 from playwright.async_api import Error, Page
 
 from lockstep.bench.browsers.firefox import Firefox
 from lockstep.bench.harness.restarting_total import RestartingTotal
+from lockstep.bench.soak.calm import Calm
 
 __all__ = ["FirefoxDocument", "OperatorPage", "WatchedPage"]
 
@@ -48,13 +48,13 @@ class FirefoxDocument:
 class WatchedPage:
     """Reads the page's statistics. If the page does not come back, it is reloaded, which is counted."""
 
-    def __init__(self, document: Document, calm_seconds: Callable[[], float]) -> None:
+    def __init__(self, document: Document, calm: Calm) -> None:
         self.reloads = 0
         self.statistics: dict[str, Any] | None = None  # the newest
         self.slowest_return = 0.0  # s of calm until it was live again
         self._document = document
         self._rendered, self._violations = RestartingTotal(), RestartingTotal()
-        self._calm_seconds = calm_seconds
+        self._calm = calm
         self._live_at = time.monotonic()
         self._news = asyncio.Event()
 
@@ -83,11 +83,11 @@ class WatchedPage:
             self._count(statistics)
         now = time.monotonic()
         if statistics is not None and statistics["connected"] and self._shows_something_new(statistics):
-            waited = min(now - self._live_at, self._calm_seconds())
+            waited = min(now - self._live_at, self._calm.seconds())
             self.slowest_return = max(self.slowest_return, waited)
             self._live_at = now
             self._news.set()
-        elif min(now - self._live_at, self._calm_seconds()) > PATIENCE:
+        elif min(now - self._live_at, self._calm.seconds()) > PATIENCE:
             self.reloads += 1
             self._live_at = now
             await self._document.reload()
@@ -119,8 +119,8 @@ class OperatorPage(WatchedPage):
     arms = 0
     seat_requests = 0
 
-    def __init__(self, page: Page, calm_seconds: Callable[[], float]) -> None:
-        super().__init__(page, calm_seconds)
+    def __init__(self, page: Page, calm: Calm) -> None:
+        super().__init__(page, calm)
         self.page = page
 
     async def act(self, statistics: dict[str, Any]) -> None:

@@ -72,25 +72,23 @@ class _Soak:
         browser = await stack.enter_async_context(running_chromium())
         operator = OperatorPage(
             await stack.enter_async_context(open_probed_page(browser, self._through(world.operator), PAD)),
-            world.calm_seconds,
+            world.calm,
         )
         observer = WatchedPage(
             await stack.enter_async_context(open_probed_page(browser, self._through(world.observer))),
-            world.calm_seconds,
+            world.calm,
         )
-        self._crowd.fill()
-        try:
-            async with asyncio.TaskGroup() as tasks:  # a task's failure ends the soak
-                background = [tasks.create_task(each.run()) for each in (operator, observer)]
-                background += [tasks.create_task(each.run()) for each in self._intruders]
-                background.append(tasks.create_task(self._sample_memory()))
-                await self._play(schedule(self._minutes, self._seed))
-                self._say("the plan is played; waiting for everybody to be back")
-                await self._until_live(operator, observer)
-                refused = await self._refusals()
-                for task in background:
-                    task.cancel()
-        finally:
+        async with asyncio.TaskGroup() as tasks:  # a task's failure ends the soak
+            self._crowd.fill(tasks)
+            background = [tasks.create_task(each.run()) for each in (operator, observer)]
+            background += [tasks.create_task(each.run()) for each in self._intruders]
+            background.append(tasks.create_task(self._sample_memory()))
+            await self._play(schedule(self._minutes, self._seed))
+            self._say("the plan is played; waiting for everybody to be back")
+            await self._until_live(operator, observer)
+            refused = await self._refusals()
+            for task in background:
+                task.cancel()
             await self._crowd.close()
         return self._verdict(operator, observer, refused)
 
@@ -114,7 +112,7 @@ class _Soak:
             case "cut_network":
                 await self._cut(action.seconds, self._done["cut_network"])
             case "stop":
-                with self._world.trouble():
+                with self._world.calm.trouble():
                     await self._world.stop_for(action.seconds)
                     await self._world.until_reset()
             case "join":
@@ -124,7 +122,7 @@ class _Soak:
 
     async def _cut(self, seconds: float, turn: int) -> None:
         """Cut the network: in turn packets are lost, or wait until the end; every fourth time on the robot link."""
-        with self._world.trouble():
+        with self._world.calm.trouble():
             self._network.outage(seconds, hold=turn % 2 == 1, robot=turn % 4 == 3)
             await asyncio.sleep(seconds)
 

@@ -3,10 +3,8 @@
 import asyncio
 import re
 import secrets
-import time
 from collections import Counter
 from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from types import TracebackType
 from typing import Self
@@ -16,6 +14,7 @@ import httpx
 from lockstep.bench.harness.event_log import Record, records
 from lockstep.bench.harness.lives import DOWN_SECONDS, BridgeLives, Lives
 from lockstep.bench.harness.stack import LOCKSTEP
+from lockstep.bench.soak.calm import Calm
 
 __all__ = ["World"]
 
@@ -40,8 +39,7 @@ class World:
         self._bridge, self._server = BridgeLives(folder), Lives()
         self._server_port = 0
         self._robot_address = ""
-        self._troubles = 0
-        self._calm_since = time.monotonic()
+        self.calm = Calm()
 
     async def __aenter__(self) -> Self:
         await self._bridge.begin()
@@ -64,28 +62,14 @@ class World:
 
     # Disturbances
 
-    @contextmanager
-    def trouble(self) -> Iterator[None]:
-        """Something is out of order meanwhile."""
-        self._troubles += 1
-        try:
-            yield
-        finally:
-            self._troubles -= 1
-            self._calm_since = time.monotonic()
-
-    def calm_seconds(self) -> float:
-        """Return the seconds for which everything has been in order; 0 while something is not."""
-        return 0.0 if self._troubles else time.monotonic() - self._calm_since
-
     async def kill_bridge(self) -> None:
-        with self.trouble():
+        with self.calm.trouble():
             await self._bridge.kill()
             await self._bridge.begin()
             self.bridge_kills += 1
 
     async def restart_server(self, *, gently: bool) -> None:
-        with self.trouble():
+        with self.calm.trouble():
             if gently:
                 await self._server.end()
                 await asyncio.sleep(DOWN_SECONDS)
@@ -130,7 +114,7 @@ class World:
     def server_memory(self) -> int | None:
         """Return the server's memory in bytes; None while it is down."""
         try:
-            return None if self._server.running is None else self._server.running.resident_bytes()
+            return None if self._server.running is None else self._server.running.usage.resident_bytes()
         except (OSError, ValueError, IndexError):
             return None
 

@@ -79,7 +79,7 @@ class _Leg:
 
     async def run(self, stack: AsyncExitStack) -> None:
         operator, observer = self._network.link(self._world.operator), self._network.link(self._world.observer)
-        calm = self._world.calm_seconds
+        calm = self._world.calm
         chromium = await stack.enter_async_context(running_chromium())
         firefox = await stack.enter_async_context(running_firefox())
         self._pages["chromium, driving"] = driving = OperatorPage(
@@ -90,19 +90,17 @@ class _Leg:
             self._pages[f"chromium, watching {number}"] = WatchedPage(page, calm)
         await firefox.open(observer)
         self._pages["firefox, watching"] = WatchedPage(FirefoxDocument(firefox, observer), calm)
-        self._crowd.fill()
-        try:
-            async with asyncio.TaskGroup() as tasks:  # a task's failure ends the run
-                background = [tasks.create_task(page.run()) for page in self._pages.values()]
-                background.append(tasks.create_task(self._intruder.run()))
-                background.append(tasks.create_task(self._sample(driving)))
-                background.append(tasks.create_task(self._tell()))
-                await self._play(plan(self._minutes, self._seed))
-                self._say("the plan is played; waiting for everybody to be back")
-                await self._until_live()
-                for task in background:
-                    task.cancel()
-        finally:
+        async with asyncio.TaskGroup() as tasks:  # a task's failure ends the run
+            self._crowd.fill(tasks)
+            background = [tasks.create_task(page.run()) for page in self._pages.values()]
+            background.append(tasks.create_task(self._intruder.run()))
+            background.append(tasks.create_task(self._sample(driving)))
+            background.append(tasks.create_task(self._tell()))
+            await self._play(plan(self._minutes, self._seed))
+            self._say("the plan is played; waiting for everybody to be back")
+            await self._until_live()
+            for task in background:
+                task.cancel()
             await self._crowd.close()
 
     async def _play(self, actions: list[Action]) -> None:
@@ -133,7 +131,7 @@ class _Leg:
                 await self._world.restart_server(gently=self._done["restart_console"] % 2 == 0)
                 self._memory.clear()
             case "kill_relay":
-                with self._world.trouble():
+                with self._world.calm.trouble():
                     await self._relays.kill_one()
             case "begin_recording":
                 return await self._record("/api/recordings", {"name": f"day {self._done['begin_recording']}"})
@@ -144,12 +142,12 @@ class _Leg:
     async def _cut(self, seconds: float) -> None:
         """Cut the network: packets are lost, or wait until its end, in turn. Every fourth is on the robot link."""
         turn = self._done["cut_network"]
-        with self._world.trouble():
+        with self._world.calm.trouble():
             self._network.outage(seconds, hold=turn % 2 == 1, robot=turn % 4 == 3)
             await asyncio.sleep(seconds)
 
     async def _stop(self, seconds: float) -> None:
-        with self._world.trouble():
+        with self._world.calm.trouble():
             await self._world.stop_for(seconds)
             await self._world.until_reset()
 
@@ -179,7 +177,7 @@ class _Leg:
             if encoders is not None and memory is not None:
                 self._memory.append(Sample(float(memory), encoders))
             found = driving.statistics
-            if found is not None and found["driving"] and self._world.calm_seconds() > CALM:
+            if found is not None and found["driving"] and self._world.calm.seconds() > CALM:
                 self._note(self._feedback, found["command_to_feedback_ms"]["median"])
                 self._note(self._picture, found["picture_delay_p50_ms"])
             for name, page in self._pages.items():

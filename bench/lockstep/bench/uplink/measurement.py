@@ -73,7 +73,7 @@ def _use(network: NetworkProcess, bridge: Running, console: Running) -> list[flo
     """Return bytes of media and of the rest on the robot link towards the console, and processor seconds."""
     paths = network.statistics().paths
     sent = [float(paths[name]["to_operator"].bytes) for name in ("robot_media", "robot_control")]
-    return [*sent, bridge.cpu_seconds(), console.cpu_seconds()]
+    return [*sent, bridge.usage.cpu_seconds(), console.usage.cpu_seconds()]
 
 
 async def _drive(client: Console, seconds: float) -> int:

@@ -3,6 +3,7 @@
 import asyncio
 import time
 from collections.abc import AsyncGenerator, AsyncIterable
+from contextlib import suppress
 from typing import TypeVar
 
 from lockstep.emulator.transport.stream_path import StreamPath
@@ -20,7 +21,7 @@ async def sleep_until(when: float) -> None:
 
 async def delayed(source: AsyncIterable[Chunk], path: StreamPath) -> AsyncGenerator[Chunk]:
     """Yield the chunks of `source` later. Close it: it has a task that reads ahead."""
-    queue: asyncio.Queue[tuple[float, Chunk | BaseException | None]] = asyncio.Queue(UNDER_WAY)
+    queue: asyncio.Queue[tuple[float, Chunk | Exception | None]] = asyncio.Queue(UNDER_WAY)
 
     async def read() -> None:
         try:
@@ -31,16 +32,17 @@ async def delayed(source: AsyncIterable[Chunk], path: StreamPath) -> AsyncGenera
         else:
             await queue.put((0.0, None))
 
-    reader = asyncio.get_running_loop().create_task(read())
-    try:
-        while True:
-            when, chunk = await queue.get()
-            if chunk is None:
-                return
-            if isinstance(chunk, BaseException):
-                raise chunk
-            await sleep_until(when)
-            yield chunk
-    finally:
+    end: Exception | None = None
+    async with asyncio.TaskGroup() as tasks:  # the reader raises nothing, so that the group does not cancel the caller
+        reader = tasks.create_task(read())
+        with suppress(GeneratorExit):  # closed: the group would raise it in a group of errors
+            while True:
+                when, chunk = await queue.get()
+                if chunk is None or isinstance(chunk, Exception):
+                    end = chunk
+                    break
+                await sleep_until(when)
+                yield chunk
         reader.cancel()
-        await asyncio.gather(reader, return_exceptions=True)
+    if end is not None:
+        raise end

@@ -51,10 +51,12 @@ class TcpForwarder:
             for direction in DIRECTIONS
             if (settings := profile.robot_bottleneck(direction)) is not None
         }
-        self._tasks: set[asyncio.Task[None]] = set()
+        self._tasks: asyncio.TaskGroup = asyncio.TaskGroup()
+        self._connections: set[asyncio.Task[None]] = set()
         self._server: asyncio.Server | None = None
 
     async def __aenter__(self) -> Self:
+        await self._tasks.__aenter__()
         self._server = await asyncio.start_server(self._accepted, "127.0.0.1", 0)
         return self
 
@@ -64,7 +66,7 @@ class TcpForwarder:
         if self._server is not None:
             self._server.close()
         self.cut()
-        await asyncio.gather(*self._tasks, return_exceptions=True)
+        await self._tasks.__aexit__(None, None, None)
 
     @property
     def address(self) -> tuple[str, int]:
@@ -75,13 +77,16 @@ class TcpForwarder:
 
     def cut(self) -> None:
         """Break all connections at once, as a rebooting router does; new ones are taken."""
-        for task in self._tasks:
-            task.cancel()
+        for connection in self._connections:
+            connection.cancel()
 
     def _accepted(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-        task = asyncio.get_running_loop().create_task(self._forward(reader, writer))
-        self._tasks.add(task)
-        task.add_done_callback(self._tasks.discard)
+        if self._server is None or not self._server.is_serving():
+            writer.transport.abort()
+            return
+        connection = self._tasks.create_task(self._forward(reader, writer))
+        self._connections.add(connection)
+        connection.add_done_callback(self._connections.discard)
 
     async def _forward(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         bridge: asyncio.StreamWriter | None = None

@@ -51,17 +51,14 @@ async def join(browser: WebSocket, console: str, paths: Mapping[Direction, Strea
     try:
         async with upstream:
             await browser.accept(subprotocol=upstream.subprotocol)
-            loop = asyncio.get_running_loop()
-            ways = (
-                loop.create_task(_to_console(browser, upstream, paths["to_robot"])),
-                loop.create_task(_to_browser(upstream, browser, paths["to_operator"])),
-            )
-            try:
+            async with asyncio.TaskGroup() as tasks:
+                ways = (
+                    tasks.create_task(_to_console(browser, upstream, paths["to_robot"])),
+                    tasks.create_task(_to_browser(upstream, browser, paths["to_operator"])),
+                )
                 await asyncio.wait(ways, return_when=asyncio.FIRST_COMPLETED)
-            finally:
                 for way in ways:
                     way.cancel()
-                await asyncio.gather(*ways, return_exceptions=True)
     finally:
         upstream.transport.abort()  # websockets leaves it open when its close is cancelled
 

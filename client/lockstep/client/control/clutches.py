@@ -42,12 +42,12 @@ class Clutches:
 
     def sent(self, message: Command | Rest) -> None:
         """Take a message that leaves."""
-        if isinstance(message, Rest) or self._sender.moves_nothing(message):
+        if isinstance(message, Rest) or self._sender.intention.moves_nothing(message):
             self.release()
 
     def settle(self) -> None:
         """Release all unless the robot may move."""
-        if not self._sender.ready:
+        if not self._sender.readiness.ready:
             self.release()
 
     def release(self) -> None:

@@ -8,8 +8,8 @@ from lockstep.client.connection_options import ConnectionOptions
 from lockstep.client.control.command_gate import CALM_INTERVAL, CommandGate
 from lockstep.client.control.command_sender import CommandSender
 from lockstep.client.control.sender_task import Driver
-from lockstep.client.errors import ConsoleLost
-from lockstep.client.media.newest_queue import NewestQueue
+from lockstep.client.errors import CommandRefused, ConsoleLost, NotArmed
+from lockstep.client.media.newest_queue import Readers
 from lockstep.client.media.render_log import LIMIT, FeedbackArrival
 from lockstep.client.session import Session
 from lockstep.client.statistics import EventRate
@@ -31,7 +31,7 @@ class Driving:
 
     def __init__(self, options: ConnectionOptions, session: Session, send: Callable[[Command | Rest], None]) -> None:
         self.known = asyncio.Event()
-        self.readers: list[NewestQueue[Feedback]] = []
+        self.readers: Readers[Feedback] = Readers()
         self.arrivals: deque[FeedbackArrival] = deque(maxlen=LIMIT)
         self.event_rate = EventRate()
         self._options = options
@@ -54,6 +54,15 @@ class Driving:
             raise ConsoleLost("not connected yet")
         return self._robot
 
+    def check_ready(self) -> None:
+        """Raise CommandRefused unless the robot may move, as far as this connection knows."""
+        sender = self.driver.sender
+        if not self._session.holds_seat or sender.readiness.ready:
+            return
+        if sender.newest is not None and sender.newest.stop.stopped:
+            raise CommandRefused("stopped", sender.newest.stop.reason)
+        raise NotArmed
+
     def describe(self, robot: RobotState) -> Feedback | None:
         """Take the robot's state. The first one makes the driver; return the feedback that waited for it."""
         self._robot = robot
@@ -74,7 +83,7 @@ class Driving:
         )
         sender = CommandSender(gate, neutral_values(description.axes))
         self._driver = Driver(sender, self._send, description.max_event_age)
-        self._session.seated, self._session.unseated = sender.seated, sender.unseated
+        self._session.seat_changed = sender.seat_changed
         sender.holds_seat = self._session.holds_seat
         self.known.set()
         return self._early_feedback
@@ -90,8 +99,7 @@ class Driving:
         now = self._loop.time()
         self.event_rate.event(feedback.event, now)
         self.arrivals.append(FeedbackArrival(now, feedback.event))
-        for reader in self.readers:
-            reader.put(feedback)
+        self.readers.put(feedback)
         return True
 
     def refusal(self, refusal: Refusal) -> None:
@@ -117,11 +125,10 @@ class Driving:
     def round_trip(self, seconds: float) -> None:
         """Take the round trip of a ping."""
         if self._driver is not None:
-            self._driver.sender.ping_answered(seconds)
+            self._driver.sender.retransmission.ping_answered(seconds)
 
     def end(self, lost: ConsoleLost) -> None:
         """End every wait: the connection ended."""
         if self._driver is not None:
             self._driver.end(lost)
-        for reader in self.readers:
-            reader.close()
+        self.readers.close()

@@ -1,10 +1,12 @@
-"""A queue between a live source and a reader that may be slow: bounded, newest wins, drops counted."""
+"""Queues between a live source and readers that may be slow: bounded, newest wins, drops counted."""
 
 import asyncio
 from collections import deque
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Generic, TypeVar
 
-__all__ = ["NewestQueue", "QueueClosed"]
+__all__ = ["NewestQueue", "QueueClosed", "Readers"]
 
 Item = TypeVar("Item")
 
@@ -58,3 +60,43 @@ class NewestQueue(Generic[Item]):
     def close(self) -> None:
         self._closed = True
         self._changed.set()
+
+
+class Readers(Generic[Item]):
+    """The readers of a source, each with a queue of its own."""
+
+    def __init__(self) -> None:
+        self._queues: list[NewestQueue[Item]] = []
+        self._unread = 0  # dropped by readers that are gone
+        self._closed = False
+
+    def __len__(self) -> int:
+        return len(self._queues)
+
+    @contextmanager
+    def open(self, bound: int) -> Iterator[NewestQueue[Item]]:
+        """Read inside the block. `bound`: items that may wait for this reader."""
+        queue: NewestQueue[Item] = NewestQueue(bound)
+        if self._closed:
+            queue.close()
+        self._queues.append(queue)
+        try:
+            yield queue
+        finally:
+            self._queues.remove(queue)
+            self._unread += queue.dropped
+
+    def put(self, item: Item) -> None:
+        for queue in self._queues:
+            queue.put(item)
+
+    @property
+    def dropped(self) -> int:
+        """The items that no reader took in time, of all readers so far."""
+        return self._unread + sum(queue.dropped for queue in self._queues)
+
+    def close(self) -> None:
+        """Note that no more items will come: readers read the remaining ones, and end."""
+        self._closed = True
+        for queue in self._queues:
+            queue.close()

@@ -2,7 +2,7 @@
 
 import asyncio
 import time
-from collections.abc import Callable
+from collections.abc import AsyncGenerator, Callable
 from concurrent.futures import Executor
 from typing import NamedTuple
 
@@ -10,8 +10,8 @@ import av
 
 from lockstep.client.media.decoder import Decoded, Decoder, is_h264_keyframe, is_vp8_keyframe
 from lockstep.client.media.frame_assembler import Assembler, AudioAssembler, EncodedFrame, MediaPacket, VideoAssembler
-from lockstep.client.media.media_gate import Gated, MediaGate, Verdict
-from lockstep.client.media.newest_queue import NewestQueue
+from lockstep.client.media.media_gate import Gated, MediaGate
+from lockstep.client.media.newest_queue import NewestQueue, Readers
 from lockstep.client.media.render_log import Rendering, RenderLog
 from lockstep.client.statistics import StreamStatistics
 from lockstep.protocol.carriers import Carrier, split_trailer
@@ -41,7 +41,11 @@ class Sound(NamedTuple):
 
 
 class Stream:
-    """One received stream. Pass it packets and feedbacks, run `run`, and read from `open_reader`."""
+    """One received stream. Pass it packets and feedbacks, run `run`, and read with `read`.
+
+    Attributes:
+        readers: get the media that pass the gate; `read` checks them again
+    """
 
     def __init__(
         self,
@@ -69,13 +73,11 @@ class Stream:
         self._on_heard = on_heard
         self._assembler: Assembler | None = None
         self._encoded: NewestQueue[EncodedFrame] = NewestQueue(ENCODED_BOUND)
-        self._readers: list[NewestQueue[Decoded]] = []
+        self.readers: Readers[Decoded] = Readers()
         self._packets = 0
         self._frames = 0
         self._unstamped = 0
-        self._closed = False
         self._round_trip = 0.0  # s; 0 before one was measured
-        self._unread = 0  # dropped by readers that are gone
 
     # From the network
 
@@ -147,7 +149,7 @@ class Stream:
 
     def _offer(self, frame: Decoded) -> None:
         self._render(self.gate.offer(frame, frame.stamp))
-        if self._on_heard is None or frame.stamp is None or self.kind != "audio" or not self._readers:
+        if self._on_heard is None or frame.stamp is None or self.kind != "audio" or not self.readers:
             return
         if self.gate.check(frame.stamp)[0] != "hold":
             self._on_heard(self.name, frame.stamp)
@@ -155,10 +157,6 @@ class Stream:
     def feedback(self, event: int) -> None:
         """Take the event of the newest feedback."""
         self._render(self.gate.feedback(event))
-
-    def check(self, medium: Decoded) -> tuple[Verdict, int | None]:
-        """Return the verdict now on a medium that a reader took."""
-        return self.gate.check(medium.stamp)
 
     def _age(self, medium: Decoded) -> float | None:
         """Return the medium's age in s, if both ends' clocks agree; None if it does not carry its capture time."""
@@ -170,27 +168,30 @@ class Stream:
         now = asyncio.get_running_loop().time()
         feedback = self.gate.newest_feedback
         self.log.add(Rendering(now, gated.stamp, gated.gap, feedback, self._age(gated.medium)))
-        for reader in self._readers:
-            reader.put(gated.medium)
+        self.readers.put(gated.medium)
         if gated.stamp is not None:
             self._on_render(self.name, gated.stamp)
 
-    def open_reader(self, bound: int) -> NewestQueue[Decoded]:
-        reader: NewestQueue[Decoded] = NewestQueue(bound)
-        if self._closed:
-            reader.close()
-        self._readers.append(reader)
-        return reader
+    async def read(self, bound: int) -> AsyncGenerator[tuple[Decoded, int | None]]:
+        """Yield the media that still pass the gate when they are taken, and their gaps.
 
-    def close_reader(self, reader: NewestQueue[Decoded]) -> None:
-        self._readers.remove(reader)
-        self._unread += reader.dropped
+        `bound`: media that may wait for a slow reader, which loses the oldest.
+
+        Raises:
+            QueueClosed: no more media will arrive.
+        """
+        with self.readers.open(bound) as queue:
+            while True:
+                medium = await queue.get()
+                verdict, gap = self.gate.check(medium.stamp)
+                if verdict == "render":
+                    yield medium, gap
+                else:
+                    queue.dropped += 1
 
     def close(self) -> None:
         """Note that no more media will arrive: readers read the remaining ones, and end."""
-        self._closed = True
-        for reader in self._readers:
-            reader.close()
+        self.readers.close()
 
     def statistics(self) -> StreamStatistics:
         gate = self.gate
@@ -215,7 +216,7 @@ class Stream:
             frames=self._frames,
             lost=self._assembler.lost if self._assembler is not None else 0,
             unstamped=self._unstamped,
-            dropped=self._unread + self._encoded.dropped + sum(reader.dropped for reader in self._readers),
+            dropped=self._encoded.dropped + self.readers.dropped,
         )
 
 

@@ -60,7 +60,7 @@ class ClutchedTool(RuleBasedStateMachine):
         self.down: list[tuple[float, Feedback | Refusal]] = []
         self.moved_until = -math.inf  # s, by which the last good event's motion has ended
         self.executed: set[int] = set()
-        self.sender.seated()
+        self.sender.seat_changed(True)
         self.issue()
         self.arm_and_wait()
 
@@ -78,7 +78,7 @@ class ClutchedTool(RuleBasedStateMachine):
     def drive_and_take_hold_again_and_again(
         self, hand: int, way: list[float], times: int, gap: int, rests: bool
     ) -> None:
-        if not self.sender.ready:
+        if not self.sender.readiness.ready:
             self.arm_and_wait()
         for number in range(times):
             self.take_hold(hand, float(number), rests)
@@ -102,7 +102,7 @@ class ClutchedTool(RuleBasedStateMachine):
             clutch.release()
         if rests:
             self.sender.rest(self.world.now)
-        elif self.sender.ready and not self.sender.resting:
+        elif self.sender.readiness.ready and not self.sender.resting:
             self.sender.intend(NEUTRAL, self.world.now)
 
     @rule(way=st.lists(ways, min_size=6, max_size=6), ticks=st.integers(1, 60))
@@ -118,7 +118,7 @@ class ClutchedTool(RuleBasedStateMachine):
 
     def operate(self) -> None:
         """What a program does in each of its turns. It has waited for the end of its rest, as `Console.rest` does."""
-        if self.hand is None or not self.sender.ready or self.sender.resting:
+        if self.hand is None or not self.sender.readiness.ready or self.sender.resting:
             return
         clutch, device = self.hands[self.hand], self.devices[self.hand]
         if not clutch.engaged:
@@ -161,7 +161,7 @@ class ClutchedTool(RuleBasedStateMachine):
 
     @rule(way=st.floats(-0.3, 0.3), ticks=st.integers(1, 30))
     def another_operator_takes_over_and_moves_the_arm(self, way: float, ticks: int) -> None:
-        self.sender.unseated()
+        self.sender.seat_changed(False)
         self.clutches.settle()
         self.hand = self.led = self.kept_still = None
         self.up.clear()
@@ -177,7 +177,7 @@ class ClutchedTool(RuleBasedStateMachine):
             self.ticks_pass(ticks)
         self.world.shaper.rest()
         self.core.interlock.require()
-        self.sender.seated()
+        self.sender.seat_changed(True)
         self.issue()
 
     @rule(since=st.floats(0.1, 0.6))

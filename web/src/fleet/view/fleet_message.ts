@@ -1,4 +1,4 @@
-import type { PollError } from "../poll_state";
+import type { PollError, PollPhase } from "../poll_state";
 import { tokenIn } from "../../replay/replay_link";
 import {
   CONNECTION_END_LABELS,
@@ -20,14 +20,14 @@ export const NO_LINK: FleetMessage = {
   action: "paste",
 };
 
-export const NO_ROBOTS: FleetMessage = {
+const NO_ROBOTS: FleetMessage = {
   key: "no_robots",
   title: "No robots",
   text: "Your link admits to none of this console’s robots. Ask the person who runs the console for another link.",
   action: "paste",
 };
 
-export function notFound(query: string): FleetMessage {
+function notFound(query: string): FleetMessage {
   return {
     key: `not_found ${query}`,
     title: "No robot found",
@@ -36,10 +36,26 @@ export function notFound(query: string): FleetMessage {
   };
 }
 
-export function shutOut(trouble: PollError): FleetMessage {
+function shutOut(trouble: PollError): FleetMessage {
   const words =
     "ended" in trouble ? CONNECTION_END_LABELS[trouble.ended] : CONNECTION_ERROR_LABELS[trouble.why];
   return { key: words.title, ...words, action: "paste" };
+}
+
+/** What stands in the tiles' place; null: the tiles. `robots`: that there are; `shown`: that pass the filter `query`. */
+export function messageOf(
+  phase: PollPhase,
+  known: {
+    readonly trouble: PollError | null;
+    readonly robots: number;
+    readonly shown: number;
+    readonly query: string;
+  },
+): FleetMessage | null {
+  if (phase === "shut_out") return known.trouble === null ? null : shutOut(known.trouble);
+  if (phase === "loading") return null;
+  if (known.robots === 0) return NO_ROBOTS;
+  return known.shown === 0 ? notFound(known.query) : null;
 }
 
 /** `clear`: shows all robots again. */

@@ -15,7 +15,7 @@ import { DirectStop } from "../direct_stop";
 import { createFleetAudit } from "./audit_sheet";
 import { createRobotLinkSheet } from "../../ui/session/robot_link_sheet";
 import { RobotLinkApi } from "../../transport/signalling/robot_link_api";
-import { messageElement, NO_LINK, NO_ROBOTS, notFound, shutOut, type FleetMessage } from "./fleet_message";
+import { messageElement, messageOf, NO_LINK } from "./fleet_message";
 import { FleetPoll } from "../fleet_poll";
 import { StopAllSender } from "../stop_all_sender";
 import { createFleetTools } from "./fleet_tools";
@@ -222,7 +222,8 @@ export class FleetPage {
       robot === null || state === null ? [] : [{ robot, kind: state.kind }],
     );
     const isNew = ranked.some(({ robot }) => this.tiles.get(robot.name)?.element.parentNode !== this.grid);
-    if (!atOnce && !isNew && this.isHeld()) return;
+    const isHeld = performance.now() - this.pointedMs < HOLD_MS || this.grid.contains(document.activeElement);
+    if (!atOnce && !isNew && isHeld) return;
     const order = sortFleet(ranked, this.tools.sorting).flatMap((name) => this.tiles.get(name) ?? []);
     for (const [index, tile] of order.entries())
       if (this.grid.children[index] !== tile.element)
@@ -231,10 +232,6 @@ export class FleetPage {
       setHidden(tile.element, tile.robot !== null && !isFound(tile.robot, this.tools.query));
     this.shown = order.filter((tile) => !tile.element.hidden);
     setData(this.grid, "few", this.shown.length <= 3 ? `${this.shown.length}` : "");
-  }
-
-  private isHeld(): boolean {
-    return performance.now() - this.pointedMs < HOLD_MS || this.grid.contains(document.activeElement);
   }
 
   /** What a screen reader hears: states that became or ended as trouble. */
@@ -278,21 +275,18 @@ export class FleetPage {
   }
 
   private showMessage(phase: PollPhase): void {
-    const message = this.message(phase);
+    const { trouble } = this.pollState;
+    const [robots, shown] = [this.robots.length, this.shown.length];
+    const message =
+      this.link.token === null
+        ? NO_LINK
+        : messageOf(phase, { trouble, robots, shown, query: this.tools.query });
     const key = message?.key ?? (phase === "loading" ? "loading" : "");
     if (key === this.messageKey) return;
     this.messageKey = key;
     if (message !== null) this.place.replaceChildren(messageElement(message, () => this.tools.clear()));
     else if (phase === "loading") this.place.replaceChildren(loadingElement());
     else this.place.replaceChildren(this.grid);
-  }
-
-  private message(phase: PollPhase): FleetMessage | null {
-    if (this.link.token === null) return NO_LINK;
-    if (phase === "shut_out") return this.pollState.trouble === null ? null : shutOut(this.pollState.trouble);
-    if (phase === "loading") return null;
-    if (this.robots.length === 0) return NO_ROBOTS;
-    return this.shown.length === 0 ? notFound(this.tools.query) : null;
   }
 }
 

@@ -49,7 +49,7 @@ export class Thumbnail {
       closed: () => this.closed(),
     });
     this.heartbeat = new Heartbeat({
-      tell: (message) => this.connection.send("control", JSON.stringify(message)),
+      tell: (message) => this.connection.tell("control", message),
       report: () => ({ type: "report", event: this.state.feedback?.event ?? 0 }),
       lost: () => undefined,
     });

@@ -1,44 +1,33 @@
-import { iceCandidates, iceFragment, restartedAnswer } from "../signalling/ice_fragment";
 import { hasTurn, type IceServer } from "../signalling/ice_servers";
-import { ConsoleError, type ConsoleApi } from "../signalling/console_api";
+import { WhepSession, type WhepApi } from "../signalling/whep_session";
 import { TransportEnd, type Transport, type TransportEvents } from "../transport";
 import type { ChannelName } from "./data_channels";
 import type { MediaSection } from "./media_section";
-import {
-  USUAL_CAMERAS,
-  USUAL_MICROPHONES,
-  type PendingConnection,
-  type PendingConnectionOptions,
-} from "./pending_connection";
-import { answerOf, type Preconnection } from "./preconnection";
-import type { WhepAnswer } from "../signalling/whep";
+import { negotiate, type Purpose } from "./negotiation";
+import type { PendingConnection, PendingConnectionOptions } from "./pending_connection";
 
-const REQUEST_LIMIT_MS = 10_000;
 const PATH_LIMIT_MS = 10_000; // from the answer to the connection; and so many times what the answer took
 const PATH_TRIPS = 10; // round trips of ICE and DTLS, some of them lost
 const MOST_PATH_MS = 30_000; // the console gives up later
 const MAX_WAITING = 100_000; // bytes
 
-/** What of the console's interface it needs. */
-export type WebRtcApi = Pick<ConsoleApi, "end" | "media" | "offer" | "restart" | "trickle">;
-
-/** Messages, pictures and sound by WebRTC. Order: `listen`; one of the `connect…` methods; `close`. */
+/** Messages, pictures and sound by WebRTC. Order: `listen`; `connect`; `close`. */
 export class WebRtcTransport implements Transport {
   isConnected = false;
   readonly isReliable = false;
-  servers: readonly IceServer[] = []; // STUN and TURN
-  private location = "";
-  private tag = ""; // of the ICE session
+  readonly session: WhepSession;
   private timer: ReturnType<typeof setTimeout> | undefined;
   private isOver = false;
   private pathLimitMs = PATH_LIMIT_MS;
 
   constructor(
-    private readonly api: WebRtcApi,
+    api: WhepApi,
     private readonly pending: PendingConnection,
     private readonly options: PendingConnectionOptions,
     private readonly events: TransportEvents,
-  ) {}
+  ) {
+    this.session = new WhepSession(api);
+  }
 
   /** From now on. What the page's first script has begun may have got somewhere by now. */
   listen(): void {
@@ -53,37 +42,19 @@ export class WebRtcTransport implements Transport {
     if (connection.connectionState !== "new") this.connectionChanged();
   }
 
-  /** Goes on with what the page's first script has begun. As `connectForMedia`. */
-  async connectFirst(first: Preconnection, signal: AbortSignal): Promise<void> {
-    signal.addEventListener("abort", () => first.abort.abort());
-    await this.withMoreSections(signal, async () => {
-      const { answer, tookMs } = await answerOf(first);
-      this.answered(answer, tookMs);
-      this.awaitPath();
-    });
-  }
-
-  /** For all pictures and sound; `voice`: for this person's too. Returns when the answer is set. Raises ConsoleError. */
-  async connectForMedia(voice: boolean, signal: AbortSignal): Promise<void> {
-    this.pending.addSections(USUAL_CAMERAS, USUAL_MICROPHONES);
-    if (voice) this.pending.addVoice();
-    await this.withMoreSections(signal, () => this.connect("sections=all", signal));
-  }
-
-  /** For one small picture. Nothing has to be asked first: a robot has a first camera or none. */
-  async connectForThumbnail(signal: AbortSignal): Promise<void> {
-    this.pending.addSections(1, 0);
-    await this.connect("view=thumbnail", signal);
-  }
-
-  /** For messages alone, beside the relay that media come from. */
-  async connectBeside(relay: string, signal: AbortSignal): Promise<void> {
-    await this.connect(`relay=${encodeURIComponent(relay)}`, signal);
+  /** Returns when the answer is set. Raises ConsoleError. */
+  async connect(purpose: Purpose, signal: AbortSignal): Promise<void> {
+    const { session, pending } = this;
+    const tookMs = await negotiate(session, pending, purpose, signal);
+    this.pathLimitMs = Math.min(PATH_LIMIT_MS + PATH_TRIPS * tookMs, MOST_PATH_MS);
+    pending.connection.onicegatheringstatechange = () => session.trickle(pending.connection);
+    session.trickle(pending.connection);
+    this.limitPath();
   }
 
   /** Takes STUN and TURN servers, for what is gathered from now on. */
   configure(servers: readonly IceServer[]): void {
-    this.servers = servers;
+    this.session.servers = servers;
     if (!this.isOver) this.pending.configure(servers);
   }
 
@@ -97,14 +68,9 @@ export class WebRtcTransport implements Transport {
     const { connection } = this.pending;
     const offer = await connection.createOffer({ iceRestart: true });
     await connection.setLocalDescription(offer);
-    const answer = await this.api.restart(this.location, iceFragment(this.localSdp(), false));
-    const before = connection.remoteDescription?.sdp ?? "";
-    const sdp = restartedAnswer(before, answer.fragment);
-    if (sdp === null)
-      throw new ConsoleError(200, "malformed", "the console's answer has no credentials", null);
-    this.tag = answer.tag;
+    const sdp = await this.session.restart(connection);
     await connection.setRemoteDescription({ type: "answer", sdp });
-    this.sendCandidates();
+    this.session.trickle(connection);
   }
 
   send(channel: ChannelName, text: string): boolean {
@@ -133,83 +99,21 @@ export class WebRtcTransport implements Transport {
     this.finish(false);
   }
 
-  /** Most robots have no more streams than are offered at first; a console with more says so instead of an answer. */
-  private async withMoreSections(signal: AbortSignal, connect: () => Promise<void>): Promise<void> {
-    try {
-      await connect();
-    } catch (error) {
-      if (!(error instanceof ConsoleError) || error.error !== "too_few_sections") throw error;
-      const media = await this.api.media(AbortSignal.any([signal, AbortSignal.timeout(REQUEST_LIMIT_MS)]));
-      const more = [media.cameras - USUAL_CAMERAS, media.microphones - USUAL_MICROPHONES] as const;
-      this.pending.addSections(Math.max(0, more[0]), Math.max(0, more[1]));
-      await this.connect("", signal);
-    }
-  }
-
-  /** `query`: of the URL, besides what the offer itself needs. */
-  private async connect(query: string, signal: AbortSignal): Promise<void> {
-    const offer = await this.pending.offer();
-    const offeredMs = performance.now();
-    const queries = [query, offer.query].filter((each) => each !== "").join("&");
-    const answer = await this.api.offer(offer.sdp, queries, signal);
-    this.answered(answer, performance.now() - offeredMs);
-    await this.pending.take(answer);
-    this.awaitPath();
-  }
-
-  private answered(answer: WhepAnswer, tookMs: number): void {
-    this.pathLimitMs = Math.min(PATH_LIMIT_MS + PATH_TRIPS * tookMs, MOST_PATH_MS);
-    this.location = answer.location;
-    this.tag = answer.tag;
-    this.servers = answer.servers;
-    if (this.isOver) throw new ConsoleError(0, "closed", "closed while connecting", null);
-  }
-
-  private awaitPath(): void {
-    this.pending.connection.onicegatheringstatechange = () => this.sendCandidates();
-    this.sendCandidates();
-    this.endAfter(this.pathLimitMs);
-  }
-
   private connectionChanged(): void {
     const state = this.pending.connection.connectionState;
     clearTimeout(this.timer);
     if (state === "connected") this.isConnected = true;
     else if (state === "closed") this.end(new TransportEnd("lost", "the connection was closed"));
     else if (this.isConnected) this.events.troubled();
-    else if (state === "failed") this.end(this.noPath());
-    else this.endAfter(this.pathLimitMs);
+    else if (state === "failed") this.end(noPath(this.options, this.session.servers));
+    else this.limitPath();
   }
 
-  /** Ends it unless it is connected by then. */
-  private endAfter(limitMs: number): void {
+  /** Ends it unless it is connected in time. */
+  private limitPath(): void {
     clearTimeout(this.timer);
-    if (!this.isConnected) this.timer = setTimeout(() => this.end(this.noPath()), limitMs);
-  }
-
-  private noPath(): TransportEnd {
-    if (this.options.turnOnly) return new TransportEnd("no_turn_path", "");
-    return new TransportEnd(
-      "no_path",
-      hasTurn(this.servers) ? "The console's TURN server gave no path either" : "",
-    );
-  }
-
-  private localSdp(): string {
-    return this.pending.connection.localDescription?.sdp ?? "";
-  }
-
-  /**
-   * The console learns our address from our own checks (RFC 8445 7.3.1.3), so no offer waits for candidates. Those that
-   * say more than an mDNS name follow in one fragment (RFC 8840).
-   */
-  private sendCandidates(): void {
-    if (this.isOver || this.location === "") return;
-    if (this.pending.connection.iceGatheringState !== "complete") return;
-    const sdp = this.localSdp();
-    if (iceCandidates(sdp).length === 0) return;
-    // Only a help: without them the connection is still found.
-    this.api.trickle(this.location, this.tag, iceFragment(sdp, true)).catch(() => undefined);
+    if (this.isConnected) return;
+    this.timer = setTimeout(() => this.end(noPath(this.options, this.session.servers)), this.pathLimitMs);
   }
 
   private consoleClosed(): void {
@@ -228,7 +132,11 @@ export class WebRtcTransport implements Transport {
     this.isOver = true;
     clearTimeout(this.timer);
     this.pending.close();
-    // The console notices a lost peer by itself; asking it to end the session only makes that quicker.
-    if (!gone) this.api.end(this.location).catch(() => undefined);
+    this.session.end(gone);
   }
+}
+
+function noPath({ turnOnly }: PendingConnectionOptions, servers: readonly IceServer[]): TransportEnd {
+  if (turnOnly) return new TransportEnd("no_turn_path", "");
+  return new TransportEnd("no_path", hasTurn(servers) ? "The console's TURN server gave no path either" : "");
 }

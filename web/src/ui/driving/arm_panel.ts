@@ -25,7 +25,7 @@ export function createArmPanel(engine: ConsoleEngine): Panel {
   return {
     element,
     update(now) {
-      const { arming } = engine;
+      const { arming } = engine.driving;
       setHidden(element, !isOperator(engine.state) && !holdsSeat(engine.state));
       setData(element, "state", arming.state);
       setData(element, "possible", String(armRefusal(arming, engine.conditions(now)) === null));
@@ -39,18 +39,18 @@ export function createArmPanel(engine: ConsoleEngine): Panel {
 
 function armWords(engine: ConsoleEngine, now: number): string {
   const warned = warningSeconds(engine.state.feedback, engine.measuredMs, now);
-  if (engine.isArmed() && warned > 0) return `The robot warns first: ${warned} s`;
-  if (engine.arming.state === "driving") return "Let go to bring the robot to rest";
-  if (engine.arming.state === "armed") {
+  if (engine.driving.isArmed() && warned > 0) return `The robot warns first: ${warned} s`;
+  if (engine.driving.arming.state === "driving") return "Let go to bring the robot to rest";
+  if (engine.driving.arming.state === "armed") {
     const hasGoals = engine.state.robot?.description.axes.some((axis) => axis.kind === "goal");
     return `Hold ${deadmanName(engine)} to move${hasGoals ? ", or drag an axis" : ""}`;
   }
-  const refusal = armRefusal(engine.arming, engine.conditions(now));
+  const refusal = armRefusal(engine.driving.arming, engine.conditions(now));
   const focused = focusedControl();
   if (refusal === null && focused !== null && focused !== "Arm")
     return `Enter and Space work “${focused}” now. Tab to Arm, or click the picture`;
   return refusal === null || refusal === "deadman_held"
-    ? disarmLabel(engine.arming.reason)
+    ? disarmLabel(engine.driving.arming.reason)
     : ARM_REFUSAL_LABELS[refusal];
 }
 
@@ -66,7 +66,7 @@ function padWords(engine: ConsoleEngine): string {
   if (engine.controls.pad?.isSuspended === true) return "A gamepad is being calibrated";
   if (state === null) return "No gamepad: press a button on it to wake it";
   if (!state.ready) return `${state.name} has to be calibrated first: press G`;
-  if (!engine.isArmed()) {
+  if (!engine.driving.isArmed()) {
     const arm = padButton(engine, "arm");
     return arm === null ? `${state.name} ready` : `${state.name} ready: ${arm} arms`;
   }

@@ -27,7 +27,7 @@ export function createAxisBars(engine: ConsoleEngine): Panel {
         element.replaceChildren(...bars.map((bar) => bar.element));
       }
       if (description === null) return;
-      const names = axesShown(description, engine.layer);
+      const names = axesShown(description, engine.driving.layer);
       const shown = bars.filter(({ axis }) => names.has(axis.name));
       setData(element, "goals", String(shown.some(({ axis }) => axis.kind === "goal")));
       setData(element, "crowd", shown.length > 6 ? "most" : shown.length > 4 ? "many" : "");
@@ -35,7 +35,7 @@ export function createAxisBars(engine: ConsoleEngine): Panel {
       for (const [index, bar] of bars.entries()) {
         setHidden(bar.element, !names.has(bar.axis.name));
         const known = feedback?.unknown.includes(bar.axis.name) === false;
-        bar.show(now, known ? feedback.axes[index] : undefined, engine.values[index]);
+        bar.show(now, known ? feedback.axes[index] : undefined, engine.driving.values[index]);
       }
     },
   };

@@ -19,7 +19,7 @@ export function createAxisPanel(engine: ConsoleEngine, bars: Panel): Panel {
         description = found;
         layers.replaceChildren(
           ...found.layers.map((layer, index) =>
-            button("segment", layer.label, () => engine.selectLayer(index)),
+            button("segment", layer.label, () => engine.driving.selectLayer(index)),
           ),
         );
         setData(layers, "crowd", found.layers.length > 3 ? "many" : found.layers.length > 2 ? "some" : "");
@@ -29,7 +29,7 @@ export function createAxisPanel(engine: ConsoleEngine, bars: Panel): Panel {
         (!isOperator(engine.state) && !holdsSeat(engine.state)) || layers.childElementCount < 2,
       );
       for (const [index, child] of [...layers.children].entries())
-        if (child instanceof HTMLElement) setPressed(child, index === engine.layer);
+        if (child instanceof HTMLElement) setPressed(child, index === engine.driving.layer);
       bars.update(now);
     },
   };

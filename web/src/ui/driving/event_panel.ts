@@ -28,7 +28,8 @@ export function createEventPanel(engine: ConsoleEngine): Panel {
   return {
     element,
     update(now) {
-      const found = engine.driver === null ? "no_feedback" : gateState(engine.driver.gate, now);
+      const found =
+        engine.driving.driver === null ? "no_feedback" : gateState(engine.driving.driver.gate, now);
       if (found === "open" || found === "rate") openMs = now;
       const blocked = gateReason(
         engine.state,

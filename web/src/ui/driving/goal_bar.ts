@@ -46,7 +46,7 @@ export function createGoalBar(
     element,
     show(now, measured, commanded) {
       const applied = engine.state.feedback?.goals[index] ?? null;
-      const refusal = shownRefusal(engine.goals?.refusal ?? null, now);
+      const refusal = shownRefusal(engine.driving.goals?.refusal ?? null, now);
       const { robot } = engine.state;
       const isRefused = refusal !== null && refusedAxis(refusal, robot?.description ?? null) === axis;
       const end = measured === undefined ? null : endOf(axis, applied ?? measured);
@@ -54,7 +54,7 @@ export function createGoalBar(
       setData(
         element,
         "state",
-        isRefused ? "refused" : drives ? "driven" : engine.isArmed() ? "armed" : "idle",
+        isRefused ? "refused" : drives ? "driven" : engine.driving.isArmed() ? "armed" : "idle",
       );
       setData(element, "end", end ?? "");
       place(measuredMark, axis, measured);
@@ -74,7 +74,7 @@ export function createGoalBar(
 /** Which input moves the axis in the active layer. */
 function hintOf(engine: ConsoleEngine, axis: Axis): string {
   if (!mayDrive(engine.state)) return "";
-  const layer = engine.state.robot?.description.layers[engine.layer];
+  const layer = engine.state.robot?.description.layers[engine.driving.layer];
   const binding = layer?.bindings.find((each) => each.axis === axis.name);
   const touches = document.documentElement.dataset["touch"] === "true";
   return inputHint(binding, engine.controls.hasPad ? "pad" : touches ? "touch" : "keys");
@@ -99,7 +99,7 @@ function describe(
   applied: number | null,
 ): void {
   setAttribute(slider, "tabindex", mayDrive(engine.state) ? "0" : "-1");
-  setAttribute(slider, "aria-disabled", String(!engine.isArmed()));
+  setAttribute(slider, "aria-disabled", String(!engine.driving.isArmed()));
   if (measured === undefined) {
     setAttribute(slider, "aria-valuetext", "not known");
     return;

@@ -12,11 +12,11 @@ export function createLimitsStrip(engine: ConsoleEngine): Panel {
     element,
     update(now) {
       const { state } = engine;
-      const share = holdsSeat(state) ? engine.speedShare : (state.speedCap?.share ?? 1);
+      const share = holdsSeat(state) ? engine.driving.speedShare : (state.speedCap?.share ?? 1);
       const description = state.robot?.description ?? null;
-      const refusal = shownRefusal(engine.goals?.refusal ?? null, now);
+      const refusal = shownRefusal(engine.driving.goals?.refusal ?? null, now);
       const refused = refusal === null ? [] : [goalRefusalWords(refusal, description)];
-      const waits = engine.goals?.saysWhatItWaitsFor(now) ?? false;
+      const waits = engine.driving.goals?.saysWhatItWaitsFor(now) ?? false;
       const words = limitLabels(state.feedback, description, state.speedCap, share, refused, waits);
       const key = JSON.stringify(words);
       if (key === shown) return;

@@ -3,6 +3,7 @@ import type { ConsoleEngine } from "../../engine/console_engine";
 import { mayDrive, note } from "../../session/console_state";
 import { ACT_REFUSAL_LABELS } from "../../robot/act_refusal_labels";
 import { actRefusal } from "../../robot/actions";
+import { actConditions } from "../../engine/act_conditions";
 
 /** Where a place on a canvas is in its picture, in shares from the left and the top; null: beside it. */
 export function pictureShare(
@@ -62,7 +63,7 @@ function ask(engine: ConsoleEngine, canvas: HTMLCanvasElement, place: readonly [
   );
   if (action === undefined || share === null) return;
   const shown = video?.gate.shown ?? null;
-  const refusal = actRefusal(action, state.actions, engine.actConditions(performance.now(), false));
+  const refusal = actRefusal(action, state.actions, actConditions(engine, performance.now(), false));
   const why = refusal !== null ? ACT_REFUSAL_LABELS[refusal] : shown === null ? "No picture is shown" : null;
   if (why === null) engine.act(action, { x: share[0], y: share[1], event: shown ?? 0 });
   else note(state, "warning", `${action.label}: ${why}`, Date.now());

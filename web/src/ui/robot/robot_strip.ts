@@ -8,6 +8,7 @@ import type { ConsoleEngine } from "../../engine/console_engine";
 import type { Action, ActionUpdate } from "../../protocol/wire";
 import { button, h, setData, setHidden, setText, type Panel } from "../elements/dom";
 import { createParameterForm, type ParameterForm } from "./parameter_form";
+import { actConditions } from "../../engine/act_conditions";
 
 /** How long the end of an action stays in words. */
 const SHOWN_MS = 8000;
@@ -87,7 +88,7 @@ function whyNot(engine: ConsoleEngine, now: number): string {
   const { state } = engine;
   if (!mayDrive(state)) return "";
   for (const action of state.robot?.description.actions ?? []) {
-    const refusal = actRefusal(action, state.actions, engine.actConditions(now, false));
+    const refusal = actRefusal(action, state.actions, actConditions(engine, now, false));
     if (refusal !== null) return `${action.label}: ${ACT_REFUSAL_LABELS[refusal]}`;
   }
   return "";
@@ -116,7 +117,7 @@ class ActionButton {
     const { engine, action } = this;
     const update = newestOf(engine.state.actions, action.name);
     const runs = update !== null && isRunning(update);
-    const refusal = runs ? null : actRefusal(action, engine.state.actions, engine.actConditions(now, false));
+    const refusal = runs ? null : actRefusal(action, engine.state.actions, actConditions(engine, now, false));
     const asks = !runs && now - this.askedMs < CONFIRM_MS;
     const mayCancel = runs && (holdsSeat(engine.state) || engine.state.welcome?.role === "supervisor");
     setText(
@@ -147,7 +148,7 @@ class ActionButton {
       return;
     }
     if (this.isByClick) return;
-    const refusal = actRefusal(action, engine.state.actions, engine.actConditions(now, remote));
+    const refusal = actRefusal(action, engine.state.actions, actConditions(engine, now, remote));
     if (refusal !== null) {
       note(engine.state, "warning", `${action.label}: ${ACT_REFUSAL_LABELS[refusal]}`, Date.now());
       return;

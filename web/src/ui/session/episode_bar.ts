@@ -18,6 +18,7 @@ import {
   type LeftEpisode,
 } from "../../session/episode_labels";
 import { button, h, setData, setHidden, setText, type Panel } from "../elements/dom";
+import { actConditions } from "../../engine/act_conditions";
 
 type Request = Pick<EpisodeRequest, "do"> & Partial<EpisodeRequest>;
 
@@ -127,7 +128,7 @@ export function createEpisodeBar(engine: ConsoleEngine): Panel {
       task: verb === "start" ? task.value.trim() : "",
       ...request,
     };
-    engine.tell("session", message);
+    engine.connection.tell("session", message);
   }
 
   /**
@@ -137,7 +138,7 @@ export function createEpisodeBar(engine: ConsoleEngine): Panel {
   function takePress(press: EpisodePress): void {
     if (element.hidden || state === null) return;
     if (document.activeElement === task) task.blur();
-    const { visible, occupied } = engine.actConditions(performance.now(), true);
+    const { visible, occupied } = actConditions(engine, performance.now(), true);
     if (!visible || occupied) return;
     const isIdle = state.phase === "idle" || state.phase === "resetting";
     const succeeds: Request = { do: "keep", outcome: "success" };
@@ -191,7 +192,8 @@ export function createEpisodeBar(engine: ConsoleEngine): Panel {
     if (event.target instanceof Element && event.target.matches(FIELDS)) return;
     const request = KEYS.get(event.code);
     if (request === undefined) return;
-    if (engine.isArmed() && drivingKeys(engine.state.robot?.description ?? null).has(event.code)) return;
+    if (engine.driving.isArmed() && drivingKeys(engine.state.robot?.description ?? null).has(event.code))
+      return;
     ask(request);
   });
 

@@ -58,7 +58,7 @@ function createComposer(engine: ConsoleEngine): Panel {
       const event = feedback === null ? "" : `Kept with event ${grouped(feedback.event)}`;
       setText(
         hint,
-        failed ? "Not sent: there is no connection" : engine.isArmed() ? "Writing disarms" : event,
+        failed ? "Not sent: there is no connection" : engine.driving.isArmed() ? "Writing disarms" : event,
       );
       send.disabled = welcome === null || field.value.trim() === "";
     },

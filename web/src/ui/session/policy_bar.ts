@@ -34,13 +34,13 @@ export function createPolicyBar(engine: ConsoleEngine): Panel {
 
   /** Lets a policy drive, which frees an own seat, or no longer. `peer`: the only one that may; "": any. */
   function offer(peer: string, offered: boolean): void {
-    engine.tell("session", { type: "seat_offer", peer, offered });
+    engine.connection.tell("session", { type: "seat_offer", peer, offered });
   }
 
   /** The person gives the robot out of their hands: whatever they hold is let go first. */
   function give(wanted: PolicyOffer | undefined): void {
     if (wanted === undefined) return;
-    engine.disarm("operator");
+    engine.driving.disarm("operator");
     offer(wanted.peer, true);
   }
 
@@ -52,7 +52,8 @@ export function createPolicyBar(engine: ConsoleEngine): Panel {
     if (key.code !== GIVE_KEY || key.repeat || key.ctrlKey || key.metaKey || key.altKey) return;
     if (key.target instanceof Element && key.target.matches(FIELDS)) return;
     if (shown.length !== 1) return; // with several the person says which
-    if (engine.isArmed() && drivingKeys(engine.state.robot?.description ?? null).has(key.code)) return;
+    if (engine.driving.isArmed() && drivingKeys(engine.state.robot?.description ?? null).has(key.code))
+      return;
     key.preventDefault();
     give(shown[0]);
   });
@@ -110,7 +111,7 @@ export function createPolicyBar(engine: ConsoleEngine): Panel {
       return;
     }
     const { description } = robot;
-    const names = axesShown(description, engine.layer);
+    const names = axesShown(description, engine.driving.layer);
     const done = description.axes.map((axis, index) =>
       axis.kind === "goal" ? (feedback.goals[index] ?? feedback.axes[index]) : feedback.axes[index],
     );

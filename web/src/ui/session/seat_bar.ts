@@ -52,7 +52,7 @@ export function createSeatBar(engine: ConsoleEngine, talk: Panel): Panel {
         claims,
         me,
         idleSeconds: session.idleSecondsLeft(now),
-        armed: engine.isArmed(),
+        armed: engine.driving.isArmed(),
         obstacle: obstacleOf(engine, now),
         notice: told !== null && now - toldMs < NEWS_MS ? told.words : null,
       });
@@ -97,7 +97,10 @@ function act(engine: ConsoleEngine, { kind }: Shown): void {
   if (kind === "request") engine.session.requestSeat();
   else if (kind === "take") engine.session.takeSeat();
   else if (kind === "withdraw") engine.session.release();
-  else if (kind === "release") engine.releaseSeat();
+  else if (kind === "release") {
+    engine.driving.disarm("operator");
+    engine.session.release();
+  }
 }
 
 function showAction(

@@ -11,11 +11,11 @@ export function createAnnouncer(engine: ConsoleEngine, polite: HTMLElement, urge
     element: polite,
     update(now) {
       const overlay = overlayLabels(engine, now);
-      const { state, reason } = engine.arming;
+      const { state, reason } = engine.driving.arming;
       const armed = state === "disarmed" ? disarmLabel(reason) : state === "armed" ? "Armed" : "Driving";
       setText(polite, overlay?.tone === "stopped" ? "" : (overlay?.title ?? armed));
       setText(urgent, overlay?.tone === "stopped" ? `${overlay.title}. ${overlay.text}` : "");
-      const title = overlay === null ? (engine.isArmed() ? "Armed" : "") : overlay.title;
+      const title = overlay === null ? (engine.driving.isArmed() ? "Armed" : "") : overlay.title;
       const name = title === "" ? page : `${title} · ${page}`;
       if (document.title !== name) document.title = name;
     },

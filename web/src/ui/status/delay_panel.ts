@@ -12,7 +12,7 @@ export function createDelayPanel(engine: ConsoleEngine, mainStream: () => string
   return {
     element: h("section", "card figures", { "aria-label": "Delays" }, ...figures),
     update(now) {
-      const latency = engine.driver?.latency;
+      const latency = engine.driving.driver?.latency;
       const main = engine.streams.videos.get(mainStream() ?? "");
       picture.show(milliseconds(latency === undefined ? null : quantile(latency.toPicture, 0.5)));
       feedback.show(milliseconds(latency === undefined ? null : quantile(latency.toFeedback, 0.5)));

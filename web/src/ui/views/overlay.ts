@@ -96,7 +96,7 @@ function linkWords(link: ConnectionState, now: number): OverlayLabels {
 
 /** A robot that is stopped stays so, whatever becomes of the connection. */
 function silentWords(engine: ConsoleEngine, now: number): OverlayLabels {
-  const since = ageLabel(engine.silentMs(now));
+  const since = ageLabel(now - engine.heardMs);
   const stopped = engine.state.stop.stopped ? " The robot was stopped when it was last heard." : "";
   const text = `The console has been silent for ${since}. ${reconnectLabel(engine.connection.reconnect.phase)}${stopped}`;
   return { tone: "bad", title: "Console silent", text };

@@ -2,7 +2,8 @@ import type { ConsoleEngine } from "../../engine/console_engine";
 import { note, robotIsUp } from "../../session/console_state";
 import { feedbackAge } from "../../drive/feedback_age";
 import { sourceLabel } from "../../session/source_labels";
-import { layoutViews, smallShape, type MovableCard, type ViewLayout } from "./view_layout";
+import { CardPlace } from "./card_place";
+import { layoutViews, smallShape } from "./view_layout";
 import { stalenessOf } from "../../engine/report";
 import type { StreamInfo } from "../../protocol/wire";
 import { h, setData, setHidden, setText } from "../elements/dom";
@@ -30,23 +31,19 @@ interface View {
 
 const SCENE = "3D scene";
 const SCENE_SHAPE = 4 / 3;
-const CARD_WIDTH = 150;
-const CARD_HEIGHT = 64;
 const TOO_SLOW = "The 3D scene was closed: this machine draws it too slowly";
 
 /** One view large, the others small; a click on a small one swaps it in. */
 export class ViewGrid {
   readonly element = h("main", "views", { "aria-label": "Views" });
   readonly gauges = h("div", "gauges");
-  card: HTMLElement | null = null; // that may stand at the end of a row of small views, where the style sheet lets it
+  readonly cardPlace = new CardPlace();
   scene: SceneView | null = null; // until its code is there
   sceneSwitch: SceneSwitch | null = null; // comes with the scene
   private readonly views = new Map<string, View>(); // cameras in their order, then the scene while it is there
   private sceneView: View | null = null;
   private main: string | null = null;
-  private epoch: string | null = null;
   private shapes = ""; // of the pictures, as they were last laid out
-  private cardHeight = 0; // in its own place
 
   constructor() {
     this.element.append(this.gauges);
@@ -56,7 +53,7 @@ export class ViewGrid {
   }
 
   takeScene(scene: SceneView, sceneSwitch: SceneSwitch): void {
-    this.sceneView = this.createView(SCENE, SCENE, null, scene.element);
+    this.sceneView = createView(SCENE, SCENE, null, scene.element, () => this.swapIn(SCENE));
     this.scene = scene;
     this.sceneSwitch = sceneSwitch;
   }
@@ -66,7 +63,7 @@ export class ViewGrid {
     const known = this.views.get(info.stream)?.canvas;
     if (known) return known;
     const canvas = h("canvas", "picture", { "data-stream": info.stream, width: "640", height: "480" });
-    this.addView(this.createView(info.stream, info.label, canvas, canvas));
+    this.addView(createView(info.stream, info.label, canvas, canvas, () => this.swapIn(info.stream)));
     if (this.main === null) this.swapIn(info.stream);
     return canvas;
   }
@@ -90,7 +87,7 @@ export class ViewGrid {
       else this.arrange();
       return;
     }
-    this.addView(this.createView(name, name, null, content));
+    this.addView(createView(name, name, null, content, () => this.swapIn(name)));
     this.swapIn(name);
   }
 
@@ -102,22 +99,29 @@ export class ViewGrid {
   }
 
   update(engine: ConsoleEngine, now: number): void {
-    this.element.classList.toggle("is-locked", engine.isArmed());
-    this.followEpoch(engine.state.robot?.epoch ?? null);
+    this.element.classList.toggle("is-locked", engine.driving.isArmed());
+    this.scene?.follow(engine.state.robot?.epoch ?? null);
     if (this.scene !== null && this.sceneView !== null)
       this.updateScene(this.scene, this.sceneView, engine, now);
     for (const view of this.views.values()) if (view.canvas !== null) showVeil(engine, view, now);
-    if (this.shapes !== this.shapesNow()) this.fit();
+    if (this.shapes !== shapesOf(this.views)) this.fit();
   }
 
   private updateScene(scene: SceneView, view: View, engine: ConsoleEngine, now: number): void {
-    if (scene.hasSettled(now) && engine.ticker.isHeldUp(now)) this.dropScene(scene, engine);
+    // Nothing may keep STOP waiting, so a scene that this machine cannot draw fast enough goes.
+    if (scene.hasSettled(now) && engine.ticker.isHeldUp(now)) {
+      if (scene.full.isOpen) scene.full.close();
+      else this.sceneSwitch?.giveUp();
+      const camera = this.mainStream();
+      if (camera !== null && this.main === SCENE) this.swapIn(camera);
+      note(engine.state, "warning", TOO_SLOW, Date.now());
+    }
     if (scene.hasFailed && this.sceneSwitch?.isWanted === false) this.sceneSwitch.giveUp();
     this.sceneSwitch?.update(engine, now);
     this.showScene(scene, view, engine);
     scene.take(engine.state.feedback);
     scene.update();
-    if (this.views.has(SCENE)) this.showSceneVeil(scene, view, engine, now);
+    if (this.views.has(SCENE)) showSceneVeil(scene, view, engine, this.isLarge(view), now);
   }
 
   /** The scene stands on the page or it does not: nothing is kept free for one that is not there. */
@@ -126,69 +130,15 @@ export class ViewGrid {
     const description = engine.state.robot?.description;
     if (isOn && description !== undefined) scene.open(description);
     if (isOn === this.views.has(SCENE)) return;
-    if (isOn) this.addView(view);
-    else this.removeScene(scene, view);
-  }
-
-  private removeScene(scene: SceneView, view: View): void {
+    if (isOn) {
+      this.addView(view);
+      return;
+    }
     scene.close();
     this.views.delete(SCENE);
     view.element.remove();
     if (this.main === SCENE) this.main = this.mainStream();
     this.arrange();
-  }
-
-  /** The scene is judged like a picture: by how far its event is from the feedback. */
-  private showSceneVeil(scene: SceneView, view: View, engine: ConsoleEngine, now: number): void {
-    const { event, gap } = scene.statistics();
-    const staleness = scene.staleness(feedbackAge(engine.measuredMs, now));
-    const words = event === null && staleness === null ? null : (unreachableWords(engine) ?? staleness);
-    setHidden(view.veil, words === null);
-    view.element.classList.toggle("is-stale", words !== null);
-    if (words !== null) setText(view.veilWords, words);
-    const { video } = engine.state.settings.tolerance;
-    const unknown = scene.lacksJoints ? " · not all joints measured" : "";
-    setText(
-      view.detail,
-      event === null || gap === null ? "" : `s ${event} · gap ${gap} of ${video}${unknown}`,
-    );
-    setData(view.element, "gap", words === null ? "good" : "bad");
-    setHidden(view.swap, this.isLarge(view) && scene.isFull);
-  }
-
-  /** Nothing may keep STOP waiting, so a scene that this machine cannot draw fast enough goes. */
-  private dropScene(scene: SceneView, engine: ConsoleEngine): void {
-    if (scene.isFull) scene.unload();
-    else this.sceneSwitch?.giveUp();
-    const camera = this.mainStream();
-    if (camera !== null && this.main === SCENE) this.swapIn(camera);
-    note(engine.state, "warning", TOO_SLOW, Date.now());
-  }
-
-  /** The scene lives as long as the bridge whose robot it shows. */
-  private followEpoch(epoch: string | null): void {
-    if (epoch === null || epoch === this.epoch) return;
-    if (this.epoch !== null) this.scene?.renew();
-    this.epoch = epoch;
-  }
-
-  private createView(
-    name: string,
-    label: string,
-    canvas: HTMLCanvasElement | null,
-    content: HTMLElement,
-  ): View {
-    const caption = h("span", "view-label", {}, label);
-    const detail = h("span", "view-detail");
-    const veilWords = h("strong", "veil-words");
-    const about = h("span", "veil-about", {}, "This picture does not show the robot's present state");
-    const veil = h("div", "veil", {}, h("div", "veil-plate", {}, veilWords, about));
-    const swap = h("button", "view-swap", { type: "button", "aria-label": `Show ${label} large` });
-    swap.addEventListener("click", () => this.swapIn(name));
-    const bar = h("figcaption", "view-caption", {}, caption, detail);
-    const element = h("figure", "view", { "data-view": name }, content, veil, bar, swap);
-    setHidden(veil, true);
-    return { name, label, element, caption, detail, veil, veilWords, swap, canvas };
   }
 
   private addView(view: View): void {
@@ -201,8 +151,8 @@ export class ViewGrid {
 
   private swapIn(name: string): void {
     this.main = name;
-    if (name === SCENE) this.scene?.load();
-    else this.scene?.unload();
+    if (name === SCENE) this.scene?.full.open();
+    else this.scene?.full.close();
     this.arrange();
   }
 
@@ -227,7 +177,7 @@ export class ViewGrid {
 
   /** Gives the others the room that the large picture leaves. */
   private fit(): void {
-    this.shapes = this.shapesNow();
+    this.shapes = shapesOf(this.views);
     const style = getComputedStyle(this.element);
     const gap = parseFloat(style.columnGap);
     let large = SCENE_SHAPE;
@@ -241,12 +191,12 @@ export class ViewGrid {
     const gauges = [...this.gauges.children]
       .map((gauge) => gauge.clientHeight)
       .filter((height) => height > 0);
-    const card = this.movableCard();
-    const hasCard = this.card?.dataset.beside === "true"; // now: the room has its height already
+    const { cardPlace } = this;
+    const card = cardPlace.measure();
+    const beside = cardPlace.isBeside ? (card?.height ?? 0) : 0; // the room has its height already
     const plan = layoutViews({
       width: this.element.clientWidth - 2 * parseFloat(style.paddingLeft),
-      height:
-        this.element.clientHeight - 2 * parseFloat(style.paddingTop) - (hasCard ? (card?.height ?? 0) : 0),
+      height: this.element.clientHeight - 2 * parseFloat(style.paddingTop) - beside,
       gap,
       large,
       small,
@@ -254,31 +204,31 @@ export class ViewGrid {
       card,
     });
     this.element.style.setProperty("--columns", rowColumns(small.length, gauges.length > 0));
-    this.lay(plan, plan.run === "row" ? rowWidth(small, plan.size, gap) : 0);
+    setData(this.element, "run", plan.run);
+    setData(this.element, "tight", String(plan.tight));
+    this.element.style.setProperty("--size", `${plan.size}px`);
+    cardPlace.lay(plan.card, plan.size, plan.run === "row" ? rowWidth(small, plan.size, gap) : 0);
   }
+}
 
-  private lay({ run, size, tight, card }: ViewLayout, taken: number): void {
-    setData(this.element, "run", run);
-    setData(this.element, "tight", String(tight));
-    this.element.style.setProperty("--size", `${size}px`);
-    if (this.card === null) return;
-    setData(this.card, "beside", String(card));
-    this.card.style.setProperty("--size", `${size}px`);
-    this.card.style.setProperty("--taken", `${taken}px`);
-  }
-
-  /** null: this screen has a place of its own for the card. */
-  private movableCard(): MovableCard | null {
-    if (this.card === null) return null;
-    const style = getComputedStyle(this.card);
-    if (style.getPropertyValue("--moves") !== "1") return null;
-    if (this.card.dataset.beside !== "true") this.cardHeight = this.card.offsetHeight;
-    return { height: this.cardHeight, leastWidth: CARD_WIDTH, leastHeight: CARD_HEIGHT };
-  }
-
-  private shapesNow(): string {
-    return [...this.views.values()].map((view) => shapeOf(view).toFixed(3)).join(" ");
-  }
+function createView(
+  name: string,
+  label: string,
+  canvas: HTMLCanvasElement | null,
+  content: HTMLElement,
+  enlarge: () => void,
+): View {
+  const caption = h("span", "view-label", {}, label);
+  const detail = h("span", "view-detail");
+  const veilWords = h("strong", "veil-words");
+  const about = h("span", "veil-about", {}, "This picture does not show the robot's present state");
+  const veil = h("div", "veil", {}, h("div", "veil-plate", {}, veilWords, about));
+  const swap = h("button", "view-swap", { type: "button", "aria-label": `Show ${label} large` });
+  swap.addEventListener("click", enlarge);
+  const bar = h("figcaption", "view-caption", {}, caption, detail);
+  const element = h("figure", "view", { "data-view": name }, content, veil, bar, swap);
+  setHidden(veil, true);
+  return { name, label, element, caption, detail, veil, veilWords, swap, canvas };
 }
 
 /** Of a row: the last one takes the rest. A column of their own for gauges that are not there would leave a gap. */
@@ -294,6 +244,31 @@ function rowWidth(small: readonly number[], height: number, gap: number): number
 
 function shapeOf({ canvas }: View): number {
   return canvas === null || canvas.height === 0 ? SCENE_SHAPE : canvas.width / canvas.height;
+}
+
+function shapesOf(views: ReadonlyMap<string, View>): string {
+  return [...views.values()].map((view) => shapeOf(view).toFixed(3)).join(" ");
+}
+
+/** The scene is judged like a picture: by how far its event is from the feedback. */
+function showSceneVeil(
+  scene: SceneView,
+  view: View,
+  engine: ConsoleEngine,
+  isLarge: boolean,
+  now: number,
+): void {
+  const { event, gap } = scene.statistics();
+  const staleness = scene.staleness(feedbackAge(engine.measuredMs, now));
+  const words = event === null && staleness === null ? null : (unreachableWords(engine) ?? staleness);
+  setHidden(view.veil, words === null);
+  view.element.classList.toggle("is-stale", words !== null);
+  if (words !== null) setText(view.veilWords, words);
+  const { video } = engine.state.settings.tolerance;
+  const unknown = scene.lacksJoints ? " · not all joints measured" : "";
+  setText(view.detail, event === null || gap === null ? "" : `s ${event} · gap ${gap} of ${video}${unknown}`);
+  setData(view.element, "gap", words === null ? "good" : "bad");
+  setHidden(view.swap, isLarge && scene.full.isOpen);
 }
 
 function showVeil(engine: ConsoleEngine, view: View, now: number): void {

@@ -11,8 +11,8 @@ from tempfile import TemporaryDirectory
 from typing import Any, Literal
 
 from lockstep.bench.browsers.chromium import PAD, open_page, running_chromium
-from lockstep.bench.browsers.console_page import RB, START
 from lockstep.bench.browsers.firefox import running_firefox
+from lockstep.bench.browsers.pad import RB, START
 from lockstep.bench.browsers.sound_card import running_sound_card
 from lockstep.bench.experiment.browser import pad_axes, robot_description
 from lockstep.bench.experiment.choices import Choices

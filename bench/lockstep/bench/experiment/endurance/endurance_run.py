@@ -14,6 +14,7 @@ from lockstep.bench.experiment.choices import Choices, media_of
 from lockstep.bench.experiment.endurance.endurance import Endurance
 from lockstep.bench.experiment.operator_script import OperatorScript
 from lockstep.bench.experiment.stage import Stage, running_stage
+from lockstep.bench.harness.background import background
 from lockstep.bench.harness.driving import applied_goals, drive_on
 from lockstep.bench.harness.stack import Metrics
 from lockstep.client import CommandRefused, Console, ConsoleError, NoSuchStream
@@ -62,18 +63,8 @@ async def run_endurance(choices: Choices, profile: Profile, client: EnduranceCli
             return time.monotonic() - began
 
         say(f"endurance on {profile.name}, {client}: driving for {choices.seconds:g} s")
-        tasks = [
-            asyncio.create_task(driven.run(endurance, clock)),
-            asyncio.create_task(_count(stage, endurance, clock, say)),
-        ]
-        try:
-            done, _ = await asyncio.wait(tasks, timeout=choices.seconds, return_when=asyncio.FIRST_COMPLETED)
-            for task in done:
-                task.result()
-        finally:
-            for task in tasks:
-                task.cancel()
-            await asyncio.gather(*tasks, return_exceptions=True)
+        async with background(driven.run(endurance, clock), _count(stage, endurance, clock, say)):
+            await asyncio.sleep(choices.seconds)
     return {
         "experiment": "endurance",
         "profile": profile.name,

@@ -11,6 +11,7 @@ from typing import Any, Protocol
 from lockstep.bench.experiment.choices import Choices, media_of, round_trip_of
 from lockstep.bench.experiment.judge.outage_judge import Cut, Finding, judge_outage
 from lockstep.bench.experiment.stage import Stage, running_stage
+from lockstep.bench.harness.background import background
 from lockstep.bench.harness.driving import applied_goals, axis_values, drive_on
 from lockstep.bench.harness.event_log import records
 from lockstep.client import CommandRefused, Console, ConsoleError
@@ -137,13 +138,8 @@ async def _stick(stage: Stage, choices: Choices) -> AsyncIterator[tuple[Stick, R
         return
     stick = HeadlessStick(stage.link, choices.seconds)
     description = await stick.describe()
-    task = asyncio.get_running_loop().create_task(stick.run())
-    try:
+    async with background(stick.run()):
         yield stick, description
-    finally:
-        task.cancel()
-        with contextlib.suppress(asyncio.CancelledError):
-            await task
 
 
 class HeadlessStick:

@@ -1,4 +1,4 @@
-"""Requests of a session against a console that answers as it is told to."""
+"""Resets against a console that answers as it is told to."""
 
 import asyncio
 from collections.abc import Callable
@@ -7,10 +7,11 @@ from typing import Any
 
 import pytest
 
-from lockstep.client import session_requests
 from lockstep.client.errors import CommandRefused
+from lockstep.client.requests import stop_requests
+from lockstep.client.requests.exchange import Exchange
+from lockstep.client.requests.stop_requests import StopRequests
 from lockstep.client.session import Session
-from lockstep.client.session_requests import SessionRequests
 from lockstep.protocol.messages import Refusal, Reset, StopState
 
 STALE = Refusal(event=0, reason="stale_reset", current=7, detail="a stop is on its way to the robot")
@@ -36,19 +37,19 @@ class Console:
 
 @pytest.fixture
 def session(monkeypatch: pytest.MonkeyPatch) -> Session:
-    monkeypatch.setattr(session_requests, "RESET_AGAIN", 0.0)
+    monkeypatch.setattr(stop_requests, "RESET_AGAIN", 0.0)
     session = Session()
     session.stop_shown(StopState(stopped=True, number=3))
     return session
 
 
-def _requests(session: Session, console: Console) -> SessionRequests:
+def _requests(session: Session, console: Console) -> StopRequests:
     async def until(condition: Callable[[], bool]) -> None:
         assert condition()
 
     driving: Any = SimpleNamespace()
     transport: Any = console
-    return SessionRequests(transport, session, driving, until)
+    return StopRequests(transport, session, driving, Exchange(transport, session, until), until)
 
 
 async def test_a_reset_right_after_a_stop_waits_for_the_robots_answer_to_the_press(session: Session) -> None:
@@ -82,7 +83,7 @@ async def test_a_stop_that_comes_while_a_reset_waits_is_not_released_by_it(sessi
 async def test_a_press_that_the_robot_never_answers_ends_the_reset(
     session: Session, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(session_requests, "ANSWER_SECONDS", 0.05)
+    monkeypatch.setattr(stop_requests, "ANSWER_SECONDS", 0.05)
     console = Console(session, [STALE] * 100_000)
     async with asyncio.timeout(10):
         with pytest.raises(CommandRefused, match="stale_reset"):

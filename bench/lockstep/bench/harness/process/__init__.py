@@ -1,0 +1,1 @@
+"""A started process: its output and its usage."""

@@ -1,0 +1,1 @@
+"""The requests of a connection that the console or the robot answers."""
