@@ -250,7 +250,7 @@ def test_an_opening_that_is_wrong_is_counted_and_its_stream_reset(stream: int, p
     victim = Victim()
     victim.say(Data(victim.tsn, WHOLE | UNORDERED, stream, 0, 50, payload))
     assert victim.end.counts[count] == 1
-    assert victim.end.association._resets._request is not None
+    assert victim.end.association._transfer.resets._request is not None
     assert victim.end.association.state is State.ESTABLISHED
 
 
