@@ -210,7 +210,7 @@ class Peer:
         self._now = now
         self._tagged = next(iter(answer.accepted), None)
         media = self._local.negotiated(remote, answer, ours)
-        self._media.negotiated(Streams(media, self._local.identity, PathShare(self.settings.epoch), self._random))
+        self._media.streams = Streams(media, self._local.identity, PathShare(self.settings.epoch), self._random)
         we_answer = remote is not answer
         active = (answer.transport.setup == "active") is we_answer
         self._dtls = DtlsConnection(

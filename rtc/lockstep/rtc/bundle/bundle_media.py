@@ -16,25 +16,24 @@ __all__ = ["BundleMedia"]
 
 
 class BundleMedia:
-    """Begin with `negotiated`, then `connected`. `streams` is None until then.
+    """Set `streams` when they are negotiated, then call `connected`. After each call, drain `datagrams_to_send` and
+    `events`, and ask for `timer`.
 
-    After each call, drain `datagrams_to_send` and `events`, and ask for `timer`.
+    `streams`: None until both descriptions are known. `due`: the timer as far as it is known without asking the
+    streams.
     """
 
     def __init__(self, counts: Counter[str]) -> None:
         """`counts`: those of the peer."""
         self.streams: Streams | None = None
+        self.due: float | None = None
         self._counts = counts
         self._protect: SrtpSender | None = None
         self._unprotect: SrtpReceiver | None = None
         self._plain = False  # packets are handed out decrypted and unread
         # True if streams may have news: most datagrams are about something else, and each stream is a chain of stages.
         self._unsent = self._untold = self._untimed = False
-        self._due: float | None = None  # the streams' timer, as far as it is known
         self._events: list[PeerEvent] = []
-
-    def negotiated(self, streams: Streams) -> None:
-        self.streams = streams
 
     def connected(self, keys: SrtpKeys) -> None:
         self._protect, self._unprotect = SrtpSender(keys), SrtpReceiver(keys)
@@ -92,12 +91,12 @@ class BundleMedia:
 
     def datagrams_of(self, stream: OutgoingStream) -> list[bytes]:
         """Return what is due of one stream, after a frame was sent on it: nothing else has to be drained."""
-        self._due = earliest(self._due, stream.timer())
+        self.due = earliest(self.due, stream.timer())
         if self._protect is None or self.streams is None:
             return []
-        sent = list(self._protected(self._protect.protect, stream.packets_to_send()))
+        sent = list(_protected(self._protect.protect, stream.packets_to_send(), self._counts))
         if controls := stream.controls_to_send():
-            sent += self._protected(self._protect.protect_rtcp, self.streams.compounds(controls))
+            sent += _protected(self._protect.protect_rtcp, self.streams.compounds(controls), self._counts)
         return sent
 
     def protected_rtcp(self, packet: bytes) -> bytes:
@@ -110,8 +109,8 @@ class BundleMedia:
         if self.streams is None or self._protect is None or not self._unsent:
             return []
         self._unsent = False
-        sent = list(self._protected(self._protect.protect_rtcp, self.streams.rtcp_to_send()))
-        sent += self._protected(self._protect.protect, self.streams.rtp_to_send())
+        sent = list(_protected(self._protect.protect_rtcp, self.streams.rtcp_to_send(), self._counts))
+        sent += _protected(self._protect.protect, self.streams.rtp_to_send(), self._counts)
         return sent
 
     def events(self) -> list[PeerEvent]:
@@ -122,24 +121,12 @@ class BundleMedia:
             events += [MediaEvent(mid, event) for mid, event in self.streams.events()]
         return events
 
-    def _protected(self, protect: Callable[[bytes], bytes], packets: Iterable[bytes]) -> Iterator[bytes]:
-        for packet in packets:
-            try:
-                yield protect(packet)
-            except SrtpPacketTooLong:  # the application's header extensions have hundreds of bytes
-                self._counts["packet_too_long"] += 1
-
     # Time and the end
-
-    @property
-    def due(self) -> float | None:
-        """The timer as far as it is known without asking the streams."""
-        return self._due
 
     def timer(self) -> float | None:
         if self._untimed and self.streams is not None:
-            self._due, self._untimed = self.streams.timer(), False
-        return self._due
+            self.due, self._untimed = self.streams.timer(), False
+        return self.due
 
     def close(self, now: float) -> None:
         """Say goodbye to the receivers of its streams."""
@@ -156,3 +143,11 @@ class BundleMedia:
         if self._unprotect is not None:
             dropped += Counter({f"srtp_{name}": count for name, count in self._unprotect.counts.items()})
         return dropped
+
+
+def _protected(protect: Callable[[bytes], bytes], packets: Iterable[bytes], counts: Counter[str]) -> Iterator[bytes]:
+    for packet in packets:
+        try:
+            yield protect(packet)
+        except SrtpPacketTooLong:  # the application's header extensions have hundreds of bytes
+            counts["packet_too_long"] += 1
