@@ -289,8 +289,8 @@ class Peer:
         self._need_channels().open_negotiated(channel, label, protocol=protocol, reliability=reliability)
 
     def has_waiting(self, channel: int) -> bool:
-        """Like `DataChannels.has_waiting`; False without channels."""
-        return self.channels is not None and self.channels.has_waiting(channel)
+        """Like `Association.has_waiting`; False without channels."""
+        return self.channels is not None and self.channels.association.has_waiting(channel)
 
     def tell_when_empty(self, channel: int) -> None:
         """Like `DataChannels.tell_when_empty`; no effect without channels."""
@@ -534,7 +534,7 @@ class Peer:
             self._media.connected(event.srtp)
         self._events.append(Connected(event.srtp.profile.name if event.srtp is not None else None))
         if self.channels is not None:
-            self.channels.start(now)
+            self.channels.association.start(now)
 
     def _end(self, reason: str, detail: str = "") -> None:
         if self._ended:

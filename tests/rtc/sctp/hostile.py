@@ -35,7 +35,7 @@ class Victim:
         self.now = 1.0
         self.events: list[ChannelEvent] = []
         peer = DataChannels(settings, seeded(2), client=True)
-        self.end.start(0.0)
+        self.end.association.start(0.0)
         if established:
             world = World(self.end, peer)
             peer.open("theirs", 0.0)
