@@ -114,7 +114,7 @@ async def test_a_channel_closes_at_both_ends(endpoint: Endpoint) -> None:
 
 
 async def test_a_port_that_is_taken_is_an_error_and_leaves_nothing_open(endpoint: Endpoint) -> None:
-    [address] = endpoint._sockets
+    [address] = endpoint.sockets.by_address
     with pytest.raises(OSError, match="in use"):
         Endpoint(["127.0.0.2", HOST], address[1])
     async with Endpoint(["127.0.0.2"], address[1]):

@@ -29,6 +29,9 @@ class Directory:
         """Return the agent that data on this path are for."""
         return self.claims.get(path) or self.hints.get(path)
 
+    def has_owner(self, path: Path) -> bool:
+        return self.owner(path) is not None
+
     def hint(self, path: Path, agent: "Agent") -> None:
         if path not in self.claims:
             self.hints[path] = agent

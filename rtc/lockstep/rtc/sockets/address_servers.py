@@ -31,9 +31,10 @@ class AddressServers:
         settings: EndpointSettings,
         counts: Counter[str],
         send: Callable[[Sequence[Datagram]], None],
-        on_data: Callable[[bytes, Path], None],
+        on_data: Callable[[Iterable[tuple[bytes, Path]]], None],
     ) -> None:
-        """`send`: sends from the endpoint's sockets; `on_data`: takes a datagram that came through a relay."""
+        """`send`: sends from the endpoint's sockets; `on_data`: takes datagrams that came through a relay, each with its
+        path."""
         self.told: list[LocalCandidate] = []
         self.probes: dict[Path, MappedAddress] = {}
         self._settings = settings
@@ -133,6 +134,14 @@ class AddressServers:
     def relay(self, address: Address) -> RelayLink | None:
         """Return the link to the relay that gave this address."""
         return next((each for each in self._relays if each.relayed == address), None)
+
+    def send(self, datagram: Datagram) -> None:
+        """Send from a relayed address; a datagram from another one is counted."""
+        link = self.relay(datagram.local)
+        if link is None:
+            self._counts["no_socket"] += 1
+        else:
+            link.send(datagram.data, datagram.remote)
 
     def give_back_unused(self, in_use: set[Address]) -> None:
         for link in [each for each in self._relays if each.relayed not in in_use]:
