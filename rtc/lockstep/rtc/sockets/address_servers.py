@@ -33,8 +33,8 @@ class AddressServers:
         send: Callable[[Sequence[Datagram]], None],
         on_data: Callable[[Iterable[tuple[bytes, Path]]], None],
     ) -> None:
-        """`send`: sends from the endpoint's sockets; `on_data`: takes datagrams that came through a relay, each with its
-        path."""
+        """`send`: sends from the endpoint's sockets; `on_data`: takes datagrams that came through a relay, with their
+        paths."""
         self.told: list[LocalCandidate] = []
         self.probes: dict[Path, MappedAddress] = {}
         self._settings = settings
