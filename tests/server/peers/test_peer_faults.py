@@ -93,7 +93,7 @@ def _connection(peer: Peer) -> Any:
 
 def _stream(peer: Peer) -> Any:
     """The first that it gets, with all stages on its way out."""
-    return _connection(peer).peer.streams.outgoing[_delivery(peer).info.mid]
+    return _connection(peer).peer.media.streams.outgoing[_delivery(peer).info.mid]
 
 
 def _answer(rig: Rig, peer: Peer, patch: pytest.MonkeyPatch) -> None:

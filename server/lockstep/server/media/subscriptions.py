@@ -155,7 +155,7 @@ class Subscriptions:
         quality = self.quality
         comes_first = quality.drives or quality.operator or quality.relays
         self._connection.urgent = quality.drives or quality.operator
-        self._connection.peer.report_every(REPORTS_OFTEN if comes_first else self._report_seconds)
+        self._connection.peer.media.streams.report_every(REPORTS_OFTEN if comes_first else self._report_seconds)
 
     def on_quality(self, tell: Callable[[Quality], None]) -> None:
         """Call `tell` whenever the quality of this peer's pictures changes."""

@@ -168,12 +168,12 @@ class Publisher:
         """Take a round trip that was measured on its path."""
         if self._incoming is not None and self._connection is not None:
             self._incoming.path.observe(seconds, time.monotonic())
-            self._connection.peer.note_round_trip(seconds)
+            self._connection.peer.share.round_trip.measure(seconds)
 
     def _all_foreign(self) -> int:
-        streams = None if self._connection is None else self._connection.peer.streams
-        if streams is None:
+        if self._connection is None:
             return self._foreign
+        streams = self._connection.peer.media.streams
         return self._foreign + streams.counts["rtp_unknown"] + streams.incoming[self._mid].ignored
 
     def _all_flooded(self) -> int:
