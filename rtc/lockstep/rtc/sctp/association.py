@@ -175,10 +175,8 @@ class Association:
     def shutdown(self, now: float) -> None:
         """End when everything has arrived (RFC 9260 9.2). Messages that arrive meanwhile are still received."""
         self.now = now
-        if self._lifecycle.closed is None:
-            self._shutdown.begin(now)
-            if self._lifecycle.closed is not None:
-                self._transfer.end()
+        if self._lifecycle.closed is None and self._shutdown.begin(now):
+            self._transfer.end()
 
     def abort(self, now: float, reason: str = "aborted") -> None:
         """End at once, and tell the peer (RFC 9260 9.1). `reason` comes back in `Closed`."""

@@ -21,14 +21,16 @@ class GracefulShutdown:
         self._round_trip = round_trip
         self._repeats = 0
 
-    def begin(self, now: float) -> None:
-        """Begin it at this end; an association that is not up yet ends at once."""
+    def begin(self, now: float) -> bool:
+        """Begin it at this end. Return True if the association has ended, because it was not up yet."""
         state = self._lifecycle.state
         if state is State.ESTABLISHED:
             self._lifecycle.become(State.SHUTDOWN_PENDING)
             self.go_on(now)
         elif state in (State.CLOSED, State.COOKIE_WAIT, State.COOKIE_ECHOED):
             self._lifecycle.end("closed")
+            return True
+        return False
 
     def go_on(self, now: float) -> None:
         """Send SHUTDOWN, or the answer to it, when everything has arrived."""
