@@ -105,7 +105,7 @@ def _queueing(rig: Rig, peer: Peer, patch: pytest.MonkeyPatch) -> None:
 
 
 def _packing(rig: Rig, peer: Peer, patch: pytest.MonkeyPatch) -> None:
-    patch.setattr(_connection(peer).peer, "frame_to_send", _raise)
+    patch.setattr(_connection(peer).peer.media, "frame_to_send", _raise)
 
 
 def _stage(rig: Rig, peer: Peer, patch: pytest.MonkeyPatch) -> None:
