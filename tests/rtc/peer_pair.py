@@ -1,9 +1,10 @@
 """Two peers with a network between them that has a clock of its own, a delay and losses that repeat."""
 
 import heapq
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Sequence
 from itertools import count
 from random import Random
+from typing import Any
 
 from lockstep.rtc.addresses import Datagram, Path
 from lockstep.rtc.certificate import Certificate
@@ -70,10 +71,26 @@ class PeerPair:
     def _collect(self) -> None:
         for side, peer in enumerate(self.peers):
             self.events[side].extend(peer.events())
-            for datagram in peer.datagrams_to_send():
-                self.sent[side].append(datagram.data)
-                if not self.lost(side, datagram.data):
-                    heapq.heappush(self._flying, (self.now + DELAY, next(self._order), side, datagram))
+            self._carry(side, peer.datagrams_to_send())
+
+    def _carry(self, side: int, datagrams: Iterable[Datagram]) -> None:
+        for datagram in datagrams:
+            self.sent[side].append(datagram.data)
+            if not self.lost(side, datagram.data):
+                heapq.heappush(self._flying, (self.now + DELAY, next(self._order), side, datagram))
+
+    def send_frame(self, side: int, mid: str, payloads: Sequence[bytes], media_time: int, **options: Any) -> None:
+        """`options`: as in `BundleMedia.frame_to_send`."""
+        peer = self.peers[side]
+        sent = peer.media.frame_to_send(mid, payloads, media_time, self.now, **options)
+        if peer.ice.path is not None:
+            self._carry(side, [Datagram(data, peer.ice.path) for data in sent])
+
+    def open_channel(self, side: int, label: str) -> int:
+        return self.peers[side].need_channels(self.now).open(label, self.now)
+
+    def send(self, side: int, channel: int, data: str | bytes) -> None:
+        self.peers[side].need_channels(self.now).send(channel, data, self.now)
 
     def of(self, side: int, kind: type) -> list[PeerEvent]:
         return [each for each in self.events[side] if isinstance(each, kind)]

@@ -114,7 +114,7 @@ async def test_a_channel_closes_at_both_ends(endpoint: Endpoint) -> None:
 
 
 async def test_a_port_that_is_taken_is_an_error_and_leaves_nothing_open(endpoint: Endpoint) -> None:
-    [address] = endpoint._sockets
+    [address] = endpoint.sockets.by_address
     with pytest.raises(OSError, match="in use"):
         Endpoint(["127.0.0.2", HOST], address[1])
     async with Endpoint(["127.0.0.2"], address[1]):
@@ -264,7 +264,8 @@ async def test_an_urgent_message_is_heard_before_the_next_datagram_is_read_and_n
         assert path is not None
 
         def datagram(text: str) -> bytes:
-            sender.peer.send(channel, text, asyncio.get_running_loop().time())
+            now = asyncio.get_running_loop().time()
+            sender.peer.need_channels(now).send(channel, text, now)
             [found] = sender.peer.datagrams_to_send()
             return found.data
 
@@ -294,7 +295,7 @@ async def test_plain_packets_come_by_a_short_way_and_everything_else_by_its_own(
     async with Endpoint([HOST]) as other:
         watcher, sender = endpoint.connect(controlling=True), other.connect(controlling=False)
         assert not watcher.peer.receive_plain(b"\x80\x60" + bytes(20)), "not asked for"
-        watcher.peer.take_plain_packets()
+        watcher.peer.media.plain = True
         assert not watcher.peer.receive_plain(b"\x80\x60" + bytes(20)), "no keys yet"
         offer = watcher.offer([OfferedMedia("camera", "video", screen)])
         watcher.accept(sender.answer(offer, {"camera": camera}))

@@ -153,7 +153,7 @@ class DtlsConnection:
         self.counts: Counter[str] = Counter()
         self._settings = settings or DtlsSettings()
         self._fingerprints = tuple(fingerprints)
-        self._state = DtlsState.NEW
+        self.state = DtlsState.NEW
         self._ssl = SSL.Connection(context)
         self._ssl.set_ciphertext_mtu(self._settings.mtu)
         self._handshake_bytes = 0
@@ -163,17 +163,13 @@ class DtlsConnection:
         self._is_unread = False  # True: the last datagram may have further records
         self._room = MAX_PLAINTEXT  # bytes of the longest record that may wait: no more than its datagram
 
-    @property
-    def state(self) -> DtlsState:
-        return self._state
-
     # input
 
     def start(self, now: float) -> None:
         """Begin the handshake: a client says hello, a server listens."""
-        if self._state is not DtlsState.NEW:
+        if self.state is not DtlsState.NEW:
             return
-        self._state = DtlsState.CONNECTING
+        self.state = DtlsState.CONNECTING
         if self.role == "client":
             self._ssl.set_connect_state()
         else:
@@ -193,19 +189,23 @@ class DtlsConnection:
         """
         if self._is_unread:
             self.read_on(now)
-        if self._state is DtlsState.NEW:
+        if self.state is DtlsState.NEW:
             self.counts["not_started"] += 1
-        elif self._state in (DtlsState.CLOSED, DtlsState.FAILED):
+        elif self.state in (DtlsState.CLOSED, DtlsState.FAILED):
             self.counts["ended"] += 1
         elif not data or data[0] not in FIRST_BYTES:
             self.counts["not_dtls"] += 1
-        elif self._state is DtlsState.CONNECTING and self._is_too_much(len(data)):
-            self._fail("too_much_handshake", f"more than {self._settings.max_handshake} bytes before connected")
-        else:
-            if self._state is DtlsState.CONNECTED:
-                self._room = max(READ_AT_LEAST, len(data))
+        elif self.state is DtlsState.CONNECTED:
+            self._room = max(READ_AT_LEAST, len(data))
             self._ssl.bio_write(data)
-            self._advance(now, only_first=self._state is DtlsState.CONNECTED)
+            self._advance(now, only_first=True)
+        else:
+            self._handshake_bytes += len(data)
+            if self._handshake_bytes > self._settings.max_handshake:
+                self._fail("too_much_handshake", f"more than {self._settings.max_handshake} bytes before connected")
+                return
+            self._ssl.bio_write(data)
+            self._advance(now)
 
     def read_on(self, now: float) -> None:
         """Read what `receive_first` has left. `events` and `datagrams_to_send` may have more then."""
@@ -215,7 +215,7 @@ class DtlsConnection:
 
     def handle_timer(self, now: float) -> None:
         """Repeat the unanswered flight (RFC 6347 4.2.4), if OpenSSL finds that it is due."""
-        if self._state not in (DtlsState.CONNECTING, DtlsState.CONNECTED):
+        if self.state not in (DtlsState.CONNECTING, DtlsState.CONNECTED):
             return
         try:
             self._ssl.DTLSv1_handle_timeout()
@@ -230,8 +230,8 @@ class DtlsConnection:
             DtlsNotConnected: before DtlsConnected, or after the end.
             DtlsMessageTooLong: `data` does not fit a record.
         """
-        if self._state is not DtlsState.CONNECTED:
-            raise DtlsNotConnected(f"DTLS is {self._state.value}")
+        if self.state is not DtlsState.CONNECTED:
+            raise DtlsNotConnected(f"DTLS is {self.state.value}")
         if len(data) > MAX_PLAINTEXT:
             raise DtlsMessageTooLong(len(data))
         if not data:
@@ -249,11 +249,11 @@ class DtlsConnection:
 
     def close(self, now: float) -> None:
         """Send close_notify (RFC 5246 7.2.1). Idempotent; there is no event."""
-        if self._state in (DtlsState.CONNECTING, DtlsState.CONNECTED):
-            self._shut_down()
+        if self.state in (DtlsState.CONNECTING, DtlsState.CONNECTED):
+            _shut_down(self._ssl)
             self._written(now)
-        if self._state is not DtlsState.FAILED:
-            self._state = DtlsState.CLOSED
+        if self.state is not DtlsState.FAILED:
+            self.state = DtlsState.CLOSED
         self._timer = None
 
     # output
@@ -277,20 +277,21 @@ class DtlsConnection:
 
     # OpenSSL
 
-    def _is_too_much(self, length: int) -> bool:
-        self._handshake_bytes += length
-        return self._handshake_bytes > self._settings.max_handshake
-
     def _advance(self, now: float, *, only_first: bool = False) -> None:
         """Let OpenSSL read all records that it has, or the first one with data.
 
         It alone knows how many: it skips only the header of a malformed record, and finds others in its content.
         """
         try:
-            if self._state is DtlsState.CONNECTING:
+            if self.state is DtlsState.CONNECTING:
                 self._ssl.do_handshake()
-                self._finish_handshake()
-            while self._state is DtlsState.CONNECTED:
+                if _is_expected_peer(self._ssl, self._fingerprints):
+                    self.state = DtlsState.CONNECTED
+                    self._events.append(DtlsConnected(_srtp_keys(self._ssl, self.role)))
+                else:
+                    _shut_down(self._ssl)
+                    self._fail("fingerprint", "the peer's certificate is not the one of its session description")
+            while self.state is DtlsState.CONNECTED:
                 self._events.append(DtlsData(self._ssl.recv(self._room)))
                 if only_first:
                     self._is_unread = True
@@ -298,53 +299,52 @@ class DtlsConnection:
         except SSL.WantReadError:
             pass  # all was read
         except SSL.ZeroReturnError:
-            self._shut_down()  # RFC 5246 7.2.1: answered with the same
-            self._state = DtlsState.CLOSED
+            _shut_down(self._ssl)  # RFC 5246 7.2.1: answered with the same
+            self.state = DtlsState.CLOSED
             self._events.append(DtlsClosed())
         except SSL.Error as error:  # a fatal alert of the peer, or OpenSSL sent one; invalid records are dropped in it
             self._fail("protocol", _words(error))
         self._written(now)
 
-    def _finish_handshake(self) -> None:
-        certificate = self._ssl.get_peer_certificate(as_cryptography=True)
-        if certificate is None or not is_expected(certificate, self._fingerprints):
-            self._shut_down()
-            self._fail("fingerprint", "the peer's certificate is not the one of its session description")
-            return
-        self._state = DtlsState.CONNECTED
-        self._events.append(DtlsConnected(self._srtp_keys()))
-
-    def _srtp_keys(self) -> SrtpKeys | None:
-        selected = self._ssl.get_selected_srtp_profile().decode()
-        profile = next((each for each in available_profiles() if each.name == selected), None)
-        if profile is None:
-            return None
-        material = self._ssl.export_keying_material(SRTP_LABEL, 2 * (profile.key_length + profile.salt_length))
-        return SrtpKeys.split(profile, material, self.role == "client")
-
-    def _shut_down(self) -> None:
-        with suppress(SSL.Error):  # in the middle of a handshake there is nothing to close
-            self._ssl.shutdown()
-
     def _fail(self, reason: DtlsFailure, detail: str) -> None:
-        self._state = DtlsState.FAILED
+        self.state = DtlsState.FAILED
         self._events.append(DtlsFailed(reason, detail))
 
     def _written(self, now: float) -> None:
         """Take what OpenSSL wrote, and ask for its timer."""
-        self._out += _datagrams(self._take_written(), self._settings.mtu)
+        self._out += _datagrams(_take_written(self._ssl), self._settings.mtu)
         left = None
-        if self._state in (DtlsState.CONNECTING, DtlsState.CONNECTED):
+        if self.state in (DtlsState.CONNECTING, DtlsState.CONNECTED):
             left = self._ssl.DTLSv1_get_timeout()
         self._timer = None if left is None else now + left
 
-    def _take_written(self) -> bytes:
-        written = b""
-        try:
-            while True:
-                written += self._ssl.bio_read(WRITTEN_AT_ONCE)
-        except SSL.WantReadError:
-            return written
+
+def _is_expected_peer(ssl: SSL.Connection, fingerprints: Sequence[Fingerprint]) -> bool:
+    certificate = ssl.get_peer_certificate(as_cryptography=True)
+    return certificate is not None and is_expected(certificate, fingerprints)
+
+
+def _srtp_keys(ssl: SSL.Connection, role: DtlsRole) -> SrtpKeys | None:
+    selected = ssl.get_selected_srtp_profile().decode()
+    profile = next((each for each in available_profiles() if each.name == selected), None)
+    if profile is None:
+        return None
+    material = ssl.export_keying_material(SRTP_LABEL, 2 * (profile.key_length + profile.salt_length))
+    return SrtpKeys.split(profile, material, role == "client")
+
+
+def _shut_down(ssl: SSL.Connection) -> None:
+    with suppress(SSL.Error):  # in the middle of a handshake there is nothing to close
+        ssl.shutdown()
+
+
+def _take_written(ssl: SSL.Connection) -> bytes:
+    written = b""
+    try:
+        while True:
+            written += ssl.bio_read(WRITTEN_AT_ONCE)
+    except SSL.WantReadError:
+        return written
 
 
 def records(data: bytes) -> Iterator[bytes]:

@@ -16,6 +16,7 @@ import time
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
+from functools import partial
 from types import TracebackType
 from typing import Self
 
@@ -31,14 +32,12 @@ from lockstep.rtc.sockets.address_servers import AddressServers
 from lockstep.rtc.sockets.connection import Connection, Turns
 from lockstep.rtc.sockets.endpoint_settings import EndpointSettings
 from lockstep.rtc.sockets.event_delivery import Listener
+from lockstep.rtc.sockets.port_sockets import PortSockets
 from lockstep.rtc.sockets.tcp_port import TcpPort
 from lockstep.rtc.sockets.udp_socket import UdpSocket
 from lockstep.rtc.turn.servers import IceServer
 
 __all__ = ["Connection", "Endpoint", "EndpointSettings", "Listener", "TooManyPeers", "Turns"]
-
-UNSENT = 64 * 1024  # bytes on a TCP path; above that pictures should wait, where newer ones replace them
-PORT_TRIES = 8  # a free port of one address may be taken at another
 
 
 class TooManyPeers(RuntimeError):
@@ -46,7 +45,10 @@ class TooManyPeers(RuntimeError):
 
 
 class Endpoint:
-    """Many peers on one UDP port. `counts` has the datagrams that were dropped before they reached a peer."""
+    """Many peers on one UDP port. `counts` has the datagrams that were dropped before they reached a peer.
+
+    Iterate `sockets` for the UDP sockets: their `fileno` tells an application when something has come.
+    """
 
     def __init__(
         self,
@@ -77,39 +79,14 @@ class Endpoint:
         self.counts = self.port.counts
         self._context = dtls_context(self.certificate)
         self._loop = asyncio.get_running_loop()
-        self._sockets: dict[Address, UdpSocket] = {}
-        self._tcp: TcpPort | None = None
-        self._flush_is_due = False
-        self._full = set[UdpSocket]()  # sockets for which the loop watches whether the kernel has room again
         self._dropped_before: Counter[str] = Counter()  # of connections that have ended
         self._connections: dict[Agent, Connection] = {}
-        self._hosts = list(hosts)
-        self._number = port
         self._advertised = tuple(advertised)
-        self._servers = AddressServers(self.settings, self.counts, self._send_probes, self._relayed)
-        if tcp:
-            self._tcp = TcpPort(self._receive_stream, self._stream_closed, self._is_used, self.settings.tcp)
-        for left in reversed(range(PORT_TRIES)):
-            try:
-                self._bind_all()
-                break
-            except OSError:
-                self.close()
-                if port or not left:
-                    raise
-                self._number = 0
-
-    def _bind_all(self) -> None:
-        for host in self._hosts:
-            self._bind(host)
-
-    def _bind(self, host: str) -> None:
-        found = UdpSocket.bind(host, self._number)
-        self._sockets[found.address] = found
-        self._number = found.address[1]
-        self._loop.add_reader(found.fileno(), self._readable, found)
-        if self._tcp is not None:
-            self._tcp.bind(host, self._number)
+        self._servers = AddressServers(self.settings, self.counts, partial(self.send, urgent=False), self._receive)
+        is_used = self.port.directory.has_owner
+        tcp_port = TcpPort(self._receive, self._stream_closed, is_used, self.settings.tcp) if tcp else None
+        self.sockets = PortSockets(self._receive, tcp_port)
+        self.sockets.bind_all(hosts, port)
 
     @property
     def connections(self) -> int:
@@ -127,30 +104,18 @@ class Endpoint:
     # Addresses for peers
 
     @property
-    def sockets(self) -> list[UdpSocket]:
-        """The UDP sockets, for an application that wants to know when something has come, by `fileno`."""
-        return list(self._sockets.values())
-
-    @property
     def candidates(self) -> list[LocalCandidate]:
         """The candidates of the local addresses, and those that servers reported."""
-        tcp = self._number if self._tcp is not None else None
-        return [*gather(self._hosts, self._number, tcp, self._advertised), *self._servers.told]
+        sockets = self.sockets
+        tcp = sockets.number if sockets.tcp is not None else None
+        return [*gather(sockets.hosts, sockets.number, tcp, self._advertised), *self._servers.told]
 
     def use_hosts(self, hosts: Sequence[str]) -> None:
         """Use these local addresses after a change of the network. Those that cannot be bound are left out.
 
         A socket of an address that is gone stays, for it costs nothing and the address may come back.
         """
-        known = {address[0] for address in self._sockets}
-        for host in hosts:
-            if host not in known:
-                try:
-                    self._bind(host)
-                except OSError:
-                    self.counts["host_not_bound"] += 1
-        bound = {address[0] for address in self._sockets}
-        self._hosts = [host for host in hosts if host in bound]
+        self.sockets.use_hosts(hosts, self.counts)
 
     async def ask(self, servers: Sequence[IceServer]) -> list[Exception]:
         """Ask STUN servers for the mapped address, and TURN servers for relayed ones; `candidates` has the answers.
@@ -158,16 +123,14 @@ class Endpoint:
         Earlier relayed addresses that carry no data are given back. Return the errors of servers without an answer:
         `OSError`, of which `TurnRefused` has the server's reason, and anything else for a fault of this endpoint.
         """
-        self._servers.give_back_unused(self._local_in_use())
-        return await self._servers.ask(servers, [base for base in self._sockets if base[0] in self._hosts])
-
-    def _local_in_use(self) -> set[Address]:
         in_use = set[Address]()
         for each in self._connections.values():
             path = each.peer.ice.path
             # A connection that looks for its path may find it through any of them.
             in_use.update([path.local] if path is not None else [x.base for x in each.peer.ice.local_candidates])
-        return in_use
+        self._servers.give_back_unused(in_use)
+        hosts = self.sockets.hosts
+        return await self._servers.ask(servers, [each.address for each in self.sockets if each.address[0] in hosts])
 
     def connect(
         self,
@@ -204,15 +167,7 @@ class Endpoint:
         for connection in list(self._connections.values()):
             connection.close()
         self._servers.close()
-        if self._tcp is not None:
-            self._tcp.close()
-        self._flush()
-        for found in self._sockets.values():
-            self._loop.remove_reader(found.fileno())
-            self._loop.remove_writer(found.fileno())
-            found.close()
-        self._sockets.clear()
-        self._full.clear()
+        self.sockets.close()
 
     async def __aenter__(self) -> Self:
         return self
@@ -226,64 +181,38 @@ class Endpoint:
 
     def send(self, datagrams: Sequence[Datagram], *, urgent: bool) -> None:
         """Send datagrams with all others of this turn of the loop; urgent ones now."""
-        if not datagrams or (urgent and len(datagrams) == 1 and self._send_at_once(datagrams[0])):
+        sockets = self.sockets
+        if not datagrams or (urgent and len(datagrams) == 1 and sockets.send_at_once(datagrams[0])):
             return
         used: UdpSocket | None = None
         for datagram in datagrams:
-            if self._tcp is not None and datagram.path.transport == "tcp":
-                self._tcp.send(datagram, urgent=urgent)
+            if sockets.tcp is not None and datagram.path.transport == "tcp":
+                sockets.tcp.send(datagram, urgent=urgent)
                 continue
-            found = self._sockets.get(datagram.local)
+            found = sockets.by_address.get(datagram.local)
             if found is None:
-                self._send_relayed(datagram)
+                self._servers.send(datagram)
                 continue
             if urgent and used is not None and used is not found:
-                self._flush_socket(used)
+                sockets.flush_socket(used)
             found.queue((datagram,), urgent=urgent)
             used = found
         if used is None:
             return
         if urgent:
-            self._flush_socket(used)
-        elif not self._flush_is_due:
-            self._flush_is_due = True
-            self._loop.call_soon(self._flush_later)
-
-    def _send_at_once(self, datagram: Datagram) -> bool:
-        """Send a datagram by UDP, without the queues; return False if it has to take its turn there."""
-        if datagram.path.transport == "tcp":
-            return False
-        found = self._sockets.get(datagram.path.local)
-        return found is not None and found.send_at_once(datagram)
+            sockets.flush_socket(used)
+        elif not sockets.flush_is_due:
+            sockets.flush_later()
 
     def is_blocked(self, path: Path) -> bool:
         """True if data sent on this path now would only wait for the network."""
-        if path.transport == "tcp":
-            return self._tcp is not None and self._tcp.unsent(path) > UNSENT
-        found = self._sockets.get(path.local)
-        return found is not None and found.is_full
-
-    def _send_relayed(self, datagram: Datagram) -> None:
-        client = self._servers.client(datagram.local)
-        if client is None:
-            self.counts["no_socket"] += 1
-        else:
-            client.send(datagram.data, datagram.remote)
-
-    def _send_probes(self, datagrams: Sequence[Datagram]) -> None:
-        self.send(datagrams, urgent=False)
+        return self.sockets.is_blocked(path)
 
     def forget(self, connection: Connection) -> None:
         if self._connections.pop(connection.peer.ice, None) is not None:
             self._dropped_before += connection.peer.dropped + connection.counts
 
-    # Sockets
-
-    def _readable(self, found: UdpSocket) -> None:
-        self._receive(found.arriving())
-
-    def _receive_stream(self, datagrams: Sequence[bytes], path: Path) -> None:
-        self._receive((each, path) for each in datagrams)
+    # For the sockets
 
     def _receive(self, datagrams: Iterable[tuple[bytes, Path]]) -> None:
         now = self._loop.time()
@@ -312,31 +241,8 @@ class Endpoint:
             else:
                 connection.hand_out_plain()
 
-    def _relayed(self, data: bytes, path: Path) -> None:
-        self._receive([(data, path)])
-
-    def _is_used(self, path: Path) -> bool:
-        return self.port.directory.owner(path) is not None
-
     def _stream_closed(self, path: Path) -> None:
         agent = self.port.directory.owner(path)
         connection = self._connections.get(agent) if agent is not None else None
         if connection is not None:
             connection.path_closed(path)
-
-    def _flush_later(self) -> None:
-        self._flush_is_due = False
-        self._flush()
-
-    def _flush(self) -> None:
-        for found in self._sockets.values():
-            self._flush_socket(found)
-
-    def _flush_socket(self, found: UdpSocket) -> None:
-        found.flush()
-        if found.wants_write:
-            self._loop.add_writer(found.fileno(), self._flush)
-            self._full.add(found)
-        elif self._full and found in self._full:
-            self._loop.remove_writer(found.fileno())
-            self._full.remove(found)

@@ -47,7 +47,7 @@ class PacketReceived:
 
 
 class PlainRtp(NamedTuple):
-    """A packet, decrypted and otherwise as it came, after `Peer.take_plain_packets`. A tuple for the sake of speed."""
+    """A packet, decrypted and otherwise as it came, with `BundleMedia.plain`. A tuple for the sake of speed."""
 
     data: bytes
 

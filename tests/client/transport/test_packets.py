@@ -126,4 +126,4 @@ async def test_without_a_connection_there_is_nothing_to_take_from() -> None:
         packets.send_control(b"")
         assert packets.counts["control_not_sent"] == 1
         with pytest.raises(RuntimeError):
-            endpoint.connect(controlling=True).peer.tagged  # noqa: B018
+            endpoint.connect(controlling=True).peer.negotiation.tagged  # noqa: B018

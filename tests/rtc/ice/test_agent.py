@@ -145,7 +145,7 @@ def test_two_agents_of_one_role_settle_who_controls(both: bool, seed: int) -> No
     there = agent_at(THERE[0], controlling=both, seed=seed + 10)
     connect(network, here, there)
     assert network.run(10, lambda: settled(network, here) and settled(network, there))
-    assert here.controlling is not there.controlling
+    assert here.role.controlling is not there.role.controlling
 
 
 def test_the_better_of_two_paths_is_nominated() -> None:
@@ -568,7 +568,7 @@ def test_checks_from_very_many_addresses_are_bounded_and_do_not_take_the_path() 
         network.inject(check_by(network, here, there), Path(HERE, (f"203.0.113.{number % 250 + 1}", 1024 + number)))
         network.run(0.03)
     assert here.path == Path(HERE, THERE)
-    assert len(here._current._list.pairs) <= 100
+    assert len(here._sessions.current._list.pairs) <= 100
     assert here._directory.size < 200
     network.run(120)
     assert not ends(network, here)
@@ -655,3 +655,19 @@ def test_the_end_of_a_tcp_connection_ends_its_path_and_the_peer_may_come_again()
     network.run(40)
     network.drain(passive)
     assert ends(network, passive) == [Ended("consent_expired")]
+
+
+def test_the_end_of_a_path_of_the_session_before_a_restart_makes_that_one_ask_nothing() -> None:
+    network = Network(conditions=Conditions(delay=(0.1, 0.1)))
+    here, there = agent_at(HERE[0], "192.0.2.2", controlling=True), agent_at(THERE[0])
+    connect(network, here, there)
+    assert network.run(10, lambda: settled(network, here))
+    network.run(1)
+    restart(network, here, there)
+    network.run(2)
+    assert here.path is not None
+    here.path_closed(here.path, network.now)
+    network.drain(here)
+    network.run(10)
+    assert here.path is not None
+    assert not ends(network, here)

@@ -40,7 +40,7 @@ def test_two_agents_meet_and_stay_together_for_an_hour(name: str, seed: int) -> 
     assert network.run(40, lambda: together(network, here, there))
     network.run(3600)
     assert together(network, here, there)
-    assert here.controlling is not there.controlling
+    assert here.role.controlling is not there.role.controlling
     assert_small(here)
     assert_small(there)
 

@@ -88,7 +88,7 @@ async def test_it_connects_when_both_believe_in_the_same_role(both_control: bool
         tell_ours(shell, connection)
         await asyncio.wait_for(connection.connect(), 20)
         await shell.until(lambda: nominated(shell))
-        assert shell.agent.controlling is not connection.ice_controlling
+        assert shell.agent.role.controlling is not connection.ice_controlling
         await exchange(shell, connection)
 
 
@@ -134,6 +134,6 @@ async def test_two_of_ours_connect_over_real_sockets_and_restart() -> None:
                 one.agent.set_remote(other.agent.local_credentials, candidates, one.now)
                 one.drain()
             for each in (here, there):
-                await each.until(lambda each=each: nominated(each) and each.agent._next is None)  # type: ignore[misc]
+                await each.until(lambda each=each: nominated(each) and each.agent._sessions.next is None)  # type: ignore[misc]
             for each in (here, there):
                 each.agent.restart(each.now)

@@ -100,7 +100,7 @@ async def aiortc_pair(ours: DataChannels, loss: float = 0.0, seed: int = 1) -> A
     feeding = asyncio.ensure_future(pair.feed_them())
     try:
         await pair.theirs.start(RTCSctpCapabilities(maxMessageSize=0), 5000)
-        ours.start(pair.loop.time())
+        ours.association.start(pair.loop.time())
         pair.flush()
         yield pair
     finally:

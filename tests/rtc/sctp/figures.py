@@ -49,7 +49,7 @@ def ours(reliability: Reliability, delay: float, *, interleaving: bool = False) 
     one = DataChannels(settings, seeded(1), client=True)
     other = DataChannels(settings, seeded(2), client=False)
     world = World(one, other)
-    one.start(0.0)
+    one.association.start(0.0)
     channel = one.open("state", 0.0, reliability=reliability)
     world.run(2.0)
     for end in (one, other):

@@ -35,16 +35,16 @@ class Victim:
         self.now = 1.0
         self.events: list[ChannelEvent] = []
         peer = DataChannels(settings, seeded(2), client=True)
-        self.end.start(0.0)
+        self.end.association.start(0.0)
         if established:
             world = World(self.end, peer)
             peer.open("theirs", 0.0)
             self.end.open("ours", 0.0)
             world.run(1.0)
             assert self.end.association.state is State.ESTABLISHED
-        self.tag = self.end.association._tag
-        self.tsn = peer.association._sender.next_tsn
-        self.theirs = self.end.association._sender.next_tsn
+        self.tag = self.end.association._packets.tag
+        self.tsn = peer.association._transfer.sender.fragmentation.next_tsn
+        self.theirs = self.end.association._transfer.sender.fragmentation.next_tsn
 
     def say(self, *chunks: Chunk) -> list[bytes]:
         """What it sends after a packet of these."""
@@ -78,10 +78,10 @@ class Victim:
             assert len(packet) <= association.settings.max_packet, len(packet)
             decode_packet(packet)
         assert len(packets) <= 40, "more in return than a window"
-        assert association._receiver.reassembly.held <= 2 * SMALL + 4096 + 2000
-        assert sum(len(run.payloads) for run in association._receiver.reassembly._starts.values()) <= 1000
-        assert len(association._receiver.received._runs) <= association.settings.max_gaps + 1
-        assert len(association._control) <= 100
+        assert association._transfer.receiver.reassembly.held <= 2 * SMALL + 4096 + 2000
+        assert sum(len(run.payloads) for run in association._transfer.receiver.reassembly._starts.values()) <= 1000
+        assert len(association._transfer.receiver.received._runs) <= association.settings.max_gaps + 1
+        assert len(association._packets.control) <= 100
         assert len(self.end._channels) <= 64
         events = self.end.events()
         for event in events:

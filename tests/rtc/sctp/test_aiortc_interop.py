@@ -122,7 +122,7 @@ async def test_newest_wins_messages_flow_both_ways_past_losses(client: bool) -> 
         pair.flush()
         await pair.until(lambda: "last" in got and ChannelMessage(number, "last") in pair.events)
         assert len(got) > 200
-        await pair.until(lambda: pair.ours.association._sender.idle)
+        await pair.until(lambda: pair.ours.association._transfer.sender.idle)
 
 
 @CLIENT

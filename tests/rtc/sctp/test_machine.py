@@ -121,8 +121,8 @@ class TwoAssociations(RuleBasedStateMachine):
     @invariant()
     def memory_is_bounded(self) -> None:
         for end in self.ends:
-            assert end._receiver.reassembly.held <= 2 * end.settings.receive_window
-            assert end._sender.outstanding <= end.settings.max_outstanding + 20
+            assert end._transfer.receiver.reassembly.held <= 2 * end.settings.receive_window
+            assert len(end._transfer.sender.outstanding.chunks) <= end.settings.max_outstanding + 20
 
     @invariant()
     def what_arrives_was_sent_in_this_order(self) -> None:
@@ -137,7 +137,7 @@ class TwoAssociations(RuleBasedStateMachine):
 
     def teardown(self) -> None:
         self.world.links = (Link(), Link())
-        self.world.run(self.world.now + 300.0, stop=lambda: all(end._sender.idle for end in self.ends))
+        self.world.run(self.world.now + 300.0, stop=lambda: all(end._transfer.sender.idle for end in self.ends))
         self.world.run(self.world.now + 5.0)
         self.collect()
         for sent, got in zip(self.sent, self.got, strict=True):
@@ -145,8 +145,8 @@ class TwoAssociations(RuleBasedStateMachine):
                 assert got.get(stream, []) == sent.get(stream, [])
         for end in self.ends:
             assert end.state is State.ESTABLISHED
-            assert end._sender._flight == end._sender._newest_flight == 0
-            assert end._receiver.reassembly.held == 0
+            assert end._transfer.sender.window.flight == end._transfer.sender.window.newest_flight == 0
+            assert end._transfer.receiver.reassembly.held == 0
 
 
 TestTwoAssociations = TwoAssociations.TestCase

@@ -3,7 +3,7 @@
 import asyncio
 import contextlib
 import socket
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncIterator, Callable, Iterable
 from contextlib import asynccontextmanager
 
 import pytest
@@ -139,9 +139,9 @@ class Port:
         self.number = free_port()
         self.core.bind(HOST, self.number)
 
-    def _receive(self, datagrams: object, path: Path) -> None:
-        assert isinstance(datagrams, list)
-        self.received += datagrams
+    def _receive(self, datagrams: Iterable[tuple[bytes, Path]]) -> None:
+        self.received += [data for data, _ in datagrams]
+        [path] = {path for _, path in datagrams}
         if self.is_open:
             self.used.add(path)
         self.paths.append(path)

@@ -60,7 +60,7 @@ async def test_a_peer_without_addresses_of_its_own_is_reached_through_a_relay_an
         assert await until(theirs, ChannelMessage) == ChannelMessage(channel, "through a relay")
         first = ours.peer.ice.path
         assert await relayed.ask([server(turn, transport)]) == []
-        answer = theirs.peer.answer_restart(ours.restart(), asyncio.get_running_loop().time())
+        answer = theirs.peer.negotiation.answer_restart(ours.restart(), asyncio.get_running_loop().time())
         theirs.flush()
         ours.accept_restart(answer)
         await until(ours, Restarted)

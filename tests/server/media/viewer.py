@@ -127,18 +127,14 @@ class Viewer:
 
     def tell(self, compound: bytes) -> None:
         """Let the plane's end have an RTCP packet, as if it came decrypted from the peer."""
-        streams = self.connection.peer.streams
-        assert streams is not None
-        streams.receive_rtcp(compound, asyncio.get_running_loop().time())
-        self.connection.peer._media.stir()
+        self.connection.peer.media.streams.receive_rtcp(compound, asyncio.get_running_loop().time())
+        self.connection.peer.media.stir()
         self.connection.flush()
 
     @property
     def ssrc(self) -> int:
         """Of the first stream."""
-        streams = self.connection.peer.streams
-        assert streams is not None
-        return streams.outgoing[self.media.streams[0].mid].parameters.ssrc
+        return self.connection.peer.media.streams.outgoing[self.media.streams[0].mid].parameters.ssrc
 
     @property
     def stats(self) -> SenderStats:

@@ -12,7 +12,7 @@ class FakeConnection:
     """Has one data channel, which takes texts but delivers only when told."""
 
     def __init__(self) -> None:
-        self.peer = self
+        self.peer = self.channels = self.association = self
         self.is_open = True
         self.waiting = False
         self.told_when_empty = 0

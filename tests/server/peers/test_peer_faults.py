@@ -94,7 +94,7 @@ def _connection(peer: Peer) -> Any:
 
 def _stream(peer: Peer) -> Any:
     """The first that it gets, with all stages on its way out."""
-    return _connection(peer).peer.streams.outgoing[_delivery(peer).info.mid]
+    return _connection(peer).peer.media.streams.outgoing[_delivery(peer).info.mid]
 
 
 def _answer(rig: Rig, peer: Peer, patch: pytest.MonkeyPatch) -> None:
@@ -106,7 +106,7 @@ def _queueing(rig: Rig, peer: Peer, patch: pytest.MonkeyPatch) -> None:
 
 
 def _packing(rig: Rig, peer: Peer, patch: pytest.MonkeyPatch) -> None:
-    patch.setattr(_connection(peer).peer, "frame_to_send", _raise)
+    patch.setattr(_connection(peer).peer.media, "frame_to_send", _raise)
 
 
 def _stage(rig: Rig, peer: Peer, patch: pytest.MonkeyPatch) -> None:

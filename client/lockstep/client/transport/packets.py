@@ -70,7 +70,7 @@ class Packets:
     def plain(self, take: Callable[[bytes], None], control: Callable[[bytes], None]) -> None:
         """Pass every RTP packet to `take` and every RTCP packet to `control`, and do nothing else for them."""
         self._take, self._control = take, control
-        self._connection.peer.take_plain_packets()
+        self._connection.peer.media.plain = True
 
     def heard(self, event: PeerEvent) -> None:
         if isinstance(event, PlainRtp):
@@ -107,4 +107,4 @@ class Packets:
     def round_trip(self, seconds: float) -> None:
         """Take the round trip to the console; lost packets are asked for accordingly."""
         if not self._of_relay:
-            self._connection.peer.note_round_trip(seconds)
+            self._connection.peer.share.round_trip.measure(seconds)

@@ -229,7 +229,7 @@ class WebRtcTransport:
             raise ConnectFailed("no new path to the console")
 
     async def _signal_restart(self, connection: Connection) -> None:
-        section = connection.peer.tagged
+        section = connection.peer.negotiation.tagged
         fragment = write_fragment(connection.restart(), section.kind, section.mid)
         sent = fragment if self._route is None else self._route.offer(fragment)
         answer = await self.whep.restart_ice(self._resource, sent)

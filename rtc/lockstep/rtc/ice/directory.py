@@ -8,7 +8,7 @@ from lockstep.rtc.addresses import Path
 if TYPE_CHECKING:
     from lockstep.rtc.ice.agent import Agent
 
-__all__ = ["Directory"]
+__all__ = ["Directory", "Entries"]
 
 
 class Directory:
@@ -29,6 +29,9 @@ class Directory:
         """Return the agent that data on this path are for."""
         return self.claims.get(path) or self.hints.get(path)
 
+    def has_owner(self, path: Path) -> bool:
+        return self.owner(path) is not None
+
     def hint(self, path: Path, agent: "Agent") -> None:
         if path not in self.claims:
             self.hints[path] = agent
@@ -47,3 +50,41 @@ class Directory:
     def size(self) -> int:
         """The number of entries of all kinds."""
         return len(self.ufrags) + len(self.transactions) + len(self.claims) + len(self.hints)
+
+
+class Entries:
+    """The entries of one agent. Its sessions, which their ufrags name, share paths: a path is given up when no session
+    has it any more."""
+
+    def __init__(self, directory: Directory, agent: "Agent") -> None:
+        self._directory = directory
+        self._agent = agent
+        self._holders: dict[Path, set[str]] = {}  # ufrags of the sessions that have heard from the peer on a path
+
+    def add_user(self, ufrag: str) -> None:
+        self._directory.ufrags[ufrag] = self._agent
+
+    def remove_user(self, ufrag: str) -> None:
+        self._directory.ufrags.pop(ufrag, None)
+
+    def add_transaction(self, transaction: bytes) -> None:
+        self._directory.transactions[transaction] = self._agent
+
+    def remove_transaction(self, transaction: bytes) -> None:
+        self._directory.transactions.pop(transaction, None)
+
+    def hint(self, path: Path, ufrag: str) -> None:
+        self._holders.setdefault(path, set()).add(ufrag)
+        self._directory.hint(path, self._agent)
+
+    def claim(self, path: Path, ufrag: str) -> None:
+        self._holders.setdefault(path, set()).add(ufrag)
+        self._directory.claim(path, self._agent)
+
+    def release(self, path: Path, ufrag: str) -> None:
+        """Note that a session has given up a path."""
+        holders = self._holders.get(path, set())
+        holders.discard(ufrag)
+        if not holders:
+            self._holders.pop(path, None)
+            self._directory.release(path, self._agent)

@@ -37,7 +37,8 @@ class OutgoingParameters:
 
 @dataclass(slots=True)
 class PathShare:
-    """The state that the streams to one peer share."""
+    """The state that the streams to one peer share. An application may have it measure round trips and limit the path's
+    budget."""
 
     epoch: float  # s since 1970 at which the clock of `now` was 0
     round_trip: RoundTrip = field(default_factory=RoundTrip)

@@ -99,6 +99,16 @@ class Streams:
             for stream in self._all():
                 stream.rtcp(packet, now)  # each takes the parts about itself
 
+    def holds_back(self, mid: str) -> bool:
+        """True if packets of the outgoing stream in section `mid` wait for its pacer. `PacketsLeft` follows."""
+        stream = self.outgoing.get(mid)
+        return stream is not None and stream.pacer is not None and stream.pacer.holds
+
+    def report_every(self, seconds: float) -> None:
+        """Send sender reports every `seconds` (RFC 3550 6.2), from the report after the next on."""
+        for stream in self.outgoing.values():
+            stream.reports.interval = seconds
+
     def timer(self) -> float | None:
         return earliest(*(stream.timer() for stream in self._all()))
 

@@ -2,6 +2,9 @@
 
 from struct import Struct
 
+from lockstep.rtc.sctp.lifecycle import Lifecycle
+from lockstep.rtc.sctp.packets import Packets
+from lockstep.rtc.sctp.sending.round_trip import RoundTrip
 from lockstep.rtc.sctp.wire.chunks import Heartbeat, HeartbeatAck
 from lockstep.rtc.sctp.wire.parameters import encode_parameters
 
@@ -14,27 +17,32 @@ _number = Struct("!Q")
 
 
 class Heartbeats:
-    """Sends one HEARTBEAT at a time. Karn's rule leaves no sample where everything is repeated: on a path whose round
-    trip is longer than the timeout, everything would be repeated for ever. An answer to a HEARTBEAT belongs to it
-    alone."""
+    """Sends one HEARTBEAT at a time, and answers the peer's. Karn's rule leaves no sample where everything is repeated:
+    on a path whose round trip is longer than the timeout, everything would be repeated for ever. An answer to a
+    HEARTBEAT belongs to it alone."""
 
-    def __init__(self) -> None:
+    def __init__(self, lifecycle: Lifecycle, packets: Packets, round_trip: RoundTrip) -> None:
+        self._lifecycle = lifecycle
+        self._packets = packets
+        self._round_trip = round_trip
         self._count = 0
         self._waits_for = b""
         self._sent_at = 0.0
 
-    def ask(self, now: float) -> Heartbeat | None:
-        """Return a HEARTBEAT to send; None while another is under way."""
+    def ask(self, now: float) -> None:
+        """Send a HEARTBEAT, unless another is under way."""
         if self._waits_for and now - self._sent_at < LOST_AFTER:
-            return None
+            return
         self._count += 1
         self._waits_for = encode_parameters([(INFO, _number.pack(self._count))])
         self._sent_at = now
-        return Heartbeat(self._waits_for)
+        self._packets.control.append(Heartbeat(self._waits_for).encode())
 
-    def answered(self, chunk: HeartbeatAck, now: float) -> float | None:
-        """Return the round trip in seconds; None if this answers no HEARTBEAT that is under way."""
-        if not self._waits_for or chunk.body != self._waits_for:
-            return None
-        self._waits_for = b""
-        return now - self._sent_at
+    def receive(self, chunk: Heartbeat, now: float) -> None:
+        if self._lifecycle.is_up:
+            self._packets.answer(HeartbeatAck(chunk.body))
+
+    def receive_ack(self, chunk: HeartbeatAck, now: float) -> None:
+        if self._waits_for and chunk.body == self._waits_for:
+            self._waits_for = b""
+            self._round_trip.sample(now - self._sent_at, now)

@@ -31,9 +31,10 @@ class AddressServers:
         settings: EndpointSettings,
         counts: Counter[str],
         send: Callable[[Sequence[Datagram]], None],
-        on_data: Callable[[bytes, Path], None],
+        on_data: Callable[[Iterable[tuple[bytes, Path]]], None],
     ) -> None:
-        """`send`: sends from the endpoint's sockets; `on_data`: takes a datagram that came through a TURN server."""
+        """`send`: sends from the endpoint's sockets; `on_data`: takes datagrams that came through a TURN server, with
+        their paths."""
         self.told: list[LocalCandidate] = []
         self.probes: dict[Path, MappedAddress] = {}
         self._settings = settings
@@ -133,6 +134,14 @@ class AddressServers:
     def client(self, address: Address) -> TurnClient | None:
         """Return the client of the TURN server that gave this address."""
         return next((each for each in self._clients if each.relayed == address), None)
+
+    def send(self, datagram: Datagram) -> None:
+        """Send from a relayed address; a datagram from another one is counted."""
+        client = self.client(datagram.local)
+        if client is None:
+            self._counts["no_socket"] += 1
+        else:
+            client.send(datagram.data, datagram.remote)
 
     def give_back_unused(self, in_use: set[Address]) -> None:
         for client in [each for each in self._clients if each.relayed not in in_use]:

@@ -14,10 +14,10 @@ from lockstep.rtc.peer_events import PeerEnded, PeerEvent
 from lockstep.rtc.sdp import Fragment, LocalMedia, SessionDescription
 from lockstep.rtc.sockets.endpoint_settings import EndpointSettings
 from lockstep.rtc.sockets.event_delivery import EventDelivery, Listener
+from lockstep.rtc.sockets.peer_timer import PeerTimer
 
 __all__ = ["Connection", "Turns"]
 
-CLOCK_RESOLUTION = 0.001  # s; a loop may call too early by so much
 PASSES = (
     4  # a channel is empty now, or a datagram had further records; what is left waits for the next datagram or timer
 )
@@ -72,9 +72,7 @@ class Connection:
         self._endpoint = endpoint
         self._settings = settings
         self._loop = asyncio.get_running_loop()
-        self._timer: asyncio.TimerHandle | None = None
-        self._timer_at = 0.0
-        self._sets_timer = False  # True: the loop calls `_set_timer_now` in its next turn
+        self._timer = PeerTimer(peer, self.settle, self._fail)
         self._turns = turns
         self._later: deque[tuple[bytes, Path]] = deque()  # datagrams that wait for their turn
         self.fault: Exception | None = None  # the exception that serving it raised, after PeerEnded("failed")
@@ -88,55 +86,64 @@ class Connection:
         return answer
 
     def offer(self, media: Sequence[OfferedMedia] = (), *, data: bool = True) -> SessionDescription:
-        return self.peer.offer(media, data=data)
+        return self.peer.negotiation.offer(media, data=data)
 
     def accept(self, answer: SessionDescription) -> None:
         self.peer.accept(answer, self._loop.time())
         self.flush()
 
     def add_candidate(self, line: str) -> None:
-        self.peer.add_candidate(line)
+        self.peer.negotiation.add_candidate(line)
         self.flush()
 
     def answer_restart(self, fragment: Fragment) -> Fragment:
-        """Like `Peer.answer_restart`, with the present candidates of the endpoint."""
-        answer = self.peer.answer_restart(fragment, self._loop.time(), self._endpoint.candidates)
+        """Like `Negotiation.answer_restart`, with the present candidates of the endpoint."""
+        answer = self.peer.negotiation.answer_restart(fragment, self._loop.time(), self._endpoint.candidates)
         self.flush()
         return answer
 
     def restart(self, candidates: Sequence[LocalCandidate] | None = None) -> Fragment:
-        """Like `Peer.restart`. `candidates`: None: the present ones of the endpoint."""
-        fragment = self.peer.restart(self._loop.time(), self._endpoint.candidates if candidates is None else candidates)
+        """Like `Negotiation.restart`. `candidates`: None: the present ones of the endpoint."""
+        own = self._endpoint.candidates if candidates is None else candidates
+        fragment = self.peer.negotiation.restart(self._loop.time(), own)
         self.flush()
         return fragment
 
     def accept_restart(self, fragment: Fragment) -> None:
-        self.peer.accept_restart(fragment, self._loop.time())
+        self.peer.negotiation.accept_restart(fragment, self._loop.time())
         self.flush()
 
     def cancel_restart(self) -> None:
-        self.peer.cancel_restart()
+        self.peer.ice.cancel_restart()
         self.flush()
 
     # Sending, as in `Peer`
 
     def open_channel(self, label: str, *, protocol: str = "", reliability: Reliability | None = None) -> int:
-        channel = self.peer.open_channel(label, self._loop.time(), protocol=protocol, reliability=reliability)
+        now = self._loop.time()
+        channel = self.peer.need_channels(now).open(label, now, protocol=protocol, reliability=reliability)
         self.flush()
         return channel
 
+    def open_negotiated_channel(self, channel: int, label: str, *, reliability: Reliability | None = None) -> None:
+        """Like `DataChannels.open_negotiated`. Raises PeerNotReady as well."""
+        self.peer.need_channels(self._loop.time()).open_negotiated(channel, label, reliability=reliability)
+
     def send(self, channel: int, data: str | bytes) -> None:
-        self.peer.send(channel, data, self._loop.time())
+        now = self._loop.time()
+        channels = self.peer.need_channels(now)
+        channels.send(channel, data, now)
         if self.fault is not None:
             return
         self._endpoint.send(self.peer.datagrams_to_send(), urgent=self.urgent)
         if self.peer.has_events:
             self.flush()
         else:
-            self._set_timer_by(self.peer.channel_timer)
+            self._timer.set_by(channels.timer())
 
     def close_channel(self, channel: int) -> None:
-        self.peer.close_channel(channel, self._loop.time())
+        now = self._loop.time()
+        self.peer.need_channels(now).close(channel, now)
         self.flush()
 
     def send_frame(
@@ -150,14 +157,16 @@ class Connection:
         captured_at: float | None = None,
     ) -> None:
         now = self._loop.time()
-        datagrams = self.peer.frame_to_send(
+        media, path = self.peer.media, self.peer.ice.path
+        sent = media.frame_to_send(
             mid, payloads, media_time, now, marker=marker, values=values, captured_at=captured_at
         )
-        self._endpoint.send(datagrams, urgent=self.urgent)
-        self._set_timer_by(self.peer.media_timer)
+        if path is not None:
+            self._endpoint.send([Datagram(data, path) for data in sent], urgent=self.urgent)
+        self._timer.set_by(media.due)
 
     def send_rtcp(self, packet: bytes) -> None:
-        self.peer.send_rtcp(packet)
+        self.peer.media.send_rtcp(packet)
         self.flush()
 
     @property
@@ -167,11 +176,12 @@ class Connection:
         return path is None or self._endpoint.is_blocked(path)
 
     def request_keyframe(self, mid: str) -> None:
-        self.peer.request_keyframe(mid, self._loop.time())
+        self.peer.media.request_keyframe(mid, self._loop.time())
         self.flush()
 
     def limit(self, mid: str, bitrate: int) -> None:
-        self.peer.limit(mid, bitrate)
+        """Ask the peer to send at most `bitrate` bit/s in this section (REMB). Raises PeerNotReady."""
+        self.peer.media.need_incoming(mid).limit = bitrate
 
     def close(self) -> None:
         """Say goodbye. The events end with PeerEnded("closed")."""
@@ -258,8 +268,7 @@ class Connection:
         with suppress(Exception):
             self.peer.ice.close()
         self._later.clear()
-        if self._timer is not None:
-            self._timer.cancel()
+        self._timer.close()
         self._delivery.hand_out([PeerEnded("failed", str(error))])
         self._endpoint.forget(self)
 
@@ -278,9 +287,9 @@ class Connection:
             self._delivery.hand_out(self.peer.events())
             self._endpoint.send(self.peer.datagrams_to_send(), urgent=self.urgent)
         if self.urgent and not self._delivery.ended:
-            self._set_timer_soon()
+            self._timer.set_soon()
         else:
-            self._set_timer()
+            self._timer.set()
         if self._delivery.ended:
             self._later.clear()
             self._endpoint.forget(self)
@@ -292,46 +301,3 @@ class Connection:
     def _not_read(self) -> None:
         self.peer.close(self._loop.time())
         self._loop.call_soon(self.flush)
-
-    def _set_timer_soon(self) -> None:
-        """Set the timer behind everything that this turn of the loop has woken, which may wait for a feedback."""
-        if not self._sets_timer:
-            self._sets_timer = True
-            self._loop.call_soon(self._set_timer_now)
-
-    def _set_timer_now(self) -> None:
-        self._sets_timer = False
-        if self.fault is None:
-            try:
-                self._set_timer()
-            except Exception as error:
-                self._fail(error)
-
-    def _set_timer(self) -> None:
-        """Set the timer anew. One that fires too early is left: the next datagram puts off most of them, and no code
-        waits for them."""
-        due = self.peer.timer()
-        if due is None and self._timer is not None:
-            self._timer.cancel()
-            self._timer = None
-        self._set_timer_by(due)
-
-    def _set_timer_by(self, due: float | None) -> None:
-        """Let the timer fire at `due` at the latest."""
-        if due is None or (self._timer is not None and self._timer_at <= due):
-            return
-        if self._timer is not None:
-            self._timer.cancel()
-        self._timer, self._timer_at = self._loop.call_at(due, self._due), due
-
-    def _due(self) -> None:
-        self._timer = None
-        due, now = self.peer.timer(), self._loop.time()
-        if due is None or due > now + CLOCK_RESOLUTION:
-            self._set_timer()
-            return
-        try:
-            self.peer.handle_timer(max(now, due))
-        except Exception as error:
-            self._fail(error)
-        self.settle()

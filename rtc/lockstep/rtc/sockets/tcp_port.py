@@ -7,7 +7,7 @@ authentic it belongs to a stranger: few at a time, each for a few seconds, and t
 import asyncio
 import socket
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
@@ -44,7 +44,7 @@ class TcpPort:
 
     def __init__(
         self,
-        receive: Callable[[Sequence[bytes], Path], None],
+        receive: Callable[[Iterable[tuple[bytes, Path]]], None],
         closed: Callable[[Path], None],
         is_used: Callable[[Path], bool],
         settings: TcpPortSettings | None = None,
@@ -52,7 +52,7 @@ class TcpPort:
         """Prepare to listen; `bind` does so.
 
         Args:
-            receive: called with the datagrams that came together, and their path.
+            receive: called with the datagrams that came together, each with its path.
             closed: called when the connection of a path has ended.
             is_used: returns True if a session has heard its peer on a path.
         """
@@ -196,7 +196,7 @@ class _TcpPath(asyncio.BufferedProtocol):
         datagrams = self._framing.receive_bytes(bytes(self._buffer[:nbytes]))
         fault = self._fault(nbytes, len(datagrams), self._framing.counts["empty_frame"] - before)
         if datagrams and not fault:
-            self._port.receive(datagrams, self.path)
+            self._port.receive([(each, self.path) for each in datagrams])
         if self._framing.too_long:
             fault = "frame_too_long"
         if fault:

@@ -3,7 +3,7 @@
 import asyncio
 import secrets
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import cast
 
 from lockstep.rtc.addresses import Address, Path
@@ -12,6 +12,8 @@ from lockstep.rtc.turn.messages import TurnStream
 from lockstep.rtc.turn.servers import IceServer, ServerUri
 
 __all__ = ["TurnClient", "TurnRefused", "open_turn_client"]
+
+OnData = Callable[[Iterable[tuple[bytes, Path]]], None]  # takes datagrams that came together, each with its path
 
 MAX_UNSENT = 256 * 1024  # bytes that wait on a TCP connection to a server; further data is lost, as UDP would lose it
 
@@ -33,7 +35,7 @@ class TurnClient(asyncio.Protocol, asyncio.DatagramProtocol):
     allocation. `counts` has dropped datagrams, by reason.
     """
 
-    def __init__(self, uri: ServerUri, server: IceServer, on_data: Callable[[bytes, Path], None]) -> None:
+    def __init__(self, uri: ServerUri, server: IceServer, on_data: OnData) -> None:
         self._loop = asyncio.get_running_loop()
         self._reliable = uri.transport == "tcp"
         self._core = Allocation(
@@ -100,9 +102,9 @@ class TurnClient(asyncio.Protocol, asyncio.DatagramProtocol):
 
     def _flush(self) -> None:
         relayed = self._core.relayed
-        for data, peer in self._core.received():
-            if relayed is not None:
-                self._on_data(data, Path(relayed, peer))
+        received = self._core.received()
+        if received and relayed is not None:
+            self._on_data([(data, Path(relayed, peer)) for data, peer in received])
         for event in self._core.events():
             if self.answered.done():
                 continue  # its end is no news: consent tells whether the path is good
@@ -134,8 +136,8 @@ class TurnClient(asyncio.Protocol, asyncio.DatagramProtocol):
             self._timer = self._loop.call_at(due, self._due)
 
 
-async def open_turn_client(uri: ServerUri, server: IceServer, on_data: Callable[[bytes, Path], None]) -> TurnClient:
-    """Return an address on a TURN server. `on_data` gets the datagrams that arrive there, with their path.
+async def open_turn_client(uri: ServerUri, server: IceServer, on_data: OnData) -> TurnClient:
+    """Return an address on a TURN server. `on_data` gets the datagrams that arrive there, with their paths.
 
     Raises:
         TurnRefused: the server refuses, or does not answer.

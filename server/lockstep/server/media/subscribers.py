@@ -86,7 +86,7 @@ class Subscribers:
         deliveries += [self._delivery(connection, peer, each, priority) for each in plan.streams]
         peer.traces = PictureTraces([each.target.traced for each in deliveries if each.info.kind == "video"])
         if self._settings.quality:
-            peer.quality.pace = connection.peer.pace
+            peer.quality.pace = connection.peer.share.path_budget.limit
         return peer
 
     def _quality_of(self, cameras: int, priority: bool) -> PeerQuality:

@@ -20,7 +20,10 @@ class ChannelWriter:
 
     def __init__(self, connection: Connection, channel: int) -> None:
         """Call `flush` on `ChannelWritable`."""
+        channels = connection.peer.channels
+        assert channels is not None  # `channel` is one of them
         self._connection = connection
+        self._channels = channels
         self._channel = channel
         self.queue = ChannelQueue()
         self.too_large = 0
@@ -40,13 +43,12 @@ class ChannelWriter:
 
     def send_spare(self, text: str) -> None:
         """Send unless something waits already: then nobody needs it."""
-        if self.queue.empty and not self._connection.peer.has_waiting(self._channel):
+        if self.queue.empty and not self._channels.association.has_waiting(self._channel):
             self.send(text)
 
     def flush(self) -> None:
         """Hand on the messages in the queue, as far as the channel takes them at once."""
-        peer = self._connection.peer
-        while not peer.has_waiting(self._channel):
+        while not self._channels.association.has_waiting(self._channel):
             text = self.queue.take()
             if text is None:
                 return
@@ -57,4 +59,4 @@ class ChannelWriter:
             except ENDED:
                 return  # the peer's end follows
         if not self.queue.empty:
-            peer.tell_when_empty(self._channel)
+            self._channels.tell_when_empty(self._channel)

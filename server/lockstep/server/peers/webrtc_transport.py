@@ -94,7 +94,7 @@ class WebRtcTransport:
         """Open data channels together with the association, without a message that opens them."""
         for each in channels:
             reliability = Reliability(ordered=each.ordered, max_retransmits=each.max_retransmits)
-            self._connection.peer.open_negotiated_channel(each.id, each.name, reliability=reliability)
+            self._connection.open_negotiated_channel(each.id, each.name, reliability=reliability)
 
     def heard(self, event: PeerEvent) -> None:
         """Take an event of its connection."""
@@ -125,7 +125,7 @@ class WebRtcTransport:
                 self._media.connected()
             peer.liveness.connect()
         elif isinstance(event, Answered):
-            self._connection.peer.note_round_trip(event.seconds)
+            self._connection.peer.share.round_trip.measure(event.seconds)
         else:
             self._hear_of_channels(event, peer)
 

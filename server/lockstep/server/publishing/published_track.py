@@ -37,7 +37,7 @@ class PublishedTrack:
     @property
     def foreign(self) -> int:
         """Packets of other streams."""
-        streams = self.connection.peer.streams
+        streams = self.connection.peer.media.streams
         if streams is None:
             return self._foreign
         return self._foreign + streams.counts["rtp_unknown"] + streams.incoming[self._mid].ignored

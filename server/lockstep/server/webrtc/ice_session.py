@@ -39,7 +39,7 @@ class IceSession:
     @property
     def section(self) -> tuple[str, str]:
         """Kind and mid of the section that candidates are for."""
-        tagged = self._connection.peer.tagged
+        tagged = self._connection.peer.negotiation.tagged
         return tagged.kind, tagged.mid
 
     def add(self, candidates: Sequence[FragmentCandidate]) -> None:

@@ -54,7 +54,7 @@ class RtpSender:
     @property
     def paced(self) -> bool:
         """True while part of the last frame waits for the pacer."""
-        return self._connection.peer.holds_back(self._mid)
+        return self._connection.peer.media.streams.holds_back(self._mid)
 
     @property
     def rtp_time(self) -> int:
@@ -123,5 +123,4 @@ class RtpSender:
 
     @property
     def _stream(self) -> OutgoingStream | None:
-        streams = self._connection.peer.streams
-        return None if streams is None else streams.outgoing.get(self._mid)
+        return self._connection.peer.media.streams.outgoing.get(self._mid)

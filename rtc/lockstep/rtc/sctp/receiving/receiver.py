@@ -4,8 +4,8 @@ from collections import Counter
 
 from lockstep.rtc.sctp.errors import ProtocolViolation
 from lockstep.rtc.sctp.events import MessageReceived
-from lockstep.rtc.sctp.reassembly import Reassembly
-from lockstep.rtc.sctp.received import ReceivedTsns
+from lockstep.rtc.sctp.receiving.reassembly import Reassembly
+from lockstep.rtc.sctp.receiving.received import ReceivedTsns
 from lockstep.rtc.sctp.serial import MASK_32
 from lockstep.rtc.sctp.settings import SctpSettings
 from lockstep.rtc.sctp.wire.chunks import (

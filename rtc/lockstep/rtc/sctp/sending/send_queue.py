@@ -7,7 +7,7 @@ from lockstep.rtc.sctp.errors import SendQueueFull
 from lockstep.rtc.sctp.settings import SctpSettings
 
 if TYPE_CHECKING:
-    from lockstep.rtc.sctp.sender import Outgoing
+    from lockstep.rtc.sctp.sending.outgoing import Outgoing
 
 __all__ = ["Message", "SendQueue"]
 

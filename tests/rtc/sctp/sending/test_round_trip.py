@@ -1,4 +1,4 @@
-from lockstep.rtc.sctp.round_trip import RoundTrip
+from lockstep.rtc.sctp.sending.round_trip import RoundTrip
 from lockstep.rtc.sctp.settings import SctpSettings
 
 

@@ -33,8 +33,8 @@ def world(settings: SctpSettings | None = None, link: Link | None = None) -> Wor
     server = DataChannels(settings, seeded(2), client=False)
     link = link or Link()
     made = World(client, server, link, Link(link.delay, link.jitter, link.loss))
-    client.start(0.0)
-    server.start(0.0)
+    client.association.start(0.0)
+    server.association.start(0.0)
     return made
 
 
@@ -187,7 +187,7 @@ def test_a_shutdown_delivers_everything() -> None:
     both.ends[0].send(channel, "x" * 10_000, 0.0)
     both.run(1.0)
     both.ends[0].send(channel, "last", both.now)
-    both.ends[0].shutdown(both.now)
+    both.ends[0].association.shutdown(both.now)
     both.run(5.0)
     events = both.ends[1].events()
     assert data(events)[-1] == "last"
@@ -204,7 +204,7 @@ def test_a_full_channel_says_so_and_when_it_has_room() -> None:
     both.ends[0].send(channel, bytes(16_000), both.now)
     with pytest.raises(SendQueueFull):
         both.ends[0].send(channel, bytes(16_000), both.now)
-    assert both.ends[0].buffered(channel) > 10_000
+    assert both.ends[0].association.buffered(channel) > 10_000
     both.run(10.0)
     assert ChannelWritable(channel) in both.ends[0].events()
     assert [len(each) for each in data(both.ends[1].events())] == [16_000] * 2
@@ -250,7 +250,7 @@ def test_an_opening_that_is_wrong_is_counted_and_its_stream_reset(stream: int, p
     victim = Victim()
     victim.say(Data(victim.tsn, WHOLE | UNORDERED, stream, 0, 50, payload))
     assert victim.end.counts[count] == 1
-    assert victim.end.association._resets._request is not None
+    assert victim.end.association._transfer.resets._request is not None
     assert victim.end.association.state is State.ESTABLISHED
 
 
@@ -309,14 +309,14 @@ def test_the_owner_is_told_once_when_nothing_waits_on_a_channel_any_more() -> No
     channel = both.ends[0].open("a", 0.0)
     both.run(1.0)
     both.ends[0].events()
-    assert not both.ends[0].has_waiting(channel)
+    assert not both.ends[0].association.has_waiting(channel)
     both.ends[0].send(channel, "x" * 10_000, both.now)
     both.ends[0].packets_to_send()
-    assert both.ends[0].has_waiting(channel)
+    assert both.ends[0].association.has_waiting(channel)
     both.ends[0].tell_when_empty(channel)
     both.run(both.now + 5.0)
     assert [each for each in both.ends[0].events() if isinstance(each, ChannelWritable)] == [ChannelWritable(channel)]
-    assert not both.ends[0].has_waiting(channel)
+    assert not both.ends[0].association.has_waiting(channel)
 
 
 def test_why_the_association_has_ended_is_known_before_its_channels_close() -> None:

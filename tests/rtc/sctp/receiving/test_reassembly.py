@@ -3,7 +3,7 @@
 import pytest
 
 from lockstep.rtc.sctp import SctpSettings
-from lockstep.rtc.sctp.reassembly import Reassembly
+from lockstep.rtc.sctp.receiving.reassembly import Reassembly
 from lockstep.rtc.sctp.wire.chunks import BEGIN, END, UNORDERED, InterleavedData, Skip
 
 
