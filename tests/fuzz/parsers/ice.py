@@ -41,7 +41,7 @@ def agent(data: bytes) -> None:
     port = Port()
     rng = Random(1)
     ours = Agent(gather([HERE[0]], HERE[1]), controlling=False, directory=port.directory, rng=rng)
-    session = ours._current
+    session = ours._sessions.newest
     del port.directory.ufrags[session.local_credentials.ufrag]
     session.local_credentials = Credentials(UFRAG, PASSWORD)
     port.directory.ufrags[UFRAG] = ours

@@ -98,10 +98,6 @@ class Driver:
                 await self.next()
         return self.feedback
 
-    async def becomes(self, command: Command) -> Feedback:
-        """Return the first feedback of the event that this command is to become."""
-        return await self.heard(lambda feedback: feedback.event == command.event, f"event {command.event}")
-
     async def fresh(self) -> Feedback:
         """Return the next feedback."""
         before = self.feedback

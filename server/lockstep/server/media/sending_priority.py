@@ -30,7 +30,7 @@ class SendingPriority:
         if self._turns is not None:
             self._turns.drives = quality.drives
         self._connection.urgent = quality.drives or quality.operator
-        self._connection.peer.report_every(REPORTS_OFTEN if comes_first else self._report_seconds)
+        self._connection.peer.media.streams.report_every(REPORTS_OFTEN if comes_first else self._report_seconds)
 
     def report_every(self, seconds: float) -> None:
         """Send a sender report every `seconds`, unless this peer comes first."""

@@ -38,8 +38,6 @@ class PublishedTrack:
     def foreign(self) -> int:
         """Packets of other streams."""
         streams = self.connection.peer.media.streams
-        if streams is None:
-            return self._foreign
         return self._foreign + streams.counts["rtp_unknown"] + streams.incoming[self._mid].ignored
 
     @property
@@ -65,7 +63,7 @@ class PublishedTrack:
     def observe(self, round_trip: float) -> None:
         """Take a round trip in s that was measured on its path."""
         self.pictures.path.observe(round_trip, time.monotonic())
-        self.connection.peer.note_round_trip(round_trip)
+        self.connection.peer.share.round_trip.measure(round_trip)
 
     def _decode(self, pictures: list[Encoded]) -> None:
         for picture in pictures:

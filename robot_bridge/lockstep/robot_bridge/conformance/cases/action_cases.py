@@ -125,7 +125,7 @@ async def _renewed(subject: Subject) -> None:
         while driver.feedback.time - began < HOLDS * driver.description.hold:
             command = msgspec.structs.replace(driver.command(driver.neutral), action=act.id)
             driver.peer.send(command)
-            await driver.becomes(command)
+            await driver.heard(lambda feedback: feedback.event == command.event, f"event {command.event}")
         driver.peer.send(act)
         said = await _told(driver, act.id)
         expect(said.state != "cancelled", f"an action that armed events renew was cancelled {said.reason!r}")

@@ -53,7 +53,7 @@ class CameraInfoTopic:
         self._topic = topic
         self._rectified = is_rectified(camera.topic)
         self._difference = ""  # by the newest message that could be used; written by the node's thread
-        ros.subscribe(ros.message("sensor_msgs", "CameraInfo"), topic, self._take)
+        ros.subscribe(ros.interface("sensor_msgs/msg/CameraInfo"), topic, self._take)
 
     def items(self) -> list[StatusItem]:
         """Return an item while it differs."""
