@@ -1,12 +1,13 @@
 """Cases about actions: at most once, and no motion without armed events. A robot without actions has nothing to try."""
 
+from functools import partial
 from itertools import count
 
 import msgspec
 
 from lockstep.protocol.actions import Act, ActionUpdate
 from lockstep.protocol.description import Action
-from lockstep.protocol.messages import Rest
+from lockstep.protocol.messages import Command, Feedback, Rest
 from lockstep.protocol.serial import event_after
 from lockstep.robot_bridge.conformance.case import Case
 from lockstep.robot_bridge.conformance.driver import BY, Driver
@@ -118,6 +119,10 @@ async def _hold(subject: Subject) -> None:
         expect(said.state == "cancelled", f"a repeat of a request that was cancelled is {said.state}: it began again")
 
 
+def _is_of(command: Command, feedback: Feedback) -> bool:
+    return feedback.event == command.event
+
+
 async def _renewed(subject: Subject) -> None:
     async with subject.operator() as driver:
         act = await _begun(driver)
@@ -125,7 +130,7 @@ async def _renewed(subject: Subject) -> None:
         while driver.feedback.time - began < HOLDS * driver.description.hold:
             command = msgspec.structs.replace(driver.command(driver.neutral), action=act.id)
             driver.peer.send(command)
-            await driver.heard(lambda feedback: feedback.event == command.event, f"event {command.event}")
+            await driver.heard(partial(_is_of, command), f"event {command.event}")
         driver.peer.send(act)
         said = await _told(driver, act.id)
         expect(said.state != "cancelled", f"an action that armed events renew was cancelled {said.reason!r}")
