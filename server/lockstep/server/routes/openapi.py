@@ -75,7 +75,7 @@ from lockstep.server.errors import (
     WrongMediaType,
 )
 from lockstep.server.http.problem import PROBLEM_JSON, Problem
-from lockstep.server.recording.episodes.listed import RecordingEpisodes
+from lockstep.server.recording.episodes.episode_list import RecordingEpisodes
 from lockstep.server.routes.access import MAX_RECORDS, AuditPage, InvitationList, InvitationRequest, NewInvitation
 from lockstep.server.routes.actions import ActionList, ActionRequest, RobotStatus
 from lockstep.server.routes.dial_in import NewPairingCode, RobotDialInfo

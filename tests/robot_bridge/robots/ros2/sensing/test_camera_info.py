@@ -7,7 +7,7 @@ from typing import Any, cast
 import pytest
 
 from lockstep.protocol.description import CameraCalibration
-from lockstep.robot_bridge.robots.ros2.discovery.tally import pinhole_of
+from lockstep.robot_bridge.robots.ros2.discovery.topic_messages import pinhole_of
 from lockstep.robot_bridge.robots.ros2.ros_side import RosSide
 from lockstep.robot_bridge.robots.ros2.sensing.camera_info import CameraInfoTopic, difference, is_rectified
 from lockstep.robot_bridge.robots.ros2.settings import CameraTopic
