@@ -60,11 +60,11 @@ class Ros:
         self.take: Callable[[Any], None] = lambda message: None
         self.topic = ""
 
-    def message(self, package: str, name: str) -> str:
-        return f"{package}/{name}"
+    def interface(self, name: str) -> str:
+        return name
 
     def subscribe(self, kind: str, topic: str, callback: Callable[[Any], None]) -> None:
-        assert kind == "sensor_msgs/CameraInfo"
+        assert kind == "sensor_msgs/msg/CameraInfo"
         self.topic, self.take = topic, callback
 
 

@@ -7,10 +7,10 @@ import msgspec
 
 from lockstep.protocol.traces.trace import CommandSpans, span_ms
 
-__all__ = ["CommandTrace"]
+__all__ = ["CommandTiming"]
 
 
-class CommandTrace:
+class CommandTiming:
     """The times of at most one command: none executes before the last one was answered."""
 
     def __init__(self) -> None:
