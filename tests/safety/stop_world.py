@@ -206,7 +206,7 @@ class ConsoleModel:
             task.cancel()
         self._world.loop.turn()
 
-    # StopsLink
+    # StopsRobotLink
 
     def send(self, message: Command | Rest | Reset) -> bool:
         if not self.up:
@@ -300,20 +300,20 @@ class ConsoleModel:
         if epoch != self.epoch:
             self.epoch = epoch
             self.service.epoch_ends(self.clock.stop)
-            self.resets.link_down("the robot bridge was started anew")
+            self.resets.robot_link_down("the robot bridge was started anew")
             self.arbiter.epoch_ends()
             self.clock.begin(epoch)
 
-    def link_up(self) -> None:
+    def robot_link_up(self) -> None:
         self.up, self.proven, self._neutral = True, False, None
-        self.service.link_up()
-        self.arbiter.link_up(ROBOT)
+        self.service.robot_link_up()
+        self.arbiter.robot_link_up(ROBOT)
 
-    def link_down(self) -> None:
+    def robot_link_down(self) -> None:
         self.up, self.detail, self.proven, self._neutral = False, "lost", False, None
-        self.arbiter.link_down()
-        self.service.link_down()
-        self.resets.link_down("lost")
+        self.arbiter.robot_link_down()
+        self.service.robot_link_down()
+        self.resets.robot_link_down("lost")
 
     def hear(self, message: LinkMessage) -> None:
         match message:
@@ -431,7 +431,7 @@ class World:
         self.live.add(link)
         self.console.hello(str(self.runs))
         if link == "operator":
-            self.console.link_up()
+            self.console.robot_link_up()
             self.bridge.operator_comes()
             self._answer([self.bridge.feedback])
         self.loop.turn()
@@ -446,7 +446,7 @@ class World:
         self.to_bridge[link], self.to_console[link] = [], []
         if link == "operator":
             self.bridge.operator_lost()
-            self.console.link_down()
+            self.console.robot_link_down()
         self.loop.turn()
 
     def lose_all(self, arrives: int = 0) -> None:

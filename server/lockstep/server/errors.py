@@ -62,7 +62,7 @@ ConsoleError
 │   └── WrongChannel
 ├── InternalFault           the console failed, not the client
 └── Unavailable             the console cannot do this right now
-    ├── LinkDown
+    ├── RobotLinkDown
     ├── RecordingFailed     the disk failed, or a file on it is damaged
     ├── ResetNotKept        the robot's disk does not store the reset
     ├── RobotFailed         the console's session of the robot failed and restarts
@@ -99,7 +99,7 @@ __all__ = [
     "HostRefused",
     "HttpError",
     "InternalFault",
-    "LinkDown",
+    "RobotLinkDown",
     "LinkExpired",
     "LinkOtherRobot",
     "LinkRevoked",
@@ -417,7 +417,7 @@ class Unavailable(ConsoleError):
     pass
 
 
-class LinkDown(Unavailable):
+class RobotLinkDown(Unavailable):
     pass
 
 
@@ -515,7 +515,7 @@ HTTP_ERRORS: dict[type[ConsoleError], HttpError] = {
     PreconditionRequired: HttpError(428, "precondition_required"),
     TooManyRequests: HttpError(429, "too_many_requests", {"Retry-After": "2"}),
     InternalFault: HttpError(500, "internal_error"),
-    LinkDown: HttpError(503, "link_down", {"Retry-After": "1"}),
+    RobotLinkDown: HttpError(503, "link_down", {"Retry-After": "1"}),
     RecordingFailed: HttpError(503, "recording_failed", {"Retry-After": "5"}),
     ResetNotKept: HttpError(503, "not_kept", {"Retry-After": "5"}),
     RobotFailed: HttpError(503, "robot_failed", {"Retry-After": "2"}),

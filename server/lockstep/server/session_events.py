@@ -33,8 +33,8 @@ __all__ = [
     "EventsTraced",
     "FeedbackReceived",
     "InputRefused",
-    "LinkDown",
-    "LinkUp",
+    "RobotLinkDown",
+    "RobotLinkUp",
     "MapReceived",
     "NavigationReceived",
     "NewcomerWelcomed",
@@ -147,11 +147,11 @@ class EpochBegan(SessionEvent, frozen=True):
     description: RobotDescription
 
 
-class LinkUp(SessionEvent, frozen=True):
+class RobotLinkUp(SessionEvent, frozen=True):
     state: RobotState | None
 
 
-class LinkDown(SessionEvent, frozen=True):
+class RobotLinkDown(SessionEvent, frozen=True):
     """The link for commands is down, or could not be opened again for another reason than before."""
 
     state: RobotState | None  # None: the robot was never reached

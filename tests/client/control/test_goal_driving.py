@@ -53,7 +53,7 @@ class GoalDriving(RuleBasedStateMachine):
         self.seat_rules = SeatRules(self.seat)
         self.arbiter = CommandArbiter(self.clock, self.seat)
         self.clock.begin("e")
-        self.arbiter.link_up(ARM)
+        self.arbiter.robot_link_up(ARM)
         # network
         self.up: list[Command | Rest] = []
         self.down: list[Feedback | Refusal] = []

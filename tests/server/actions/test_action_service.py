@@ -20,9 +20,9 @@ from lockstep.server.audit.records import Actor
 from lockstep.server.errors import (
     ActionIdUsed,
     ConsoleError,
-    LinkDown,
     NotFound,
     NotRenewable,
+    RobotLinkDown,
     TooManyRequests,
     Unconfirmed,
 )
@@ -206,7 +206,7 @@ def test_what_moves_is_known_to_have_ended_when_the_link_is_lost() -> None:
     bench = Bench()
     bench.service.updated(update("a"))
     bench.service.updated(update("light", moves=False))
-    bench.service.link_down()
+    bench.service.robot_link_down()
     assert [(each.id, each.state, each.reason) for each in bench.service.newest()] == [
         ("a", "cancelled", "link_down"),
         ("light", "running", ""),
@@ -353,7 +353,7 @@ async def test_over_http_an_id_of_another_request_is_refused() -> None:
 async def test_over_http_a_request_that_did_not_leave_may_be_repeated() -> None:
     bench = Bench()
     bench.robot.up = False
-    with pytest.raises(LinkDown):
+    with pytest.raises(RobotLinkDown):
         await by_http(bench, id="mine")
     bench.robot.up = True
     asking = asyncio.create_task(by_http(bench, id="mine"))
@@ -375,7 +375,12 @@ async def test_over_http_the_robots_first_answer_is_returned() -> None:
 
 @pytest.mark.parametrize(
     ("name", "up", "error"),
-    [("home", True, NotRenewable), ("fly", True, NotFound), ("light", False, LinkDown), ("light", True, Unconfirmed)],
+    [
+        ("home", True, NotRenewable),
+        ("fly", True, NotFound),
+        ("light", False, RobotLinkDown),
+        ("light", True, Unconfirmed),
+    ],
 )
 async def test_over_http_what_cannot_be_done_is_refused_by_name(
     name: str, up: bool, error: type[ConsoleError], monkeypatch: pytest.MonkeyPatch

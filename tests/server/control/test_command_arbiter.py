@@ -69,7 +69,7 @@ class Bench:
         if held:
             self.rules.request("me", "operator", 0.0)
         if up:
-            self.arbiter.link_up(ROBOT)
+            self.arbiter.robot_link_up(ROBOT)
             self.hear(_feedback(7, stopped=stopped))
         self.seat.neutral("me")
 
@@ -136,8 +136,8 @@ def test_what_the_last_holder_executed_is_not_taken_for_the_new_ones() -> None:
 def test_a_repeat_after_the_link_was_lost_is_answered_if_it_was_executed() -> None:
     bench = Bench()
     bench.arbiter.command("me", _command(8))
-    bench.arbiter.link_down()
-    bench.arbiter.link_up(ROBOT)
+    bench.arbiter.robot_link_down()
+    bench.arbiter.robot_link_up(ROBOT)
     bench.hear(_feedback(8))
     assert bench.arbiter.command("me", _command(8)) == Answer(_feedback(8))
     bench.arbiter.epoch_ends()
@@ -171,7 +171,7 @@ def test_a_command_that_may_not_pass_is_refused_with_the_reason(
 
 def test_a_link_without_feedback_yet_is_as_good_as_down() -> None:
     bench = Bench(up=False)
-    bench.arbiter.link_up(ROBOT)
+    bench.arbiter.robot_link_up(ROBOT)
     assert _reason(bench.arbiter.command("me", _command(8))) == "link_down"
 
 
@@ -183,7 +183,7 @@ def test_while_one_is_in_flight_no_other_event_passes() -> None:
 
 def test_the_successor_wraps() -> None:
     bench = Bench(up=False)
-    bench.arbiter.link_up(ROBOT)
+    bench.arbiter.robot_link_up(ROBOT)
     bench.hear(_feedback(MAX_EVENT))
     assert bench.arbiter.command("me", _command(1, NEUTRAL)) == Forward(_command(1, NEUTRAL))
     bench.hear(_feedback(1))
@@ -209,9 +209,9 @@ def test_a_refusal_of_something_else_goes_to_the_holder() -> None:
 def test_what_was_in_flight_is_forgotten_with_the_link() -> None:
     bench = Bench()
     bench.arbiter.command("me", _command(8))
-    bench.arbiter.link_down()
+    bench.arbiter.robot_link_down()
     assert _reason(bench.arbiter.command("me", _command(8))) == "link_down"
-    bench.arbiter.link_up(ROBOT)
+    bench.arbiter.robot_link_up(ROBOT)
     assert bench.arbiter.command("me", _command(8, NEUTRAL)) == Forward(_command(8, NEUTRAL))
 
 
@@ -288,14 +288,14 @@ def test_after_a_stop_a_new_link_a_new_epoch_and_when_the_robot_says_so_a_neutra
         bench.hear(_feedback(8, 2, stopped=True, number=1))
         bench.hear(_feedback(8, 3, number=1))
     elif what == "link":
-        bench.arbiter.link_down()
-        bench.arbiter.link_up(ROBOT)
+        bench.arbiter.robot_link_down()
+        bench.arbiter.robot_link_up(ROBOT)
         bench.hear(_feedback(8, 3))
     elif what == "epoch":
-        bench.arbiter.link_down()
+        bench.arbiter.robot_link_down()
         bench.arbiter.epoch_ends()
         bench.clock.begin("another")
-        bench.arbiter.link_up(ROBOT)
+        bench.arbiter.robot_link_up(ROBOT)
         bench.hear(_feedback(8, 3))
     else:
         bench.hear(_feedback(8, 3, neutral=True))
@@ -360,15 +360,15 @@ class DeskMachine(RuleBasedStateMachine):
         self.on_the_way: list[Command] = []  # forwarded, not yet seen by the bridge
 
     @rule()
-    def link_up(self) -> None:
-        self.arbiter.link_up(ROBOT)
+    def robot_link_up(self) -> None:
+        self.arbiter.robot_link_up(ROBOT)
         self.up, self.proven = True, ""
         self.on_the_way = []
         self.bridge_issues()
 
     @rule()
-    def link_down(self) -> None:
-        self.arbiter.link_down()
+    def robot_link_down(self) -> None:
+        self.arbiter.robot_link_down()
         self.up, self.on_the_way = False, []
 
     @rule(peer=peers, operator=st.booleans())

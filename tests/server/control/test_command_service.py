@@ -68,7 +68,7 @@ class Bench:
         arbiter = CommandArbiter(self.clock, seat)
         self.service = CommandService(arbiter, self, self, self, self.clock, refusals, events)
         SeatRules(seat).request("ann", "operator", 0.0)
-        arbiter.link_up(ROBOT)
+        arbiter.robot_link_up(ROBOT)
         self.show(feedback(7, nonce=5))
         seat.neutral("ann")
 

@@ -178,10 +178,10 @@ class FakeHost:
     def epoch_began(self, epoch: str, description: RobotDescription) -> None:
         self.calls.append(f"epoch {epoch}")
 
-    def link_up(self) -> None:
+    def robot_link_up(self) -> None:
         self.calls.append("up")
 
-    def link_down(self, detail: str) -> None:
+    def robot_link_down(self, detail: str) -> None:
         self.calls.append(f"down {detail}")
 
     def feedback_received(self, feedback: Feedback) -> None:
@@ -267,7 +267,7 @@ def test_a_stop_goes_by_every_link_that_lives_since_one_may_be_stalled(
             sent.extend([self.role] if self.role in living else [])
             return self.role in living
 
-    monkeypatch.setattr("lockstep.server.robot.robot_connection.ReconnectingLink", FakeKeeper)
+    monkeypatch.setattr("lockstep.server.robot.robot_connection.ReconnectingRobotLink", FakeKeeper)
     connection, _ = _connection()
     assert connection.send_stop(Stop()) == bool(living)
     assert sent == list(living)

@@ -38,7 +38,7 @@ class Bench:
         self.arbiter = CommandArbiter(self.clock, self.seat, None, cap)
         self.clock.begin("e")
         self.rules.request("me", "operator", 0.0)
-        self.arbiter.link_up(robot)
+        self.arbiter.robot_link_up(robot)
         self.hear(7)
 
     def hear(self, event: int, **fields: Any) -> None:
@@ -131,8 +131,8 @@ def test_after_a_take_over_a_stop_and_a_new_link_goals_wait_for_the_holders_own_
     bench.hear(13, stop=StopState(number=1))
     assert bench.send(14, (0.0, 0.25, 0.0), "boss") == "not_neutral"
     bench.executed(14, NEUTRAL, "boss")
-    bench.arbiter.link_down()
-    bench.arbiter.link_up(ROBOT)
+    bench.arbiter.robot_link_down()
+    bench.arbiter.robot_link_up(ROBOT)
     bench.hear(15)
     assert bench.send(16, (0.0, 0.25, 0.0), "boss") == "not_neutral"
 

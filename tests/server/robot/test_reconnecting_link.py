@@ -7,9 +7,9 @@ from typing import Any, Self
 import pytest
 
 from lockstep.protocol.messages import LinkRole
-from lockstep.server.robot.credentials import LinkCredentials
+from lockstep.server.robot.credentials import RobotLinkCredentials
 from lockstep.server.robot.dial_in import DialIn
-from lockstep.server.robot.reconnecting_link import ReconnectingLink
+from lockstep.server.robot.reconnecting_link import ReconnectingRobotLink
 from lockstep.server.util.backoff import Backoff
 from lockstep.server.util.state_dir import StateDir
 from tests.waiting import eventually
@@ -28,7 +28,7 @@ class Sink:
     def link_closed(self, role: LinkRole, detail: str) -> None:
         pass
 
-    def link_failed(self, role: LinkRole, error: Exception) -> None:
+    def robot_link_failed(self, role: LinkRole, error: Exception) -> None:
         self.failed.append(error)
 
 
@@ -70,7 +70,9 @@ async def test_a_line_that_comes_while_no_robot_is_paired_gets_no_link(tmp_path:
     """With no key a link would ask for no proof."""
     dial_in = DialIn(StateDir(tmp_path), None, lambda: None)
     sink, line, later = Sink(), Line(), Line()
-    keeper = ReconnectingLink("", 0, "operator", sink, Backoff(0.01, 0.01), LinkCredentials(), dial_in=dial_in)
+    keeper = ReconnectingRobotLink(
+        "", 0, "operator", sink, Backoff(0.01, 0.01), RobotLinkCredentials(), dial_in=dial_in
+    )
     running = asyncio.ensure_future(keeper.run())
     dial_in.arrived("operator", line)
     await eventually(lambda: line.is_closed)
@@ -87,7 +89,7 @@ async def test_a_fault_in_ending_does_not_hide_that_it_was_cancelled(
     FailsAsItEnds.tried, FailsAsItEnds.waiting = [], asyncio.Event()
     monkeypatch.setattr("lockstep.server.robot.reconnecting_link.RobotLink", FailsAsItEnds)
     sink = Sink()
-    keeper = ReconnectingLink("127.0.0.1", 1, "operator", sink, Backoff(0.01, 0.01), LinkCredentials())
+    keeper = ReconnectingRobotLink("127.0.0.1", 1, "operator", sink, Backoff(0.01, 0.01), RobotLinkCredentials())
     running = asyncio.ensure_future(keeper.run())
     await FailsAsItEnds.waiting.wait()
     FailsAsItEnds.waiting.clear()

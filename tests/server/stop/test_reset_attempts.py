@@ -45,5 +45,5 @@ def test_without_an_answer_in_time_and_without_a_link_nobody_knows() -> None:
     assert attempts.expire(PATIENCE / 2) == []
     assert [each.reason for each in attempts.expire(PATIENCE)] == ["link_down"]
     assert attempts.ask(5, "Ann", 3.0)
-    assert [each.reason for each in attempts.link_down("gone")] == ["link_down"]
+    assert [each.reason for each in attempts.robot_link_down("gone")] == ["link_down"]
     assert len(attempts) == 0

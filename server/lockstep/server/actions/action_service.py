@@ -19,7 +19,7 @@ from lockstep.rtc.token_bucket import TokenBucket
 from lockstep.server.actions.action_requests import ActionAnswer, ActionRequests, answered
 from lockstep.server.actions.action_states import ActionStates
 from lockstep.server.audit.records import Actor
-from lockstep.server.errors import LinkDown, NotFound, NotRenewable, TooManyRequests
+from lockstep.server.errors import NotFound, NotRenewable, RobotLinkDown, TooManyRequests
 from lockstep.server.event_clock import EventClock
 from lockstep.server.peers.peer import Peer
 from lockstep.server.session_events import (
@@ -39,7 +39,7 @@ UPDATES, UPDATE_RATE = 100, 50.0  # Hz, of the robot; further updates of progres
 STATES, STATE_RATE = 200, 20.0  # Hz, of the robot; of further new states each action's newest is told later
 
 
-class ActionsLink(Protocol):
+class ActionsRobotLink(Protocol):
     """The part of the connection to the robot that the service uses."""
 
     @property
@@ -56,7 +56,7 @@ class ActionService:
 
     def __init__(
         self,
-        robot: ActionsLink,
+        robot: ActionsRobotLink,
         clock: EventClock,
         holds_seat: Callable[[Peer], bool],
         may_move: Callable[[Peer], bool],
@@ -128,14 +128,14 @@ class ActionService:
             NotFound: the robot has no such action.
             NotRenewable: it moves the robot, and no armed events come over HTTP.
             TooManyRequests: of this link.
-            LinkDown, Unconfirmed: the robot cannot be asked, or has not answered.
+            RobotLinkDown, Unconfirmed: the robot cannot be asked, or has not answered.
         """
         if id in self._requests or self._kept.get(id) is not None:
             self._spend(by)
             return await self._requests.again(id, name, parameters)
         description, feedback = self._robot.description, self._clock.feedback
         if description is None or feedback is None or not self._robot.up:
-            raise LinkDown(self._robot.detail)
+            raise RobotLinkDown(self._robot.detail)
         action = next((each for each in description.actions if each.name == name), None)
         if action is None:
             raise NotFound(f"the robot has no action {name!r}"[:200])
@@ -151,7 +151,7 @@ class ActionService:
             by=by.name,
         )
         if not self._send(act, by, answer):
-            raise LinkDown(self._robot.detail)
+            raise RobotLinkDown(self._robot.detail)
         return await answered(answer)
 
     def _spend(self, by: Actor) -> None:
@@ -212,7 +212,7 @@ class ActionService:
             if not self._kept.is_owing:
                 self._is_owing.clear()
 
-    def link_down(self) -> None:
+    def robot_link_down(self) -> None:
         """Note what the bridge does without this link: it cancels the action that moves the robot."""
         for update in self.newest():
             if update.moves and update.state == "running":

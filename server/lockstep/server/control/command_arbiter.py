@@ -101,7 +101,7 @@ class CommandArbiter:
         self._presses = presses or StopPresses()
         self._speed_cap = speed_cap or SpeedCap("off")
         self._description: RobotDescription | None = None
-        self._link_is_up = False
+        self._robot_link_is_up = False
         self.in_flight: Command | None = None
         self._sender = ""  # peer whose command was forwarded last
         self._sent_event = 0  # of that command; 0 before the first of this epoch
@@ -111,13 +111,13 @@ class CommandArbiter:
         self._shown_stop = 0  # number of the newest stop that a feedback has shown
         self._newest_stop = 0  # number of the newest stop that the bridge has latched
 
-    def link_up(self, description: RobotDescription) -> None:
+    def robot_link_up(self, description: RobotDescription) -> None:
         self._description = description
-        self._link_is_up = True
+        self._robot_link_is_up = True
         self._forget()
 
-    def link_down(self) -> None:
-        self._link_is_up = False
+    def robot_link_down(self) -> None:
+        self._robot_link_is_up = False
         self._forget()
 
     def epoch_ends(self) -> None:
@@ -131,7 +131,7 @@ class CommandArbiter:
         description, feedback = self._description, self._clock.feedback
         if not self._seat.holds(peer):
             return self._refuse(command, "no_seat")
-        if not self._link_is_up or description is None or feedback is None:
+        if not self._robot_link_is_up or description is None or feedback is None:
             return self._refuse(command, "link_down")
         if len(command.values) != len(description.axes):
             return self._refuse(command, "wrong_size", f"{len(description.axes)} values are needed")
@@ -221,7 +221,7 @@ class CommandArbiter:
         self._seat.neutral_needed()
 
     def _forward_rest(self, rest: Rest) -> RestOutcome:
-        if not self._link_is_up:
+        if not self._robot_link_is_up:
             return self._refuse(rest, "link_down")
         if rest == self._resting:
             return Absorbed()

@@ -77,12 +77,12 @@ from lockstep.server.session_events import (
     EventsTraced,
     FeedbackReceived,
     InputRefused,
-    LinkDown,
-    LinkUp,
     MapReceived,
     NavigationReceived,
     NewcomerWelcomed,
     Refused,
+    RobotLinkDown,
+    RobotLinkUp,
     RobotTaken,
     SessionBegan,
     SessionEvents,
@@ -159,7 +159,7 @@ class Console:
         )
         self.traces = TraceService()
         self._shown_stop = StopState()  # state that was published last
-        self._link_was_up = False
+        self._robot_link_was_up = False
         self._robot_is_taken = False  # another console has the robot, and this was published
 
     async def run(self) -> None:
@@ -310,7 +310,7 @@ class Console:
     def epoch_began(self, epoch: str, description: RobotDescription) -> None:
         """Begin an epoch. References of different epochs are never compared, so every peer starts anew."""
         self.stops.epoch_ends(self.clock.stop)
-        self.resets.link_down("the robot bridge has restarted")
+        self.resets.robot_link_down("the robot bridge has restarted")
         self._commands.arbiter.epoch_ends()
         self.actions.epoch_ends()
         self.shadows.epoch_ends()
@@ -324,23 +324,23 @@ class Console:
         self.peers.end_all("new epoch")
         self._media.configure(description)
 
-    def link_up(self) -> None:
+    def robot_link_up(self) -> None:
         if self.robot.description is None:
             raise TypeError("a link is up only after its hello")
-        self._link_was_up = True
-        self.stops.link_up()
-        self._commands.arbiter.link_up(self.robot.description)
-        self.shadows.link_up(self.robot.description)
-        self._events.publish(LinkUp(self.robot.state()))
+        self._robot_link_was_up = True
+        self.stops.robot_link_up()
+        self._commands.arbiter.robot_link_up(self.robot.description)
+        self.shadows.robot_link_up(self.robot.description)
+        self._events.publish(RobotLinkUp(self.robot.state()))
 
-    def link_down(self, detail: str) -> None:
-        was_up, self._link_was_up = self._link_was_up, False
+    def robot_link_down(self, detail: str) -> None:
+        was_up, self._robot_link_was_up = self._robot_link_was_up, False
         self.seat.end_offer(SeatInput.LINK_LOST)
-        self._commands.arbiter.link_down()
-        self.stops.link_down()
-        self.resets.link_down(detail)
-        self.actions.link_down()
-        self._events.publish(LinkDown(self.robot.state(), detail, was_up))
+        self._commands.arbiter.robot_link_down()
+        self.stops.robot_link_down()
+        self.resets.robot_link_down(detail)
+        self.actions.robot_link_down()
+        self._events.publish(RobotLinkDown(self.robot.state(), detail, was_up))
         is_taken = detail.startswith("taken")
         if is_taken and (was_up or not self._robot_is_taken):
             self._events.publish(RobotTaken(detail))

@@ -8,12 +8,12 @@ from lockstep.server.audit.records import AuditTrouble
 from lockstep.server.peers.peer_registry import PeerRegistry
 from lockstep.server.session_events import (
     ActionUpdated,
-    LinkDown,
-    LinkUp,
     NavigationReceived,
     NewcomerWelcomed,
     NoteWritten,
     ParticipantsChanged,
+    RobotLinkDown,
+    RobotLinkUp,
     RobotTaken,
     SeatChanged,
     SessionEvents,
@@ -36,8 +36,8 @@ AUDIT_UNWRITTEN = (
 AUDIT_WRITTEN = "The audit log is written again."
 
 Told = (
-    LinkUp
-    | LinkDown
+    RobotLinkUp
+    | RobotLinkDown
     | RobotTaken
     | SeatChanged
     | SpeedCapChanged
@@ -90,7 +90,7 @@ class Notices:
     def _tell(self, event: Told) -> None:
         announce = self._peers.announce
         match event:
-            case LinkUp() | LinkDown():
+            case RobotLinkUp() | RobotLinkDown():
                 if event.state is not None:
                     announce(event.state)
             case RobotTaken():

@@ -13,8 +13,6 @@ from lockstep.server.session_events import (
     ActionRefused,
     ActionUpdated,
     EpochBegan,
-    LinkDown,
-    LinkUp,
     NoteWritten,
     PeerJoined,
     PeerLeft,
@@ -22,6 +20,8 @@ from lockstep.server.session_events import (
     Refused,
     ResetDone,
     ResetRefused,
+    RobotLinkDown,
+    RobotLinkUp,
     RobotTaken,
     SeatChanged,
     SessionBegan,
@@ -43,8 +43,8 @@ STOPS, STOP_RATE = 5, 0.2  # Hz, of stops of one link that are recorded in full;
 Audited = (
     SessionBegan
     | EpochBegan
-    | LinkUp
-    | LinkDown
+    | RobotLinkUp
+    | RobotLinkDown
     | RobotTaken
     | AuditTrouble
     | SeatChanged
@@ -86,9 +86,9 @@ class SessionAudit:
                 audit.started(console_version(), page_build(), PROTOCOL_VERSION)
             case EpochBegan():
                 audit.epoch(event.description.label, description_hash(event.description))
-            case LinkUp():
+            case RobotLinkUp():
                 audit.record("link_up")
-            case LinkDown():
+            case RobotLinkDown():
                 if event.was_up:
                     audit.record("link_down", detail=event.detail)
             case RobotTaken():

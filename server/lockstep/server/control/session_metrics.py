@@ -16,11 +16,11 @@ from lockstep.server.session_events import (
     EpochBegan,
     FeedbackReceived,
     InputRefused,
-    LinkDown,
-    LinkUp,
     Refused,
     ResetDone,
     RestForwarded,
+    RobotLinkDown,
+    RobotLinkUp,
     SeatChanged,
     SessionEvents,
     SpeedCapChanged,
@@ -42,8 +42,8 @@ Counted = (
     | ActionRefused
     | StatusReceived
     | EpochBegan
-    | LinkUp
-    | LinkDown
+    | RobotLinkUp
+    | RobotLinkDown
     | StopAsked
     | ResetDone
     | SeatChanged
@@ -106,10 +106,10 @@ class SessionMetrics:
                 metrics.status_shown(event.status)
             case EpochBegan():
                 metrics.status_shown(Status(event=1))  # the last one was another bridge's
-            case LinkUp():
-                metrics.link_up.set(1)
-            case LinkDown():
-                metrics.link_up.set(0)
+            case RobotLinkUp():
+                metrics.robot_link_up.set(1)
+            case RobotLinkDown():
+                metrics.robot_link_up.set(0)
                 if event.was_up:
                     metrics.link_losses.inc()
             case StopAsked():

@@ -2,7 +2,7 @@
 
 from lockstep.server.media.pipeline.capture_clock import CaptureClock
 
-__all__ = ["LinkTimes", "RecordClock"]
+__all__ = ["RobotLinkTimes", "RecordClock"]
 
 SECOND = 1_000_000_000
 STEP = 0.001  # s by which the estimate has to change before it is taken
@@ -20,7 +20,7 @@ class RecordClock:
         return self._offset + round(monotonic * SECOND)
 
 
-class LinkTimes:
+class RobotLinkTimes:
     """Maps the robot bridge's monotonic clock to the console's. The mapping changes only with a feedback.
 
     So a reader gets the bridge's own time of a picture back exactly, by the feedback before it. A picture that came

@@ -9,10 +9,10 @@ from pydantic import SecretStr
 from lockstep.protocol.link_secret import LinkSecret
 from lockstep.robot_bridge.link.link_tls import LinkTls
 
-__all__ = ["LinkCredentials", "LinkSettings", "link_access"]
+__all__ = ["RobotLinkCredentials", "RobotLinkSettings", "link_access"]
 
 
-class LinkSettings(Protocol):
+class RobotLinkSettings(Protocol):
     @property
     def robot_uses_tls(self) -> bool: ...
     @property
@@ -27,12 +27,12 @@ class LinkSettings(Protocol):
     def link_tls_ca(self) -> Path | None: ...
 
 
-class LinkCredentials(NamedTuple):
+class RobotLinkCredentials(NamedTuple):
     secret: LinkSecret | None = None
     tls: ssl.SSLContext | None = None
 
 
-def link_access(settings: LinkSettings) -> LinkCredentials:
+def link_access(settings: RobotLinkSettings) -> RobotLinkCredentials:
     """Read the credentials that the settings name. Raises SecretError if a file or the secret is invalid."""
     secret = None
     if settings.link_secret_file is not None:
@@ -40,6 +40,6 @@ def link_access(settings: LinkSettings) -> LinkCredentials:
     elif settings.link_secret is not None:
         secret = LinkSecret(settings.link_secret.get_secret_value())
     if not settings.robot_uses_tls:
-        return LinkCredentials(secret)
+        return RobotLinkCredentials(secret)
     files = LinkTls(certificate=settings.link_tls_cert, key=settings.link_tls_key, authority=settings.link_tls_ca)
-    return LinkCredentials(secret, files.client_context())
+    return RobotLinkCredentials(secret, files.client_context())

@@ -11,13 +11,13 @@ from lockstep.protocol.description import RobotDescription
 from lockstep.protocol.errors import LinkError, LinkLost
 from lockstep.protocol.messages import LinkMessage, LinkRole
 from lockstep.robot_bridge.link.link_client import RobotLink
-from lockstep.server.robot.credentials import LinkCredentials
+from lockstep.server.robot.credentials import RobotLinkCredentials
 from lockstep.server.robot.dial_in import DialIn
 from lockstep.server.util.backoff import Backoff
 from lockstep.server.util.cooperative_scheduler import turns_of_loop
 from lockstep.server.util.uncancelled import attempt
 
-__all__ = ["ReconnectingLink", "LinkSink"]
+__all__ = ["ReconnectingRobotLink", "RobotLinkSink"]
 
 log = structlog.get_logger(__name__)
 
@@ -25,17 +25,17 @@ HEALTHY_AFTER = 5.0  # s up; then the next loss is retried soon again
 FAULT = "internal_error: this console failed on a message of the robot"
 
 
-class LinkSink(Protocol):
+class RobotLinkSink(Protocol):
     """Takes the events of a link. `link_closed` also follows a try that failed, with the reason; `link_failed` comes
     before it if one of these methods raised `error`."""
 
     def link_opened(self, role: LinkRole, epoch: str, description: RobotDescription) -> None: ...
     def link_closed(self, role: LinkRole, detail: str) -> None: ...
     def link_received(self, role: LinkRole, message: LinkMessage) -> None: ...
-    def link_failed(self, role: LinkRole, error: Exception) -> None: ...
+    def robot_link_failed(self, role: LinkRole, error: Exception) -> None: ...
 
 
-class ReconnectingLink:
+class ReconnectingRobotLink:
     """One link to the robot. An exception of the sink ends this link alone, which then connects again."""
 
     def __init__(
@@ -43,9 +43,9 @@ class ReconnectingLink:
         host: str,
         port: int,
         role: LinkRole,
-        sink: LinkSink,
+        sink: RobotLinkSink,
         backoff: Backoff,
-        access: LinkCredentials,
+        access: RobotLinkCredentials,
         name: str = "console",
         dial_in: DialIn | None = None,
     ) -> None:
@@ -103,7 +103,7 @@ class ReconnectingLink:
             except LinkError as error:
                 self._sink.link_closed(self._role, error.detail)
             except Exception as error:
-                self._sink.link_failed(self._role, error)
+                self._sink.robot_link_failed(self._role, error)
                 self._sink.link_closed(self._role, FAULT)
             await asyncio.sleep(self._backoff.next())
 

@@ -25,9 +25,9 @@ from lockstep.protocol.messages import (
     Stop,
 )
 from lockstep.server.robot.console_name import console_name
-from lockstep.server.robot.credentials import LinkSettings, link_access
+from lockstep.server.robot.credentials import RobotLinkSettings, link_access
 from lockstep.server.robot.dial_in import DialIn
-from lockstep.server.robot.reconnecting_link import ReconnectingLink
+from lockstep.server.robot.reconnecting_link import ReconnectingRobotLink
 from lockstep.server.telemetry.faults import Faults
 from lockstep.server.util.backoff import Backoff
 
@@ -38,7 +38,7 @@ log = structlog.get_logger(__name__)
 _ROLES: tuple[LinkRole, ...] = ("operator", "media")
 
 
-class RobotSettings(LinkSettings, Protocol):
+class RobotSettings(RobotLinkSettings, Protocol):
     @property
     def robot_host(self) -> str: ...
     @property
@@ -55,8 +55,8 @@ class RobotHost(Protocol):
     """Takes the reports of the connection. All methods are called on the loop and return at once."""
 
     def epoch_began(self, epoch: str, description: RobotDescription) -> None: ...
-    def link_up(self) -> None: ...
-    def link_down(self, detail: str) -> None: ...
+    def robot_link_up(self) -> None: ...
+    def robot_link_down(self, detail: str) -> None: ...
     def feedback_received(self, feedback: Feedback) -> None: ...
     def link_message_received(self, message: LinkMessage) -> None: ...  # neither feedback nor media
 
@@ -98,7 +98,7 @@ class RobotConnection:
         # A robot that dials in paces its tries itself, and is taken as soon as it comes.
         cap = settings.link_backoff_cap if dial_in is None else settings.link_backoff
         self._keepers = {
-            role: ReconnectingLink(
+            role: ReconnectingRobotLink(
                 settings.robot_host,
                 settings.robot_port,
                 role,
@@ -163,7 +163,7 @@ class RobotConnection:
         if role == "operator":
             self.reached.set()
             self.detail = ""
-            self._host.link_up()
+            self._host.robot_link_up()
 
     def link_closed(self, role: LinkRole, detail: str) -> None:
         if role != "operator":
@@ -173,9 +173,9 @@ class RobotConnection:
         self.detail = detail
         if changed:
             log.warning("robot link down", detail=detail)
-            self._host.link_down(detail)
+            self._host.robot_link_down(detail)
 
-    def link_failed(self, role: LinkRole, error: Exception) -> None:
+    def robot_link_failed(self, role: LinkRole, error: Exception) -> None:
         self._faults.caught(f"robot link {role}", error)
 
     def link_received(self, role: LinkRole, message: LinkMessage) -> None:

@@ -12,13 +12,13 @@ from lockstep.server.errors import (
     ConsoleError,
     EpisodeEmpty,
     EpisodeOpen,
-    LinkDown,
     NoEpisode,
     NotAllowed,
     NoTask,
     OtherEpisode,
     RecordingFailed,
     RecordingOff,
+    RobotLinkDown,
     TooManyRequests,
 )
 from lockstep.server.http.json_response import json_answer
@@ -35,7 +35,7 @@ ERRORS: dict[EpisodeReason, type[ConsoleError]] = {
     "not_allowed": NotAllowed,
     "too_often": TooManyRequests,
     "recording_off": RecordingOff,
-    "link_down": LinkDown,
+    "link_down": RobotLinkDown,
     "no_task": NoTask,
     "episode_open": EpisodeOpen,
     "no_episode": NoEpisode,

@@ -34,7 +34,6 @@ from lockstep.server.errors import (
     EpisodeOpen,
     HostRefused,
     HttpError,
-    LinkDown,
     LinkExpired,
     LinkOtherRobot,
     LinkRevoked,
@@ -58,6 +57,7 @@ from lockstep.server.errors import (
     RecordingUnreadable,
     ResetNotKept,
     ResetTooSoon,
+    RobotLinkDown,
     RobotUnreachable,
     SceneUnavailable,
     ShuttingDown,
@@ -75,7 +75,7 @@ from lockstep.server.errors import (
     WrongMediaType,
 )
 from lockstep.server.http.problem import PROBLEM_JSON, Problem
-from lockstep.server.recording.episodes.listed import RecordingEpisodes
+from lockstep.server.recording.episodes.episode_list import RecordingEpisodes
 from lockstep.server.routes.access import MAX_RECORDS, AuditPage, InvitationList, InvitationRequest, NewInvitation
 from lockstep.server.routes.actions import ActionList, ActionRequest, RobotStatus
 from lockstep.server.routes.dial_in import NewPairingCode, RobotDialInfo
@@ -255,13 +255,13 @@ OPERATIONS: tuple[Operation, ...] = (
     ),
     Operation(
         *("post", "/api/stop", "Stop the robot, latched. Every role may do this.", 200, Delivered),
-        errors=(Silenced, PressUsed, LinkDown, Unconfirmed, *WITH_JSON),
+        errors=(Silenced, PressUsed, RobotLinkDown, Unconfirmed, *WITH_JSON),
         body=StopRequest,
     ),
     Operation(
         *("post", "/api/reset", "Release the latched stop that the body names.", 200, Released),
         errors=(
-            *(NotAllowed, NoSeat, StaleReset, ResetTooSoon, LockedOut, LinkDown, Unconfirmed, ResetNotKept),
+            *(NotAllowed, NoSeat, StaleReset, ResetTooSoon, LockedOut, RobotLinkDown, Unconfirmed, ResetNotKept),
             *WITH_JSON,
         ),
         body=ResetRequest,
@@ -270,13 +270,13 @@ OPERATIONS: tuple[Operation, ...] = (
     Operation("post", "/api/seat/take_over", "Take the robot from the policy that drives.", 200, Seat, (NotAllowed,)),
     Operation(
         *("post", "/api/seat/offer", "Let a policy drive, or no longer.", 200, Seat),
-        (BadJson, BodyTooLarge, BodyTooSlow, WrongMediaType, NotAllowed, NoSeat, TooManyRequests, LinkDown),
+        (BadJson, BodyTooLarge, BodyTooSlow, WrongMediaType, NotAllowed, NoSeat, TooManyRequests, RobotLinkDown),
         body=OfferRequest,
     ),
     Operation("get", "/api/actions", "How the newest actions of the robot do.", 200, ActionList),
     Operation(
         *("post", "/api/actions/{name}", "Ask for an action that moves nothing.", 200, ActionUpdate),
-        errors=(NotAllowed, NoSeat, NotFound, NotRenewable, ActionIdUsed, LinkDown, Unconfirmed, *WITH_JSON),
+        errors=(NotAllowed, NoSeat, NotFound, NotRenewable, ActionIdUsed, RobotLinkDown, Unconfirmed, *WITH_JSON),
         body=ActionRequest,
         parameters=(ACTION,),
     ),
@@ -292,7 +292,7 @@ OPERATIONS: tuple[Operation, ...] = (
             EpisodeEmpty,
             NoTask,
             BadParameter,
-            LinkDown,
+            RobotLinkDown,
             RecordingFailed,
             *WITH_JSON,
         ),

@@ -7,7 +7,7 @@ from fastapi import APIRouter, Depends, Request, Response
 
 from lockstep.protocol.console import Seat
 from lockstep.server.auth.tokens import Right
-from lockstep.server.errors import LinkDown, NotAllowed
+from lockstep.server.errors import NotAllowed, RobotLinkDown
 from lockstep.server.http.json_response import json_answer
 from lockstep.server.http.request_body import read_json
 from lockstep.server.state.dependencies import authorized, dependencies
@@ -49,7 +49,7 @@ async def offer(request: Request, caller: Caller) -> Response:
         return json_answer(console.seat.message())
     match console.why_no_offer():
         case "link_down":
-            raise LinkDown(console.robot.detail)
+            raise RobotLinkDown(console.robot.detail)
         case "stopped":
             raise NotAllowed("the robot is stopped")
     console.seat_by_link.offer(caller.token_id, caller.actor, policy=wanted.peer)

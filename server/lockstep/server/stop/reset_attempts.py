@@ -69,7 +69,7 @@ class ResetAttempts(Generic[Asker]):
         late = [number for number, attempt in self._attempts.items() if now >= attempt.until]
         return [each for number in late for each in self._end(number, "link_down", "the robot has not answered")]
 
-    def link_down(self, detail: str) -> list[ResetOutcome[Asker]]:
+    def robot_link_down(self, detail: str) -> list[ResetOutcome[Asker]]:
         return [each for number in list(self._attempts) for each in self._end(number, "link_down", detail)]
 
     def _end(self, number: int, reason: RefusalReason | None, detail: str = "") -> list[ResetOutcome[Asker]]:

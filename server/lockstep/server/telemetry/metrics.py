@@ -65,7 +65,7 @@ class Metrics:
             "lockstep_peers_ended", "Peers that have left, by reason", ["why"], registry=registry
         )
         self.scene_viewers = Gauge("lockstep_scene_viewers", "Viewers of the 3D scene", registry=registry)
-        self.link_up = Gauge("lockstep_robot_link_up", "1 if the robot link is up, else 0", registry=registry)
+        self.robot_link_up = Gauge("lockstep_robot_link_up", "1 if the robot link is up, else 0", registry=registry)
         self.link_losses = Counter(
             "lockstep_robot_link_losses", "Number of times that the robot link went down", registry=registry
         )

@@ -27,7 +27,7 @@ def _shadow(event: int, values: list[float | None], issue: int = 1, nonce: int |
 
 def _judge() -> ShadowJudge:
     judge = ShadowJudge()
-    judge.link_up(ROBOT)
+    judge.robot_link_up(ROBOT)
     judge.feedback(_feedback(1), None)
     return judge
 
@@ -73,7 +73,7 @@ def test_a_goal_axis_that_turns_on_and_on_is_compared_the_shorter_way() -> None:
     turning = Axis(
         name="y", label="y", unit="rad", minimum=-4, maximum=4, slew=1, brake=1, kind="goal", reach=1, wrap=2 * math.pi
     )
-    judge.link_up(RobotDescription(name="r", label="R", axes=(turning,)))
+    judge.robot_link_up(RobotDescription(name="r", label="R", axes=(turning,)))
     judge.feedback(_feedback(1), None)
     judge.take("p", _shadow(2, [math.pi - 0.1]))
     [judged] = judge.feedback(_feedback(2), Command(event=2, issue=1, values=[-math.pi + 0.1]))

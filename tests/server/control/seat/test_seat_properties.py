@@ -38,7 +38,7 @@ class SeatMachine(RuleBasedStateMachine):
         self.seat_rules = SeatRules(self.seat)
         self.arbiter = CommandArbiter(self.clock, self.seat)
         self.clock.begin("epoch")
-        self.arbiter.link_up(ROBOT)
+        self.arbiter.robot_link_up(ROBOT)
         self.sent: list[tuple[str | None, Command | Rest]] = []
         self.event = 0
         self.answer()

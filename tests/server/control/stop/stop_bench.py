@@ -137,8 +137,8 @@ class StopBench:
 
     def lose(self) -> None:
         self.robot.up = False
-        self.service.link_down()
-        self.resets.link_down("gone")
+        self.service.robot_link_down()
+        self.resets.robot_link_down("gone")
 
     def reset(self, who: str, number: int, *, peer: bool = False) -> "asyncio.Task[None]":
         actor = self.peers.all[who].actor

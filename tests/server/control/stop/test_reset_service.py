@@ -9,11 +9,11 @@ from lockstep.protocol.messages import Refusal, RefusalReason, Reset, Stop, Stop
 from lockstep.server.control.stop import reset_service
 from lockstep.server.errors import (
     ConsoleError,
-    LinkDown,
     LockedOut,
     NoSeat,
     NotAllowed,
     ResetTooSoon,
+    RobotLinkDown,
     StaleReset,
     TooManyRequests,
     Unconfirmed,
@@ -114,7 +114,7 @@ async def test_without_a_link_and_without_an_answer_a_reset_says_so(
     bench.stopped(4)
     assert await raised(bench.reset("ann", 4)) is Unconfirmed
     bench.lose()
-    assert await raised(bench.reset("ann", 4)) is LinkDown
+    assert await raised(bench.reset("ann", 4)) is RobotLinkDown
 
 
 async def test_a_peer_is_told_of_a_refused_reset_by_its_number_on_the_channel_that_it_came_from(

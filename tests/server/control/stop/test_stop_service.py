@@ -13,7 +13,7 @@ from lockstep.server.audit.records import Actor
 from lockstep.server.control.session_audit import STOPS
 from lockstep.server.control.stop import stop_service
 from lockstep.server.errors import (
-    LinkDown,
+    RobotLinkDown,
 )
 from lockstep.server.stop.stop_presses import Press, new_press
 from tests.server.control.stop.stop_bench import StopBench, raised
@@ -101,7 +101,7 @@ async def test_when_the_link_is_back_all_that_has_no_answer_goes_first_in_order(
     bench.lose()
     bench.press("bob", "b")
     bench.robot.up, bench.robot.sent = True, []
-    bench.service.link_up()
+    bench.service.robot_link_up()
     assert [cast(Stop, each).press for each in bench.robot.sent] == ["a", "b"]
     bench.take("a", 1)
     bench.take("b", 2)
@@ -112,7 +112,7 @@ async def test_when_the_link_is_back_all_that_has_no_answer_goes_first_in_order(
     ]
     bench.lose()
     bench.robot.up, bench.robot.sent = True, []
-    bench.service.link_up()
+    bench.service.robot_link_up()
     assert bench.robot.sent == []
 
 
@@ -124,9 +124,9 @@ async def test_stop_reset_stop_and_then_no_link_is_a_stop_that_is_sent_again(ben
     await asyncio.sleep(0)
     bench.press("bob", "b")  # the old latch is still what the feedback shows
     bench.lose()
-    assert await raised(resetting) is LinkDown
+    assert await raised(resetting) is RobotLinkDown
     bench.robot.up, bench.robot.sent = True, []
-    bench.service.link_up()
+    bench.service.robot_link_up()
     assert [cast(Stop, each).press for each in bench.robot.sent] == ["b"]
 
 
@@ -180,7 +180,7 @@ async def test_a_bridge_that_starts_anew_is_told_of_the_stop_that_held(bench: St
     bench.show(StopState(stopped=True, by="ann", reason="smoke", number=1, press="a"))
     bench.robot.sent = []
     bench.service.epoch_ends(bench.clock.stop)
-    bench.service.link_up()
+    bench.service.robot_link_up()
     assert bench.robot.sent == [Stop(by="ann", reason="smoke", press="a")]
     assert bench.service.unconfirmed
     bench.take("a", 1)
@@ -251,7 +251,7 @@ async def test_presses_that_are_held_go_with_all_others_when_the_link_is_back(be
     for number in range(stop_service.PRESSES + 5):
         bench.press("olga", str(number))
     bench.robot.up = True
-    bench.service.link_up()
+    bench.service.robot_link_up()
     assert len(bench.robot.sent) == stop_service.PRESSES + 1
     assert not (await bench.service.outcome(str(stop_service.PRESSES + 4))).delivered
     bench.take(str(stop_service.PRESSES), 9)

@@ -16,7 +16,7 @@ from lockstep.server.recording.browsing.catalog import (
     EpisodeCatalog,
 )
 from lockstep.server.recording.browsing.worker import RecordingWorker
-from lockstep.server.recording.episodes.listed import RecordingEpisodes
+from lockstep.server.recording.episodes.episode_list import RecordingEpisodes
 from lockstep.server.recording.library import Library
 from lockstep.server.recording.recording_store import RecordingEntry
 from lockstep.server.recording.rights import RecordingReaderRight

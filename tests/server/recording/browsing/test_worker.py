@@ -22,7 +22,7 @@ from lockstep.server.recording.browsing import worker as worker_module
 from lockstep.server.recording.browsing.jobs import ListEpisodes, ShowPicture
 from lockstep.server.recording.browsing.worker import RecordingWorker
 from lockstep.server.recording.episodes.edits import edits_path
-from lockstep.server.recording.episodes.listed import RecordingEpisodes
+from lockstep.server.recording.episodes.episode_list import RecordingEpisodes
 from tests.server.recording.makers import SECOND, START, Story
 from tests.server.recording.test_episode_export import KEPT_AND_NOT, recording
 from tests.waiting import eventually

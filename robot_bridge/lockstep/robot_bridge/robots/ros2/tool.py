@@ -16,9 +16,9 @@ from lockstep.robot_bridge.kinematics.pose_solver import JointBounds
 from lockstep.robot_bridge.kinematics.rotations import quaternion
 from lockstep.robot_bridge.kinematics.surfaces import body_surfaces
 from lockstep.robot_bridge.robots.ros2.settings import Arm, ToolObstacle
+from lockstep.robot_bridge.robots.tool_pose.arm_solver import tool_solver
 from lockstep.robot_bridge.robots.tool_pose.axes import ToolAxes, shortest_hold, tool_axes, tool_layer
 from lockstep.robot_bridge.robots.tool_pose.posed_tool import PosedTool, ToolPlace, tool_pose
-from lockstep.robot_bridge.robots.tool_pose.solver import tool_solver
 from lockstep.robot_bridge.yaml_file import SettingsPlace
 
 __all__ = ["ToolDescription", "arm_tool", "describe_tool"]

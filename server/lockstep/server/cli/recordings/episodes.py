@@ -14,7 +14,12 @@ from lockstep.server.cli.access.access import MakeSettings
 from lockstep.server.cli.options import RobotOption, StateDirOption
 from lockstep.server.cli.recordings.recordings import DirectoryOption, File, recording_file
 from lockstep.server.recording.episodes.edits import EpisodeEdit, EpisodeEditRefused, add_edit, edited, read_edits
-from lockstep.server.recording.episodes.listed import EpisodeChange, ListedEpisode, RecordingEpisodes, listed_episodes
+from lockstep.server.recording.episodes.episode_list import (
+    EpisodeChange,
+    ListedEpisode,
+    RecordingEpisodes,
+    listed_episodes,
+)
 from lockstep.server.recording.errors import RecordingError
 from lockstep.server.recording.export.lerobot_rows import episodes_of
 from lockstep.server.recording.format.episodes import EpisodeEntry

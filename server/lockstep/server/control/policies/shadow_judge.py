@@ -51,7 +51,7 @@ class ShadowJudge:
         self._waiting: dict[str, tuple[Shadow, ShadowJudgement]] = {}  # newest of each peer, for the next event
         self._judged: dict[str, int] = {}  # peer -> the newest event for which a shadow of it was judged
 
-    def link_up(self, description: RobotDescription) -> None:
+    def robot_link_up(self, description: RobotDescription) -> None:
         self._description = description
 
     def epoch_ends(self) -> None:

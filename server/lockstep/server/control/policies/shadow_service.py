@@ -25,8 +25,8 @@ class ShadowService:
         self._events = events
         self._told = RateLimits(TOLD_RATE, TOLD)
 
-    def link_up(self, description: RobotDescription) -> None:
-        self._judge.link_up(description)
+    def robot_link_up(self, description: RobotDescription) -> None:
+        self._judge.robot_link_up(description)
 
     def epoch_ends(self) -> None:
         self._judge.epoch_ends()

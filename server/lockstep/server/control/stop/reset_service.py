@@ -14,12 +14,12 @@ from lockstep.protocol.console import PEOPLE
 from lockstep.protocol.messages import Refusal, RefusalReason, Reset, StopState
 from lockstep.server.audit.records import Actor
 from lockstep.server.errors import (
-    LinkDown,
     LockedOut,
     NoSeat,
     NotAllowed,
     ResetNotKept,
     ResetTooSoon,
+    RobotLinkDown,
     StaleReset,
     TooManyRequests,
     Unconfirmed,
@@ -40,7 +40,7 @@ RESETS, RESET_RATE = 5, 1.0  # Hz, of one link
 ROBOT_RESETS, ROBOT_RESET_RATE = 10, 2.0  # Hz, of all links together
 
 
-class ResetsLink(Protocol):
+class ResetsRobotLink(Protocol):
     """The part of the connection to the robot that the service uses."""
 
     @property
@@ -79,7 +79,7 @@ class ResetService:
 
     def __init__(
         self,
-        robot: ResetsLink,
+        robot: ResetsRobotLink,
         stops: TakenStops,
         peers: PeerRegistry,
         clock: EventClock,
@@ -105,7 +105,7 @@ class ResetService:
             TooManyRequests: of this link, or for this robot.
             StaleReset: another stop is the newest.
             ResetTooSoon, LockedOut, ResetNotKept: as the bridge says.
-            LinkDown, Unconfirmed: the robot cannot be told, or has not answered.
+            RobotLinkDown, Unconfirmed: the robot cannot be told, or has not answered.
         """
         done: asyncio.Future[ResetOutcome[_Asker]] = asyncio.get_running_loop().create_future()
 
@@ -132,9 +132,9 @@ class ResetService:
 
         self._ask(_Asker(peer.actor, "stop", tell), number)
 
-    def link_down(self, detail: str) -> None:
+    def robot_link_down(self, detail: str) -> None:
         """Called when the link for commands is down, or another bridge has begun."""
-        self._settle(self._attempts.link_down(detail))
+        self._settle(self._attempts.robot_link_down(detail))
 
     def feedback(self, stop: StopState) -> None:
         if self._attempts:
@@ -167,7 +167,7 @@ class ResetService:
         elif self._attempts.ask(number, asker, time.monotonic()):
             self._wake.set()
             if not self._robot.send(Reset(by=asker.by.name[:500], number=number)):
-                self._settle(self._attempts.link_down(self._robot.detail))
+                self._settle(self._attempts.robot_link_down(self._robot.detail))
 
     def _refusal(self, by: Actor, number: int) -> tuple[RefusalReason, str] | None:
         """Return the reason why `by` may not reset now; None: it may."""
@@ -221,4 +221,4 @@ class ResetService:
             case "not_kept":
                 return ResetNotKept(detail)
             case _:
-                return Unconfirmed(detail) if self._robot.up else LinkDown(detail)
+                return Unconfirmed(detail) if self._robot.up else RobotLinkDown(detail)

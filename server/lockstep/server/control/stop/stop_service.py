@@ -13,7 +13,7 @@ import structlog
 from lockstep.protocol.messages import Stop, StopState, StopTaken
 from lockstep.server.audit.records import Actor
 from lockstep.server.control.stop.stop_silence import SILENCED, StopSilence
-from lockstep.server.errors import LinkDown, Silenced, Unavailable, Unconfirmed
+from lockstep.server.errors import RobotLinkDown, Silenced, Unavailable, Unconfirmed
 from lockstep.server.event_clock import EventClock
 from lockstep.server.peers.peer_registry import PeerRegistry
 from lockstep.server.session_events import (
@@ -32,7 +32,7 @@ from lockstep.server.stop.stop_keeper import StopKeeper
 from lockstep.server.stop.stop_presses import AlreadyTaken, Held, NewPress, Press, Settled, told_id
 from lockstep.server.util.rate_limits import RateLimits
 
-__all__ = ["StopAnswer", "StopOutcome", "StopService", "StopsLink"]
+__all__ = ["StopAnswer", "StopOutcome", "StopService", "StopsRobotLink"]
 
 log = structlog.get_logger(__name__)
 
@@ -43,7 +43,7 @@ PRESSES, PRESS_RATE = 20, 20.0  # Hz, of one link by any path: new ones, and ans
 LINES, LINE_RATE = 5, 0.2  # Hz, of the log, for stops of one link
 
 
-class StopsLink(Protocol):
+class StopsRobotLink(Protocol):
     """The part of the connection to the robot that the service uses."""
 
     @property
@@ -82,7 +82,7 @@ class StopAnswer(NamedTuple):
 
     def error(self) -> Unavailable:
         """Return the error for a stop that is not delivered."""
-        return Unconfirmed(self.outcome.detail) if self.up else LinkDown(self.outcome.detail)
+        return Unconfirmed(self.outcome.detail) if self.up else RobotLinkDown(self.outcome.detail)
 
 
 class StopService:
@@ -93,7 +93,7 @@ class StopService:
 
     def __init__(
         self,
-        robot: StopsLink,
+        robot: StopsRobotLink,
         keeper: StopKeeper,
         peers: PeerRegistry,
         clock: EventClock,
@@ -212,14 +212,14 @@ class StopService:
 
     # events of the link
 
-    def link_up(self) -> None:
+    def robot_link_up(self) -> None:
         """Called when some link is up: send all pending presses first, in order."""
         for press in self._presses.pending:
             self._robot.send_stop(press.message())
         self._sent_at = time.monotonic()
         self._wake.set()
 
-    def link_down(self) -> None:
+    def robot_link_down(self) -> None:
         """Called when the link for commands is down: unanswered presses go by the other link, or are kept on disk."""
         for press in self._presses.pending:
             if not self._robot.send_stop(press.message()):
@@ -277,7 +277,7 @@ class StopService:
         if late:
             self._news.send()
         if now - self._sent_at >= AGAIN_SECONDS and self._presses.pending:
-            self.link_up()
+            self.robot_link_up()
         return bool(self._presses.pending)
 
 

@@ -138,7 +138,8 @@ async def running(
         tls: the certificate to encrypt with; None: nothing is encrypted
 
     Raises:
-        ExceptionGroup: it failed, which cancels the block. An exception of the block comes out as it is.
+        ExceptionGroup: it failed, which cancels the block. An exception of the block comes out as it is, and so does
+            that of a server that does not start.
     """
     config = uvicorn.Config(
         app,
@@ -156,18 +157,25 @@ async def running(
         ssl_keyfile=None if tls is None else tls.key,
     )
     failure: BaseException | None = None
-    async with asyncio.TaskGroup() as tasks:
-        server = _Server(config, http, listener, tasks)
-        serving = tasks.create_task(server.serve([listener]), name="http")
-        try:
-            await server.settled.wait()
-            if not server.started:
-                raise RuntimeError("the console did not start")
-            yield
-        except BaseException as error:
-            failure = error  # raised behind the group, which would wrap it
-        server.should_exit = True
-        await asyncio.wait((serving,))
+    started = False
+    try:
+        async with asyncio.TaskGroup() as tasks:
+            server = _Server(config, http, listener, tasks)
+            serving = tasks.create_task(server.serve([listener]), name="http")
+            try:
+                await server.settled.wait()
+                if not server.started:
+                    raise RuntimeError("the console did not start")
+                started = True
+                yield
+            except BaseException as error:
+                failure = error  # raised behind the group, which would wrap it
+            server.should_exit = True
+            await asyncio.wait((serving,))
+    except BaseExceptionGroup as errors:
+        if started:
+            raise
+        raise errors.exceptions[0] from None  # the caller says what is wrong with its settings
     try:
         if failure is not None:
             raise failure

@@ -29,7 +29,7 @@ from lockstep.server.recording.browsing.jobs import ListEpisodes, MakeReport, Sh
 from lockstep.server.recording.browsing.worker import RecordingWorker
 from lockstep.server.recording.episodes.edit_rules import EditedEpisode, EpisodeEdit, apply_edits
 from lockstep.server.recording.episodes.edits import EpisodeEditRefused, EpisodeEditStale, add_edit, read_edits
-from lockstep.server.recording.episodes.listed import RecordingEpisodes, listed_episodes
+from lockstep.server.recording.episodes.episode_list import RecordingEpisodes, listed_episodes
 from lockstep.server.recording.errors import RecordingError
 from lockstep.server.recording.format.event_index import EventEntry, EventIndex
 from lockstep.server.recording.format.topics import CAMERA

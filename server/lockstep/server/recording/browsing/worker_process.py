@@ -25,7 +25,7 @@ from lockstep.server.recording.browsing.jobs import (
     decode_job,
 )
 from lockstep.server.recording.episodes.edits import read_edits
-from lockstep.server.recording.episodes.listed import listed_episodes
+from lockstep.server.recording.episodes.episode_list import listed_episodes
 from lockstep.server.recording.errors import RecordingError
 from lockstep.server.recording.reading.known_indexes import KnownIndexes
 from lockstep.server.recording.reading.picture_at import picture_at

@@ -38,8 +38,8 @@ from lockstep.server.session_events import (
     EpisodeAsked,
     EpochBegan,
     FeedbackReceived,
-    LinkDown,
     ResetDone,
+    RobotLinkDown,
     SeatChanged,
     SessionEvents,
     StopShown,
@@ -111,7 +111,7 @@ class EpisodeService:
         events.subscribe(ResetDone, self._happened)
         events.subscribe(FeedbackReceived, self._place.fed_back)
         events.subscribe(EpochBegan, lambda event: self._cut("epoch"))
-        events.subscribe(LinkDown, lambda event: self._cut("link_down"))
+        events.subscribe(RobotLinkDown, lambda event: self._cut("link_down"))
         events.subscribe(ActionUpdated, self._reset.updated)
 
     async def run(self) -> None:

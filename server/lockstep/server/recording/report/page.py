@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from lockstep.server.recording.episodes.edits import read_edits
-from lockstep.server.recording.episodes.listed import ListedEpisode, listed_episodes
+from lockstep.server.recording.episodes.episode_list import ListedEpisode, listed_episodes
 from lockstep.server.recording.errors import RecordingError
 from lockstep.server.recording.format.payload import own_record_of
 from lockstep.server.recording.format.topics import CAMERA, stream_of

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from lockstep.server.recording.episodes.listed import ListedEpisode
+from lockstep.server.recording.episodes.episode_list import ListedEpisode
 from lockstep.server.recording.report.page_parts import text
 from lockstep.server.recording.report.totals import Totals
 

@@ -11,7 +11,7 @@ from lockstep.server.event_clock import EventClock
 from lockstep.server.media.pipeline.frame import EncodedFrame
 from lockstep.server.recording.format.drivers import EventDrivers
 from lockstep.server.recording.format.records import RobotRecord, ShadowRecord
-from lockstep.server.recording.times import LinkTimes, RecordClock
+from lockstep.server.recording.times import RecordClock, RobotLinkTimes
 from lockstep.server.recording.writing.episode_written import EpisodeWritten
 from lockstep.server.recording.writing.event_records import RecordedEvent, record_of
 from lockstep.server.recording.writing.map_records import MapRecords
@@ -26,13 +26,13 @@ from lockstep.server.session_events import (
     CommandRefused,
     CommandRepeated,
     FeedbackReceived,
-    LinkDown,
-    LinkUp,
     NoteWritten,
     ParticipantsChanged,
     Refused,
     ResetDone,
     RestForwarded,
+    RobotLinkDown,
+    RobotLinkUp,
     SeatChanged,
     SessionEvents,
     ShadowJudged,
@@ -62,8 +62,8 @@ class SessionRecords:
         self._media = media
         self._sink = RecordSink()
         self._drivers = EventDrivers()
-        self._link_times = LinkTimes()
-        self._link_epoch = ""
+        self._robot_link_times = RobotLinkTimes()
+        self._robot_link_epoch = ""
         self._robot: RobotState | None = None
         self._seat = SeatChanged(Seat(), Actor(), Actor())
         self._participants = ParticipantsChanged(Participants(participants=[]))
@@ -85,8 +85,8 @@ class SessionRecords:
         self._sink.close()
 
     def subscribe(self, events: SessionEvents) -> None:
-        events.subscribe(LinkUp, self._link_changed)
-        events.subscribe(LinkDown, self._link_changed)
+        events.subscribe(RobotLinkUp, self._robot_link_changed)
+        events.subscribe(RobotLinkDown, self._robot_link_changed)
         events.subscribe(SeatChanged, self._seat_changed)
         events.subscribe(ParticipantsChanged, self._participants_changed)
         events.subscribe(NoteWritten, self._happened)
@@ -113,14 +113,14 @@ class SessionRecords:
         if self._sink.is_open:
             self._sink.put_own(record_of(event, self._clock.epoch, self._clock.event))
 
-    def _link_changed(self, event: LinkUp | LinkDown) -> None:
+    def _robot_link_changed(self, event: RobotLinkUp | RobotLinkDown) -> None:
         state = event.state
         if state is None:
             return
         self._robot = state
-        if state.epoch != self._link_epoch:
-            self._link_epoch = state.epoch
-            self._link_times = LinkTimes()
+        if state.epoch != self._robot_link_epoch:
+            self._robot_link_epoch = state.epoch
+            self._robot_link_times = RobotLinkTimes()
             self._maps.forget()
         self._put_robot(state)
 
@@ -155,7 +155,7 @@ class SessionRecords:
         )
 
     def _feedback_received(self, event: FeedbackReceived) -> None:
-        self._link_times.observe(event.feedback.time, event.now)
+        self._robot_link_times.observe(event.feedback.time, event.now)
         self._put_feedback(event.feedback, event.now)
 
     def _put_feedback(self, feedback: Feedback, now: float) -> None:
@@ -163,7 +163,7 @@ class SessionRecords:
         if not self._sink.is_open:
             return
         times = self._sink.times
-        captured = times.at(self._link_times.captured(feedback.time, now))
+        captured = times.at(self._robot_link_times.captured(feedback.time, now))
         self._sink.put(FeedbackItem(times.at(now), captured, self._clock.epoch, feedback, driver))
 
     def _episode_written(self, event: EpisodeWritten) -> None:
@@ -173,7 +173,7 @@ class SessionRecords:
 
     def take_frame(self, stream: str, codec: str, frame: EncodedFrame, *, attached: bool) -> None:
         now, times = time.monotonic(), self._sink.times
-        captured = min(now, frame.time if attached else self._link_times.captured(frame.time, now))
+        captured = min(now, frame.time if attached else self._robot_link_times.captured(frame.time, now))
         self._sink.put(
             MediaItem(
                 times.at(now),

@@ -15,7 +15,7 @@ from lockstep.server.http.json_response import json_answer
 from lockstep.server.http.request_body import read_json
 from lockstep.server.recording.browsing.catalog import CatalogPage
 from lockstep.server.recording.episodes.edits import EpisodeEdit
-from lockstep.server.recording.episodes.listed import RecordingEpisodes
+from lockstep.server.recording.episodes.episode_list import RecordingEpisodes
 from lockstep.server.recording.errors import RecordingError
 from lockstep.server.recording.format.records import Whole
 from lockstep.server.routes.recorded.recordings import (

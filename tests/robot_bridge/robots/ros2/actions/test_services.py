@@ -51,7 +51,7 @@ def client() -> Client:
 
 @pytest.fixture
 def services(client: Client) -> Services:
-    ros = SimpleNamespace(service=lambda _: SimpleNamespace(Request=SimpleNamespace), client=lambda *_: client)
+    ros = SimpleNamespace(interface=lambda _: SimpleNamespace(Request=SimpleNamespace), client=lambda *_: client)
     return Services(ros, [Service(name="clear", service="/clear", type="Trigger", timeout=5.0)])  # type: ignore[arg-type]
 
 

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 from lockstep.robot_bridge.robots.ros2.discovery.graph import Endpoint, Graph, Heard, Topic
-from lockstep.robot_bridge.robots.ros2.discovery.kinds import ODOMETRY, TWIST_STAMPED
+from lockstep.robot_bridge.robots.ros2.discovery.message_kinds import ODOMETRY, TWIST_STAMPED
 
 __all__ = ["Person", "base_graph", "published", "taken", "topics"]
 

@@ -7,7 +7,7 @@ from typing import Any, cast
 import pytest
 
 from lockstep.protocol.description import CameraCalibration
-from lockstep.robot_bridge.robots.ros2.discovery.tally import pinhole_of
+from lockstep.robot_bridge.robots.ros2.discovery.topic_messages import pinhole_of
 from lockstep.robot_bridge.robots.ros2.ros_side import RosSide
 from lockstep.robot_bridge.robots.ros2.sensing.camera_info import CameraInfoTopic, difference, is_rectified
 from lockstep.robot_bridge.robots.ros2.settings import CameraTopic
@@ -60,11 +60,11 @@ class Ros:
         self.take: Callable[[Any], None] = lambda message: None
         self.topic = ""
 
-    def message(self, package: str, name: str) -> str:
-        return f"{package}/{name}"
+    def interface(self, name: str) -> str:
+        return name
 
     def subscribe(self, kind: str, topic: str, callback: Callable[[Any], None]) -> None:
-        assert kind == "sensor_msgs/CameraInfo"
+        assert kind == "sensor_msgs/msg/CameraInfo"
         self.topic, self.take = topic, callback
 
 

@@ -19,9 +19,9 @@ from lockstep.robot_bridge.robots.mjcf.names import label_of, name_of
 from lockstep.robot_bridge.robots.mjcf.tools.capsules import capsules_of, may_touch
 from lockstep.robot_bridge.robots.mjcf.tools.obstacles import OBSTACLES, obstacles_of, surfaces_of
 from lockstep.robot_bridge.robots.mjcf.tools.tool_setting import ModelTool
+from lockstep.robot_bridge.robots.tool_pose.arm_solver import tool_solver
 from lockstep.robot_bridge.robots.tool_pose.axes import tool_axes, tool_layer
 from lockstep.robot_bridge.robots.tool_pose.posed_tool import PosedTool, ToolPlace, tool_pose
-from lockstep.robot_bridge.robots.tool_pose.solver import tool_solver
 
 __all__ = ["ToolParts", "tool_parts"]
 

@@ -16,8 +16,8 @@ from lockstep.robot_bridge.robots.actions import ActionRun
 from lockstep.robot_bridge.robots.mobile_manipulator.goal_driven.description import RATES, arm_chain, describe_arm
 from lockstep.robot_bridge.robots.mobile_manipulator.simulation import ARM, BASE, Simulation
 from lockstep.robot_bridge.robots.so101.postures import GoTo
+from lockstep.robot_bridge.robots.tool_pose.arm_solver import tool_solver
 from lockstep.robot_bridge.robots.tool_pose.posed_tool import PosedTool, ToolPlace
-from lockstep.robot_bridge.robots.tool_pose.solver import tool_solver
 
 __all__ = ["GoalArm"]
 

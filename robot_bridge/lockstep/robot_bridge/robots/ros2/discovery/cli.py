@@ -12,7 +12,7 @@ import typer
 from lockstep.robot_bridge.errors import BridgeError, RobotUnavailable, SettingsError
 from lockstep.robot_bridge.robots.other_python import link_packages, with_packages
 from lockstep.robot_bridge.robots.ros2 import read_settings
-from lockstep.robot_bridge.robots.ros2.discovery.ask import Ask, AskAtTerminal, TakeGuesses
+from lockstep.robot_bridge.robots.ros2.discovery.terminal_questions import Ask, AskAtTerminal, TakeGuesses
 
 if TYPE_CHECKING:
     from lockstep.robot_bridge.robots.ros2.discovery.drafting.draft import Draft
@@ -82,8 +82,8 @@ def discover(
 
 def _look_and_draft(seconds: float, domain: int | None, namespace: str | None, ask: Ask) -> "Draft":
     """Import what needs numpy last: a robot without ROS need not have it, and is told that ROS is missing."""
+    from lockstep.robot_bridge.robots.ros2.discovery.graph_observer import look
     from lockstep.robot_bridge.robots.ros2.discovery.graph_side import GraphSide
-    from lockstep.robot_bridge.robots.ros2.discovery.look import look
 
     ros = GraphSide(domain)
     try:

@@ -15,7 +15,7 @@ from lockstep.robot_bridge.robots.ros2.discovery.graph import (
     ServiceServer,
     Topic,
 )
-from lockstep.robot_bridge.robots.ros2.discovery.kinds import SERVICES
+from lockstep.robot_bridge.robots.ros2.discovery.message_kinds import SERVICES
 from lockstep.robot_bridge.robots.ros2.ros_side import RosSide
 from lockstep.robot_bridge.robots.ros2.settings import Ros2Settings
 

@@ -10,7 +10,7 @@ from typing import Any
 from lockstep.protocol.actions import StatusItem
 from lockstep.protocol.description import CameraCalibration
 from lockstep.robot_bridge.robots.ros2.discovery.graph import Pinhole
-from lockstep.robot_bridge.robots.ros2.discovery.tally import pinhole_of
+from lockstep.robot_bridge.robots.ros2.discovery.topic_messages import pinhole_of
 from lockstep.robot_bridge.robots.ros2.ros_side import RosSide
 from lockstep.robot_bridge.robots.ros2.settings import CameraTopic
 

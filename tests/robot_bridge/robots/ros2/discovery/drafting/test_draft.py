@@ -6,11 +6,10 @@ from pathlib import Path
 import pytest
 
 from lockstep.robot_bridge.robots.ros2 import read_settings
-from lockstep.robot_bridge.robots.ros2.discovery.ask import TakeGuesses
 from lockstep.robot_bridge.robots.ros2.discovery.drafting.choice import SeveralRobots, robots
 from lockstep.robot_bridge.robots.ros2.discovery.drafting.draft import NothingToDrive, draft
 from lockstep.robot_bridge.robots.ros2.discovery.graph import Graph, Heard, ParameterValue, Topic
-from lockstep.robot_bridge.robots.ros2.discovery.kinds import (
+from lockstep.robot_bridge.robots.ros2.discovery.message_kinds import (
     COMPRESSED,
     FLOATS,
     IMAGE,
@@ -23,6 +22,7 @@ from lockstep.robot_bridge.robots.ros2.discovery.kinds import (
     TWIST_STAMPED,
     WRENCH,
 )
+from lockstep.robot_bridge.robots.ros2.discovery.terminal_questions import TakeGuesses
 from lockstep.robot_bridge.robots.ros2.settings import Ros2Settings
 from tests.robot_bridge.robots.ros2.discovery.graphs import Person, base_graph, published, taken, topics
 

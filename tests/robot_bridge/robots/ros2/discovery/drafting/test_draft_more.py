@@ -7,7 +7,6 @@ from typing import Any
 import pytest
 
 from lockstep.robot_bridge.robots.ros2 import read_settings
-from lockstep.robot_bridge.robots.ros2.discovery.ask import TakeGuesses
 from lockstep.robot_bridge.robots.ros2.discovery.drafting.draft import Draft, draft
 from lockstep.robot_bridge.robots.ros2.discovery.graph import (
     ActionFields,
@@ -19,7 +18,7 @@ from lockstep.robot_bridge.robots.ros2.discovery.graph import (
     ServiceServer,
     Topic,
 )
-from lockstep.robot_bridge.robots.ros2.discovery.kinds import (
+from lockstep.robot_bridge.robots.ros2.discovery.message_kinds import (
     BATTERY,
     CAMERA_INFO,
     DESCRIPTION,
@@ -32,6 +31,7 @@ from lockstep.robot_bridge.robots.ros2.discovery.kinds import (
     POSE_COVARIANCE,
 )
 from lockstep.robot_bridge.robots.ros2.discovery.pose import Pose
+from lockstep.robot_bridge.robots.ros2.discovery.terminal_questions import TakeGuesses
 from lockstep.robot_bridge.robots.ros2.settings import Ros2Settings
 from tests.robot_bridge.robots.ros2.discovery.graphs import Person, base_graph, published
 

@@ -3,9 +3,9 @@
 from collections.abc import Callable, Sequence
 
 from lockstep.robot_bridge.errors import BridgeError
-from lockstep.robot_bridge.robots.ros2.discovery.ask import Ask
 from lockstep.robot_bridge.robots.ros2.discovery.graph import Graph, Topic, namespace_of, parts_of_name
-from lockstep.robot_bridge.robots.ros2.discovery.kinds import COMMANDS, JOINT_STATE, ODOMETRY
+from lockstep.robot_bridge.robots.ros2.discovery.message_kinds import COMMANDS, JOINT_STATE, ODOMETRY
+from lockstep.robot_bridge.robots.ros2.discovery.terminal_questions import Ask
 
 __all__ = ["SeveralRobots", "choose_robot", "choose_topic", "robots"]
 

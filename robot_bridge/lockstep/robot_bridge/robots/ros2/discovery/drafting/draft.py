@@ -5,7 +5,6 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from lockstep.robot_bridge.errors import BridgeError
-from lockstep.robot_bridge.robots.ros2.discovery.ask import Ask
 from lockstep.robot_bridge.robots.ros2.discovery.drafting.choice import choose_robot
 from lockstep.robot_bridge.robots.ros2.discovery.drafting.draft_arm import draft_arm
 from lockstep.robot_bridge.robots.ros2.discovery.drafting.draft_base import draft_base
@@ -26,6 +25,7 @@ from lockstep.robot_bridge.robots.ros2.discovery.drafting.draft_servers import (
 from lockstep.robot_bridge.robots.ros2.discovery.drafting.draft_status import draft_batteries, draft_diagnostics
 from lockstep.robot_bridge.robots.ros2.discovery.drafting.yaml_text import CHECK, Section, Value, comment, render
 from lockstep.robot_bridge.robots.ros2.discovery.graph import Graph, parts_of_name
+from lockstep.robot_bridge.robots.ros2.discovery.terminal_questions import Ask
 from lockstep.robot_bridge.robots.ros2.discovery.urdf import BadUrdf, Urdf, parse_urdf
 
 __all__ = ["Draft", "NothingToDrive", "draft"]

@@ -2,13 +2,13 @@
 
 from typing import NamedTuple
 
-from lockstep.robot_bridge.robots.ros2.discovery.ask import Ask
 from lockstep.robot_bridge.robots.ros2.discovery.drafting.choice import choose_topic
 from lockstep.robot_bridge.robots.ros2.discovery.drafting.draft_servo import SERVO_LEAF, draft_servo, states_section
 from lockstep.robot_bridge.robots.ros2.discovery.drafting.notes import others
 from lockstep.robot_bridge.robots.ros2.discovery.drafting.yaml_text import Plain, Section, Value
 from lockstep.robot_bridge.robots.ros2.discovery.graph import Graph, Topic
-from lockstep.robot_bridge.robots.ros2.discovery.kinds import FLOATS, JOINT_STATE, TRAJECTORY, TWIST_STAMPED
+from lockstep.robot_bridge.robots.ros2.discovery.message_kinds import FLOATS, JOINT_STATE, TRAJECTORY, TWIST_STAMPED
+from lockstep.robot_bridge.robots.ros2.discovery.terminal_questions import Ask
 from lockstep.robot_bridge.robots.ros2.discovery.urdf import Urdf, UrdfJoint
 
 __all__ = ["draft_arm"]

@@ -1,12 +1,12 @@
 """Drafts the `base` of a robot's file."""
 
-from lockstep.robot_bridge.robots.ros2.discovery.ask import Ask
 from lockstep.robot_bridge.robots.ros2.discovery.drafting.choice import choose_topic
 from lockstep.robot_bridge.robots.ros2.discovery.drafting.draft_servo import SERVO_LEAF
 from lockstep.robot_bridge.robots.ros2.discovery.drafting.notes import others, rate_of, timeout_for
 from lockstep.robot_bridge.robots.ros2.discovery.drafting.yaml_text import Section, Value
 from lockstep.robot_bridge.robots.ros2.discovery.graph import Graph, Topic, namespace_of, parts_of_name
-from lockstep.robot_bridge.robots.ros2.discovery.kinds import ODOMETRY, TWIST, TWIST_STAMPED
+from lockstep.robot_bridge.robots.ros2.discovery.message_kinds import ODOMETRY, TWIST, TWIST_STAMPED
+from lockstep.robot_bridge.robots.ros2.discovery.terminal_questions import Ask
 
 __all__ = ["draft_base"]
 

@@ -2,7 +2,7 @@
 
 from lockstep.robot_bridge.robots.ros2.discovery.drafting.yaml_text import Plain
 from lockstep.robot_bridge.robots.ros2.discovery.graph import Graph, Pinhole, Topic, parts_of_name
-from lockstep.robot_bridge.robots.ros2.discovery.kinds import CAMERA_INFO
+from lockstep.robot_bridge.robots.ros2.discovery.message_kinds import CAMERA_INFO
 from lockstep.robot_bridge.robots.ros2.discovery.pose import Pose
 from lockstep.robot_bridge.robots.ros2.discovery.urdf import Urdf
 from lockstep.robot_bridge.robots.ros2.sensing.camera_info import is_rectified

@@ -1,11 +1,11 @@
 """Drafts the `map` of a robot's file: the grid, where the odometry is on it, the path, and the goal."""
 
-from lockstep.robot_bridge.robots.ros2.discovery.ask import Ask
 from lockstep.robot_bridge.robots.ros2.discovery.drafting.choice import choose_topic
 from lockstep.robot_bridge.robots.ros2.discovery.drafting.notes import others
 from lockstep.robot_bridge.robots.ros2.discovery.drafting.yaml_text import Section, Value
 from lockstep.robot_bridge.robots.ros2.discovery.graph import Graph, Topic, parts_of_name
-from lockstep.robot_bridge.robots.ros2.discovery.kinds import GRID, NAVIGATE, PATH, POSE, POSE_COVARIANCE
+from lockstep.robot_bridge.robots.ros2.discovery.message_kinds import GRID, NAVIGATE, PATH, POSE, POSE_COVARIANCE
+from lockstep.robot_bridge.robots.ros2.discovery.terminal_questions import Ask
 
 __all__ = ["draft_map"]
 

@@ -2,14 +2,14 @@
 
 import math
 
-from lockstep.robot_bridge.robots.ros2.discovery.ask import Ask
 from lockstep.robot_bridge.robots.ros2.discovery.drafting.choice import choose_topic
 from lockstep.robot_bridge.robots.ros2.discovery.drafting.draft_bodies import BASE_BODY
 from lockstep.robot_bridge.robots.ros2.discovery.drafting.draft_calibration import Places, calibration, info_topic
 from lockstep.robot_bridge.robots.ros2.discovery.drafting.notes import others, rate_of, timeout_for
 from lockstep.robot_bridge.robots.ros2.discovery.drafting.yaml_text import Plain, Section, Value
 from lockstep.robot_bridge.robots.ros2.discovery.graph import Graph, Heard, Topic
-from lockstep.robot_bridge.robots.ros2.discovery.kinds import COMPRESSED, IMAGE, SCAN, WRENCH
+from lockstep.robot_bridge.robots.ros2.discovery.message_kinds import COMPRESSED, IMAGE, SCAN, WRENCH
+from lockstep.robot_bridge.robots.ros2.discovery.terminal_questions import Ask
 from lockstep.robot_bridge.robots.ros2.discovery.urdf import Urdf
 from lockstep.robot_bridge.robots.ros2.sensing.picture import ENCODINGS
 

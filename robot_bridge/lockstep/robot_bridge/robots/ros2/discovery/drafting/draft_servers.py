@@ -6,10 +6,10 @@ answers, or the answer is no.
 
 from collections.abc import Iterable
 
-from lockstep.robot_bridge.robots.ros2.discovery.ask import Ask
 from lockstep.robot_bridge.robots.ros2.discovery.drafting.yaml_text import Plain, Section, Value
 from lockstep.robot_bridge.robots.ros2.discovery.graph import ActionServer, Graph, parts_of_name
-from lockstep.robot_bridge.robots.ros2.discovery.kinds import GRIPPER, NAVIGATE
+from lockstep.robot_bridge.robots.ros2.discovery.message_kinds import GRIPPER, NAVIGATE
+from lockstep.robot_bridge.robots.ros2.discovery.terminal_questions import Ask
 from lockstep.robot_bridge.robots.ros2.discovery.urdf import Urdf
 
 __all__ = ["draft_actions", "draft_grippers", "draft_services", "unique_name"]

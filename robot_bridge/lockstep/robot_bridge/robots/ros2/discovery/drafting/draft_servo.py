@@ -1,10 +1,10 @@
 """Drafts the `servo` of a robot's file, for MoveIt Servo."""
 
-from lockstep.robot_bridge.robots.ros2.discovery.ask import Ask
 from lockstep.robot_bridge.robots.ros2.discovery.drafting.notes import others, rate_of, timeout_for
 from lockstep.robot_bridge.robots.ros2.discovery.drafting.yaml_text import Section, Value
 from lockstep.robot_bridge.robots.ros2.discovery.graph import Graph, Topic, namespace_of
-from lockstep.robot_bridge.robots.ros2.discovery.kinds import INT8, SERVO_COMMAND_TYPE, SERVO_STATUS
+from lockstep.robot_bridge.robots.ros2.discovery.message_kinds import INT8, SERVO_COMMAND_TYPE, SERVO_STATUS
+from lockstep.robot_bridge.robots.ros2.discovery.terminal_questions import Ask
 
 __all__ = ["SERVO_LEAF", "draft_servo", "states_section"]
 

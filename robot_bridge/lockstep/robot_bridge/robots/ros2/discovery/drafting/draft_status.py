@@ -1,12 +1,12 @@
 """Drafts what a robot's file says of its status: batteries and diagnostics."""
 
-from lockstep.robot_bridge.robots.ros2.discovery.ask import Ask
 from lockstep.robot_bridge.robots.ros2.discovery.drafting.choice import choose_topic
 from lockstep.robot_bridge.robots.ros2.discovery.drafting.draft_servers import unique_name
 from lockstep.robot_bridge.robots.ros2.discovery.drafting.notes import rate_of, timeout_for
 from lockstep.robot_bridge.robots.ros2.discovery.drafting.yaml_text import Plain, Section, Value
 from lockstep.robot_bridge.robots.ros2.discovery.graph import Graph
-from lockstep.robot_bridge.robots.ros2.discovery.kinds import BATTERY, DIAGNOSTICS
+from lockstep.robot_bridge.robots.ros2.discovery.message_kinds import BATTERY, DIAGNOSTICS
+from lockstep.robot_bridge.robots.ros2.discovery.terminal_questions import Ask
 
 __all__ = ["draft_batteries", "draft_diagnostics"]
 

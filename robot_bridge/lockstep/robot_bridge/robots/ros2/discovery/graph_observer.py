@@ -13,7 +13,7 @@ from typing import Any
 from lockstep.robot_bridge.errors import BridgeError, RobotUnavailable
 from lockstep.robot_bridge.robots.ros2.discovery.graph import Graph, ParameterValue, Topic
 from lockstep.robot_bridge.robots.ros2.discovery.graph_side import GraphSide
-from lockstep.robot_bridge.robots.ros2.discovery.kinds import (
+from lockstep.robot_bridge.robots.ros2.discovery.message_kinds import (
     COMMANDS,
     DESCRIPTION,
     FRAMES,
@@ -23,7 +23,7 @@ from lockstep.robot_bridge.robots.ros2.discovery.kinds import (
     SERVO_COMMAND_TYPE,
 )
 from lockstep.robot_bridge.robots.ros2.discovery.pose import Pose
-from lockstep.robot_bridge.robots.ros2.discovery.tally import Tally
+from lockstep.robot_bridge.robots.ros2.discovery.topic_messages import Tally
 from lockstep.robot_bridge.robots.ros2.ros_side import header_ns
 
 __all__ = ["EmptyGraph", "look"]

@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 
 from lockstep.robot_bridge.robots.ros2.discovery.graph import Heard
-from lockstep.robot_bridge.robots.ros2.discovery.tally import Tally
+from lockstep.robot_bridge.robots.ros2.discovery.topic_messages import Tally
 
 
 def message(**fields: Any) -> Any:

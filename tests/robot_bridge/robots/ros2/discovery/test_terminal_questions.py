@@ -3,7 +3,7 @@
 import typer
 from typer.testing import CliRunner
 
-from lockstep.robot_bridge.robots.ros2.discovery.ask import AskAtTerminal
+from lockstep.robot_bridge.robots.ros2.discovery.terminal_questions import AskAtTerminal
 
 app = typer.Typer()
 
