@@ -10,6 +10,7 @@ from starlette.applications import Starlette
 
 from lockstep.server.http.transport.acceptor import Acceptor
 from lockstep.server.http.transport.serve import bind, running, stop_signals
+from lockstep.server.http.transport.tls import Certificate
 from lockstep.server.http.transport.uvicorn_http_limits import BoundedConnections
 from tests.waiting import PATIENCE
 
