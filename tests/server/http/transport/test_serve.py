@@ -52,7 +52,8 @@ async def test_the_second_signal_to_stop_has_its_usual_effect() -> None:
 
 async def test_a_server_that_does_not_start_says_why() -> None:
     nothing = Certificate(chain=Path("nothing.pem"), key=Path("nothing.pem"))
-    async with asyncio.timeout(PATIENCE):
-        with pytest.raises(FileNotFoundError):
-            async with running(Starlette(), bind("127.0.0.1", 0), tls=nothing):
-                pass
+    with bind("127.0.0.1", 0) as listener:
+        async with asyncio.timeout(PATIENCE):
+            with pytest.raises(FileNotFoundError):
+                async with running(Starlette(), listener, tls=nothing):
+                    pass
