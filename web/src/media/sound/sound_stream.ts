@@ -132,14 +132,13 @@ export class SoundStream {
       const begun = (): void => this.observe(this.context(), this.isAudible());
       return new PacketSound(stamps, reader, info.codec, audio, begun, () => this.leaveToBrowser());
     }
-    if (track === null) throw new TypeError("sound without a track and without packets");
     return new TrackSound(section, track, reader, info.codec === "PCMU" ? 8000 : 48_000, audio);
   }
 
   /** The page cannot play it: the browser does, as long as this connection lasts. */
   private leaveToBrowser(): void {
-    const { stamps, track } = this.section;
-    if (stamps === null || track === null) return;
+    const { stamps } = this.section;
+    if (stamps === null) return;
     this.reader?.leave(stamps);
     this.source.close();
     this.source = this.openSource();
