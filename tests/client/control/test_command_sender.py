@@ -66,8 +66,8 @@ def test_a_sender_that_waits_for_sound_wakes_when_none_has_been_heard_for_a_whil
     sender.gate.heard("microphone", 16, 0.0)
     sender.intend(FAST, 0.05)
     assert sender.due(0.05) == []
-    assert sender.wake_at(0.05) == 0.6
-    assert [command.event for command in commands(sender.due(0.6))] == [21]
+    assert sender.wake_at(0.05) == 0.2
+    assert [command.event for command in commands(sender.due(0.2))] == [21]
 
 
 def test_an_unanswered_command_is_repeated_with_the_newest_intention_and_the_newest_issue() -> None:

@@ -95,9 +95,10 @@ export class MediaStreams {
   heard(): HeardSound[] {
     const { tolerance, gate } = this.context("audio");
     if (gate === "off") return [];
-    return [...this.sounds].flatMap(([microphone, { playing }]) =>
-      playing === null ? [] : [{ microphone, stamp: playing, tolerance }],
-    );
+    return [...this.sounds].flatMap(([microphone, { playing, awaited }]) => {
+      const stamp = this.state.settings.pacing === "media" ? playing : awaited;
+      return stamp === null ? [] : [{ microphone, stamp, tolerance }];
+    });
   }
 
   /** Timers are slow on a hidden page, too slow to gate sound. */

@@ -45,7 +45,7 @@ export class VideoStream {
       this.trace?.decoded(rtpTimestamp, this.lastGoodMs);
       offerPicture(this.gate, picture, rtpTimestamp, this.lookup, events.context(), this.draw);
     };
-    this.endFrames = section.track === null ? () => undefined : openFrames(section.track, take);
+    this.endFrames = openFrames(section.track, take);
   }
 
   /** Judges the waiting picture again. */

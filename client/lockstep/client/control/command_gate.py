@@ -11,7 +11,9 @@ CALM_INTERVAL = 0.040  # s; events that follow one another sooner wait for pictu
 # An event that would take sound out of its tolerance waits for it so long at most, and for half of the time for which
 # the robot holds a command. Armed and at rest, events follow one another no sooner.
 SOUND_WAIT = 0.200  # s
-HEARD = 0.600  # s without a new segment after which nothing waits for it: what is late may still come
+# Sound without a new segment for so long is waited for no more. With feedback pacing each wait is short, and what is
+# late may still come; with media pacing the next command waits until then, and the robot must not come to rest.
+AWAITED = {"feedback": 0.600, "media": 0.200}  # s
 TOO_OLD_FOR = 3.0  # s of sound that was always too old, after which nothing waits for it: its path is too slow
 
 Pacing = Literal["feedback", "media"]
@@ -130,7 +132,8 @@ class CommandGate:
 
     def silent_at(self, now: float) -> float:
         """Return when a gate that waits for sound opens although none comes."""
-        return min((at + HEARD for _, at in self._heard.values() if now - at < HEARD), default=now)
+        awaited = AWAITED[self.pacing]
+        return min((at + awaited for _, at in self._heard.values() if now - at < awaited), default=now)
 
     def next(self) -> NextCommand:
         """Return the command that an open gate lets pass.
@@ -151,8 +154,8 @@ class CommandGate:
         """Return the gap of the microphone that is farthest behind of those that are heard; None if none is."""
         if self._feedback is None:
             return None
-        event = self._feedback[0]
-        return max((event_gap(event, stamp) for stamp, at in self._heard.values() if now - at < HEARD), default=None)
+        event, awaited = self._feedback[0], AWAITED[self.pacing]
+        return max((event_gap(event, stamp) for stamp, at in self._heard.values() if now - at < awaited), default=None)
 
 
 def _keeps_up(gap: int, tolerance: int) -> bool:

@@ -267,6 +267,8 @@ class Connection:
             self._loop.call_exception_handler({"message": "serving a WebRTC peer failed", "exception": error})
         with suppress(Exception):
             self.peer.ice.close()
+        with suppress(Exception):
+            self.peer.media.end()  # a sender is told; what it sends would never leave
         self._later.clear()
         self._timer.close()
         self._delivery.hand_out([PeerEnded("failed", str(error))])

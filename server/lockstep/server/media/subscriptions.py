@@ -125,7 +125,7 @@ class Subscriptions:
 
     def failed(self, stage: str, error: Exception) -> None:
         """Stop serving this peer, because doing so raised `error`. Only the first error is told. Raises nothing."""
-        if self.ending.failure is None:
+        if self.ending.failure is None and not self._has_left:
             self.leave((stage, error))
 
     def leave(self, failure: tuple[str, Exception] | None = None) -> None:

@@ -16,8 +16,9 @@ export class SoundStream {
   readonly gate = createSoundGate();
   readonly log = new RenderLog();
   isOpen = false;
-  /** Stamp of the sound that plays, heard or too old to be, or played a moment ago; null: no sound is waited for. */
-  playing: number | null = null;
+  playing: number | null = null; // stamp of the sound that plays, heard or too old to be; null: none does
+  /** The same, or that of the sound that played a moment ago: what is late may still come. */
+  awaited: number | null = null;
   private playedMs = -Infinity; // when sound last played
   private source: SoundSource;
   private output: SoundOutput;
@@ -60,8 +61,9 @@ export class SoundStream {
     this.isOpen = passes && audible;
     this.output.open(this.isOpen);
     const isReal = playing !== undefined && !this.isStarting() && !isConcealed(this.gate, now);
-    if (isReal && audible) [this.playing, this.playedMs] = [mark?.stamp ?? null, now];
-    else if (!audible || now - this.playedMs > AWAITED_MS) this.playing = null;
+    this.playing = isReal && audible ? (mark?.stamp ?? null) : null;
+    if (this.playing !== null) [this.awaited, this.playedMs] = [this.playing, now];
+    else if (!audible || now - this.playedMs > AWAITED_MS) this.awaited = null;
   }
 
   private judge(
@@ -130,14 +132,13 @@ export class SoundStream {
       const begun = (): void => this.observe(this.context(), this.isAudible());
       return new PacketSound(stamps, reader, info.codec, audio, begun, () => this.leaveToBrowser());
     }
-    if (track === null) throw new TypeError("sound without a track and without packets");
     return new TrackSound(section, track, reader, info.codec === "PCMU" ? 8000 : 48_000, audio);
   }
 
   /** The page cannot play it: the browser does, as long as this connection lasts. */
   private leaveToBrowser(): void {
-    const { stamps, track } = this.section;
-    if (stamps === null || track === null) return;
+    const { stamps } = this.section;
+    if (stamps === null) return;
     this.reader?.leave(stamps);
     this.source.close();
     this.source = this.openSource();

@@ -6,7 +6,7 @@ import type { SourceStamps } from "./source_stamps";
 /** One medium that is received, and the stamps of its frames. */
 export interface MediaSection {
   readonly kind: "audio" | "video";
-  readonly track: MediaStreamTrack | null; // null: sound whose packets come to the page, as `stamps` tells
+  readonly track: MediaStreamTrack; // sound: plays where the page plays no packets itself, as `stamps` tells
   readonly stamps: ReceiverStamps | null; // null without a transform
   mark(rtpTimestamp: number): FrameMark | undefined; // of a frame; undefined while nothing is known of it
   playing(): number | undefined; // RTP timestamp of the sound of `track` that plays now
@@ -24,5 +24,5 @@ export function receivedSection(
     if (sources !== null) return sources.find(rtpTimestamp);
     return stamps === null ? UNMARKED : findMark(stamps.table, rtpTimestamp);
   };
-  return { kind, track: stamps?.packets === true ? null : receiver.track, stamps, mark, playing };
+  return { kind, track: receiver.track, stamps, mark, playing };
 }

@@ -1,5 +1,6 @@
 """Reads a model's file, and names its fault in one sentence."""
 
+import logging
 import math
 from pathlib import Path
 from typing import Any, Final
@@ -9,6 +10,8 @@ import mujoco
 from lockstep.robot_bridge.errors import ModelError
 
 __all__ = ["load_model"]
+
+_logger = logging.getLogger(__name__)
 
 MOST_ACTUATORS: Final = 64
 LONGEST_STEP: Final = 0.02  # s
@@ -21,6 +24,7 @@ def load_model(path: Path) -> Any:
     Raises:
         ModelError: the model cannot be used.
     """
+    mujoco.set_mju_user_warning(_warn)  # else MuJoCo writes a file into the working directory
     if path.is_dir():
         raise ModelError(f"{path} is a folder, not an MJCF file")
     if not path.is_file():
@@ -53,3 +57,7 @@ def _reason(path: Path, text: str) -> str:
     if "XML parse error" in words or "ParseXML" in words:
         return f"{path} is not well-formed XML: {words}"
     return f"{path} is not a valid MuJoCo model: {words}"
+
+
+def _warn(text: str) -> None:
+    _logger.warning("MuJoCo: %s", text)

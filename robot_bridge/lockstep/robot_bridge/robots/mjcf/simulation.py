@@ -27,7 +27,6 @@ class Simulation:
     """
 
     def __init__(self, model: Any) -> None:
-        mujoco.set_mju_user_warning(warn)  # else MuJoCo writes a file into the working directory
         self.model = model
         self.data = mujoco.MjData(model)
         self.restarts = 0
@@ -84,7 +83,3 @@ class Simulation:
         """Return the part of the present state that a picture needs."""
         state: npt.NDArray[np.float64] = self.data.qpos.copy()
         return state
-
-
-def warn(text: str) -> None:
-    _logger.warning("MuJoCo: %s", text)

@@ -4,6 +4,7 @@ import asyncio
 import datetime
 import gc
 import json
+import logging
 import os
 import socket
 import sys
@@ -37,6 +38,9 @@ __all__ = ["ConsoleFailed", "run_console", "say"]
 PATIENCE = 2.0  # s until people are told that the console waits for a robot
 SIGNS_OF_LIFE = 4  # in each time after which the service manager restarts a silent console
 GC_THRESHOLDS = (5_000, 20, 10)  # allocations, young collections, middle collections
+
+
+_logger = logging.getLogger(__name__)
 
 
 class ConsoleFailed(Exception):
@@ -87,6 +91,9 @@ async def run_console(
                     task.cancel()
             if not asked.is_set():
                 raise ConsoleFailed
+    except ExceptionGroup as errors:
+        _logger.error("the console has failed", exc_info=errors)
+        raise ConsoleFailed from errors
     finally:
         service.close()
         listener.close()
@@ -119,6 +126,8 @@ async def _start(bridges: Mapping[str, BridgeProcess], asked: asyncio.Event) -> 
                 await asyncio.wait(starting.values())
             stopping.cancel()
     except BaseExceptionGroup as errors:
+        if asked.is_set():
+            return None
         raise errors.exceptions[0] from None
     return None if asked.is_set() else {name: each.result() for name, each in starting.items()}
 

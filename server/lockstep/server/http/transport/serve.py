@@ -191,15 +191,26 @@ async def wait_for_signal() -> None:
 
 @contextlib.contextmanager
 def stop_signals() -> Iterator[asyncio.Event]:
-    """Set the event, while entered, at SIGINT, SIGTERM, or the end of the terminal unless that is ignored (`nohup`)."""
+    """Set the event, while entered, at SIGINT, SIGTERM, or the end of the terminal unless that is ignored (`nohup`).
+
+    The next signal has its usual effect: it ends a process that does not come to its end.
+    """
     loop, asked = asyncio.get_running_loop(), asyncio.Event()
     signals = [signal.SIGINT, signal.SIGTERM]
     if signal.getsignal(signal.SIGHUP) is not signal.SIG_IGN:
         signals.append(signal.SIGHUP)
+
+    def leave() -> None:
+        for number in signals:
+            loop.remove_signal_handler(number)
+
+    def ask() -> None:
+        asked.set()
+        leave()
+
     for number in signals:
-        loop.add_signal_handler(number, asked.set)
+        loop.add_signal_handler(number, ask)
     try:
         yield asked
     finally:
-        for number in signals:
-            loop.remove_signal_handler(number)
+        leave()
