@@ -99,7 +99,8 @@ class GoalDriving(RuleBasedStateMachine):
             self.down.append(refusal)
             return
         if goal is None:
-            self.neutral_needed = False
+            # One that was decided before the robot asked for it does not count (docs/robot-link.md).
+            self.neutral_needed &= self.losses_at[command.nonce] < self.losses
         else:
             assert self.bound_at[goal] == self.losses, "a goal of before a loss executes after it"
             self.applied += max(-0.1, min(0.1, goal - self.applied))
