@@ -1,6 +1,7 @@
 import { eventAfter, eventGap, isNewer } from "../gate/serial";
+import { hear, isAwaited, type AwaitedSound, type Pacing } from "./awaited_sound";
 
-export type Pacing = "feedback" | "media";
+export type { Pacing };
 
 /** Events that follow one another sooner wait for pictures and sound; ms. */
 export const CALM_INTERVAL_MS = 40;
@@ -9,7 +10,6 @@ export const CALM_INTERVAL_MS = 40;
  * the robot holds a command; ms. Armed and at rest, events follow one another no sooner.
  */
 export const SOUND_WAIT_MS = 200;
-const TOO_OLD_FOR_MS = 3000;
 
 /** Why no new command may be sent now, or that it may. */
 export type GateState = "open" | "no_feedback" | "in_flight" | "rate" | "picture" | "sound";
@@ -26,15 +26,15 @@ export interface CommandGate {
   inFlight: number | null; // the event sent and not yet answered
   lastSentMs: number; // -Infinity before the first
   shown: number | null; // stamp of the picture on screen
-  heard: HeardSound | null; // null: nothing is heard, and nothing is waited for
-  tooOldSinceMs: Map<string, number>; // by microphone, of those whose sound is too old now
+  heard: AwaitedSound | null; // of several the one that is farthest behind; null: nothing is waited for
+  sounds: Map<string, AwaitedSound>; // by microphone
 }
 
-/** The sound that plays now; of several the one that is farthest behind. */
+/** A microphone that is heard. */
 export interface HeardSound {
-  readonly stamp: number;
-  readonly tolerance: number; // events
   readonly microphone: string;
+  readonly stamp: number | null; // of the sound that plays now; null: it is silent
+  readonly tolerance: number; // events
 }
 
 /** The next event and the issue of the feedback that it answers. */
@@ -71,7 +71,7 @@ export function createCommandGate(
     lastSentMs: -Infinity,
     shown: null,
     heard: null,
-    tooOldSinceMs: new Map(),
+    sounds: new Map(),
   };
 }
 
@@ -116,19 +116,20 @@ export function noteShown(gate: CommandGate, stamp: number): void {
   gate.shown = stamp;
 }
 
-/** What is heard now. Nothing waits for a microphone whose sound has been too old for 3 s: its path is too slow. */
-export function noteHeard(gate: CommandGate, sounds: readonly HeardSound[], now: number): void {
-  const before = gate.tooOldSinceMs;
-  gate.tooOldSinceMs = new Map();
+/** What is heard now. A microphone that is not among them, as when sound is off, is forgotten. */
+export function noteHeard(gate: CommandGate, heard: readonly HeardSound[], now: number): void {
+  const before = gate.sounds;
   const event = gate.event ?? 0;
+  gate.sounds = new Map();
   gate.heard = null;
-  for (const sound of sounds) {
-    const { microphone, stamp, tolerance } = sound;
-    const sinceMs = before.get(microphone) ?? now;
-    if (gate.event !== null && eventGap(event, stamp) > tolerance)
-      gate.tooOldSinceMs.set(microphone, sinceMs);
-    if (gate.tooOldSinceMs.has(microphone) && now - sinceMs > TOO_OLD_FOR_MS) continue;
-    if (gate.heard === null || eventGap(event, stamp) > eventGap(event, gate.heard.stamp)) gate.heard = sound;
+  for (const { microphone, stamp, tolerance } of heard) {
+    const known = before.get(microphone);
+    const sound = stamp === null || gate.event === null ? known : hear(known, stamp, event, tolerance, now);
+    if (sound === undefined) continue;
+    gate.sounds.set(microphone, sound);
+    if (!isAwaited(sound, gate.pacing, now)) continue;
+    if (gate.heard === null || eventGap(event, sound.stamp) > eventGap(event, gate.heard.stamp))
+      gate.heard = sound;
   }
 }
 

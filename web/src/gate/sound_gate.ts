@@ -12,11 +12,6 @@ import {
 
 /** When no new segment came for this long, what plays is the decoder's concealment: its own invention. */
 const CONCEALED_MS = 200;
-/**
- * With feedback pacing events wait so long for sound that fell silent: what is late may still come, and they would make
- * it too old. With media pacing they do not: there the next command waits until it comes, and the robot would rest.
- */
-export const AWAITED_MS = 600;
 /** A browser that has not worked off the sound of its start by then is not about to. */
 export const START_MS = 5000;
 

@@ -94,11 +94,8 @@ export class MediaStreams {
   /** What commands wait for: the sound of each microphone that is heard, unless it is not judged. */
   heard(): HeardSound[] {
     const { tolerance, gate } = this.context("audio");
-    if (gate === "off") return [];
-    return [...this.sounds].flatMap(([microphone, { playing, awaited }]) => {
-      const stamp = this.state.settings.pacing === "media" ? playing : awaited;
-      return stamp === null ? [] : [{ microphone, stamp, tolerance }];
-    });
+    if (gate === "off" || !this.isAudible()) return [];
+    return [...this.sounds].map(([microphone, { playing }]) => ({ microphone, stamp: playing, tolerance }));
   }
 
   /** Timers are slow on a hidden page, too slow to gate sound. */

@@ -9,7 +9,6 @@ import {
   type Pacing,
 } from "../../src/drive/command_gate";
 import { judge } from "../../src/gate/media_gate";
-import { AWAITED_MS } from "../../src/gate/sound_gate";
 import { eventAfter } from "../../src/gate/serial";
 import { createSoundPlayer, judgeAgainst, nextFrame, takePacket } from "../../src/media/sound/sound_player";
 
@@ -27,6 +26,7 @@ const LOSS = 0.005; // one way
 /** What a loss costs: a repeat of ours, TCP's shortest timer, and its timer where the round trip has varied. */
 const REPEAT_MS = { control: 60, link: 200, variedLink: 350 };
 const HOLD_MS = 300;
+const CONCEALED_MS = 200;
 const SECONDS = 30;
 
 /** One way, in ms: lognormal above `min`, none above `max`. */
@@ -139,7 +139,7 @@ function drive(pacing: Pacing, seed: number, blockMs: number, busyMs: number, li
     if (ms % blockMs === 0) play(ms);
     noteHeard(
       gate,
-      ms - heardMs < AWAITED_MS ? [{ microphone: "front", stamp: heard, tolerance: TOLERANCE }] : [],
+      [{ microphone: "front", stamp: ms - heardMs < CONCEALED_MS ? heard : null, tolerance: TOLERANCE }],
       ms,
     );
     gate.shown = gate.event; // no picture holds anything up

@@ -3,6 +3,7 @@
 import math
 from typing import Literal, NamedTuple
 
+from lockstep.client.control.awaited_sound import AwaitedSound, Pacing, hear
 from lockstep.protocol.serial import event_after, event_gap
 
 __all__ = ["CALM_INTERVAL", "CommandGate", "GateState", "NextCommand", "Pacing"]
@@ -11,12 +12,6 @@ CALM_INTERVAL = 0.040  # s; events that follow one another sooner wait for pictu
 # An event that would take sound out of its tolerance waits for it so long at most, and for half of the time for which
 # the robot holds a command. Armed and at rest, events follow one another no sooner.
 SOUND_WAIT = 0.200  # s
-# Sound without a new segment for so long is waited for no more. With feedback pacing each wait is short, and what is
-# late may still come; with media pacing the next command waits until then, and the robot must not come to rest.
-AWAITED = {"feedback": 0.600, "media": 0.200}  # s
-TOO_OLD_FOR = 3.0  # s of sound that was always too old, after which nothing waits for it: its path is too slow
-
-Pacing = Literal["feedback", "media"]
 GateState = Literal["open", "no_feedback", "in_flight", "rate", "picture", "sound"]
 
 
@@ -59,8 +54,7 @@ class CommandGate:
         self._in_flight: int | None = None
         self._sent_at: float | None = None
         self._shown: int | None = None
-        self._heard: dict[str, tuple[int, float]] = {}  # by microphone: stamp of the newest segment, and when
-        self._too_old_since: dict[str, float] = {}
+        self._sounds: dict[str, AwaitedSound] = {}  # by microphone
 
     @property
     def in_flight(self) -> int | None:
@@ -96,12 +90,9 @@ class CommandGate:
 
     def heard(self, microphone: str, stamp: int, now: float) -> None:
         """Note that a segment of sound stamped `stamp` plays, or is too old to."""
-        if self._feedback is None or event_gap(self._feedback[0], stamp) <= self.sound_tolerance:
-            self._too_old_since.pop(microphone, None)
-        elif now - self._too_old_since.setdefault(microphone, now) > TOO_OLD_FOR:
-            self._heard.pop(microphone, None)
-            return
-        self._heard[microphone] = stamp, now
+        if self._feedback is not None:
+            known = self._sounds.get(microphone)
+            self._sounds[microphone] = hear(known, stamp, self._feedback[0], self.sound_tolerance, now)
 
     def state(self, now: float, *, lets_go: bool = False) -> GateState:
         """Return "open", or the reason that the gate is closed. `lets_go`: the command would be neutral."""
@@ -132,8 +123,8 @@ class CommandGate:
 
     def silent_at(self, now: float) -> float:
         """Return when a gate that waits for sound opens although none comes."""
-        awaited = AWAITED[self.pacing]
-        return min((at + awaited for _, at in self._heard.values() if now - at < awaited), default=now)
+        sounds = self._sounds.values()
+        return min((each.silent_at(self.pacing) for each in sounds if each.is_awaited(self.pacing, now)), default=now)
 
     def next(self) -> NextCommand:
         """Return the command that an open gate lets pass.
@@ -154,8 +145,8 @@ class CommandGate:
         """Return the gap of the microphone that is farthest behind of those that are heard; None if none is."""
         if self._feedback is None:
             return None
-        event, awaited = self._feedback[0], AWAITED[self.pacing]
-        return max((event_gap(event, stamp) for stamp, at in self._heard.values() if now - at < awaited), default=None)
+        event, sounds = self._feedback[0], self._sounds.values()
+        return max((event_gap(event, each.stamp) for each in sounds if each.is_awaited(self.pacing, now)), default=None)
 
 
 def _keeps_up(gap: int, tolerance: int) -> bool:

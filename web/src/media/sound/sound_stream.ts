@@ -1,6 +1,6 @@
 import { judge } from "../../gate/media_gate";
 import { UNMARKED, ageOf, noteSeen, type FrameMark, type GateContext } from "../../gate/gate_counters";
-import { AWAITED_MS, START_MS, createSoundGate, isConcealed, observeSound } from "../../gate/sound_gate";
+import { START_MS, createSoundGate, isConcealed, observeSound } from "../../gate/sound_gate";
 import { findMark } from "../../gate/stamp_table";
 import type { MediaSection } from "../../transport/webrtc/media_section";
 import type { StreamInfo } from "../../protocol/wire";
@@ -17,9 +17,6 @@ export class SoundStream {
   readonly log = new RenderLog();
   isOpen = false;
   playing: number | null = null; // stamp of the sound that plays, heard or too old to be; null: none does
-  /** The same, or that of the sound that played a moment ago: what is late may still come. */
-  awaited: number | null = null;
-  private playedMs = -Infinity; // when sound last played
   private source: SoundSource;
   private output: SoundOutput;
   private droppedAtStart: number; // before decoding, to begin with the newest
@@ -62,8 +59,6 @@ export class SoundStream {
     this.output.open(this.isOpen);
     const isReal = playing !== undefined && !this.isStarting() && !isConcealed(this.gate, now);
     this.playing = isReal && audible ? (mark?.stamp ?? null) : null;
-    if (this.playing !== null) [this.awaited, this.playedMs] = [this.playing, now];
-    else if (!audible || now - this.playedMs > AWAITED_MS) this.awaited = null;
   }
 
   private judge(
