@@ -1,8 +1,7 @@
 /** What the page can do without until its first picture: loaded after it, in one file. */
 import "../style/console_page_later.css";
-export { Rumble } from "../haptics/rumble";
+export { createHaptics } from "../haptics/haptics";
 export { installHook } from "./lockstep_hook";
-export { ContactTone } from "../haptics/contact_tone";
 export { SoundStream } from "../media/sound/sound_stream";
 export { SidePanels } from "./side_panels";
 export { createForceGauge } from "../ui/driving/force_gauge";

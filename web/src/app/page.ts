@@ -61,6 +61,7 @@ export class Page {
     };
     this.engine = new ConsoleEngine(api, options, name, new TouchSticks(left, right), events, first);
     this.later.use(({ lateMisfit }) => this.engine.late.read(lateMisfit)); // before there are panels that take messages
+    this.later.use(({ createHaptics }) => (this.engine.haptics = createHaptics(this.engine))); // and that show forces
     this.panels = this.build(left, right, api);
     this.later.use(({ installHook }) => installHook(this));
     this.later.use(({ RESET_WORDS }) => takeResetWords(RESET_WORDS));
@@ -68,11 +69,9 @@ export class Page {
     this.later.use(({ ToolOverlay }) => {
       this.engine.streams.overlay = new ToolOverlay(() => this.engine.state.robot?.description ?? null);
     });
-    this.later.use(({ Rumble, ContactTone, SceneSwitch, SoundStream, createScene }) => {
+    this.later.use(({ SceneSwitch, SoundStream, createScene }) => {
       this.engine.streams.sound = SoundStream;
       this.grid.takeScene(createScene(this.engine, this.grid, api), new SceneSwitch());
-      this.engine.haptics.rumble = new Rumble();
-      this.engine.haptics.tone = new ContactTone(this.engine.audio);
     });
     watchTouch();
   }

@@ -26,7 +26,7 @@ import type { TouchSticks } from "../input/touch_sticks";
 import { AudioDevice } from "../media/sound/audio_device";
 import { MediaStreams } from "../media/media_streams";
 import type { VideoStream } from "../media/video_stream";
-import { Haptics } from "../haptics/haptics";
+import type { Haptics } from "../haptics/haptics";
 import { Heartbeat } from "../transport/heartbeat";
 import { Connection, type ConnectionState } from "../transport/connection";
 import type { ConsoleApi } from "../transport/signalling/console_api";
@@ -84,7 +84,7 @@ export class ConsoleEngine {
   talkback: Talkback | null = null; // likewise
   connectionState: ConnectionState = { kind: "connecting" };
   firstPictureMs: number | null = null;
-  readonly haptics = new Haptics(this);
+  haptics: Haptics | null = null; // until its code is there
   tracing: Tracing | null = null; // until its code is there, after the first picture
   readonly ticker: Ticker;
   private readonly disposal = new Disposal();
@@ -156,12 +156,12 @@ export class ConsoleEngine {
       action: (now) => this.actions?.renewed(now) ?? "",
       armedChanged: () => page.armedChanged(),
       disarmed: () => {
-        this.haptics.still();
+        this.haptics?.still();
         this.actions?.forget();
       },
       intended: (now, deadmanChanged) => {
         this.tracing?.noteIntention(this.driving.values, now);
-        if (deadmanChanged) this.haptics.stick?.stop();
+        if (deadmanChanged) this.haptics?.stick?.stop();
       },
       delayKnown: () => this.connection.tell("control", reportOf(this)),
       send: (message, now) => {
@@ -248,13 +248,13 @@ export class ConsoleEngine {
     this.connection.close();
     this.streams.close();
     this.reader?.close();
-    this.haptics.close();
+    this.haptics?.close();
     await this.audio.close();
   }
 
   private connectionClosed(): void {
     this.driving.disarm("connection_lost");
-    this.haptics.forget();
+    this.haptics?.forget();
     this.tracing?.connectionClosed();
     this.peer = null;
     this.driving.driver = null;
@@ -322,7 +322,7 @@ export class ConsoleEngine {
   private tookFeedback(feedback: Feedback, before: Feedback | null, now: number): void {
     if (before?.event !== feedback.event) noteOccurrence(this.events, now);
     this.measuredMs = now;
-    this.haptics.took(feedback, now);
+    this.haptics?.took(feedback, now);
     this.driving.tookFeedback(feedback, now);
     this.streams.changed();
     this.page.feedbackTaken(now);
@@ -350,7 +350,7 @@ export class ConsoleEngine {
     this.stopping.step(now);
     this.charts?.step(now);
     this.headset?.step(now);
-    this.haptics.step(now);
+    this.haptics?.step(now);
     this.tracing?.step(now);
     if (this.state.welcome !== null) this.heartbeat.step(now);
     this.connection.step(now);

@@ -7,7 +7,9 @@ const KEPT = "lockstep.force"; // where force_feedback.ts keeps the stick
 export class ForceFeedbackLoader {
   private loading: Promise<ForceFeedback | null> | null = null;
 
-  constructor(private readonly engine: ForceContext & { readonly haptics: { stick: PushingStick | null } }) {
+  constructor(
+    private readonly engine: ForceContext & { readonly haptics: { stick: PushingStick | null } | null },
+  ) {
     if (wasChosen()) void this.load();
   }
 
@@ -27,7 +29,7 @@ export class ForceFeedbackLoader {
     const code = await import("./force_feedback");
     const forces = new code.ForceFeedback(hid, this.engine);
     if (!(await forces.resume())) return null;
-    this.engine.haptics.stick = forces;
+    if (this.engine.haptics !== null) this.engine.haptics.stick = forces;
     return forces;
   }
 }

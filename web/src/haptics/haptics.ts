@@ -2,8 +2,8 @@ import type { ArmConditions } from "../drive/arming";
 import type { ConsoleState } from "../session/console_state";
 import { contactStrength, feelingOf, forceOf } from "./contact_force";
 import { clearTrace, createForceTrace, noteForce } from "./force_trace";
-import type { Rumble } from "./rumble";
-import type { ContactTone } from "./contact_tone";
+import { Rumble } from "./rumble";
+import { ContactTone } from "./contact_tone";
 import type { Feedback, ForceFeeling } from "../protocol/wire";
 
 const REFRESH_MS = 50;
@@ -31,12 +31,14 @@ export interface PushingStick {
 export class Haptics {
   readonly trace = createForceTrace();
   private force = 0; // N
-  rumble: Rumble | null = null; // as the tone: until its code is there
-  tone: ContactTone | null = null;
   stick: PushingStick | null = null; // until one was chosen
   private dueMs = 0;
 
-  constructor(private readonly context: HapticsContext) {}
+  constructor(
+    private readonly context: HapticsContext,
+    private readonly rumble: Rumble,
+    private readonly tone: ContactTone,
+  ) {}
 
   took(feedback: Feedback, now: number): void {
     this.force = forceOf(feedback.wrench);
@@ -51,8 +53,8 @@ export class Haptics {
 
   /** Nothing is felt or heard until the next feeling. */
   still(): void {
-    this.rumble?.stop();
-    this.tone?.sound(0);
+    this.rumble.stop();
+    this.tone.sound(0);
     this.stick?.stop();
   }
 
@@ -65,7 +67,7 @@ export class Haptics {
 
   close(): void {
     this.still();
-    this.tone?.close();
+    this.tone.close();
     this.stick?.close();
   }
 
@@ -76,8 +78,8 @@ export class Haptics {
     const by = this.feeling(now);
     const strength = by === null ? 0 : contactStrength(this.force, by);
     const felt = settings.rumble && context.driving.isArmed() ? context.controls.felt : null;
-    this.rumble?.feel(felt, strength, now);
-    this.tone?.sound(settings.contactTone && context.streams.isAudible() ? strength : 0);
+    this.rumble.feel(felt, strength, now);
+    this.tone.sound(settings.contactTone && context.streams.isAudible() ? strength : 0);
     this.stick?.feel(by === null ? null : strength, now);
   }
 
@@ -89,4 +91,11 @@ export class Haptics {
     if (!visible || stopped || !connected || robot === null) return null;
     return measuredMs !== null && now - measuredMs < FELT_MS ? feelingOf(robot.description) : null;
   }
+}
+
+/** With the pads' motors and the page's speakers. */
+export function createHaptics(
+  context: HapticsContext & { readonly audio: ConstructorParameters<typeof ContactTone>[0] },
+): Haptics {
+  return new Haptics(context, new Rumble(), new ContactTone(context.audio));
 }

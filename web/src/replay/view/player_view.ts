@@ -53,6 +53,7 @@ export class PlayerView {
   readonly scene: SceneCard | null; // null: the robot does not describe its shape
   private readonly axes: AxisRows | null;
   private readonly gauge: { element: HTMLElement; update(now: number): void } | null;
+  private readonly trace = createForceTrace();
   private readonly force: Parameters<typeof createForceGauge>[0] & {
     state: { feedback: ReplayFeedback | null };
   };
@@ -71,7 +72,7 @@ export class PlayerView {
     this.force = {
       measuredMs: null,
       state: { robot: description === null ? null : { description }, feedback: null },
-      haptics: { trace: createForceTrace() },
+      haptics: { trace: this.trace },
     };
     this.axes = description === null ? null : new AxisRows(description);
     this.gauge = (description?.wrench ?? null) === null ? null : createForceGauge(this.force, false);
@@ -192,7 +193,7 @@ export class PlayerView {
     );
     this.axes?.show(command?.values ?? [], feedback?.axes ?? [], feedback?.goals ?? [], unknown);
     this.force.state.feedback = feedback;
-    if (feedback !== null) noteForce(this.force.haptics.trace, event, forceOf(feedback.wrench));
+    if (feedback !== null) noteForce(this.trace, event, forceOf(feedback.wrench));
     void this.sounds.show(moment.sounds, moment.damaged);
     setText(this.number, grouped(event));
     setText(this.state, stateWords(shown));

@@ -16,7 +16,7 @@ export interface ForceSource {
     readonly robot: { readonly description: RobotDescription } | null;
     readonly feedback: { readonly wrench: readonly number[] } | null;
   };
-  readonly haptics: { readonly trace: ForceTrace };
+  readonly haptics: { readonly trace: ForceTrace } | null; // null: its code is not there yet
 }
 
 /**
@@ -62,7 +62,8 @@ export function createForceGauge(engine: ForceSource, onContact: boolean): Panel
       const strength = feeling === null ? 0 : contactStrength(force, feeling);
       setHidden(element, sensor === null || wrench.length < 3 || (onContact && strength === 0));
       if (sensor === null || feeling === null) return;
-      trace.show(tracePath(engine.haptics.trace, feeling.full_newtons, TRACE_WIDTH, TRACE_HEIGHT), feeling);
+      if (engine.haptics !== null)
+        trace.show(tracePath(engine.haptics.trace, feeling.full_newtons, TRACE_WIDTH, TRACE_HEIGHT), feeling);
       setData(element, "tone", strength >= 0.7 ? "bad" : strength > 0 ? "wait" : "good");
       arrow.setAttribute("d", arrowPath(wrench[0] ?? 0, wrench[1] ?? 0, sensor.full_scale_force));
       const scale = scaleFor("N", sensor.full_scale_force);
