@@ -21,10 +21,10 @@ INSTALL_LOCK := $(PIP) install --no-deps --require-hashes -r
 ARGS ?=
 # A file's tests share what they start. Many wait more than they compute (a worker computes for 43 % of its time), so that
 # there are twice as many workers as cores; not more, or their robots and consoles are late. Browsers take what there is:
-# their tests run after the others, two at a time, since each waits half of its time; those that listen to what a browser
-# plays have the machine to themselves.
+# their tests run after the others, one at a time for each two cores; those that listen to what a browser plays or draw a
+# headset's view have the machine to themselves.
 WORKERS ?= 4
-BROWSERS ?= 2
+BROWSERS ?= $(shell [ "$$(nproc)" -ge 4 ] && echo 2 || echo 1)
 PARALLEL := --dist loadfile --no-loadscope-reorder
 # Every process that a test starts would compile all of Lockstep again.
 unexport PYTHONDONTWRITEBYTECODE

@@ -114,11 +114,13 @@ async def test_a_stick_that_is_moved_cancels_what_moves(stack: Stack) -> None:
                 assert refused.value.reason == "busy"
                 assert not homing.done(), "the second request takes nothing from the first"
                 await drive_on(console, [0.0, 0.2, 0.0])
-                with pytest.raises(ActionCancelled) as cancelled:
-                    await homing
-                if cancelled.value.reason not in HELD_UP:
+                try:
+                    ended: str = (await homing).state  # a busy machine's robot was home before it was driven
+                except ActionCancelled as cancelled:
+                    ended = cancelled.reason
+                if ended not in ("done", *HELD_UP):
                     break
-        assert cancelled.value.reason == "driving"
+        assert ended == "driving"
 
 
 async def test_a_stop_from_an_observer_cancels_and_after_the_reset_arming_comes_first(stack: Stack) -> None:

@@ -29,6 +29,7 @@ __all__ = ["soak"]
 
 SAMPLE_SECONDS = 2.0
 LAST_LOOK = 45.0  # s at the end for everybody to be live again
+READ_SECONDS = 1.0  # s between two looks at what the server counts
 MAX_EVENT_AGE, HOLD = 2.0, 0.3  # of the planar robot
 
 
@@ -143,7 +144,15 @@ class _Soak:
             await asyncio.sleep(SAMPLE_SECONDS)
 
     async def _refusals(self) -> dict[str, float]:
-        """Return the refusals by reason, since the server's last start."""
+        """Return the refusals by reason since the server's last start, as soon as an intruder was refused."""
+        end = time.monotonic() + LAST_LOOK
+        refused = await self._refusals_until_now()
+        while not refused.get("no_seat") and time.monotonic() < end:
+            await asyncio.sleep(READ_SECONDS)
+            refused = await self._refusals_until_now()
+        return refused
+
+    async def _refusals_until_now(self) -> dict[str, float]:
         async with httpx.AsyncClient(base_url=self._world.console_url, trust_env=False) as http:
             with suppress(httpx.TransportError):
                 return Metrics((await http.get("/metrics")).text).values("lockstep_refusals_total", "reason")
