@@ -215,7 +215,7 @@ class Peer:
         """Return what was sent since the last call: of each camera the newest pictures, `most` of them."""
         traces: list[PictureTrace] = []
         with self.contained("media"):
-            traces = self.media.traces.take(most)
+            traces += self.media.traces.take(most)
         return traces
 
     def _quality_decided(self, quality: Quality) -> None:
