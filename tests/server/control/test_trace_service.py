@@ -2,7 +2,7 @@
 
 import asyncio
 from collections.abc import AsyncIterator
-from contextlib import asynccontextmanager, nullcontext
+from contextlib import asynccontextmanager
 
 import pytest
 
@@ -11,40 +11,25 @@ from lockstep.protocol.traces.trace import CommandSpans, PictureSpans, known_spa
 from lockstep.protocol.traces.trace_messages import MAX_TRACED_COMMANDS, EventTrace, PictureTrace, TraceReport, Traces
 from lockstep.server.control import trace_service
 from lockstep.server.control.trace_service import TraceService, command_spans
-from lockstep.server.media.picture_traces import PictureTraces
 
 SPANS = CommandSpans(forward_ms=1.0)
 TRACE = PictureTrace(stream="front", stamp=1, rtp_time=90, spans=PictureSpans(encode_ms=2.0))
-
-
-class FakeTraces(PictureTraces):
-    def __init__(self) -> None:
-        super().__init__()
-        self.wanted: list[bool] = []
-        self.pictures: list[PictureTrace] = []
-
-    def want(self, wanted: bool) -> None:
-        self.wanted.append(wanted)
-
-    def take(self, most: int) -> list[PictureTrace]:
-        taken, self.pictures = self.pictures[:most], []
-        return taken
-
-
-class FakeMedia:
-    def __init__(self) -> None:
-        self.traces = FakeTraces()
 
 
 class FakePeer:
     def __init__(self, role: str = "operator") -> None:
         self.ended = ""
         self.role = role
-        self.media = FakeMedia()
+        self.wanted: list[bool] = []
+        self.pictures: list[PictureTrace] = []
         self.told: asyncio.Queue[Traces] = asyncio.Queue()
 
-    def contained(self, stage: str) -> nullcontext[None]:
-        return nullcontext()
+    def want_traces(self, wanted: bool) -> None:
+        self.wanted.append(wanted)
+
+    def take_traces(self, most: int) -> list[PictureTrace]:
+        taken, self.pictures = self.pictures[:most], []
+        return taken
 
     def send_spare(self, text: str) -> None:
         message = decode_server_message(text)
@@ -74,7 +59,7 @@ async def test_a_peer_is_told_what_came_since_it_asked_and_each_command_once(mon
         service.executed(2, SPANS)
         assert [each.event for each in (await peer.next()).commands] == [2]
         service.executed(3, SPANS)
-        peer.media.traces.pictures = [TRACE]
+        peer.pictures = [TRACE]
         told = await peer.next()
         assert ([each.event for each in told.commands], told.pictures) == ([3], [TRACE])
 
@@ -89,8 +74,8 @@ async def test_a_peer_that_does_not_ask_or_asks_no_more_is_told_nothing(monkeypa
         service.request(witness, True)
         service.executed(1, SPANS)
         await witness.next()
-        assert former.media.traces.wanted == [True, False]
-        assert silent.media.traces.wanted == []
+        assert former.wanted == [True, False]
+        assert silent.wanted == []
         assert silent.told.empty()
         assert former.told.empty()
 

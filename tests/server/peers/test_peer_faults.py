@@ -5,7 +5,6 @@ import traceback
 from collections.abc import AsyncIterator, Callable
 from contextlib import AsyncExitStack, asynccontextmanager
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any, NoReturn, cast
 
 import pytest
@@ -14,6 +13,7 @@ from structlog.testing import capture_logs
 
 from lockstep.protocol.console import Role
 from lockstep.protocol.messages import Ping, Pong
+from lockstep.server.media.subscriptions import Subscriptions
 from lockstep.server.peers.peer import Peer
 from lockstep.server.telemetry.faults import Faults
 from tests.server.rig import Rig, TestPeer, eventually, running_rig
@@ -154,8 +154,27 @@ def _flushing(rig: Rig, peer: Peer, patch: pytest.MonkeyPatch) -> None:
 
 
 def _showing(rig: Rig, peer: Peer, patch: pytest.MonkeyPatch) -> None:
-    streams = [SimpleNamespace(carrier="trailer")]
-    patch.setattr(peer, "media", SimpleNamespace(streams=streams, close=peer.media.close))
+    class LossFails(Subscriptions):
+        @property
+        def loss(self) -> float | None:
+            _raise()
+
+    patch.setattr(peer.media, "__class__", LossFails)
+
+
+def _driving(rig: Rig, peer: Peer, patch: pytest.MonkeyPatch) -> None:
+    patch.setattr(peer.media, "drives", _raise)
+    peer.drives(True)
+
+
+def _wanting_traces(rig: Rig, peer: Peer, patch: pytest.MonkeyPatch) -> None:
+    patch.setattr(peer.media.traces, "want", _raise)
+    peer.want_traces(True)
+
+
+def _taking_traces(rig: Rig, peer: Peer, patch: pytest.MonkeyPatch) -> None:
+    patch.setattr(peer.media.traces, "take", _raise)
+    assert peer.take_traces(1) == []
 
 
 def _closing_media(rig: Rig, peer: Peer, patch: pytest.MonkeyPatch) -> None:
@@ -199,6 +218,9 @@ CASES: list[tuple[str, Role, Plant]] = [
     ("media", "operator", _queueing),
     ("media", "observer", _packing),
     ("media", "operator", _stage),
+    ("media", "observer", _driving),
+    ("media", "observer", _wanting_traces),
+    ("media", "operator", _taking_traces),
     ("connection", "observer", _reporting),
     ("connection", "operator", _receiving),
     ("rtcp", "operator", _rtcp),

@@ -28,7 +28,7 @@ class Sink:
     def link_closed(self, role: LinkRole, detail: str) -> None:
         pass
 
-    def robot_link_failed(self, role: LinkRole, error: Exception) -> None:
+    def link_failed(self, role: LinkRole, error: Exception) -> None:
         self.failed.append(error)
 
 

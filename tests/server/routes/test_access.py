@@ -353,7 +353,7 @@ async def test_a_console_writes_down_that_a_link_has_expired(tmp_path: Path, mon
 async def test_while_the_list_of_links_cannot_be_read_nobody_gets_in_and_everybody_can_still_stop(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("lockstep.server.peers.revoked_peers.UNKNOWN_SECONDS", 1.0)
+    monkeypatch.setattr("lockstep.server.peers.token_revocation.UNKNOWN_SECONDS", 1.0)
     async with running_rig(state_dir=tmp_path) as rig, rig.peer("operator") as peer:
         await _invite(rig, "operator")
         good = (tmp_path / "invitations.json").read_bytes()

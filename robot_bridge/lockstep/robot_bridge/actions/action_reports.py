@@ -44,7 +44,7 @@ class ActionReports:
         self._link = None
 
     def tell(self, update: ActionUpdate | None, *, is_new: bool = True) -> None:
-        """Send an update. `is_new`: note it too; False for a repeat and for progress alone."""
+        """Send an update on the operator link. `is_new`: count and record it too; False for repeats and progress."""
         if update is None:
             return
         if is_new:

@@ -1,7 +1,6 @@
 """Encodes one camera's pictures in a thread: the newest one wins, and none is encoded that no link could take."""
 
 import asyncio
-import logging
 import time
 from collections.abc import Callable
 from contextlib import suppress
@@ -13,11 +12,9 @@ from lockstep.protocol.messages import Media
 from lockstep.protocol.traces.trace import PictureSpans, join_spans, span_ms
 from lockstep.robot_bridge.encoding.encoder_thread import EncoderThread
 from lockstep.robot_bridge.encoding.encoding_requests import EncodingGoal, FrameRateGate, KeyframeSpacing
-from lockstep.robot_bridge.errors import EncodingFailed
+from lockstep.robot_bridge.encoding.failure_log import FailureLog
 
 __all__ = ["EncodedPicture", "PictureEncoder", "PictureEncoding", "Requests"]
-
-_logger = logging.getLogger(__name__)
 
 
 class EncodedPicture(NamedTuple):
@@ -77,7 +74,7 @@ class PictureEncoding:
         self._spacing = KeyframeSpacing()
         self._waiting: Media | None = None  # the newest picture, while the encoder is busy
         self._busy = False
-        self._has_failed = False  # True after the first failure that was not foreseen
+        self._failures = FailureLog(stream, count)
         self._loop: asyncio.AbstractEventLoop | None = None  # None: not running
         self._thread: EncoderThread | None = None
 
@@ -115,7 +112,7 @@ class PictureEncoding:
         if failure is None:
             self._busy = True
         else:
-            self._failed(failure)
+            self._failures.add(failure)
             self._then(media)
 
     def _work(self, loop: asyncio.AbstractEventLoop, media: Media, goal: EncodingGoal, keyframe: bool) -> None:
@@ -135,7 +132,7 @@ class PictureEncoding:
         if self._loop is None:  # ended meanwhile
             return
         if isinstance(result, Exception):
-            self._failed(result)
+            self._failures.add(result)
         else:
             if result.keyframe:
                 self._requests.keyframe_made(self._stream)
@@ -155,10 +152,3 @@ class PictureEncoding:
             self._emit(encoded)
         self._begin_next()
         self._then(media)
-
-    def _failed(self, error: Exception) -> None:
-        self._count("encoding_failed")
-        if not isinstance(error, EncodingFailed) and not self._has_failed:
-            self._has_failed = True
-            text = "stream %s: the encoder failed; further failures are only counted"
-            _logger.error(text, self._stream, exc_info=error)

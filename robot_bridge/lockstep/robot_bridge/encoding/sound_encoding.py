@@ -1,21 +1,18 @@
 """Encodes one microphone's sound in a thread, in order; when the thread is too slow, the oldest is left out."""
 
 import asyncio
-import logging
 from collections import deque
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 
 from lockstep.protocol.messages import Media
 from lockstep.robot_bridge.encoding.encoder_thread import EncoderThread
+from lockstep.robot_bridge.encoding.failure_log import FailureLog
 from lockstep.robot_bridge.encoding.sound_encoder import OpusEncoder
-from lockstep.robot_bridge.errors import EncodingFailed
 
 __all__ = ["SoundEncoding"]
 
 MOST_WAITING = 10  # segments
-
-_logger = logging.getLogger(__name__)
 
 
 class SoundEncoding:
@@ -31,7 +28,7 @@ class SoundEncoding:
         self._count = count
         self._waiting: deque[Media] = deque()
         self._busy = False
-        self._has_failed = False  # True after the first failure that was not foreseen
+        self._failures = FailureLog(stream, count)
         self._loop: asyncio.AbstractEventLoop | None = None  # None: not running
         self._thread: EncoderThread | None = None
 
@@ -60,7 +57,7 @@ class SoundEncoding:
         if failure is None:
             self._busy = True
         else:
-            self._failed(failure)
+            self._failures.add(failure)
 
     def _work(self, loop: asyncio.AbstractEventLoop, media: Media) -> None:
         """Encode in the thread."""
@@ -77,15 +74,8 @@ class SoundEncoding:
         if self._loop is None:  # ended meanwhile
             return
         if isinstance(result, Exception):
-            self._failed(result)
+            self._failures.add(result)
         else:
             for packet in result:
                 self._emit(packet)
         self._begin_next()
-
-    def _failed(self, error: Exception) -> None:
-        self._count("encoding_failed")
-        if not isinstance(error, EncodingFailed) and not self._has_failed:
-            self._has_failed = True
-            text = "stream %s: the encoder failed; further failures are only counted"
-            _logger.error(text, self._stream, exc_info=error)

@@ -5,8 +5,8 @@ import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from lockstep.server.auth.stored_clock import steady_time
 from lockstep.server.util.state_dir import StateDir
+from lockstep.server.util.steady_time import steady_time
 
 __all__ = ["DirectoryLock"]
 

@@ -7,8 +7,9 @@ import structlog
 
 from lockstep.server.auth.invitation_clock import LinkClock
 from lockstep.server.util.state_dir import StateDamaged, StateDir
+from lockstep.server.util.steady_time import steady_time
 
-__all__ = ["SEEN", "StoredClock", "steady_time"]
+__all__ = ["SEEN", "StoredClock"]
 
 log = structlog.get_logger(__name__)
 
@@ -63,8 +64,3 @@ class StoredClock:
             return 0.0 if data is None else _seen.decode(data).seen
         except (msgspec.DecodeError, UnicodeError, RecursionError) as error:
             raise StateDamaged(self._directory.path / SEEN, f"the file is damaged: {error}") from error
-
-
-def steady_time() -> float:
-    """Return monotonic s, which count also while the machine sleeps, where the system can tell."""
-    return time.clock_gettime(time.CLOCK_BOOTTIME) if hasattr(time, "CLOCK_BOOTTIME") else time.monotonic()

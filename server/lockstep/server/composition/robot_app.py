@@ -33,7 +33,7 @@ from lockstep.server.state.persistent_state import ConsoleState
 from lockstep.server.telemetry.background import keep_running
 from lockstep.server.telemetry.log_context import LogContext
 from lockstep.server.telemetry.metrics import Metrics
-from lockstep.server.util.gc_scheduler import sweep_forever
+from lockstep.server.util.process.gc_scheduler import sweep_forever
 
 __all__ = ["attach_session", "create_app", "session_app"]
 

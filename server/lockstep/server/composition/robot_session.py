@@ -24,7 +24,7 @@ from lockstep.server.media.frame_takers import FrameTakers
 from lockstep.server.media.hub import MediaHub
 from lockstep.server.media.sources.source_manager import SourceManager
 from lockstep.server.peers.peer_registry import PeerRegistry
-from lockstep.server.peers.revoked_peers import TokenRevocation
+from lockstep.server.peers.token_revocation import TokenRevocation
 from lockstep.server.publishing.publishers import Publishers
 from lockstep.server.recording.episodes.episode_service import EpisodeService
 from lockstep.server.recording.episodes.metrics import count_episodes

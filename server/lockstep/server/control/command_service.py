@@ -7,7 +7,8 @@ import time
 from typing import Protocol
 
 from lockstep.protocol.console import encode_console_message
-from lockstep.protocol.messages import Command, Feedback, Refusal, Rest
+from lockstep.protocol.description import RobotDescription
+from lockstep.protocol.messages import Command, Feedback, Refusal, Rest, StopTaken
 from lockstep.protocol.traces.trace import CommandSpans
 from lockstep.server.audit.records import Actor
 from lockstep.server.control.command_arbiter import Absorbed, Answer, CommandArbiter, Forward, ForwardRest, Refuse
@@ -26,7 +27,7 @@ from lockstep.server.session_events import (
 __all__ = ["CommandService"]
 
 
-class CommandsLink(Protocol):
+class CommandsRobotLink(Protocol):
     """The part of the connection to the robot that the service uses."""
 
     def send(self, message: Command | Rest) -> bool: ...
@@ -45,19 +46,19 @@ class RenewedActions(Protocol):
 
 
 class CommandService:
-    """All methods are called on the loop and return at once. Tell `arbiter`, the rules, of the link and of stops."""
+    """All methods are called on the loop and return at once."""
 
     def __init__(
         self,
         arbiter: CommandArbiter,
-        robot: CommandsLink,
+        robot: CommandsRobotLink,
         seat: MovingSeat,
         actions: RenewedActions,
         clock: EventClock,
         refusals: Refusals,
         events: SessionEvents,
     ) -> None:
-        self.arbiter = arbiter
+        self._arbiter = arbiter
         self._robot = robot
         self._seat = seat
         self._actions = actions
@@ -68,14 +69,14 @@ class CommandService:
         self._forward_seconds = 0.0  # from its arrival to its departure
 
     def command(self, peer: Peer, command: Command, now: float) -> None:
-        outcome = self.arbiter.command(peer.id, command, now)
+        outcome = self._arbiter.command(peer.id, command, now)
         if isinstance(outcome, Forward) and not self._forward(outcome, now):
             outcome = Refuse(Refusal(event=0, reason="link_down", current=self._clock.event))
         if isinstance(outcome, Answer) and not peer.answers.allows(now, queues=peer.media.queues):
             outcome = Absorbed()
         match outcome:
             case Forward(forwarded):
-                if self.arbiter.moves(forwarded) or self._actions.renews(forwarded.action):
+                if self._arbiter.moves(forwarded) or self._actions.renews(forwarded.action):
                     self._seat.moved(peer)
                 self._events.publish(CommandForwarded(peer.actor, forwarded))
             case Refuse(refusal):
@@ -96,7 +97,7 @@ class CommandService:
         return is_sent
 
     def rest(self, peer: Peer, rest: Rest) -> None:
-        outcome = self.arbiter.rest(peer.id, rest)
+        outcome = self._arbiter.rest(peer.id, rest)
         if isinstance(outcome, ForwardRest):
             if self._robot.send(outcome.rest):
                 self._events.publish(RestForwarded(peer.actor, outcome.rest, ""))
@@ -107,23 +108,41 @@ class CommandService:
 
     def abandon(self, why: str) -> None:
         """Rest the robot before anybody else drives: the last holder's command in flight is void too."""
-        outcome = self.arbiter.abandon()
+        outcome = self._arbiter.abandon()
         if isinstance(outcome, ForwardRest) and self._robot.send(outcome.rest):
             self._events.publish(RestForwarded(Actor(), outcome.rest, why))
 
     def feedback(self, feedback: Feedback) -> Command | None:
         """Take a feedback that the event clock accepted. Return the command that became its event, if one did."""
-        command = self.arbiter.in_flight
-        self.arbiter.feedback(feedback)
-        return command if self.arbiter.in_flight is None else None
+        command = self._arbiter.in_flight
+        self._arbiter.feedback(feedback)
+        return command if self._arbiter.in_flight is None else None
 
-    def turnaround(self, now: float) -> float:
-        """Return the seconds since the newest command was forwarded."""
-        return now - self._forwarded_at
+    def timing(self, robot: CommandSpans, now: float, back: float) -> tuple[float, CommandSpans]:
+        """Return the seconds from the newest command's departure to the arrival of its feedback, and its spans.
 
-    def spans(self, robot: CommandSpans, turnaround: float, back: float) -> CommandSpans:
-        """Return the spans of the newest command. `robot`: as the bridge has measured them; `back`: s, at the console.
-
-        `turnaround`: s, from its departure to the arrival of its feedback.
+        Args:
+            robot: the spans that the bridge has measured
+            now: s, when the feedback arrived
+            back: s, from there until the feedback was sent to the operator
         """
-        return command_spans(robot, forward=self._forward_seconds, link=turnaround, back=back)
+        turnaround = now - self._forwarded_at
+        return turnaround, command_spans(robot, forward=self._forward_seconds, link=turnaround, back=back)
+
+    def refused(self, refusal: Refusal) -> str:
+        """Take a refusal of the bridge. Return the peer to tell, or "" for none."""
+        return self._arbiter.refused(refusal)
+
+    def stop_taken(self, taken: StopTaken) -> None:
+        """Called when the bridge has latched a stop."""
+        self._arbiter.stop_taken(taken)
+
+    def robot_link_up(self, description: RobotDescription) -> None:
+        self._arbiter.robot_link_up(description)
+
+    def robot_link_down(self) -> None:
+        self._arbiter.robot_link_down()
+
+    def epoch_ends(self) -> None:
+        """Forget this epoch. Call before the clock begins another one."""
+        self._arbiter.epoch_ends()

@@ -186,8 +186,7 @@ class Console:
 
     def peer_joined(self, peer: Peer) -> None:
         peer.silenced = self.silence.holds(peer.identity.token_id)
-        with peer.contained("media"):
-            peer.media.drives(False)
+        peer.drives(False)
         self.people.joined(peer)
 
     def channel_opened(self, peer: Peer, channel: ChannelName) -> None:
@@ -311,7 +310,7 @@ class Console:
         """Begin an epoch. References of different epochs are never compared, so every peer starts anew."""
         self.stops.epoch_ends(self.clock.stop)
         self.resets.robot_link_down("the robot bridge has restarted")
-        self._commands.arbiter.epoch_ends()
+        self._commands.epoch_ends()
         self.actions.epoch_ends()
         self.shadows.epoch_ends()
         self.status.forget()
@@ -329,14 +328,14 @@ class Console:
             raise TypeError("a link is up only after its hello")
         self._robot_link_was_up = True
         self.stops.robot_link_up()
-        self._commands.arbiter.robot_link_up(self.robot.description)
+        self._commands.robot_link_up(self.robot.description)
         self.shadows.robot_link_up(self.robot.description)
         self._events.publish(RobotLinkUp(self.robot.state()))
 
     def robot_link_down(self, detail: str) -> None:
         was_up, self._robot_link_was_up = self._robot_link_was_up, False
         self.seat.end_offer(SeatInput.LINK_LOST)
-        self._commands.arbiter.robot_link_down()
+        self._commands.robot_link_down()
         self.stops.robot_link_down()
         self.resets.robot_link_down(detail)
         self.actions.robot_link_down()
@@ -360,8 +359,7 @@ class Console:
         self.resets.feedback(feedback.stop)
         self.speed_cap.fed_back(feedback, now)
         if executed is not None:
-            turnaround = self._commands.turnaround(now)
-            spans = self._commands.spans(robot, turnaround, back)
+            turnaround, spans = self._commands.timing(robot, now, back)
             self.traces.executed(feedback.event, spans)
             self._events.publish(FeedbackReceived(feedback, now, turnaround, spans))
         else:
@@ -376,13 +374,13 @@ class Console:
         match message:
             case Refusal():
                 if not self.resets.refused(message):
-                    peer = self.peers.by_id(self._commands.arbiter.refused(message))
+                    peer = self.peers.by_id(self._commands.refused(message))
                     if peer is not None:
                         peer.send("control", message)
                     self._events.publish(Refused(Actor() if peer is None else peer.actor, "control", message, "robot"))
             case StopTaken():
                 self.seat.end_offer(SeatInput.STOPPED)
-                self._commands.arbiter.stop_taken(message)
+                self._commands.stop_taken(message)
                 self.stops.taken(message)
             case ActionUpdate():
                 self.actions.updated(message)

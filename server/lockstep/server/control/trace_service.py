@@ -7,7 +7,6 @@ it delays neither feedback nor pictures; what it did not carry is forgotten.
 import asyncio
 from collections import deque
 from collections.abc import Callable, Collection, Sequence
-from contextlib import AbstractContextManager
 from typing import NamedTuple, Protocol
 
 from lockstep.protocol.console import encode_console_message
@@ -29,7 +28,6 @@ from lockstep.protocol.traces.trace_messages import (
     Traces,
 )
 from lockstep.rtc.token_bucket import TokenBucket
-from lockstep.server.media.picture_traces import PictureTraces
 from lockstep.server.util.cooperative_scheduler import turns_of_loop
 
 __all__ = ["TracedPeer", "TraceService", "command_spans"]
@@ -41,13 +39,6 @@ REPORTED_EVENTS_HZ = 100.0  # that the operator's client may report; events come
 KEPT_COMMANDS = 128  # that the client's reports are completed with
 
 
-class TracedMedia(Protocol):
-    """The part of a peer's media that is needed here."""
-
-    @property
-    def traces(self) -> PictureTraces: ...
-
-
 class TracedPeer(Protocol):
     """The part of a peer that is needed here; `Peer` has it."""
 
@@ -56,10 +47,8 @@ class TracedPeer(Protocol):
     @property
     def role(self) -> str: ...
 
-    @property
-    def media(self) -> TracedMedia: ...
-
-    def contained(self, stage: str) -> AbstractContextManager[None]: ...
+    def want_traces(self, wanted: bool) -> None: ...
+    def take_traces(self, most: int) -> list[PictureTrace]: ...
     def send_spare(self, text: str) -> None: ...
 
 
@@ -84,8 +73,7 @@ class TraceService:
         """Take a peer's request."""
         if wanted == (peer in self._asked):
             return
-        with peer.contained("media"):
-            peer.media.traces.want(wanted)
+        peer.want_traces(wanted)
         if wanted:
             self._asked[peer] = _Asked(len(self._asked) % OBSERVER_TURNS, self._count)
             self._has_asked.set()
@@ -142,9 +130,7 @@ class TraceService:
         asked = self._asked.get(peer)
         if asked is None or peer.ended:
             return
-        pictures: list[PictureTrace] = []
-        with peer.contained("media"):
-            pictures = peer.media.traces.take(NEWEST_PICTURES)
+        pictures = peer.take_traces(NEWEST_PICTURES)
         new = min(self._count - asked.seen, MAX_TRACED_COMMANDS, len(self._commands))
         commands = list(self._commands)[len(self._commands) - new :]
         self._asked[peer] = asked._replace(seen=self._count)

@@ -24,7 +24,7 @@ from lockstep.server.state.console_context import ConsoleContext
 from lockstep.server.state.persistent_state import robot_place
 from lockstep.server.stop.stop_presses import Press
 from lockstep.server.telemetry.background import keep_running
-from lockstep.server.util.gc_scheduler import sweep_forever
+from lockstep.server.util.process.gc_scheduler import sweep_forever
 
 __all__ = ["Fleet", "fleet_caller", "fleet_of"]
 

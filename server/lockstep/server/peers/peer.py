@@ -18,6 +18,7 @@ from lockstep.protocol.console import (
     Tier,
     encode_console_message,
 )
+from lockstep.protocol.traces.trace_messages import PictureTrace
 from lockstep.rtc.token_bucket import TokenBucket
 from lockstep.server.audit.records import Actor
 from lockstep.server.auth.tokens import Identity
@@ -97,7 +98,7 @@ class Peer:
     `end` ends it from outside, with the reason that logs and metrics show. An exception while it is served ends it
     alone: `failed` is told of the stage, and methods that others call raise nothing.
 
-    It is the `TransportEvents` of its transport. Use its `media` within `contained`.
+    It is the `TransportEvents` of its transport.
     """
 
     def __init__(
@@ -200,12 +201,29 @@ class Peer:
             with self.contained("message out"):
                 self.transport.send_spare(text)
 
+    def drives(self, holds_seat: bool) -> None:
+        """Set whether it holds the control seat."""
+        with self.contained("media"):
+            self.media.drives(holds_seat)
+
+    def want_traces(self, wanted: bool) -> None:
+        """Begin or end keeping which pictures are sent to it, and when."""
+        with self.contained("media"):
+            self.media.traces.want(wanted)
+
+    def take_traces(self, most: int) -> list[PictureTrace]:
+        """Return what was sent since the last call: of each camera the newest pictures, `most` of them."""
+        traces: list[PictureTrace] = []
+        with self.contained("media"):
+            traces += self.media.traces.take(most)
+        return traces
+
     def _quality_decided(self, quality: Quality) -> None:
         self._quality = quality
         self.send("session", quality)
 
     async def close(self) -> None:
-        """Close everything of it, as `run` does at its end; call it for a peer that is never admitted."""
+        """Close its media and its transport. `run` does so at its end; call it for a peer that is not admitted."""
         try:
             async with asyncio.timeout(CLOSE_TIMEOUT):
                 for close in (self.media.close, self.transport.close):

@@ -32,7 +32,7 @@ class RobotLinkSink(Protocol):
     def link_opened(self, role: LinkRole, epoch: str, description: RobotDescription) -> None: ...
     def link_closed(self, role: LinkRole, detail: str) -> None: ...
     def link_received(self, role: LinkRole, message: LinkMessage) -> None: ...
-    def robot_link_failed(self, role: LinkRole, error: Exception) -> None: ...
+    def link_failed(self, role: LinkRole, error: Exception) -> None: ...
 
 
 class ReconnectingRobotLink:
@@ -103,7 +103,7 @@ class ReconnectingRobotLink:
             except LinkError as error:
                 self._sink.link_closed(self._role, error.detail)
             except Exception as error:
-                self._sink.robot_link_failed(self._role, error)
+                self._sink.link_failed(self._role, error)
                 self._sink.link_closed(self._role, FAULT)
             await asyncio.sleep(self._backoff.next())
 

@@ -175,7 +175,7 @@ class RobotConnection:
             log.warning("robot link down", detail=detail)
             self._host.robot_link_down(detail)
 
-    def robot_link_failed(self, role: LinkRole, error: Exception) -> None:
+    def link_failed(self, role: LinkRole, error: Exception) -> None:
         self._faults.caught(f"robot link {role}", error)
 
     def link_received(self, role: LinkRole, message: LinkMessage) -> None:

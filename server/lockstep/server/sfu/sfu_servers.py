@@ -9,6 +9,7 @@ import structlog
 
 from lockstep.server.sfu.publication import Publication
 from lockstep.server.sfu.sfu_server import SfuServer
+from lockstep.server.util.broadcast import Broadcast
 
 __all__ = ["SfuServers"]
 
@@ -23,7 +24,7 @@ class SfuServers:
     def __init__(self, servers: Sequence[SfuServer], clock: Callable[[], float] = time.monotonic) -> None:
         self._servers = servers
         self._clock = clock
-        self._changed = asyncio.Event()  # replaced whenever a relay became live or was lost
+        self._changed = Broadcast()  # a relay became live or was lost
 
     def __iter__(self) -> Iterator[SfuServer]:
         return iter(self._servers)
@@ -62,7 +63,7 @@ class SfuServers:
         """Note that a relay carries the session from now on."""
         server.feed, server.streams, server.trouble = publication.feed, tuple(publication.streams), ""
         log.info("relay carries the session", relay=server.url.address, room=server.url.room)
-        self._tell()
+        self._changed.send()
 
     def failed(self, server: SfuServer, trouble: str) -> None:
         """Note that a relay does not carry the session, by a fault."""
@@ -76,8 +77,4 @@ class SfuServers:
         """Note that a relay no longer carries the session, if it did."""
         if server.live:
             server.feed, server.trouble = 0, trouble or server.trouble
-            self._tell()
-
-    def _tell(self) -> None:
-        self._changed.set()
-        self._changed = asyncio.Event()
+            self._changed.send()

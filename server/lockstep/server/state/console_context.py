@@ -15,7 +15,7 @@ from lockstep.server.auth.silenced_links import SilencedLinks
 from lockstep.server.auth.tokens import Identity
 from lockstep.server.http.request_rate_limits import RequestRateLimits
 from lockstep.server.peers.peer_places import check_place
-from lockstep.server.peers.revoked_peers import TokenRevocation
+from lockstep.server.peers.token_revocation import TokenRevocation
 from lockstep.server.state.persistent_state import ConsoleState
 from lockstep.server.telemetry.faults import Faults
 from lockstep.server.util.state_dir import StateDirUnusable

@@ -18,7 +18,7 @@ from lockstep.server.errors import RobotFailed, SceneUnavailable
 from lockstep.server.foxglove.service import FoxgloveService
 from lockstep.server.http.request_rate_limits import RequestRateLimits
 from lockstep.server.media.hub import MediaHub
-from lockstep.server.peers.revoked_peers import TokenRevocation
+from lockstep.server.peers.token_revocation import TokenRevocation
 from lockstep.server.publishing.publishers import Publishers
 from lockstep.server.recording.episodes.episode_service import EpisodeService
 from lockstep.server.recording.service import RecordingService

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import structlog
 
-from lockstep.server.stop.broadcast import Broadcast
 from lockstep.server.stop.stop_presses import Press, StopPresses
 from lockstep.server.stop.stop_store import KeptStops, kept_stops_place
+from lockstep.server.util.broadcast import Broadcast
 from lockstep.server.util.uncancelled import in_thread
 
 __all__ = ["KEPT", "KEPT_IN_MEMORY", "StopKeeper"]

@@ -33,8 +33,8 @@ from lockstep.server.settings import Settings
 from lockstep.server.settings_file import SettingsFileUnusable, exposed_secrets
 from lockstep.server.state.persistent_state import open_state
 from lockstep.server.telemetry.logs import configure_logs
-from lockstep.server.util.file_limit import raise_file_limit
-from lockstep.server.util.glibc_malloc import share_arenas
+from lockstep.server.util.process.file_limit import raise_file_limit
+from lockstep.server.util.process.glibc_malloc import share_arenas
 from lockstep.server.util.robot_names import BadFleet, is_named
 from lockstep.server.util.state_dir import StateDirUnusable, default_state_dir
 from lockstep.server.webrtc.media_addresses import MediaAddressUnusable, check_media_addresses

@@ -146,8 +146,7 @@ class SeatKeeper:
         if outcome.changed:
             self._publish(_actor(actor))
             for peer in self._peers:
-                with peer.contained("media"):
-                    peer.media.drives(self.state.holds(peer.id))
+                peer.drives(self.state.holds(peer.id))
         if outcome.refusal is not None:
             refused = self._peers.by_id(outcome.refusal.peer)
             if refused is not None:

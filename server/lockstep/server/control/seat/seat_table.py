@@ -54,8 +54,8 @@ class SeatInput(Enum):
     IDLE = "idle"
     OFFERED = "offered"
     WITHDRAWN = "offer withdrawn"
-    STOPPED = "stopped"
-    LINK_LOST = "robot link lost"
+    STOPPED = "stopped"  # no policy moves it again before a person says so
+    LINK_LOST = "robot link lost"  # nobody knows what has changed there
     UNATTENDED = "nobody attends"
 
 

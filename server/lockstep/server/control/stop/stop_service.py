@@ -25,11 +25,11 @@ from lockstep.server.session_events import (
     StopSilenced,
     StopUndelivered,
 )
-from lockstep.server.stop.broadcast import Broadcast
 from lockstep.server.stop.press_deadlines import PressDeadlines
 from lockstep.server.stop.press_listeners import PressListeners
 from lockstep.server.stop.stop_keeper import StopKeeper
 from lockstep.server.stop.stop_presses import AlreadyTaken, Held, NewPress, Press, Settled, told_id
+from lockstep.server.util.broadcast import Broadcast
 from lockstep.server.util.rate_limits import RateLimits
 
 __all__ = ["StopAnswer", "StopOutcome", "StopService", "StopsRobotLink"]

@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from lockstep.robot_bridge.robots.ros2.discovery.pose import Pose
+from lockstep.robot_bridge.robots.ros2.pinhole import Pinhole
 
 __all__ = [
     "ActionFields",
@@ -13,7 +14,6 @@ __all__ = [
     "Graph",
     "Heard",
     "ParameterValue",
-    "Pinhole",
     "ServiceServer",
     "Topic",
     "namespace_of",
@@ -66,18 +66,6 @@ class ActionServer(NamedTuple):
     kind: str  # "nav2_msgs/action/DockRobot"
     node: str
     fields: ActionFields | None = None  # None: the action is not installed where the look was taken
-
-
-class Pinhole(NamedTuple):
-    """What a sensor_msgs/CameraInfo says: of the raw picture, and of the rectified one."""
-
-    width: int
-    height: int
-    frame: str
-    raw: tuple[float, float, float, float]  # fx, fy, cx, cy, pixels
-    rectified: tuple[float, float, float, float]
-    distortion_model: str
-    distortion: tuple[float, ...]
 
 
 @dataclass(frozen=True)

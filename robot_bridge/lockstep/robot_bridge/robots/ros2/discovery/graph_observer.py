@@ -23,7 +23,7 @@ from lockstep.robot_bridge.robots.ros2.discovery.message_kinds import (
     SERVO_COMMAND_TYPE,
 )
 from lockstep.robot_bridge.robots.ros2.discovery.pose import Pose
-from lockstep.robot_bridge.robots.ros2.discovery.topic_messages import Tally
+from lockstep.robot_bridge.robots.ros2.discovery.topic_messages import TopicMessages
 from lockstep.robot_bridge.robots.ros2.ros_side import header_ns
 
 __all__ = ["EmptyGraph", "look"]
@@ -50,7 +50,7 @@ class _Listening:
 
     def __init__(self, ros: GraphSide) -> None:
         self._ros = ros
-        self.tallies: dict[str, Tally] = {}
+        self.messages: dict[str, TopicMessages] = {}
         self.descriptions: dict[str, str] = {}
         self.frames: dict[str, str] = {}
         self.mounts: dict[str, tuple[str, Pose]] = {}
@@ -60,10 +60,10 @@ class _Listening:
         """Listen to sensors that came since the last call."""
         for topic in topics.values():
             for kind in SENSORS:
-                if topic.publishes(kind) and topic.name not in self.tallies and len(self.tallies) < MAX_LISTENERS:
-                    self.tallies[topic.name] = Tally()
+                if topic.publishes(kind) and topic.name not in self.messages and len(self.messages) < MAX_LISTENERS:
+                    self.messages[topic.name] = TopicMessages()
                     kept = kind in KEPT and any(each.kept for each in topic.publishers)
-                    self._listen(kind, topic.name, partial(self._take, self.tallies[topic.name]), kept)
+                    self._listen(kind, topic.name, partial(self._take, self.messages[topic.name]), kept)
             if topic.name in ("/tf", "/tf_static") and topic.publishes(FRAMES):
                 self._follow_frames(topic.name)
             is_new = topic.name not in self.descriptions and len(self.descriptions) < MAX_LISTENERS
@@ -93,9 +93,9 @@ class _Listening:
             if static and all(map(math.isfinite, numbers)) and any(numbers[3:]):
                 self.mounts[child] = parent, Pose((move.x, move.y, move.z), (turn.w, turn.x, turn.y, turn.z))
 
-    def _take(self, tally: Tally, message: Any) -> None:
+    def _take(self, messages: TopicMessages, message: Any) -> None:
         header = header_ns(message.header)
-        tally.take(message, time.monotonic(), (self._ros.now_ns() - header) / 1e9 if header else None)
+        messages.take(message, time.monotonic(), (self._ros.now_ns() - header) / 1e9 if header else None)
 
     def _take_text(self, topic: str, message: Any) -> None:
         self.descriptions[topic] = str(message.data)
@@ -135,7 +135,7 @@ def look(ros: GraphSide, seconds: float) -> Graph:
     grippers = [each.node for each in actions if each.kind == GRIPPER]
     return Graph(
         topics=topics,
-        heard={name: tally.heard() for name, tally in listening.tallies.items()},
+        heard={name: messages.heard() for name, messages in listening.messages.items()},
         parameters=_parameters(ros, topics, grippers),
         descriptions=dict(listening.descriptions),
         seconds=time.monotonic() - began,

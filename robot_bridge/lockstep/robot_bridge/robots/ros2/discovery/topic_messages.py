@@ -4,18 +4,18 @@ import math
 from dataclasses import replace
 from typing import Any
 
-from lockstep.robot_bridge.robots.ros2.discovery.graph import Heard, Pinhole
+from lockstep.robot_bridge.robots.ros2.discovery.graph import Heard
+from lockstep.robot_bridge.robots.ros2.pinhole import pinhole_of
 from lockstep.robot_bridge.robots.ros2.sensing.jpeg_size import jpeg_size
 
-__all__ = ["Tally", "pinhole_of"]
+__all__ = ["TopicMessages"]
 
 MAX_TEXT = 100
 MAX_JOINTS = 64
-MAX_DISTORTION = 14  # coefficients
 CLOCKS_APART = 10.0  # s; a header's stamp that is older was given by another clock, or means nothing
 
 
-class Tally:
+class TopicMessages:
     """`take` each message; then `heard` says what they had in common. The newest message has the last word."""
 
     def __init__(self) -> None:
@@ -63,27 +63,3 @@ class Tally:
             said["width"], said["height"] = jpeg_size(bytes(message.data)) or (0, 0)
             said["encoding"] = str(message.format)[:MAX_TEXT]
         return said
-
-
-def pinhole_of(message: Any) -> Pinhole | None:
-    """Return what a CameraInfo says; None for another message, without calibration, or for a part of the sensor."""
-    if not all(hasattr(message, name) for name in ("k", "p", "d", "binning_x", "roi")):
-        return None
-    if max(message.binning_x, message.binning_y) > 1 or message.roi.width or message.roi.x_offset:
-        return None
-    k, p = [float(value) for value in message.k], [float(value) for value in message.p]
-    distortion = tuple(float(value) for value in message.d[: MAX_DISTORTION + 1])
-    numbers = (*k, *p, *distortion)
-    if not all(math.isfinite(value) and abs(value) < 1e6 for value in numbers) or len(distortion) > MAX_DISTORTION:
-        return None
-    if not (k[0] > 0 and k[4] > 0 and message.width > 0 and message.height > 0):
-        return None
-    return Pinhole(
-        int(message.width),
-        int(message.height),
-        str(message.header.frame_id)[:MAX_TEXT],
-        (k[0], k[4], k[2], k[5]),
-        (p[0], p[5], p[2], p[6]),
-        str(message.distortion_model)[:MAX_TEXT] if any(distortion) else "",
-        distortion if any(distortion) else (),
-    )

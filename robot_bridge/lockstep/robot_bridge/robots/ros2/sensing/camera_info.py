@@ -9,22 +9,15 @@ from typing import Any
 
 from lockstep.protocol.actions import StatusItem
 from lockstep.protocol.description import CameraCalibration
-from lockstep.robot_bridge.robots.ros2.discovery.graph import Pinhole
-from lockstep.robot_bridge.robots.ros2.discovery.topic_messages import pinhole_of
+from lockstep.robot_bridge.robots.ros2.pinhole import Pinhole, is_rectified, pinhole_of
 from lockstep.robot_bridge.robots.ros2.ros_side import RosSide
 from lockstep.robot_bridge.robots.ros2.settings import CameraTopic
 
-__all__ = ["CameraInfoTopic", "difference", "is_rectified"]
+__all__ = ["CameraInfoTopic", "difference"]
 
 SHARE = 0.01  # of the focal length, and of the picture's width: as much as a person sees
 COEFFICIENT = 0.02
 MAX_LABEL = 200  # characters
-
-
-def is_rectified(topic: str) -> bool:
-    """Return whether the pictures of a topic are rectified, by the names of image_proc: "/camera/image_rect"."""
-    parts = [part for part in topic.removesuffix("/compressed").split("/") if part]
-    return bool(parts) and "rect" in parts[-1]
 
 
 def difference(calibration: CameraCalibration, pinhole: Pinhole, width: int, *, rectified: bool) -> str:

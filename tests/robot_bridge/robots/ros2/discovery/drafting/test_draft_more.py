@@ -14,7 +14,6 @@ from lockstep.robot_bridge.robots.ros2.discovery.graph import (
     Endpoint,
     Graph,
     Heard,
-    Pinhole,
     ServiceServer,
     Topic,
 )
@@ -32,6 +31,7 @@ from lockstep.robot_bridge.robots.ros2.discovery.message_kinds import (
 )
 from lockstep.robot_bridge.robots.ros2.discovery.pose import Pose
 from lockstep.robot_bridge.robots.ros2.discovery.terminal_questions import TakeGuesses
+from lockstep.robot_bridge.robots.ros2.pinhole import Pinhole
 from lockstep.robot_bridge.robots.ros2.settings import Ros2Settings
 from tests.robot_bridge.robots.ros2.discovery.graphs import Person, base_graph, published
 

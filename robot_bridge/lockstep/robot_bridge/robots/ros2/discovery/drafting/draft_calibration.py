@@ -1,11 +1,11 @@
 """Finds the calibration of a camera: the pinhole by its CameraInfo, its place by the URDF and static frames of TF."""
 
 from lockstep.robot_bridge.robots.ros2.discovery.drafting.yaml_text import Plain
-from lockstep.robot_bridge.robots.ros2.discovery.graph import Graph, Pinhole, Topic, parts_of_name
+from lockstep.robot_bridge.robots.ros2.discovery.graph import Graph, Topic, parts_of_name
 from lockstep.robot_bridge.robots.ros2.discovery.message_kinds import CAMERA_INFO
 from lockstep.robot_bridge.robots.ros2.discovery.pose import Pose
 from lockstep.robot_bridge.robots.ros2.discovery.urdf import Urdf
-from lockstep.robot_bridge.robots.ros2.sensing.camera_info import is_rectified
+from lockstep.robot_bridge.robots.ros2.pinhole import Pinhole, is_rectified
 
 __all__ = ["Places", "calibration", "info_topic"]
 

@@ -1,6 +1,5 @@
 """Ends the peers of a link at once when the link ends, and its viewers of the 3D scene too."""
 
-import asyncio
 from typing import Protocol
 
 from lockstep.server.audit.audit_trail import AuditTrail
@@ -8,6 +7,7 @@ from lockstep.server.audit.records import Actor, AuditKind
 from lockstep.server.auth.invitation_store import InvitationStore
 from lockstep.server.auth.invitations import Invitation
 from lockstep.server.peers.peer_registry import PeerRegistry
+from lockstep.server.util.broadcast import Broadcast
 
 __all__ = ["UNKNOWN_SECONDS", "TokenRevocation"]
 
@@ -40,7 +40,7 @@ class TokenRevocation:
         self._audit = audit
         self._invitations = invitations
         self._robot = robot
-        self._looked = asyncio.Event()  # replaced by every `enforce`
+        self._enforced = Broadcast()  # by every `enforce`
         self._trouble_since: float | None = None
 
     def enforce(self, changed: list[Invitation], by: Actor, now: float) -> None:
@@ -58,8 +58,7 @@ class TokenRevocation:
             elif now >= peer.identity.expires:
                 peer.end("link expired")
         self._silence.show()
-        self._looked.set()
-        self._looked = asyncio.Event()
+        self._enforced.send()
 
     def silence_ended(self, link: str) -> None:
         """Record that the silence of this link's stops has run out."""
@@ -70,7 +69,7 @@ class TokenRevocation:
         while not self._invitations.has_ended(link, expires):
             if self._unknown_for(self._invitations.clock.now()) > UNKNOWN_SECONDS:
                 return
-            await self._looked.wait()
+            await self._enforced.wait()
 
     def _unknown_for(self, now: float) -> float:
         """Return the seconds for which the list of revoked links could not be read."""

@@ -10,7 +10,7 @@ pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="glibc")
 GIVEN_BACK = """
 import os
 from pathlib import Path
-from lockstep.server.util.glibc_malloc import give_back
+from lockstep.server.util.process.glibc_malloc import give_back
 
 def resident():
     return int(Path("/proc/self/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE")
@@ -25,7 +25,7 @@ print(before - resident())
 
 ARENAS = """
 import ctypes, sys, threading
-from lockstep.server.util.glibc_malloc import share_arenas
+from lockstep.server.util.process.glibc_malloc import share_arenas
 if sys.argv[1] == "shared":
     share_arenas()
 all_there, libc = threading.Barrier(9), ctypes.CDLL(None)

@@ -14,7 +14,7 @@ import itertools
 import time
 from collections.abc import Callable
 
-from lockstep.server.util.glibc_malloc import give_back
+from lockstep.server.util.process.glibc_malloc import give_back
 
 __all__ = ["SweepPlan", "sweep_forever"]
 

@@ -4,8 +4,8 @@ import weakref
 
 import pytest
 
-from lockstep.server.util import gc_scheduler
-from lockstep.server.util.gc_scheduler import ENOUGH, INTERVAL, PATIENCE, SweepPlan, sweep_forever
+from lockstep.server.util.process import gc_scheduler
+from lockstep.server.util.process.gc_scheduler import ENOUGH, INTERVAL, PATIENCE, SweepPlan, sweep_forever
 
 
 def test_a_sweep_is_due_when_enough_have_left_and_some_time_has_passed() -> None:

@@ -3,7 +3,7 @@ import sys
 
 PROGRAM = """
 import resource
-from lockstep.server.util.file_limit import raise_file_limit
+from lockstep.server.util.process.file_limit import raise_file_limit
 resource.setrlimit(resource.RLIMIT_NOFILE, (128, {hard}))
 raise_file_limit()
 print(*resource.getrlimit(resource.RLIMIT_NOFILE))

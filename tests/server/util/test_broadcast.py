@@ -1,6 +1,6 @@
 import asyncio
 
-from lockstep.server.stop.broadcast import Broadcast
+from lockstep.server.util.broadcast import Broadcast
 
 
 async def test_everybody_who_waits_is_woken_and_whoever_waits_afterwards_waits_for_the_next() -> None:

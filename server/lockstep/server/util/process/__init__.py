@@ -1,0 +1,1 @@
+"""What one process asks of the system: memory, garbage collection, files."""
