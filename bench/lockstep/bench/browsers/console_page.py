@@ -10,7 +10,7 @@ from playwright.async_api import Browser, Error, Page
 
 from lockstep.bench.browsers.chromium import missed_in_page, open_page
 from lockstep.bench.browsers.pad import FORWARD, LEFT_Y, RB, ROUND, START, Pad
-from lockstep.bench.harness.background import background
+from lockstep.server.util.background_tasks import background_tasks
 
 __all__ = ["SMALL_WINDOW", "ConsolePage", "open_console"]
 
@@ -123,7 +123,7 @@ class ConsolePage:
         """
         await self.arm()
         await self.drive_forward(tilts)
-        async with background(self._go_on(tilts)):
+        async with background_tasks(self._go_on(tilts)):
             yield
 
     async def _go_on(self, tilts: Mapping[int, float]) -> None:

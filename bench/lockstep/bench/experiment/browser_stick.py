@@ -11,8 +11,8 @@ from lockstep.bench.browsers.chromium import open_page, running_chromium
 from lockstep.bench.browsers.console_page import ConsolePage
 from lockstep.bench.browsers.pad import LEFT_Y, RB, START
 from lockstep.bench.experiment.browser import robot_description
-from lockstep.bench.harness.background import background
 from lockstep.protocol.description import RobotDescription
+from lockstep.server.util.background_tasks import background_tasks
 
 __all__ = ["BrowserStick", "browser_stick"]
 
@@ -66,5 +66,5 @@ class BrowserStick:
 async def browser_stick(link: str) -> AsyncIterator[tuple[BrowserStick, RobotDescription]]:
     async with running_chromium() as browser, open_page(browser, link, pad=True) as page:
         stick = BrowserStick(ConsolePage(page))
-        async with background(stick.run()):
+        async with background_tasks(stick.run()):
             yield stick, await robot_description(link)
