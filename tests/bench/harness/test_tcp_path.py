@@ -74,9 +74,10 @@ async def test_it_may_be_entered_again_after_it_was_left_or_its_port_could_not_b
 
     async with echo(b"one") as target:
         path = TcpPath(target)
-        with monkeypatch.context() as broken, pytest.raises(OSError, match="planted"):
+        with monkeypatch.context() as broken:
             broken.setattr(asyncio, "start_server", refuse)
-            await path.__aenter__()
+            with pytest.raises(OSError, match="planted"):
+                await path.__aenter__()
         for _ in range(2):
             async with path:
                 reader, writer = await asyncio.open_connection("127.0.0.1", path.port)
