@@ -30,9 +30,12 @@ class BrowserStick:
         self._page = page
 
     async def run(self) -> None:
-        """Drive until cancelled, or until the page is gone."""
-        with contextlib.suppress(Error):
+        """Drive until cancelled, or until the page is closed."""
+        try:
             await self._hold()
+        except Error:
+            if not self._page.page.is_closed():
+                raise
 
     async def _hold(self) -> None:
         while True:
