@@ -36,7 +36,7 @@ class TcpPath:
 
     async def __aenter__(self) -> Self:
         self._server = await asyncio.start_server(self._accept, "127.0.0.1", 0)
-        self._tasks = await self._stack.enter_async_context(asyncio.TaskGroup())
+        self._tasks: asyncio.TaskGroup = await self._stack.enter_async_context(asyncio.TaskGroup())
         self._stack.callback(self._end_connections)
         self._stack.callback(self._server.close)
         return self
