@@ -31,6 +31,7 @@ from lockstep.rtc.sctp.wire.chunks import (
 )
 from tests.fuzz.parsers.sctp import SCENES, pack
 from tests.rtc.sctp.hostile import Victim
+from tests.rtc.sctp.internals import Internals
 
 __all__ = ["CORPUS", "seeds"]
 
@@ -50,7 +51,7 @@ def reset(number: int, last: int, *streams: int) -> Reconfig:
 def seeds() -> dict[str, bytes]:
     """Packets that a peer could send, by name; without the byte that chooses the scene."""
     victim = Victim()
-    tsn, own, first = victim.tsn, victim.theirs, victim.end.association._transfer.receiver.received.cumulative
+    tsn, own, first = victim.tsn, victim.theirs, Internals(victim.end.association).cumulative
     init = Init(77, 9000, 10, 10, 5, [(0xC000, b""), (0x8008, b"\x82\xc0\x40\xc2"), (0xC123, b"?")])
     opening = Open("a", "b", Reliability(False, 0)).encode()
     made: dict[str, list[bytes]] = {

@@ -52,7 +52,7 @@ class Stack:
     @property
     def output(self) -> list[str]:
         """Its last lines on standard error."""
-        return self.running.output.errors
+        return list(self.running.output.errors)
 
     def bridge_pid(self, robot: str = "") -> int:
         """The bridge's process: the child of `lockstep up` that writes this robot's log."""

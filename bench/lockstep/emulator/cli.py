@@ -20,6 +20,7 @@ from lockstep.emulator.namespace.namespaces import OPERATOR_ADDRESS, ROBOT_ADDRE
 from lockstep.emulator.network import Network
 from lockstep.emulator.orders import Impaired, obey
 from lockstep.server.http.transport.serve import PortTaken, wait_for_signal
+from lockstep.server.util.background_tasks import background_tasks
 
 __all__ = ["main", "network_command"]
 
@@ -106,10 +107,8 @@ def _explain(network: Network, link: str) -> None:
 
 async def _until_signal(network: Impaired) -> None:
     """Obeys orders meanwhile."""
-    async with asyncio.TaskGroup() as tasks:
-        obeying = tasks.create_task(obey(network, print))
+    async with background_tasks(obey(network, print)):
         await wait_for_signal()
-        obeying.cancel()
 
 
 async def _run_namespaces(profile: Profile, seed: int, robot_side: str, operator_side: str, as_json: bool) -> int:

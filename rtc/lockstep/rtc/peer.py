@@ -93,13 +93,13 @@ class Peer:
             SdpError: the offer cannot be answered; nothing has changed.
             RuntimeError: this session was negotiated before.
         """
-        answer, agreement = self.negotiation.answer(offer, media)
+        answer, agreement = self.negotiation.agree_on(offer, media)
         self._begin(agreement, now)
         return answer
 
     def accept(self, answer: SessionDescription, now: float) -> None:
         """Take the peer's answer to the offer. Raises SdpError; RuntimeError without an offer that waits for one."""
-        self._begin(self.negotiation.accept(answer), now)
+        self._begin(self.negotiation.agree_with(answer), now)
 
     def _begin(self, agreement: Agreement, now: float) -> None:
         self._now = now

@@ -49,7 +49,7 @@ async def test_a_line_is_awaited_wherever_it_is_written_and_errors_are_kept_apar
     async with started([sys.executable, "-c", script]) as process:
         assert await process.line("^t.o$") == "two"
         assert await process.line("one") == "one {"
-        assert process.output.errors == ["two"]
+        assert list(process.output.errors) == ["two"]
         assert list(process.output.unread) == ["one {"]
         with pytest.raises(ProcessFailed):
             await process.line("three", 0.05)

@@ -64,3 +64,22 @@ async def test_a_slow_path_takes_its_time_each_way() -> None:
         assert await reader.readexactly(4) == b"ping"
         assert loop.time() - began >= 0.1
         writer.close()
+
+
+async def test_it_may_be_entered_again_after_it_was_left_or_its_port_could_not_be_opened(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    async def refuse(*_: object) -> asyncio.Server:
+        raise OSError("planted")
+
+    async with echo(b"one") as target:
+        path = TcpPath(target)
+        with monkeypatch.context() as broken:
+            broken.setattr(asyncio, "start_server", refuse)
+            with pytest.raises(OSError, match="planted"):
+                await path.__aenter__()
+        for _ in range(2):
+            async with path:
+                reader, writer = await asyncio.open_connection("127.0.0.1", path.port)
+                assert await reader.readexactly(3) == b"one"
+                writer.close()

@@ -1,12 +1,17 @@
 from lockstep.bench.soak.calm import Calm
 
 
-def test_it_is_calm_when_the_last_trouble_has_ended() -> None:
-    calm = Calm()
-    before = calm.seconds()
-    assert before >= 0
+def test_it_is_calm_from_the_end_of_the_last_trouble() -> None:
+    now = 100.0
+    calm = Calm(lambda: now)
+    now = 107.0
+    assert calm.seconds() == 7.0
     with calm.trouble():
         with calm.trouble():
+            now = 109.0
             assert calm.seconds() == 0
+        now = 112.0
         assert calm.seconds() == 0
-    assert 0 <= calm.seconds() < 60
+    assert calm.seconds() == 0, "calm begins anew"
+    now = 115.0
+    assert calm.seconds() == 3.0

@@ -55,3 +55,27 @@ def test_a_robot_that_asks_for_a_neutral_command_ends_it() -> None:
     assert readiness.lost_by(feedback(2, neutral_needed=True), wanted=False) == "not_neutral"
     readiness.lose()
     assert readiness.lost_by(feedback(2, 2, neutral_needed=True), wanted=True) is None
+
+
+def test_an_arming_that_is_given_up_leaves_a_ready_robot_ready() -> None:
+    readiness = _armed()
+    readiness.begin()
+    readiness.give_up_arming()
+    assert (readiness.ready, readiness.arming) == (True, False)
+
+
+def test_the_answer_to_a_neutral_command_whose_arming_was_given_up_makes_nothing_ready() -> None:
+    readiness = Readiness()
+    readiness.begin()
+    readiness.give_up_arming()
+    assert readiness.answered(feedback(2), neutral=True) is None
+    assert not readiness.ready
+
+
+def test_a_robot_that_is_unready_becomes_ready_by_the_neutral_command_that_stays_wanted() -> None:
+    readiness = _armed()
+    readiness.begin()
+    readiness.unready()
+    assert (readiness.ready, readiness.arming) == (False, True)
+    assert readiness.answered(feedback(3), neutral=True) is None
+    assert (readiness.ready, readiness.arming) == (True, False)

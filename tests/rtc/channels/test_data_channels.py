@@ -20,6 +20,7 @@ from lockstep.rtc.sctp.wire.chunks import BEGIN, END, UNORDERED, CookieEcho, Dat
 from lockstep.rtc.sctp.wire.packet import decode_packet
 from lockstep.rtc.sctp.wire.parameters import STATE_COOKIE
 from tests.rtc.sctp.hostile import Victim
+from tests.rtc.sctp.internals import Internals
 from tests.rtc.sctp.network import Link, World, seeded
 
 NEWEST_WINS = Reliability(ordered=False, max_retransmits=0)
@@ -250,7 +251,7 @@ def test_an_opening_that_is_wrong_is_counted_and_its_stream_reset(stream: int, p
     victim = Victim()
     victim.say(Data(victim.tsn, WHOLE | UNORDERED, stream, 0, 50, payload))
     assert victim.end.counts[count] == 1
-    assert victim.end.association._transfer.resets._request is not None
+    assert Internals(victim.end.association).asks_for_reset
     assert victim.end.association.state is State.ESTABLISHED
 
 

@@ -4,6 +4,7 @@ from lockstep.rtc.channels import ChannelEvent, DataChannels
 from lockstep.rtc.sctp import Closed, SctpSettings, State
 from lockstep.rtc.sctp.wire.chunks import Chunk, Init
 from lockstep.rtc.sctp.wire.packet import decode_packet, encode_packet
+from tests.rtc.sctp.internals import Internals
 from tests.rtc.sctp.network import World, seeded
 
 __all__ = ["NAMED_ENDS", "Victim"]
@@ -42,9 +43,9 @@ class Victim:
             self.end.open("ours", 0.0)
             world.run(1.0)
             assert self.end.association.state is State.ESTABLISHED
-        self.tag = self.end.association._packets.tag
-        self.tsn = peer.association._transfer.sender.fragmentation.next_tsn
-        self.theirs = self.end.association._transfer.sender.fragmentation.next_tsn
+        self.tag = Internals(self.end.association).tag
+        self.tsn = Internals(peer.association).next_tsn
+        self.theirs = Internals(self.end.association).next_tsn
 
     def say(self, *chunks: Chunk) -> list[bytes]:
         """What it sends after a packet of these."""
@@ -72,16 +73,16 @@ class Victim:
         return sent
 
     def _check(self) -> list[bytes]:
-        association = self.end.association
+        association, inside = self.end.association, Internals(self.end.association)
         packets = self.end.packets_to_send()
         for packet in packets:
             assert len(packet) <= association.settings.max_packet, len(packet)
             decode_packet(packet)
         assert len(packets) <= 40, "more in return than a window"
-        assert association._transfer.receiver.reassembly.held <= 2 * SMALL + 4096 + 2000
-        assert sum(len(run.payloads) for run in association._transfer.receiver.reassembly._starts.values()) <= 1000
-        assert len(association._transfer.receiver.received._runs) <= association.settings.max_gaps + 1
-        assert len(association._packets.control) <= 100
+        assert inside.held <= 2 * SMALL + 4096 + 2000
+        assert inside.fragments <= 1000
+        assert inside.runs <= association.settings.max_gaps + 1
+        assert inside.control_chunks <= 100
         assert len(self.end._channels) <= 64
         events = self.end.events()
         for event in events:

@@ -10,6 +10,7 @@ from lockstep.rtc.channels import ChannelClosed, ChannelMessage, ChannelOpened, 
 from lockstep.rtc.dcep import Reliability
 from lockstep.rtc.sctp import Closed, Established, SctpSettings, State
 from tests.rtc.sctp.aiortc_peer import AiortcPair, aiortc_pair
+from tests.rtc.sctp.internals import Internals
 
 SETTINGS = SctpSettings(max_send_message=256 * 1024, max_receive_message=256 * 1024, receive_window=512 * 1024)
 KINDS = [
@@ -122,7 +123,7 @@ async def test_newest_wins_messages_flow_both_ways_past_losses(client: bool) -> 
         pair.flush()
         await pair.until(lambda: "last" in got and ChannelMessage(number, "last") in pair.events)
         assert len(got) > 200
-        await pair.until(lambda: pair.ours.association._transfer.sender.idle)
+        await pair.until(lambda: Internals(pair.ours.association).is_idle)
 
 
 @CLIENT

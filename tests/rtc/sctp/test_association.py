@@ -43,6 +43,7 @@ from lockstep.rtc.sctp.wire.parameters import (
     UNRECOGNIZED_PARAMETER,
 )
 from tests.rtc.sctp.hostile import Victim
+from tests.rtc.sctp.internals import Internals
 from tests.rtc.sctp.network import Link, World, associated, seeded
 
 WHOLE = BEGIN | END
@@ -298,7 +299,7 @@ def test_what_exceeds_the_window_is_dropped_and_taken_when_it_comes_again() -> N
     victim.say(Data(victim.tsn, WHOLE, 0, 1, 51, bytes(1000)))  # 0 was the OPEN
     for index in range(1, 12):
         victim.say(Data(victim.tsn + index, WHOLE, 0, index + 1, 51, bytes(1000)))
-    assert victim.end.association._transfer.receiver.received.cumulative == victim.tsn + 11
+    assert Internals(victim.end.association).cumulative == victim.tsn + 11
 
 
 def test_a_full_queue_is_said_and_loses_nothing() -> None:
@@ -322,7 +323,7 @@ def test_no_more_than_a_burst_leaves_before_something_comes_back() -> None:
     for _ in range(30):
         first.send(0, 53, bytes(16_000), world.now)
     world.run(world.now + 10.0)
-    assert first._transfer.sender.window.congestion.size > 20 * settings.max_packet
+    assert Internals(first).congestion_window > 20 * settings.max_packet
     for _ in range(10):
         first.send(0, 53, bytes(16_000), world.now)
     leaving = first.packets_to_send() + first.packets_to_send()
@@ -395,7 +396,7 @@ def test_two_messages_with_one_number_are_one() -> None:
     victim.say(Data(victim.tsn + 2, WHOLE, 0, 2, 51, b"another two"))
     victim.say(Data(victim.tsn, WHOLE, 0, 1, 51, b"one"))
     assert [getattr(event, "data", None) for event in victim.events][-2:] == ["one", "two"]
-    assert victim.end.association._transfer.receiver.reassembly.held == 0
+    assert Internals(victim.end.association).held == 0
 
 
 # Partial reliability
@@ -409,7 +410,7 @@ def test_a_message_whose_time_has_passed_is_not_repeated() -> None:
     first.send(0, 51, b"next", world.now, lifetime=0.2)
     world.run(world.now + 1.0)
     assert second.events() == [MessageReceived(0, 51, b"next")]
-    assert first._transfer.sender.idle
+    assert Internals(first).is_idle
 
 
 def test_many_messages_that_were_given_up_are_told_of_in_one_forward_tsn() -> None:
@@ -427,7 +428,7 @@ def test_many_messages_that_were_given_up_are_told_of_in_one_forward_tsn() -> No
     assert [event for event in second.events() if isinstance(event, MessageReceived)] == [
         MessageReceived(stream, 51, b"next") for stream in range(5)
     ]
-    assert first._transfer.sender.idle
+    assert Internals(first).is_idle
 
 
 def test_what_is_given_up_before_all_of_it_has_left_holds_nothing_up() -> None:
@@ -440,7 +441,7 @@ def test_what_is_given_up_before_all_of_it_has_left_holds_nothing_up() -> None:
     first.send(0, 51, b"next", world.now)
     world.run(world.now + 10.0)
     assert [event.payload for event in second.events() if isinstance(event, MessageReceived)][-1] == b"next"
-    assert second._transfer.receiver.reassembly.held == 0
+    assert Internals(second).held == 0
 
 
 def test_one_forward_tsn_passes_every_other_message() -> None:
@@ -451,7 +452,7 @@ def test_one_forward_tsn_passes_every_other_message() -> None:
         first.send(0, 51, b"lost" if number % 2 else b"kept", world.now, ordered=False, max_retransmits=0)
         world.run(start + 0.01 * number)
     world.run(world.now + 3.0)
-    assert first._transfer.sender.idle
+    assert Internals(first).is_idle
     forwards = [names for names in kinds(world.packets[0][before:]) if "InterleavedForwardTsn" in names]
     assert len(forwards) <= 35
 
@@ -479,7 +480,7 @@ def test_holes_of_a_peer_that_gives_up_and_does_not_say_so_are_passed_after_a_wh
             victim.say(Data((tsn + index) & 0xFFFFFFFF, WHOLE | UNORDERED, 0, 0, 51, b"x"))
         victim.wait(0.05)
     assert victim.end.counts["given_up_by_peer"] > 0
-    assert len(victim.end.association._transfer.receiver.received._runs) < 60
+    assert Internals(victim.end.association).runs < 60
     assert victim.end.association.state is State.ESTABLISHED
 
 
@@ -519,7 +520,7 @@ def results(packets: list[bytes]) -> list[int]:
 
 def test_a_reset_waits_for_the_messages_before_it() -> None:
     victim = Victim()
-    number = victim.end.association._transfer.resets._peer_number
+    number = Internals(victim.end.association).peer_reset_number
     request = b"".join((value & 0xFFFFFFFF).to_bytes(4, "big") for value in (number, 0, victim.tsn)) + b"\0\0"
     assert results(victim.say(Reconfig([(OUTGOING_RESET_REQUEST, request)]))) == [6]
     assert results(victim.say(Reconfig([(OUTGOING_RESET_REQUEST, request)]))) == [6]
@@ -531,7 +532,7 @@ def test_a_reset_waits_for_the_messages_before_it() -> None:
 @pytest.mark.parametrize(("kind", "result"), [(14, 2), (15, 2), (17, 1), (18, 2)])
 def test_other_requests_are_answered_once_in_their_turn(kind: int, result: int) -> None:
     victim = Victim()
-    number = (victim.end.association._transfer.resets._peer_number & 0xFFFFFFFF).to_bytes(4, "big")
+    number = (Internals(victim.end.association).peer_reset_number & 0xFFFFFFFF).to_bytes(4, "big")
     for _ in range(2):
         assert results(victim.say(Reconfig([(kind, number + bytes(4))]))) == [result]
     assert results(victim.say(Reconfig([(kind, b"\x7f" + number[1:] + bytes(4))]))) == [5]

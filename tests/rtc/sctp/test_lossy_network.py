@@ -5,6 +5,7 @@ from itertools import pairwise
 import pytest
 
 from lockstep.rtc.sctp import Association, Closed, MessageReceived, SctpSettings, State
+from tests.rtc.sctp.internals import Internals
 from tests.rtc.sctp.network import Link, World, associated, seeded
 
 pytestmark = pytest.mark.slow
@@ -81,11 +82,11 @@ def test_reliable_messages_arrive_once_and_in_order(name: str, interleaving: boo
     settings = SctpSettings(interleaving=interleaving)
     world, first, second = associated(settings, copied(link), copied(link), seed=seed, seconds=0.0)
     sent = speak(world, first, 20.0)
-    world.run(world.now + 200.0, stop=lambda: first._transfer.sender.idle)
+    world.run(world.now + 200.0, stop=lambda: Internals(first).is_idle)
     assert_delivered(sent, received(second))
     assert first.state is second.state is State.ESTABLISHED
-    assert first._transfer.sender.idle
-    assert second._transfer.receiver.reassembly.held == 0
+    assert Internals(first).is_idle
+    assert Internals(second).held == 0
 
 
 def test_most_newest_wins_messages_arrive_under_loss_in_one_way_time() -> None:
@@ -105,7 +106,7 @@ def test_an_hour_long_cut_ends_nothing_and_keeps_a_bounded_amount() -> None:
     for _ in range(36_000):
         first.send(NEWEST, 51, bytes(300), world.now, ordered=False, max_retransmits=0)
         world.run(world.now + 0.1)
-        most = max(most, len(first._transfer.sender.outstanding.chunks))
+        most = max(most, Internals(first).outstanding)
     assert most <= first.settings.max_outstanding
     second.events()
     world.run(3610.0)
@@ -113,7 +114,7 @@ def test_an_hour_long_cut_ends_nothing_and_keeps_a_bounded_amount() -> None:
     world.run(3612.0)
     arrived = [event.payload for event in second.events() if isinstance(event, MessageReceived)]
     assert [payload for payload in arrived if payload in (b"before", b"after")] == [b"before", b"after"]
-    assert first._transfer.sender.idle
+    assert Internals(first).is_idle
 
 
 @pytest.mark.parametrize("seed", range(20))

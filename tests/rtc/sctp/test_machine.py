@@ -42,6 +42,7 @@ from lockstep.rtc.sctp.wire.chunks import (
     Unknown,
 )
 from tests.rtc.sctp.hostile import Victim
+from tests.rtc.sctp.internals import Internals
 from tests.rtc.sctp.network import Link, World, seeded
 
 pytestmark = pytest.mark.slow
@@ -121,8 +122,8 @@ class TwoAssociations(RuleBasedStateMachine):
     @invariant()
     def memory_is_bounded(self) -> None:
         for end in self.ends:
-            assert end._transfer.receiver.reassembly.held <= 2 * end.settings.receive_window
-            assert len(end._transfer.sender.outstanding.chunks) <= end.settings.max_outstanding + 20
+            assert Internals(end).held <= 2 * end.settings.receive_window
+            assert Internals(end).outstanding <= end.settings.max_outstanding + 20
 
     @invariant()
     def what_arrives_was_sent_in_this_order(self) -> None:
@@ -137,7 +138,7 @@ class TwoAssociations(RuleBasedStateMachine):
 
     def teardown(self) -> None:
         self.world.links = (Link(), Link())
-        self.world.run(self.world.now + 300.0, stop=lambda: all(end._transfer.sender.idle for end in self.ends))
+        self.world.run(self.world.now + 300.0, stop=lambda: all(Internals(end).is_idle for end in self.ends))
         self.world.run(self.world.now + 5.0)
         self.collect()
         for sent, got in zip(self.sent, self.got, strict=True):
@@ -145,8 +146,8 @@ class TwoAssociations(RuleBasedStateMachine):
                 assert got.get(stream, []) == sent.get(stream, [])
         for end in self.ends:
             assert end.state is State.ESTABLISHED
-            assert end._transfer.sender.window.flight == end._transfer.sender.window.newest_flight == 0
-            assert end._transfer.receiver.reassembly.held == 0
+            assert Internals(end).flight == Internals(end).newest_flight == 0
+            assert Internals(end).held == 0
 
 
 TestTwoAssociations = TwoAssociations.TestCase

@@ -5,6 +5,7 @@ import pytest
 from lockstep.rtc.sctp import MessageReceived, SctpSettings
 from lockstep.rtc.sctp.wire.chunks import Data, InterleavedData
 from lockstep.rtc.sctp.wire.packet import decode_packet
+from tests.rtc.sctp.internals import Internals
 from tests.rtc.sctp.network import Link, associated
 
 BULK, STATE = 1, 2
@@ -81,14 +82,14 @@ def test_the_floor_is_what_is_unacknowledged_at_most_when_nothing_comes_back() -
     for _ in range(2000):
         first.send(STATE, 53, bytes(1000), world.now, ordered=False, max_retransmits=0)
         world.run(world.now + 0.005)
-        assert first._transfer.sender.window.newest_flight <= floor + 1000
+        assert Internals(first).newest_flight <= floor + 1000
 
 
 def test_the_oldest_make_room_for_the_newest_where_none_can_leave() -> None:
     world, first, second = associated(SctpSettings(newest_wins_queue=5000))
     for number in range(100):
         first.send(STATE, 53, number.to_bytes(4, "big") + bytes(996), world.now, ordered=False, max_retransmits=0)
-    assert first._transfer.sender.queue.dropped == 95
+    assert Internals(first).dropped == 95
     world.run(world.now + 1.0)
     arrived = [event.payload[3] for event in second.events() if isinstance(event, MessageReceived)]
     assert arrived == [95, 96, 97, 98, 99]

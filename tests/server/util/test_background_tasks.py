@@ -16,7 +16,7 @@ async def _for_ever(ended: list[str]) -> None:
 
 
 async def _fail() -> None:
-    raise ZeroDivisionError
+    raise ZeroDivisionError("planted")
 
 
 async def test_the_work_ends_with_the_block() -> None:
@@ -29,14 +29,16 @@ async def test_the_work_ends_with_the_block() -> None:
 
 async def test_an_exception_of_the_block_comes_out_as_it_is_behind_the_end_of_the_work() -> None:
     ended: list[str] = []
+    error = KeyError("of the block")
 
     async def run() -> None:
         async with background_tasks(_for_ever(ended)):
             await asyncio.sleep(0)
-            raise KeyError
+            raise error
 
-    with pytest.raises(KeyError):
+    with pytest.raises(KeyError) as raised:
         await run()
+    assert raised.value is error
     assert ended == ["ended"]
 
 
@@ -49,8 +51,9 @@ async def test_work_that_fails_cancels_the_block_and_comes_out_as_a_group() -> N
 
     with pytest.raises(ExceptionGroup) as raised:
         await run()
-    assert [type(each) for each in raised.value.exceptions] == [ZeroDivisionError]
+    assert [repr(each) for each in raised.value.exceptions] == ["ZeroDivisionError('planted')"]
     assert ended == ["ended"]
+    await asyncio.sleep(0)  # and nothing is left of the cancellation
 
 
 async def test_a_block_that_is_cancelled_ends_the_work_and_stays_cancelled() -> None:

@@ -2,7 +2,7 @@
 
 import asyncio
 from collections.abc import AsyncIterator, Mapping, Sequence
-from contextlib import asynccontextmanager, suppress
+from contextlib import asynccontextmanager
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +10,7 @@ from playwright.async_api import Browser, Error, Page
 
 from lockstep.bench.browsers.chromium import missed_in_page, open_page
 from lockstep.bench.browsers.pad import FORWARD, LEFT_Y, RB, ROUND, START, Pad
-from lockstep.bench.harness.background import background
+from lockstep.server.util.background_tasks import background_tasks
 
 __all__ = ["SMALL_WINDOW", "ConsolePage", "open_console"]
 
@@ -120,20 +120,26 @@ class ConsolePage:
         """Arm and drive inside the block, again if a busy machine ended that; deadman and sticks stay held.
 
         Anything else that ends it, such as a stop, lasts.
+
+        Raises:
+            ExceptionGroup: the page failed meanwhile, or cannot drive again; the block was cancelled.
         """
         await self.arm()
         await self.drive_forward(tilts)
-        async with background(self._go_on(tilts)):
+        async with background_tasks(self._go_on(tilts)):
             yield
 
     async def _go_on(self, tilts: Mapping[int, float]) -> None:
-        with suppress(AssertionError, Error):  # the block's own waits tell what is wrong, or has closed the page
+        try:
             while True:
                 await self._missed("!s.armed", 600)
                 if not await self.was_held_up():
                     return
                 await self._arm_anew(tilts)
                 await self.drive_forward(tilts)
+        except Error:
+            if not self.page.is_closed():
+                raise
 
     async def _arm_anew(self, tilts: Mapping[int, float]) -> None:
         await self.pad.press(RB, False)

@@ -11,8 +11,8 @@ from lockstep.bench.browsers.chromium import open_page, running_chromium
 from lockstep.bench.browsers.console_page import ConsolePage
 from lockstep.bench.browsers.pad import LEFT_Y, RB, START
 from lockstep.bench.experiment.browser import robot_description
-from lockstep.bench.harness.background import background
 from lockstep.protocol.description import RobotDescription
+from lockstep.server.util.background_tasks import background_tasks
 
 __all__ = ["BrowserStick", "browser_stick"]
 
@@ -30,9 +30,12 @@ class BrowserStick:
         self._page = page
 
     async def run(self) -> None:
-        """Drive until cancelled, or until the page is gone."""
-        with contextlib.suppress(Error):
+        """Drive until cancelled, or until the page is closed."""
+        try:
             await self._hold()
+        except Error:
+            if not self._page.page.is_closed():
+                raise
 
     async def _hold(self) -> None:
         while True:
@@ -66,5 +69,5 @@ class BrowserStick:
 async def browser_stick(link: str) -> AsyncIterator[tuple[BrowserStick, RobotDescription]]:
     async with running_chromium() as browser, open_page(browser, link, pad=True) as page:
         stick = BrowserStick(ConsolePage(page))
-        async with background(stick.run()):
+        async with background_tasks(stick.run()):
             yield stick, await robot_description(link)

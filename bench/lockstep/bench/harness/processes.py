@@ -11,9 +11,9 @@ from collections.abc import AsyncIterator, Mapping, Sequence
 from contextlib import asynccontextmanager, suppress
 from typing import Any, Protocol
 
-from lockstep.bench.harness.background import background
 from lockstep.bench.harness.process.output import ProcessOutput
 from lockstep.bench.harness.process.usage import ProcessUsage
+from lockstep.server.util.background_tasks import background_tasks
 
 __all__ = ["ProcessFailed", "Running", "Spawn", "running_process", "spawn_here", "started"]
 
@@ -193,7 +193,7 @@ async def started(
         command, stdin=pipe, stdout=pipe, stderr=pipe, limit=LINE_LIMIT, env=os.environ | dict(environment or {})
     )
     output = ProcessOutput()
-    async with background(output.read(process)):
+    async with background_tasks(output.read(process)):
         running = Running(process, command, output)
         try:
             yield running

@@ -1,7 +1,7 @@
 """A port of loopback that leads to another address, and can be slow, away and cut: a simple network for TCP."""
 
 import asyncio
-from contextlib import suppress
+from contextlib import AsyncExitStack, suppress
 from types import TracebackType
 from typing import Self
 
@@ -24,9 +24,9 @@ class TcpPath:
         self.away = False
         self._delay = delay
         self._ends: set[asyncio.StreamWriter] = set()
-        self._tasks: asyncio.TaskGroup = asyncio.TaskGroup()
         self._joins: set[asyncio.Task[None]] = set()
         self._server: asyncio.Server | None = None
+        self._stack = AsyncExitStack()
 
     @property
     def port(self) -> int:
@@ -35,25 +35,26 @@ class TcpPath:
         return int(self._server.sockets[0].getsockname()[1])
 
     async def __aenter__(self) -> Self:
-        await self._tasks.__aenter__()
         self._server = await asyncio.start_server(self._accept, "127.0.0.1", 0)
+        self._tasks: asyncio.TaskGroup = await self._stack.enter_async_context(asyncio.TaskGroup())
+        self._stack.callback(self._end_connections)
+        self._stack.callback(self._server.close)
         return self
 
     async def __aexit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        if self._server is not None:
-            self._server.close()
-        self.away = True
-        self.cut()
-        for join in self._joins:
-            join.cancel()
-        await self._tasks.__aexit__(None, None, None)
+        await self._stack.aclose()
 
     def cut(self) -> None:
         """Break all connections at once."""
         for end in self._ends:
             end.transport.abort()
+
+    def _end_connections(self) -> None:
+        self.cut()
+        for join in self._joins:
+            join.cancel()
 
     def _accept(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         if self._server is None or not self._server.is_serving():

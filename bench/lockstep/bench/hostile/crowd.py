@@ -16,10 +16,10 @@ import httpx
 import uvloop
 
 from lockstep.bench.harness.asked import answer, say
-from lockstep.bench.harness.background import background
 from lockstep.bench.hostile import over_http, over_robot_link, over_webrtc, over_whip
 from lockstep.bench.hostile.target import Misbehaviour, Target
 from lockstep.client.console_url import parse_link
+from lockstep.server.util.background_tasks import background_tasks
 
 __all__ = ["KINDS", "Crowd", "main"]
 
@@ -98,7 +98,7 @@ class Crowd:
 
 async def _run(link: str, operator: str, bridge: str, count: int, seed: int, only: str = "") -> None:
     crowd = Crowd(link, operator, bridge, count, seed, tuple(kind for kind in KINDS if only in ("", kind.__name__)))
-    async with background(crowd.run()):
+    async with background_tasks(crowd.run()):
         say({"members": count})
         await answer(crowd.summary)
 

@@ -17,9 +17,9 @@ from typing import Any
 from lockstep.bench.experiment.choices import Choices
 from lockstep.bench.experiment.endurance.endurance import Endurance
 from lockstep.bench.experiment.endurance.endurance_run import Driven, HeadlessHands
-from lockstep.bench.harness.background import background
 from lockstep.bench.harness.tcp_path import TcpPath
 from lockstep.client import Console
+from lockstep.server.util.background_tasks import background_tasks
 
 __all__ = ["main"]
 
@@ -49,7 +49,7 @@ async def _drive(client: str, link: str, seconds: float) -> dict[str, Any]:
         async with asyncio.timeout(LIVE_SECONDS):
             await driven.until_live()
         began = time.monotonic()
-        async with background(driven.run(endurance, lambda: time.monotonic() - began)):
+        async with background_tasks(driven.run(endurance, lambda: time.monotonic() - began)):
             await asyncio.sleep(seconds)
     found = endurance.fields()
     return {

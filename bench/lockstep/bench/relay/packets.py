@@ -14,7 +14,6 @@ from typing import Any
 import numpy as np
 from prometheus_client import CollectorRegistry
 
-from lockstep.bench.harness.background import background
 from lockstep.bench.harness.processes import Running, started
 from lockstep.bench.relay.janus import JANUS_READY, janus_command
 from lockstep.client.transport.sfu_media import RelayMedia, RelayTicket
@@ -27,6 +26,7 @@ from lockstep.server.media.hub import MediaHub, MediaSettings
 from lockstep.server.sfu.janus_publishing import publish
 from lockstep.server.sfu.janus_room import JanusRoom, RoomKeys
 from lockstep.server.sfu.janus_session import open_janus
+from lockstep.server.util.background_tasks import background_tasks
 
 __all__ = ["main"]
 
@@ -92,7 +92,7 @@ async def measure(host: str, janus: Running) -> list[tuple[int, float]]:
         ticket = RelayTicket(
             engine="janus", relay="0", url=url, room=ROOM, pin=KEYS.pin, feed=FEED, streams=publication.streams
         )
-        async with background(hub.run(), feed(hub, camera.name), _talk(publication)):
+        async with background_tasks(hub.run(), feed(hub, camera.name), _talk(publication)):
             for step in STEPS:
                 while len(watchers) < step:
                     watchers.append(await subscribe(ticket, counts))

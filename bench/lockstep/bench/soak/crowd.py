@@ -17,7 +17,10 @@ BACKWARDS = -0.5  # value of the first axis with which only intruders drive
 
 
 class Crowd:
-    """Keeps `size` observers connected, some leaving and others coming, from `fill` to `close`."""
+    """Keeps `size` observers connected, some leaving and others coming, from `fill` to `close`.
+
+    They are tasks of the group that it is given when they join.
+    """
 
     def __init__(self, link: str, size: int, seed: int) -> None:
         self.joined = self.lost = 0
@@ -25,21 +28,19 @@ class Crowd:
         self._size = size
         self._chance = random.Random(seed)
         self._guests: list[asyncio.Task[None]] = []
-        self._tasks: asyncio.TaskGroup | None = None
 
     def __len__(self) -> int:
         return len(self._guests)
 
     def fill(self, tasks: asyncio.TaskGroup) -> None:
-        """Connect them, as tasks of this group."""
-        self._tasks = tasks
+        """Connect them."""
         while len(self._guests) < self._size:
-            self._join()
+            self._join(tasks)
 
-    def come(self) -> None:
+    def come(self, tasks: asyncio.TaskGroup) -> None:
         """Let a few observers join, up to the size."""
         for _ in range(min(self._size - len(self._guests), self._chance.randint(1, 5))):
-            self._join()
+            self._join(tasks)
 
     async def go(self) -> None:
         """Let a few observers leave, like a person who closes the tab."""
@@ -51,10 +52,8 @@ class Crowd:
         while self._guests:
             await _ended(self._guests.pop())
 
-    def _join(self) -> None:
-        if self._tasks is None:
-            raise RuntimeError("fill the crowd first")
-        self._guests.append(self._tasks.create_task(self._attend()))
+    def _join(self, tasks: asyncio.TaskGroup) -> None:
+        self._guests.append(tasks.create_task(self._attend()))
 
     async def _attend(self) -> None:
         while True:

@@ -84,7 +84,7 @@ class _Soak:
             background = [tasks.create_task(each.run()) for each in (operator, observer)]
             background += [tasks.create_task(each.run()) for each in self._intruders]
             background.append(tasks.create_task(self._sample_memory()))
-            await self._play(schedule(self._minutes, self._seed))
+            await self._play(schedule(self._minutes, self._seed), tasks)
             self._say("the plan is played; waiting for everybody to be back")
             await self._until_live(operator, observer)
             refused = await self._refusals()
@@ -93,16 +93,16 @@ class _Soak:
             await self._crowd.close()
         return self._verdict(operator, observer, refused)
 
-    async def _play(self, plan: list[Action]) -> None:
+    async def _play(self, plan: list[Action], tasks: asyncio.TaskGroup) -> None:
         began = time.monotonic()
         for action in plan:
             await asyncio.sleep(max(0.0, began + action.at - time.monotonic()))
             self._say(f"{time.monotonic() - began:6.1f} s  {action.kind} {action.seconds or ''}")
-            await self._act(action)
+            await self._act(action, tasks)
             self._done[action.kind] += 1
         await asyncio.sleep(max(0.0, began + self._minutes * 60 - LAST_LOOK - time.monotonic()))
 
-    async def _act(self, action: Action) -> None:
+    async def _act(self, action: Action, tasks: asyncio.TaskGroup) -> None:
         match action.kind:
             case "kill_bridge":
                 await self._world.kill_bridge()
@@ -117,7 +117,7 @@ class _Soak:
                     await self._world.stop_for(action.seconds)
                     await self._world.until_reset()
             case "join":
-                self._crowd.come()
+                self._crowd.come(tasks)
             case "leave":
                 await self._crowd.go()
 

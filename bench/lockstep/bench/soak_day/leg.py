@@ -96,28 +96,28 @@ class _Leg:
             background.append(tasks.create_task(self._intruder.run()))
             background.append(tasks.create_task(self._sample(driving)))
             background.append(tasks.create_task(self._tell()))
-            await self._play(plan(self._minutes, self._seed))
+            await self._play(plan(self._minutes, self._seed), tasks)
             self._say("the plan is played; waiting for everybody to be back")
             await self._until_live()
             for task in background:
                 task.cancel()
             await self._crowd.close()
 
-    async def _play(self, actions: list[Action]) -> None:
+    async def _play(self, actions: list[Action], tasks: asyncio.TaskGroup) -> None:
         for action in actions:
             await asyncio.sleep(max(0.0, self._begin + action.at - time.monotonic()))
             self._say(f"{time.monotonic() - self._begin:7.1f} s  {action.kind} {round(action.seconds, 1) or ''}")
-            if await self._act(action):
+            if await self._act(action, tasks):
                 self._done[action.kind] += 1
         await asyncio.sleep(max(0.0, self._begin + self._minutes * 60 - LAST_LOOK - time.monotonic()))
 
-    async def _act(self, action: Action) -> bool:
+    async def _act(self, action: Action, tasks: asyncio.TaskGroup) -> bool:
         """Do the action, and return whether it was done; while the console is down, it is not."""
         match action.kind:
             case "hand_over":
                 return await take_over(self._network.link(self._world.supervisor))
             case "join":
-                self._crowd.come()
+                self._crowd.come(tasks)
             case "leave":
                 await self._crowd.go()
             case "cut_network":

@@ -3,10 +3,10 @@
 import asyncio
 import time
 from collections.abc import AsyncGenerator, AsyncIterable
-from contextlib import suppress
 from typing import TypeVar
 
 from lockstep.emulator.transport.stream_path import StreamPath
+from lockstep.server.util.background_tasks import background_tasks
 
 __all__ = ["delayed", "sleep_until"]
 
@@ -32,17 +32,12 @@ async def delayed(source: AsyncIterable[Chunk], path: StreamPath) -> AsyncGenera
         else:
             await queue.put((0.0, None))
 
-    end: Exception | None = None
-    async with asyncio.TaskGroup() as tasks:  # the reader raises nothing, so that the group does not cancel the caller
-        reader = tasks.create_task(read())
-        with suppress(GeneratorExit):  # closed: the group would raise it in a group of errors
-            while True:
-                when, chunk = await queue.get()
-                if chunk is None or isinstance(chunk, Exception):
-                    end = chunk
-                    break
-                await sleep_until(when)
-                yield chunk
-        reader.cancel()
-    if end is not None:
-        raise end
+    async with background_tasks(read()):
+        while True:
+            when, chunk = await queue.get()
+            if chunk is None:
+                return
+            if isinstance(chunk, Exception):
+                raise chunk
+            await sleep_until(when)
+            yield chunk

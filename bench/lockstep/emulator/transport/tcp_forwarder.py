@@ -9,7 +9,7 @@ import socket
 import time
 from collections import Counter
 from collections.abc import Iterator
-from contextlib import suppress
+from contextlib import AsyncExitStack, suppress
 from types import TracebackType
 from typing import Self
 
@@ -51,22 +51,21 @@ class TcpForwarder:
             for direction in DIRECTIONS
             if (settings := profile.robot_bottleneck(direction)) is not None
         }
-        self._tasks: asyncio.TaskGroup = asyncio.TaskGroup()
         self._connections: set[asyncio.Task[None]] = set()
         self._server: asyncio.Server | None = None
+        self._stack = AsyncExitStack()
 
     async def __aenter__(self) -> Self:
-        await self._tasks.__aenter__()
         self._server = await asyncio.start_server(self._accepted, "127.0.0.1", 0)
+        self._tasks: asyncio.TaskGroup = await self._stack.enter_async_context(asyncio.TaskGroup())
+        self._stack.callback(self.cut)
+        self._stack.callback(self._server.close)
         return self
 
     async def __aexit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        if self._server is not None:
-            self._server.close()
-        self.cut()
-        await self._tasks.__aexit__(None, None, None)
+        await self._stack.aclose()
 
     @property
     def address(self) -> tuple[str, int]:

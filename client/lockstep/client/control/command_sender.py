@@ -107,7 +107,7 @@ class CommandSender:
 
     def hold_back(self, reason: RefusalReason) -> None:
         """Give up the wanted values and the flight for `reason`; the robot may not move until the next `arm`."""
-        self.readiness.ready = False
+        self.readiness.unready()
         if self.readiness.arming and reason == "not_neutral" and self.intention.is_neutral:
             return  # arming cures this; values that were wanted since then are of before the loss
         self.armed = False
@@ -159,7 +159,8 @@ class CommandSender:
 
     def rest(self, now: float) -> None:
         """Send a rest at once, until it is proven, and one neutral command; then nothing. Disarms."""
-        self.armed = self.readiness.arming = False
+        self.armed = False
+        self.readiness.give_up_arming()
         wanted = self.intention.want
         self.intention.forget(wanted)
         if self._rest is not None:

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from lockstep.client.connection_options import ConnectionOptions
 from lockstep.client.control.command_gate import CALM_INTERVAL, CommandGate
 from lockstep.client.control.command_sender import CommandSender
-from lockstep.client.control.sender_task import Driver
+from lockstep.client.control.driver import Driver
 from lockstep.client.errors import CommandRefused, ConsoleLost, NotArmed
 from lockstep.client.media.newest_queue import Readers
 from lockstep.client.media.render_log import LIMIT, FeedbackArrival

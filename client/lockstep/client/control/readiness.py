@@ -28,6 +28,14 @@ class Readiness:
         """Want a neutral command."""
         self.arming, self._asked_again = True, False
 
+    def give_up_arming(self) -> None:
+        """Want no neutral command; a robot that may move still may."""
+        self.arming = False
+
+    def unready(self) -> None:
+        """Note that the robot may not move; a neutral command that is wanted stays wanted."""
+        self.ready = False
+
     def lose(self) -> None:
         """Note that the robot may not move before the next `begin`."""
         self.ready = self.arming = False

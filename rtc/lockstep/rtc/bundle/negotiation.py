@@ -50,23 +50,23 @@ class Negotiation:
         self._tagged: MediaSection | None = None  # section with the transport of the bundle; None until negotiated
         self._is_done = False
 
-    def answer(
+    def agree_on(
         self, offer: SessionDescription, media: Mapping[str, LocalMedia]
     ) -> tuple[SessionDescription, Agreement]:
-        """Return the answer to a peer's offer. Raises SdpError and RuntimeError like `Peer.answer`."""
+        """Return the answer to a peer's offer, for `Peer.answer`. Raises like it."""
         self._check_new()
         answer = self._local.answer(offer, media)
         return answer, self._agreed(offer, answer, answer.sections)
 
     def offer(self, media: Sequence[OfferedMedia], *, data: bool = True) -> SessionDescription:
         """Return an offer, with channels if `data`. The answer goes to `Peer.accept`. Raises RuntimeError like
-        `answer`."""
+        `Peer.answer`."""
         self._check_new()
         self._offer = self._local.offer(media, data=data)
         return self._offer
 
-    def accept(self, answer: SessionDescription) -> Agreement:
-        """Take the peer's answer. Raises SdpError and RuntimeError like `Peer.accept`."""
+    def agree_with(self, answer: SessionDescription) -> Agreement:
+        """Take the peer's answer, for `Peer.accept`. Raises like it."""
         if self._offer is None:
             raise RuntimeError("no offer waits for an answer")
         check_answer(self._offer, answer)

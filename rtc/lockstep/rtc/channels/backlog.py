@@ -15,6 +15,14 @@ class Backlog:
         self._association = association
         self._half_full = association.settings.send_queue // 2
 
+    def filled(self, channel: int) -> None:
+        """Note that a channel's queue is full."""
+        self.full.add(channel)
+
+    def watch(self, channel: int) -> None:
+        """Tell once when nothing waits on a channel."""
+        self.watched.add(channel)
+
     def take_writable(self) -> list[int]:
         """Return the channels whose owner need not wait any more."""
         half_empty = [each for each in self.full if self._association.buffered(each) <= self._half_full]

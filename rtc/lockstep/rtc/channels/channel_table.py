@@ -53,9 +53,14 @@ class ChannelTable:
         if stream in self.channels or not 0 <= stream < self._streams:
             raise ValueError(f"channel {stream} is taken or out of range")
         self._check_number()
-        added = self.channels[stream] = Channel(stream, what, ChannelState.OPEN, by_peer=False)
+        added = self.add(stream, what, ChannelState.OPEN)
         if self._is_up:
             self.opened(added)
+
+    def add(self, stream: int, what: Open, state: ChannelState, *, by_peer: bool = False) -> Channel:
+        """Add a channel on a stream that `free_stream` returned, or that has no `refusal`."""
+        added = self.channels[stream] = Channel(stream, what, state, by_peer)
+        return added
 
     def _check_number(self) -> None:
         if len(self.channels) >= MAX_CHANNELS:

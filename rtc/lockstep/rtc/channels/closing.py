@@ -50,6 +50,10 @@ class ChannelClosing:
                 channel.outgoing_reset = True
                 self._remove_when_reset(channel)
 
+    def clear(self) -> None:
+        """Wait for nothing: the association has ended."""
+        self.waiting.clear()
+
     def _remove_when_reset(self, channel: Channel) -> None:
         if channel.outgoing_reset and channel.incoming_reset:
             self._remove(channel.stream)

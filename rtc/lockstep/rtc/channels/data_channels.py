@@ -111,13 +111,13 @@ class DataChannels:
                 lifetime=limits.lifetime,
             )
         except SendQueueFull:
-            self._backlog.full.add(channel)
+            self._backlog.filled(channel)
             raise
 
     def tell_when_empty(self, channel: int) -> None:
         """Tell once, with `ChannelWritable`, when nothing waits on the channel."""
         if channel in self._channels:
-            self._backlog.watched.add(channel)
+            self._backlog.watch(channel)
 
     def close(self, channel: int, now: float) -> None:
         """Close a channel when its waiting messages have left; `ChannelClosed` follows. No effect on a channel that
@@ -178,7 +178,7 @@ class DataChannels:
                 self._table.established(event)
             else:
                 self.closed = event
-                self._closing.waiting.clear()
+                self._closing.clear()
                 self._backlog.clear()
                 self._table.ended(event)
 

@@ -2,7 +2,7 @@
 
 from collections import Counter
 
-from lockstep.rtc.channels.channel_table import Channel, ChannelState, ChannelTable
+from lockstep.rtc.channels.channel_table import ChannelState, ChannelTable
 from lockstep.rtc.channels.closing import ChannelClosing
 from lockstep.rtc.dcep import ACK, DcepError, Open, decode_open
 from lockstep.rtc.sctp import Association, State
@@ -28,7 +28,7 @@ class ChannelOpening:
         message = what.encode()
         stream = self._table.free_stream()
         self._association.send(stream, DCEP, message, now)
-        self._table.channels[stream] = Channel(stream, what, ChannelState.CONNECTING, by_peer=False)
+        self._table.add(stream, what, ChannelState.CONNECTING)
         return stream
 
     def receive(self, stream: int, payload: bytes, now: float) -> None:
@@ -49,7 +49,7 @@ class ChannelOpening:
         elif self._association.state is not State.ESTABLISHED:
             self._counts["unexpected"] += 1  # it is shutting down
         else:
-            added = self._table.channels[stream] = Channel(stream, what, ChannelState.OPEN, by_peer=True)
+            added = self._table.add(stream, what, ChannelState.OPEN, by_peer=True)
             self._association.send(stream, DCEP, ACK, now)
             self._table.opened(added)
 

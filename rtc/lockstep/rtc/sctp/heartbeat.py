@@ -26,23 +26,23 @@ class Heartbeats:
         self._packets = packets
         self._round_trip = round_trip
         self._count = 0
-        self._waits_for = b""
+        self._awaited_info = b""
         self._sent_at = 0.0
 
     def ask(self, now: float) -> None:
         """Send a HEARTBEAT, unless another is under way."""
-        if self._waits_for and now - self._sent_at < LOST_AFTER:
+        if self._awaited_info and now - self._sent_at < LOST_AFTER:
             return
         self._count += 1
-        self._waits_for = encode_parameters([(INFO, _number.pack(self._count))])
+        self._awaited_info = encode_parameters([(INFO, _number.pack(self._count))])
         self._sent_at = now
-        self._packets.control.append(Heartbeat(self._waits_for).encode())
+        self._packets.control.append(Heartbeat(self._awaited_info).encode())
 
     def receive(self, chunk: Heartbeat, now: float) -> None:
         if self._lifecycle.is_up:
             self._packets.answer(HeartbeatAck(chunk.body))
 
     def receive_ack(self, chunk: HeartbeatAck, now: float) -> None:
-        if self._waits_for and chunk.body == self._waits_for:
-            self._waits_for = b""
+        if self._awaited_info and chunk.body == self._awaited_info:
+            self._awaited_info = b""
             self._round_trip.sample(now - self._sent_at, now)

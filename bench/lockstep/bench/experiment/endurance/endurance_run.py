@@ -14,11 +14,11 @@ from lockstep.bench.experiment.choices import Choices, media_of
 from lockstep.bench.experiment.endurance.endurance import Endurance
 from lockstep.bench.experiment.operator_script import OperatorScript
 from lockstep.bench.experiment.stage import Stage, running_stage
-from lockstep.bench.harness.background import background
 from lockstep.bench.harness.driving import applied_goals, drive_on
 from lockstep.bench.harness.stack import Metrics
 from lockstep.client import CommandRefused, Console, ConsoleError, NoSuchStream
 from lockstep.emulator.impairment.profile import Profile
+from lockstep.server.util.background_tasks import background_tasks
 
 __all__ = ["Driven", "EnduranceClient", "run_endurance"]
 
@@ -63,7 +63,7 @@ async def run_endurance(choices: Choices, profile: Profile, client: EnduranceCli
             return time.monotonic() - began
 
         say(f"endurance on {profile.name}, {client}: driving for {choices.seconds:g} s")
-        async with background(driven.run(endurance, clock), _count(stage, endurance, clock, say)):
+        async with background_tasks(driven.run(endurance, clock), _count(stage, endurance, clock, say)):
             await asyncio.sleep(choices.seconds)
     return {
         "experiment": "endurance",

@@ -11,7 +11,6 @@ from typing import Any, Protocol
 from lockstep.bench.experiment.choices import Choices, media_of, round_trip_of
 from lockstep.bench.experiment.judge.outage_judge import Cut, Finding, judge_outage
 from lockstep.bench.experiment.stage import Stage, running_stage
-from lockstep.bench.harness.background import background
 from lockstep.bench.harness.driving import applied_goals, axis_values, drive_on
 from lockstep.bench.harness.event_log import records
 from lockstep.client import CommandRefused, Console, ConsoleError
@@ -19,6 +18,7 @@ from lockstep.emulator.impairment.delay import Constant
 from lockstep.emulator.impairment.impairment import Impairment
 from lockstep.emulator.impairment.profile import Profile, TwoWay
 from lockstep.protocol.description import RobotDescription
+from lockstep.server.util.background_tasks import background_tasks
 
 __all__ = ["OUTAGE_PROFILE", "run_outages"]
 
@@ -138,7 +138,7 @@ async def _stick(stage: Stage, choices: Choices) -> AsyncIterator[tuple[Stick, R
         return
     stick = HeadlessStick(stage.link, choices.seconds)
     description = await stick.describe()
-    async with background(stick.run()):
+    async with background_tasks(stick.run()):
         yield stick, description
 
 

@@ -24,7 +24,7 @@ class ProcessOutput:
 
     def __init__(self) -> None:
         self.lines: list[str] = []
-        self.errors: list[str] = []
+        self.errors = deque[str](maxlen=KEPT_LINES)
         self.unread = deque[str](maxlen=KEPT_LINES)
         self.grew = asyncio.Event()
         self.ended = False
@@ -37,25 +37,17 @@ class ProcessOutput:
     async def read(self, process: asyncio.subprocess.Process) -> None:
         """Read until both streams end."""
         async with asyncio.TaskGroup() as streams:
-            streams.create_task(self._read_output(process.stdout))
-            streams.create_task(self._read_errors(process.stderr))
+            streams.create_task(self._read(process.stderr, self.errors))
+            await self._read(process.stdout, self.unread)
+            self.ended = True
+            self.grew.set()
         self.complete.set()
 
-    async def _read_output(self, stream: asyncio.StreamReader | None) -> None:
+    async def _read(self, stream: asyncio.StreamReader | None, kept: deque[str]) -> None:
         if stream is not None:
             async for line in stream:
                 text = line.decode(errors="replace").rstrip()
-                self.unread.append(text)
-                self._keep(text)
-        self.ended = True
-        self.grew.set()
-
-    async def _read_errors(self, stream: asyncio.StreamReader | None) -> None:
-        if stream is not None:
-            async for line in stream:
-                text = line.decode(errors="replace").rstrip()
-                self.errors.append(text)
-                del self.errors[:-KEPT_LINES]
+                kept.append(text)
                 self._keep(text)
 
     def _keep(self, line: str) -> None:

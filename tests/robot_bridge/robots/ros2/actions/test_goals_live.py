@@ -219,7 +219,7 @@ async def test_whatever_ends_an_armed_motion_cancels_the_goal_at_its_server(
     try:
         ends = await node.noted("ended", lambda notes: len(notes) > 0)
     except TimeoutError:
-        raise AssertionError("\n".join(bridge.process.output.errors[-30:])) from None
+        raise AssertionError("\n".join(list(bridge.process.output.errors)[-30:])) from None
     assert ends[0]["how"] == "canceled"
     assert ends[0]["count"] < 90
 

@@ -4,7 +4,7 @@ import pytest
 
 from lockstep.client.control.command_gate import CommandGate
 from lockstep.client.control.command_sender import CommandSender
-from lockstep.client.control.sender_task import Driver
+from lockstep.client.control.driver import Driver
 from lockstep.client.errors import CommandRefused, ConsoleLost
 from lockstep.protocol.messages import Command, Rest
 from tests.makers import feedback, refusal
