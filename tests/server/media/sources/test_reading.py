@@ -69,8 +69,7 @@ def test_what_cannot_go_on_as_it_is_is_decoded(
 
 def test_a_lower_rate_leaves_pictures_out(tmp_path: Path) -> None:
     found = media(read("video", f"file:{film(tmp_path / 'film.avi', 'mjpeg')}#rate=10", 5))
-    steps = [b.time - a.time for a, b in itertools.pairwise(found)]
-    assert min(steps) > 0.05
+    assert found[-1].time - found[0].time > 0.25  # at the file's own rate 0.13 s; a busy machine shortens 0.4 s a bit
 
 
 def test_sound_comes_as_samples_with_the_time_of_the_first(tmp_path: Path) -> None:
