@@ -6,16 +6,16 @@ from lockstep.protocol.carriers import EVENT_REFERENCE_URI
 from lockstep.protocol.traces.trace import PictureSpans, known_spans
 from lockstep.server.media.picture_traces import NEWEST, PictureTraces, SentPictures
 from lockstep.server.media.pipeline.frame import EncodedFrame
-from lockstep.server.media.pipeline.picture_timing import PictureTiming
+from lockstep.server.media.pipeline.picture_span_times import PictureSpanTimes
 from tests.server.media.feeding import stream
 from tests.server.media.viewer import noise, running_plane, viewing
 
-TIMING = PictureTiming(
+TIMING = PictureSpanTimes(
     PictureSpans(capture_ms=5.0, draw_ms=9.0), arrived=1.0, began=1.002, encoded=1.005, packetised=1.006
 )
 
 
-def _frame(stamp: int, timing: PictureTiming | None = TIMING) -> EncodedFrame:
+def _frame(stamp: int, timing: PictureSpanTimes | None = TIMING) -> EncodedFrame:
     return EncodedFrame(
         b"",
         lambda data, trailer: [],

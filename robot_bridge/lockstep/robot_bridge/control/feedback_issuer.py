@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from lockstep.protocol.description import RobotDescription
 from lockstep.protocol.messages import Feedback
 from lockstep.robot_bridge.control.clock import Clock
-from lockstep.robot_bridge.control.command_timing import CommandTiming
+from lockstep.robot_bridge.control.command_span_times import CommandSpanTimes
 from lockstep.robot_bridge.control.event_core import EventCore
 from lockstep.robot_bridge.control.event_times import EventTimes
 from lockstep.robot_bridge.control.feedback_room import within_size
@@ -42,7 +42,7 @@ class FeedbackIssuer:
         log: EventLog,
         now: Clock,
     ) -> None:
-        self.timing = CommandTiming()
+        self.timing = CommandSpanTimes()
         self.times = EventTimes()
         self.rested_why = ""
         self._robot = robot

@@ -19,7 +19,7 @@ from lockstep.server.media.errors import MediaError
 from lockstep.server.media.metrics import DropCounter, MediaMetrics
 from lockstep.server.media.pipeline.frame import EncodedFrame
 from lockstep.server.media.pipeline.media_clock import PictureClock
-from lockstep.server.media.pipeline.picture_timing import PictureTiming
+from lockstep.server.media.pipeline.picture_span_times import PictureSpanTimes
 from lockstep.server.media.pipeline.stage import SourceFrame
 from lockstep.server.media.quality.encoding_target import EncodingTarget
 
@@ -204,7 +204,7 @@ class TierEncoders:
         for trailer in job.variants:
             packed.payloads(trailer)
         ended = time.monotonic()
-        packed.timing = PictureTiming(source.media.spans, source.arrived, started, finished, ended)
+        packed.timing = PictureSpanTimes(source.media.spans, source.arrived, started, finished, ended)
         return [Encoded(encoding, (packed,), ended - started)]
 
     def _encoder(self, encoding: TierEncoding, plan: EncodingTarget) -> PictureEncoder:

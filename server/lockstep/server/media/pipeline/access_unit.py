@@ -5,7 +5,7 @@ import time
 from lockstep.server.media.codecs.packetise import packetise_h264
 from lockstep.server.media.encoding.tier_encoding import TierEncoding
 from lockstep.server.media.pipeline.frame import EncodedFrame
-from lockstep.server.media.pipeline.picture_timing import PictureTiming
+from lockstep.server.media.pipeline.picture_span_times import PictureSpanTimes
 from lockstep.server.media.pipeline.stage import SourceFrame
 
 __all__ = ["is_access_unit", "passed_frame"]
@@ -39,5 +39,5 @@ def passed_frame(frame: SourceFrame, media_time: int, encoding: TierEncoding) ->
     if not encoded.payloads(trailer=False):
         return None
     # Nothing is encoded here: from its arrival on it is being packetised.
-    encoded.timing = PictureTiming(media.spans, at, at, at, time.monotonic())
+    encoded.timing = PictureSpanTimes(media.spans, at, at, at, time.monotonic())
     return encoded

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 
 from lockstep.protocol.carriers import append_trailer
-from lockstep.server.media.pipeline.picture_timing import PictureTiming
+from lockstep.server.media.pipeline.picture_span_times import PictureSpanTimes
 
 __all__ = ["EncodedFrame", "frame_trailer"]
 
@@ -57,7 +57,7 @@ class EncodedFrame:
         capture_time: float,
         media_time: int,
         time: float = 0.0,
-        timing: PictureTiming | None = None,
+        timing: PictureSpanTimes | None = None,
     ) -> None:
         self.data = data
         self.keyframe = keyframe  # decodable without earlier frames; always so for sound

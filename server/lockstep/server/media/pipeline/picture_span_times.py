@@ -6,10 +6,10 @@ import msgspec
 
 from lockstep.protocol.traces.trace import PictureSpans, join_spans, span_ms, spans_at_bridge
 
-__all__ = ["PictureTiming"]
+__all__ = ["PictureSpanTimes"]
 
 
-class PictureTiming(NamedTuple):
+class PictureSpanTimes(NamedTuple):
     """Made with every encoded picture and shared by all peers, so it only keeps times; spans are made when asked for.
 
     All times are in s on this machine's monotonic clock.

@@ -7,10 +7,10 @@ import msgspec
 
 from lockstep.protocol.traces.trace import CommandSpans, span_ms
 
-__all__ = ["CommandTiming"]
+__all__ = ["CommandSpanTimes"]
 
 
-class CommandTiming:
+class CommandSpanTimes:
     """The times of at most one command: none executes before the last one was answered."""
 
     def __init__(self) -> None:

@@ -3,11 +3,11 @@
 import msgspec
 
 from lockstep.protocol.traces.trace import CommandSpans
-from lockstep.robot_bridge.control.command_timing import CommandTiming
+from lockstep.robot_bridge.control.command_span_times import CommandSpanTimes
 
 
 def test_a_command_waits_for_the_tick_is_applied_waits_for_the_rate_and_is_measured() -> None:
-    timing = CommandTiming()
+    timing = CommandSpanTimes()
     timing.executed(10.0)
     assert timing.waits_for_tick
     timing.applied(10.002, 10.0025)
@@ -17,7 +17,7 @@ def test_a_command_waits_for_the_tick_is_applied_waits_for_the_rate_and_is_measu
 
 
 def test_an_event_that_is_measured_again_has_no_spans() -> None:
-    timing = CommandTiming()
+    timing = CommandSpanTimes()
     timing.executed(10.0)
     timing.applied(10.002, 10.003)
     timing.measured(10.003, 10.004)
@@ -26,6 +26,6 @@ def test_an_event_that_is_measured_again_has_no_spans() -> None:
 
 
 def test_a_feedback_that_comes_without_a_tick_has_only_its_measurement() -> None:
-    timing = CommandTiming()
+    timing = CommandSpanTimes()
     timing.executed(10.0)
     assert timing.measured(10.003, 10.004) == CommandSpans(measure_ms=1.0)
