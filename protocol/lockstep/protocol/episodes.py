@@ -9,6 +9,7 @@ import msgspec
 
 __all__ = [
     "EpisodeAnswer",
+    "EpisodeCut",
     "EpisodeOutcome",
     "EpisodePhase",
     "EpisodeProblem",
@@ -39,6 +40,15 @@ EpisodeReason = Literal[
     "other_episode",  # the request names another episode than the one that is open
     "empty",  # no event was executed since it began
     "not_written",  # the disk or the recorder failed: it is not kept
+]
+
+EpisodeCut = Literal[
+    "epoch",  # the robot bridge was restarted
+    "link_down",  # the robot link was lost
+    "recording_ended",
+    "recording_failed",
+    "new_part",  # the recording goes on in another file
+    "console_ended",
 ]
 
 EpisodeProblemKind = Literal[
@@ -95,5 +105,6 @@ class EpisodeState(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", 
     discarded: Count = 0
     cut: Count = 0  # ended by something else than a person; they are in no dataset
     last: str = ""  # what became of the last one, in words
+    lost: EpisodeCut | Literal[""] = ""  # why the last one was lost; "": it was not
     reset_action: str = ""  # name of the robot's action that is run between episodes; "" for none
     problems: list[EpisodeProblem] = []

@@ -220,6 +220,7 @@ export interface EpisodeState {
   readonly discarded: number;
   readonly cut: number;
   readonly last: string;
+  readonly lost: "console_ended" | "epoch" | "link_down" | "new_part" | "recording_ended" | "recording_failed" | "";
   readonly reset_action: string;
   readonly problems: readonly (EpisodeProblem)[];
 }

@@ -53,7 +53,9 @@ export function episodeLabels(
       const isLost = hasLost(state);
       const hint = recordingHint(recording);
       if (isLost && recording?.state === "failed") {
-        const text = said(state.last).replace(FAILED, recording.detail); // the line has no room for both
+        // The line has no room for both.
+        const isCause = state.lost === "recording_failed";
+        const text = isCause ? `Episode ${state.number} is lost: ${recording.detail}` : said(state.last);
         return { tone: "bad", text, time: "", count };
       }
       const text = [isLost || hint === "" ? said(state.last) : "", hint].filter(Boolean).join(" · ");
@@ -62,7 +64,6 @@ export function episodeLabels(
   }
 }
 
-const FAILED = "the recording failed"; // as the console says it
 const SILENT_SECONDS = 3;
 
 /** Whether nothing was heard of the open episode for longer than that takes: every second. */
@@ -76,8 +77,8 @@ export function unknownWords({ number }: Pick<EpisodeState, "number">): string {
 }
 
 /** Whether the last episode was lost. */
-export function hasLost({ phase, last }: EpisodeState): boolean {
-  return phase === "idle" && last.includes("lost");
+export function hasLost({ phase, lost }: EpisodeState): boolean {
+  return phase === "idle" && lost !== "";
 }
 
 /** Why no episode can begin; "" where one can. */
@@ -135,7 +136,7 @@ export function leftEpisode(state: EpisodeState | null): LeftEpisode | null {
  */
 export function withLeftEpisode(state: EpisodeState, left: LeftEpisode | null): EpisodeState {
   if (left === null || state.last !== "" || state.episode === left.episode) return state;
-  return { ...state, last: `episode ${left.number} is lost: the console has ended` };
+  return { ...state, last: `episode ${left.number} is lost: the console has ended`, lost: "console_ended" };
 }
 
 function countWords({ kept, discarded, cut }: EpisodeState): string {

@@ -22,6 +22,7 @@ const IDLE: EpisodeState = {
   discarded: 0,
   cut: 0,
   last: "",
+  lost: "",
   reset_action: "",
   problems: [],
 };
@@ -87,7 +88,8 @@ it("names the worst problem first, and aloud without figures that change", () =>
 });
 
 it("says that an episode is lost also where the recording ended with it", () => {
-  const state = { ...IDLE, last: "episode 2 is lost: the recording failed" };
+  const last = "episode 2 is lost: the recording failed";
+  const state: EpisodeState = { ...IDLE, number: 2, last, lost: "recording_failed" };
   const failed: RecordingState = { ...RECORDING, state: "failed", detail: "no space left" };
   expect(episodeLabels(state, failed, 0, 0)).toMatchObject({
     tone: "bad",
@@ -97,6 +99,14 @@ it("says that an episode is lost also where the recording ended with it", () => 
     tone: "bad",
     text: "Episode 2 is lost: the recording failed · Record first",
   });
+  expect(
+    episodeLabels(
+      { ...state, last: "episode 2 is lost: the robot link was lost", lost: "link_down" },
+      failed,
+      0,
+      0,
+    ),
+  ).toMatchObject({ tone: "bad", text: "Episode 2 is lost: the robot link was lost" });
   expect(episodeLabels({ ...IDLE, last: "episode 1 is kept" }, null, 0, 0).text).toBe("Record first");
 });
 
@@ -105,7 +115,10 @@ it("says that an episode is lost with the console", () => {
   expect(left).toEqual({ episode: "a", number: 3 });
   expect(leftEpisode(IDLE)).toBeNull();
   expect(leftEpisode(null)).toBeNull();
-  expect(withLeftEpisode(IDLE, left).last).toBe("episode 3 is lost: the console has ended");
+  expect(withLeftEpisode(IDLE, left)).toMatchObject({
+    last: "episode 3 is lost: the console has ended",
+    lost: "console_ended",
+  });
   const goesOn = { ...IDLE, phase: "open", episode: "a", number: 3 } as const;
   expect(withLeftEpisode(goesOn, left)).toEqual(goesOn);
   const kept = { ...IDLE, last: "episode 3 is kept" };

@@ -142,7 +142,11 @@ def test_what_cuts_an_episode_is_named_in_its_record_and_it_cannot_be_kept_any_m
     (cut,) = records(it.cut(why, LATER))  # type: ignore[arg-type]
     assert (cut.kind, cut.why, cut.epoch) == ("cut", why, "e1")
     assert (it.phase, it.history.cuts, it.history.kept) == ("idle", 1, 0)
+    assert it.history.lost == why
     assert refused(lambda: it.keep("", "", "Ada", LATER)) == "no_episode"
+    it.start("x", "Ada", HERE, 0.0)
+    it.discard("", "Ada", LATER, 1.0)
+    assert it.history.lost == "", "of the last one only"
 
 
 def test_an_episode_whose_record_is_on_its_way_survives_the_epoch_but_not_the_disk() -> None:

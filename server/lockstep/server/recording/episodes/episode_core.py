@@ -14,16 +14,16 @@ Only the record `kept` makes an episode count. Any other end, such as the end of
 from collections.abc import Callable
 from typing import Literal, NamedTuple
 
-from lockstep.protocol.episodes import EpisodeOutcome, EpisodePhase, EpisodeReason
+from lockstep.protocol.episodes import EpisodeCut, EpisodeOutcome, EpisodePhase, EpisodeReason
 from lockstep.protocol.serial import event_gap
-from lockstep.server.recording.episodes.episode_history import EpisodeEnd, EpisodeHistory
+from lockstep.server.recording.episodes.episode_history import EpisodeHistory
 from lockstep.server.recording.episodes.next_episode import NextEpisode
 from lockstep.server.recording.episodes.open_episode import OpenEpisode, Place
 from lockstep.server.recording.format.records import EpisodeRecord
 
 __all__ = ["Effect", "Ended", "EpisodeCore", "EpisodeRefused", "RunReset", "Write"]
 
-CUT_WORDS = {
+CUT_WORDS: dict[EpisodeCut, str] = {
     "epoch": "the robot bridge was restarted",
     "link_down": "the robot link was lost",
     "recording_ended": "the recording ended",
@@ -31,7 +31,6 @@ CUT_WORDS = {
     "new_part": "the recording went on in another file",
     "console_ended": "the console ended",
 }
-CutReason = Literal["epoch", "link_down", "recording_ended", "recording_failed", "new_part", "console_ended"]
 
 
 class EpisodeRefused(Exception):
@@ -61,7 +60,7 @@ class RunReset(NamedTuple):
 class Ended(NamedTuple):
     """The caller says that an episode has ended: one that is kept when its record is on the disk, not before."""
 
-    end: EpisodeEnd
+    end: Literal["kept", "discarded", "cut"]
 
 
 Effect = Write | RunReset | Ended
@@ -132,7 +131,7 @@ class EpisodeCore:
         current = self._open(episode)
         current.last_event = place.event
         self.current = None
-        self.history.end(current.number, "discarded")
+        self.history.discard(current.number)
         return [Write(current.record("discarded", place, by)), Ended("discarded"), *_reset(self.next, now)]
 
     def redo(self, episode: str, by: str, place: Place, now: float) -> list[Effect]:
@@ -166,7 +165,7 @@ class EpisodeCore:
         if current is None or not current.is_keeping or current.id != episode:
             return []
         self.current = None
-        self.history.end(current.number, "kept")
+        self.history.keep(current.number)
         return [Ended("kept"), *_reset(self.next, now)]
 
     def noted(self, text: str, place: Place) -> list[Effect]:
@@ -177,7 +176,7 @@ class EpisodeCore:
         current.driven_by(place.driver)
         return [Write(current.record("mark", place, "", text=text))]
 
-    def cut(self, why: CutReason, place: Place) -> list[Effect]:
+    def cut(self, why: EpisodeCut, place: Place) -> list[Effect]:
         """End the open episode, which is in no dataset then. An epoch's end leaves one that is being kept alone."""
         current = self.current
         if current is None:
@@ -186,7 +185,7 @@ class EpisodeCore:
         if current.is_keeping and why not in ("recording_failed", "new_part"):
             return []
         self.current = None
-        self.history.end(current.number, "cut", CUT_WORDS[why])
+        self.history.cut(current.number, why, CUT_WORDS[why])
         if current.is_keeping:
             return [Ended("cut")]
         return [Write(current.record("cut", place._replace(epoch=current.epoch), "", why=why)), Ended("cut")]

@@ -2,22 +2,24 @@
 
 from typing import Literal
 
-__all__ = ["EpisodeEnd", "EpisodeHistory"]
+from lockstep.protocol.episodes import EpisodeCut
 
-EpisodeEnd = Literal["kept", "discarded", "cut"]
+__all__ = ["EpisodeHistory"]
 
 
 class EpisodeHistory:
-    """Call `begin` and `end` for each episode.
+    """Call `begin` for each episode, then `keep`, `discard` or `cut`; `cancel` for one that did not begin.
 
     Attributes:
         number: of the newest episode; all counts begin anew with each recording
         last: what became of the last one, in words
+        lost: why the last one was lost; "": it was not
     """
 
     def __init__(self) -> None:
         self.number = self.kept = self.discarded = self.cuts = 0
         self.last = ""
+        self.lost: EpisodeCut | Literal[""] = ""
         self._recording = ""
 
     def begin(self, recording: str) -> int:
@@ -28,9 +30,21 @@ class EpisodeHistory:
         self.number += 1
         return self.number
 
-    def end(self, number: int, end: EpisodeEnd, why: str = "") -> None:
-        """Take the end of an episode; `why` it was cut, in words."""
-        self.kept += end == "kept"
-        self.discarded += end == "discarded"
-        self.cuts += end == "cut"
-        self.last = f"episode {number} is lost: {why}" if end == "cut" else f"episode {number} is {end}"
+    def keep(self, number: int) -> None:
+        """The episode is on the disk."""
+        self.kept += 1
+        self.last, self.lost = f"episode {number} is kept", ""
+
+    def discard(self, number: int) -> None:
+        """A person discarded the episode."""
+        self.discarded += 1
+        self.last, self.lost = f"episode {number} is discarded", ""
+
+    def cut(self, number: int, why: EpisodeCut, words: str) -> None:
+        """Something else than a person ended the episode; `words` say why."""
+        self.cuts += 1
+        self.last, self.lost = f"episode {number} is lost: {words}", why
+
+    def cancel(self, why: str) -> None:
+        """The episode was cancelled before it began; `why`: in words, or ""."""
+        self.last, self.lost = f"cancelled before it began: {why}".rstrip(": "), ""

@@ -8,6 +8,7 @@ from collections.abc import Callable, Mapping
 
 from lockstep.protocol.episodes import (
     EpisodeAnswer,
+    EpisodeCut,
     EpisodeReason,
     EpisodeRequest,
     EpisodeState,
@@ -17,7 +18,6 @@ from lockstep.server.audit.records import Actor
 from lockstep.server.event_clock import EventClock
 from lockstep.server.peers.peer_registry import PeerRegistry
 from lockstep.server.recording.episodes.episode_core import (
-    CutReason,
     Effect,
     Ended,
     EpisodeCore,
@@ -153,6 +153,7 @@ class EpisodeService:
             discarded=history.discarded,
             cut=history.cuts,
             last=history.last,
+            lost=history.lost,
             reset_action=self._reset.name,
             problems=self._checks.problems if core.phase == "open" else [],
         )
@@ -234,7 +235,7 @@ class EpisodeService:
         if text := self._place.note(event):
             self._act(self._core.noted(text, self._place.now()), tells=False)
 
-    def _cut(self, why: CutReason) -> None:
+    def _cut(self, why: EpisodeCut) -> None:
         episode, before = self._core.episode, self._core.phase
         place = self._place.at_epoch_end() if why == "epoch" else self._place.now()
         self._act(self._core.cut(why, place), before=before)

@@ -75,7 +75,7 @@ class NextEpisode:
             self.phase = "idle"
         if self.wanted is not None:
             self.wanted = None
-            self._history.last = f"cancelled before it began: {why}".rstrip(": ")
+            self._history.cancel(why)
 
     def _count_down(self, now: float) -> None:
         self.phase, self._deadline = "countdown", now + self._countdown
