@@ -90,7 +90,7 @@ def test_nothing_waits_for_sound_that_was_too_old_for_three_seconds_until_it_is_
     assert gate.state(3.0) == "sound"
     gate.heard("microphone", 11, 3.1)
     assert gate.state(3.1) == "open"
-    gate.heard("microphone", 16, 3.5)
+    gate.heard("microphone", 17, 3.5)
     gate.heard("microphone", 12, 6.55)
     assert gate.state(6.6) == "sound"
 

@@ -1,7 +1,7 @@
 import { eventAfter, eventGap, isNewer } from "../gate/serial";
-import { hear, isAwaited, type AwaitedSound, type Pacing } from "./awaited_sound";
+import { hear, isAwaited, mostBehind, type AwaitedSound, type HeardSegment } from "./awaited_sound";
 
-export type { Pacing };
+export type Pacing = "feedback" | "media";
 
 /** Events that follow one another sooner wait for pictures and sound; ms. */
 export const CALM_INTERVAL_MS = 40;
@@ -10,6 +10,11 @@ export const CALM_INTERVAL_MS = 40;
  * the robot holds a command; ms. Armed and at rest, events follow one another no sooner.
  */
 export const SOUND_WAIT_MS = 200;
+/**
+ * With feedback pacing sound that fell silent is waited for so long, by each event as above: what is late may still
+ * come. With media pacing one command waits all the while, so it waits no longer than above.
+ */
+const SILENCE_MS = 600;
 
 /** Why no new command may be sent now, or that it may. */
 export type GateState = "open" | "no_feedback" | "in_flight" | "rate" | "picture" | "sound";
@@ -33,7 +38,7 @@ export interface CommandGate {
 /** A microphone that is heard. */
 export interface HeardSound {
   readonly microphone: string;
-  readonly stamp: number | null; // of the sound that plays now; null: it is silent
+  readonly segment: HeardSegment | null; // its newest; null: none
   readonly tolerance: number; // events
 }
 
@@ -122,12 +127,18 @@ export function noteHeard(gate: CommandGate, heard: readonly HeardSound[], now: 
   const event = gate.event ?? 0;
   gate.sounds = new Map();
   gate.heard = null;
-  for (const { microphone, stamp, tolerance } of heard) {
+  const awaitedMs = gate.pacing === "media" ? gate.soundWaitMs : SILENCE_MS;
+  for (const { microphone, segment, tolerance } of heard) {
     const known = before.get(microphone);
-    const sound = stamp === null || gate.event === null ? known : hear(known, stamp, event, tolerance, now);
+    const sound =
+      segment === null ||
+      gate.event === null ||
+      (segment.atMs === known?.atMs && segment.stamp === known.stamp)
+        ? known
+        : hear(known, segment, event, tolerance);
     if (sound === undefined) continue;
     gate.sounds.set(microphone, sound);
-    if (!isAwaited(sound, gate.pacing, now)) continue;
+    if (!isAwaited(sound, awaitedMs, now)) continue;
     if (gate.heard === null || eventGap(event, sound.stamp) > eventGap(event, gate.heard.stamp))
       gate.heard = sound;
   }
@@ -156,7 +167,7 @@ function intervalMs(gate: CommandGate, letsGo: boolean): number {
 /** Whether the next event would take what is heard out of its tolerance, and no rule but this one waits for it. */
 function losesSound({ pacing, event, heard }: CommandGate): boolean {
   if (pacing === "media" || event === null || heard === null) return false;
-  return eventGap(event, heard.stamp) > Math.max(heard.tolerance - 1, 0);
+  return eventGap(event, heard.stamp) > mostBehind(heard.tolerance);
 }
 
 function keepsUp({ event, shown, tolerance, heard }: CommandGate): boolean {
@@ -179,5 +190,5 @@ export function nextCommand(gate: CommandGate): NextCommand | null {
 function isNear(event: number, stamp: number | null, tolerance: number): boolean {
   if (stamp === null) return false;
   const gap = eventGap(event, stamp);
-  return -tolerance <= gap && gap <= Math.max(tolerance - 1, 0);
+  return -tolerance <= gap && gap <= mostBehind(tolerance);
 }

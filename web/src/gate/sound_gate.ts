@@ -22,6 +22,7 @@ export interface SoundGate {
   playingSinceMs: number;
   judged: boolean; // whether that segment is counted
   isTooOld: boolean; // what plays now
+  isAhead: boolean; // its event has not come
   starting: boolean; // nothing was heard yet, and the browser plays what waited while it opened its sound device
   playsSinceMs: number | null; // anything at all
 }
@@ -35,6 +36,7 @@ export function createSoundGate(): SoundGate {
     playingSinceMs: 0,
     judged: false,
     isTooOld: false,
+    isAhead: false,
     ...NOT_STARTED,
   };
 }
@@ -67,6 +69,7 @@ export function observeSound(
   const { verdict, gap } = judge(context.feedback, stamp, context.tolerance, context.gate);
   if (stamp !== null) counts.stamp = stamp;
   gate.isTooOld = verdict === "discard";
+  gate.isAhead = verdict === "hold";
   gate.starting &&= verdict === "discard" && waiting > MOST_MS && now - gate.playsSinceMs < START_MS;
   if (gate.starting) return false;
   noteSeen(counts, gap);
@@ -82,6 +85,6 @@ export function observeSound(
 }
 
 /** Whether the segment last observed has played for longer than any lasts. */
-export function isConcealed(gate: SoundGate, now: number): boolean {
+function isConcealed(gate: SoundGate, now: number): boolean {
   return now - gate.playingSinceMs >= CONCEALED_MS;
 }

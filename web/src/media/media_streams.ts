@@ -95,7 +95,7 @@ export class MediaStreams {
   heard(): HeardSound[] {
     const { tolerance, gate } = this.context("audio");
     if (gate === "off" || !this.isAudible()) return [];
-    return [...this.sounds].map(([microphone, { playing }]) => ({ microphone, stamp: playing, tolerance }));
+    return [...this.sounds].map(([microphone, { segment }]) => ({ microphone, segment, tolerance }));
   }
 
   /** Timers are slow on a hidden page, too slow to gate sound. */

@@ -48,7 +48,17 @@ function act(gate: CommandGate, { at, do: action }: Step, soundTolerance: number
   if (refused !== undefined) takeRefusal(gate, refused);
   if (shown !== undefined) noteShown(gate, shown);
   if (heard !== undefined)
-    noteHeard(gate, [{ microphone: "front", stamp: heard, tolerance: soundTolerance }], at);
+    noteHeard(
+      gate,
+      [
+        {
+          microphone: "front",
+          segment: heard === null ? null : { stamp: heard, atMs: at, leftOut: 0 },
+          tolerance: soundTolerance,
+        },
+      ],
+      at,
+    );
 }
 
 /** The newest feedback and the picture on screen are of event 20. */
@@ -82,7 +92,12 @@ describe("the command gate", () => {
   });
 
   describe("with sound that is heard", () => {
-    const heard = (stamp: number, tolerance = 6, microphone = "front") => ({ microphone, stamp, tolerance });
+    const heard = (stamp: number, tolerance = 6, microphone = "front", atMs = 0) => ({
+      microphone,
+      segment: { stamp, atMs, leftOut: 0 },
+      tolerance,
+    });
+    const heardAt = (atMs: number, stamp: number) => heard(stamp, 6, "front", atMs);
 
     it("paced by media waits until the sound stays within tolerance when the next feedback comes", () => {
       const gate = openGate("media");
@@ -140,14 +155,36 @@ describe("the command gate", () => {
 
     it("waits no longer for sound that was too old for three seconds, until it is not", () => {
       const gate = openGate("media");
-      for (let ms = 0; ms <= 3000; ms += 100) noteHeard(gate, [heard(10)], ms);
+      for (let ms = 0; ms <= 3000; ms += 100) noteHeard(gate, [heardAt(ms, 10)], ms);
       expect(gateState(gate, 3000)).toBe("sound");
-      noteHeard(gate, [heard(11)], 3001);
+      noteHeard(gate, [heardAt(3001, 11)], 3001);
       expect(gateState(gate, 3001)).toBe("open");
-      noteHeard(gate, [heard(16)], 3500);
-      noteHeard(gate, [heard(15)], 3600);
-      noteHeard(gate, [heard(12)], 6500);
+      noteHeard(gate, [heardAt(3500, 16)], 3500);
+      noteHeard(gate, [heardAt(3600, 15)], 3600);
+      noteHeard(gate, [heardAt(6500, 12)], 6500);
       expect(gateState(gate, 6600)).toBe("sound");
+    });
+
+    it("counts a segment once and its silence from its begin, however long its end is drawn out", () => {
+      const gate = openGate("media");
+      noteHeard(gate, [heardAt(0, 10)], 0);
+      for (let ms = 16; ms < SOUND_WAIT_MS; ms += 16) {
+        noteHeard(gate, [heardAt(0, 10)], ms);
+        expect(gateState(gate, ms)).toBe("sound");
+      }
+      noteHeard(gate, [heardAt(0, 10)], SOUND_WAIT_MS);
+      expect(gateState(gate, SOUND_WAIT_MS)).toBe("open");
+    });
+
+    it("paced by media waits through silence for no more than half of the robot's hold", () => {
+      const gate = createCommandGate("media", 4, 0, 0, 200);
+      takeFeedback(gate, 20, 1);
+      noteShown(gate, 20);
+      noteHeard(gate, [heardAt(0, 10)], 0);
+      noteHeard(gate, [heardAt(0, 10)], 99);
+      expect(gateState(gate, 99)).toBe("sound");
+      noteHeard(gate, [heardAt(0, 10)], 100);
+      expect(gateState(gate, 100)).toBe("open");
     });
 
     it("paced by media does not let a command that only lets go wait for it", () => {
@@ -168,13 +205,14 @@ describe("the command gate", () => {
 
     it("gives up one microphone on a slower path, and goes on waiting for the other", () => {
       const gate = openGate("media");
-      for (let ms = 0; ms <= 3001; ms += 3001 / 30) noteHeard(gate, [heard(1), heard(15, 6, "left")], ms);
+      for (let ms = 0; ms <= 3001; ms += 3001 / 30)
+        noteHeard(gate, [heardAt(ms, 1), heard(15, 6, "left", ms)], ms);
       expect(gate.heard?.stamp).toBe(15);
       expect(gateState(gate, 3001)).toBe("open");
-      noteHeard(gate, [heard(1), heard(14, 6, "left")], 3002);
+      noteHeard(gate, [heardAt(3002, 1), heard(14, 6, "left", 3002)], 3002);
       expect(gateState(gate, 3002)).toBe("sound");
-      noteHeard(gate, [heard(14, 6, "left")], 3003);
-      noteHeard(gate, [heard(1), heard(14, 6, "left")], 3004);
+      noteHeard(gate, [heard(14, 6, "left", 3003)], 3003);
+      noteHeard(gate, [heardAt(3004, 1), heard(14, 6, "left", 3004)], 3004);
       expect(gate.heard?.stamp).toBe(1); // it went away and came again: it is waited for again
     });
   });

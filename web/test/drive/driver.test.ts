@@ -78,7 +78,8 @@ describe("commands", () => {
     driverFeedback(driver, feedbackOf(1), true, 0);
     expect(driverStep(driver, MOVING, true, 0)).toHaveLength(1);
     driverFeedback(driver, feedbackOf(2), true, 5);
-    noteHeard(driver.gate, [{ microphone: "front", stamp: MAX_EVENT - 1, tolerance: 4 }], 5);
+    const segment = { stamp: MAX_EVENT - 1, atMs: 5, leftOut: 0 };
+    noteHeard(driver.gate, [{ microphone: "front", segment, tolerance: 4 }], 5);
     expect(driverOpensIn(driver, MOVING, 5)).toBe(145);
     expect(driverStep(driver, MOVING, true, 40)).toEqual([]);
     const released = { ...MOVING, values: NEUTRAL };

@@ -26,7 +26,7 @@ const LOSS = 0.005; // one way
 /** What a loss costs: a repeat of ours, TCP's shortest timer, and its timer where the round trip has varied. */
 const REPEAT_MS = { control: 60, link: 200, variedLink: 350 };
 const HOLD_MS = 300;
-const CONCEALED_MS = 200;
+const TALKS_MS = 500;
 const SECONDS = 30;
 
 /** One way, in ms: lognormal above `min`, none above `max`. */
@@ -79,7 +79,15 @@ function path(seed: number, delay: Delay, repeatMs: number): (ms: number) => num
   };
 }
 
-function drive(pacing: Pacing, seed: number, blockMs: number, busyMs: number, linkMs = REPEAT_MS.link): Run {
+/** `pauseMs`: the microphone sends nothing for so long after each half second. */
+function drive(
+  pacing: Pacing,
+  seed: number,
+  blockMs: number,
+  busyMs: number,
+  linkMs = REPEAT_MS.link,
+  pauseMs = 0,
+): Run {
   const up = path(seed, CONTROL, REPEAT_MS.control);
   const down = path(seed + 100, CONTROL, REPEAT_MS.control);
   const link = path(seed + 200, LINK, linkMs);
@@ -90,7 +98,7 @@ function drive(pacing: Pacing, seed: number, blockMs: number, busyMs: number, li
   let [robot, captured, events] = [1, 1, 0];
   let [executesAt, answersAt] = [Infinity, Infinity];
   let [heard, heardMs] = [1, -Infinity];
-  let [begun, leftOut] = [0, 0];
+  let [begun, leftOut, unplayed] = [0, 0, 0];
   takeFeedback(gate, robot, 1);
 
   const runRobot = (ms: number): void => {
@@ -101,7 +109,8 @@ function drive(pacing: Pacing, seed: number, blockMs: number, busyMs: number, li
     }
     if (ms % PACKET_MS !== 0) return;
     stamps.push(captured);
-    coming.push({ index: stamps.length - 1, at: link(ms) + busyMs });
+    const isPause = ms % (TALKS_MS + pauseMs) >= TALKS_MS;
+    if (!isPause) coming.push({ index: stamps.length - 1, at: link(ms) + busyMs });
     captured = robot;
   };
   const receive = (ms: number): void => {
@@ -125,6 +134,7 @@ function drive(pacing: Pacing, seed: number, blockMs: number, busyMs: number, li
   const play = (ms: number): void => {
     for (let frame = 0; frame < blockMs / FRAME_MS; frame++) nextFrame(player, ms / 1000);
     leftOut += player.leftOut;
+    unplayed += player.leftOut;
     player.leftOut = 0;
     for (const time of player.begun.splice(0)) {
       heard = stamps[(time / RATE) * (1000 / PACKET_MS)] ?? heard;
@@ -137,11 +147,8 @@ function drive(pacing: Pacing, seed: number, blockMs: number, busyMs: number, li
     runRobot(ms);
     receive(ms);
     if (ms % blockMs === 0) play(ms);
-    noteHeard(
-      gate,
-      [{ microphone: "front", stamp: ms - heardMs < CONCEALED_MS ? heard : null, tolerance: TOLERANCE }],
-      ms,
-    );
+    const segment = heardMs < 0 ? null : { stamp: heard, atMs: heardMs, leftOut: unplayed };
+    noteHeard(gate, [{ microphone: "front", segment, tolerance: TOLERANCE }], ms);
     gate.shown = gate.event; // no picture holds anything up
     if (gateState(gate, ms) !== "open") continue;
     noteSent(gate, ms);
@@ -162,5 +169,13 @@ describe("sound and the pace of events, over a network whose delays wander", () 
     expect(busy.share).toBeLessThan(0.02);
     expect(varied.share).toBeLessThan(0.02);
     expect(busy.eventRate).toBeGreaterThan(12);
+  });
+
+  it.each([1, 2, 3])("does not let a microphone that pauses slow the operator: %i", (seed) => {
+    const without = drive("feedback", seed, 10, 0).eventRate;
+    for (const pauseMs of [250, 400, 700]) {
+      const { eventRate } = drive("feedback", seed, 10, 0, REPEAT_MS.link, pauseMs);
+      expect(eventRate).toBeGreaterThan(0.8 * without);
+    }
   });
 });

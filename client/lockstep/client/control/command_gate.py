@@ -3,7 +3,7 @@
 import math
 from typing import Literal, NamedTuple
 
-from lockstep.client.control.awaited_sound import AwaitedSound, Pacing, hear
+from lockstep.client.control.awaited_sound import AwaitedSound, hear, most_behind
 from lockstep.protocol.serial import event_after, event_gap
 
 __all__ = ["CALM_INTERVAL", "CommandGate", "GateState", "NextCommand", "Pacing"]
@@ -12,6 +12,10 @@ CALM_INTERVAL = 0.040  # s; events that follow one another sooner wait for pictu
 # An event that would take sound out of its tolerance waits for it so long at most, and for half of the time for which
 # the robot holds a command. Armed and at rest, events follow one another no sooner.
 SOUND_WAIT = 0.200  # s
+# With feedback pacing sound that fell silent is waited for so long, by each event as above: what is late may still come.
+# With media pacing one command waits all the while, so it waits no longer than above.
+SILENCE = 0.600  # s
+Pacing = Literal["feedback", "media"]
 GateState = Literal["open", "no_feedback", "in_flight", "rate", "picture", "sound"]
 
 
@@ -117,14 +121,14 @@ class CommandGate:
         heard = self._farthest_heard(now)
         if self._picture_keeps_up() and (heard is None or _keeps_up(heard, self.sound_tolerance)):
             return self._sent_at + self.min_interval
-        loses_sound = self.pacing != "media" and heard is not None and heard > max(self.sound_tolerance - 1, 0)
+        loses_sound = self.pacing != "media" and heard is not None and heard > most_behind(self.sound_tolerance)
         waits = loses_sound and not lets_go
         return self._sent_at + (max(self._sound_wait, self.calm_interval) if waits else self.calm_interval)
 
     def silent_at(self, now: float) -> float:
         """Return when a gate that waits for sound opens although none comes."""
-        sounds = self._sounds.values()
-        return min((each.silent_at(self.pacing) for each in sounds if each.is_awaited(self.pacing, now)), default=now)
+        sounds, awaited = self._sounds.values(), self._awaited
+        return min((each.silent_at(awaited) for each in sounds if each.is_awaited(awaited, now)), default=now)
 
     def next(self) -> NextCommand:
         """Return the command that an open gate lets pass.
@@ -145,8 +149,13 @@ class CommandGate:
         """Return the gap of the microphone that is farthest behind of those that are heard; None if none is."""
         if self._feedback is None:
             return None
-        event, sounds = self._feedback[0], self._sounds.values()
-        return max((event_gap(event, each.stamp) for each in sounds if each.is_awaited(self.pacing, now)), default=None)
+        event, sounds, awaited = self._feedback[0], self._sounds.values(), self._awaited
+        return max((event_gap(event, each.stamp) for each in sounds if each.is_awaited(awaited, now)), default=None)
+
+    @property
+    def _awaited(self) -> float:
+        """How long sound that fell silent is waited for, s."""
+        return self._sound_wait if self.pacing == "media" else SILENCE
 
 
 def _keeps_up(gap: int, tolerance: int) -> bool:
@@ -156,4 +165,4 @@ def _keeps_up(gap: int, tolerance: int) -> bool:
 def _is_near(gap: int, tolerance: int) -> bool:
     """True if what is seen or heard stays within tolerance when the next feedback arrives, one event on. At tolerance 0
     nothing can; there the medium of the newest event suffices."""
-    return -tolerance <= gap <= max(tolerance - 1, 0)
+    return -tolerance <= gap <= most_behind(tolerance)

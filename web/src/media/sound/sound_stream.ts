@@ -1,6 +1,7 @@
+import type { HeardSegment } from "../../drive/awaited_sound";
 import { judge } from "../../gate/media_gate";
 import { UNMARKED, ageOf, noteSeen, type FrameMark, type GateContext } from "../../gate/gate_counters";
-import { START_MS, createSoundGate, isConcealed, observeSound } from "../../gate/sound_gate";
+import { START_MS, createSoundGate, observeSound } from "../../gate/sound_gate";
 import { findMark } from "../../gate/stamp_table";
 import type { MediaSection } from "../../transport/webrtc/media_section";
 import type { StreamInfo } from "../../protocol/wire";
@@ -16,7 +17,7 @@ export class SoundStream {
   readonly gate = createSoundGate();
   readonly log = new RenderLog();
   isOpen = false;
-  playing: number | null = null; // stamp of the sound that plays, heard or too old to be; null: none does
+  segment: HeardSegment | null = null; // that plays, heard or too old to be; null: none does
   private source: SoundSource;
   private output: SoundOutput;
   private droppedAtStart: number; // before decoding, to begin with the newest
@@ -57,8 +58,10 @@ export class SoundStream {
     if (this.gate.counts.rendered > before) this.note(mark ?? UNMARKED, context);
     this.isOpen = passes && audible;
     this.output.open(this.isOpen);
-    const isReal = playing !== undefined && !this.isStarting() && !isConcealed(this.gate, now);
-    this.playing = isReal && audible ? (mark?.stamp ?? null) : null;
+    const isReal = playing !== undefined && !this.isStarting() && !this.gate.isAhead;
+    const stamp = isReal && audible ? (mark?.stamp ?? null) : null;
+    const atMs = this.gate.playingSinceMs;
+    this.segment = stamp === null ? null : { stamp, atMs, leftOut: this.dropped() };
   }
 
   private judge(
