@@ -12,8 +12,8 @@ CALM_INTERVAL = 0.040  # s; events that follow one another sooner wait for pictu
 # An event that would take sound out of its tolerance waits for it so long at most, and for half of the time for which
 # the robot holds a command. Armed and at rest, events follow one another no sooner.
 SOUND_WAIT = 0.200  # s
-# With feedback pacing sound that fell silent is waited for so long, by each event as above: what is late may still come.
-# With media pacing one command waits all the while, so it waits no longer than above.
+# With feedback pacing sound that fell silent is waited for so long, by each event as above: what is late may still
+# come. With media pacing one command waits all the while, so it waits no longer than above.
 SILENCE = 0.600  # s
 Pacing = Literal["feedback", "media"]
 GateState = Literal["open", "no_feedback", "in_flight", "rate", "picture", "sound"]
