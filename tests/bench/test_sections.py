@@ -10,9 +10,10 @@ from lockstep.bench.context import Context
 from lockstep.bench.harness.driving import console_trips, link_trips
 from lockstep.bench.harness.event_log import robot_times
 from lockstep.bench.harness.stack import running_bridge, running_stack
-from lockstep.bench.sections import command_to_feedback, datagrams, scene
+from lockstep.bench.sections import command_to_feedback, datagrams, goals, scene
 from lockstep.client import Console
 from lockstep.robot_bridge.link.link_client import RobotLink
+from tests.e2e.so101 import SO101, needs_so101
 
 
 async def test_every_trip_through_a_console_is_one_event_that_the_robot_executed() -> None:
@@ -45,6 +46,26 @@ async def test_command_to_feedback_reports_each_figure_with_its_baseline(monkeyp
     assert own.value is not None
     assert total.value is not None
     assert own.value < total.value
+
+
+@needs_so101
+async def test_the_goals_section_compares_goals_with_neutral_commands(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name, value in SO101.items():
+        monkeypatch.setenv(name, value)
+    monkeypatch.setattr(goals, "QUICK_TURNS", 1)
+    monkeypatch.setattr(goals, "EVENTS", 5)
+    results = await goals.run(Context(quick=True, robots=[], say=lambda _: None))
+    assert [result.name for result in results] == [
+        f"so101: {kind}, {name}" for kind in ("a joint's goals", "goals of the tool") for name in ("median", "p99")
+    ]
+    assert all(result.value and result.baseline and result.samples == 5 for result in results)
+
+
+async def test_the_goals_section_says_what_is_missing(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setenv("SO101_MODEL_FOLDER", str(tmp_path))
+    (missing,) = await goals.run(Context(quick=True, robots=[], say=lambda _: None))
+    assert missing.value is None
+    assert "lockstep robot fetch so101" in missing.conditions
 
 
 async def test_the_datagrams_section_sends_pictures_in_one_call_and_one_by_one(monkeypatch: pytest.MonkeyPatch) -> None:

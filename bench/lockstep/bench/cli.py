@@ -1,4 +1,4 @@
-"""`python -m bench [--json FILE|-] [--markdown FILE] [--quick] [SECTION ...]`: measures Lockstep on this machine."""
+"""`python -m lockstep.bench [OPTIONS] [SECTION ...]`: measures Lockstep on this machine."""
 
 import asyncio
 import json
@@ -22,6 +22,7 @@ __all__ = ["SECTIONS", "Measured", "main", "measure"]
 
 SECTIONS = (
     "command_to_feedback",
+    "goals",
     "lossy",
     "gates",
     "capture_to_shown",
