@@ -16,7 +16,14 @@ export function staleness(
   if (lastDrawnMs === null) return "Waiting for the first picture";
   if (lastPictureMs === null || now - lastPictureMs > FROZEN_MS)
     return `No picture for ${Math.max(1, Math.round((now - (lastPictureMs ?? lastDrawnMs)) / 1000))} s`;
-  if (context.gate !== "event" || context.feedback === null || shown === null) return null;
-  const gap = eventGap(context.feedback, shown);
-  return gap > context.tolerance ? eventsBehind(gap) : null;
+  const gap = gapOnScreen(shown, context);
+  return context.gate === "event" && gap !== null && gap > context.tolerance ? eventsBehind(gap) : null;
+}
+
+/** By how many events the picture on screen is behind the newest feedback now; null while that is not known. */
+export function gapOnScreen(
+  shown: number | null,
+  { feedback }: Pick<GateContext, "feedback">,
+): number | null {
+  return feedback === null || shown === null ? null : eventGap(feedback, shown);
 }

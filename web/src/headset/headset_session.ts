@@ -308,7 +308,7 @@ export class HeadsetSession {
 
 function viewCamera(engine: ConsoleEngine, { name, label, canvas }: PlacedPicture, now: number): ViewCamera {
   const video = engine.streams.videos.get(name);
-  const gap = video?.gate.counts.gap ?? null;
+  const gap = video?.gapOnScreen() ?? null;
   const tolerance = engine.state.settings.tolerance.video;
   return {
     name,

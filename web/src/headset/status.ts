@@ -109,7 +109,7 @@ function figuresOf(engine: ConsoleEngine, stream: string | null, now: number): F
   const { state } = engine;
   const { feedback, robot, settings } = state;
   const age = feedbackAge(engine.measuredMs, now);
-  const gap = stream === null ? null : (engine.streams.videos.get(stream)?.gate.counts.gap ?? null);
+  const gap = stream === null ? null : (engine.streams.videos.get(stream)?.gapOnScreen() ?? null);
   const tolerance = settings.tolerance.video;
   const layer = robot?.description.layers[engine.driving.layer];
   const figures: Figure[] = [

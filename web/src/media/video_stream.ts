@@ -1,5 +1,6 @@
 import { closePictureGate, createPictureGate, offerPicture, settlePicture } from "../gate/picture_gate";
 import type { FrameMark, GateContext } from "../gate/gate_counters";
+import { gapOnScreen } from "../gate/staleness";
 import { createRateMeter, noteOccurrence } from "../util/samples";
 import type { MediaSection } from "../transport/webrtc/media_section";
 import type { StreamInfo } from "../protocol/wire";
@@ -51,6 +52,11 @@ export class VideoStream {
   /** Judges the waiting picture again. */
   settle(): void {
     settlePicture(this.gate, this.lookup, this.events.context(), this.draw);
+  }
+
+  /** By how many events the picture on screen is behind the newest feedback now; null while that is not known. */
+  gapOnScreen(): number | null {
+    return gapOnScreen(this.gate.shown, this.events.context());
   }
 
   close(): void {

@@ -1,5 +1,5 @@
 import { expect, it } from "vitest";
-import { staleness } from "../../src/gate/staleness";
+import { gapOnScreen, staleness } from "../../src/gate/staleness";
 
 const context = { feedback: 10, tolerance: 4, gate: "event", wallMs: 0 } as const;
 
@@ -23,4 +23,11 @@ it("judges no gap while the gate is off or nothing is known", () => {
   expect(staleness(1, 0, 0, { ...context, gate: "off" }, 0)).toBeNull();
   expect(staleness(1, 0, 0, { ...context, feedback: null }, 0)).toBeNull();
   expect(staleness(null, 0, 0, context, 0)).toBeNull();
+});
+
+it("knows how far the picture on screen is behind now, not when it was drawn", () => {
+  expect(gapOnScreen(9, { feedback: 10 })).toBe(1);
+  expect(gapOnScreen(9, { feedback: 18 })).toBe(9);
+  expect(gapOnScreen(null, { feedback: 18 })).toBeNull();
+  expect(gapOnScreen(9, { feedback: null })).toBeNull();
 });

@@ -94,7 +94,7 @@ export class Tile {
     this.pictureSays = words;
     setHidden(this.veil, words === null);
     if (words !== null) setText(this.veilWords, words);
-    const gap = video?.gate.counts.gap ?? null;
+    const gap = video?.gapOnScreen() ?? null;
     setHidden(this.pictureGap, words !== null || gap === null);
     if (gap !== null) setText(this.pictureGap, `gap ${gapLabel(gap, this.thumbnail?.tolerance ?? null)}`);
   }

@@ -277,7 +277,7 @@ function showVeil(engine: ConsoleEngine, view: View, now: number): void {
   setHidden(view.veil, words === null);
   view.element.classList.toggle("is-stale", words !== null);
   if (words !== null) setText(view.veilWords, words);
-  const gap = video?.gate.counts.gap ?? null;
+  const gap = video?.gapOnScreen() ?? null;
   const tolerance = engine.state.settings.tolerance.video;
   setText(view.detail, gap === null ? "" : `gap ${gap} of ${tolerance}`);
   setData(view.element, "gap", gap !== null && Math.abs(gap) > tolerance ? "bad" : "good");
