@@ -39,6 +39,18 @@ def test_joints_that_are_driven_move_their_bodies_and_the_others_do_not(tmp_path
     assert "laser" not in found, "a link that nobody sees needs no body"
 
 
+def test_a_frame_without_a_shape_is_a_body_where_a_joint_that_is_driven_moves_it(tmp_path: Path) -> None:
+    tool = (
+        '<link name="tool0"/><joint name="mount" type="fixed"><parent link="wrist_2"/><child link="tool0"/>'
+        '<origin xyz="0 0 0.1"/></joint></robot>'
+    )
+    found, _ = bodies(tmp_path, URDF.replace("</robot>", tool), BASE + ARM, no_mesh)
+    assert (found["tool0"].parent, list(found["tool0"].position)) == ("wrist_2", [0, 0, 0.1])
+    assert found["tool0"].geoms == [] or found["tool0"].geoms == ()
+    found, _ = bodies(tmp_path, URDF.replace("</robot>", tool), BASE, no_mesh)
+    assert "tool0" not in found
+
+
 def test_a_mesh_is_drawn_where_its_file_can_be_read(tmp_path: Path) -> None:
     found, written = bodies(tmp_path, URDF, BASE, no_mesh)
     assert "wrist_3" not in found

@@ -42,6 +42,10 @@ def draft_bodies(urdf: Urdf, joints: set[str], find_mesh: FindMesh, *, has_base:
             needed |= {name, *(joint.parent for joint in urdf.chain(name))}
     if not needed or len(needed) > MAX_BODIES:
         return None
+    # Frames without a shape, such as `tool0`: the tip of a tool is often one.
+    frames = {name for name in urdf.links if any(joint.name in joints for joint in urdf.chain(name))}
+    if len(needed | frames) <= MAX_BODIES:
+        needed |= frames
     prefix = LINK_PREFIX if has_base and BASE_BODY in needed else ""
     above = {joint.child: joint for joint in urdf.joints.values()}
     order = sorted(needed, key=lambda name: (len(urdf.chain(name)), name))  # parents first
