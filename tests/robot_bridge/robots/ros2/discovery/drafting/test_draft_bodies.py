@@ -46,7 +46,7 @@ def test_a_frame_without_a_shape_is_a_body_where_a_joint_that_is_driven_moves_it
     )
     found, _ = bodies(tmp_path, URDF.replace("</robot>", tool), BASE + ARM, no_mesh)
     assert (found["tool0"].parent, list(found["tool0"].position)) == ("wrist_2", [0, 0, 0.1])
-    assert found["tool0"].geoms == [] or found["tool0"].geoms == ()
+    assert not found["tool0"].geoms
     found, _ = bodies(tmp_path, URDF.replace("</robot>", tool), BASE, no_mesh)
     assert "tool0" not in found
 
