@@ -80,6 +80,7 @@ class Chain:
         self._end = offset + turn @ np.array(point)
         self._end_turn = turn
         self._slides = np.array([link.slides for link in self._links])
+        self._has_slides = bool(self._slides.any())
         self.begins: Array = self._links[0].offset
         self.length = sum(math.hypot(*link.offset) for link in self._links[1:]) + math.hypot(*self._end)
 
@@ -115,7 +116,7 @@ class Chain:
             turns.append(turn)
         position = place + turn @ self._end
         linear, angular = cross(axes, position - places[1:]), axes
-        if self._slides.any():
+        if self._has_slides:
             linear = np.where(self._slides[:, None], axes, linear)
             angular = np.where(self._slides[:, None], 0.0, axes)
         return ChainState(position, turn @ self._end_turn, linear.T, angular.T, places, turns, axes)
@@ -127,8 +128,10 @@ class Chain:
     def motion(self, state: ChainState, moving: int, place: Array) -> Array:
         """Return the velocity of a point per velocity of each joint, 3 x joints; `moving`: as of its `ChainPoint`."""
         columns = np.zeros((len(self._links), 3))
-        linear = cross(state.axes[:moving], place - state.places[1 : moving + 1])
-        columns[:moving] = np.where(self._slides[:moving, None], state.axes[:moving], linear)
+        columns[:moving] = cross(state.axes[:moving], place - state.places[1 : moving + 1])
+        if self._has_slides:
+            slides = self._slides[:moving]
+            columns[:moving][slides] = state.axes[:moving][slides]
         return columns.T
 
     def twists(self, state: ChainState, motion: Array) -> tuple[Array, Array]:
@@ -137,17 +140,23 @@ class Chain:
         The first is the motion of the point of the frame that is at the origin now, m; the second its turn, rad. So a
         point of the frame at `place` moves by the first plus the second x `place`. `motion`: rad or m, of each joint.
         """
-        turns = np.where(self._slides[:, None], 0.0, state.axes) * motion[:, None]
-        ways = np.where(self._slides[:, None], state.axes * motion[:, None], cross(state.places[1:], turns))
+        along = state.axes * motion[:, None]
+        turns = np.where(self._slides[:, None], 0.0, along) if self._has_slides else along
+        ways = cross(state.places[1:], turns)
+        if self._has_slides:
+            ways[self._slides] = along[self._slides]
         none = np.zeros((1, 3))
         return np.concatenate((none, ways.cumsum(axis=0))), np.concatenate((none, turns.cumsum(axis=0)))
 
 
+# Taken by index arrays: a tenth of the time that `numpy.cross` takes for so few rows.
+FROM_SECOND, FROM_THIRD = np.array((1, 2, 0)), np.array((2, 0, 1))
+
+
 def cross(one: Array, other: Array) -> Array:
-    """Return the cross products of rows: a third of the time that `numpy.cross` takes for so few."""
-    a, b, c = one.T
-    x, y, z = other.T
-    return np.stack((b * z - c * y, c * x - a * z, a * y - b * x), axis=1)
+    """Return the cross products of rows."""
+    products: Array = one.take(FROM_SECOND, 1) * other.take(FROM_THIRD, 1)
+    return products - one.take(FROM_THIRD, 1) * other.take(FROM_SECOND, 1)
 
 
 def _path(bodies: Sequence[Body], tool: str, base: str) -> list[Body]:
