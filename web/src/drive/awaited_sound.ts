@@ -11,7 +11,7 @@ export interface HeardSegment {
 export interface AwaitedSound extends HeardSegment {
   readonly tolerance: number; // events
   readonly event: number; // newest feedback then
-  readonly farMs: number; // for how long sound came that events had to wait for, since the last that they had not
+  readonly farMs: number; // for how long sound came that was too far behind, since the last that was not
   readonly pausesUntilMs: number; // silence that begins before is taken for a pause
 }
 
@@ -20,17 +20,21 @@ const HOLE_MS = 200;
 const PAUSES_FOR_MS = 10_000;
 const FAR_FOR_MS = 3000;
 
-/** A segment began. `before`: what was known of its microphone; `event`: newest feedback. */
+/**
+ * A segment began. `before`: what was known of its microphone; `event`: newest feedback; `mostGap`: sound farther behind
+ * is too far.
+ */
 export function hear(
   before: AwaitedSound | undefined,
   segment: HeardSegment,
   event: number,
   tolerance: number,
+  mostGap: number,
 ): AwaitedSound {
   const { atMs, stamp } = segment;
   const holeMs = before === undefined ? 0 : atMs - before.atMs;
   const paused = before !== undefined && holeMs > HOLE_MS && wasPause(before, segment, event);
-  const isFar = eventGap(event, stamp) > mostBehind(tolerance);
+  const isFar = eventGap(event, stamp) > mostGap;
   return {
     ...segment,
     tolerance,

@@ -127,7 +127,8 @@ export function noteHeard(gate: CommandGate, heard: readonly HeardSound[], now: 
   const event = gate.event ?? 0;
   gate.sounds = new Map();
   gate.heard = null;
-  const awaitedMs = gate.pacing === "media" ? gate.soundWaitMs : SILENCE_MS;
+  const isMedia = gate.pacing === "media"; // then sound that stays at its tolerance would keep the gate shut
+  const awaitedMs = isMedia ? gate.soundWaitMs : SILENCE_MS;
   for (const { microphone, segment, tolerance } of heard) {
     const known = before.get(microphone);
     const sound =
@@ -135,7 +136,7 @@ export function noteHeard(gate: CommandGate, heard: readonly HeardSound[], now: 
       gate.event === null ||
       (segment.atMs === known?.atMs && segment.stamp === known.stamp)
         ? known
-        : hear(known, segment, event, tolerance);
+        : hear(known, segment, event, tolerance, isMedia ? mostBehind(tolerance) : tolerance);
     if (sound === undefined) continue;
     gate.sounds.set(microphone, sound);
     if (!isAwaited(sound, awaitedMs, now)) continue;

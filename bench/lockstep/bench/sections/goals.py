@@ -76,7 +76,9 @@ async def _turn(console: Console, axis: str, *, seed: int) -> list[float]:
     axes = console.description.axes
     neutral, pause = neutral_values(axes), Pause(console.description, seed)
     number = next((at for at, each in enumerate(axes) if each.name == axis), None)
-    middle = 0.0 if number is None else applied_goals(console)[number] or 0.0
+    middle = 0.0 if number is None else applied_goals(console)[number]
+    if middle is None:
+        raise RuntimeError(f"the robot says no goal of {axis}")
     began = time.monotonic()
 
     def values(now: float) -> list[float | None]:
@@ -87,7 +89,7 @@ async def _turn(console: Console, axis: str, *, seed: int) -> list[float]:
 
     found: list[float] = []
     await drive_on(console, values(began))
-    await pause.after(began)
+    await pause.after(time.monotonic())
     while len(found) < EVENTS:
         sent = time.monotonic()
         try:

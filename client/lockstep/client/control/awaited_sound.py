@@ -20,7 +20,7 @@ class AwaitedSound(NamedTuple):
     stamp: int  # of the newest segment
     at: float  # s, when that began to play, or was too old to
     event: int  # newest feedback then
-    far: float  # s for which sound came that events had to wait for, since the last that they had not
+    far: float  # s for which sound came that was too far behind, since the last that was not
     pauses_until: float  # s; silence that begins before is taken for a pause
 
     def silent_at(self, awaited: float) -> float:
@@ -40,9 +40,12 @@ def most_behind(tolerance: int) -> int:
     return max(tolerance - 1, 0)
 
 
-def hear(before: AwaitedSound | None, stamp: int, event: int, tolerance: int, now: float) -> AwaitedSound:
-    """Return what is known once a segment plays, or is too old to. `before`: what was known of its microphone."""
-    is_far = event_gap(event, stamp) > most_behind(tolerance)
+def hear(before: AwaitedSound | None, stamp: int, event: int, most_gap: int, now: float) -> AwaitedSound:
+    """Return what is known once a segment plays, or is too old to.
+
+    `before`: what was known of its microphone. `event`: newest feedback. `most_gap`: sound farther behind is too far.
+    """
+    is_far = event_gap(event, stamp) > most_gap
     if before is None:
         return AwaitedSound(stamp, now, event, 0.0, float("-inf"))
     hole = now - before.at

@@ -95,8 +95,10 @@ class CommandGate:
     def heard(self, microphone: str, stamp: int, now: float) -> None:
         """Note that a segment of sound stamped `stamp` plays, or is too old to."""
         if self._feedback is not None:
+            # With media pacing sound that stays at its tolerance would keep the gate shut.
+            most_gap = most_behind(self.sound_tolerance) if self.pacing == "media" else self.sound_tolerance
             known = self._sounds.get(microphone)
-            self._sounds[microphone] = hear(known, stamp, self._feedback[0], self.sound_tolerance, now)
+            self._sounds[microphone] = hear(known, stamp, self._feedback[0], most_gap, now)
 
     def state(self, now: float, *, lets_go: bool = False) -> GateState:
         """Return "open", or the reason that the gate is closed. `lets_go`: the command would be neutral."""

@@ -6,7 +6,7 @@ import msgspec
 
 from lockstep.protocol.description import Body
 from lockstep.robot_bridge.robots.ros2 import read_settings
-from lockstep.robot_bridge.robots.ros2.discovery.drafting.draft_bodies import FindMesh, draft_bodies
+from lockstep.robot_bridge.robots.ros2.discovery.drafting.draft_bodies import MOST_FRAMES, FindMesh, draft_bodies
 from lockstep.robot_bridge.robots.ros2.discovery.drafting.yaml_text import Section, render
 from lockstep.robot_bridge.robots.ros2.discovery.urdf import Mesh, parse_urdf
 
@@ -49,6 +49,30 @@ def test_a_frame_without_a_shape_is_a_body_where_a_joint_that_is_driven_moves_it
     assert not found["tool0"].geoms
     found, _ = bodies(tmp_path, URDF.replace("</robot>", tool), BASE, no_mesh)
     assert "tool0" not in found
+
+
+def test_the_frames_between_the_root_and_an_arm_that_is_not_drawn_are_bodies_too(tmp_path: Path) -> None:
+    text = URDF.replace(
+        "</robot>",
+        '<link name="world"/><joint name="stand" type="fixed"><parent link="world"/>'
+        '<child link="base_link"/></joint><link name="table"><visual><geometry><box size="1 1 1"/></geometry></visual>'
+        '</link><joint name="floor" type="fixed"><parent link="world"/><child link="table"/></joint></robot>',
+    )
+    for drawn in ('<box size="0.5 0.4 0.2"/>', '<cylinder radius="0.05" length="0.3"/>'):
+        text = text.replace(drawn, '<mesh filename="package://x/y.dae"/>')
+    found, _ = bodies(tmp_path, text, BASE + ARM, no_mesh)
+    assert (found["shoulder"].parent, found["base_link"].parent) == ("base_link", "world")
+
+
+def test_many_frames_are_left_out(tmp_path: Path) -> None:
+    frames = "".join(
+        f'<link name="f{number}"/><joint name="to_f{number}" type="fixed"><parent link="shoulder"/>'
+        f'<child link="f{number}"/></joint>'
+        for number in range(MOST_FRAMES + 1)
+    )
+    found, _ = bodies(tmp_path, URDF.replace("</robot>", frames + "</robot>"), BASE + ARM, no_mesh)
+    assert "shoulder" in found
+    assert "f0" not in found
 
 
 def test_a_mesh_is_drawn_where_its_file_can_be_read(tmp_path: Path) -> None:

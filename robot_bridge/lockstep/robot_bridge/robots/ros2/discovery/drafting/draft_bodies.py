@@ -10,11 +10,12 @@ from collections.abc import Callable
 from lockstep.robot_bridge.robots.ros2.discovery.drafting.yaml_text import Plain, Section, Value
 from lockstep.robot_bridge.robots.ros2.discovery.urdf import Mesh, Shape, Urdf, UrdfJoint, UrdfLink
 
-__all__ = ["BASE_BODY", "LINK_PREFIX", "FindMesh", "draft_bodies"]
+__all__ = ["BASE_BODY", "LINK_PREFIX", "MOST_FRAMES", "FindMesh", "draft_bodies"]
 
 BASE_BODY = "base"  # the body at the pose of the odometry
 LINK_PREFIX = "link."  # of all links, where one of them has the name of that body
 MAX_BODIES = 200
+MOST_FRAMES = 40  # bodies that nothing is drawn by; some 200 bytes of a description each
 ROOM, VERTEX = 30_000, 40  # bytes of a description for all meshes, and for each vertex with its triangles
 LEAST_VERTICES, MOST_VERTICES = 8, 150  # of a mesh
 
@@ -44,7 +45,8 @@ def draft_bodies(urdf: Urdf, joints: set[str], find_mesh: FindMesh, *, has_base:
         return None
     # Frames without a shape, such as `tool0`: the tip of a tool is often one.
     frames = {name for name in urdf.links if any(joint.name in joints for joint in urdf.chain(name))}
-    if len(needed | frames) <= MAX_BODIES:
+    frames |= {joint.parent for name in frames for joint in urdf.chain(name)}
+    if len(frames - needed) <= MOST_FRAMES and len(needed | frames) <= MAX_BODIES:
         needed |= frames
     prefix = LINK_PREFIX if has_base and BASE_BODY in needed else ""
     above = {joint.child: joint for joint in urdf.joints.values()}
