@@ -56,6 +56,18 @@ def test_a_recording_is_verified_by_its_id_or_its_path(directory: Path) -> None:
     assert all(check["count"] == 0 for check in found["checks"].values())
 
 
+def test_several_are_verified_each_under_its_name_whatever_the_others_are_like(directory: Path) -> None:
+    Story(events=EVENTS).write(directory / "two.mcap")
+    (directory / "text.mcap").write_text("no recording")
+    good = _lockstep(directory, "verify", "one", "two")
+    assert good.exit_code == 0, good.output
+    assert [line for line in good.stdout.splitlines() if line in ("one", "two")] == ["one", "two"]
+    found = _lockstep(directory, "verify", "text", "one", "--json")
+    assert found.exit_code == 2, "the worst of all"
+    (line,) = found.stdout.splitlines()
+    assert json.loads(line)["file"].endswith("one.mcap")
+
+
 def test_who_signed_it_is_said_and_a_key_that_did_not_is_named(directory: Path) -> None:
     signer = Signer(Ed25519PrivateKey.generate())
     Story(events=EVENTS).write(directory / "two.mcap", signing=RecordingSigning(signer, lambda: ""))

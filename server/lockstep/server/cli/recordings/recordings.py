@@ -160,7 +160,7 @@ def add_recording_commands(app: typer.Typer, make_settings: MakeSettings) -> Non
 
     @app.command()
     def verify(
-        file: File,
+        files: Annotated[list[Path], typer.Argument(help="Recordings, by file or id in the directory; or datasets.")],
         key: Annotated[
             str,
             typer.Option(help="The public key that must have signed the recording. Unset: any key, or no signature."),
@@ -171,21 +171,26 @@ def add_recording_commands(app: typer.Typer, make_settings: MakeSettings) -> Non
         state_dir: StateDirOption = None,
         as_json: Json = False,
     ) -> None:
-        """Check what is promised against a recording or dataset. Exit code 1: it is not kept; 2: it cannot be read."""
-        if (file / "meta" / "info.json").is_file():
-            _verify_dataset(file, as_json, pixels)
-            return
-        path = recording_file(file, make_settings(state_dir=state_dir), robot, directory)
+        """Check what is promised against recordings or datasets. Exit code 1: it is not kept; 2: one cannot be read."""
         if key and not is_public_key(key):
             raise usage_error("a public key has 64 hexadecimal digits")
-        verdict = or_usage(lambda: verify_file(path, key))
-        if as_json:
-            told = os.fsencode(path).decode(errors="replace")
-            sys.stdout.write(msgspec.json.encode({"file": told, **msgspec.to_builtins(verdict)}).decode() + "\n")
-        else:
-            sys.stdout.write(_in_words(verdict))
-        if not verdict.ok:
-            raise typer.Exit(EXIT_BROKEN)
+
+        def is_kept(file: Path) -> bool:
+            if (file / "meta" / "info.json").is_file():
+                return _verify_dataset(file, as_json, pixels)
+            return _verify_file(
+                recording_file(file, make_settings(state_dir=state_dir), robot, directory), key, as_json
+            )
+
+        worst = 0
+        for file in files:  # each of them, whatever the one before was like
+            if len(files) > 1 and not as_json:
+                sys.stdout.write(f"{escaped(file)}\n")
+            try:
+                worst = max(worst, 0 if is_kept(file) else EXIT_BROKEN)
+            except typer.Exit as error:
+                worst = max(worst, error.exit_code)
+        raise typer.Exit(worst)
 
     @app.command()
     def report(
@@ -210,7 +215,17 @@ def add_recording_commands(app: typer.Typer, make_settings: MakeSettings) -> Non
         sys.stdout.write(f"{escaped(written)}\n")
 
 
-def _verify_dataset(root: Path, as_json: bool, pixels: bool) -> None:
+def _verify_file(path: Path, key: str, as_json: bool) -> bool:
+    verdict = or_usage(lambda: verify_file(path, key))
+    if as_json:
+        told = os.fsencode(path).decode(errors="replace")
+        sys.stdout.write(msgspec.json.encode({"file": told, **msgspec.to_builtins(verdict)}).decode() + "\n")
+    else:
+        sys.stdout.write(_in_words(verdict))
+    return bool(verdict.ok)
+
+
+def _verify_dataset(root: Path, as_json: bool, pixels: bool) -> bool:
     verifier: Any = load_extra("lockstep.server.recording.verify.verify_dataset", "export")  # needs pyarrow
     verdict = or_usage(lambda: verifier.verify_dataset(root, pixels=pixels))
     if as_json:
@@ -224,8 +239,7 @@ def _verify_dataset(root: Path, as_json: bool, pixels: bool) -> None:
             lines.append(f"{'ok  ' if check.ok else 'FAIL'}  {name} ({check.looked} looked at)")
             lines += [f"        row {each.row}: {printable(each.text)}" for each in check.violations[:5]]
         sys.stdout.write("\n".join(lines) + "\n")
-    if not verdict.ok:
-        raise typer.Exit(EXIT_BROKEN)
+    return bool(verdict.ok)
 
 
 def _say_state(answer: dict[str, Any], as_json: bool) -> None:
