@@ -6,11 +6,16 @@ import pytest
 from lockstep.bench.harness import lives
 from lockstep.bench.harness.event_log import records
 from lockstep.bench.harness.lives import BridgeLives, Lives
+from tests.waiting import eventually
 
 
 @pytest.fixture(autouse=True)
 def at_once(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(lives, "DOWN_SECONDS", 0.0)
+
+
+def _kinds(bridge: BridgeLives) -> list[str]:
+    return [record["kind"] for record in records(bridge.event_log)] if bridge.event_log.exists() else []
 
 
 async def test_a_process_lives_again_after_it_was_killed_with_what_it_is_told_then() -> None:
@@ -30,10 +35,11 @@ async def test_a_bridge_keeps_its_port_and_its_log_and_is_not_stopped_in_its_sec
     bridge = BridgeLives(tmp_path)
     await bridge.begin()
     port = bridge.port
+    await eventually(lambda: "start" in _kinds(bridge))  # a process that is killed writes no more
     await bridge.kill()
     await bridge.begin()
     assert bridge.address == f"tcp://127.0.0.1:{port}"
     await bridge.end()
-    found = [record["kind"] for record in records(bridge.event_log)]
+    found = _kinds(bridge)
     assert found.count("start") == 2
     assert "stop" not in found

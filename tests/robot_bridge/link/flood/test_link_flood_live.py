@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from lockstep.bench.harness.tcp_path import TcpPath
-from lockstep.protocol.errors import LinkLost
+from lockstep.protocol.errors import LinkLost, LinkRefused
 from lockstep.protocol.framing import frame
 from lockstep.protocol.link_secret import LinkSecret
 from lockstep.protocol.messages import Hello, encode_message
@@ -63,7 +63,7 @@ def flood(address: tuple[str, int], host: str, says: bytes) -> AbstractAsyncCont
 async def _opens(path: TcpPath, trust: ssl.SSLContext | None) -> bool:
     """At the first try, or on a machine that is slower than the flood at the third: a console tries again at once."""
     for _ in range(3):
-        with contextlib.suppress(LinkLost):
+        with contextlib.suppress(LinkLost, LinkRefused):
             async with RobotLink("127.0.0.1", path.port, "operator", secret=SECRET, tls=trust) as link:
                 return link.connected
     return False

@@ -30,7 +30,8 @@ async def test_a_script_puts_a_block_into_the_bowl_over_the_robot_link(robot: So
         while not task.done and not task.failed:
             await driver.drive(task.values(driver.feedback))
         assert task.done, task.failed
-    assert robot.simulation.blocks_in_bowl() == 1
+        while robot.simulation.blocks_in_bowl() != 1:  # it may still fall
+            await driver.drive([None] * len(robot.describe().axes))
 
 
 async def test_a_goal_beyond_reach_is_refused_and_a_pose_with_joints_conflicts(robot: So101) -> None:
