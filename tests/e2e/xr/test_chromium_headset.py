@@ -88,10 +88,13 @@ DOUBTS = (
 )
 
 
+DOUBT_TRIES = 15  # the view must not stand still for 0.3 s meanwhile, on a machine whose processor draws it
+
+
 async def _ends_by(headset: Headset, what: str, undo: str, words: str) -> None:
     """Drive, do it, and look whether that has ended driving; again if a busy machine did."""
     console = headset.console
-    for _ in range(TRIES):
+    for _ in range(DOUBT_TRIES):
         await headset.drive()
         await headset.do(f"void {what}")
         await console.until("!s.armed && s.at_rest === true")
@@ -104,6 +107,7 @@ async def _ends_by(headset: Headset, what: str, undo: str, words: str) -> None:
     raise AssertionError(f"a busy machine ended it each time: {what}")
 
 
+@pytest.mark.timeout(600)
 async def test_what_leaves_a_doubt_brings_the_robot_to_rest_by_name(stack: Stack, chromium: Browser) -> None:
     async with open_headset(chromium, stack.operator) as headset:
         await headset.enter()
