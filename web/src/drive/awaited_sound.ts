@@ -15,7 +15,7 @@ export interface AwaitedSound extends HeardSegment {
   readonly pausesUntilMs: number; // silence that begins before is taken for a pause
 }
 
-/** No segment lasts longer. Sound that pauses is waited for no longer either. */
+/** No segment lasts longer, and sound that pauses is waited for no longer. */
 const HOLE_MS = 200;
 const PAUSES_FOR_MS = 10_000;
 const FAR_FOR_MS = 3000;

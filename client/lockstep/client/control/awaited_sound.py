@@ -9,7 +9,7 @@ from lockstep.protocol.serial import event_gap
 
 __all__ = ["AwaitedSound", "hear", "most_behind"]
 
-HOLE: Final = 0.200  # s; no segment lasts longer. Sound that pauses is waited for no longer either
+HOLE: Final = 0.200  # s; no segment lasts longer, and sound that pauses is waited for no longer
 PAUSES_FOR: Final = 10.0  # s
 FAR_FOR: Final = 3.0  # s of sound that was too far behind, after which nothing waits for it: its path is too slow
 
@@ -43,7 +43,8 @@ def most_behind(tolerance: int) -> int:
 def hear(before: AwaitedSound | None, stamp: int, event: int, most_gap: int, now: float) -> AwaitedSound:
     """Return what is known once a segment plays, or is too old to.
 
-    `before`: what was known of its microphone. `event`: newest feedback. `most_gap`: sound farther behind is too far.
+    `before`: what was known of its microphone. `event`: newest feedback. `most_gap`: events; sound that is farther
+    behind the feedback is too far behind.
     """
     is_far = event_gap(event, stamp) > most_gap
     if before is None:

@@ -29,11 +29,11 @@ class Readiness:
         self.arming, self._asked_again = True, False
 
     def give_up_arming(self) -> None:
-        """Want no neutral command; a robot that may move still may."""
+        """Ask for no neutral command any more. `ready` stays as it is."""
         self.arming = False
 
     def unready(self) -> None:
-        """Note that the robot may not move; a neutral command that is wanted stays wanted."""
+        """Note that the robot may not move. `arming` stays as it is."""
         self.ready = False
 
     def lose(self) -> None:
