@@ -88,13 +88,10 @@ DOUBTS = (
 )
 
 
-DOUBT_TRIES = 15  # the view must not stand still for 0.3 s meanwhile, on a machine whose processor draws it
-
-
 async def _ends_by(headset: Headset, what: str, undo: str, words: str) -> None:
     """Drive, do it, and look whether that has ended driving; again if a busy machine did."""
     console = headset.console
-    for _ in range(DOUBT_TRIES):
+    for _ in range(TRIES):
         await headset.drive()
         await headset.do(f"void {what}")
         await console.until("!s.armed && s.at_rest === true")
