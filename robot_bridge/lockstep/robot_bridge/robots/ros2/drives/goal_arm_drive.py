@@ -67,6 +67,11 @@ class GoalArmDrive(Drive):
         step = self._stream.step(rates, lost, now)
         self.topic.publish(self.advance(step.said, step.values, dt), step.said)
 
+    def prepare(self) -> None:
+        """Compute what the next `step` needs of the joints alone."""
+        if self._goals is not None:
+            self._goals.prepare()
+
     def advance(self, said: Said, values: list[float], dt: float) -> Any:
         if said is Said.NOTHING or self._goals is None:
             return None
