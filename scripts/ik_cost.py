@@ -1,4 +1,4 @@
-"""Measures the inverse kinematics: processor time of a step of the solver, and of a tick of the robot.
+"""Measures the inverse kinematics: processor time of a tick of the robot, before and after its feedback can be sent.
 
 python -m scripts.ik_cost             the SO-101; needs its model: lockstep robot fetch so101
 python -m scripts.ik_cost MODEL.xml   a MuJoCo model that names a tool (docs/mujoco.md)
@@ -23,19 +23,17 @@ STEPS = 3000
 SWING = 0.06  # m, to and fro along y
 
 
-def times_us(call: Callable[[int], object]) -> tuple[float, float]:
-    """Return the median and the 99th percentile of the processor time of one call, µs."""
-    spent = []
+def show(what: str, *calls: Callable[[int], object]) -> None:
+    """Print the processor time of each of the calls, which follow each other."""
+    spent: list[list[float]] = [[] for _ in calls]
     for number in range(STEPS):
-        before = time.thread_time()
-        call(number)
-        spent.append(1e6 * (time.thread_time() - before))
-    return statistics.median(spent), statistics.quantiles(spent, n=100)[-1]
-
-
-def show(what: str, times: tuple[float, float]) -> None:
-    median, late = times
-    print(f"{what:26}{median:6.0f} µs, 99 % below {late:6.0f} µs")
+        for times, call in zip(spent, calls, strict=True):
+            before = time.thread_time()
+            call(number)
+            times.append(1e6 * (time.thread_time() - before))
+    for times, part in zip(spent, ("", ", after the feedback"), strict=False):
+        median, late = statistics.median(times), statistics.quantiles(times, n=100)[-1]
+        print(f"{what + part:44}{median:6.0f} µs, 99 % below {late:6.0f} µs")
 
 
 def measure(robot: Robot) -> None:
@@ -57,10 +55,10 @@ def measure(robot: Robot) -> None:
         robot.tick()
 
     print(f"{description.label}: {len(pose.instead_of)} joints")
-    show("one tick, tool driven", times_us(drive))
+    show("one tick, tool driven", drive, lambda _: robot.prepare())
     for _ in range(100):
         rest(0)
-    show("one tick, at rest", times_us(rest))
+    show("one tick, at rest", rest, lambda _: robot.prepare())
 
 
 def measure_solver(robot: Robot) -> None:
@@ -74,7 +72,7 @@ def measure_solver(robot: Robot) -> None:
         goal = begun.position + np.array((0.0, SWING * math.sin(step / 100), 0.0))
         joints = solver.step(joints, goal, begun.rotation, robot.tick_seconds).joints
 
-    show("one step of the solver", times_us(solve))
+    show("one step of the solver", solve)
 
 
 def main() -> None:

@@ -357,6 +357,32 @@ async def test_the_log_tells_what_happened(tmp_path: Path) -> None:
     assert [line["event"] for line in log_lines(log, "feedback")][0] == 1
 
 
+async def test_a_robot_prepares_its_next_tick_when_the_feedback_of_this_one_was_sent() -> None:
+    class Prepares(RecordingRobot):
+        def tick(self) -> None:
+            self.calls.append("tick")
+            super().tick()
+
+        def prepare(self) -> None:
+            self.calls.append("prepare")
+
+    robot = Prepares()
+    async with running_bridge(robot) as bridge, operator(bridge) as driver:
+        publish = bridge._links.publisher.publish_feedback
+
+        def published(feedback: Feedback) -> None:
+            robot.calls.append("feedback")
+            publish(feedback)
+
+        with pytest.MonkeyPatch.context() as patched:
+            patched.setattr(bridge._links.publisher, "publish_feedback", published)
+            await driver.drive()
+    last = [call for call in robot.calls if call in ("tick", "feedback", "prepare")]
+    at = last.index("feedback")
+    assert last[at - 1 : at + 2] == ["tick", "feedback", "prepare"]
+    assert "tick" in last[at + 2 :], "and goes on"
+
+
 async def test_the_measurement_is_taken_right_after_the_tick() -> None:
     class Watched(RecordingRobot):
         def tick(self) -> None:

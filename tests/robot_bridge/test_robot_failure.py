@@ -50,6 +50,10 @@ class BreakableRobot(RecordingRobot):
         self._call("measure")
         return super().measure()
 
+    def prepare(self) -> None:
+        self._call("prepare")
+        super().prepare()
+
     def positions(self) -> Sequence[float]:
         self._call("positions")
         return super().positions()
@@ -70,7 +74,7 @@ async def fed_back(driver: Operator) -> tuple[Feedback, str]:
 
 
 @pytest.mark.parametrize("often", [1, sys.maxsize], ids=["once", "always"])
-@pytest.mark.parametrize("method", ["apply", "tick", "measure", "positions"])
+@pytest.mark.parametrize("method", ["apply", "tick", "measure", "prepare", "positions"])
 @pytest.mark.parametrize(
     "error",
     [OSError("no answer"), SystemExit(3), KeyboardInterrupt(), asyncio.CancelledError(), BaseException("odd")],

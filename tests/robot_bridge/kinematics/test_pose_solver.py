@@ -4,7 +4,7 @@ import math
 import numpy as np
 import numpy.typing as npt
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 
 from lockstep.robot_bridge.kinematics.chain import Chain
@@ -249,6 +249,7 @@ def test_for_an_obstacle_the_rotation_is_given_up_before_the_position_unless_it_
 
 @few
 @given(reachable, directions, st.floats(0.05, 0.4), turns)
+@example((0.5, -1.5, 1.4375, -0.87109375, 0.0), (0.2265625, 0.0, -0.78125), 0.3125, (1.75, -0.515625, 0.0))
 def test_whatever_is_wanted_the_arm_stays_off_the_table(
     start: tuple[float, ...], direction: tuple[float, float, float], far: float, turn: tuple[float, float, float]
 ) -> None:
@@ -313,3 +314,25 @@ def test_a_wide_hand_that_moves_as_fast_as_the_joints_can_stays_off_the_table(se
         solution = solver.step(joints, position, rotation, TICK, before=rates)
         joints, rates = solution.joints, solution.rates
         assert nearest(joints) > 0.004
+
+
+@few
+@given(reachable, directions, st.floats(0.0, 0.4), turns, st.tuples(*(st.floats(-1.0, 1.0) for _ in range(5))))
+def test_a_step_that_was_prepared_is_the_same_step(
+    start: tuple[float, ...],
+    direction: tuple[float, float, float],
+    far: float,
+    turn: tuple[float, float, float],
+    before: tuple[float, ...],
+) -> None:
+    solver = PoseSolver(ARM, BOUNDS, keeps_off=(APART, TABLE))
+    begun = ARM.at(start)
+    position = begun.position + np.array(direction) / math.hypot(*direction) * far
+    rotation = from_rotation_vector(turn) @ begun.rotation
+    wanted = solver.step(start, position, rotation, TICK, before=before)
+    prepared = solver.prepare(start, before)
+    assert solver.step(start, position, rotation, TICK, before=before, prepared=prepared) == wanted
+    assert solver.step(start, position, rotation, TICK, before=before, prepared=prepared) == wanted, "used twice"
+    # What was prepared for other joints or rates is left.
+    for other in (solver.prepare(start), solver.prepare(clipped(np.array(start) + 0.1), before)):
+        assert solver.step(start, position, rotation, TICK, before=before, prepared=other) == wanted

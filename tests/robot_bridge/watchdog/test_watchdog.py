@@ -64,6 +64,10 @@ class Hangs(RecordingRobot):
         self._call("measure")
         return super().measure()
 
+    def prepare(self) -> None:
+        self._call("prepare")
+        super().prepare()
+
     def positions(self) -> Sequence[float]:
         self._call("positions")
         return super().positions()
@@ -79,7 +83,7 @@ async def drive_fast(robot: RecordingRobot, driver: Operator) -> None:
         await driver.drive()
 
 
-@pytest.mark.parametrize("method", ["apply", "tick", "measure", "positions"])
+@pytest.mark.parametrize("method", ["apply", "tick", "measure", "prepare", "positions"])
 async def test_a_robot_whose_call_hangs_is_brought_to_rest_beside_it_and_moves_on_only_after_a_neutral(
     method: str, tmp_path: Path
 ) -> None:

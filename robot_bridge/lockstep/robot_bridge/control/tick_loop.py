@@ -114,6 +114,7 @@ class TickLoop:
             self._publisher.publish_feedback(feedback)
         if (status := self._executor.status(now)) is not None:
             self._publisher.publish_to_operator(status)
+        self._robot.prepare()
 
     async def _tick_on(self) -> None:
         metronome = Ticker(self._robot.tick_seconds, time.monotonic(), catch_up=MAX_CATCH_UP)

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from lockstep.protocol.description import Body
-from lockstep.robot_bridge.kinematics.rotations import about_axis, from_quaternion
+from lockstep.robot_bridge.kinematics.rotations import from_quaternion
 
 __all__ = ["Chain", "ChainPoint", "ChainState", "NoChain", "cross"]
 
@@ -34,7 +34,7 @@ class ChainState(NamedTuple):
     linear: Array  # m/s of the tool per rad/s (or m/s) of each joint, 3 x joints
     angular: Array  # rad/s of the tool per rad/s (or m/s) of each joint, 3 x joints
     places: Array  # m, of each joint's moving frame, after the base's own: (joints + 1) x 3
-    turns: list[Array]  # 3 x 3, of the same frames
+    turns: Array  # of the same frames: (joints + 1) x 3 x 3
     axes: Array  # unit vectors of the joints, joints x 3
 
 
@@ -77,12 +77,14 @@ class Chain:
                 self._links.append(_Link(offset, turn, axis, joint.kind == "prismatic"))
                 offset, turn = np.zeros(3), np.eye(3)
             self._bodies[body.name] = (len(self._links), offset, turn)
-        self._end = offset + turn @ np.array(point)
-        self._end_turn = turn
+        end = offset + turn @ np.array(point)
+        self._end = _frame(turn, end)
         self._slides = np.array([link.slides for link in self._links])
+        self._axes = np.array([link.axis for link in self._links])[:, :, None]  # columns, in the frames that they move
+        self._parts = np.array([_parts(link) for link in self._links]).swapaxes(0, 1)
         self._has_slides = bool(self._slides.any())
         self.begins: Array = self._links[0].offset
-        self.length = sum(math.hypot(*link.offset) for link in self._links[1:]) + math.hypot(*self._end)
+        self.length = sum(math.hypot(*link.offset) for link in self._links[1:]) + math.hypot(*end)
 
     def has(self, body: str) -> bool:
         """Return whether a body is between the base and the tool, these included."""
@@ -101,25 +103,25 @@ class Chain:
 
     def at(self, joints: Sequence[float]) -> ChainState:
         """Return the state at these joint positions (rad or m), in the order of `joints`."""
-        place, turn = np.zeros(3), np.eye(3)
-        places, turns = np.zeros((len(self._links) + 1, 3)), [turn]
-        axes = np.empty((len(self._links), 3))
-        for number, (link, value) in enumerate(zip(self._links, joints, strict=True)):
-            place = place + turn @ link.offset
-            turn = turn @ link.turn
-            axes[number] = axis = turn @ link.axis
-            if link.slides:
-                place = place + axis * value
-            else:
-                turn = turn @ about_axis(link.axis.tolist(), value)
-            places[number + 1] = place
-            turns.append(turn)
-        position = place + turn @ self._end
+        values = np.array(joints, dtype=np.float64)
+        if len(values) != len(self._links):
+            raise ValueError(f"{len(values)} positions for {len(self._links)} joints")
+        values = values[:, None, None]
+        fixed, sine, cosine, slide = self._parts
+        steps = fixed + np.sin(values) * sine + np.cos(values) * cosine + values * slide
+        frames = np.empty((len(steps) + 1, 4, 4))
+        frames[0] = np.eye(4)
+        for number, step in enumerate(steps):
+            np.matmul(frames[number], step, out=frames[number + 1])
+        tool = frames[-1] @ self._end
+        places, turns = frames[:, :3, 3], frames[:, :3, :3]
+        axes = (turns[1:] @ self._axes)[:, :, 0]
+        position = tool[:3, 3]
         linear, angular = cross(axes, position - places[1:]), axes
         if self._has_slides:
             linear = np.where(self._slides[:, None], axes, linear)
             angular = np.where(self._slides[:, None], 0.0, axes)
-        return ChainState(position, turn @ self._end_turn, linear.T, angular.T, places, turns, axes)
+        return ChainState(position, tool[:3, :3], linear.T, angular.T, places, turns, axes)
 
     def place(self, state: ChainState, point: ChainPoint) -> Array:
         """Return where a point is, m."""
@@ -147,6 +149,31 @@ class Chain:
             ways[self._slides] = along[self._slides]
         none = np.zeros((1, 3))
         return np.concatenate((none, ways.cumsum(axis=0))), np.concatenate((none, turns.cumsum(axis=0)))
+
+
+def _frame(turn: Array, offset: Array) -> Array:
+    """Return the homogeneous matrix, 4 x 4, of a turn (3 x 3) and then an offset (m)."""
+    frame = np.eye(4)
+    frame[:3, :3], frame[:3, 3] = turn, offset
+    return frame
+
+
+def _parts(link: _Link) -> list[Array]:
+    """Return what a joint's frame is against the frame before it: four matrices 4 x 4, of which they are the sum.
+
+    The first stands alone, the others are multiplied by the sine and the cosine of the joint's position (Rodrigues'
+    formula), and by the position.
+    """
+    fixed, sine, cosine, slide = _frame(link.turn, link.offset), np.zeros((4, 4)), np.zeros((4, 4)), np.zeros((4, 4))
+    if link.slides:
+        slide[:3, 3] = link.turn @ link.axis
+        return [fixed, sine, cosine, slide]
+    x, y, z = link.axis
+    about = np.array(((0.0, -z, y), (z, 0.0, -x), (-y, x, 0.0)))
+    sine[:3, :3] = link.turn @ about
+    cosine[:3, :3] = -link.turn @ about @ about
+    fixed[:3, :3] -= cosine[:3, :3]
+    return [fixed, sine, cosine, slide]
 
 
 # Taken by index arrays: a tenth of the time that `numpy.cross` takes for so few rows.

@@ -58,7 +58,8 @@ class Clearance:
             (names.index(first), names.index(second), capsules[first].radius + capsules[second].radius)
             for first, second in pairs
         ]
-        self._both = [end.moving for each in self._ends for end in each]
+        self._both = np.array([end.moving for each in self._ends for end in each], dtype=int)
+        self._places = np.array([end.position for each in self._ends for end in each]).reshape(-1, 3, 1)
         self._columns = np.array([pair[:2] for pair in self._pairs], dtype=int).reshape(-1, 2).T
         reaches = np.array([math.dist(each.start, each.end) / 2 + each.radius for each in capsules.values()])
         self._reaches = reaches[self._columns].sum(axis=0)  # m, of both capsules around their middles
@@ -67,7 +68,8 @@ class Clearance:
         """Return the gaps of the pairs that are closer than `within` (m), or come so by the motion `ahead`."""
         if not self._pairs:
             return []
-        ends = np.array([[self._chain.place(state, end) for end in each] for each in self._ends])
+        places = state.places[self._both] + (state.turns[self._both] @ self._places)[:, :, 0]
+        ends = places.reshape(-1, 2, 3)
         middles = ends.mean(axis=1)
         apart = middles[self._columns[0]] - middles[self._columns[1]]
         closer = self._reaches + within

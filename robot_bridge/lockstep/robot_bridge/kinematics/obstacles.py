@@ -64,18 +64,18 @@ class Obstacles:
             NoChain: a body is not a part of the chain.
         """
         self._chain = chain
-        self._bodies: list[tuple[int, Array, Array]] = []  # joints that move it, points in their frame, radii
+        self._bodies: list[tuple[int, Array, Array]] = []  # joints that move it, points in their frame (3 x n), radii
         middles, reaches = [], []  # of the balls that hold each: m, in the same frame; and their radii, m
         for name, surface in surfaces.items():
             places = [chain.point(name, point) for point in surface.points.tolist()]
             if places and places[0].moving:  # what no joint moves keeps its distance
                 points = np.array([place.position for place in places])
                 middle = (points.min(axis=0) + points.max(axis=0)) / 2.0
-                self._bodies.append((places[0].moving, points, surface.radii))
+                self._bodies.append((places[0].moving, np.ascontiguousarray(points.T), surface.radii))
                 middles.append(middle)
                 reaches.append(float((np.linalg.norm(points - middle, axis=1) + surface.radii).max()))
         self._obstacles = tuple(obstacles)
-        self._moving = [moving for moving, _, _ in self._bodies]
+        self._moving = np.array([moving for moving, _, _ in self._bodies], dtype=int)
         self._middles = np.array(middles).reshape(-1, 3, 1)
         self._reaches = np.array(reaches)
         # Of all obstacles: the sides' directions in rows, and the middles seen along them.
@@ -92,22 +92,35 @@ class Obstacles:
         if not self._bodies or not self._obstacles:
             return []
         twists = None if ahead is None else self._chain.twists(state, ahead)
-        found = []
+        found: list[Gap] = []
         for body, obstacles in self._near(state, within, twists):
-            moving, points, radii = self._bodies[body]
-            places = state.places[moving] + points @ state.turns[moving].T
-            ways = None if twists is None else twists[0][moving] + cross(twists[1][moving : moving + 1], places)
             for obstacle in obstacles:
-                distances = soon = _distances(obstacle, places) - radii
-                outward = None
-                if ways is not None:
-                    outward = _outward(obstacle, places)
-                    soon = distances + np.minimum((outward * ways).sum(axis=1), 0.0)
-                for number in _spread(places, soon, within, APART * float(self._reaches[body])):
-                    out = _outward(obstacle, places[number : number + 1])[0] if outward is None else outward[number]
-                    motion = self._chain.motion(state, moving, places[number])
-                    found.append(Gap(float(distances[number]), out @ motion, obstacle.name))
+                found += self._between(state, body, obstacle, within, twists)
         return found
+
+    def _between(
+        self, state: ChainState, body: int, obstacle: Obstacle, within: float, twists: tuple[Array, Array] | None
+    ) -> Iterator[Gap]:
+        """Yield the gaps between a body and an obstacle. Places and ways are along the obstacle's sides, 3 x n."""
+        moving, points, radii = self._bodies[body]
+        sides = obstacle.rotation.T
+        begins = sides @ (state.places[moving] - obstacle.position)
+        places = sides @ state.turns[moving] @ points + begins[:, None]
+        beyond = np.abs(places) - obstacle.half[:, None]
+        distances = soon = _distances(beyond) - radii
+        outward = None
+        if twists is not None:
+            outward = _outward(places, beyond)
+            way, (x, y, z) = sides @ twists[0][moving], (sides @ twists[1][moving]).tolist()
+            spin = np.array(((0.0, -z, y), (z, 0.0, -x), (-y, x, 0.0)))
+            ways = spin @ places + (way + spin @ (sides @ obstacle.position))[:, None]
+            soon = distances + np.minimum((outward * ways).sum(axis=0), 0.0)
+        for number in _spread(places, soon, within, APART * float(self._reaches[body])):
+            one = slice(number, number + 1)
+            out = (_outward(places[:, one], beyond[:, one]) if outward is None else outward[:, one])[:, 0]
+            place = obstacle.position + obstacle.rotation @ places[:, number]
+            motion = self._chain.motion(state, moving, place)
+            yield Gap(float(distances[number]), (obstacle.rotation @ out) @ motion, obstacle.name)
 
     def _near(
         self, state: ChainState, within: float, twists: tuple[Array, Array] | None
@@ -116,8 +129,7 @@ class Obstacles:
 
         The distance of a ball's middle is taken along the sides alone, which is never more than it is.
         """
-        turns = np.array([state.turns[moving] for moving in self._moving])
-        middles = state.places[self._moving] + (turns @ self._middles)[:, :, 0]
+        middles = state.places[self._moving] + (state.turns[self._moving] @ self._middles)[:, :, 0]
         reaches = self._reaches + within
         if twists is not None:
             spins = twists[1][self._moving]
@@ -133,31 +145,29 @@ class Obstacles:
 
 
 def _spread(places: Array, distances: Array, within: float, apart: float) -> Iterator[int]:
-    """Yield the numbers of the nearest places that are `apart` (m) from each other."""
-    left = np.where(distances < within, distances, np.inf)
+    """Yield the numbers of the nearest places (3 x n) that are `apart` (m) from each other."""
+    left = distances
     for _ in range(MOST_PLACES):
-        number = int(np.argmin(left))
+        number = int(left.argmin())
         if not left[number] < within:
             return
         yield number
-        away = places - places[number]
-        left = np.where((away * away).sum(axis=1) < apart * apart, np.inf, left)
+        away = places - places[:, number : number + 1]
+        left = np.where((away * away).sum(axis=0) < apart * apart, np.inf, left)
 
 
-def _distances(obstacle: Obstacle, places: Array) -> Array:
-    """Return how far places are outside of an obstacle; negative: inside."""
-    beyond = np.abs((places - obstacle.position) @ obstacle.rotation) - obstacle.half
+def _distances(beyond: Array) -> Array:
+    """Return how far places are outside of an obstacle; negative: inside. `beyond`: beyond its sides, 3 x n."""
     outside = np.maximum(beyond, 0.0)
-    return np.sqrt((outside * outside).sum(axis=1)) + np.minimum(beyond.max(axis=1), 0.0)  # type: ignore[no-any-return]
+    return np.sqrt((outside * outside).sum(axis=0)) + np.minimum(beyond.max(axis=0), 0.0)  # type: ignore[no-any-return]
 
 
-def _outward(obstacle: Obstacle, places: Array) -> Array:
-    """Return the directions in which places get away from an obstacle the fastest."""
-    own = (places - obstacle.position) @ obstacle.rotation
-    beyond = np.abs(own) - obstacle.half
+def _outward(places: Array, beyond: Array) -> Array:
+    """Return the directions in which places get away from an obstacle the fastest; all along its sides, 3 x n."""
     ways = np.maximum(beyond, 0.0)
-    inside = np.flatnonzero(~ways.any(axis=1))
-    ways[inside, beyond[inside].argmax(axis=1)] = 1.0
-    ways = np.copysign(ways, own)
-    ways /= np.sqrt((ways * ways).sum(axis=1))[:, None]
-    return ways @ obstacle.rotation.T
+    lengths = np.sqrt((ways * ways).sum(axis=0))
+    inside = np.flatnonzero(lengths == 0.0)
+    if len(inside):
+        ways[beyond[:, inside].argmax(axis=0), inside] = lengths[inside] = 1.0
+    outward: Array = np.copysign(ways / lengths, places)
+    return outward

@@ -19,18 +19,15 @@ import numpy.typing as npt
 
 from lockstep.robot_bridge.kinematics.chain import Chain, ChainState
 from lockstep.robot_bridge.kinematics.clearance import GapSource
+from lockstep.robot_bridge.kinematics.gap_limits import GapLimits, gap_limits
 from lockstep.robot_bridge.kinematics.rotations import rotation_vector
+from lockstep.robot_bridge.kinematics.task_order import Damping, TaskOrder, task_order
 
-__all__ = ["JointBounds", "PoseSolver", "Solution", "Tuning"]
+__all__ = ["JointBounds", "PoseSolver", "Prepared", "Solution", "Tuning"]
 
 Array = npt.NDArray[np.float64]
 
 MOST_GAPS: Final = 4  # that bind at once in the order of priority; of more, each is kept by itself
-SMALL_GAP: Final = 0.05  # of the lengths of the gaps' gradients: those that bind together are damped below it
-DAMPING_GAP: Final = 0.02
-FLAT: Final = 1e-4  # m per rad (or m), of a gap that the joints do not change
-MOST_TRIES: Final = 12  # to keep all gaps with rates that the joints can have now
-KEPT: Final = 1e-6  # m/s, above what a gap allows
 
 
 class JointBounds(NamedTuple):
@@ -74,11 +71,17 @@ class Solution(NamedTuple):
     askew: float  # rad, of the rotation before this step, at most pi
 
 
-class _Near(NamedTuple):
-    gradient: Array  # m per rad (or m) of each joint
-    steep: float  # its length
-    most: float  # m/s, at which the gap may become narrower
-    what: str  # that is near
+class Prepared(NamedTuple):
+    """What a step needs of the joints alone. It can be computed before the goal is known."""
+
+    joints: tuple[float, ...]
+    before: tuple[float, ...] | None
+    here: Array
+    state: ChainState
+    slowest: Array
+    fastest: Array
+    gaps: GapLimits
+    order: TaskOrder  # with all joints free, where nothing binds
 
 
 class PoseSolver:
@@ -105,6 +108,16 @@ class PoseSolver:
         self._turns = turns
         self._tuning = tuning or Tuning()
 
+    def prepare(self, joints: Sequence[float], before: Sequence[float] | None = None) -> Prepared:
+        """Return what `step` needs of the joints alone, most of its work. `joints`, `before`: as for `step`."""
+        here = np.array(joints)
+        state = self._chain.at(joints)
+        slowest, fastest = self._speeds(here)
+        gaps = self._near(state, before)
+        order = self._order(state, np.ones(len(here), dtype=bool), gaps, [])
+        kept = None if before is None else tuple(before)
+        return Prepared(tuple(joints), kept, here, state, slowest, fastest, gaps, order)
+
     def step(
         self,
         joints: Sequence[float],
@@ -117,6 +130,7 @@ class PoseSolver:
         share: float = 1.0,
         before: Sequence[float] | None = None,
         turns: bool = True,
+        prepared: Prepared | None = None,
     ) -> Solution:
         """Return the joint goals after `seconds`.
 
@@ -124,10 +138,12 @@ class PoseSolver:
         (rad/s): of that pose, so that the tool follows it without lag. `share`: of the joints' rates, 0 to 1, for what
         is wanted; where it falls, a joint may be faster while it brakes, or while it keeps a gap that the joints that
         brake would narrow. `before`: the rates of the step before; without them a rate may change at once. `turns`:
-        False to keep the rotation that the tool has, as far as its way to the position allows.
+        False to keep the rotation that the tool has, as far as its way to the position allows. `prepared`: made by
+        `prepare`; it changes no result, and counts only if it was made for these joints and rates.
         """
-        here = np.array(joints)
-        state = self._chain.at(joints)
+        if prepared is None or prepared.joints != tuple(joints) or prepared.before != before:
+            prepared = self.prepare(joints, before)
+        here, state, gaps = prepared.here, prepared.state, prepared.gaps
         tuning = self._tuning
         error = position - state.position
         wanted = tuning.gain * _shortened(error, tuning.longest) + (0.0 if velocity is None else velocity)
@@ -144,30 +160,33 @@ class PoseSolver:
         # would be too long, and the joints would swing. Damping by the error bounds it (Sugihara 2011), and vanishes as
         # a goal that can be reached is approached.
         part = tuning.gain * (seconds + self._ramp / 2)  # the time in which a rate follows what is solved here
-        residual = (part * tuning.bend * min(float(np.sqrt(error @ error)), tuning.longest), part * angle)
-        slowest, fastest = self._speeds(here, share)
-        gaps = self._near(state, before)
-        rates, limited, bind = self._within(state, here, (wanted, turn), residual, (slowest, fastest), gaps)
-        rates, near = _apart(gaps, rates)
-        near = tuple(dict.fromkeys((*(gap.what for gap in bind), *near)))
+        speeds = [wanted, turn][: len(prepared.order.tasks)]
+        residuals = [part * tuning.bend * min(float(np.sqrt(error @ error)), tuning.longest), part * angle]
+        del residuals[len(speeds) :]
+        if tuning.turns_first:
+            speeds.reverse()
+            residuals.reverse()
+        rates, limited, bind = self._within(prepared, speeds, residuals)
+        rates, more = gaps.apart(rates)
+        near = tuple(dict.fromkeys(gaps.what[number] for number in (*bind, *more)))
         ratio = float(np.max(np.abs(rates) / self._rates)) if share > 0.0 else math.inf
         rates = rates * (min(1.0, share / ratio) if ratio > 0.0 else 1.0)
         if before is not None:
             last, most = np.array(before), self._accelerations * seconds
-            rates = _changed(gaps, rates, (last - most, last + most), last * max(0.0, 1.0 - seconds / self._ramp))
-        after = here + np.clip(rates, slowest, fastest) * seconds
+            rates = gaps.changed(rates, last - most, last + most, last * max(0.0, 1.0 - seconds / self._ramp))
+        after = here + np.clip(rates, prepared.slowest, prepared.fastest) * seconds
         after = np.clip(after, np.minimum(self._lower, here), np.maximum(self._upper, here))
         made = tuple(((after - here) / seconds).tolist())
         return Solution(tuple(after.tolist()), made, limited, near, float(np.linalg.norm(error)), away)
 
-    def _speeds(self, here: Array, share: float) -> tuple[Array, Array]:
+    def _speeds(self, here: Array) -> tuple[Array, Array]:
         """Return each joint's range of speeds: slower near the end of its range, and only inwards beyond it."""
         gain = self._tuning.limit_gain
         slowest = np.clip(gain * (self._lower - here), -self._rates, 0.0)
         fastest = np.clip(gain * (self._upper - here), 0.0, self._rates)
         return slowest, fastest
 
-    def _near(self, state: ChainState, before: Sequence[float] | None) -> list[_Near]:
+    def _near(self, state: ChainState, before: Sequence[float] | None) -> GapLimits:
         """Return what is near, the nearest last.
 
         What comes fast is near from further away: joints need time to become slower.
@@ -175,35 +194,28 @@ class PoseSolver:
         tuning = self._tuning
         ahead = None if before is None or not any(before) else np.array(before) / tuning.limit_gain
         found = [gap for source in self._keeps_off for gap in source.gaps(state, tuning.safe, ahead)]
-        near = []
-        for gap in sorted(found, key=lambda gap: -gap.distance):
-            steep = float(np.sqrt(gap.gradient @ gap.gradient))
-            if steep > FLAT:
-                most = max(0.0, tuning.limit_gain * (gap.distance - tuning.close))
-                near.append(_Near(gap.gradient, steep, most, gap.what))
-        return near
+        return gap_limits(found, len(self._rates), tuning.limit_gain, tuning.close)
 
     def _within(
-        self,
-        state: ChainState,
-        here: Array,
-        wanted: tuple[Array, Array],
-        residual: tuple[float, float],
-        speeds: tuple[Array, Array],
-        gaps: list[_Near],
-    ) -> tuple[Array, tuple[int, ...], list[_Near]]:
+        self, prepared: Prepared, speeds: Sequence[Array], residuals: Sequence[float]
+    ) -> tuple[Array, tuple[int, ...], list[int]]:
         """Solve; what would pass a bound set by a range or a gap keeps to it, and the other joints solve anew.
 
-        Return the rates, the joints at the ends of their ranges, and the gaps that bind.
+        `speeds`, `residuals`: of the tasks in their order. Return the rates, the joints at the ends of their ranges,
+        and the gaps that bind.
         """
-        slowest, fastest = speeds
+        here, gaps, slowest, fastest = prepared.here, prepared.gaps, prepared.slowest, prepared.fastest
+        order = prepared.order
         free = np.ones(len(here), dtype=bool)
         held = np.zeros(len(here))
         limited: list[int] = []
-        bind: list[_Near] = []
+        bind: list[int] = []
         rates = held
-        for _ in range(len(here) + MOST_GAPS):
-            rates = held + self._solve(state, here, wanted, residual, free, held, bind)
+        pull = None if self._posture is None else self._tuning.posture * (self._posture - here)
+        for _ in range((len(here) + 1) * (MOST_GAPS + 1)):
+            if limited or bind:
+                order = self._order(prepared.state, free, gaps, bind)
+            rates = held + order.rates(speeds, residuals, held, pull)
             beyond = free & (
                 ((rates > fastest) & (fastest < self._rates)) | ((rates < slowest) & (slowest > -self._rates))
             )
@@ -213,105 +225,26 @@ class PoseSolver:
                 held[worst] = fastest[worst] if rates[worst] > 0.0 else slowest[worst]
                 free[worst] = False
                 limited.append(worst)
-            elif len(bind) < min(MOST_GAPS, int(free.sum())) and (gap := _narrowed(gaps, rates)) is not None:
+            elif len(bind) < min(MOST_GAPS, int(free.sum())) and (gap := gaps.narrowed(rates)) is not None:
                 bind.append(gap)
+                free[:], held[:] = True, 0.0  # which joints pass a bound may be others now
+                limited.clear()
             else:
                 break
         ended = np.minimum(here - self._lower, self._upper - here) < self._tuning.end
         return rates, tuple(number for number in limited if ended[number]), bind
 
-    def _solve(
-        self,
-        state: ChainState,
-        here: Array,
-        wanted: tuple[Array, Array],
-        residual: tuple[float, float],
-        free: Array,
-        held: Array,
-        bind: list[_Near],
-    ) -> Array:
-        """Return the rates of the free joints.
-
-        `wanted`: m/s and rad/s of the tool. `residual`: additional damping of position and rotation. `bind`: gaps that
-        become narrower as fast as they may.
-        """
+    def _order(self, state: ChainState, free: Array, gaps: GapLimits, bind: list[int]) -> TaskOrder:
+        """Return the tasks for the free joints, after the gaps that bind."""
         tuning = self._tuning
-        rates, left = np.zeros(len(here)), np.diag(free.astype(float))  # the joints that are left for the next task
-        if bind:
-            rows = np.array([gap.gradient / gap.steep for gap in bind])
-            most = np.array([-gap.most / gap.steep for gap in bind])
-            inverse, basis = _damped_inverse(rows * free, SMALL_GAP, DAMPING_GAP, 0.0)
-            rates = inverse @ (most - rows @ held)
-            left = left - basis @ basis.T
-        tasks = [(state.linear, wanted[0], (tuning.small_linear, tuning.damping_linear, residual[0]))]
+        jacobians = [(state.linear, Damping(tuning.small_linear, tuning.damping_linear))]
         if self._turns:
-            turn = (state.angular, wanted[1], (tuning.small_angular, tuning.damping_angular, residual[1]))
-            tasks.insert(0 if tuning.turns_first else 1, turn)
-        for jacobian, speed, damping in tasks:
-            inverse, basis = _damped_inverse(jacobian @ left, *damping)
-            rates = rates + left @ inverse @ (speed - jacobian @ (rates + held))
-            left = left - basis @ basis.T
-        if self._posture is not None:
-            rates = rates + left @ (tuning.posture * (self._posture - here))
-        return rates * free
-
-
-def _narrowed(gaps: Sequence[_Near], rates: Array) -> _Near | None:
-    """Return the gap that these rates narrow the most above what it allows; None if they keep to all."""
-    worst, found = KEPT, None
-    for gap in gaps:
-        above = -float(gap.gradient @ rates) - gap.most
-        if above > worst:
-            worst, found = above, gap
-    return found
-
-
-def _apart(gaps: Sequence[_Near], rates: Array) -> tuple[Array, tuple[str, ...]]:
-    """Take from the rates what still narrows a gap faster than it allows: more gaps bind than there are joints."""
-    near = []
-    for gap in gaps:
-        above = -float(gap.gradient @ rates) - gap.most
-        if above > KEPT:
-            rates = rates + gap.gradient * (above / gap.steep**2)
-            near.append(gap.what)
-    return rates, tuple(near)
-
-
-def _changed(gaps: Sequence[_Near], rates: Array, within: tuple[Array, Array], braked: Array) -> Array:
-    """Return rates that the joints can have now, the nearest to those wanted which keep the gaps as well as they can.
-
-    A joint that changes more slowly than the others might otherwise lead towards what the others lead away from.
-    `within`: the least and the most that each rate can be. `braked`: what is left of the rates where all joints brake.
-    """
-    lowest, highest = within
-    rates = np.clip(rates, lowest, highest)
-    for _ in range(MOST_TRIES):
-        if (gap := _narrowed(gaps, rates)) is None:
-            return rates
-        above = -float(gap.gradient @ rates) - gap.most
-        rates = np.clip(rates + gap.gradient * (above / gap.steep**2), lowest, highest)
-    return braked if _excess(gaps, braked) < _excess(gaps, rates) else rates
-
-
-def _excess(gaps: Sequence[_Near], rates: Array) -> float:
-    """Return by how much these rates narrow a gap faster than it allows, m/s."""
-    return max((-float(gap.gradient @ rates) - gap.most for gap in gaps), default=0.0)
+            jacobians.append((state.angular, Damping(tuning.small_angular, tuning.damping_angular)))
+        if tuning.turns_first:
+            jacobians.reverse()
+        return task_order(jacobians, free, gaps.gradients[bind], gaps.most[bind], gaps.steep[bind])
 
 
 def _shortened(vector: Array, longest: float) -> Array:
     length = float(np.sqrt(vector @ vector))
     return vector if length <= longest else vector * (longest / length)
-
-
-def _damped_inverse(jacobian: Array, small: float, damping: float, residual: float) -> tuple[Array, Array]:
-    """Return the inverse, and a basis of the joints that it uses.
-
-    Directions that are nearly singular are damped, and all of them by `residual` besides. A direction whose singular
-    value is small counts for the basis by the share that the damping leaves of it, so that what is left for later tasks
-    changes without a jump.
-    """
-    left, values, right = np.linalg.svd(jacobian, full_matrices=False)
-    squares = values**2
-    near = damping**2 * np.clip(1.0 - squares / small**2, 0.0, 1.0) + 1e-12
-    shares = np.sqrt(squares / (squares + near))
-    return (right.T * (values / (squares + near + residual))) @ left.T, right.T * shares

@@ -62,8 +62,8 @@ class MediaSource(ABC):
 class Robot(ABC):
     """A robot. All methods but `rest_from_thread` are called from the bridge's event loop and must return at once.
 
-    Order: `describe` first; then, every `tick_seconds`, `apply` and `tick`; `measure` right after a `tick`. Values
-    reach `apply` already clamped, slew-limited and, without a command to execute, at rest.
+    Order: `describe` first; then, every `tick_seconds`, `apply`, `tick` and `prepare`; `measure` right after a `tick`.
+    Values reach `apply` already clamped, slew-limited and, without a command to execute, at rest.
 
     With `ticks_on_command` a command begins the tick of the present period of `tick_seconds` at once. There is still
     one tick in each period, so two ticks may follow each other closely, and the next tick may come up to two periods
@@ -114,6 +114,12 @@ class Robot(ABC):
 
     def tick(self) -> None:
         """Let one `tick_seconds` pass. Only simulations need it."""
+
+    def prepare(self) -> None:
+        """Compute what the next `apply` and `tick` can use, whatever their values are, so that they take less time.
+
+        Called after each tick, when its feedback was sent. It must not change what the robot does.
+        """
 
     @abstractmethod
     def measure(self) -> Measurement:

@@ -109,6 +109,9 @@ class MjcfRobot(Robot):
         if self._wrench is not None:
             self._wrench.read(self.simulation.data, self.tick_seconds)
 
+    def prepare(self) -> None:
+        self._tools.prepare()
+
     def measure(self) -> Measurement:
         data = self.simulation.data
         is_still = not self._moving.size or bool((np.abs(data.qvel) * self._moving).max() < REST_SPEED)

@@ -91,6 +91,10 @@ class MobileManipulator(Robot):
             self._contacts.clear()
         self._hearing.listen(data, self._contacts.update(data, self.tick_seconds))
 
+    def prepare(self) -> None:
+        if isinstance(self._arm, GoalArm):
+            self._arm.prepare()
+
     def measure(self) -> Measurement:
         simulation = self.simulation
         return Measurement(

@@ -60,6 +60,11 @@ class ArmGoals:
         found: list[float] = rates.tolist()
         return found
 
+    def prepare(self) -> None:
+        """Compute what the next `drive` needs of the joints alone."""
+        if self._tool is not None:
+            self._tool.prepare()
+
     def hold(self) -> None:
         """Stay where the goals are until the values change."""
         self._others.hold()

@@ -101,6 +101,11 @@ class Ros2Robot(Robot):
             raise self._ros.failure
         self._actions.tick()
 
+    def prepare(self) -> None:
+        for drive in self._drives:
+            if isinstance(drive, GoalArmDrive):
+                drive.prepare()
+
     def measure(self) -> Measurement:
         now = clock.now()
         sensed = [drive.sense(now) for drive in self._drives]

@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from lockstep.robot_bridge.kinematics.chain import Chain
-from lockstep.robot_bridge.kinematics.pose_solver import PoseSolver
+from lockstep.robot_bridge.kinematics.pose_solver import PoseSolver, Prepared
 from lockstep.robot_bridge.kinematics.rotations import from_rotation_vector, rotation_vector
 
 __all__ = ["SETTLES", "ArmDrive"]
@@ -56,6 +56,7 @@ class ArmDrive:
         self._still = math.inf  # s since the pose's goal changed or was pursued
         self._pursued = False  # the tool's goal was pursued in the last tick
         self._turns = True  # the tool follows the rotation of its goal
+        self._prepared: Prepared | None = None  # for the next step of the solver
         self._tool: _Tool | None = None  # of the present goals
         self.faults: list[str] = []
 
@@ -81,6 +82,10 @@ class ArmDrive:
     def restart(self) -> None:
         """Stay where the goals are, whatever the next values are."""
         self.hold()
+
+    def prepare(self) -> None:
+        """Compute what the next `drive` needs of the joints alone, if it goes on with the tool."""
+        self._prepared = None if self._pose is None else self._solver.prepare(self._goals, self._solved)
 
     def pursued(self) -> list[float]:
         """Return what the joints' goals are, and the tool's pose at them."""
@@ -169,6 +174,7 @@ class ArmDrive:
             share=share,
             before=self._solved,
             turns=self._turns,
+            prepared=self._prepared,
         )
         self._turns = solution.askew < (TURNED_AWAY if self._turns else TURNED_BACK)
         self._goals, self._solved = solution.joints, solution.rates

@@ -93,6 +93,9 @@ class So101(Robot):
             self._grip.hold(HOME[GRIPPER])
         self._contact.update(simulation.data, seconds)
 
+    def prepare(self) -> None:
+        self._drive.prepare()
+
     def measure(self) -> Measurement:
         return Measurement(
             axes=on_wire(self.measured_axes()),

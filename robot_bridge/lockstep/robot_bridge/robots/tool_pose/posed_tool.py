@@ -91,6 +91,10 @@ class PosedTool:
         own = [values[number] for number in (*self.place.joints, *self.place.pose)]
         return self._drive.drive(own, seconds, since, measured, pursues=pursues)
 
+    def prepare(self) -> None:
+        """Compute what the next `drive` needs of the joints alone."""
+        self._drive.prepare()
+
     def hold(self, posture: Sequence[float] | None = None) -> None:
         """Stay where the goals are, or in a posture, until the values change."""
         self._drive.hold(posture)

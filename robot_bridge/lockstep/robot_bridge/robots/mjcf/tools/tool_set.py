@@ -54,6 +54,11 @@ class ToolSet:
         for each in self._parts:
             each.tool.drive(values, seconds, since, self._joints(each), pursues=each.tool.name in pursued)
 
+    def prepare(self) -> None:
+        """Compute what the next `drive` needs of the joints alone."""
+        for each in self._parts:
+            each.tool.prepare()
+
     def hold(self) -> None:
         """Stay where the goals are until the values change."""
         for each in self._parts:

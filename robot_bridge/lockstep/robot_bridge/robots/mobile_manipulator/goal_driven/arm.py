@@ -77,6 +77,10 @@ class GoalArm:
         # A servo follows a moving target with its lag; aiming ahead by that makes the arm stop at its target.
         self._aims[:] = held + rates * self._lags
 
+    def prepare(self) -> None:
+        """Compute what the next `drive` needs of the joints alone."""
+        self._tool.prepare()
+
     def stay(self) -> None:
         """Stay where the goals are until the values change."""
         self._tool.hold()

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Sequence
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 from lockstep.protocol.description import RobotDescription
 from lockstep.robot_bridge.control import clock
@@ -21,6 +21,14 @@ QUIET: Final = 0.5  # s without a word, after which the arm is looked at: someth
 SAME: Final = 1e-9  # rad or m
 
 
+class _Bounds(NamedTuple):
+    """Of the published positions of each joint."""
+
+    horizon: float  # s, by which they are ahead of a goal that moves
+    ranges: list[tuple[float, float]]  # rad or m
+    leads: list[float]  # rad or m, from where the joint is
+
+
 class GoalArmDrive(Drive):
     """An arm whose axes are the places of its joints, and the pose of its tool.
 
@@ -36,12 +44,13 @@ class GoalArmDrive(Drive):
         self._settings = settings
         self._described = description
         self._joints = count
-        self._leads = [joint.maximum * command.lead for joint in settings.joints]
         axes = {axis.name: axis for axis in description.axes}
-        self._ranges = [
-            (-math.inf, math.inf) if axis.wrap else (axis.minimum, axis.maximum)
-            for axis in (axes[f"arm.{joint.name}"] for joint in settings.joints)
-        ]
+        own = [axes[f"arm.{joint.name}"] for joint in settings.joints]
+        self._bounds = _Bounds(
+            horizon=command.horizon,
+            ranges=[(-math.inf, math.inf) if axis.wrap else (axis.minimum, axis.maximum) for axis in own],
+            leads=[joint.maximum * command.lead for joint in settings.joints],
+        )
         self._feedback = JointFeedback(ros, settings.states, [joint.name for joint in settings.joints])
         self._messages = PositionMessages(ros, command, [joint.name for joint in settings.joints], kind)
         self._goals: ArmGoals | None = None  # until the arm was measured
@@ -67,11 +76,18 @@ class GoalArmDrive(Drive):
         step = self._stream.step(rates, lost, now)
         self.topic.publish(self.advance(step.said, step.values, dt), step.said)
 
+    def prepare(self) -> None:
+        """Compute what the next `step` needs of the joints alone."""
+        if self._goals is not None:
+            self._goals.prepare()
+
     def advance(self, said: Said, values: list[float], dt: float) -> Any:
         if said is Said.NOTHING or self._goals is None:
             return None
         rates = values[: self._joints]
-        return self._messages.make(self._points(rates if said is Said.VALUES else [0.0] * self._joints), rates)
+        moved = rates if said is Said.VALUES else [0.0] * self._joints
+        points = _points(self._goals.goals, moved, self.joints(clock.now()), self._bounds)
+        return self._messages.make(points, rates)
 
     def stop(self) -> None:
         if self._goals is not None:
@@ -133,19 +149,17 @@ class GoalArmDrive(Drive):
         still[: len(rates)] = rates
         return still
 
-    def _points(self, rates: Sequence[float]) -> list[float]:
-        """Return the positions to publish, which never run far ahead of a joint that is blocked, nor out of its range.
 
-        A goal that is outside already is published as it is.
-        """
-        goals = [] if self._goals is None else self._goals.goals
-        measured = self.joints(clock.now())
-        horizon = self._settings.command.horizon
-        ahead = [
-            min(max(goal + rate * horizon, min(lower, goal)), max(upper, goal))
-            for goal, rate, (lower, upper) in zip(goals, rates, self._ranges, strict=True)
-        ]
-        return [
-            point if place != place else min(max(point, place - lead), place + lead)
-            for point, place, lead in zip(ahead, measured, self._leads, strict=True)
-        ]
+def _points(goals: Sequence[float], rates: Sequence[float], measured: Sequence[float], bounds: _Bounds) -> list[float]:
+    """Return the positions to publish, which never run far ahead of a joint that is blocked, nor out of its range.
+
+    A goal that is outside already is published as it is.
+    """
+    ahead = [
+        min(max(goal + rate * bounds.horizon, min(lower, goal)), max(upper, goal))
+        for goal, rate, (lower, upper) in zip(goals, rates, bounds.ranges, strict=True)
+    ]
+    return [
+        point if place != place else min(max(point, place - lead), place + lead)
+        for point, place, lead in zip(ahead, measured, bounds.leads, strict=True)
+    ]
