@@ -49,11 +49,14 @@ async def test_a_silent_console_is_called_silent_and_what_it_measured_last_is_sh
             await expect(page.locator(".plate-title", has_text="Console silent")).to_be_visible()
             await expect(page.locator(".console")).to_have_attribute("data-stale", "true")
             await expect(page.locator(".event")).to_contain_text("The console is silent")
+            label = page.locator('[data-view="overview"] .view-detail')
+            await expect(label).to_have_text("")  # nobody knows how many events the picture is behind now
             assert (await console.stats())["gate"]["state"] == "console_silent"
             await expect(page.locator(".axis-panel .stale-mark")).to_have_text(re.compile(r"([3-9]|\d\d+) s old"))
             await console.until("Number(getComputedStyle(document.querySelector('.axes')).opacity) < 0.6")
         await expect(page.locator(".console")).to_have_attribute("data-stale", "false")
         await expect(page.locator(".plate-title", has_text="Console silent")).to_be_hidden()
+        await expect(label).to_have_text(re.compile("gap [0-9] of 4"))
         # The seat went with the silence; its loss and its return are still on their way.
         await console.until("s.seat && s.seat.mine && s.at_rest === true")
         assert (await console.stats())["peer"] == peer, "the same connection goes on"

@@ -3,7 +3,7 @@ import type { ConsoleEngine } from "../engine/console_engine";
 import type { HeadsetStatistics } from "../engine/headset_statistics";
 import { robotIsUp } from "../session/console_state";
 import { pressedStopLabel, restingStopLabel } from "../stop/stop_labels";
-import { veilWords, type PlacedPicture } from "../ui/views/view_grid";
+import { knownGap, veilWords, type PlacedPicture } from "../ui/views/view_grid";
 import { grab, isSilent, type HeadsetEvent, type Side } from "../xr/headset_input";
 import type { RobotDescription } from "../protocol/wire";
 import type { HandSettings } from "../xr/hand_mapping";
@@ -308,7 +308,7 @@ export class HeadsetSession {
 
 function viewCamera(engine: ConsoleEngine, { name, label, canvas }: PlacedPicture, now: number): ViewCamera {
   const video = engine.streams.videos.get(name);
-  const gap = video?.gapOnScreen() ?? null;
+  const gap = knownGap(engine, name, now);
   const tolerance = engine.state.settings.tolerance.video;
   return {
     name,

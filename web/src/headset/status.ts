@@ -11,6 +11,7 @@ import { holdsSeat } from "../session/console_state";
 import { mayReset, secondsToReset } from "../stop/reset_state";
 import { grouped, milliseconds } from "../ui/elements/dom";
 import { overlayLabels } from "../ui/views/overlay";
+import { knownGap } from "../ui/views/view_grid";
 import { wayGroups, type WayGroup } from "./way_groups";
 
 const WAYS_OF_MS = 3000; // pictures that the shown way is the mean of
@@ -109,7 +110,7 @@ function figuresOf(engine: ConsoleEngine, stream: string | null, now: number): F
   const { state } = engine;
   const { feedback, robot, settings } = state;
   const age = feedbackAge(engine.measuredMs, now);
-  const gap = stream === null ? null : (engine.streams.videos.get(stream)?.gapOnScreen() ?? null);
+  const gap = stream === null ? null : knownGap(engine, stream, now);
   const tolerance = settings.tolerance.video;
   const layer = robot?.description.layers[engine.driving.layer];
   const figures: Figure[] = [

@@ -272,15 +272,20 @@ function showSceneVeil(
 }
 
 function showVeil(engine: ConsoleEngine, view: View, now: number): void {
-  const video = engine.streams.videos.get(view.name);
   const words = veilWords(engine, view.name, now);
   setHidden(view.veil, words === null);
   view.element.classList.toggle("is-stale", words !== null);
   if (words !== null) setText(view.veilWords, words);
-  const gap = video?.gapOnScreen() ?? null;
+  const gap = knownGap(engine, view.name, now);
   const tolerance = engine.state.settings.tolerance.video;
   setText(view.detail, gap === null ? "" : `gap ${gap} of ${tolerance}`);
   setData(view.element, "gap", gap !== null && Math.abs(gap) > tolerance ? "bad" : "good");
+}
+
+/** Events between the picture of a camera and the robot; null when one of them is not known. */
+export function knownGap(engine: ConsoleEngine, name: string, now: number): number | null {
+  if (!engine.hears(now) || !robotIsUp(engine.state)) return null; // the robot may have executed more
+  return engine.streams.videos.get(name)?.gapOnScreen() ?? null;
 }
 
 /** Why the picture of a camera does not show the robot's present state; null when it may be looked at. */
