@@ -38,7 +38,7 @@ class Dialer:
             self._context = console_context(access.key.pin, access.authority)
         self._expected = access.key.pin if self._context is not None and access.key.pin != TRUSTED else None
         self._leaving = False
-        self._said: str | None = None  # the newest trouble that the log has; "": connected
+        self._said: dict[LinkRole, str] = {}  # the newest trouble of each link that the log has; "": connected
 
     async def run(self) -> None:
         """Run until cancelled."""
@@ -62,7 +62,7 @@ class Dialer:
                 refused = isinstance(error, WrongConsole) or (
                     isinstance(error, ConsoleRefused) and error.status in DENIED
                 )
-                self._say(str(error))
+                self._say(role, str(error))
             except Exception as error:  # a fault here must not end the robot's bridge
                 _logger.error("dialling the console failed: %r", error, exc_info=error)
             await asyncio.sleep(times.wait(refused=refused))
@@ -79,17 +79,17 @@ class Dialer:
         )
         try:
             connection.carry(self._links.dialled_link(key))
-            self._say("")
+            self._say(role, "")
             await connection.ended.wait()
         finally:
             connection.transport.abort()
 
-    def _say(self, trouble: str) -> None:
-        """Log a trouble once, and its end."""
-        if trouble == self._said:
+    def _say(self, role: LinkRole, trouble: str) -> None:
+        """Log a trouble of a link once, and its end."""
+        if trouble == self._said.get(role):
             return
+        self._said[role] = trouble
         if trouble:
-            _logger.warning("the console cannot be reached, trying on: %s", trouble)
+            _logger.warning("the %s link does not reach the console, trying on: %s", role, trouble)
         else:
-            _logger.info("dialled the console at %s", self._access.address.url)
-        self._said = trouble
+            _logger.info("the %s link has reached the console at %s", role, self._access.address.url)

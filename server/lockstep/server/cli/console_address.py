@@ -1,30 +1,45 @@
-"""The address of a state directory's console, for commands that run beside it."""
+"""Where a state directory's console is, for commands that run beside it."""
+
+import socket
+from typing import Final
 
 import msgspec
 
 from lockstep.server.util.state_dir import StateDir
 
-__all__ = ["read_address", "write_address"]
+__all__ = ["ConsoleAddress", "local_url", "read_address", "write_address"]
 
-FILE = "console.json"
-
-
-class _Address(msgspec.Struct, frozen=True):
-    url: str
+FILE: Final = "console.json"
+LOOPBACK: Final = {"0.0.0.0": "127.0.0.1", "::": "::1"}  # of an address that means all of a machine
 
 
-_decoder = msgspec.json.Decoder(_Address)
+class ConsoleAddress(msgspec.Struct, frozen=True):
+    """The addresses of the console that started last."""
+
+    url: str = ""  # for others; "": no console has run with this directory
+    local: str = ""  # of the listener itself, on this machine
+    certificate: str = ""  # PEM, that the console shows there; "": it does not encrypt
 
 
-def write_address(directory: StateDir, url: str) -> None:
+_decoder = msgspec.json.Decoder(ConsoleAddress)
+
+
+def local_url(listener: socket.socket, *, encrypted: bool) -> str:
+    """Return the URL by which this machine itself reaches `listener`, past every proxy and router."""
+    host, port = listener.getsockname()[:2]
+    host = LOOPBACK.get(host, host)
+    return f"{'https' if encrypted else 'http'}://{f'[{host}]' if ':' in host else host}:{port}"
+
+
+def write_address(directory: StateDir, address: ConsoleAddress) -> None:
     """Write the address. The console that started last is the one that is found."""
-    directory.write(FILE, msgspec.json.encode(_Address(url)))
+    directory.write(FILE, msgspec.json.encode(address))
 
 
-def read_address(directory: StateDir) -> str:
-    """Return the address; "" when no console has run with this directory."""
+def read_address(directory: StateDir) -> ConsoleAddress:
+    """Return the address of the console that started last."""
     data = directory.read(FILE)
     try:
-        return "" if data is None else _decoder.decode(data).url
+        return ConsoleAddress() if data is None else _decoder.decode(data)
     except (msgspec.DecodeError, UnicodeError, RecursionError):
-        return ""
+        return ConsoleAddress()

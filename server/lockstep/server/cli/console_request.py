@@ -1,5 +1,6 @@
 """Requests of the command line to a running console: that of the state directory, or of a supervisor's link."""
 
+import secrets
 import ssl
 from pathlib import Path
 from typing import Any, TypeVar
@@ -8,9 +9,10 @@ from urllib.parse import parse_qs, urlsplit
 import msgspec
 import typer
 
+from lockstep.server.auth.tokens import Identity
 from lockstep.server.cli.console_address import read_address
 from lockstep.server.http.robot_paths import ROBOTS
-from lockstep.server.http.transport.tls import CERTIFICATE
+from lockstep.server.http.transport.tls import trusting
 from lockstep.server.settings import Settings
 from lockstep.server.state.persistent_state import open_state
 from lockstep.server.util.display_names import escaped
@@ -20,6 +22,7 @@ __all__ = ["ask_by_link", "ask_console", "read_answer"]
 
 EXIT_USAGE = 2
 HTTP_SECONDS = 30.0
+TOKEN_SECONDS = 60.0  # that a request's token is good for
 
 Answer = TypeVar("Answer", bound=msgspec.Struct)
 
@@ -28,6 +31,9 @@ def ask_console(
     settings: Settings, robot: str, method: str, path: str, body: dict[str, str] | None = None
 ) -> dict[str, Any]:
     """Return the answer of this state directory's console, as a supervisor.
+
+    It is asked at its listener on this machine, and shows the certificate that it wrote down: the token of a supervisor
+    goes nowhere else, whatever the console's name leads to.
 
     Args:
         robot: of a fleet; "" for the only robot of a console
@@ -41,13 +47,19 @@ def ask_console(
         state = open_state(settings)
     except StateDirUnusable as error:
         raise _usage(str(error)) from error
-    url = settings.public_url or read_address(state.directory)
-    if not url:
-        raise _usage("no console has run with this state directory")
-    token = state.access.issue("supervisor", "command line")
-    # Its certificate may be self-signed; a writer of the state directory can name any address there anyway.
-    is_own = bool(settings.tls) or (state.directory.path / CERTIFICATE).exists()
-    return _ask(f"{url}{ROBOTS}/{robot}" if robot else url, token, not is_own, method, path, body)
+    console = read_address(state.directory)
+    if not console.local:
+        was = "the console that has run with this state directory is older than this command: restart it"
+        raise _usage(was if console.url else "no console has run with this state directory")
+    try:
+        verify: ssl.SSLContext | bool = trusting(console.certificate) if console.certificate else True
+    except ValueError as error:
+        raise _usage(f"what the console wrote down of itself is {error}") from error
+    now = state.invitations.clock.now()
+    token = state.access.sign(Identity("supervisor", "command line", secrets.token_hex(8), now + TOKEN_SECONDS), now)
+    base = f"{console.local}{ROBOTS}/{robot}" if robot else console.local
+    outer = urlsplit(settings.public_url or console.url).netloc  # by which the answer names the console
+    return _ask(base, token, verify, method, path, body, host=outer)
 
 
 def ask_by_link(link: str, tls_ca: Path | None, robot: str, method: str, path: str) -> dict[str, Any]:
@@ -87,11 +99,17 @@ def read_answer(kind: type[Answer], answer: dict[str, Any]) -> Answer:
 
 
 def _ask(
-    base: str, token: str, verify: ssl.SSLContext | bool, method: str, path: str, body: dict[str, str] | None
+    base: str,
+    token: str,
+    verify: ssl.SSLContext | bool,
+    method: str,
+    path: str,
+    body: dict[str, str] | None,
+    host: str = "",
 ) -> dict[str, Any]:
     import httpx
 
-    headers = {"Authorization": f"Bearer {token}"}
+    headers = {"Authorization": f"Bearer {token}", **({"Host": host} if host else {})}
     try:
         with httpx.Client(verify=verify, trust_env=False, timeout=HTTP_SECONDS) as http:
             answer = http.request(method, f"{base}{path}", headers=headers, json=body)

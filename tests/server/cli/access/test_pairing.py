@@ -52,6 +52,17 @@ async def test_a_robot_is_paired_and_forgotten_from_beside_the_console(tmp_path:
         assert (code, "no robot is paired" in said) == (2, True)
 
 
+@pytest.mark.parametrize("outer", ["--public-url", "--advertise"])
+async def test_beside_the_console_its_address_for_others_need_not_lead_anywhere(tmp_path: Path, outer: str) -> None:
+    """As with a proxy, or a router, that this machine does not get through from inside."""
+    name = "https://console.example.org" if outer == "--public-url" else "203.0.113.7"
+    options = ("--tls", "self-signed", "--host", "0.0.0.0", outer, name)
+    async with running_console(tmp_path, "dial-in", tmp_path / "events", options):
+        code, output, errors = await run("pair", "--state-dir", str(tmp_path / "state"))
+    assert code == 0, errors
+    assert output.startswith(f"lockstep robot NAME --console wss://{name.removeprefix('https://')}")
+
+
 async def test_a_supervisors_link_does_the_same_from_elsewhere_and_an_operators_does_not(tmp_path: Path) -> None:
     async with running_console(tmp_path, "dial-in", tmp_path / "events", TLS) as stack:
         trusted = ("--tls-ca", str(tmp_path / "state" / "tls-cert.pem"))

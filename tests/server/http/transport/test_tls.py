@@ -1,13 +1,19 @@
 import datetime
+import ssl
+from contextlib import suppress
 from pathlib import Path
+from typing import NamedTuple
 
 import httpx
 import pytest
 from cryptography import x509
+from cryptography.hazmat.primitives import hashes, serialization
+from cryptography.hazmat.primitives.asymmetric import ec
+from cryptography.x509.oid import NameOID
 
 from lockstep.client import Console
 from lockstep.client.errors import ConnectFailed
-from lockstep.server.http.transport.tls import fingerprint, own_names, self_signed
+from lockstep.server.http.transport.tls import Certificate, fingerprint, own_names, self_signed, shown_by, trusting
 from lockstep.server.settings import Settings
 from tests.server.rig import running_bridge, running_console
 
@@ -48,6 +54,70 @@ def test_it_is_made_anew_when_it_ends_soon_or_lacks_a_name_or_is_damaged(tmp_pat
 def test_a_console_on_all_interfaces_does_not_put_that_into_its_certificate() -> None:
     assert "0.0.0.0" not in own_names("0.0.0.0")
     assert {"127.0.0.1", "localhost", "192.0.2.7"} <= own_names("192.0.2.7")
+
+
+class Issued(NamedTuple):
+    certificate: x509.Certificate
+    key: ec.EllipticCurvePrivateKey
+
+
+def issue(name: str, by: Issued | None = None, *, authority: bool = False) -> Issued:
+    key = ec.generate_private_key(ec.SECP256R1())
+    subject = x509.Name([x509.NameAttribute(NameOID.COMMON_NAME, name)])
+    now = datetime.datetime.now(datetime.UTC)
+    made = (
+        x509.CertificateBuilder()
+        .subject_name(subject)
+        .issuer_name(subject if by is None else by.certificate.subject)
+        .public_key(key.public_key())
+        .serial_number(x509.random_serial_number())
+        .not_valid_before(now - datetime.timedelta(minutes=5))
+        .not_valid_after(now + datetime.timedelta(days=1))
+        .add_extension(x509.BasicConstraints(ca=authority, path_length=None), critical=True)
+        .sign(key if by is None else by.key, hashes.SHA256())
+    )
+    return Issued(made, key)
+
+
+def files(directory: Path, chain: list[Issued]) -> Certificate:
+    directory.mkdir()
+    pem = serialization.Encoding.PEM
+    made = Certificate(directory / "chain.pem", directory / "key.pem")
+    made.chain.write_bytes(b"".join(each.certificate.public_bytes(pem) for each in chain))
+    kind, none = serialization.PrivateFormat.PKCS8, serialization.NoEncryption()
+    made.key.write_bytes(chain[0].key.private_bytes(pem, kind, none))
+    return made
+
+
+def shakes_hands(client: ssl.SSLContext, served: Certificate) -> bool:
+    server = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
+    server.load_cert_chain(served.chain, served.key)
+    here, there = ssl.MemoryBIO(), ssl.MemoryBIO()
+    ends = client.wrap_bio(here, there), server.wrap_bio(there, here, server_side=True)
+    for _ in range(5):
+        for end in ends:
+            with suppress(ssl.SSLWantReadError):
+                try:
+                    end.do_handshake()
+                except ssl.SSLCertVerificationError:
+                    return False
+    return ends[0].getpeercert(binary_form=True) is not None
+
+
+def test_who_trusts_a_certificate_takes_it_with_its_chain_and_no_other_of_the_same_authority(tmp_path: Path) -> None:
+    authority = issue("authority", authority=True)
+    between = issue("between", authority, authority=True)
+    own = files(tmp_path / "own", [issue("console", between), between])
+    other = files(tmp_path / "other", [issue("console", between), between])
+    trusted = trusting(shown_by(own))
+    assert shakes_hands(trusted, own)
+    assert not shakes_hands(trusted, other)
+    assert not shakes_hands(trusted, self_signed(tmp_path / "made", NAMES, datetime.datetime.now(datetime.UTC)))
+
+
+def test_text_that_is_no_certificate_is_trusted_by_nobody() -> None:
+    with pytest.raises(ValueError, match="no certificate"):
+        trusting("-----BEGIN CERTIFICATE-----\nAAAA\n-----END CERTIFICATE-----\n")
 
 
 async def test_a_console_with_tls_answers_who_trusts_its_certificate_and_nobody_in_clear(tmp_path: Path) -> None:

@@ -76,7 +76,9 @@ def add_access_commands(app: typer.Typer, make_settings: MakeSettings) -> None:
             raise _usage(error.detail) from error
         except StateDirUnusable as error:
             raise _usage(str(error)) from error
-        base = url.rstrip("/") or settings.public_url or read_address(with_state.directory) or _settings_url(settings)
+        base = (
+            url.rstrip("/") or settings.public_url or read_address(with_state.directory).url or _settings_url(settings)
+        )
         link = console_link(base, with_state.access.sign(made.identity, made.created))
         if as_json:
             _print_json({**_described(made, now), "link": link})

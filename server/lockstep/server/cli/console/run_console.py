@@ -17,13 +17,13 @@ from fastapi import FastAPI
 
 from lockstep.robot_bridge.service_manager import ServiceManager
 from lockstep.rtc.interfaces import own_addresses
-from lockstep.server.cli.console_address import write_address
+from lockstep.server.cli.console_address import ConsoleAddress, local_url, write_address
 from lockstep.server.composition.robot_app import create_app
 from lockstep.server.fleet.fleet import Fleet
 from lockstep.server.fleet.fleet_app import create_fleet_app
 from lockstep.server.fleet.robots import robot_settings
 from lockstep.server.http.transport.serve import running, stop_signals
-from lockstep.server.http.transport.tls import Certificate, ends_at, fingerprint, own_names, self_signed
+from lockstep.server.http.transport.tls import Certificate, ends_at, fingerprint, own_names, self_signed, shown_by
 from lockstep.server.http.transport.uvicorn_http_limits import bounded_by
 from lockstep.server.robot.bridge_process import BridgeProcess
 from lockstep.server.robot.dial_in import DIAL_IN
@@ -80,7 +80,9 @@ async def run_console(
                 url = listening_url(settings, listener)
                 links = console_links(settings, url, state)
                 with suppress(StateDirUnusable):  # `lockstep invite` then needs --url
-                    write_address(state.directory, url)
+                    shown = "" if certificate is None else shown_by(certificate)
+                    local = local_url(listener, encrypted=certificate is not None)
+                    write_address(state.directory, ConsoleAddress(url, local, shown))
                 background.append(tasks.create_task(_announce(application, links, as_json)))
                 background.append(tasks.create_task(_report(service)))
                 stopping = tasks.create_task(asked.wait())

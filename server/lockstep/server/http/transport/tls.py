@@ -4,6 +4,7 @@ import datetime
 import ipaddress
 import os
 import socket
+import ssl
 from pathlib import Path
 from typing import NamedTuple, Protocol
 
@@ -15,7 +16,7 @@ from cryptography.x509.oid import ExtendedKeyUsageOID, NameOID
 from lockstep.protocol.dial_in import certificate_pin
 from lockstep.protocol.errors import SecretError
 
-__all__ = ["Certificate", "ends_at", "fingerprint", "own_names", "own_pin", "self_signed"]
+__all__ = ["Certificate", "ends_at", "fingerprint", "own_names", "own_pin", "self_signed", "shown_by", "trusting"]
 
 DAYS = 397  # more is refused by some browsers
 RENEW_DAYS = 30  # before its end, when it is renewed
@@ -79,6 +80,27 @@ def fingerprint(certificate: Certificate) -> str:
     """SHA-256 of the certificate, as browsers show it."""
     digest = _load(certificate).fingerprint(hashes.SHA256()).hex().upper()
     return ":".join(digest[at : at + 2] for at in range(0, len(digest), 2))
+
+
+def shown_by(certificate: Certificate) -> str:
+    """Return the certificate itself, in PEM, without those that vouch for it."""
+    return _load(certificate).public_bytes(serialization.Encoding.PEM).decode()
+
+
+def trusting(shown: str) -> ssl.SSLContext:
+    """Return the context of a client that takes this certificate (PEM), and no other, whatever the console's name is.
+
+    Raises:
+        ValueError: it is no certificate.
+    """
+    context = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)
+    context.check_hostname = False
+    context.verify_flags |= ssl.VERIFY_X509_PARTIAL_CHAIN  # it need not be an authority's
+    try:
+        context.load_verify_locations(cadata=shown)
+    except ssl.SSLError as error:
+        raise ValueError(f"no certificate: {error}") from error
+    return context
 
 
 def ends_at(certificate: Certificate) -> float:
