@@ -30,13 +30,13 @@ class LockstepRobot(LockstepDevice, Robot):
     @cached_property
     def observation_features(self) -> dict[str, Any]:
         return {
-            **self.action_features,
+            **{axis["name"]: float for axis in self._description()["axes"]},
             **{camera["name"]: (camera["height"], camera["width"], 3) for camera in self._description()["cameras"]},
         }
 
     @cached_property
     def action_features(self) -> dict[str, type]:
-        return {axis["name"]: float for axis in self._description()["axes"]}
+        return {axis["name"]: float for axis in self._description()["axes"] if axis["action"]}
 
     @property
     def cameras(self) -> dict[str, Any]:

@@ -30,7 +30,7 @@ class LockstepTeleoperator(LockstepDevice, Teleoperator):
     def action_features(self) -> dict[str, type]:
         if self.config.source == "page":
             return dict.fromkeys(self.config.axes, float)
-        return {axis["name"]: float for axis in self._session()["axes"]}
+        return {axis["name"]: float for axis in self._session()["axes"] if axis["action"]}
 
     @property
     def feedback_features(self) -> dict[str, Any]:
@@ -65,7 +65,7 @@ class LockstepTeleoperator(LockstepDevice, Teleoperator):
         seconds = self.config.observation_timeout_s
         answer, _ = pipe.ask("observe", seconds, seconds=seconds)
         measured, goals = answer["values"], answer["goals"]
-        return {name: float(measured[name] if goals[name] is None else goals[name]) for name in measured}
+        return {name: float(measured[name] if goals[name] is None else goals[name]) for name in self.action_features}
 
     def send_feedback(self, feedback: dict[str, Any]) -> None:
         """A page takes no feedback of LeRobot: it has its robot's own."""

@@ -11,6 +11,7 @@ import msgspec
 from lockstep.client.console import Console
 from lockstep.client.errors import ConsoleError, ConsoleLost, Refused
 from lockstep.client.media.stream import Picture
+from lockstep.client.pipe.action_axes import action_axes, without_doubles
 from lockstep.client.pipe.observation import NoFreshObservation, Observer
 from lockstep.client.pipe.reach import within_reach
 from lockstep.protocol.pipe.pipe_frames import BadFrame, read_request, to_frame
@@ -163,11 +164,12 @@ class PipeServer:
         self._cameras = {camera.name: (camera.width, camera.height) for camera in cameras}
         self._observer = Observer(console, list(self._cameras), request.tolerance)
         self._watching = self._tasks.create_task(self._watch(self._observer), name="observer")
+        actions = action_axes(description)
         return {
             "robot": description.name,
             "axes": [
                 {"name": axis.name, "kind": axis.kind, "unit": axis.unit, "minimum": axis.minimum}
-                | {"maximum": axis.maximum}
+                | {"maximum": axis.maximum, "action": axis.name in actions}
                 for axis in description.axes
             ],
             "cameras": [{"name": name, "width": size[0], "height": size[1]} for name, size in self._cameras.items()],
@@ -196,8 +198,9 @@ class PipeServer:
         console = self._connected()
         self._raise_failed()
         newest = console.feedback
+        wanted = without_doubles(console.description, request.values)
         measured, applied = ([], []) if newest is None else (newest.axes, newest.goals)
-        values = within_reach(console.description.axes, measured, applied, request.values)
+        values = within_reach(console.description.axes, measured, applied, wanted)
         if request.wait:
             await self._end_driving()
             feedback = await console.drive(values)
