@@ -36,7 +36,7 @@ class LockstepRobot(LockstepDevice, Robot):
 
     @cached_property
     def action_features(self) -> dict[str, type]:
-        return {axis["name"]: float for axis in self._description()["axes"] if axis["action"]}
+        return {axis["name"]: float for axis in self._description()["axes"] if axis.get("action", True)}
 
     @property
     def cameras(self) -> dict[str, Any]:

@@ -30,7 +30,7 @@ class LockstepTeleoperator(LockstepDevice, Teleoperator):
     def action_features(self) -> dict[str, type]:
         if self.config.source == "page":
             return dict.fromkeys(self.config.axes, float)
-        return {axis["name"]: float for axis in self._session()["axes"] if axis["action"]}
+        return {axis["name"]: float for axis in self._session()["axes"] if axis.get("action", True)}
 
     @property
     def feedback_features(self) -> dict[str, Any]:

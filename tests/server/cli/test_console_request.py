@@ -14,6 +14,7 @@ from typing import Any
 import pytest
 from typer.testing import CliRunner, Result
 
+from lockstep.server.cli.console_address import ConsoleAddress, forget_listener, read_address, write_address
 from lockstep.server.cli.main import app
 from lockstep.server.http.transport.tls import Certificate, self_signed, shown_by
 from lockstep.server.settings import Settings
@@ -109,20 +110,50 @@ def test_nobody_at_the_address_for_others_is_asked(tmp_path: Path, where: str) -
     asked: list[Message] = []
     outside: list[Message] = []
     with answering(RECORDING, asked) as local, answering(RECORDING, outside) as others:
-        done = lockstep(tmp_path, local, "record", "status", **{where: others})
+        done = lockstep(tmp_path, local, "record", "status", url=others, public=others if where == "public" else "")
     assert done.exit_code == 0, done.output
     assert outside == []
     (headers,) = asked
     assert headers["Host"] == others.removeprefix("http://"), "by which the console's answer names it"
 
 
-def test_the_token_of_a_request_is_good_for_a_minute(tmp_path: Path) -> None:
+def test_the_token_of_a_request_is_good_for_minutes(tmp_path: Path) -> None:
     asked: list[Message] = []
     with answering(RECORDING, asked) as local:
         assert lockstep(tmp_path, local, "record", "status").exit_code == 0
     state = open_state(Settings(state_dir=tmp_path))
     holder = state.access.verify(asked[0]["Authorization"].removeprefix("Bearer "))
-    assert 0.0 < holder.expires - state.invitations.clock.now() <= 60.0
+    assert 0.0 < holder.expires - state.invitations.clock.now() <= 300.0
+
+
+def test_a_console_that_is_not_the_one_that_was_named_is_not_asked(tmp_path: Path) -> None:
+    asked: list[Message] = []
+    with answering(RECORDING, asked) as local:
+        done = lockstep(tmp_path, local, "record", "start", url="http://second:1", public="http://first:1")
+    assert (done.exit_code, asked) == (2, [])
+    assert "at http://second:1, not at http://first:1" in done.stderr
+
+
+def test_a_certificate_counts_after_its_end(tmp_path: Path) -> None:
+    """A console may run for longer; what it is known by is the certificate and not its dates."""
+    old = self_signed(tmp_path / "own", {"localhost"}, datetime.datetime(2020, 1, 1, tzinfo=datetime.UTC))
+    with answering(RECORDING, tls=old) as local:
+        done = lockstep(tmp_path, local, "record", "status", certificate=shown_by(old))
+    assert done.exit_code == 0, done.output
+
+
+def test_a_console_that_ends_forgets_its_listener_and_not_that_of_another(tmp_path: Path) -> None:
+    directory = open_state(Settings(state_dir=tmp_path)).directory
+    first, second = (
+        ConsoleAddress("http://a:1", "http://127.0.0.1:1"),
+        ConsoleAddress("http://b:2", "http://127.0.0.1:2"),
+    )
+    write_address(directory, first)
+    write_address(directory, second)
+    forget_listener(directory, first)
+    assert read_address(directory) == second
+    forget_listener(directory, second)
+    assert read_address(directory) == ConsoleAddress("http://b:2")
 
 
 def test_a_console_is_known_by_its_certificate_whatever_its_name(tmp_path: Path) -> None:

@@ -17,6 +17,7 @@ __all__ = ["Dialer"]
 
 ROLES: tuple[LinkRole, ...] = ("operator", "media")
 HEALTHY_AFTER = 5.0  # s of a link; then the next loss is followed by a try at once
+MOST_SAID = 16  # different troubles of a link; after more they are told anew
 DENIED = (401, 403, 409)  # statuses that only a person ends: not paired, forgotten, not a console for dialling
 
 _logger = logging.getLogger(__name__)
@@ -38,7 +39,9 @@ class Dialer:
             self._context = console_context(access.key.pin, access.authority)
         self._expected = access.key.pin if self._context is not None and access.key.pin != TRUSTED else None
         self._leaving = False
-        self._said: dict[LinkRole, str] = {}  # the newest trouble of each link that the log has; "": connected
+        self._said: dict[LinkRole, set[str]] = {
+            role: set() for role in ROLES
+        }  # what the log has since it was connected
 
     async def run(self) -> None:
         """Run until cancelled."""
@@ -85,10 +88,13 @@ class Dialer:
             connection.transport.abort()
 
     def _say(self, role: LinkRole, trouble: str) -> None:
-        """Log a trouble of a link once, and its end."""
-        if trouble == self._said.get(role):
+        """Log a trouble of a link once until it is connected again, and that it is."""
+        said = self._said[role]
+        if trouble in said:
             return
-        self._said[role] = trouble
+        if not trouble or len(said) > MOST_SAID:
+            said.clear()
+        said.add(trouble)
         if trouble:
             _logger.warning("the %s link does not reach the console, trying on: %s", role, trouble)
         else:

@@ -25,11 +25,15 @@ class GapLimits(NamedTuple):
     most: Array  # m/s, at which each gap may become narrower
     what: tuple[str, ...]  # that is near
 
-    def narrowed(self, rates: Array) -> int | None:
-        """Return the gap that these rates narrow the most above what it allows; None if they keep to all."""
+    def narrowed(self, rates: Array, besides: Sequence[int] = ()) -> int | None:
+        """Return the gap that these rates narrow the most above what it allows; None if they keep to all.
+
+        `besides`: gaps that are left out.
+        """
         if not self.what:
             return None
         excess = self._excess(rates)
+        excess[list(besides)] = -np.inf
         worst = int(excess.argmax())
         return worst if excess[worst] > KEPT else None
 

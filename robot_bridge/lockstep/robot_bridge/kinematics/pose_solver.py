@@ -225,7 +225,7 @@ class PoseSolver:
                 held[worst] = fastest[worst] if rates[worst] > 0.0 else slowest[worst]
                 free[worst] = False
                 limited.append(worst)
-            elif len(bind) < min(MOST_GAPS, int(free.sum())) and (gap := gaps.narrowed(rates)) is not None:
+            elif len(bind) < min(MOST_GAPS, int(free.sum())) and (gap := gaps.narrowed(rates, bind)) is not None:
                 bind.append(gap)
                 free[:], held[:] = True, 0.0  # which joints pass a bound may be others now
                 limited.clear()

@@ -7,7 +7,7 @@ import msgspec
 
 from lockstep.server.util.state_dir import StateDir
 
-__all__ = ["ConsoleAddress", "local_url", "read_address", "write_address"]
+__all__ = ["ConsoleAddress", "forget_listener", "local_url", "read_address", "write_address"]
 
 FILE: Final = "console.json"
 LOOPBACK: Final = {"0.0.0.0": "127.0.0.1", "::": "::1"}  # of an address that means all of a machine
@@ -17,7 +17,7 @@ class ConsoleAddress(msgspec.Struct, frozen=True):
     """The addresses of the console that started last."""
 
     url: str = ""  # for others; "": no console has run with this directory
-    local: str = ""  # of the listener itself, on this machine
+    local: str = ""  # of the listener itself, on this machine; "": it does not run any more
     certificate: str = ""  # PEM, that the console shows there; "": it does not encrypt
 
 
@@ -34,6 +34,16 @@ def local_url(listener: socket.socket, *, encrypted: bool) -> str:
 def write_address(directory: StateDir, address: ConsoleAddress) -> None:
     """Write the address. The console that started last is the one that is found."""
     directory.write(FILE, msgspec.json.encode(address))
+
+
+def forget_listener(directory: StateDir, address: ConsoleAddress) -> None:
+    """Forget the listener of a console that ends: another program may listen there next.
+
+    Raises:
+        StateDirUnusable: it cannot be written.
+    """
+    if read_address(directory) == address:
+        write_address(directory, ConsoleAddress(address.url))
 
 
 def read_address(directory: StateDir) -> ConsoleAddress:

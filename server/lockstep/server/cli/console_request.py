@@ -22,7 +22,7 @@ __all__ = ["ask_by_link", "ask_console", "read_answer"]
 
 EXIT_USAGE = 2
 HTTP_SECONDS = 30.0
-TOKEN_SECONDS = 60.0  # that a request's token is good for
+TOKEN_SECONDS = 300.0  # that a request's token is good for; the clock that the two share is written once a minute
 
 Answer = TypeVar("Answer", bound=msgspec.Struct)
 
@@ -32,8 +32,8 @@ def ask_console(
 ) -> dict[str, Any]:
     """Return the answer of this state directory's console, as a supervisor.
 
-    It is asked at its listener on this machine, and shows the certificate that it wrote down: the token of a supervisor
-    goes nowhere else, whatever the console's name leads to.
+    It is asked at its listener on this machine, whatever the console's name leads to, and must show the certificate
+    that it wrote down if it encrypts.
 
     Args:
         robot: of a fleet; "" for the only robot of a console
@@ -49,8 +49,12 @@ def ask_console(
         raise _usage(str(error)) from error
     console = read_address(state.directory)
     if not console.local:
-        was = "the console that has run with this state directory is older than this command: restart it"
+        was = f"the console at {console.url} does not run any more, or is older than this command: start it again"
         raise _usage(was if console.url else "no console has run with this state directory")
+    if settings.public_url and settings.public_url != console.url:
+        raise _usage(
+            f"the console that started last with this state directory is at {console.url}, not at {settings.public_url}"
+        )
     try:
         verify: ssl.SSLContext | bool = trusting(console.certificate) if console.certificate else True
     except ValueError as error:
@@ -58,7 +62,7 @@ def ask_console(
     now = state.invitations.clock.now()
     token = state.access.sign(Identity("supervisor", "command line", secrets.token_hex(8), now + TOKEN_SECONDS), now)
     base = f"{console.local}{ROBOTS}/{robot}" if robot else console.local
-    outer = urlsplit(settings.public_url or console.url).netloc  # by which the answer names the console
+    outer = urlsplit(console.url).netloc  # by which the answer names the console
     return _ask(base, token, verify, method, path, body, host=outer)
 
 
@@ -113,7 +117,7 @@ def _ask(
     try:
         with httpx.Client(verify=verify, trust_env=False, timeout=HTTP_SECONDS) as http:
             answer = http.request(method, f"{base}{path}", headers=headers, json=body)
-    except (httpx.HTTPError, httpx.InvalidURL) as error:
+    except (httpx.HTTPError, httpx.InvalidURL, UnicodeError) as error:
         raise _usage(f"the console at {base} does not answer: {error}") from error
     try:
         found = answer.json()

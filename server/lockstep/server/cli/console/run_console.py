@@ -17,7 +17,7 @@ from fastapi import FastAPI
 
 from lockstep.robot_bridge.service_manager import ServiceManager
 from lockstep.rtc.interfaces import own_addresses
-from lockstep.server.cli.console_address import ConsoleAddress, local_url, write_address
+from lockstep.server.cli.console_address import ConsoleAddress, forget_listener, local_url, write_address
 from lockstep.server.composition.robot_app import create_app
 from lockstep.server.fleet.fleet import Fleet
 from lockstep.server.fleet.fleet_app import create_fleet_app
@@ -78,17 +78,19 @@ async def run_console(
                 _calm_garbage_collection()
                 background = [tasks.create_task(bridge.watch()) for bridge in bridges.values()]
                 url = listening_url(settings, listener)
+                local = local_url(listener, encrypted=certificate is not None)
+                address = ConsoleAddress(url, local, "" if certificate is None else shown_by(certificate))
                 links = console_links(settings, url, state)
                 with suppress(StateDirUnusable):  # `lockstep invite` then needs --url
-                    shown = "" if certificate is None else shown_by(certificate)
-                    local = local_url(listener, encrypted=certificate is not None)
-                    write_address(state.directory, ConsoleAddress(url, local, shown))
+                    write_address(state.directory, address)
                 background.append(tasks.create_task(_announce(application, links, as_json)))
                 background.append(tasks.create_task(_report(service)))
                 stopping = tasks.create_task(asked.wait())
                 failed = tasks.create_task(application.state.failed.wait())
                 await asyncio.wait((stopping, failed), return_when=asyncio.FIRST_COMPLETED)
                 service.stopping()
+                with suppress(StateDirUnusable):
+                    forget_listener(state.directory, address)
                 for task in (*background, stopping, failed):
                     task.cancel()
             if not asked.is_set():
