@@ -279,9 +279,14 @@ async def status_item(link: RobotLink, name: str) -> StatusItem:
     raise AssertionError("the link ended")
 
 
-async def test_an_encoder_that_is_not_there_is_said_in_the_status_before_any_picture_was_taken() -> None:
+async def test_an_encoder_that_is_not_there_is_said_in_the_status_before_any_picture_was_taken(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
     settings = replace(SETTINGS, encode=EncodeSettings("h264_of_nobody"))
     async with encoding_bridge(settings) as bridge, RobotLink(*bridge.address, "operator") as link:
         item = await status_item(link, "encoder_fallback")
         assert (item.name, item.value, item.level) == ("encoder_fallback", "libx264", "warning")
         assert item.text.startswith("h264_of_nobody cannot be opened")
+    said = [record.getMessage() for record in caplog.records if "encoder_fallback" in record.getMessage()]
+    assert len(said) == 1, "two cameras have two encoders each, and the trial has one; the fact is one"
+    assert said[0].startswith("encoder_fallback: h264_of_nobody cannot be opened")

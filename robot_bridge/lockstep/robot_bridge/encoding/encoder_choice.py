@@ -1,11 +1,12 @@
 """The encoders that `--encode` can name, and whether PyAV is there to run them."""
 
 import importlib.util
+import logging
 from dataclasses import dataclass
 
 from lockstep.robot_bridge.errors import EncoderMissing, SettingsError
 
-__all__ = ["ENCODERS", "SOFTWARE", "EncodeSettings", "encode_settings"]
+__all__ = ["ENCODERS", "SOFTWARE", "EncodeSettings", "encode_settings", "log_fallback"]
 
 SOFTWARE = "libx264"
 # name in settings -> name in FFmpeg
@@ -15,6 +16,8 @@ ENCODERS = {
     "h264_nvenc": "h264_nvenc",  # NVIDIA
     "h264_qsv": "h264_qsv",  # Intel
 }
+
+_logger = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
@@ -36,3 +39,8 @@ def encode_settings(name: str) -> EncodeSettings:
     if importlib.util.find_spec("av") is None:
         raise EncoderMissing("--encode needs PyAV; install lockstep-bridge[encode]")
     return EncodeSettings(ENCODERS[name])
+
+
+def log_fallback(why: str) -> None:
+    """Log why the software encoder takes the place of the one in the settings."""
+    _logger.warning("encoder_fallback: %s; %s takes its place", why, SOFTWARE)

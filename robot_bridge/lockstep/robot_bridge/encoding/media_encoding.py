@@ -11,7 +11,7 @@ import msgspec
 from lockstep.protocol.actions import StatusItem
 from lockstep.protocol.description import RobotDescription
 from lockstep.protocol.messages import EncodeRequest, Media
-from lockstep.robot_bridge.encoding.encoder_choice import SOFTWARE, EncodeSettings
+from lockstep.robot_bridge.encoding.encoder_choice import SOFTWARE, EncodeSettings, log_fallback
 from lockstep.robot_bridge.encoding.encoding_requests import EncodingRequests
 from lockstep.robot_bridge.encoding.picture_encoding import PictureEncoding
 
@@ -61,6 +61,7 @@ class MediaEncoding:
         self._second: dict[str, PictureEncoding] = {}  # by camera
         self._encoders: list[H264Encoder] = []
         self._fallback = ""  # why the software encoder took the place of the one in the settings; "": it has not
+        self._logged: set[str] = set()  # all such reasons so far; each encoder adds one at most
         self._streams: dict[str, PictureEncoding | SoundEncoding] = {}
         self._publish: Callable[[Media], None] = lambda media: None
 
@@ -152,7 +153,10 @@ class MediaEncoding:
             )
 
     def _fell_back(self, why: str) -> None:
-        """Note why; called in an encoder's thread."""
+        """Note why, and log each reason once for all encoders; called in an encoder's thread, or on the loop."""
+        if why not in self._logged:
+            self._logged.add(why)
+            log_fallback(why)
         self._fallback = why
 
     def _put_second(self, media: Media) -> None:

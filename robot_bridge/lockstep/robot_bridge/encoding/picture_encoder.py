@@ -1,6 +1,5 @@
 """Encodes a camera's pictures to H.264 with PyAV. Used from one thread."""
 
-import logging
 from collections.abc import Callable, Sequence
 from fractions import Fraction
 from typing import NoReturn
@@ -12,7 +11,7 @@ from av.video.frame import PictureType
 from av.video.plane import VideoPlane
 
 from lockstep.protocol.messages import Media
-from lockstep.robot_bridge.encoding.encoder_choice import SOFTWARE
+from lockstep.robot_bridge.encoding.encoder_choice import SOFTWARE, log_fallback
 from lockstep.robot_bridge.encoding.encoding_requests import EncodingGoal
 from lockstep.robot_bridge.encoding.picture_encoding import EncodedPicture
 from lockstep.robot_bridge.errors import EncodingFailed
@@ -34,14 +33,12 @@ CONSTRAINED_BASELINE = 66 | 1 << 9  # FFmpeg's number
 MOST_WRONG = 3  # pictures in a row for which another encoder gives no packet of theirs; then SOFTWARE takes its place
 PIXELS = {"h264_qsv": "nv12"}  # of encoders that do not take yuv420p
 
-_logger = logging.getLogger(__name__)
-
 
 class H264Encoder:
     """Constrained baseline; parameter sets in front of every keyframe; no reordering, no delay.
 
     What `encode` returns is the picture that it was given: an encoder that returns another one is opened again. Where
-    the named encoder cannot be used, the software encoder takes its place, and the log says why.
+    the named encoder cannot be used, the software encoder takes its place, and `fell_back` hears why.
     """
 
     def __init__(
@@ -50,7 +47,7 @@ class H264Encoder:
         frame_rate: float = ASSUMED_RATE,
         *,
         keyframe_seconds: float = KEYFRAME_SECONDS,
-        fell_back: Callable[[str], None] = lambda why: None,
+        fell_back: Callable[[str], None] = log_fallback,
     ) -> None:
         """`encoder`: FFmpeg's name.
 
@@ -110,7 +107,6 @@ class H264Encoder:
 
     def fall_back(self, why: str) -> None:
         """Go on with the software encoder, from the next picture on."""
-        _logger.warning("encoder_fallback: %s; %s takes its place", why, SOFTWARE)
         self._name, self._wrong = SOFTWARE, 0
         self._fell_back(why)
 
