@@ -56,3 +56,11 @@ def test_the_bridge_takes_further_options_word_by_word() -> None:
     lines = next(unit for unit in UNITS if unit.name == "lockstep-robot.service").read_text().splitlines()
     assert "Environment=LOCKSTEP_ROBOT_OPTIONS=" in lines, "systemd warns of a variable that is not set"
     assert next(line for line in lines if line.startswith("ExecStart=")).endswith(" $LOCKSTEP_ROBOT_OPTIONS")
+
+
+def test_the_group_of_serial_ports_is_named_but_not_asked_for_since_a_missing_group_ends_the_unit() -> None:
+    unit = next(unit for unit in UNITS if unit.name == "lockstep-robot.service")
+    lines = unit.read_text().splitlines()
+    assert "# SupplementaryGroups=dialout" in lines
+    assert "SupplementaryGroups=video render" in lines
+    assert "SupplementaryGroups=dialout" in (unit.parents[2] / "docs" / "deploy.md").read_text()
