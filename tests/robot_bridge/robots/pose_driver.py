@@ -1,5 +1,6 @@
 """Sends a robot to a saved pose, as an operator does."""
 
+import secrets
 from collections.abc import Callable
 
 import msgspec
@@ -16,16 +17,18 @@ BUSY = ("not_renewed", "interrupted", "late", "not_neutral")  # a busy machine h
 async def send_to(
     driver: Operator, pose: str, *, until: Callable[[Feedback], bool] | None = None
 ) -> ActionUpdate | None:
-    """Renew the action until it ends, or until the condition holds, which returns None; begin again if that was late."""
+    """Renew the action until it ends, or until the condition holds, which returns None; begin anew if it was late."""
     description = driver.link.hello.description
     assert description is not None
     neutral = [None if axis.kind == "goal" else axis.rest for axis in description.axes]
     reasons: list[str] = []
-    for number in range(20):
-        await driver.next(Feedback)  # one that knows why the action before ended
+    for _ in range(20):
+        if reasons:
+            await driver.drive(neutral)  # its feedback comes after the end of the action before
         await driver.arm()
-        id = f"{pose}-{number}"
+        id = secrets.token_hex(8)
         driver.link.send(Act(id=id, name=pose, nonce=driver.feedback.nonce, by="test"))
+        driver.link.send(msgspec.structs.replace(driver.command(neutral), action=id))  # else nothing has a feedback
         while True:
             message = await driver._next((Feedback, ActionUpdate))
             if isinstance(message, Feedback):
