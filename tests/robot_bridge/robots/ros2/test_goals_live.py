@@ -3,6 +3,7 @@
 import asyncio
 import itertools
 from collections.abc import AsyncIterator
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +14,7 @@ from lockstep.robot_bridge.conformance import CASES, Outcome, Subject, play
 from lockstep.robot_bridge.conformance.place import Place
 from lockstep.robot_bridge.link.link_client import RobotLink
 from tests.robot_bridge.bridge_helpers import Operator
+from tests.robot_bridge.robots.pose_driver import ended, send_to
 from tests.robot_bridge.robots.ros2.test_tool_settings import JOINTS, ROWS
 from tests.robot_bridge.robots.ros2.test_tool_settings import settings as written
 from tests.support.ros2 import PATIENCE, RosBridge, RosRobot, have_ros, running_ros_bridge, running_ros_robot
@@ -113,6 +115,34 @@ async def test_the_tool_goes_where_it_is_told_and_the_last_word_is_where_it_stay
         assert len(list(node.notes("trajectory"))) == len(notes)
     assert_smooth(notes)
     assert notes[0]["names"] == list(JOINTS)
+
+
+def is_past(place: float, feedback: Feedback) -> bool:
+    return feedback.axes[5] < place
+
+
+async def test_a_saved_pose_is_gone_to_and_a_stick_and_a_stop_cancel_that(tmp_path: Path, node: RosRobot) -> None:
+    near, far = "[0.1, -1, 1, 0, 0.2, 0.2]", "[0.1, -1, 1, 0, 0.2, -1.5]"
+    path = written(tmp_path, TOOL + f"  poses: {{near: {near}, far: {far}}}\n", more="watchdog: 0.4\n")
+    async with (
+        running_ros_bridge(tmp_path, node, path) as running,
+        RobotLink(*running.address, "operator", name="test") as link,
+    ):
+        driver = await ready(link)
+        told = await send_to(driver, "near")
+        assert told is not None
+        assert (told.state, told.reason, told.text) == ("done", "", "pose near")
+        assert driver.feedback.axes[:6] == pytest.approx([0.1, -1, 1, 0, 0.2, 0.2], abs=0.04)
+        await driver.heard(lambda feedback: feedback.at_rest)
+        for reason, place in (("driving", 0.0), ("stopped", -0.4)):
+            begun = driver.feedback.axes[5]
+            await send_to(driver, "far", until=partial(is_past, place))
+            link.send(driver.command(command(arm_wrist_3_joint=begun)) if reason == "driving" else Stop(by="test"))
+            told = await ended(driver)
+            assert (told.state, told.reason) == ("cancelled", reason)
+            await driver.heard(lambda feedback: feedback.at_rest)
+            assert driver.feedback.axes[5] > -1.3
+    assert_smooth(list(node.notes("trajectory")))
 
 
 async def test_a_joint_goes_where_it_is_told_after_the_tool_and_a_stop_holds_it(

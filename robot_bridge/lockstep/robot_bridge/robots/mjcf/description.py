@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
-from lockstep.protocol.description import AxisGain, Body, Camera, PositionLimit, RobotDescription
+from lockstep.protocol.description import Action, AxisGain, Body, Camera, PositionLimit, RobotDescription
 from lockstep.robot_bridge.robots.mjcf.actuators import Kind
 from lockstep.robot_bridge.robots.mjcf.controls import layers_of
 from lockstep.robot_bridge.robots.mjcf.drives import Drive
@@ -33,6 +33,7 @@ def describe(
     cameras: Mapping[Camera, int],
     wrench: WrenchSense | None,
     ranges: RangeSense | None,
+    actions: Sequence[Action],
 ) -> RobotDescription:
     """Return the description. `name`: of the file. `cameras`: with their numbers in the model."""
     model, data = simulation.model, simulation.data
@@ -52,6 +53,7 @@ def describe(
         cameras=tuple(_calibrated(camera, number, model, bodies) for camera, number in cameras.items()),
         wrench=None if wrench is None else wrench.description,
         ranges=None if ranges is None else ranges.description,
+        actions=tuple(actions),
         bodies=(*_with_rays(bodies, ranges), *tools.bodies),
         poses=tools.poses,
         position_limits=tuple(_limit(drive, model, joints) for drive in drives if _is_limited(drive, model)),

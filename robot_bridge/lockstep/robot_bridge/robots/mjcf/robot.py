@@ -1,16 +1,19 @@
 """A robot from a MuJoCo model: its drives, senses and cameras around one simulation."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
 
+from lockstep.protocol.actions import ParameterValue
 from lockstep.protocol.description import RobotDescription
 from lockstep.robot_bridge.control import clock
+from lockstep.robot_bridge.robots.actions import ActionNotPossible, ActionRun
 from lockstep.robot_bridge.robots.base import Measurement, MediaSource, Robot
 from lockstep.robot_bridge.robots.camera_source import CameraSource
+from lockstep.robot_bridge.robots.go_to import GoTo
 from lockstep.robot_bridge.robots.mjcf.actuators import actuators_of
 from lockstep.robot_bridge.robots.mjcf.bodies import DRAWN_GROUPS, bodies_of
 from lockstep.robot_bridge.robots.mjcf.cameras import cameras_of
@@ -18,6 +21,7 @@ from lockstep.robot_bridge.robots.mjcf.description import describe
 from lockstep.robot_bridge.robots.mjcf.drives import Drive, drives_of
 from lockstep.robot_bridge.robots.mjcf.goal_setting import goal_actuators, gripper_actuators
 from lockstep.robot_bridge.robots.mjcf.joints import joints_of
+from lockstep.robot_bridge.robots.mjcf.keyframes import keyframes_of
 from lockstep.robot_bridge.robots.mjcf.model_file import load_model
 from lockstep.robot_bridge.robots.mjcf.senses import range_sense, wrench_sense
 from lockstep.robot_bridge.robots.mjcf.simulation import Simulation
@@ -29,6 +33,7 @@ from lockstep.robot_bridge.robots.mujoco_view.renderer import Renderer
 __all__ = ["MjcfRobot"]
 
 REST_SPEED: Final = 0.02  # rad/s, or of the model's size per second
+NOT_THERE: Final = "it stays short of the posture: something is in its way, or its servos are too weak"
 
 
 class MjcfRobot(Robot):
@@ -55,6 +60,7 @@ class MjcfRobot(Robot):
         arms = {servo.number for tool in found for servo in tool.servos}
         grippers = gripper_actuators(model, actuators, arms)
         self._drives = drives_of(model, data, actuators, goal_actuators(model, actuators) | grippers | arms, grippers)
+        self._keyframes = keyframes_of(model, self._drives)
         self._joints = joints_of(model)
         bodies = bodies_of(model, self._joints)
         self._tools = ToolSet(model, data, found, self._drives, bodies)
@@ -72,6 +78,7 @@ class MjcfRobot(Robot):
             cameras,
             self._wrench,
             self._ranges,
+            [keyframe.action for keyframe in self._keyframes.values()],
         )
         self._drive(0.0)
         simulation.keep_up()
@@ -125,8 +132,7 @@ class MjcfRobot(Robot):
         )
 
     def measured_axes(self) -> list[float]:
-        measured = [drive.measured(self.simulation.data) for drive in self._drives]
-        return [short(value) for value in (*measured, *self._tools.measured())]
+        return [short(value) for value in (*self._measured_drives(), *self._tools.measured())]
 
     def goals(self) -> list[float]:
         goals = list(self._values)  # also while it is stopped: the servos hold there
@@ -136,6 +142,16 @@ class MjcfRobot(Robot):
     def positions(self) -> Sequence[float]:
         qpos = self.simulation.data.qpos
         return [value for joint in self._joints for value in joint.values(qpos)]
+
+    def begin_action(self, name: str, parameters: Mapping[str, ParameterValue]) -> ActionRun:
+        if self._stopped:
+            raise ActionNotPossible("the robot is stopped")
+        keyframe = self._keyframes[name]
+        return GoTo(
+            *(keyframe.goals, self._description.axes, self._measured_drives, self.tick_seconds),
+            keyframe.action.label,
+            NOT_THERE,
+        )
 
     def rest_from_thread(self) -> None:
         self._rest()
@@ -153,6 +169,9 @@ class MjcfRobot(Robot):
 
     def close(self) -> None:
         self._renderer.close()
+
+    def _measured_drives(self) -> list[float]:
+        return [drive.measured(self.simulation.data) for drive in self._drives]
 
     def _release(self) -> None:
         """Hold everything where the state begins."""

@@ -23,6 +23,7 @@ from lockstep.protocol.description import (
 )
 from lockstep.robot_bridge.robots.ros2.controls import arm_layers, base_layer
 from lockstep.robot_bridge.robots.ros2.joint_axes import SLEW_TIME, brake_for, joint_axes
+from lockstep.robot_bridge.robots.ros2.saved_poses import pose_actions
 from lockstep.robot_bridge.robots.ros2.settings import (
     ArmJoint,
     Base,
@@ -71,6 +72,9 @@ def describe(settings: Ros2Settings) -> RobotDescription:
     base_axes = () if base is None else _base_axes(base, settings.hold)
     bodies = (() if base is None else (_base_body(base),)) + settings.bodies
     arm_axes = () if arm is None else joint_axes(arm, settings.hold)
+    actions = _actions(settings)
+    if arm is not None:
+        actions = pose_actions(arm, arm_axes, [action.name for action in actions]) + actions
     tool = None
     if arm is not None and arm.tool is not None:
         from lockstep.robot_bridge.robots.ros2.tool import describe_tool  # needs numpy, as few robots do
@@ -107,7 +111,7 @@ def describe(settings: Ros2Settings) -> RobotDescription:
         position_limits=() if arm is None else tuple(filter(None, map(_position_limit, arm.joints))),
         planar_base=None if base is None else _planar_base(base),
         geofences=settings.geofences,
-        actions=_actions(settings),
+        actions=actions,
         map=_map(settings),
         hold=settings.hold,
         watchdog=settings.watchdog,

@@ -1,12 +1,14 @@
 """A robot behind ROS 2 topics, as the bridge sees it."""
 
 from collections.abc import Callable, Mapping, Sequence
+from typing import Final
 
 from lockstep.protocol.actions import ParameterValue, StatusItem
 from lockstep.protocol.description import RobotDescription
 from lockstep.robot_bridge.control import clock
 from lockstep.robot_bridge.robots.actions import ActionRun
 from lockstep.robot_bridge.robots.base import Measurement, MediaSource, Robot
+from lockstep.robot_bridge.robots.go_to import GoTo
 from lockstep.robot_bridge.robots.navigation import GridMap, NavigationNow
 from lockstep.robot_bridge.robots.ros2.actions.ros_actions import RosActions
 from lockstep.robot_bridge.robots.ros2.drives.arm_drive import ArmDrive
@@ -19,6 +21,7 @@ from lockstep.robot_bridge.robots.ros2.joint_axes import is_goal_arm
 from lockstep.robot_bridge.robots.ros2.mapping.frame_listener import FrameListener
 from lockstep.robot_bridge.robots.ros2.mapping.map_topics import MapReader
 from lockstep.robot_bridge.robots.ros2.ros_side import RosSide
+from lockstep.robot_bridge.robots.ros2.saved_poses import pose_goals
 from lockstep.robot_bridge.robots.ros2.sensing.battery import BatteryTopic
 from lockstep.robot_bridge.robots.ros2.sensing.camera import CameraSource
 from lockstep.robot_bridge.robots.ros2.sensing.camera_info import CameraInfoTopic
@@ -27,6 +30,8 @@ from lockstep.robot_bridge.robots.ros2.sensing.sensors import LockoutTopic, Rang
 from lockstep.robot_bridge.robots.ros2.settings import Arm, Ros2Settings
 
 __all__ = ["Ros2Robot"]
+
+NOT_THERE: Final = "the arm stays short of the pose: something is in its way, or nobody drives it"
 
 
 class Ros2Robot(Robot):
@@ -42,6 +47,7 @@ class Ros2Robot(Robot):
             RobotUnavailable: ROS 2 is missing or does not start.
         """
         self._description = description
+        self._poses = {} if settings.arm is None else pose_goals(settings.arm, description.axes)
         self._ros = RosSide(settings)
         try:
             tick = self.tick_seconds
@@ -129,6 +135,9 @@ class Ros2Robot(Robot):
         return "" if self._lockout is None else self._lockout.reason(clock.now())
 
     def begin_action(self, name: str, parameters: Mapping[str, ParameterValue]) -> ActionRun:
+        if (goals := self._poses.get(name)) is not None:
+            axes, tick = self._description.axes, self.tick_seconds
+            return GoTo(goals, axes, self.measured_axes, tick, f"pose {name}", NOT_THERE)
         return self._actions.begin(name, parameters)
 
     def status(self) -> Sequence[StatusItem]:

@@ -134,6 +134,7 @@ class Arm(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
 
     goals: bool = False  # each axis is the place where a joint is to be
     tool: Tool | None = None  # its pose is driven, or the joints' goals
+    poses: Annotated[dict[Name, tuple[float, ...]], Meta(max_length=12)] = {}  # of all joints; each is an action
     joints: Annotated[tuple[ArmJoint, ...], Meta(min_length=1, max_length=64)]
     command: ArmCommand = field(default_factory=ArmCommand)
     states: JointStates = field(default_factory=JointStates)

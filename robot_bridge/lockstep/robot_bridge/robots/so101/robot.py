@@ -13,6 +13,7 @@ from lockstep.robot_bridge.kinematics.rotations import rotation_vector
 from lockstep.robot_bridge.robots.actions import ActionDone, ActionNotPossible, ActionRun
 from lockstep.robot_bridge.robots.base import Measurement, MediaSource, Robot
 from lockstep.robot_bridge.robots.camera_source import CameraSource
+from lockstep.robot_bridge.robots.go_to import GoTo
 from lockstep.robot_bridge.robots.mujoco_view.canvas import Look
 from lockstep.robot_bridge.robots.mujoco_view.renderer import Renderer
 from lockstep.robot_bridge.robots.so101.arm_drive import ArmDrive
@@ -21,7 +22,6 @@ from lockstep.robot_bridge.robots.so101.controls import RATES
 from lockstep.robot_bridge.robots.so101.description import CAMERAS, describe
 from lockstep.robot_bridge.robots.so101.grip_drive import GripDrive
 from lockstep.robot_bridge.robots.so101.model import ARM, GRIPPER
-from lockstep.robot_bridge.robots.so101.postures import FOLDED, GoTo
 from lockstep.robot_bridge.robots.so101.reach import arm_chain, arm_solver
 from lockstep.robot_bridge.robots.so101.simulation import HOME, REST_SPEED, Simulation
 
@@ -29,6 +29,7 @@ __all__ = ["So101"]
 
 STEPS_PER_TICK: Final = 2
 DIGITS: Final = 5  # of measured values on the wire
+FOLDED: Final[tuple[float, ...]] = (0.0, -1.68, 1.48, 0.9, 0.0, 0.0)  # rad, of each joint: low and near the foot
 OPEN: Final = 1.2  # rad, of the gripper
 JAW: Final = 0.08  # m, from the jaw's joint to its fingertip
 
@@ -157,8 +158,7 @@ class So101(Robot):
         self._grip.hold()
 
     def _go_to(self, goals: Mapping[int, float], text: str) -> GoTo:
-        axes = len(self._description.axes)
-        return GoTo(goals, axes, self.simulation.joints, self.tick_seconds, text)
+        return GoTo(goals, self._description.axes, self.simulation.joints, self.tick_seconds, text)
 
     def _faults(self) -> list[str]:
         restarts = self.simulation.restarts

@@ -13,9 +13,9 @@ from lockstep.robot_bridge.kinematics.capsules import separate_pairs
 from lockstep.robot_bridge.kinematics.clearance import Clearance
 from lockstep.robot_bridge.kinematics.pose_solver import JointBounds
 from lockstep.robot_bridge.robots.actions import ActionRun
+from lockstep.robot_bridge.robots.go_to import GoTo
 from lockstep.robot_bridge.robots.mobile_manipulator.goal_driven.description import RATES, arm_chain, describe_arm
 from lockstep.robot_bridge.robots.mobile_manipulator.simulation import ARM, BASE, Simulation
-from lockstep.robot_bridge.robots.so101.postures import GoTo
 from lockstep.robot_bridge.robots.tool_pose.arm_solver import tool_solver
 from lockstep.robot_bridge.robots.tool_pose.posed_tool import PosedTool, ToolPlace
 
@@ -55,7 +55,7 @@ class GoalArm:
         solver = tool_solver(chain, bounds, arm.axes, keeps_off=keeps_off)
         self._tool = PosedTool(arm.pose.name, place, chain, solver, RATES, self._home)
         self._size = COUNT + len(arm.axes.all)
-        self._rest = [None if axis.kind == "goal" else axis.rest for axis in description.axes]
+        self._axes = description.axes
         self._now = now
         self._ticked_at = now()
         self.moving = False  # a goal moved in the last tick
@@ -110,4 +110,4 @@ class GoalArm:
     def home(self, tick: float) -> ActionRun:
         """Return the action that brings the arm home, by goals that pass through the bridge as an operator's do."""
         goals = dict(enumerate(self._home, start=BASE.stop))
-        return GoTo(goals, len(self._rest), self._all_joints.tolist, tick, "the arm is at home", self._rest)
+        return GoTo(goals, self._axes, self._all_joints.tolist, tick, "the arm is at home")
