@@ -19,7 +19,7 @@ ALLOWED = {
     f"{ROBOTS}/base.py Robot": 21,
     f"{ROBOTS}/lerobot/robot.py LeRobotRobot": 19,
     f"{ROBOTS}/micromanipulator/robot.py Micromanipulator": 19,
-    f"{ROBOTS}/mjcf/robot.py MjcfRobot": 19,
+    f"{ROBOTS}/mjcf/robot.py MjcfRobot": 21,
     f"{ROBOTS}/mobile_manipulator/robot.py MobileManipulator": 20,
     f"{ROBOTS}/planar/robot.py PlanarRobot": 18,
     f"{ROBOTS}/ros2/robot.py Ros2Robot": 20,
