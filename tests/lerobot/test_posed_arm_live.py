@@ -50,7 +50,12 @@ async def test_what_a_person_drove_by_the_tools_pose_is_recorded_and_replayed_by
         assert np.ptp(recorded[:, 0]) > 0.05, "the tool went to and fro by the pan"
         replayed = await run_driving(
             *(Arm(stack, tmp_path), tmp_path, "lerobot-replay", "--robot.type=lockstep", *BLIND, *PATIENT),
-            *("--dataset.repo_id=tests/posed", f"--dataset.root={tmp_path / 'posed'}", "--dataset.episode=0"),
+            *(
+                "--dataset.repo_id=tests/posed",
+                f"--dataset.root={tmp_path / 'posed'}",
+                "--dataset.episode=0",
+                "--play_sounds=false",
+            ),
         )
         assert len(await replayed.events("executed")) >= len(recorded)
         assert not [each for each in await replayed.events("refused") if each["reason"] in ("conflict", "jump")]
