@@ -1,6 +1,6 @@
 import type { PadInputs } from "../gamepad/mapping";
 import { shapeStick } from "../gamepad/stick_shape";
-import { distance, type RigidPose } from "./rigid";
+import { distance, inverse, multiply, rotationVector, type RigidPose } from "./rigid";
 
 export type Side = "left" | "right";
 
@@ -45,6 +45,8 @@ export const SILENT_MS = 300;
 const SQUEEZED = 0.6;
 const RELEASED = 0.35;
 const FASTEST = 8; // m/s; a hand that is faster has jumped: the headset found it somewhere else
+const QUICKEST = 40; // rad/s, the same for its turning: a flicked wrist reaches some 25
+const WIDEST = 2.5; // rad, that a wrist turns between two frames at most, however far these are apart
 
 const NOTHING: PadInputs = {
   left_x: 0,
@@ -144,7 +146,12 @@ function drop(
 
 function hasJumped(before: RigidPose | null, pose: RigidPose, elapsed: number): boolean {
   if (before === null) return false;
-  return distance(before.position, pose.position) > FASTEST * (Math.max(elapsed, 10) / 1000);
+  const seconds = Math.max(elapsed, 10) / 1000;
+  const turn = rotationVector(multiply(pose.orientation, inverse(before.orientation)));
+  return (
+    distance(before.position, pose.position) > FASTEST * seconds ||
+    Math.hypot(...turn) > Math.min(QUICKEST * seconds, WIDEST)
+  );
 }
 
 function isPressed(value: number, before: boolean): boolean {

@@ -10,6 +10,7 @@ import {
   type HeadsetEvent,
   type HeadsetInput,
 } from "../../src/xr/headset_input";
+import { about } from "../../src/xr/rigid";
 
 const FRAME_MS = 14;
 const PLACE = { position: [0.2, 1.2, -0.4], orientation: [0, 0, 0, 1] } as const;
@@ -104,6 +105,35 @@ describe("a hand that holds the deadman is lost", () => {
     const far = { ...PLACE, position: [0.9, 1.2, -0.4] } as const;
     expect(session.frame(hand({ squeeze: 1, pose: near }))).toEqual([]);
     expect(session.frame(hand({ squeeze: 1, pose: far }))).toEqual([{ kind: "lost", why: "tracking_lost" }]);
+  });
+
+  const turned = (angle: number) => ({ ...PLACE, orientation: about([0.6, 0, 0.8], angle) }) as const;
+
+  it("when it comes out turned further than a wrist can have turned", () => {
+    const session = new Session().squeezed();
+    expect(session.frame(hand({ squeeze: 1, pose: turned(0.3) }))).toEqual([]);
+    expect(session.frame(hand({ squeeze: 1, pose: turned(0.6) }))).toEqual([]);
+    expect(session.frame(hand({ squeeze: 1, pose: turned(2.2) }))).toEqual([
+      { kind: "lost", why: "tracking_lost" },
+    ]);
+  });
+
+  it("when it comes out the other way round, however long the frame took", () => {
+    const session = new Session().squeezed();
+    session.now += 200;
+    expect(session.frame(hand({ squeeze: 1, pose: turned(1.5) }))).toEqual([]);
+    session.now += 200;
+    expect(session.frame(hand({ squeeze: 1, pose: turned(1.5 + Math.PI) }))).toEqual([
+      { kind: "lost", why: "tracking_lost" },
+    ]);
+  });
+
+  it("but not when the same orientation is told by the other quaternion", () => {
+    const session = new Session().squeezed();
+    const { orientation } = PLACE;
+    const [x, y, z, w] = orientation;
+    const other = { ...PLACE, orientation: [-x, -y, -z, -w] } as const;
+    expect(session.frame(hand({ squeeze: 1, pose: other }))).toEqual([]);
   });
 
   it("and ends driving with both", () => {

@@ -39,9 +39,8 @@ class Dialer:
             self._context = console_context(access.key.pin, access.authority)
         self._expected = access.key.pin if self._context is not None and access.key.pin != TRUSTED else None
         self._leaving = False
-        self._said: dict[LinkRole, set[str]] = {
-            role: set() for role in ROLES
-        }  # what the log has since it was connected
+        # What the log has of each link since it was connected.
+        self._said: dict[LinkRole, set[str]] = {role: set() for role in ROLES}
 
     async def run(self) -> None:
         """Run until cancelled."""
