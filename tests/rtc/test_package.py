@@ -11,7 +11,7 @@ FILES = sorted((ROOT / "rtc").rglob("*.py"))
 FOREIGN = {"server", "client", "robot_bridge", "bench", "aiortc", "aioice"}
 SHELLS = {
     *("address_servers.py", "connection.py", "endpoint.py", "event_delivery.py", "interfaces.py"),
-    *("peer_timer.py", "port_sockets.py", "turn_client.py", "tcp_port.py", "udp_socket.py"),
+    *("core_timer.py", "port_sockets.py", "turn_client.py", "tcp_port.py", "udp_socket.py"),
 }
 NOT_IN_CORES = {"asyncio", "socket", "time", "threading"}
 

@@ -15,9 +15,9 @@ from lockstep.rtc.channels import ChannelMessage
 from lockstep.rtc.endpoint import Connection, Endpoint, EndpointSettings
 from lockstep.rtc.peer_events import Connected, PeerEvent, Restarted
 from lockstep.rtc.sdp import parse_description, write_description
-from lockstep.rtc.sockets.turn_client import TurnRefused, open_turn_client
+from lockstep.rtc.sockets.turn_client import TurnClient, TurnRefused, open_turn_client
 from lockstep.rtc.stun import Kind, Message, parse, serialize
-from lockstep.rtc.turn.servers import IceServer, ServerUri
+from lockstep.rtc.turn.servers import IceServer, ServerUri, parse_server_uri
 from tests.support.turn_server import TURN_SECRET, TurnServer, running_turn_server
 
 HOST = "127.0.0.1"
@@ -109,6 +109,34 @@ async def test_addresses_that_carry_nothing_are_given_back(turn: TurnServer) -> 
         await endpoint.ask([])
         assert client.relayed is None
         assert [each.candidate.type for each in endpoint.candidates] == ["host"]
+
+
+class Silent(asyncio.DatagramProtocol):
+    """A server that answers nothing; `asked` is set once it was asked twice."""
+
+    def __init__(self) -> None:
+        self.asked = asyncio.Event()
+        self._questions = 0
+
+    def datagram_received(self, data: bytes, addr: object) -> None:
+        self._questions += 1
+        if self._questions == 2:
+            self.asked.set()
+
+
+async def test_a_timer_is_handled_although_every_turn_of_the_loop_has_a_datagram() -> None:
+    loop = asyncio.get_running_loop()
+    transport, silent = await loop.create_datagram_endpoint(Silent, local_addr=(HOST, 0))
+    port: int = transport.get_extra_info("sockname")[1]
+    url = f"turn:{HOST}:{port}?transport=udp"
+    client = TurnClient(parse_server_uri(url), IceServer([url], "user", "password"), lambda data: None)
+    await loop.create_datagram_endpoint(lambda: client, remote_addr=(HOST, port))
+    async with asyncio.timeout(SECONDS):
+        while not silent.asked.is_set():  # the request is repeated after half a second
+            client.datagram_received(b"datagram", (HOST, port))
+            await asyncio.sleep(0)
+    client.close()
+    transport.close()
 
 
 class Nat(asyncio.DatagramProtocol):

@@ -14,7 +14,7 @@ from lockstep.rtc.peer_events import PeerEnded, PeerEvent
 from lockstep.rtc.sdp import Fragment, LocalMedia, SessionDescription
 from lockstep.rtc.sockets.endpoint_settings import EndpointSettings
 from lockstep.rtc.sockets.event_delivery import EventDelivery, Listener
-from lockstep.rtc.sockets.peer_timer import PeerTimer
+from lockstep.rtc.sockets.core_timer import CoreTimer
 
 __all__ = ["Connection", "Turns"]
 
@@ -72,7 +72,7 @@ class Connection:
         self._endpoint = endpoint
         self._settings = settings
         self._loop = asyncio.get_running_loop()
-        self._timer = PeerTimer(peer, self.settle, self._fail)
+        self._timer = CoreTimer(peer, self.settle, self._fail)
         self._turns = turns
         self._later: deque[tuple[bytes, Path]] = deque()  # datagrams that wait for their turn
         self.fault: Exception | None = None  # the exception that serving it raised, after PeerEnded("failed")

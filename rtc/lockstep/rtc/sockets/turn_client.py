@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterable
 from typing import cast
 
 from lockstep.rtc.addresses import Address, Path
+from lockstep.rtc.sockets.core_timer import CoreTimer
 from lockstep.rtc.turn.allocation import Allocated, Allocation
 from lockstep.rtc.turn.messages import TurnStream
 from lockstep.rtc.turn.servers import IceServer, ServerUri
@@ -47,7 +48,7 @@ class TurnClient(asyncio.Protocol, asyncio.DatagramProtocol):
         self._on_data = on_data
         self._stream = TurnStream()
         self._transport: asyncio.BaseTransport | None = None
-        self._timer: asyncio.TimerHandle | None = None
+        self._timer = CoreTimer(self._core, self._flush, self._fail)
 
     @property
     def relayed(self) -> Address | None:
@@ -91,14 +92,13 @@ class TurnClient(asyncio.Protocol, asyncio.DatagramProtocol):
         self._core.close(self._loop.time())
         if not self.answered.done():
             self.answered.set_exception(TurnRefused(408, "the connection was closed"))
-        self._set_timer()
+        self._timer.close()
 
     # Inside
 
-    def _due(self) -> None:
-        self._timer = None
-        self._core.handle_timer(self._loop.time())
-        self._flush()
+    def _fail(self, error: Exception) -> None:
+        self._loop.call_exception_handler({"message": "a fault in the timer of a TURN allocation", "exception": error})
+        self.close()  # else it would fail again at once, for ever
 
     def _flush(self) -> None:
         relayed = self._core.relayed
@@ -115,7 +115,7 @@ class TurnClient(asyncio.Protocol, asyncio.DatagramProtocol):
                 self.answered.set_exception(TurnRefused(event.error.code, event.error.reason))
         for message in self._core.data_to_send():
             self._write(message)
-        self._set_timer()
+        self._timer.set()
 
     def _write(self, message: bytes) -> None:
         if self._transport is None or self._transport.is_closing():
@@ -126,14 +126,6 @@ class TurnClient(asyncio.Protocol, asyncio.DatagramProtocol):
             self.counts["backlog"] += 1
         else:
             cast(asyncio.WriteTransport, self._transport).write(message)
-
-    def _set_timer(self) -> None:
-        if self._timer is not None:
-            self._timer.cancel()
-            self._timer = None
-        due = self._core.timer()
-        if due is not None:
-            self._timer = self._loop.call_at(due, self._due)
 
 
 async def open_turn_client(uri: ServerUri, server: IceServer, on_data: OnData) -> TurnClient:

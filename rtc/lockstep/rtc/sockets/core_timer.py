@@ -1,22 +1,30 @@
-"""Calls `handle_timer` of a peer when it is due."""
+"""Calls `handle_timer` of a core when it is due."""
 
 import asyncio
 from collections.abc import Callable
+from typing import Protocol
 
-from lockstep.rtc.peer import Peer
-
-__all__ = ["PeerTimer"]
+__all__ = ["CoreTimer"]
 
 CLOCK_RESOLUTION = 0.001  # s; a loop may call too early by so much
 
 
-class PeerTimer:
-    """One timer of the loop. One that fires too early is left: the next datagram puts off most of them, and no code
-    waits for them."""
+class _Core(Protocol):
+    """What lives by a timer, without I/O."""
 
-    def __init__(self, peer: Peer, handled: Callable[[], None], failed: Callable[[Exception], None]) -> None:
-        """`handled`: called when the peer has handled its timer. `failed`: called with an exception of the peer."""
-        self._peer = peer
+    def timer(self) -> float | None: ...
+
+    def handle_timer(self, now: float) -> None: ...
+
+
+class CoreTimer:
+    """One timer of the loop. One that fires too early is left: the next datagram puts off most of them, and no code
+    waits for them. One that is due is never put off: on a busy machine each turn of the loop has a datagram, which the
+    loop takes first."""
+
+    def __init__(self, core: _Core, handled: Callable[[], None], failed: Callable[[Exception], None]) -> None:
+        """`handled`: called when the core has handled its timer. `failed`: called with an exception of the core."""
+        self._core = core
         self._handled = handled
         self._failed = failed
         self._loop = asyncio.get_running_loop()
@@ -41,7 +49,7 @@ class PeerTimer:
 
     def set(self) -> None:
         """Set it anew."""
-        due = self._peer.timer()
+        due = self._core.timer()
         if due is None and self._handle is not None:
             self._handle.cancel()
             self._handle = None
@@ -57,12 +65,12 @@ class PeerTimer:
 
     def _due(self) -> None:
         self._handle = None
-        due, now = self._peer.timer(), self._loop.time()
+        due, now = self._core.timer(), self._loop.time()
         if due is None or due > now + CLOCK_RESOLUTION:
             self.set()
             return
         try:
-            self._peer.handle_timer(max(now, due))
+            self._core.handle_timer(max(now, due))
         except Exception as error:
             self._failed(error)
         self._handled()
