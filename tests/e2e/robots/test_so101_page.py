@@ -107,12 +107,14 @@ async def test_a_hand_in_a_headset_leads_the_tool_and_closes_the_gripper(so101: 
         for _ in range(TRIES):  # a busy machine may end it
             await headset.squeeze(value=0)
             await headset.place("right", GRIP)
-            await headset.page.evaluate("void (window.before = lockstep.stats().goals)")
+            here = await headset.page.evaluate("window.before = lockstep.stats().goals")
+            # To the left and up; back where an ended try has led it there, or it would soon be out of reach.
+            sign = 1 if here["tool.y"] < start["tool.y"] + 0.02 else -1
             await headset.drive_until("s.driving && s.commanded['tool.x'] !== null")
-            await headset.place("right", [GRIP[0] - 0.05, GRIP[1] + 0.04, GRIP[2]])  # to the left and up
+            await headset.place("right", [GRIP[0] - sign * 0.05, GRIP[1] + sign * 0.04, GRIP[2]])
             reached = (
-                "((b) => Math.abs(s.axes['tool.y'] - b['tool.y'] - 0.05) < 0.01"
-                " && Math.abs(s.axes['tool.z'] - b['tool.z'] - 0.04) < 0.01)(window.before)"
+                f"((b) => Math.abs(s.axes['tool.y'] - b['tool.y'] - {sign * 0.05}) < 0.01"
+                f" && Math.abs(s.axes['tool.z'] - b['tool.z'] - {sign * 0.04}) < 0.01)(window.before)"
             )
             await headset.console.until(f"!s.armed || {reached}")
             if await headset.holds(reached):
