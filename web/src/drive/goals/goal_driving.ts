@@ -4,6 +4,7 @@ import { Clutch, settlingOf } from "./clutch";
 import type { AxisValue } from "./goal_range";
 import type { GoalRefusal } from "./goal_refusal";
 import { createJog, stepJog, type AxisPlace, type Jog } from "./jog";
+import { createTurnJog, stepTurn, type Three, type TurnJog } from "./turn_jog";
 
 /** Most waits are shorter: they need no words. */
 const SAID_AFTER_MS = 300;
@@ -34,6 +35,19 @@ interface GoalAxis {
   readonly clutch: Clutch; // of its slider
 }
 
+/** The rotation of a pose. */
+interface GoalTurn {
+  readonly axes: Three<GoalAxis>;
+  readonly jog: TurnJog;
+}
+
+/** What leads a goal axis besides the keys and sticks of its own. */
+interface Led {
+  readonly posed: AxisValue; // by the device
+  readonly isIdle: boolean; // a pose moves the axis instead
+  readonly turned: readonly [AxisValue, number] | undefined; // as a part of its pose's rotation
+}
+
 /**
  * The values of a robot's goal axes. Sticks, keys and pushes jog them, sliders and devices drive them by a clutch;
  * null where nobody does. Whenever the next command may not move the robot, everything is let go, and the first goal
@@ -46,6 +60,7 @@ export class GoalDriving {
   waitsSinceMs: number | null = null; // a slider or the device is held, and moves nothing until the robot stands still
   private description: RobotDescription | null = null;
   private axes: readonly GoalAxis[] = [];
+  private turns: readonly GoalTurn[] = [];
 
   /** `values` with those of the goal axes put in. */
   take(values: readonly AxisValue[], inputs: GoalInputs, now: number): readonly AxisValue[] {
@@ -59,11 +74,12 @@ export class GoalDriving {
     const posed = this.device?.goals(feedback) ?? [];
     const idle = replaced(description, posed);
     const taken = [...values];
+    const turned = this.turned(posed, idle, inputs, feedback, now);
     let fastest = 0;
     for (const each of this.axes) {
       const isIdle = idle.has(each.axis.name);
-      const posedAt = posed[each.index] ?? null;
-      const [goal, share] = this.goalOf(each, posedAt, isIdle, inputs, feedback, now);
+      const led = { posed: posed[each.index] ?? null, isIdle, turned: turned.get(each.index) };
+      const [goal, share] = this.goalOf(each, led, inputs, feedback, now);
       taken[each.index] = goal;
       fastest = Math.max(fastest, share);
     }
@@ -86,6 +102,7 @@ export class GoalDriving {
       jog.goal = null;
       clutch.lostFeedback();
     }
+    for (const { jog } of this.turns) jog.goal = null;
     this.device?.release();
   }
 
@@ -105,13 +122,53 @@ export class GoalDriving {
       const settling = settlingOf(description, axis.name);
       return [{ index, axis, jog: createJog(), clutch: new Clutch([{ index, axis, scale: 1, settling }]) }];
     });
+    this.turns = description.poses.flatMap(({ rotation }) => {
+      const [x, y, z] = rotation.map((name) => this.axes.find(({ axis }) => axis.name === name));
+      return x && y && z ? [{ axes: [x, y, z] as const, jog: createTurnJog() }] : [];
+    });
   }
 
-  /** Goal, and the share of the axis' largest speed that it needs. `isIdle`: a pose moves the axis instead. */
+  /** By the axes' indices: goals and shares of poses' rotations that keys, sticks and pushes turn, or nobody does. */
+  private turned(
+    posed: readonly AxisValue[],
+    idle: ReadonlySet<string>,
+    { layer, held, share }: GoalInputs,
+    feedback: Feedback,
+    now: number,
+  ): ReadonlyMap<number, readonly [AxisValue, number]> {
+    const turned = new Map<number, readonly [AxisValue, number]>();
+    for (const { axes, jog } of this.turns) {
+      const isLed = axes.some(
+        ({ index, axis }) =>
+          typeof posed[index] === "number" ||
+          idle.has(axis.name) ||
+          held.sliders?.travels[axis.name] !== undefined,
+      );
+      if (isLed) {
+        jog.goal = null;
+        continue;
+      }
+      const each = <T>(of: (axis: GoalAxis) => T): Three<T> => [of(axes[0]), of(axes[1]), of(axes[2])];
+      const rates = each(({ axis }) => pushOf(axis, layer, held) * share * axis.slew);
+      const places = each(({ index, axis }) => placeOf(feedback, index, axis));
+      const [x, y, z] = places;
+      const { goals, speed } = stepTurn(
+        jog,
+        each(({ axis }) => axis),
+        rates,
+        x && y && z ? [x, y, z] : null,
+        now,
+      );
+      for (const [part, { index }] of axes.entries())
+        turned.set(index, [goals[part] ?? null, share > 0 ? Math.min(1, speed / share) : 0]);
+    }
+    return turned;
+  }
+
+  /** Goal, and the share of the axis' largest speed that it needs. */
   private goalOf(
     { index, axis, jog, clutch }: GoalAxis,
-    posed: AxisValue,
-    isIdle: boolean,
+    { posed, isIdle, turned }: Led,
     { layer, held, share }: GoalInputs,
     feedback: Feedback,
     now: number,
@@ -122,12 +179,17 @@ export class GoalDriving {
     const travel = isFree ? held.sliders?.travels[axis.name] : undefined;
     if (travel === undefined) clutch.release(); // a slider that is held goes on from where the pose has led its axis
     const led = travel !== undefined ? drag(clutch, axis, travel) : isIdle ? null : posed;
-    const push = held.sliders?.pushes[axis.name] ?? inputFor(axis, layer, held);
-    const input = led === null && !isIdle ? push : 0;
+    const input = led === null && !isIdle && turned === undefined ? pushOf(axis, layer, held) : 0;
     const jogged = stepJog(jog, axis, input * share * axis.slew, place, now);
     if (led !== null) return [led, 1];
+    if (turned !== undefined) return turned;
     return [jogged, jogged === null ? 0 : Math.min(1, Math.abs(input))];
   }
+}
+
+/** From -1 to 1, what keys, sticks and pushes ask of an axis. */
+function pushOf(axis: Axis, layer: ControlLayer | undefined, held: HeldInputs): number {
+  return held.sliders?.pushes[axis.name] ?? inputFor(axis, layer, held);
 }
 
 /** The axes that a device drives by a pose instead: a command for both is refused. */

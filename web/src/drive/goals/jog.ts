@@ -10,7 +10,7 @@ const LEAD_SECONDS = 0.8;
 /** Of the usable reach. */
 const LEAD_SHARE = 0.75;
 /** A page that was held up does not make up for it. */
-const LONGEST_STEP_MS = 50;
+export const LONGEST_STEP_MS = 50;
 
 /** One goal axis that a stick, a key or a push moves on. */
 export interface Jog {
@@ -45,7 +45,7 @@ export function stepJog(jog: Jog, axis: Axis, rate: number, place: AxisPlace | n
 }
 
 /** So that the robot moves steadily, and is never told to go far by one command. */
-function longestLead(axis: Axis, rate: number): number {
+export function longestLead(axis: Axis, rate: number): number {
   const acceleration = axis.acceleration > 0 ? axis.acceleration : axis.brake;
   const braking = acceleration > 0 ? (rate * rate) / (2 * acceleration) : 0;
   return Math.min(Math.abs(rate) * LEAD_SECONDS + braking, LEAD_SHARE * REACH_SHARE * axis.reach);

@@ -164,6 +164,50 @@ describe("goal axes", () => {
   });
 });
 
+describe("the rotation of a pose", () => {
+  const names = ["rx", "ry", "rz"] as const;
+  const arm = names.map((name) => goalAxisOf(name, { minimum: -4, maximum: 4, reach: 8 }));
+  const pose = {
+    ...{ name: "tool", label: "Tool", body: "hand", frame: "", point: [0, 0, 0] as const },
+    ...{ position: ["", "", ""] as const, rotation: names, instead_of: [], settling: 0 },
+  };
+  const robot = { ...descriptionOf(arm), poses: [pose] };
+  const bindings = names.map((axis, at) => ({
+    ...{ ...binding, axis },
+    ...{ key_positive: ["KeyQ", "KeyW", "KeyE"][at] ?? "", key_negative: "" },
+  }));
+  const down = feedbackOf(5, { axes: [0, 1.6, 0], goals: [0, 1.5, 0] });
+  const inputs = (held: HeldInputs): GoalInputs => ({
+    ...inputsOf(held, { description: robot }),
+    ...{ feedback: down, layer: { name: "tool", label: "Tool", bindings } },
+  });
+  const rest: readonly AxisValue[] = [null, null, null];
+
+  it("is turned by keys about the axes of its frame, and stays when they are let go", () => {
+    const driving = new GoalDriving();
+    expect(driving.take(rest, inputs(heldOf(["KeyQ"])), 0)).toEqual([0, 1.5, 0]);
+    const [rx, ry, rz] = driving.take(rest, inputs(heldOf(["KeyQ"])), 10);
+    expect(rx).toBeGreaterThan(0.005);
+    expect(ry).toBeCloseTo(1.5, 3);
+    expect(rz).toBeGreaterThan(0.005); // its component of a turn about x, where it points down
+    expect(driving.speed).toBeGreaterThan(0.7);
+    expect(driving.take(rest, inputs(heldOf([])), 20)).toEqual(rest);
+    driving.take(rest, inputs(heldOf(["KeyQ"])), 30);
+    driving.release();
+    expect(driving.take(rest, inputs(heldOf(["KeyQ"])), 40)).toEqual([0, 1.5, 0]);
+  });
+
+  it("is moved by one component where a slider of it is dragged, or left to the device that leads it", () => {
+    const driving = new GoalDriving();
+    driving.take(rest, inputs(heldOf(["KeyQ"], { rz: 0 })), 0);
+    const [rx, ry, rz] = driving.take(rest, inputs(heldOf(["KeyQ"], { rz: 0.01 })), 10);
+    expect([rx, ry]).toEqual([0.01, null]);
+    expect(rz).toBeCloseTo(0.08);
+    driving.device = { goals: () => [0.1, 0.2, 0.3], release: () => undefined, waits: false };
+    expect(driving.take(rest, inputs(heldOf(["KeyQ"])), 20)).toEqual([0.1, 0.2, 0.3]);
+  });
+});
+
 describe("a pose that a device drives", () => {
   it("keeps still the axes that it stands for, whatever is held", () => {
     const names = ["x", "y", "z"] as const;
