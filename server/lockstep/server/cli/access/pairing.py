@@ -1,5 +1,6 @@
 """The commands `pair` and `forget`, about robots that dial in: what a supervisor's page does, for scripts."""
 
+import ipaddress
 import json
 import sys
 import time
@@ -11,7 +12,6 @@ from urllib.parse import urlsplit
 import msgspec
 import typer
 
-from lockstep.robot_bridge.loopback import is_loopback
 from lockstep.server.cli.access.access import MakeSettings
 from lockstep.server.cli.console_request import ask_by_link, ask_console, read_answer
 from lockstep.server.cli.options import RobotOption, StateDirOption
@@ -119,9 +119,10 @@ def _loopback_host(command: str) -> str:
     _, _, rest = command.partition("--console ")
     try:
         host = urlsplit(rest.partition(" ")[0]).hostname or ""
-    except ValueError:  # it is the console's answer, and may be anything
+        is_loopback = host == "localhost" or ipaddress.ip_address(host).is_loopback
+    except ValueError:  # a name, or none at all: the answer is the console's
         return ""
-    return host if is_loopback(host) else ""
+    return host if is_loopback else ""
 
 
 def _is_paired(ask: Ask) -> bool:
