@@ -19,6 +19,8 @@ __all__ = [
     "DIAL",
     "MAX_PAIRING_MESSAGE",
     "TRUSTED",
+    "WAITS",
+    "WAIT_HEADER",
     "PairingAnswer",
     "PairingChallenge",
     "PairingCode",
@@ -38,6 +40,7 @@ MAX_PAIRING_MESSAGE = 2048  # bytes
 EXAMPLE = "K7-3F9QW-2MXBD"
 SCHEME = "LockstepRobot"  # of the request's `Authorization` (RFC 9110 11.4)
 TRUSTED = "trusted"  # instead of a pin: the robot has checked the console's certificate against its authorities
+WAIT_HEADER, WAITS = "Lockstep-Link", "waits"  # of the answer: the console has another connection for this link
 SCRYPT_COST = {"n": 1 << 15, "r": 8, "p": 1, "maxmem": 64 << 20}  # 32 MiB and some 60 ms
 
 _CODE = re.compile(rf"[{ALPHABET}]{{{PLACE_SIGNS + SECRET_SIGNS}}}")

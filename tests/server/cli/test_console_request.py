@@ -2,6 +2,7 @@
 
 import datetime
 import json
+import socket
 import ssl
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -43,7 +44,9 @@ ANSWERS: tuple[Any, ...] = (
 
 
 @contextmanager
-def answering(answer: Any, asked: list[Message] | None = None, tls: Certificate | None = None) -> Iterator[str]:
+def answering(
+    answer: Any, asked: list[Message] | None = None, tls: Certificate | None = None, host: str = "127.0.0.1"
+) -> Iterator[str]:
     """The URL of what answers each request with this JSON. `asked`: gets the headers of each request."""
     received = [] if asked is None else asked
 
@@ -60,7 +63,15 @@ def answering(answer: Any, asked: list[Message] | None = None, tls: Certificate 
 
         def log_message(self, format: str, *args: Any) -> None: ...
 
-    with ThreadingHTTPServer(("127.0.0.1", 0), Handler) as server:
+    class Server(ThreadingHTTPServer):
+        address_family = socket.AF_INET6 if ":" in host else socket.AF_INET
+
+        def server_bind(self) -> None:  # the base class looks up a name, which may take long
+            self.socket.bind(bind_to)
+            self.server_name, self.server_port = host, self.socket.getsockname()[1]
+
+    bind_to = socket.getaddrinfo(host, 0, type=socket.SOCK_STREAM)[0][4]
+    with Server((host, 0), Handler) as server:
         if tls is not None:
             context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
             context.load_cert_chain(tls.chain, tls.key)
@@ -68,7 +79,8 @@ def answering(answer: Any, asked: list[Message] | None = None, tls: Certificate 
         thread = Thread(target=server.serve_forever, args=(0.01,))
         thread.start()
         try:
-            yield f"{'http' if tls is None else 'https'}://127.0.0.1:{server.server_port}"
+            shown = f"[{host}]" if ":" in host else host
+            yield f"{'http' if tls is None else 'https'}://{shown}:{server.server_port}"
         finally:
             server.shutdown()
             thread.join()

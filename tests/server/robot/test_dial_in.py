@@ -3,6 +3,7 @@
 import asyncio
 import os
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -113,6 +114,33 @@ async def test_a_line_that_is_gone_again_is_not_taken(tmp_path: Path) -> None:
     await asyncio.sleep(0)
     dial_in.arrived("media", there)
     assert await waiting is there
+
+
+async def test_a_second_robot_that_waits_is_logged_once_until_another_connection_is_taken(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    said: list[dict[str, str]] = []
+    monkeypatch.setattr(
+        "lockstep.server.robot.dial_in.log", SimpleNamespace(warning=lambda text, **more: said.append(more))
+    )
+    now = [0.0]
+    dial_in = DialIn(StateDir(tmp_path), None, lambda: None, lambda: now[0])
+    first, second = Line(), Line("192.0.2.8")
+    dial_in.arrived("operator", first)
+    assert not dial_in.is_taken("operator")
+    await dial_in.next_line("operator")
+    assert (dial_in.is_taken("operator"), dial_in.is_taken("media"), said) == (True, False, [])
+    for line in (*(Line("192.0.2.8") for _ in range(20)), second):  # it dials again, since no console says hello
+        dial_in.arrived("operator", line)
+        now[0] += 2.5
+    assert said == [{"waits": "192.0.2.8", "connected": "192.0.2.7"}]
+    first.close()
+    assert not dial_in.is_taken("operator")
+    assert await dial_in.next_line("operator") is second
+    for _ in range(20):
+        dial_in.arrived("operator", Line())
+        now[0] += 2.5
+    assert said[1:] == [{"waits": "192.0.2.7", "connected": "192.0.2.8"}]
 
 
 async def test_to_forget_a_robot_closes_its_lines_and_ends_its_token(tmp_path: Path) -> None:

@@ -1,9 +1,11 @@
 """Robots that dial their console: a real console with TLS, real bridges, real TCP."""
 
 import asyncio
+import logging
 import ssl
 from contextlib import AsyncExitStack
 from pathlib import Path
+from typing import Any
 
 import pytest
 from starlette.websockets import WebSocket
@@ -229,8 +231,8 @@ async def test_a_robot_that_is_forgotten_while_its_websocket_opens_gets_no_link(
         key = await paired_key(rig)
         dial_in = dial_in_of(rig)
 
-        async def forgotten_then(websocket: WebSocket) -> None:
-            await opens(websocket)
+        async def forgotten_then(websocket: WebSocket, **options: Any) -> None:
+            await opens(websocket, **options)
             await dial_in.forget()
 
         monkeypatch.setattr(WebSocket, "accept", forgotten_then)
@@ -245,6 +247,31 @@ async def test_a_robot_that_is_forgotten_while_its_websocket_opens_gets_no_link(
             await connection.wait_closed()
         assert arrived == []
         assert rig.count("lockstep_bad_input_total", where="dial", reason="robot_unknown") == 1
+
+
+async def test_a_second_robot_with_the_key_says_that_it_waits_and_then_that_it_has_the_place(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("lockstep.robot_bridge.dial.dialer.OWN_LINK_ENDS", 0.1)
+    caplog.set_level(logging.INFO, "lockstep.robot_bridge.dial.dialer")
+
+    def said(words: str) -> int:
+        return sum(words in record.getMessage() for record in caplog.records)
+
+    async with waiting_console(tmp_path) as rig, AsyncExitStack() as first:
+        key = await paired_key(rig)
+        await first.enter_async_context(dialling_bridge(address_of(rig), key))
+        await until_up(rig)
+        await eventually(lambda: said("link has reached the console at") == 2)
+        async with dialling_bridge(address_of(rig), key):
+            await eventually(lambda: said("the console has another connection with this robot's key") == 2)
+            assert said("link has reached the console at") == 2
+            await asyncio.sleep(2.5)  # a bridge gives up a connection without hello after 2 s, and dials again
+            assert said("the console has another connection with this robot's key") == 2
+            await first.aclose()
+            await eventually(lambda: said("link has reached the console at") == 4)
+            assert said("the console has another connection with this robot's key") == 2
+            await until_up(rig)
 
 
 async def test_a_second_console_is_refused_while_the_first_holds_the_robot(tmp_path: Path) -> None:

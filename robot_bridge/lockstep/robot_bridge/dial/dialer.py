@@ -5,18 +5,23 @@ import logging
 import random
 import ssl
 
-from lockstep.protocol.dial_in import TRUSTED, RobotToken
+from lockstep.protocol.dial_in import TRUSTED, WAIT_HEADER, WAITS, RobotToken
 from lockstep.protocol.messages import LinkRole
 from lockstep.robot_bridge.dial.console_access import ConsoleAccess
-from lockstep.robot_bridge.dial.console_connection import console_context, open_connection
+from lockstep.robot_bridge.dial.console_connection import ConsoleConnection, console_context, open_connection
 from lockstep.robot_bridge.dial.redial_times import RedialTimes
 from lockstep.robot_bridge.errors import BridgeError, ConsoleRefused, WrongConsole
-from lockstep.robot_bridge.link.link_server import LinkServer
+from lockstep.robot_bridge.link.link_server import LinkPeer, LinkServer
 
 __all__ = ["Dialer"]
 
 ROLES: tuple[LinkRole, ...] = ("operator", "media")
 HEALTHY_AFTER = 5.0  # s of a link; then the next loss is followed by a try at once
+OWN_LINK_ENDS = 6.0  # s; a console ends this robot's own link from before a break sooner, for its silence
+TAKEN = (
+    "the console has another connection with this robot's key, and takes this one when that ends: a second robot with"
+    " the same key, or a copy of its state directory, may be running"
+)
 MOST_SAID = 16  # different troubles of a link; after more they are told anew
 DENIED = (401, 403, 409)  # statuses that only a person ends: not paired, forgotten, not a console for dialling
 
@@ -41,6 +46,7 @@ class Dialer:
         self._leaving = False
         # What the log has of each link since it was connected.
         self._said: dict[LinkRole, set[str]] = {role: set() for role in ROLES}
+        self._waits_since: dict[LinkRole, float] = {}  # loop time; a wait goes on over many tries
 
     async def run(self) -> None:
         """Run until cancelled."""
@@ -61,6 +67,7 @@ class Dialer:
                 if loop.time() - since > HEALTHY_AFTER:
                     times.healthy()
             except BridgeError as error:
+                self._waits_since.pop(role, None)
                 refused = isinstance(error, WrongConsole) or (
                     isinstance(error, ConsoleRefused) and error.status in DENIED
                 )
@@ -80,11 +87,27 @@ class Dialer:
             for_link=True,
         )
         try:
-            connection.carry(self._links.dialled_link(key))
-            self._say(role, "")
-            await connection.ended.wait()
+            link = self._links.dialled_link(key)
+            connection.carry(link)
+            async with asyncio.TaskGroup() as tasks:
+                saying = tasks.create_task(self._say_reached(role, link, _waits(connection)), name=f"dialled {role}")
+                await connection.ended.wait()
+                saying.cancel()
         finally:
             connection.transport.abort()
+
+    async def _say_reached(self, role: LinkRole, link: LinkPeer, waits: bool) -> None:
+        """Log that a link has reached the console; of a link that waits there for long, that it does. Is cancelled."""
+        if waits and not link.admitted.is_set():
+            since = self._waits_since.setdefault(role, asyncio.get_running_loop().time())
+            try:
+                async with asyncio.timeout_at(since + OWN_LINK_ENDS):
+                    await link.admitted.wait()
+            except TimeoutError:
+                self._say(role, TAKEN)
+                await link.admitted.wait()
+        self._waits_since.pop(role, None)
+        self._say(role, "")
 
     def _say(self, role: LinkRole, trouble: str) -> None:
         """Log a trouble of a link once until it is connected again, and that it is."""
@@ -93,8 +116,17 @@ class Dialer:
             return
         if not trouble or len(said) > MOST_SAID:
             said.clear()
+        said.discard("")
         said.add(trouble)
-        if trouble:
+        if trouble == TAKEN:
+            _logger.warning("the %s link waits: %s", role, trouble)
+        elif trouble:
             _logger.warning("the %s link does not reach the console, trying on: %s", role, trouble)
         else:
             _logger.info("the %s link has reached the console at %s", role, self._access.address.url)
+
+
+def _waits(connection: ConsoleConnection) -> bool:
+    """Return whether the console's answer says so. Older consoles do not; `get_all` takes a header that came twice."""
+    response = connection.response
+    return response is not None and response.headers.get_all(WAIT_HEADER) == [WAITS]

@@ -86,6 +86,7 @@ class LinkPeer(LinkTransport):
         """`dialled`: this bridge opened the connection."""
         now = clock()
         self.dialled = dialled
+        self.admitted = asyncio.Event()  # set once, and stays set after the end
         session = BridgeSession(now, self._admit, secret)
         self._reads = MessageRate(READ_RATE, READ_BURST, now)
         super().__init__(session, clock, self._reads)
@@ -97,8 +98,10 @@ class LinkPeer(LinkTransport):
     def _admit(self, hello: Hello) -> Hello | Goodbye:
         self.name = hello.name
         answer = self._server.admit(self, hello)
-        if isinstance(answer, Hello) and hello.role == "operator":
-            self._reads.rate = OPERATOR_READ_RATE
+        if isinstance(answer, Hello):
+            self.admitted.set()
+            if hello.role == "operator":
+                self._reads.rate = OPERATOR_READ_RATE
         return answer
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:

@@ -26,9 +26,19 @@ _decoder = msgspec.json.Decoder(ConsoleAddress)
 
 def local_url(listener: socket.socket, *, encrypted: bool) -> str:
     """Return the URL by which this machine itself reaches `listener`, past every proxy and router."""
-    host, port = listener.getsockname()[:2]
+    host, port, *more = listener.getsockname()
     host = LOOPBACK.get(host, host)
+    scope = more[1] if more else 0  # of IPv6: the interface, without which a link-local address leads nowhere
+    if scope and "%" not in host:
+        host = f"{host}%{_interface(scope)}"  # not "%25" (RFC 6874), which HTTP clients do not read
     return f"{'https' if encrypted else 'http'}://{f'[{host}]' if ':' in host else host}:{port}"
+
+
+def _interface(index: int) -> str:
+    try:
+        return socket.if_indextoname(index)
+    except OSError:  # it is gone
+        return str(index)
 
 
 def write_address(directory: StateDir, address: ConsoleAddress) -> None:

@@ -18,6 +18,7 @@ from lockstep.protocol.link_secret import LinkSecret
 from lockstep.protocol.messages import LinkRole
 from lockstep.server.robot.paired_robot import PairedRobot, forget_paired, load_paired, save_paired
 from lockstep.server.robot.pairing_offer import Exchange, Paired, PairingOffer, Refusal
+from lockstep.server.robot.second_connection import SecondConnection
 from lockstep.server.util.state_dir import StateDir, StateDirUnusable
 from lockstep.server.util.uncancelled import in_thread
 
@@ -53,7 +54,13 @@ class DialIn:
         exchanges: robots that pair at this moment
     """
 
-    def __init__(self, directory: StateDir, given: LinkSecret | None, own_pin: Callable[[], str | None]) -> None:
+    def __init__(
+        self,
+        directory: StateDir,
+        given: LinkSecret | None,
+        own_pin: Callable[[], str | None],
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
         """`given`: the key that the settings name; with it nothing is paired. `own_pin` may wait for the disk."""
         self.offer = PairingOffer()
         self.paired: PairedRobot | None = None
@@ -62,8 +69,10 @@ class DialIn:
         self._directory = directory
         self._given = given
         self._own_pin = own_pin
+        self._clock = clock
         self._arrived: dict[LinkRole, RobotLine] = {}  # that wait for their link
         self._carrying: dict[LinkRole, RobotLine] = {}
+        self._second = SecondConnection()
         self._news = asyncio.Event()
         self._changing = asyncio.Lock()
         self._by = ""  # who has opened the code
@@ -87,8 +96,7 @@ class DialIn:
     @property
     def address(self) -> str:
         """Where the robot is connected from; "" while it is away."""
-        line = self._carrying.get("operator")
-        return "" if line is None or line.is_closed else line.address
+        return self._carrying["operator"].address if self.is_taken("operator") else ""
 
     @property
     def words(self) -> str:
@@ -105,11 +113,19 @@ class DialIn:
 
     def arrived(self, role: LinkRole, line: RobotLine) -> None:
         """Take a connection of the robot. A newer one replaces one that waits: the robot has given that up."""
+        if role == "operator" and self.is_taken(role) and self._second.is_news(self._clock()):
+            text = "another connection with the robot's key waits: a second robot, or a copy of its key, may be running"
+            log.warning(text, waits=line.address, connected=self.address)
         before = self._arrived.get(role)
         if before is not None:
             before.close()
         self._arrived[role] = line
         self._news.set()
+
+    def is_taken(self, role: LinkRole) -> bool:
+        """Return whether a connection carries this link, so that another one waits for its end."""
+        line = self._carrying.get(role)
+        return line is not None and not line.is_closed
 
     async def next_line(self, role: LinkRole) -> RobotLine:
         """Wait for the next connection for this link."""
@@ -117,6 +133,8 @@ class DialIn:
             line = self._arrived.pop(role, None)
             if line is not None and not line.is_closed:
                 self._carrying[role] = line
+                if role == "operator":
+                    self._second = SecondConnection()
                 return line
             self._news.clear()
             await self._news.wait()
@@ -133,14 +151,14 @@ class DialIn:
         """Make a code, which replaces any other. `by`: the person, for the list."""
         code, salt = PairingCode.draw(), secrets.token_bytes(SALT_BYTES)
         secret = await asyncio.to_thread(PairingSecret, code, salt)
-        self.offer.offer(code, salt, secret, time.monotonic())
+        self.offer.offer(code, salt, secret, self._clock())
         self._by = by
         return code
 
     async def prove(self, exchange: Exchange, proof: bytes) -> Paired | Refusal:
         """Judge a robot's proof; keep the robot before it is answered. Raises StateDirUnusable."""
         pin = await in_thread(self._own_pin)
-        outcome = self.offer.prove(exchange, proof, pin, time.monotonic())
+        outcome = self.offer.prove(exchange, proof, pin, self._clock())
         if isinstance(outcome, Paired):
             paired = PairedRobot(outcome.key, outcome.robot, self._by, time.time())
             async with self._changing:

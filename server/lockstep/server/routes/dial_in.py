@@ -8,7 +8,14 @@ import msgspec
 from fastapi import APIRouter, Depends, Request, Response, WebSocket
 from starlette.websockets import WebSocketDisconnect
 
-from lockstep.protocol.dial_in import MAX_PAIRING_MESSAGE, PairingAnswer, PairingHello, PairingProof
+from lockstep.protocol.dial_in import (
+    MAX_PAIRING_MESSAGE,
+    WAIT_HEADER,
+    WAITS,
+    PairingAnswer,
+    PairingHello,
+    PairingProof,
+)
 from lockstep.protocol.messages import LinkRole
 from lockstep.server.audit.records import Actor
 from lockstep.server.auth.tokens import Right, require_role
@@ -212,7 +219,8 @@ async def _carry(websocket: WebSocket, here: Dependencies, dial_in: DialIn, name
     if not dial_in.knows(authorization):
         raise RobotUnknown("this console does not know this robot, or has forgotten it: pair it (anew) by a code")
     socket = _socket(websocket)
-    await websocket.accept()
+    waits = ((WAIT_HEADER.encode(), WAITS.encode()),) if dial_in.is_taken(role) else ()
+    await websocket.accept(headers=waits)
     if not dial_in.knows(authorization):  # the robot was forgotten meanwhile
         here.metrics.bad_input.labels("dial", "robot_unknown").inc()
         await _close(websocket, POLICY_VIOLATION)

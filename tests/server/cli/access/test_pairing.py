@@ -9,6 +9,7 @@ import pytest
 
 from lockstep.bench.harness.processes import running_process
 from lockstep.bench.harness.stack import LOCKSTEP
+from tests.server.cli.test_console_request import answering, lockstep
 from tests.support.stack import Stack, running_console, running_stack
 from tests.waiting import PATIENCE
 
@@ -61,6 +62,7 @@ async def test_beside_the_console_its_address_for_others_need_not_lead_anywhere(
         code, output, errors = await run("pair", "--state-dir", str(tmp_path / "state"))
     assert code == 0, errors
     assert output.startswith(f"lockstep robot NAME --console wss://{name.removeprefix('https://')}")
+    assert "warning" not in errors
 
 
 async def test_a_supervisors_link_does_the_same_from_elsewhere_and_an_operators_does_not(tmp_path: Path) -> None:
@@ -68,14 +70,42 @@ async def test_a_supervisors_link_does_the_same_from_elsewhere_and_an_operators_
         trusted = ("--tls-ca", str(tmp_path / "state" / "tls-cert.pem"))
         code, output, errors = await run("pair", "--link", stack.supervisor, *trusted)
         assert code == 0, errors
-        assert output.startswith("lockstep robot NAME --console wss://")
+        assert output.startswith("lockstep robot NAME --console wss://127.0.0.1:")
         assert "5 tries" in errors
+        assert "warning: 127.0.0.1 in this command is the robot's own computer" in errors
+        assert "--public-url (LOCKSTEP_PUBLIC_URL)" in errors
         code, _, errors = await run("pair", "--link", stack.operator, *trusted)
         assert (code, "lockstep: " in errors) == (2, True)
         code, output, _ = await run("pair", "--withdraw", "--link", stack.supervisor, *trusted)
         assert (code, output) == (0, "the code is withdrawn\n")
         code, _, errors = await run("pair", "--link", stack.supervisor)
         assert (code, "does not answer" in errors) == (2, True), "its certificate is nobody's"
+
+
+@pytest.mark.parametrize(
+    ("command", "warned"),
+    [
+        ("lockstep robot NAME --console wss://127.0.0.1:8000 --pair K", True),
+        ("lockstep robot NAME --console wss://127.8.8.8/robots/left --pair K", True),
+        ("lockstep robot NAME --console ws://[::1]:8000 --pair K", True),
+        ("lockstep robot NAME --console wss://localhost --pair K", True),
+        ("lockstep robot NAME --console wss://192.0.2.7:8000 --pair K", False),
+        ("lockstep robot NAME --console wss://localhost.example.org --pair K", False),
+        ("lockstep robot NAME --console wss://[::1 --pair K", False),
+        ("lockstep robot NAME --console", False),
+        ("lockstep robot", False),
+    ],
+)
+def test_a_command_that_works_on_this_machine_alone_comes_with_a_warning(
+    tmp_path: Path, command: str, warned: bool
+) -> None:
+    with answering({"command": command, "seconds": 60, "tries": 5}) as local:
+        done = lockstep(tmp_path, local, "pair")
+        as_json = lockstep(tmp_path, local, "pair", "--json")
+    assert (done.exit_code, done.stdout) == (0, f"{command}\n")
+    assert ("warning: " in done.stderr) is warned
+    assert json.loads(as_json.stdout)["command"] == command
+    assert ("warning: " in as_json.stderr) is warned
 
 
 async def test_waiting_ends_when_the_code_does(tmp_path: Path) -> None:

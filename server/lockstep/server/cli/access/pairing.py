@@ -1,11 +1,13 @@
 """The commands `pair` and `forget`, about robots that dial in: what a supervisor's page does, for scripts."""
 
+import ipaddress
 import json
 import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated, Any
+from urllib.parse import urlsplit
 
 import msgspec
 import typer
@@ -19,6 +21,11 @@ __all__ = ["add_pairing_commands"]
 
 EXIT_UNPAIRED = 1
 LOOK_SECONDS = 1.0
+NOT_ELSEWHERE = (
+    "warning: {host} in this command is the robot's own computer, so only a robot on the console's machine can dial it."
+    " Start the console with --public-url (LOCKSTEP_PUBLIC_URL), the address by which robots reach it, and with --host"
+    " if it listens on loopback alone"
+)
 
 Ask = Callable[[str, str], dict[str, Any]]
 Link = Annotated[
@@ -88,6 +95,8 @@ def add_pairing_commands(app: typer.Typer, make_settings: MakeSettings) -> None:
         made = read_answer(_Code, answer)
         _print(answer, as_json, printable(made.command))
         typer.echo(f"lockstep: the code is good once, for {made.seconds:.0f} s and {made.tries} tries", err=True)
+        if host := _loopback_host(made.command):
+            typer.echo(f"lockstep: {escaped(NOT_ELSEWHERE.format(host=host))}", err=True)
         if wait and not _is_paired(ask):
             raise typer.Exit(EXIT_UNPAIRED)
 
@@ -103,6 +112,17 @@ def add_pairing_commands(app: typer.Typer, make_settings: MakeSettings) -> None:
         found = asking(link, tls_ca, robot, state_dir)("DELETE", "/api/dial-in/robot")
         read_answer(_DialIn, found)
         _print(found, as_json, "the robot is forgotten")
+
+
+def _loopback_host(command: str) -> str:
+    """Return the host behind `--console` if a machine means itself by it; "" otherwise."""
+    _, _, rest = command.partition("--console ")
+    try:
+        host = urlsplit(rest.partition(" ")[0]).hostname or ""
+        is_loopback = host == "localhost" or ipaddress.ip_address(host).is_loopback
+    except ValueError:  # a name, or none at all: the answer is the console's
+        return ""
+    return host if is_loopback else ""
 
 
 def _is_paired(ask: Ask) -> bool:
