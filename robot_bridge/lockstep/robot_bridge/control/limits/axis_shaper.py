@@ -12,6 +12,7 @@ two periods later. A limiter (position limits, geofences) has the last word on t
 
 import math
 from collections.abc import Callable, Sequence
+from typing import Final
 
 from lockstep.protocol.description import Axis, Pose
 from lockstep.protocol.neutral import has_goals
@@ -20,6 +21,8 @@ from lockstep.robot_bridge.control.limits.goal_axis import GoalAxis
 from lockstep.robot_bridge.control.limits.rate_axis import RateAxis
 
 __all__ = ["AxisShaper", "Limiter"]
+
+ROUNDING: Final = 1e-6  # unit: goals that are so close to each other are the same
 
 # (rates, what they would be under braking) -> rates nearer to rest
 Limiter = Callable[[list[float], Callable[[], list[float]]], list[float]]
@@ -106,6 +109,26 @@ class AxisShaper:
         if self._turns is not None:
             self._turns.begin()
         return self.is_known
+
+    def take_up(self, pursued: Sequence[float]) -> bool:
+        """Command goal axes at rest from where the robot pursues them now; return whether that is another place.
+
+        Something else may have moved the robot since its axes came to rest, and the next goals are bound to these.
+
+        `pursued`: the goals of the robot's own, one per axis, as of `Robot.take_up`; NaN: that axis stays as it is.
+        Measured places do not do: an arm that hangs below its goals under a load would go down step by step.
+        """
+        if not self.at_rest or not self.is_known:
+            return False
+        read = () if self._turns is None else self._turns.unread
+        moved = [
+            (axis, goal)
+            for number, (axis, goal) in enumerate(zip(self._axes, pursued, strict=True))
+            if isinstance(axis, GoalAxis) and number not in read and abs(goal - axis.goal) > ROUNDING
+        ]
+        for axis, goal in moved:
+            axis.begin(goal)
+        return bool(moved)
 
     def drive(self, values: Sequence[float | None], now: float, speed: float = 1.0) -> None:
         """Aim for `values`, one per axis, clamped to the axes' limits. Numbers are finite; None: a goal axis stays.

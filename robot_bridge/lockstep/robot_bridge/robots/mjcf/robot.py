@@ -139,6 +139,10 @@ class MjcfRobot(Robot):
         self._tools.put_pursued(goals)
         return goals
 
+    def take_up(self) -> Sequence[float]:
+        """A simulation that began anew holds the arm where it is then."""
+        return self.goals()
+
     def positions(self) -> Sequence[float]:
         qpos = self.simulation.data.qpos
         return [value for joint in self._joints for value in joint.values(qpos)]
@@ -175,8 +179,10 @@ class MjcfRobot(Robot):
 
     def _release(self) -> None:
         """Hold everything where the state begins."""
-        for drive in self._drives:
+        for number, drive in enumerate(self._drives):
             drive.release(self.simulation.data)
+            if drive.axis.kind == "goal":
+                self._values[number] = drive.measured(self.simulation.data)
         self._tools.restart(measured=True)
 
     def _rest(self) -> None:

@@ -112,6 +112,10 @@ class MobileManipulator(Robot):
     def goals(self) -> list[float]:
         return [*STILL, *self._arm.pursued()]
 
+    def take_up(self) -> Sequence[float]:
+        """A simulation that began anew holds the arm where it is then."""
+        return self.goals()
+
     def positions(self) -> Sequence[float]:
         joints: list[float] = self.simulation.joints.tolist()
         return joints

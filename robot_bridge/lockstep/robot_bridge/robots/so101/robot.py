@@ -79,6 +79,10 @@ class So101(Robot):
         *joints, x, y, z, rx, ry, rz = self._drive.pursued()
         return [*joints, self._grip.goal, x, y, z, rx, ry, rz]
 
+    def take_up(self) -> Sequence[float]:
+        """A simulation that began anew holds the arm where it is then."""
+        return self.goals()
+
     def tick(self) -> None:
         simulation, seconds = self.simulation, self.tick_seconds
         before, self._ticked_at = self._ticked_at, self._now()

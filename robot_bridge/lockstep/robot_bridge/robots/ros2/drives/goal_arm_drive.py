@@ -57,6 +57,8 @@ class GoalArmDrive(Drive):
         self._before: list[float] = []  # values of the tick before
         self._ticked_at: float | None = None  # s
         self._spoke_at = float("-inf")  # s, when a joint's goal moved last
+        self._held = True  # the arm could not be driven in the last tick
+        self._looked = False  # in this tick the bridge asked already whether something else has moved the arm
         self.pursues = False  # a command drives the tool
 
     def seen(self, now: float) -> bool:
@@ -120,6 +122,16 @@ class GoalArmDrive(Drive):
         """Return the goal of each axis; where the arm is before the first motion."""
         return self._goals.pursued() if self._begun(now) and self._goals is not None else self.measured_axes(now)
 
+    def take_up(self, now: float) -> list[float]:
+        """Begin anew where something else has moved the arm, unless it was just driven; return the goals.
+
+        The next `step` leaves them there: its values are these, and others would lead back to them.
+        """
+        self._looked = True
+        if not self._held:
+            self._look(now)
+        return self.goals(now)
+
     def joints(self, now: float) -> list[float]:
         return [joint.position for joint in self._feedback.known(now)]
 
@@ -135,19 +147,24 @@ class GoalArmDrive(Drive):
     def _advance(self, values: Sequence[float], dt: float, since: float, now: float, held: bool) -> list[float]:
         """Let a tick pass; return the joints' rates, and nought for each axis of the tool."""
         still = [0.0] * self.size
+        looked, self._looked, self._held = self._looked, False, held
         if not self._begun(now) or self._goals is None:
             return still
         if held:
             self._goals.hold()
             return still
-        measured = self.joints(now)
-        if now - self._spoke_at > QUIET:
-            self._goals.take_up(measured)
-        rates = self._goals.drive(values, dt, since, measured, self.pursues)
+        if not looked:
+            self._look(now)
+        rates = self._goals.drive(values, dt, since, self.joints(now), self.pursues)
         if any(rates):
             self._spoke_at = now
         still[: len(rates)] = rates
         return still
+
+    def _look(self, now: float) -> None:
+        """Begin anew where something else has moved the arm since it was driven."""
+        if self._goals is not None and now - self._spoke_at > QUIET and self.seen(now):
+            self._goals.take_up(self.joints(now))
 
 
 def _points(goals: Sequence[float], rates: Sequence[float], measured: Sequence[float], bounds: _Bounds) -> list[float]:
