@@ -199,7 +199,7 @@ class CommandExecutor:
         Raises:
             BaseException: the adapter raised.
         """
-        if not (self._shaper.has_goals and self._shaper.is_known and self._shaper.at_rest):
+        if not self._shaper.may_take_up:
             return
         before, pursued = self._taken_up, self._robot.take_up()
         self._taken_up = pursued is not None and self._shaper.take_up(pursued)

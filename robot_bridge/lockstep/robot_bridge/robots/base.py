@@ -91,11 +91,11 @@ class Robot(ABC):
         """Drive the axes with these values during the coming tick, in the description's order and units.
 
         The value of a goal axis is its applied goal: the place to be at. The first values after the start and after
-        `reset` are what `goals` said then; they move nothing. From then on a value changes by no more than
-        a tick at `slew`, with two exceptions. At rest it becomes what `take_up` said in the same tick. And of a pose and the axes that it stands in for, only those change that are
-        driven, and when one of these sets begins to be driven in place of the other, or a pose with `settling` again
-        after it came to rest, its values are first what `goals` said. The bridge does not call this before every goal
-        axis has been measured.
+        `reset` are what `goals` said then; they move nothing. From then on a value changes by no more than a tick at
+        `slew`, with two exceptions. At rest it becomes what `take_up` said in the same tick. And of a pose and the axes
+        that it stands in for, only those change that are driven, and when one of these sets begins to be driven in
+        place of the other, or a pose with `settling` again after it came to rest, its values are first what `goals`
+        said. The bridge does not call this before every goal axis has been measured.
         """
 
     def pursue_poses(self, names: Sequence[str]) -> None:
@@ -152,7 +152,7 @@ class Robot(ABC):
         return self.measured_axes()
 
     def take_up(self) -> Sequence[float] | None:
-        """Return `goals`, which may be others than those applied; None: this robot pursues those that are applied.
+        """Return `goals` if something else has moved the robot since the last call; else None.
 
         Called in each tick that begins at rest, before `apply`, which gets these goals then and must move nothing by
         them. So the next operator begins where the robot is after something else has moved it. Override it only if the

@@ -1,5 +1,4 @@
-"""Goals at rest follow a robot that something else has moved, by what the robot itself pursues, never by a measurement.
-"""
+"""Goals at rest follow a robot that something else moves: what the robot itself pursues counts, no measurement."""
 
 import asyncio
 import math
@@ -25,6 +24,7 @@ def moved_by_others(arm: Arm, way: float) -> None:
 
 def test_at_rest_the_goals_are_where_the_robot_has_taken_itself_and_applying_them_moves_nothing() -> None:
     arm = Arm()
+    arm.tick()
     moved_by_others(arm, 0.3)
     pursued = list(arm.robot.pursued)
     assert arm.shaper.take_up(arm.robot.goals())
@@ -33,6 +33,17 @@ def test_at_rest_the_goals_are_where_the_robot_has_taken_itself_and_applying_the
         assert not arm.shaper.take_up(arm.robot.goals())
         arm.tick()
     assert arm.robot.pursued == pytest.approx(pursued)
+
+
+def test_an_arm_that_had_fallen_is_not_taken_up_to_where_it_was_before_it_is_told_to_stay() -> None:
+    arm = Arm()
+    before = list(arm.robot.pursued)
+    fallen = [0.0, -0.9, 0.4, 0.0, -0.5, -1.3]
+    arm.shaper.begin(fallen, before)
+    assert not arm.shaper.take_up(before)
+    assert arm.shaper.goals == [None, *fallen[1:]]
+    arm.tick()
+    assert arm.shaper.take_up(before)  # from now on the robot knows better
 
 
 def test_an_arm_that_hangs_below_its_goals_is_not_taken_up() -> None:

@@ -67,6 +67,9 @@ class MjcfRobot(Robot):
         self._wrench = wrench_sense(model)
         self._ranges = range_sense(model, data)
         cameras = cameras_of(model)
+        self._began_anew = (
+            False  # the simulation, which holds the arm where it is then, and the bridge does not know yet
+        )
         self._values = [drive.at_rest(drive.measured(data)) for drive in self._drives] + self._tools.measured()
         self._now = now
         self._ticked_at = now()
@@ -139,9 +142,9 @@ class MjcfRobot(Robot):
         self._tools.put_pursued(goals)
         return goals
 
-    def take_up(self) -> Sequence[float]:
-        """A simulation that began anew holds the arm where it is then."""
-        return self.goals()
+    def take_up(self) -> Sequence[float] | None:
+        anew, self._began_anew = self._began_anew, False
+        return self.goals() if anew else None
 
     def positions(self) -> Sequence[float]:
         qpos = self.simulation.data.qpos
@@ -179,6 +182,7 @@ class MjcfRobot(Robot):
 
     def _release(self) -> None:
         """Hold everything where the state begins."""
+        self._began_anew = True
         for number, drive in enumerate(self._drives):
             drive.release(self.simulation.data)
             if drive.axis.kind == "goal":

@@ -80,8 +80,8 @@ class ArmGoals:
         if self._tool is not None:
             self._tool.restart()
 
-    def take_up(self, measured: Sequence[float]) -> None:
-        """Begin anew where an arm at rest is, if something else has moved it away from its goals.
+    def take_up(self, measured: Sequence[float]) -> bool:
+        """Begin anew where an arm at rest is, if something else has moved it away from its goals; return whether.
 
         From then on nothing here holds the arm, so that its goals follow it to where it comes to rest. An arm that is
         held keeps its goals: it may hang below them by MOVED, and does not go down by being driven and released.
@@ -91,7 +91,7 @@ class ArmGoals:
         """
         moved = {number for number in range(len(self.goals)) if self._was_moved(number, measured[number])}
         if not moved:
-            return
+            return False
         if not moved.issubset(self._grips):
             moved |= set(range(len(self.goals))).difference(self._grips)
             if self._tool is not None:
@@ -100,6 +100,7 @@ class ArmGoals:
         self._rested = list(measured)
         self._away |= moved
         self._note_goals()
+        return True
 
     def _was_moved(self, number: int, place: float) -> bool:
         goal, rested = self.goals[number], self._rested[number]

@@ -40,10 +40,10 @@ class World:
     """
 
     def __init__(self, directory: Path, monkeypatch: pytest.MonkeyPatch, sag: float = 0.0) -> None:
+        self.now, self.sag = 100.0, sag
         monkeypatch.setattr(clock, "now", lambda: self.now)
         found, description = read_settings(written(directory, ARM))
         assert found.arm is not None
-        self.now, self.sag = 100.0, sag
         self.names = [axis.name for axis in description.axes]
         self.told = [place + sag for place in START]
         self.published: list[list[float]] = []
@@ -99,7 +99,7 @@ class World:
         for _ in range(round(seconds / TICK)):
             self.now += TICK
             self._push(pushed / 2)
-            if self.shaper.at_rest:
+            if self.shaper.may_take_up:
                 self.shaper.take_up(self.drive.take_up(self.now))
             self._push(pushed / 2)
             self.drive.step(self.shaper.step(self.now, TICK), TICK)

@@ -54,8 +54,8 @@ class Drive(ABC):
         return [math.nan] * self.size
 
     def take_up(self, now: float) -> list[float]:
-        """Begin anew where something else has moved the part at rest; return `goals`."""
-        return self.goals(now)
+        """Begin anew where something else has moved the part at rest; return `goals` then, else NaN."""
+        return [math.nan] * self.size
 
     def measured_axes(self, now: float) -> list[float]:
         """Return the measured value of each axis now; cheaper than `sense` where that matters."""
