@@ -126,7 +126,7 @@ class GoalArmDrive(Drive):
         return self._goals.pursued() if self._begun(now) and self._goals is not None else self.measured_axes(now)
 
     def take_up(self, now: float) -> list[float]:
-        """Begin anew where something else has moved the arm, unless it was just driven; return the goals then, else NaN.
+        """Begin anew where others have moved the arm, unless it was just driven; return the goals then, else NaN.
 
         The next `step` leaves them there: its values are these, and others would lead back to them.
         """
