@@ -71,6 +71,7 @@ class CommandExecutor:
         self._signal = StartSignal(description)
         self._axes = len(description.axes)
         self._blind: frozenset[str] = frozenset()  # limits that slowed the robot because its position was unknown
+        self._taken_up = False  # something else moved the robot's goals in the last tick
         self._rested = True  # nothing was driven at the last tick
 
     # LinkHandler
@@ -150,6 +151,7 @@ class CommandExecutor:
         self._stops.look(now)
         self._measured.look()
         self._actions.look()
+        self._take_up()
         moved = self._moves
         self._actions.step()
         values = self._shaper.step(now, self._robot.tick_seconds)  # asks for positions, which may hang too
@@ -190,6 +192,19 @@ class CommandExecutor:
         if known:
             self._core.interlock.require()
         return False
+
+    def _take_up(self) -> None:
+        """Let the goals at rest follow a robot that something else moves, and issue them where that ends.
+
+        Raises:
+            BaseException: the adapter raised.
+        """
+        if not self._shaper.may_take_up:
+            return
+        before, pursued = self._taken_up, self._robot.take_up()
+        self._taken_up = pursued is not None and self._shaper.take_up(pursued)
+        if before and not self._taken_up:
+            self._core.want_issue()
 
     @property
     def _moves(self) -> bool:

@@ -91,11 +91,11 @@ class Robot(ABC):
         """Drive the axes with these values during the coming tick, in the description's order and units.
 
         The value of a goal axis is its applied goal: the place to be at. The first values after the start and after
-        `reset` are what `goals` said then; they move nothing. From then on a value changes by no more than
-        a tick at `slew`, with one exception: of a pose and the axes that it stands in for, only those change that are
-        driven, and when one of these sets begins to be driven in place of the other, or a pose with `settling` again
-        after it came to rest, its values are first what `goals` said. The bridge does not call this before every goal
-        axis has been measured.
+        `reset` are what `goals` said then; they move nothing. From then on a value changes by no more than a tick at
+        `slew`, with two exceptions. At rest it becomes what `take_up` said in the same tick. And of a pose and the axes
+        that it stands in for, only those change that are driven, and when one of these sets begins to be driven in
+        place of the other, or a pose with `settling` again after it came to rest, its values are first what `goals`
+        said. The bridge does not call this before every goal axis has been measured.
         """
 
     def pursue_poses(self, names: Sequence[str]) -> None:
@@ -150,6 +150,17 @@ class Robot(ABC):
         down by that much on each of these occasions.
         """
         return self.measured_axes()
+
+    def take_up(self) -> Sequence[float] | None:
+        """Return `goals` if something else has moved the robot since the last call; else None.
+
+        Called in each tick that begins at rest, before `apply`, which gets these goals then and must move nothing by
+        them. So the next operator begins where the robot is after something else has moved it. Override it only if the
+        robot itself knows that: by a controller of its own that was told other goals, or a simulation that began anew.
+        It must not return what is measured of an arm that `apply` holds: an arm that hangs below its goals under a load
+        would go down step by step. NaN: that axis is where it was.
+        """
+        return None
 
     def positions(self) -> Sequence[float]:
         """Return the position of each joint now, for limits and geofences; NaN if unknown or too old to be trusted.

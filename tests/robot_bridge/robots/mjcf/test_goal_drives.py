@@ -1,5 +1,6 @@
 """Position servos that a model's own setting makes goal axes."""
 
+import asyncio
 import math
 from collections.abc import Iterator
 from pathlib import Path
@@ -137,6 +138,18 @@ async def test_it_is_driven_to_a_goal_and_does_not_creep_down_under_its_load(arm
         assert driver.feedback.goals == [-0.2]
         await driver.heard(lambda feedback: feedback.at_rest)
         assert driver.feedback.axes[0] > -0.19  # it hangs; the axis turns downwards
+
+
+async def test_after_a_simulation_began_anew_the_arm_is_held_where_it_is_then(arm: MjcfRobot) -> None:
+    async with running_bridge(arm) as bridge, operator(bridge) as driver, asyncio.timeout(PATIENCE):
+        begun = driver.feedback.axes[0]
+        while driver.feedback.goals != [-0.2]:
+            await driver.drive([-0.2])
+        await driver.drive([None])
+        await driver.heard(lambda feedback: feedback.at_rest)
+        arm.simulation.data.qvel[:] = math.nan
+        await driver.heard(lambda feedback: feedback.goals != [-0.2])
+        assert driver.feedback.goals == [pytest.approx(begun, abs=0.01)]
 
 
 async def test_the_bridges_of_models_pass_the_cases_about_goals(arm: MjcfRobot) -> None:

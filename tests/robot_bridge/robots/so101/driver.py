@@ -77,6 +77,8 @@ class ArmDriver:
 
     def ticks(self, seconds: float) -> None:
         for _ in range(round(seconds / self.robot.tick_seconds)):
+            if self._shaper.may_take_up and (goals := self.robot.take_up()) is not None:
+                self._shaper.take_up(goals)
             values = self._shaper.step(self._now, self.robot.tick_seconds)
             self.robot.pursue_poses(self._shaper.pursued_poses)
             self.robot.apply(values)

@@ -173,6 +173,19 @@ def test_a_simulation_that_diverged_begins_anew_and_says_so(arm: ArmDriver) -> N
     assert joints(arm) == pytest.approx(HOME, abs=0.02)
 
 
+def test_after_a_simulation_began_anew_a_joint_is_driven_from_where_it_is_then(arm: ArmDriver) -> None:
+    arm.drive(1.0, shoulder_pan=0.4)
+    arm.ticks(0.6)
+    assert arm.feedback.goals[0] == pytest.approx(0.4)
+    arm.robot.simulation.data.qvel[:] = math.nan
+    arm.ticks(0.04)
+    goal = arm.feedback.goals[0]
+    assert goal is not None
+    assert goal == pytest.approx(HOME[0], abs=1e-6)
+    arm.drive(0.4, shoulder_pan=goal + 0.01)
+    assert joints(arm) == pytest.approx(HOME, abs=0.02)
+
+
 def test_a_grip_outlives_a_stop_and_its_reset(arm: ArmDriver) -> None:
     simulation = arm.robot.simulation
     task = PickAndPlace(arm.description, "red")

@@ -51,6 +51,11 @@ class PoseTurns:
         self.settled = False
         self.pursued_poses: list[str] = []
 
+    @property
+    def unread(self) -> Collection[int]:
+        """The axes whose goals are, or will be when they have settled, out of date until they are read anew."""
+        return self._stale.union(*(self._shared.mates[number] for number in self._driven))
+
     def begin(self) -> None:
         """All goals are up to date."""
         self._stale.clear()

@@ -12,6 +12,7 @@ two periods later. A limiter (position limits, geofences) has the last word on t
 
 import math
 from collections.abc import Callable, Sequence
+from typing import Final
 
 from lockstep.protocol.description import Axis, Pose
 from lockstep.protocol.neutral import has_goals
@@ -20,6 +21,8 @@ from lockstep.robot_bridge.control.limits.goal_axis import GoalAxis
 from lockstep.robot_bridge.control.limits.rate_axis import RateAxis
 
 __all__ = ["AxisShaper", "Limiter"]
+
+ROUNDING: Final = 1e-6  # unit: goals that are so close to each other are the same
 
 # (rates, what they would be under braking) -> rates nearer to rest
 Limiter = Callable[[list[float], Callable[[], list[float]]], list[float]]
@@ -57,6 +60,7 @@ class AxisShaper:
         self._limiter = limiter
         self._turns = None if pursued is None or not poses else PoseTurns(axes, poses, self._axes, pursued)
         self._released = True  # coming to rest or there
+        self._begins = False  # the robot was not told the goals of the last `begin` yet
         self._deadline = -math.inf  # s, when all axes must be at rest
 
     @property
@@ -79,6 +83,11 @@ class AxisShaper:
         return all(axis.stands and (released or not axis.is_driven) for axis in self._axes)
 
     @property
+    def may_take_up(self) -> bool:
+        """True if all stands, and the robot was told where: after an arm has fallen it still pursues other goals."""
+        return self.has_goals and self.is_known and not self._begins and self.at_rest
+
+    @property
     def pursued_poses(self) -> Sequence[str]:
         """The poses with `settling` that the robot pursues in the tick of the last step, see `Robot.pursue_poses`."""
         return () if self._turns is None or self._released else self._turns.pursued_poses
@@ -97,7 +106,7 @@ class AxisShaper:
         place, the robot is not where it says, and the places count: all, since a pose and its joints belong together.
         A gripper counts by itself: an arm that has fallen does not open the hand that holds something.
         """
-        self._released = True
+        self._released = self._begins = True
         holds = [axis.reaches(place, goal) for axis, place, goal in zip(self._axes, places, pursued, strict=True)]
         whole = all(each or grips for each, grips in zip(holds, self._grips, strict=True))
         for axis, grips, held, place, goal in zip(self._axes, self._grips, holds, places, pursued, strict=True):
@@ -106,6 +115,26 @@ class AxisShaper:
         if self._turns is not None:
             self._turns.begin()
         return self.is_known
+
+    def take_up(self, pursued: Sequence[float]) -> bool:
+        """Command goal axes at rest from where the robot pursues them now; return whether that is another place.
+
+        Something else may have moved the robot since its axes came to rest, and the next goals are bound to these.
+
+        `pursued`: the goals of the robot's own, one per axis, as of `Robot.take_up`; NaN: that axis stays as it is.
+        Measured places do not do: an arm that hangs below its goals under a load would go down step by step.
+        """
+        if not self.may_take_up:
+            return False
+        read = () if self._turns is None else self._turns.unread
+        moved = [
+            (axis, goal)
+            for number, (axis, goal) in enumerate(zip(self._axes, pursued, strict=True))
+            if isinstance(axis, GoalAxis) and number not in read and abs(goal - axis.goal) > ROUNDING
+        ]
+        for axis, goal in moved:
+            axis.begin(goal)
+        return bool(moved)
 
     def drive(self, values: Sequence[float | None], now: float, speed: float = 1.0) -> None:
         """Aim for `values`, one per axis, clamped to the axes' limits. Numbers are finite; None: a goal axis stays.
@@ -141,6 +170,7 @@ class AxisShaper:
 
     def step(self, now: float, dt: float) -> list[float]:
         """Return the values for a tick of `dt` seconds that begins now."""
+        self._begins = False
         left = self._deadline - now
         if left <= 0:
             self._released = True

@@ -67,6 +67,9 @@ class MjcfRobot(Robot):
         self._wrench = wrench_sense(model)
         self._ranges = range_sense(model, data)
         cameras = cameras_of(model)
+        self._began_anew = (
+            False  # the simulation, which holds the arm where it is then, and the bridge does not know yet
+        )
         self._values = [drive.at_rest(drive.measured(data)) for drive in self._drives] + self._tools.measured()
         self._now = now
         self._ticked_at = now()
@@ -139,6 +142,10 @@ class MjcfRobot(Robot):
         self._tools.put_pursued(goals)
         return goals
 
+    def take_up(self) -> Sequence[float] | None:
+        anew, self._began_anew = self._began_anew, False
+        return self.goals() if anew else None
+
     def positions(self) -> Sequence[float]:
         qpos = self.simulation.data.qpos
         return [value for joint in self._joints for value in joint.values(qpos)]
@@ -175,8 +182,11 @@ class MjcfRobot(Robot):
 
     def _release(self) -> None:
         """Hold everything where the state begins."""
-        for drive in self._drives:
+        self._began_anew = True
+        for number, drive in enumerate(self._drives):
             drive.release(self.simulation.data)
+            if drive.axis.kind == "goal":
+                self._values[number] = drive.measured(self.simulation.data)
         self._tools.restart(measured=True)
 
     def _rest(self) -> None:

@@ -61,6 +61,9 @@ class MobileManipulator(Robot):
         self._sound = Sound(MICROPHONE.sample_rate, round(MICROPHONE.sample_rate * SEGMENT_SECONDS))
         self._values: Sequence[float] | None = None  # None: at rest
         self._stopped = False  # the base is parked and the arm holds its posture, at any applied value
+        self._began_anew = (
+            False  # the simulation, which holds the arm where it is then, and the bridge does not know yet
+        )
         self._light = False
         self._battery = SimulatedBattery()
         self._renderer = Renderer(model, CAMERAS[0].width, CAMERAS[0].height)
@@ -86,6 +89,7 @@ class MobileManipulator(Robot):
         self._base.drive(data, base)
         self._arm.drive(None if values is None else values[BASE.stop :], self.tick_seconds)
         if not self.simulation.step(STEPS_PER_TICK):
+            self._began_anew = True
             self._base.release()
             self._arm.release()
             self._contacts.clear()
@@ -111,6 +115,10 @@ class MobileManipulator(Robot):
 
     def goals(self) -> list[float]:
         return [*STILL, *self._arm.pursued()]
+
+    def take_up(self) -> Sequence[float] | None:
+        anew, self._began_anew = self._began_anew, False
+        return self.goals() if anew else None
 
     def positions(self) -> Sequence[float]:
         joints: list[float] = self.simulation.joints.tolist()

@@ -15,6 +15,7 @@ __all__ = ["ArmGoals"]
 
 Array = npt.NDArray[np.float64]
 MOVED = 0.05  # rad or m: an arm at rest that is further than that from its goal was moved by something else
+FOLLOWS = 0.002  # rad or m, by which it may go on then before its goal follows again: a joint's reading is not steadier
 
 
 class ArmGoals:
@@ -34,6 +35,7 @@ class ArmGoals:
         self._others = JointFollower(others, rates, [measured[number] for number in others])
         self._grips = [number for number in others if settings.joints[number].grips]
         self._rested = list(measured)  # rad or m, of the joints: nearest to their goals since the arm was driven last
+        self._away: set[int] = set()  # joints that something else has moved since the arm was driven, and may yet
         self._size = len(settings.joints) + (0 if self._tool is None else len(self._tool.place.pose))
         self.goals = list(measured)
 
@@ -57,6 +59,7 @@ class ArmGoals:
         self._note_goals()
         if rates.any():
             self._rested = list(measured)
+            self._away.clear()
         found: list[float] = rates.tolist()
         return found
 
@@ -77,26 +80,33 @@ class ArmGoals:
         if self._tool is not None:
             self._tool.restart()
 
-    def take_up(self, measured: Sequence[float]) -> None:
-        """Begin anew where an arm at rest is, if something else has moved it away from its goals.
+    def take_up(self, measured: Sequence[float]) -> bool:
+        """Begin anew where an arm at rest is, if something else has moved it away from its goals; return whether.
+
+        From then on nothing here holds the arm, so that its goals follow it to where it comes to rest. An arm that is
+        held keeps its goals: it may hang below them by MOVED, and does not go down by being driven and released.
 
         What a gripper holds keeps it from its goal. It begins anew only if it was moved away from its goal since it was
         driven, also during a stop, and goes on squeezing when the rest of the arm was moved.
         """
         moved = {number for number in range(len(self.goals)) if self._was_moved(number, measured[number])}
         if not moved:
-            return
+            return False
         if not moved.issubset(self._grips):
             moved |= set(range(len(self.goals))).difference(self._grips)
             if self._tool is not None:
                 self._tool.hold([measured[number] for number in self._tool.place.joints])
         self._others.hold([measured[n] if n in moved else self.goals[n] for n in self._others.joints])
         self._rested = list(measured)
+        self._away |= moved
         self._note_goals()
+        return True
 
     def _was_moved(self, number: int, place: float) -> bool:
         goal, rested = self.goals[number], self._rested[number]
         way = abs(place - goal)
+        if number in self._away:
+            return way > FOLLOWS
         if number not in self._grips:
             return way > MOVED
         if not abs(rested - goal) <= way:  # it goes on closing, or was not measured before

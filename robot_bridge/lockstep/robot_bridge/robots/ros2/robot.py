@@ -164,6 +164,10 @@ class Ros2Robot(Robot):
         now = clock.now()
         return [value for drive in self._drives for value in drive.goals(now)]
 
+    def take_up(self) -> Sequence[float]:
+        now = clock.now()
+        return [value for drive in self._drives for value in drive.take_up(now)]
+
     def rest_from_thread(self) -> None:
         """rclpy publishes from any thread; a middleware that blocks all of them blocks this one too."""
         call_all([drive.rest_from_thread for drive in self._drives])

@@ -58,6 +58,9 @@ class So101(Robot):
         self._contact = ContactForce(model)
         self._stopped = False  # the arm holds its posture, at any applied value
         self._values: Sequence[float] | None = None
+        self._began_anew = (
+            False  # the simulation, which holds the arm where it is then, and the bridge does not know yet
+        )
         self._pursues = False  # the tool goes on to a goal that stands still
         self._now = now
         self._ticked_at = now()
@@ -79,6 +82,10 @@ class So101(Robot):
         *joints, x, y, z, rx, ry, rz = self._drive.pursued()
         return [*joints, self._grip.goal, x, y, z, rx, ry, rz]
 
+    def take_up(self) -> Sequence[float] | None:
+        anew, self._began_anew = self._began_anew, False
+        return self.goals() if anew else None
+
     def tick(self) -> None:
         simulation, seconds = self.simulation, self.tick_seconds
         before, self._ticked_at = self._ticked_at, self._now()
@@ -90,6 +97,7 @@ class So101(Robot):
             rates[ARM] = self._drive.drive(values, seconds, since, joints, pursues=self._pursues)
         simulation.aim((*self._drive.goals, self._grip.goal), rates)
         if not simulation.step(STEPS_PER_TICK):
+            self._began_anew = True
             self._drive.hold(HOME[ARM])
             self._grip.hold(HOME[GRIPPER])
         self._contact.update(simulation.data, seconds)

@@ -57,6 +57,9 @@ class GoalArmDrive(Drive):
         self._before: list[float] = []  # values of the tick before
         self._ticked_at: float | None = None  # s
         self._spoke_at = float("-inf")  # s, when a joint's goal moved last
+        self._held = True  # the arm could not be driven in the last tick
+        self._moved = False  # the goals are others than those applied, and the bridge does not know yet
+        self._looked = False  # in this tick the bridge asked already whether something else has moved the arm
         self.pursues = False  # a command drives the tool
 
     def seen(self, now: float) -> bool:
@@ -73,6 +76,7 @@ class GoalArmDrive(Drive):
         rates = self._advance(values, dt, since, now, held)
         if held and changed:  # goals that move have to end before the arm is driven again; nothing of this is published
             rates = [1.0] * self.size
+            self._moved |= not self._stopped and lost
         step = self._stream.step(rates, lost, now)
         self.topic.publish(self.advance(step.said, step.values, dt), step.said)
 
@@ -96,6 +100,7 @@ class GoalArmDrive(Drive):
 
     def reset(self) -> None:
         super().reset()
+        self._moved = False
         if self._goals is not None:
             self._goals.restart()
 
@@ -120,6 +125,17 @@ class GoalArmDrive(Drive):
         """Return the goal of each axis; where the arm is before the first motion."""
         return self._goals.pursued() if self._begun(now) and self._goals is not None else self.measured_axes(now)
 
+    def take_up(self, now: float) -> list[float]:
+        """Begin anew where others have moved the arm, unless it was just driven; return the goals then, else NaN.
+
+        The next `step` leaves them there: its values are these, and others would lead back to them.
+        """
+        self._looked = True
+        if not self._held:
+            self._look(now)
+        moved, self._moved = self._moved, False
+        return self.goals(now) if moved else [math.nan] * self.size
+
     def joints(self, now: float) -> list[float]:
         return [joint.position for joint in self._feedback.known(now)]
 
@@ -135,19 +151,24 @@ class GoalArmDrive(Drive):
     def _advance(self, values: Sequence[float], dt: float, since: float, now: float, held: bool) -> list[float]:
         """Let a tick pass; return the joints' rates, and nought for each axis of the tool."""
         still = [0.0] * self.size
+        looked, self._looked, self._held = self._looked, False, held
         if not self._begun(now) or self._goals is None:
             return still
         if held:
             self._goals.hold()
             return still
-        measured = self.joints(now)
-        if now - self._spoke_at > QUIET:
-            self._goals.take_up(measured)
-        rates = self._goals.drive(values, dt, since, measured, self.pursues)
+        if not looked:
+            self._look(now)
+        rates = self._goals.drive(values, dt, since, self.joints(now), self.pursues)
         if any(rates):
             self._spoke_at = now
         still[: len(rates)] = rates
         return still
+
+    def _look(self, now: float) -> None:
+        """Begin anew where something else has moved the arm since it was driven."""
+        if self._goals is not None and now - self._spoke_at > QUIET and self.seen(now):
+            self._moved |= self._goals.take_up(self.joints(now))
 
 
 def _points(goals: Sequence[float], rates: Sequence[float], measured: Sequence[float], bounds: _Bounds) -> list[float]:
