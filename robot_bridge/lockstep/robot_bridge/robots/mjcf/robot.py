@@ -67,9 +67,8 @@ class MjcfRobot(Robot):
         self._wrench = wrench_sense(model)
         self._ranges = range_sense(model, data)
         cameras = cameras_of(model)
-        self._began_anew = (
-            False  # the simulation, which holds the arm where it is then, and the bridge does not know yet
-        )
+        # The simulation has, which holds the arm where it is then, and the bridge does not know yet.
+        self._began_anew = False
         self._values = [drive.at_rest(drive.measured(data)) for drive in self._drives] + self._tools.measured()
         self._now = now
         self._ticked_at = now()

@@ -61,9 +61,8 @@ class MobileManipulator(Robot):
         self._sound = Sound(MICROPHONE.sample_rate, round(MICROPHONE.sample_rate * SEGMENT_SECONDS))
         self._values: Sequence[float] | None = None  # None: at rest
         self._stopped = False  # the base is parked and the arm holds its posture, at any applied value
-        self._began_anew = (
-            False  # the simulation, which holds the arm where it is then, and the bridge does not know yet
-        )
+        # The simulation has, which holds the arm where it is then, and the bridge does not know yet.
+        self._began_anew = False
         self._light = False
         self._battery = SimulatedBattery()
         self._renderer = Renderer(model, CAMERAS[0].width, CAMERAS[0].height)

@@ -58,9 +58,8 @@ class So101(Robot):
         self._contact = ContactForce(model)
         self._stopped = False  # the arm holds its posture, at any applied value
         self._values: Sequence[float] | None = None
-        self._began_anew = (
-            False  # the simulation, which holds the arm where it is then, and the bridge does not know yet
-        )
+        # The simulation has, which holds the arm where it is then, and the bridge does not know yet.
+        self._began_anew = False
         self._pursues = False  # the tool goes on to a goal that stands still
         self._now = now
         self._ticked_at = now()
