@@ -12,6 +12,7 @@ from lockstep.robot_bridge.control.clock import Clock
 from lockstep.robot_bridge.control.event_core import Answered, EventCore, Executed, Refused
 from lockstep.robot_bridge.control.feedback_issuer import FeedbackIssuer
 from lockstep.robot_bridge.control.goals.measured_axes import MeasuredAxes
+from lockstep.robot_bridge.control.goals.taken_up_goals import TakenUpGoals
 from lockstep.robot_bridge.control.limits.axis_shaper import AxisShaper
 from lockstep.robot_bridge.control.limits.motion_limits import MotionLimits
 from lockstep.robot_bridge.control.start_signal import StartSignal
@@ -63,6 +64,7 @@ class CommandExecutor:
         self._feedback = feedback
         self._actions = actions
         self._measured = measured
+        self._taken_up = TakenUpGoals(robot, shaper)
         self._refusals = refusals
         self._counters = counters
         self._log = log
@@ -71,7 +73,6 @@ class CommandExecutor:
         self._signal = StartSignal(description)
         self._axes = len(description.axes)
         self._blind: frozenset[str] = frozenset()  # limits that slowed the robot because its position was unknown
-        self._taken_up = False  # something else moved the robot's goals in the last tick
         self._rested = True  # nothing was driven at the last tick
 
     # LinkHandler
@@ -151,7 +152,8 @@ class CommandExecutor:
         self._stops.look(now)
         self._measured.look()
         self._actions.look()
-        self._take_up()
+        if self._taken_up.look():
+            self._core.want_issue()
         moved = self._moves
         self._actions.step()
         values = self._shaper.step(now, self._robot.tick_seconds)  # asks for positions, which may hang too
@@ -192,19 +194,6 @@ class CommandExecutor:
         if known:
             self._core.interlock.require()
         return False
-
-    def _take_up(self) -> None:
-        """Let the goals at rest follow a robot that something else moves, and issue them where that ends.
-
-        Raises:
-            BaseException: the adapter raised.
-        """
-        if not self._shaper.may_take_up:
-            return
-        before, pursued = self._taken_up, self._robot.take_up()
-        self._taken_up = pursued is not None and self._shaper.take_up(pursued)
-        if before and not self._taken_up:
-            self._core.want_issue()
 
     @property
     def _moves(self) -> bool:

@@ -1,5 +1,6 @@
 """A robot behind ROS 2 topics, as the bridge sees it."""
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import Final
 
@@ -166,7 +167,11 @@ class Ros2Robot(Robot):
 
     def take_up(self) -> Sequence[float]:
         now = clock.now()
-        return [value for drive in self._drives for value in drive.take_up(now)]
+        return [
+            value
+            for drive in self._drives
+            for value in (drive.take_up(now) if isinstance(drive, GoalArmDrive) else [math.nan] * drive.size)
+        ]
 
     def rest_from_thread(self) -> None:
         """rclpy publishes from any thread; a middleware that blocks all of them blocks this one too."""

@@ -53,10 +53,6 @@ class Drive(ABC):
         """Return the goal that each axis pursues; NaN for one that has none."""
         return [math.nan] * self.size
 
-    def take_up(self, now: float) -> list[float]:
-        """Begin anew where something else has moved the part at rest; return `goals` then, else NaN."""
-        return [math.nan] * self.size
-
     def measured_axes(self, now: float) -> list[float]:
         """Return the measured value of each axis now; cheaper than `sense` where that matters."""
         return self.sense(now).axes

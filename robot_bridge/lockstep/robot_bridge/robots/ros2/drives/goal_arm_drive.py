@@ -59,7 +59,7 @@ class GoalArmDrive(Drive):
         self._spoke_at = float("-inf")  # s, when a joint's goal moved last
         self._held = True  # the arm could not be driven in the last tick
         self._moved = False  # the goals are others than those applied, and the bridge does not know yet
-        self._looked = False  # in this tick the bridge asked already whether something else has moved the arm
+        self._looked = False  # in this tick it was asked already whether something else has moved the arm
         self.pursues = False  # a command drives the tool
 
     def seen(self, now: float) -> bool:
@@ -110,16 +110,13 @@ class GoalArmDrive(Drive):
         super().rest_from_thread()
 
     def sense(self, now: float) -> Sensed:
+        seen = self._begun(now) and self.seen(now)  # first: a state that comes meanwhile is only newer
         known = self._feedback.known(now)
         positions = [joint.position for joint in known]
-        return Sensed(self.measured_axes(now), positions, self._feedback.is_still(known))
-
-    def measured_axes(self, now: float) -> list[float]:
-        """Return where the joints and the tool are; NaN where that is not known."""
-        if not self._begun(now) or self._goals is None or not self.seen(now):
-            joints = self.joints(now)
-            return [*joints, *[float("nan")] * (self.size - len(joints))]
-        return self._goals.measured_axes(self.joints(now))
+        axes = [*positions, *[math.nan] * (self.size - len(positions))]
+        if seen and self._goals is not None:
+            axes = self._goals.measured_axes(positions)
+        return Sensed(axes, positions, self._feedback.is_still(known))
 
     def goals(self, now: float) -> list[float]:
         """Return the goal of each axis; where the arm is before the first motion."""
@@ -131,10 +128,9 @@ class GoalArmDrive(Drive):
         The next `step` leaves them there: its values are these, and others would lead back to them.
         """
         self._looked = True
-        if not self._held:
-            self._look(now)
-        moved, self._moved = self._moved, False
-        return self.goals(now) if moved else [math.nan] * self.size
+        if not self._held and self._goals is not None and now - self._spoke_at > QUIET and self.seen(now):
+            self._moved |= self._goals.take_up(self.joints(now))
+        return self.goals(now) if self._moved else [math.nan] * self.size
 
     def joints(self, now: float) -> list[float]:
         return [joint.position for joint in self._feedback.known(now)]
@@ -151,24 +147,22 @@ class GoalArmDrive(Drive):
     def _advance(self, values: Sequence[float], dt: float, since: float, now: float, held: bool) -> list[float]:
         """Let a tick pass; return the joints' rates, and nought for each axis of the tool."""
         still = [0.0] * self.size
-        looked, self._looked, self._held = self._looked, False, held
+        self._held = held
+        if self._looked:
+            self._moved = False  # the bridge knows
+        elif not held:
+            self.take_up(now)
+        self._looked = False
         if not self._begun(now) or self._goals is None:
             return still
         if held:
             self._goals.hold()
             return still
-        if not looked:
-            self._look(now)
         rates = self._goals.drive(values, dt, since, self.joints(now), self.pursues)
         if any(rates):
             self._spoke_at = now
         still[: len(rates)] = rates
         return still
-
-    def _look(self, now: float) -> None:
-        """Begin anew where something else has moved the arm since it was driven."""
-        if self._goals is not None and now - self._spoke_at > QUIET and self.seen(now):
-            self._moved |= self._goals.take_up(self.joints(now))
 
 
 def _points(goals: Sequence[float], rates: Sequence[float], measured: Sequence[float], bounds: _Bounds) -> list[float]:
