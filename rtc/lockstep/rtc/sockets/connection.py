@@ -12,9 +12,9 @@ from lockstep.rtc.ice.check_list import LocalCandidate
 from lockstep.rtc.peer import OfferedMedia, Peer
 from lockstep.rtc.peer_events import PeerEnded, PeerEvent
 from lockstep.rtc.sdp import Fragment, LocalMedia, SessionDescription
+from lockstep.rtc.sockets.core_timer import CoreTimer
 from lockstep.rtc.sockets.endpoint_settings import EndpointSettings
 from lockstep.rtc.sockets.event_delivery import EventDelivery, Listener
-from lockstep.rtc.sockets.core_timer import CoreTimer
 
 __all__ = ["Connection", "Turns"]
 
