@@ -86,7 +86,7 @@ describe("a turned pose", () => {
 
   it("is never told to go further than the lead, or beyond a bound, whatever the inputs and delays", () => {
     const random = randomNumbers(4);
-    for (let run = 0; run < 200; run += 1) {
+    for (let run = 0; run < 50; run += 1) {
       const jog = createTurnJog();
       let applied: Vector = [random() * 4 - 2, random() * 4 - 2, random() * 4 - 2];
       for (let step = 0; step < 60; step += 1) {
