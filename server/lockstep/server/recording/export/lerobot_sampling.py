@@ -9,7 +9,7 @@ the robot was not driven; the moments until the next event have no rows.
 from collections.abc import Sequence
 from typing import NamedTuple
 
-__all__ = ["LONGEST", "Sample", "sampled"]
+__all__ = ["LONGEST", "ROUNDING", "Sample", "sampled"]
 
 LONGEST = 1.0  # s that an event stands for, at most; commands of an operator who is armed come 5 times a second
 
