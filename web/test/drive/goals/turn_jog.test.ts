@@ -66,7 +66,7 @@ describe("a turned pose", () => {
           const turn = turnSince(from, turnedBy(from, rates, 100, delay).at(-1) ?? from);
           const off = Math.hypot(...turn.map((value, at) => (at === part ? 0 : value)));
           expect(sign * turn[part], `${from.join()} ${part}`).toBeGreaterThan(0.2);
-          expect(off, `${from.join()} ${part}`).toBeLessThan(0.1 * Math.hypot(...turn));
+          expect(off, `${from.join()} ${part}`).toBeLessThan(0.05 * Math.hypot(...turn));
         }
   });
 
