@@ -18,6 +18,7 @@ from lockstep.protocol.link_secret import LinkSecret
 __all__ = [
     "DIAL",
     "MAX_PAIRING_MESSAGE",
+    "OWN_LINK_ENDS",
     "TRUSTED",
     "WAITS",
     "WAIT_HEADER",
@@ -41,6 +42,7 @@ EXAMPLE = "K7-3F9QW-2MXBD"
 SCHEME = "LockstepRobot"  # of the request's `Authorization` (RFC 9110 11.4)
 TRUSTED = "trusted"  # instead of a pin: the robot has checked the console's certificate against its authorities
 WAIT_HEADER, WAITS = "Lockstep-Link", "waits"  # of the answer: the console has another connection for this link
+OWN_LINK_ENDS = 6.0  # s; the console ends a robot's own link from before a break sooner, for its silence
 SCRYPT_COST = {"n": 1 << 15, "r": 8, "p": 1, "maxmem": 64 << 20}  # 32 MiB and some 60 ms
 
 _CODE = re.compile(rf"[{ALPHABET}]{{{PLACE_SIGNS + SECRET_SIGNS}}}")

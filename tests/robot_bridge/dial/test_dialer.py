@@ -22,6 +22,15 @@ from tests.waiting import PATIENCE
 ACCESS = ConsoleAccess(ConsoleAddress.parse("ws://127.0.0.1:9"), ConsoleKey(LinkSecret("k" * 32)))
 
 
+async def _dial_until(enough: asyncio.Event, links: object) -> None:
+    dialing = asyncio.create_task(dialer.Dialer(ACCESS, cast(LinkServer, links)).run())
+    async with asyncio.timeout(PATIENCE):
+        await enough.wait()
+    dialing.cancel()
+    with pytest.raises(asyncio.CancelledError):
+        await dialing
+
+
 async def test_each_link_tells_a_trouble_once_however_often_it_is_tried(
     monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
@@ -39,12 +48,7 @@ async def test_each_link_tells_a_trouble_once_however_often_it_is_tried(
     monkeypatch.setattr(dialer, "open_connection", refused)
     monkeypatch.setattr(RedialTimes, "wait", lambda *_, **__: 0.0)
     caplog.set_level(logging.INFO, dialer.__name__)
-    dialing = asyncio.create_task(dialer.Dialer(ACCESS, cast(LinkServer, None)).run())
-    async with asyncio.timeout(PATIENCE):
-        await enough.wait()
-    dialing.cancel()
-    with pytest.raises(asyncio.CancelledError):
-        await dialing
+    await _dial_until(enough, None)
     assert len({url.rpartition("/")[2] for url in tried}) == 2, "both links were tried"
     told = [record.getMessage() for record in caplog.records]
     assert len(told) == len(set(told)) == 4, "two troubles of each link"
@@ -89,12 +93,7 @@ async def told(
     monkeypatch.setattr(RedialTimes, "wait", lambda *_, **__: 0.0)
     caplog.set_level(logging.INFO, dialer.__name__)
     links = SimpleNamespace(dialled_link=lambda key: SimpleNamespace(admitted=asyncio.Event()))
-    dialing = asyncio.create_task(dialer.Dialer(ACCESS, cast(LinkServer, links)).run())
-    async with asyncio.timeout(PATIENCE):
-        await lasts.wait()
-    dialing.cancel()
-    with pytest.raises(asyncio.CancelledError):
-        await dialing
+    await _dial_until(lasts, links)
     return [record.getMessage() for record in caplog.records]
 
 

@@ -1,6 +1,7 @@
 """When a second connection is told to people."""
 
-from lockstep.server.robot.second_connection import OWN_LINK_ENDS, WAIT_ENDS, SecondConnection
+from lockstep.protocol.dial_in import OWN_LINK_ENDS
+from lockstep.server.robot.second_connection import WAIT_ENDS, SecondConnection
 
 
 def tries(second: SecondConnection, start: float, end: float, every: float = 2.5) -> int:

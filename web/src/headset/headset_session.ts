@@ -9,7 +9,7 @@ import type { RobotDescription } from "../protocol/wire";
 import type { HandSettings } from "../xr/hand_mapping";
 import type { ButtonName } from "../xr/headset_buttons";
 import { PoseDevice } from "../xr/pose_drive";
-import type { RigidPose } from "../xr/rigid";
+import type { RigidPose } from "../util/rigid";
 import { Battery } from "./battery";
 import { Hands } from "./hands";
 import { HeadsetView, type ViewCamera } from "./headset_view";

@@ -2,7 +2,7 @@ import { Color, GridHelper, Group, PerspectiveCamera, Scene, type Object3D } fro
 import { layoutPanels } from "../xr/panel_layout";
 import { pressable, type ButtonName } from "../xr/headset_buttons";
 import { pairStreams, type PanelStreams } from "../xr/stereo_pairs";
-import { about, heading, type Quaternion, type RigidPose } from "../xr/rigid";
+import { about, heading, type Quaternion, type RigidPose } from "../util/rigid";
 import type { Side } from "../xr/headset_input";
 import { CanvasPanel } from "./canvas_panel";
 import { drawButton, drawStatus } from "./panel_drawings";

@@ -1,6 +1,6 @@
 import { readGesture } from "../xr/hand_gesture";
 import type { HandSample, Side } from "../xr/headset_input";
-import type { Quaternion, RigidPose, Vector } from "../xr/rigid";
+import type { Quaternion, RigidPose, Vector } from "../util/rigid";
 
 /** One controller or hand at one frame, with what only the view needs. */
 export interface HandReading {

@@ -2,7 +2,7 @@ import { createScenePoses, forgetPoses, keepPose } from "../gate/scene_poses";
 import type { Camera, Feedback, RobotDescription } from "../protocol/wire";
 import { BodyPoses } from "../robot/body_poses";
 import { toolFrames, type ToolState } from "../robot/tool_frames";
-import { difference, inverse, rotate, type RigidPose, type Vector } from "../xr/rigid";
+import { difference, inverse, rotate, type RigidPose, type Vector } from "../util/rigid";
 
 type View = NonNullable<Camera["calibration"]>;
 const KEY = "lockstep.tool_frames";

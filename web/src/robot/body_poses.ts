@@ -1,5 +1,5 @@
 import type { Body, Camera, RobotDescription } from "../protocol/wire";
-import { about, multiply, rotate, type Quaternion, type RigidPose, type Vector } from "../xr/rigid";
+import { about, multiply, rotate, type Quaternion, type RigidPose, type Vector } from "../util/rigid";
 
 const HERE: RigidPose = { position: [0, 0, 0], orientation: [0, 0, 0, 1] };
 

@@ -1,5 +1,5 @@
 import type { Feedback, Pose, RobotDescription } from "../protocol/wire";
-import { distance, inverse, multiply, ofRotationVector, type RigidPose, type Vector } from "../xr/rigid";
+import { distance, inverse, multiply, ofRotationVector, type RigidPose, type Vector } from "../util/rigid";
 import { BodyPoses, joined } from "./body_poses";
 
 /** What the frames of tools are made of. */

@@ -1,7 +1,7 @@
 import { AxesHelper, type Material } from "three";
 import type { RobotDescription } from "../protocol/wire";
 import { toolFrames, type ToolState } from "../robot/tool_frames";
-import type { RigidPose } from "../xr/rigid";
+import type { RigidPose } from "../util/rigid";
 import type { RobotModel } from "./robot_model";
 
 const SHARE = 0.16; // of the robot's size: the length of a frame's axes

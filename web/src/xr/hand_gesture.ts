@@ -1,4 +1,4 @@
-import { distance, type Vector } from "./rigid";
+import { distance, type Vector } from "../util/rigid";
 
 /** Places of a tracked hand's joints by their WebXR names; null: not tracked. */
 export type JointPlaces = (name: string) => Vector | null;

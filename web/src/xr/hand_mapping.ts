@@ -10,7 +10,7 @@ import {
   type Quaternion,
   type RigidPose,
   type Vector,
-} from "./rigid";
+} from "../util/rigid";
 
 /** WebXR has x to the right, y up and -z ahead; a robot's base has x ahead, y to the left and z up (REP 103). */
 const TO_REP_103: Quaternion = [0.5, -0.5, -0.5, 0.5];

@@ -1,6 +1,6 @@
 import type { PadInputs } from "../gamepad/mapping";
 import { shapeStick } from "../gamepad/stick_shape";
-import { distance, inverse, multiply, rotationVector, type RigidPose } from "./rigid";
+import { distance, inverse, multiply, rotationVector, type RigidPose } from "../util/rigid";
 
 export type Side = "left" | "right";
 

@@ -12,7 +12,7 @@ import {
   type HandSettings,
 } from "./hand_mapping";
 import type { Side } from "./headset_input";
-import { about, type Quaternion, type RigidPose, type Vector } from "./rigid";
+import { about, type Quaternion, type RigidPose, type Vector } from "../util/rigid";
 
 /** The hands that may drive now. */
 export interface DrivingHands {

@@ -2,7 +2,7 @@ import { describe, expect, it } from "vitest";
 import vectors from "../../../tests/vectors/poses.json";
 import { BodyPoses } from "../../src/robot/body_poses";
 import { toolFrames } from "../../src/robot/tool_frames";
-import { about, type RigidPose } from "../../src/xr/rigid";
+import { about, type RigidPose } from "../../src/util/rigid";
 import type { Body, Camera, Pose, RobotDescription } from "../../src/protocol/wire";
 import { descriptionOf, goalAxisOf } from "../messages";
 

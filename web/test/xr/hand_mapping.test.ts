@@ -1,6 +1,6 @@
 import { describe, expect, it } from "vitest";
 import { baseFrame, baseFromSpace, bindHand, DEFAULT_HAND, handValues } from "../../src/xr/hand_mapping";
-import { about, multiply, rotate, type Quaternion, type RigidPose, type Vector } from "../../src/xr/rigid";
+import { about, multiply, rotate, type Quaternion, type RigidPose, type Vector } from "../../src/util/rigid";
 
 const STILL: Quaternion = [0, 0, 0, 1];
 

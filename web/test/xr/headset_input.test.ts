@@ -10,7 +10,7 @@ import {
   type HeadsetEvent,
   type HeadsetInput,
 } from "../../src/xr/headset_input";
-import { about } from "../../src/xr/rigid";
+import { about } from "../../src/util/rigid";
 
 const FRAME_MS = 14;
 const PLACE = { position: [0.2, 1.2, -0.4], orientation: [0, 0, 0, 1] } as const;

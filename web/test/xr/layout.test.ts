@@ -4,7 +4,7 @@ import { pairStreams } from "../../src/xr/stereo_pairs";
 import { readHandSettings } from "../../src/xr/hand_settings";
 import { DEFAULT_HAND } from "../../src/xr/hand_mapping";
 import { readGesture } from "../../src/xr/hand_gesture";
-import type { Vector } from "../../src/xr/rigid";
+import type { Vector } from "../../src/util/rigid";
 
 describe("cameras", () => {
   it("whose names end in left and right are a pair, whatever stands before it", () => {

@@ -2,7 +2,7 @@ import { describe, expect, it } from "vitest";
 import { baseFrame, bindHand, cameraFrame, DEFAULT_HAND, handValues } from "../../src/xr/hand_mapping";
 import { PoseDevice, sideOf, type DrivingHands } from "../../src/xr/pose_drive";
 import type { Side } from "../../src/xr/headset_input";
-import { about, multiply, type Quaternion, type RigidPose, type Vector } from "../../src/xr/rigid";
+import { about, multiply, type Quaternion, type RigidPose, type Vector } from "../../src/util/rigid";
 import type { Pose } from "../../src/protocol/wire";
 import { axisOf, descriptionOf, feedbackOf, goalAxisOf } from "../messages";
 import { randomNumbers } from "../random";

@@ -5,7 +5,7 @@ import logging
 import random
 import ssl
 
-from lockstep.protocol.dial_in import TRUSTED, WAIT_HEADER, WAITS, RobotToken
+from lockstep.protocol.dial_in import OWN_LINK_ENDS, TRUSTED, WAIT_HEADER, WAITS, RobotToken
 from lockstep.protocol.messages import LinkRole
 from lockstep.robot_bridge.dial.console_access import ConsoleAccess
 from lockstep.robot_bridge.dial.console_connection import ConsoleConnection, console_context, open_connection
@@ -17,7 +17,6 @@ __all__ = ["Dialer"]
 
 ROLES: tuple[LinkRole, ...] = ("operator", "media")
 HEALTHY_AFTER = 5.0  # s of a link; then the next loss is followed by a try at once
-OWN_LINK_ENDS = 6.0  # s; a console ends this robot's own link from before a break sooner, for its silence
 TAKEN = (
     "the console has another connection with this robot's key, and takes this one when that ends: a second robot with"
     " the same key, or a copy of its state directory, may be running"

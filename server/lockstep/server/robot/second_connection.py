@@ -1,8 +1,9 @@
 """When a connection that waits for the end of another one is told to people. No I/O, no clock."""
 
-__all__ = ["SecondConnection"]
+from lockstep.protocol.dial_in import OWN_LINK_ENDS
 
-OWN_LINK_ENDS = 6.0  # s; a robot's own link from before a break ends sooner, for its silence
+__all__ = ["WAIT_ENDS", "SecondConnection"]
+
 WAIT_ENDS = 30.0  # s without a try; a robot that waits dials again well before that
 
 

@@ -73,8 +73,9 @@ def test_axes_that_are_driven_brake_or_are_told_where_they_stand_are_not_disturb
 def test_a_goal_that_the_robot_does_not_know_stays() -> None:
     arm = Arm()
     goals = arm.shaper.goals
-    assert not arm.shaper.take_up([math.nan] * 6)
-    assert arm.shaper.goals == goals
+    for unknown in (math.nan, math.inf):
+        assert not arm.shaper.take_up([unknown] * 6)
+        assert arm.shaper.goals == goals
     arm.shaper.begin([math.nan] * 6, [math.nan] * 6)
     assert not arm.shaper.take_up([0.0] * 6)
     assert not arm.shaper.is_known

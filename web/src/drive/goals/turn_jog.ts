@@ -8,7 +8,7 @@ import {
   rotationVector,
   type Quaternion,
   type Vector,
-} from "../../xr/rigid";
+} from "../../util/rigid";
 import type { AxisValue } from "./goal_range";
 import { REACH_SHARE } from "./goal_range";
 import { LONGEST_STEP_MS, longestLead, type AxisPlace } from "./jog";

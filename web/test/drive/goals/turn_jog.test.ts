@@ -1,7 +1,7 @@
 import { describe, expect, it } from "vitest";
 import type { AxisPlace } from "../../../src/drive/goals/jog";
 import { createTurnJog, stepTurn, type Three } from "../../../src/drive/goals/turn_jog";
-import { inverse, multiply, ofRotationVector, rotationVector, type Vector } from "../../../src/xr/rigid";
+import { inverse, multiply, ofRotationVector, rotationVector, type Vector } from "../../../src/util/rigid";
 import { goalAxisOf } from "../../messages";
 import { randomNumbers } from "../../random";
 

@@ -130,7 +130,10 @@ class AxisShaper:
         moved = [
             (axis, goal)
             for number, (axis, goal) in enumerate(zip(self._axes, pursued, strict=True))
-            if isinstance(axis, GoalAxis) and number not in read and abs(goal - axis.goal) > ROUNDING
+            if isinstance(axis, GoalAxis)
+            and number not in read
+            and math.isfinite(goal)
+            and abs(goal - axis.goal) > ROUNDING
         ]
         for axis, goal in moved:
             axis.begin(goal)

@@ -9,7 +9,7 @@ import {
   rotate,
   rotationVector,
   type Vector,
-} from "../../src/xr/rigid";
+} from "../../src/util/rigid";
 import { randomNumbers } from "../random";
 
 function expectVector(found: readonly number[], expected: readonly number[]): void {
