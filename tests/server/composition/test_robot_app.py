@@ -6,8 +6,6 @@ from inspect import iscoroutinefunction
 from typing import Any
 
 from lockstep.protocol.console import Seat, SeatRequest
-from lockstep.protocol.messages import Command
-from lockstep.protocol.serial import event_after
 from lockstep.server.composition.robot_app import create_app
 from lockstep.server.settings import Settings
 from tests.server.rig import PATIENCE, TestPeer, running_bridge, running_console
@@ -28,10 +26,7 @@ async def test_a_console_that_ends_with_peers_connected_ends_them_and_rests_the_
                 now = await driver.feedback()
                 await driver.until(lambda each: isinstance(each, Seat) and each.holder != "")  # the seat
                 for speed in (0.0, 0.2):
-                    now, values = driver.newest_feedback(), [speed] + [0.0] * (len(now.axes) - 1)
-                    following = event_after(now.event)
-                    driver.send("control", Command(event=following, issue=now.issue, nonce=now.nonce, values=values))
-                    await driver.feedback(lambda each, wanted=following: each.event == wanted)  # type: ignore[misc]
+                    await driver.drive([speed] + [0.0] * (len(now.axes) - 1))
             async with asyncio.timeout(PATIENCE):
                 for peer in peers:
                     await peer.closed.wait()

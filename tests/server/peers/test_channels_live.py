@@ -50,16 +50,10 @@ async def _take_seat(peer: TestPeer) -> None:
 
 async def _drive(peer: TestPeer, value: float, count: int = 1) -> Feedback:
     """Events one after the other, as fast as they are answered; this network loses nothing."""
-    await peer.feedback()
+    now = await peer.feedback()
     for _ in range(count):
-        now = peer.newest_feedback()
-        following = event_after(now.event)
-        peer.send(
-            "control",
-            Command(event=following, issue=now.issue, nonce=now.nonce, values=[value] + [0.0] * (len(now.axes) - 1)),
-        )
-        await peer.feedback(lambda each, wanted=following: each.event == wanted)  # type: ignore[misc]
-    return peer.newest_feedback()
+        now = await peer.drive([value] + [0.0] * (len(now.axes) - 1))
+    return now
 
 
 async def _refused(peer: TestPeer, reason: str, detail: str = "") -> Refusal:
@@ -83,12 +77,13 @@ async def test_a_newcomer_is_told_all_there_is_to_know() -> None:
 async def test_an_operator_takes_the_seat_and_drives() -> None:
     async with running_rig() as rig, rig.peer("operator") as peer:
         await _take_seat(peer)
-        before = peer.newest_feedback().event
+        first = peer.newest_feedback()
         last = await _drive(peer, 0.2, count=20)
-        assert last.event == before + 20
+        executed = last.event - first.event
+        assert executed >= 20  # and a neutral one each time that a busy machine held the robot up
         assert not last.at_rest
-        assert rig.count("lockstep_commands_total", outcome="forward") == 21
-        assert rig.count("lockstep_robot_turnaround_seconds_count") == 21
+        assert rig.count("lockstep_robot_turnaround_seconds_count") == executed + 1
+        assert rig.count("lockstep_commands_total", outcome="forward") >= executed + 1
 
 
 async def test_what_the_bridge_refuses_reaches_the_sender_and_the_way_is_free_again() -> None:

@@ -34,6 +34,7 @@ DEFAULT_ROBOT = "mobile-manipulator"
 LOCKSTEP = str(Path(sys.executable).with_name("lockstep"))
 ROBOTS = (DEFAULT_ROBOT, "planar")
 HTTP_SECONDS = 30.0
+METRICS_ADDRESS = "127.0.0.2"
 TRIES = 30  # for the counters, each after a Retry-After
 MAX_PEERS = 300  # more than any section needs
 
@@ -60,8 +61,14 @@ class Stack:
     observer: str
 
     async def metrics(self) -> "Metrics":
-        """Return the console's counters now; ask again if others at this address have used up its requests."""
-        async with httpx.AsyncClient(trust_env=False, timeout=HTTP_SECONDS) as http:
+        """Return the console's counters now.
+
+        A console here is asked from an address of its own: those of this address may have used up its requests and
+        connections.
+        """
+        is_here = urlsplit(self.url).hostname == "127.0.0.1"
+        way = httpx.AsyncHTTPTransport(local_address=METRICS_ADDRESS if is_here else None)
+        async with httpx.AsyncClient(transport=way, trust_env=False, timeout=HTTP_SECONDS) as http:
             for _ in range(TRIES):
                 answer = await http.get(f"{self.url}/metrics")
                 if answer.status_code != httpx.codes.TOO_MANY_REQUESTS:

@@ -1,12 +1,11 @@
 """The crowd, in a separate process: `python -m lockstep.bench.hostile.crowd LINK OPERATOR BRIDGE COUNT SEED [KIND]`.
 
 LINK is an observer's, OPERATOR the link of a peer that publishes a camera and speaks, BRIDGE is tls://host:port.
-It runs with the processor time that no other process wants (SCHED_IDLE): attackers have their own machines. It prints a
-JSON line when it has begun, answers each line on standard input with its counts, and ends at the end of its input.
+It prints a JSON line when it has begun, answers each line on standard input with its counts, and ends at the end of
+its input.
 """
 
 import asyncio
-import os
 import sys
 from collections import Counter
 from random import Random
@@ -104,7 +103,6 @@ async def _run(link: str, operator: str, bridge: str, count: int, seed: int, onl
 
 
 def main() -> None:
-    os.sched_setscheduler(0, os.SCHED_IDLE, os.sched_param(0))
     link, operator, bridge, count, seed, *kind = sys.argv[1:]
     uvloop.run(_run(link, operator, bridge, int(count), int(seed), *kind[:1]))
 
