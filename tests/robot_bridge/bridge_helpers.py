@@ -174,6 +174,11 @@ class Operator:
                 return await self.drive(values)
         return self.feedback
 
+    async def drive_until(self, condition: Callable[[], bool], values: Sequence[float | None] = DRIVE) -> None:
+        """Drive until the condition holds, however often a busy machine brings the robot to rest meanwhile."""
+        while not condition():
+            await self.drive(values)
+
     async def heard(self, condition: Callable[[Feedback], bool]) -> None:
         """Wait until the newest feedback meets the condition."""
         while not condition(self.feedback):

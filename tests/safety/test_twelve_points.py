@@ -101,8 +101,7 @@ def test_point_03_the_timeout_is_the_robots_and_on_a_monotonic_clock() -> None:
 async def test_point_03_when_commands_end_the_robot_comes_to_rest_by_itself_while_the_link_lives() -> None:
     robot = RecordingRobot()
     async with running_bridge(robot) as bridge, operator(bridge) as driver:
-        await driver.drive()
-        await robot.until(lambda: robot.applied[-1][1] != NEUTRAL, "it moves")
+        await driver.drive_until(lambda: robot.applied[-1][1] != NEUTRAL)
         await driver.heard(lambda feedback: feedback.at_rest)
         assert robot.applied[-1][1] == NEUTRAL
 

@@ -52,6 +52,16 @@ def test_without_another_command_all_is_at_rest_when_hold_has_passed() -> None:
     assert shaper.at_rest
 
 
+@pytest.mark.parametrize("phase", [0.0, 0.001, 0.002, 0.0039])
+def test_no_motion_that_a_tick_applies_lasts_beyond_hold(phase: float) -> None:
+    """What is applied lasts until the next tick, so the last tick before `hold` applies rest."""
+    shaper = AxisShaper(AXES, hold=HOLD)
+    shaper.drive([1.0, 0.5], 0.0)
+    steps = ticks(shaper, phase, 0.6)
+    moves = [now for now, values in steps if values != [0.0, 0.2]]
+    assert HOLD - 2 * DT < moves[-1] + DT <= HOLD + 1e-9
+
+
 def test_the_ramp_to_rest_is_no_steeper_than_the_brake() -> None:
     shaper = AxisShaper(AXES, hold=HOLD)
     shaper.drive([1.0, 0.5], 0.0)
@@ -118,7 +128,7 @@ def test_whatever_is_commanded_values_stay_in_limits_and_at_rest_hold_after_the_
         now += gap
         applied = shaper.step(now, DT)[0]
         assert axis.minimum <= applied <= axis.maximum
-        if now >= last + HOLD:
+        if now + DT >= last + HOLD:
             assert applied == axis.rest
 
 

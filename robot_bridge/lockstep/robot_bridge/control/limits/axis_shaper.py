@@ -174,7 +174,7 @@ class AxisShaper:
     def step(self, now: float, dt: float) -> list[float]:
         """Return the values for a tick of `dt` seconds that begins now."""
         self._begins = False
-        left = self._deadline - now
+        left = self._deadline - now - dt  # what this tick applies lasts until the next one
         if left <= 0:
             self._released = True
         released = self._released
