@@ -18,7 +18,7 @@ ALLOWED = {
     # what authors of robots implement, and the robots that do
     f"{ROBOTS}/base.py Robot": 22,
     f"{ROBOTS}/lerobot/robot.py LeRobotRobot": 19,
-    f"{ROBOTS}/micromanipulator/robot.py Micromanipulator": 19,
+    f"{ROBOTS}/micromanipulator/robot.py Micromanipulator": 20,
     f"{ROBOTS}/mjcf/robot.py MjcfRobot": 22,
     f"{ROBOTS}/mobile_manipulator/robot.py MobileManipulator": 21,
     f"{ROBOTS}/planar/robot.py PlanarRobot": 18,

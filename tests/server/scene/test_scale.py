@@ -21,7 +21,7 @@ from lockstep.server.session_events import EpochBegan, FeedbackReceived, Session
 from lockstep.server.telemetry.metrics import Metrics
 from tests.server.rig import eventually
 
-FEEDBACK = Feedback(event=1, issue=1, time=0.0, axes=[], joints=[1e-5, -2e-5, 3e-5, 0.0], wrench=[1e-5, 0, 0])
+FEEDBACK = Feedback(event=1, issue=1, time=0.0, axes=[], joints=[1e-5, -2e-5, 3e-5, 0.0, 0.0, 0.0], wrench=[1e-5, 0, 0])
 
 
 def test_a_robot_of_metres_stays_as_it_is() -> None:

@@ -98,6 +98,25 @@ def test_a_tip_above_the_focal_plane_is_unsharp_and_the_focus_follows_it(microsc
     assert seen(40, 40) > 1.5 * seen(40, 0)
 
 
+def test_a_view_that_was_moved_shows_the_same_slide_needle_and_dent_at_other_places(microscope: Microscope) -> None:
+    x, y = DROP.x / MICRO, DROP.y / MICRO
+    pressed = at(x, y, 2, contact=Contact(DROP, 8 * MICRO, (2 * MICRO, 0.0)))
+    straight = luma_of(microscope, pressed)
+    for ahead, left in ((20.0, 30.0), (-12.5, 8.5), (30.0, -50.0)):
+        moved = luma_of(microscope, pressed._replace(view=(ahead * MICRO, left * MICRO)))
+        for place in ((x, y), (x - 10, y - 5), (x - 20, y)):  # tip and dent, needle, the drop's edge
+            one, other = part(straight, *place, 8), part(moved, place[0] - ahead, place[1] - left, 8)
+            alike = np.corrcoef(one.ravel(), other.ravel())[0, 1]
+            assert alike > 0.99, place  # but for the lens' shading, and the grain
+
+
+@pytest.mark.parametrize(("ahead", "left"), [(60, 80), (-60, -80), (60, -80)])
+def test_all_of_the_views_range_is_drawn(microscope: Microscope, ahead: float, left: float) -> None:
+    luma = luma_of(microscope, at(0, 0, 40, view=(ahead * MICRO, left * MICRO)))
+    assert luma.min() >= 5
+    assert luma.max() <= 250
+
+
 def test_the_slide_is_sharp_only_in_focus(microscope: Microscope) -> None:
     def slide(focus: float) -> float:
         return sharpness(luma_of(microscope, FAR._replace(focus=focus * MICRO))[:, 120:520])
@@ -157,7 +176,7 @@ async def test_no_stamp_is_newer_than_the_truth(robot: Micromanipulator, tmp_pat
     """By the bridge's own log, and by the event that is drawn into each picture."""
     media: list[Media] = []
     log = tmp_path / "events.jsonl"
-    values = [20e-6, 10e-6, -5e-6, 5e-6, 0.0]
+    values = [20e-6, 10e-6, -5e-6, 5e-6, 3e-6, -4e-6, 0.0]
 
     async def receive(bridge: Bridge) -> None:
         async with RobotLink(*bridge.address, "media") as link:

@@ -8,7 +8,7 @@ from lockstep.robot_bridge.robots.micromanipulator.description import DESCRIPTIO
 from lockstep.robot_bridge.robots.micromanipulator.samples import MICRO, SAMPLES
 from lockstep.robot_bridge.robots.micromanipulator.stepper import STEP
 
-REST = [0.0] * 5
+REST = [0.0] * 7
 
 
 @pytest.fixture(scope="module")
@@ -39,7 +39,7 @@ def test_its_description_is_sound_and_of_micrometres() -> None:
         assert low < place < high
 
 
-def test_all_axes_are_reached_by_touch_and_all_layers_move_the_probe_or_the_lens() -> None:
+def test_all_axes_are_reached_by_touch_and_all_layers_move_the_probe_or_the_microscope() -> None:
     touched = {binding.axis for layer in DESCRIPTION.layers for binding in layer.bindings if binding.touch}
     assert touched == {axis.name for axis in DESCRIPTION.axes}
 
@@ -53,7 +53,7 @@ def test_the_fine_layer_is_a_tenth_as_fast() -> None:
 
 def test_it_goes_where_it_is_told_in_whole_steps(made: Micromanipulator) -> None:
     before = made.measure().joints
-    run(made, [20 * MICRO, -10 * MICRO, 0.0, 0.0, 0.0], 0.5)
+    run(made, [20 * MICRO, -10 * MICRO, *REST[2:]], 0.5)
     measured = made.measure()
     assert measured.joints[0] - before[0] == pytest.approx(10 * MICRO, abs=STEP)
     assert measured.joints[1] - before[1] == pytest.approx(-5 * MICRO, abs=STEP)
@@ -68,24 +68,24 @@ def test_it_goes_where_it_is_told_in_whole_steps(made: Micromanipulator) -> None
 
 def test_pressed_into_a_drop_it_feels_micronewtons_and_says_when_it_is_too_much(made: Micromanipulator) -> None:
     drop = SAMPLES[0]
-    x, y, z, _ = made.measure().joints
-    run(made, [(drop.x - x) / 2, (drop.y - y) / 2, 0.0, 0.0, 0.0], 2.0)
-    run(made, [0.0, 0.0, (drop.height - 4 * MICRO - z) / 2, 0.0, 0.0], 2.0)
+    x, y, z = made.measure().joints[:3]
+    run(made, [(drop.x - x) / 2, (drop.y - y) / 2, *REST[2:]], 2.0)
+    run(made, [0.0, 0.0, (drop.height - 4 * MICRO - z) / 2, *REST[3:]], 2.0)
     measured = made.measure()
     assert 0.2e-6 < measured.wrench[2] < 50e-6
     assert measured.faults == []
     state = made.state()
     assert state.contact is not None
     assert state.contact.sample is drop
-    run(made, [0.0, 0.0, -15 * MICRO, 0.0, 0.0], 2.0)
+    run(made, [0.0, 0.0, -15 * MICRO, *REST[3:]], 2.0)
     assert made.measure().faults == ["the needle is bent too far"]
-    run(made, [0.0, 0.0, 30 * MICRO, 0.0, 0.0], 2.0)
+    run(made, [0.0, 0.0, 30 * MICRO, *REST[3:]], 2.0)
     assert made.measure().wrench == [0.0] * 6
 
 
 def test_the_light_has_an_end(made: Micromanipulator) -> None:
-    run(made, [0.0, 0.0, 0.0, 0.0, 50.0], 5.0)
+    run(made, [*REST[:6], 50.0], 5.0)
     brightest = made.state().light
-    run(made, [0.0, 0.0, 0.0, 0.0, -50.0], 5.0)
+    run(made, [*REST[:6], -50.0], 5.0)
     assert 0 < made.state().light < 50 < brightest < 200
-    run(made, [0.0, 0.0, 0.0, 0.0, 50.0], 1.6)
+    run(made, [*REST[:6], 50.0], 1.6)

@@ -20,19 +20,20 @@ class BlurredPlanes:
     def __init__(self, planes: dict[str, Plane]) -> None:
         self._degrees = [{name: blurred(plane, sigma) for name, plane in planes.items()} for sigma in SIGMAS]
 
-    def at(self, sigma: float) -> dict[str, Plane]:
-        """Return the planes blurred by about `sigma` pixels of the picture."""
+    def at(self, sigma: float, part: tuple[slice, slice]) -> dict[str, Plane]:
+        """Return a part of the planes, blurred by about `sigma` pixels of the picture."""
         if sigma <= SIGMAS[1]:
             low, share = 0, max(0.0, sigma / SIGMAS[1])
         else:
             exponent = min(math.log2(sigma), len(SIGMAS) - 2.0)
             low = min(int(exponent) + 1, len(SIGMAS) - 2)
             share = exponent + 1 - low
+        below = {name: plane[part] for name, plane in self._degrees[low].items()}
         if share == 0.0:
-            return self._degrees[low]
+            return below
         above = self._degrees[low + 1]
         weight = np.float32(share)
-        return {name: plane + (above[name] - plane) * weight for name, plane in self._degrees[low].items()}
+        return {name: plane + (above[name][part] - plane) * weight for name, plane in below.items()}
 
 
 def blurred(plane: Plane, sigma: float) -> Plane:

@@ -1,4 +1,4 @@
-"""The micromanipulator's action `centre`: brings the tip of the needle to what was clicked on in a picture."""
+"""The micromanipulator's actions that go to a place: `centre` and `tip_to_middle`."""
 
 import math
 from collections import OrderedDict
@@ -14,68 +14,78 @@ NEAR: Final = 0.4 * MICRO  # m
 SPEED: Final = 40 * MICRO  # m/s
 PATIENCE: Final = 10.0  # s for the whole
 OLDEST: Final = 2.0  # s that the picture may be old which was clicked on
-KEPT: Final = 256  # events whose time is known: more than come in that time
+KEPT: Final = 256  # events that are known: more than come in that time
+
+Place = tuple[float, float]  # x and y, m
 
 
 class ShownPictures:
-    """Remembers when the pictures of each event were taken. No clock: the caller hands in `now`."""
+    """Remembers when and where the pictures of each event were taken. No clock: the caller hands in `now`."""
 
     def __init__(self) -> None:
-        self._times: OrderedDict[int, float] = OrderedDict()  # by event: s, of its newest picture
+        self._taken: OrderedDict[int, tuple[float, Place]] = OrderedDict()  # by event: of its newest picture, s and m
 
-    def shown(self, event: int, now: float) -> None:
-        """Note a picture that is taken now."""
-        self._times[event] = now
-        self._times.move_to_end(event)
-        if len(self._times) > KEPT:
-            self._times.popitem(last=False)
+    def shown(self, event: int, middle: Place, now: float) -> None:
+        """Note a picture that is taken now. `middle`: what its middle shows."""
+        self._taken[event] = now, middle
+        self._taken.move_to_end(event)
+        if len(self._taken) > KEPT:
+            self._taken.popitem(last=False)
 
-    def check(self, event: float, now: float) -> None:
-        """Check that a picture with this event may be pointed into.
+    def middle(self, event: float, now: float) -> Place:
+        """Return what the middle of this event's newest picture shows.
 
         Raises:
-            ActionNotPossible: it is too old, or there was none.
+            ActionNotPossible: the picture is too old, or there was none.
         """
-        taken = self._times.get(int(event)) if event == int(event) else None
-        if taken is None or now - taken > OLDEST:
+        taken = self._taken.get(int(event)) if event == int(event) else None
+        if taken is None or now - taken[0] > OLDEST:
             raise ActionNotPossible("the picture that was clicked on is too old")
+        return taken[1]
 
 
 class Centring(ActionRun):
-    """Drives the probe along x and y in a straight line. The bridge's limits bound it as they bound a stick."""
+    """Drives two axes in a straight line to a place. The bridge's limits bound it as they bound a stick."""
 
     def __init__(
         self,
-        tip: Callable[[], tuple[float, float, float]],
-        goal: tuple[float, float],
+        place: Callable[[], tuple[float, ...]],
+        goal: Place,
         *,
         axes: int,
+        first: int,
         tick: float,
+        result: str = "there",
     ) -> None:
-        """`tip`: its place, m. `goal`: x and y, m. `axes`: of the robot; the first two move along x and y."""
-        self._tip = tip
+        """`place`: where it is now: x, y, m. `axes`: of the robot; `first` and the next move along x and y.
+
+        `result`: what it says at the end. `tick`: s of a step.
+        """
+        self._place = place
         self._goal = goal
         self._axes = axes
+        self._first = first
         self._tick = tick
+        self._result = result
         self._seconds = 0.0
         self._whole = max(self._left(), NEAR)
 
     def step(self) -> ActionStep:
         self._seconds += self._tick
         if self._seconds > PATIENCE:
-            raise ActionFailed("the tip does not get to that place")
+            raise ActionFailed("the drives do not get to that place")
         left = self._left()
         if left < NEAR:
-            return ActionStep(1.0, "there", done=True)
-        x, y, _ = self._tip()
+            return ActionStep(1.0, self._result, done=True)
         speed = min(left / (5 * self._tick), SPEED) / left
         values = [0.0] * self._axes
-        values[0], values[1] = (self._goal[0] - x) * speed, (self._goal[1] - y) * speed
+        for axis, goal, at in zip((self._first, self._first + 1), self._goal, self._place(), strict=False):
+            values[axis] = (goal - at) * speed
         return ActionStep(max(0.0, 1 - left / self._whole), f"{left / MICRO:.0f} µm to go", values)
 
     def cancel(self) -> None:
         """The bridge brings the axes to rest."""
 
     def _left(self) -> float:
-        x, y, _ = self._tip()
+        x, y, *_ = self._place()
         return math.hypot(self._goal[0] - x, self._goal[1] - y)

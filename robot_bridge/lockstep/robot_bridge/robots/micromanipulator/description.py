@@ -60,6 +60,8 @@ WINDOWS: Final = {  # ranges of the joints, m
     "probe.y": (-145 * MICRO, 145 * MICRO),
     "probe.z": (-16 * MICRO, 90 * MICRO),
     "focus.z": (-30 * MICRO, 80 * MICRO),
+    "view.x": (-60 * MICRO, 60 * MICRO),  # of the middle of the microscope's picture: all of the slide can be seen
+    "view.y": (-80 * MICRO, 80 * MICRO),
 }
 SLEW_TIME: Final = 0.1  # s from rest to full speed
 BRAKE_TIME: Final = 0.04  # s from full speed to rest
@@ -96,7 +98,9 @@ LAYERS: Final = (
         bindings=(
             upwards("focus.vz", "left_y", "left_y", ("KeyW", "KeyS")),
             Binding(axis="light.rate", pad="left_x", touch="left_x", key_positive="KeyD", key_negative="KeyA"),
-            upwards("probe.vz", "right_y", "right_y", ("KeyR", "KeyF"), scale=FINE),
+            upwards("probe.vz", "right_y", None, ("KeyR", "KeyF"), scale=FINE),
+            upwards("view.vx", "dpad_y", "right_y", ("ArrowUp", "ArrowDown")),
+            leftwards("view.vy", "dpad_x", "right_x", ("ArrowLeft", "ArrowRight")),
         ),
     ),
 )
@@ -182,6 +186,8 @@ DESCRIPTION: Final = RobotDescription(
         _axis("probe.vy", "Left", 60 * MICRO),
         _axis("probe.vz", "Up", 30 * MICRO),
         _axis("focus.vz", "Focus up", 40 * MICRO),
+        _axis("view.vx", "View forward", 60 * MICRO),
+        _axis("view.vy", "View left", 60 * MICRO),
         _axis("light.rate", "Brighter", 50.0, "%/s"),
     ),
     joints=tuple(Joint(name=name, unit="m", minimum=low, maximum=high) for name, (low, high) in WINDOWS.items()),
@@ -191,13 +197,14 @@ DESCRIPTION: Final = RobotDescription(
         Action(name="snapshot", label="Snapshot", moves=False),
         Action(
             name="centre",
-            label="Tip to the place",
+            label="Centre the picture there",
             parameters=(
                 ActionParameter(name="x", label="From the left", kind="number", minimum=0, maximum=1),
                 ActionParameter(name="y", label="From the top", kind="number", minimum=0, maximum=1),
                 ActionParameter(name="event", label="Event of the picture", kind="number", minimum=1),
             ),
         ),
+        Action(name="tip_to_middle", label="Tip to the middle"),
     ),
     cameras=(MICROSCOPE, SIDE),
     microphones=(MICROPHONE,),
@@ -220,7 +227,11 @@ DESCRIPTION: Final = RobotDescription(
         Body(
             name="focal plane",
             parent="",
-            joints=(BodyJoint(joint="focus.z", kind="prismatic", axis=(0, 0, 1)),),
+            joints=(
+                BodyJoint(joint="view.x", kind="prismatic", axis=(1, 0, 0)),
+                BodyJoint(joint="view.y", kind="prismatic", axis=(0, 1, 0)),
+                BodyJoint(joint="focus.z", kind="prismatic", axis=(0, 0, 1)),
+            ),
             geoms=(Geom(shape="box", size=(120 * MICRO, 160 * MICRO, 0.2 * MICRO), rgba=(0.3, 0.8, 1.0, 0.10)),),
         ),
     ),
@@ -229,5 +240,7 @@ DESCRIPTION: Final = RobotDescription(
         _limit("probe.y", "probe.vy", "Sideways"),
         _limit("probe.z", "probe.vz", "Height"),
         _limit("focus.z", "focus.vz", "Focus"),
+        _limit("view.x", "view.vx", "View forward"),
+        _limit("view.y", "view.vy", "View sideways"),
     ),
 )

@@ -7,7 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 from lockstep.robot_bridge.robots.micromanipulator.dent import draw_dent
-from lockstep.robot_bridge.robots.micromanipulator.description import MICROSCOPE
+from lockstep.robot_bridge.robots.micromanipulator.description import MICROSCOPE, WINDOWS
 from lockstep.robot_bridge.robots.micromanipulator.samples import MICRO
 from lockstep.robot_bridge.robots.micromanipulator.shaft import Outline, outline
 from lockstep.robot_bridge.robots.micromanipulator.slide import DROP_HEIGHT, Slide
@@ -37,9 +37,10 @@ class Microscope:
     def __init__(self, width: int, height: int) -> None:
         self._shape = (height, width)
         self._scale = MICROSCOPE.metres_per_pixel or MICRO
-        self._slide = Slide(width, height, self._scale)
+        margins = [math.ceil(WINDOWS[joint][1] / self._scale) for joint in ("view.x", "view.y")]
+        self._slide = Slide(width, height, self._scale, (margins[0], margins[1]))
         self._empty: Picture | None = None  # the slide alone, as it was drawn last
-        self._empty_key = (0, 0)
+        self._empty_key = (0, 0, (0, 0))
         random = np.random.default_rng(7)
         grains = np.round(random.normal(0.0, 1.3, (GRAINS, height, width))).astype(np.int8)
         self._grains = np.clip(grains, -4, 4).view(np.uint8)  # as bytes that wrap: luma never comes near the ends
@@ -47,9 +48,11 @@ class Microscope:
 
     def draw(self, state: "MicromanipulatorState", event: int) -> bytes:
         """Return a yuv420p picture of the state."""
-        slide = self._seen_slide(state)
+        moved = (-round(state.view[0] / self._scale), -round(state.view[1] / self._scale))  # rows, columns
+        slide = self._seen_slide(state, moved)
         picture = slide.copy()
-        draw_dent(picture, slide, self._slide.cover, state, self._scale)
+        state = _from_middle(state, moved, self._scale)
+        draw_dent(picture, slide, self._slide.cover(moved), state, self._scale)
         shadow = outline(state, self._shape, self._scale, _shadow_blur, SHADOW, shadow=True)
         if shadow is not None:
             _darken(picture, shadow)
@@ -60,13 +63,13 @@ class Microscope:
         picture.y += self._grains[self._count]
         return picture.buffer.tobytes()
 
-    def _seen_slide(self, state: "MicromanipulatorState") -> Picture:
-        key = (round(state.focus / FOCUS_STEP), round(state.light))
+    def _seen_slide(self, state: "MicromanipulatorState", moved: tuple[int, int]) -> Picture:
+        key = (round(state.focus / FOCUS_STEP), round(state.light), moved)
         if self._empty is None or key != self._empty_key:
             glass, drops = (
                 float(blur_at(np.float32(away))) / self._scale for away in (state.focus, state.focus - DROP_HEIGHT)
             )
-            seen = self._slide.seen(glass, drops, state.light / 100)
+            seen = self._slide.seen(glass, drops, state.light / 100, moved)
             self._empty, self._empty_key = picture_of(*(np.clip(plane, 0.03, 0.97) for plane in seen)), key
         return self._empty
 
@@ -83,6 +86,13 @@ class Microscope:
         weaker = 1.0 - cover[::2, ::2]
         for plane in (picture.u, picture.v):
             plane[half] = 128.0 + (plane[half] - np.float32(128.0)) * weaker
+
+
+def _from_middle(state: "MicromanipulatorState", moved: tuple[int, int], scale: float) -> "MicromanipulatorState":
+    """Return the state as it would be if its places were measured from what the middle of the picture shows."""
+    x, y = (pixels * scale for pixels in moved)
+    tip, holder = state.tip, state.holder
+    return state._replace(tip=(tip[0] + x, tip[1] + y, tip[2]), holder=(holder[0] + x, holder[1] + y, holder[2]))
 
 
 def blur_at(away: Plane | np.float32) -> Plane:

@@ -8,7 +8,7 @@ from typing import Final, NamedTuple
 from lockstep.protocol.actions import ParameterValue, StatusItem
 from lockstep.protocol.description import RobotDescription
 from lockstep.robot_bridge.control import clock
-from lockstep.robot_bridge.robots.actions import ActionDone, ActionNotPossible, ActionRun
+from lockstep.robot_bridge.robots.actions import ActionDone, ActionRun
 from lockstep.robot_bridge.robots.base import Measurement, MediaSource, Robot
 from lockstep.robot_bridge.robots.camera_source import CameraSource
 from lockstep.robot_bridge.robots.micromanipulator.autofocus import Autofocus
@@ -33,6 +33,7 @@ __all__ = ["MicromanipulatorState", "Micromanipulator"]
 LIGHT_RANGE: Final = (20.0, 130.0)  # %
 SNAPSHOTS: Final = 16  # that are kept
 FOCUS: Final = 3  # index of its axis and of its drive
+VIEW: Final = 4  # of the first of two, along x and y
 TOO_MUCH: Final = 300e-6  # N on the needle above which a fault reports it
 
 Vector = tuple[float, float, float]
@@ -46,18 +47,21 @@ class MicromanipulatorState(NamedTuple):
     force: Vector = (0.0, 0.0, 0.0)  # N, on the needle
     contact: Contact | None = None
     focus: float = 0.0  # m, height of the plane that is sharp
+    view: tuple[float, float] = (0.0, 0.0)  # x and y of what the middle of the microscope's picture shows
     light: float = 100.0  # %
 
 
 class Micromanipulator(Robot):
-    """The axes are the probe's velocity along x, y and z, the focus' velocity, and the change of the light."""
+    """The axes are the velocity of the probe along x, y and z, of the focus along z and of the view along x and y, and
+    the change of the light.
+    """
 
     tick_seconds = 0.004
     ticks_on_command = True
     rests_from_thread = True
 
     def __init__(self) -> None:
-        self._drives = (*(Stepper(place) for place in START), Stepper(0.0))
+        self._drives = tuple(Stepper(place) for place in (*START, 0.0, 0.0, 0.0))
         self._needle = Needle(self._holder())
         self._light = MicromanipulatorState().light
         self._values: list[float] = [0.0] * len(DESCRIPTION.axes)
@@ -109,7 +113,8 @@ class Micromanipulator(Robot):
             tip=needle.tip,
             force=needle.force,
             contact=needle.contact,
-            focus=self._drives[3].position,
+            focus=self._drives[FOCUS].position,
+            view=self._view(),
             light=self._light,
         )
 
@@ -125,23 +130,31 @@ class Micromanipulator(Robot):
             )
         if name == "centre":
             return self._centre(*(float(parameters[each]) for each in ("x", "y", "event")))
+        if name == "tip_to_middle":
+            return Centring(
+                lambda: self._needle.tip, self._view(), axes=len(DESCRIPTION.axes), first=0, tick=self.tick_seconds
+            )
         self._taken += 1
         self._snapshots.append(self.state())
         return ActionDone(f"picture {self._taken}, focus {self._drives[FOCUS].position * 1e6:.1f} µm")
 
     def _centre(self, across: float, down: float, event: float) -> ActionRun:
         """`across`, `down`: shares of the microscope's picture from the left and from the top."""
-        self._shown.check(event, clock.now())
+        x, y = self._shown.middle(event, clock.now())
         scale = MICROSCOPE.metres_per_pixel or MICRO
-        goal = (0.5 - down) * MICROSCOPE.height * scale, (0.5 - across) * MICROSCOPE.width * scale
-        for place, joint in zip(goal, ("probe.x", "probe.y"), strict=True):
-            low, high = WINDOWS[joint]
-            if not low < place < high:
-                raise ActionNotPossible("the tip does not reach that place")
-        return Centring(lambda: self._needle.tip, goal, axes=len(DESCRIPTION.axes), tick=self.tick_seconds)
+        wanted = x + (0.5 - down) * MICROSCOPE.height * scale, y + (0.5 - across) * MICROSCOPE.width * scale
+        goal = _within(wanted[0], "view.x"), _within(wanted[1], "view.y")
+        return Centring(
+            self._view,
+            goal,
+            axes=len(DESCRIPTION.axes),
+            first=VIEW,
+            tick=self.tick_seconds,
+            result="there" if goal == wanted else "as far as the stage goes",
+        )
 
     def _draw_microscope(self, state: MicromanipulatorState, event: int) -> bytes | Awaitable[bytes]:
-        self._shown.shown(event, clock.now())
+        self._shown.shown(event, state.view, clock.now())
         return self._draughtsman.microscope(state, event)
 
     @property
@@ -175,5 +188,15 @@ class Micromanipulator(Robot):
         return self._sound.segment(sum(drive.rate for drive in self._drives), math.hypot(*self._needle.force))
 
     def _holder(self) -> Vector:
-        x, y, z, _ = self._drives
+        x, y, z = self._drives[:FOCUS]
         return (x.position, y.position, z.position)
+
+    def _view(self) -> tuple[float, float]:
+        x, y = self._drives[VIEW:]
+        return (x.position, y.position)
+
+
+def _within(place: float, joint: str) -> float:
+    """Return the place that is nearest to this one and short of the joint's limits."""
+    low, high = WINDOWS[joint]
+    return min(max(place, low + MICRO), high - MICRO)

@@ -23,29 +23,47 @@ DROP_HEIGHT: Final = 6 * MICRO  # m, height at which drops are sharpest
 
 
 class Slide:
-    """The slide's picture. `cover` is 1 on drops, 0 on glass."""
+    """All of the slide that can be seen. Its parts in sight are `width` by `height` pixels."""
 
-    def __init__(self, width: int, height: int, scale: float) -> None:
-        """`scale`: m per pixel; the middle of the picture is the origin."""
-        rows, columns = np.mgrid[0:height, 0:width].astype(np.float32)
-        self.x = (height / 2 - 0.5 - rows) * np.float32(scale)  # forward is up
-        self.y = (width / 2 - 0.5 - columns) * np.float32(scale)  # left is left
+    def __init__(self, width: int, height: int, scale: float, margins: tuple[int, int] = (0, 0)) -> None:
+        """`scale`: m per pixel. `margins`: rows and columns by which the part in sight can be moved from the origin."""
+        self._shape = (height, width)
+        self._margins = margins
+        whole_height, whole_width = height + 2 * margins[0], width + 2 * margins[1]
+        rows, columns = np.mgrid[0:whole_height, 0:whole_width].astype(np.float32)
+        self.x = (whole_height / 2 - 0.5 - rows) * np.float32(scale)  # forward is up
+        self.y = (whole_width / 2 - 0.5 - columns) * np.float32(scale)  # left is left
         random = np.random.default_rng(20)
         glass = self._glass(random)
         drops = self._drops(random)
-        self.cover = drops["cover"]
+        self._cover = drops["cover"]
         self._glass_degrees = BlurredPlanes(glass)
         self._drop_degrees = BlurredPlanes(drops)
+        rows, columns = np.mgrid[0:height, 0:width].astype(np.float32)
         distance = (rows / height - 0.5) ** 2 + (columns / width - 0.5) ** 2
         self.vignette: Plane = 1.0 - (1.0 - np.float32(CORNERS)) * (2.0 * distance) ** 1.5
 
-    def seen(self, glass_blur: float, drop_blur: float, light: float) -> tuple[Plane, Plane, Plane]:
-        """Return red, green and blue, 0 to 1 and brighter, with the lens' shading; `light`: 1 is as usual."""
-        glass, drops = self._glass_degrees.at(glass_blur), self._drop_degrees.at(drop_blur)
+    def cover(self, moved: tuple[int, int]) -> Plane:
+        """Return what is in sight: 1 on drops, 0 on glass. `moved`: see `seen`."""
+        return self._cover[self._sight(moved)]
+
+    def seen(
+        self, glass_blur: float, drop_blur: float, light: float, moved: tuple[int, int] = (0, 0)
+    ) -> tuple[Plane, Plane, Plane]:
+        """Return red, green and blue, 0 to 1 and brighter, with the lens' shading.
+
+        `light`: 1 is as usual. `moved`: rows down and columns to the right from the origin, within the margins.
+        """
+        sight = self._sight(moved)
+        glass, drops = self._glass_degrees.at(glass_blur, sight), self._drop_degrees.at(drop_blur, sight)
         through = (1.0 - drops["cover"]) * self.vignette * np.float32(light)
         shaded = self.vignette * np.float32(light)
         red, green, blue = (glass["grey"] * tint * through + drops[name] * shaded for tint, name in _tints())
         return red, green, blue
+
+    def _sight(self, moved: tuple[int, int]) -> tuple[slice, slice]:
+        top, left = (min(max(margin + by, 0), 2 * margin) for margin, by in zip(self._margins, moved, strict=True))
+        return slice(top, top + self._shape[0]), slice(left, left + self._shape[1])
 
     def _glass(self, random: np.random.Generator) -> dict[str, Plane]:
         grey = np.ones(self.x.shape, np.float32)
@@ -63,7 +81,7 @@ class Slide:
             across = across + 3 * MICRO * np.sin(along / (30 * MICRO))
             grey -= 0.10 * np.exp(-((across / (0.6 * MICRO)) ** 2)) * (np.abs(along) < random.uniform(20, 70) * MICRO)
         cloud = blurred(np.asarray(random.standard_normal(grey.shape), np.float32), 40.0)
-        grey += 0.03 * cloud / np.float32(cloud.std())
+        grey += 0.03 * np.clip(cloud / np.float32(cloud.std()), -2, 2)  # it is larger at the edges, which repeat
         return {"grey": grey}
 
     def _drops(self, random: np.random.Generator) -> dict[str, Plane]:
