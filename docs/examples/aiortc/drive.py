@@ -59,10 +59,14 @@ class Pilot:
         await self._until(lambda: self.holder == self.me)
 
     async def drive(self, values: list[float]) -> dict[str, Any]:
-        """The next event, as the answer to the newest feedback: its feedback."""
+        """The next event, as the answer to the newest feedback: its feedback.
+
+        It is a neutral one if the robot wants that first: at the beginning, after a stop, after it was held up.
+        """
         event = self.feedback["event"] + 1
         while self.feedback["event"] < event:
-            command: dict[str, Any] = {"type": "command", "event": event, "values": values}
+            wanted = [0.0] * len(values) if self.feedback.get("neutral_needed") else values
+            command: dict[str, Any] = {"type": "command", "event": event, "values": wanted}
             command |= {name: self.feedback[name] for name in ("issue", "nonce") if name in self.feedback}
             self._say("control", command)
             try:
@@ -128,7 +132,6 @@ async def main(link: str, seconds: float, value: float) -> None:
     await pilot.take_seat()
     axes = len(pilot.feedback["axes"])
     try:
-        await pilot.drive([0.0] * axes)
         end = asyncio.get_running_loop().time() + seconds
         while asyncio.get_running_loop().time() < end:
             feedback = await pilot.drive([value] + [0.0] * (axes - 1))
