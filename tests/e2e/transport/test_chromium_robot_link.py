@@ -49,6 +49,7 @@ async def test_a_supervisor_pairs_a_robot_drives_it_and_forgets_it(
         shown = await dialogue.get_by_label("Command for the robot's computer").input_value()
         code = await dialogue.get_by_label("Pairing code").inner_text()
         assert shown.endswith(f"--pair {code}")
+        await expect(dialogue).to_contain_text("127.0.0.1 in this command is the robot's own computer")
         await _photo(page, f"waiting-{width}")
         wrong = _command(shown.replace(code, f"{code[:2]}-22222-22222"), tmp_path)
         assert await (await asyncio.create_subprocess_exec(*wrong)).wait() == 2

@@ -94,6 +94,13 @@ export function codeLabel(link: RobotLink): string {
   return "";
 }
 
+/** A warning if the command names the machine that it is typed on, where only a robot beside the console can use it. */
+export function loopbackWarning(command: string): string {
+  const host = /--console \w+:\/\/(\[[^\]]*\]|[^\s/:]+)/.exec(command)?.[1] ?? "";
+  if (!/^(localhost|127(\.\d+){3}|\[::1\])$/.test(host)) return "";
+  return `${host} in this command is the robot's own computer, so it works only beside the console. For a robot elsewhere, start the console with --public-url, the address by which robots reach it, and with --host if it listens on loopback alone.`;
+}
+
 /** Why a robot was just refused; "" while none was. */
 export function refusedLabel(link: RobotLink): string {
   return link.code === "waiting" ? (REFUSED[link.refused] ?? "") : "";

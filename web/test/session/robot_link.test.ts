@@ -1,6 +1,7 @@
 import { describe, expect, it } from "vitest";
 import {
   codeLabel,
+  loopbackWarning,
   parsePairingCode,
   parseRobotLink,
   refusedLabel,
@@ -41,6 +42,23 @@ describe("the answer of the console", () => {
 
   it.each([null, 7, {}, { dials_in: "yes" }, { ...ANSWER, state: "broken" }])("is refused: %j", (answer) => {
     expect(parseRobotLink(answer)).toBeNull();
+  });
+
+  it.each([
+    ["lockstep robot NAME --console ws://127.0.0.1:8000 --code K7", "127.0.0.1"],
+    ["lockstep robot NAME --console wss://localhost --code K7", "localhost"],
+    ["lockstep robot NAME --console ws://[::1]:8000/ --code K7", "[::1]"],
+  ])("warns of a command that only a robot beside the console can use: %s", (command, host) => {
+    expect(loopbackWarning(command)).toContain(`${host} in this command is the robot's own computer`);
+  });
+
+  it.each([
+    "lockstep robot NAME --console wss://192.168.1.7:8000 --code K7",
+    "lockstep robot NAME --console wss://localhost.example --code K7",
+    "lockstep robot NAME --console wss://[fe80::1]:8000 --code K7",
+    "lockstep",
+  ])("does not warn of a console that is reached from elsewhere: %s", (command) => {
+    expect(loopbackWarning(command)).toBe("");
   });
 
   it("has defaults for what is missing or of a wrong kind", () => {

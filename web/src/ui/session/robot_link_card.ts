@@ -1,5 +1,6 @@
 import {
   codeLabel,
+  loopbackWarning,
   refusedLabel,
   robotLinkAbout,
   robotLinkTitle,
@@ -32,7 +33,8 @@ export function createRobotLinkCard(api: RobotLinkApi, name = ""): RobotLinkCard
   const copy = createCopyField("Command for the robot's computer", "The command is copied");
   const cancel = button("field-button quiet", "Withdraw the code", () => void act(closeCode));
   const steps = h("p", "muted", {}, "On the robot's computer, with the robot's own name instead of NAME:");
-  const shown = h("div", "pairing-shown", {}, code, steps, copy.element, cancel);
+  const warning = h("p", "pairing-warning");
+  const shown = h("div", "pairing-shown", {}, code, steps, copy.element, warning, cancel);
   const words = h("p", "pairing-words", { role: "status" });
   const refused = h("p", "pairing-refused", { role: "alert" });
   const trouble = h("p", "form-trouble", { role: "alert" });
@@ -84,6 +86,9 @@ export function createRobotLinkCard(api: RobotLinkApi, name = ""): RobotLinkCard
     setHidden(code, made === null);
     setHidden(steps, made === null);
     setHidden(copy.element, made === null);
+    const elsewhere = made === null ? "" : loopbackWarning(made.command);
+    setText(warning, elsewhere);
+    setHidden(warning, elsewhere === "");
     setText(code, made?.code ?? "");
     setText(words, codeLabel(link));
     setData(words, "tone", waits ? "waits" : link.code === "paired" ? "good" : "bad");
