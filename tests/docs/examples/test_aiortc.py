@@ -17,8 +17,13 @@ async def test_plain_aiortc_drives_and_decodes_pictures() -> None:
         script = await asyncio.create_subprocess_exec(
             sys.executable, str(SCRIPT), link, "--seconds", "5", stdout=asyncio.subprocess.PIPE
         )
-        async with asyncio.timeout(2 * PATIENCE):
-            printed, _ = await script.communicate()
+        try:
+            async with asyncio.timeout(2 * PATIENCE):
+                printed, _ = await script.communicate()
+        finally:
+            if script.returncode is None:
+                script.kill()
+                await script.wait()
         assert script.returncode == 0
         found = json.loads(printed.splitlines()[-1])
         assert found["event"] > 5
