@@ -1,5 +1,6 @@
 """The joints' goals of an arm behind ROS 2, through the bridge's shaping of goals, in simulated time."""
 
+import math
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -95,6 +96,26 @@ def test_an_arm_that_something_else_moved_goes_on_from_where_it_is(place: Path) 
     assert world.goals.goals == away
     world.command({"tool.z": world.at("tool.z") - 0.05}, 5)
     assert world.way[1] == pytest.approx(away)
+
+
+@pytest.mark.parametrize("place", [-2.95, -2.95 + 4 * math.pi, 3.34])
+def test_a_joint_that_turns_on_and_on_was_not_moved_where_it_is_measured_a_turn_away(
+    tmp_path: Path, place: float
+) -> None:
+    rows = "".join(f"    - {{name: {name}, maximum: 1.0}}\n" for name in JOINTS)
+    found, description = read_settings(written(tmp_path, "  goals: true\n", rows=rows))
+    assert found.arm is not None
+    assert description.axes[5].wrap == math.tau
+    goals = ArmGoals(found.arm, description, START)
+    values = [*START[:5], 3.33]  # beyond half a turn, which drivers report as one from the other side
+    goals.drive(START, TICK, TICK, START, False)
+    while any(goals.drive(values, TICK, TICK, START, False)):
+        pass
+    assert goals.goals == values
+    assert not goals.take_up([*START[:5], place])
+    assert goals.goals == values
+    assert goals.take_up([*START[:5], place + 0.3])
+    assert goals.goals == [*START[:5], place + 0.3]
 
 
 @pytest.mark.parametrize("fallen", [False, True])

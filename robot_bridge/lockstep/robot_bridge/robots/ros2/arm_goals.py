@@ -6,6 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from lockstep.protocol.description import RobotDescription
+from lockstep.robot_bridge.control.limits.goal_axis import shorter_way
 from lockstep.robot_bridge.robots.ros2.settings import Arm
 from lockstep.robot_bridge.robots.ros2.tool import arm_tool
 from lockstep.robot_bridge.robots.tool_pose.joint_follower import JointFollower
@@ -34,6 +35,8 @@ class ArmGoals:
         rates = [settings.joints[number].maximum for number in others]
         self._others = JointFollower(others, rates, [measured[number] for number in others])
         self._grips = [number for number in others if settings.joints[number].grips]
+        axes = {axis.name: axis for axis in description.axes}
+        self._wraps = [axes[f"arm.{joint.name}"].wrap for joint in settings.joints]
         self._rested = list(measured)  # rad or m, of the joints: nearest to their goals since the arm was driven last
         self._away: set[int] = set()  # joints that something else has moved since the arm was driven, and may yet
         self._size = len(settings.joints) + (0 if self._tool is None else len(self._tool.place.pose))
@@ -104,15 +107,20 @@ class ArmGoals:
 
     def _was_moved(self, number: int, place: float) -> bool:
         goal, rested = self.goals[number], self._rested[number]
-        way = abs(place - goal)
+        way = self._way(number, goal, place)
         if number in self._away:
             return way > FOLLOWS
         if number not in self._grips:
             return way > MOVED
-        if not abs(rested - goal) <= way:  # it goes on closing, or was not measured before
+        if not self._way(number, goal, rested) <= way:  # it goes on closing, or was not measured before
             self._rested[number] = place
             return False
-        return way - abs(rested - goal) > MOVED
+        return way - self._way(number, goal, rested) > MOVED
+
+    def _way(self, number: int, start: float, end: float) -> float:
+        """Return how far it is: a joint that turns on and on may be measured a turn away from where its goal is."""
+        wrap = self._wraps[number]
+        return abs(end - start) if wrap is None else abs(shorter_way(start, end, wrap))
 
     def pursued(self) -> list[float]:
         """Return the goal of each axis: the joints', and the tool's pose at them."""
