@@ -1,0 +1,3 @@
+from lockstep.bench.first_drive.cli import app
+
+app()

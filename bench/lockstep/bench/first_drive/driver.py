@@ -1,0 +1,30 @@
+"""Drives a robot until it has moved: `python -m lockstep.bench.first_drive.driver LINK`."""
+
+import asyncio
+import sys
+
+from lockstep.bench.harness.asked import say
+from lockstep.bench.harness.driving import axis_values, drive_on
+from lockstep.client import Console
+
+__all__ = ["drive_until_moved"]
+
+SHARE = 0.3  # of the first axis' largest speed
+MOVED = 0.01  # of the unit of any joint
+
+
+async def drive_until_moved(link: str) -> int:
+    """Drive the first axis until a joint has moved; return the event in which it had."""
+    async with Console(link, video=False, audio=False, name="first drive") as console:
+        await console.take_seat()
+        axes = console.description.axes
+        speed = axis_values(axes, {0: SHARE * axes[0].maximum})
+        first = last = await drive_on(console, axis_values(axes, {}))
+        while max(abs(now - then) for now, then in zip(last.joints, first.joints, strict=True)) < MOVED:
+            last = await drive_on(console, speed)
+        await console.rest()
+        return last.event
+
+
+if __name__ == "__main__":
+    say({"event": asyncio.run(drive_until_moved(sys.argv[1]))})
