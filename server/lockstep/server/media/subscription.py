@@ -36,6 +36,7 @@ class Subscription:
         self.h264: Profile | None = None  # negotiated profile; None for another codec
         self.tier: PictureTier = "operator"  # of the console's encoding that it gets, or would get
         self.held_back = False  # from the camera's own encoding, because its path has no room
+        self.newest = float("-inf")  # s, capture of the newest frame that it got, on the source's clock
         self.sends = False  # True from the connection's begin to the peer's end
         self.sender = sender
         self.traced = SentPictures(stream)
@@ -57,6 +58,8 @@ class Subscription:
         return self.sends and self.sender.paced
 
     def put(self, frame: EncodedFrame) -> None:
+        if frame.time > self.newest:
+            self.newest = frame.time
         before = self._queue.dropped
         complete = self._queue.put(frame)
         if self._queue.dropped != before:

@@ -47,6 +47,11 @@ class TwoEncodings:
         self._hub.feed(medium, medium.time + late)
 
 
+def read_last(viewer: Viewer) -> int | None:
+    """The event of the newest picture."""
+    return read_stamp("native", viewer.of("video")[-1])
+
+
 def narrow_operator(hub: MediaHub, *, shown: float = 2e6) -> None:
     """Let the operator's path carry a quarter of what observers are due, and the uplink be known to carry `shown`."""
     encoding = cast(Any, hub.robot_encoding)
@@ -149,6 +154,39 @@ async def test_an_observer_changes_only_with_a_keyframe_that_is_as_new_as_the_pi
             assert robot.requests[-1].second[0].keyframes > before
             hub.feed(msgspec.structs.replace(second, second=True), second.time)
             assert target in encodings.second.targets
+
+
+async def test_an_observer_that_had_a_later_picture_of_the_second_waits_for_a_keyframe_as_new_of_the_first() -> None:
+    async with running_plane(quality=False, second_encoding=True) as hub:
+        robot = Robot(hub)
+        narrow_operator(hub)
+        async with (
+            viewing(hub, ["video"], uris=NATIVE, priority=True) as operator,
+            viewing(hub, ["video"], uris=NATIVE) as observer,
+        ):
+            operator.media.drives(True)
+            target = observer.media.deliveries[0].target
+            target.tier = "high"
+            two = TwoEncodings(hub, robot)
+            await two.give(operator, 195)
+            encodings = stream_of(operator).encodings
+            assert encodings.second is not None
+            assert encodings.passed is not None
+            assert target in encodings.second.targets
+            first, second, third = PICTURES[195:198]
+            # The first encoding is larger, and so later on the uplink.
+            hub.feed(msgspec.structs.replace(second, second=True), second.time)
+            encodings.move("H264", target, "operator")
+            before = robot.requests[-1].streams[0].keyframes
+            robot.give(first)
+            assert target not in encodings.passed.targets
+            hub.robot_encoding.tick(second.time + 1.0)
+            assert robot.requests[-1].streams[0].keyframes > before
+            robot.give(third)
+            assert target in encodings.passed.targets
+            await observer.until(lambda: read_last(observer) == third.stamp)
+            stamps = [read_stamp("native", each) for each in observer.of("video") if each.packet.marker]
+            assert stamps == sorted(filter(None, stamps))
 
 
 async def test_second_pictures_that_nobody_asked_for_go_nowhere() -> None:

@@ -41,7 +41,6 @@ class TierEncoding:
         self.recorded = False  # True while a recording takes it
         self.paused_until = 0.0  # no picture before; on the clock of `SourceFrame.arrived_at`
         self.encoded_at = 0.0  # time of the last picture taken, on the same clock
-        self.newest = float("-inf")  # time of capture of the newest picture, on the link's clock
         self._last_capture_time = 0.0
         self._moves_at_keyframes = moves_at_keyframes
         self._encoded = metrics.encoded.labels(stream, codec)
@@ -104,7 +103,6 @@ class TierEncoding:
 
     def publishing(self, frame: EncodedFrame) -> None:
         """Count a frame that is about to go to the targets, and let those begin with it that wait for a keyframe."""
-        self.newest = max(self.newest, frame.time)
         self._encoded.inc()
         self._of_tier.inc()
         if frame.keyframe:

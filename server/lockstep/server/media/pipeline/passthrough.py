@@ -101,8 +101,10 @@ class Passthrough(FrameStage):
     def _pass(self, frame: SourceFrame) -> None:
         media = frame.media
         if media.keyframe:
-            self._begin(media)
+            all_begin = self._begin(media)
             self.keyframes.came(frame.arrived_at)
+            if not all_begin:
+                self._passed.keyframes.join()
         self._group.add(media)
         self._measure(media)
         if not self._passed.needed:
@@ -135,8 +137,12 @@ class Passthrough(FrameStage):
             self._encodings.return_to_own(target)
         target.held_back = wanted
 
-    def _begin(self, keyframe: Media) -> None:
-        """Take a keyframe of the camera: targets that can decode it move here, those that no longer can move back."""
+    def _begin(self, keyframe: Media) -> bool:
+        """Take a keyframe of the camera: targets that can decode it move here, those that no longer can move back.
+
+        Return False if one has had a later picture, of a second encoding that came sooner: events never go back.
+        """
+        all_begin = True
         access = inspect(keyframe.payload)
         if access.profile is not None:
             self._profile = access.profile
@@ -147,9 +153,13 @@ class Passthrough(FrameStage):
         for encoding in [each for each in self._encodings.own if each.codec == "H264"]:
             for target in [*encoding.targets, *encoding.arriving]:
                 if self._may_pass_to(target):
+                    if target.newest > keyframe.time:
+                        all_begin = False
+                        continue
                     for each in self._encodings:
                         each.leave(target)
                     self._passed.targets[target] = None
+        return all_begin
 
     def _end(self) -> None:
         """Move all targets to the console's encoding, from a keyframe on: the camera gives other pictures now."""

@@ -96,7 +96,7 @@ class SecondPassthrough(FrameStage):
             takes = profile is not None and target.h264 is not None and accepts(target.h264, profile)
             if not takes or not self._takes(target) or target in self._second.targets:
                 continue
-            if any(target in each.targets and each.newest > keyframe.time for each in self._encodings):
+            if target.newest > keyframe.time:
                 self._second.keyframes.join()  # it has had a later picture, and events never go back
                 continue
             for encoding in self._encodings:
