@@ -20,10 +20,10 @@ PIP := $(BIN)/python -m pip --disable-pip-version-check -q
 INSTALL_LOCK := $(PIP) install --no-deps --require-hashes -r
 ARGS ?=
 # A file's tests share what they start. Many wait more than they compute (a worker computes for 43 % of its time), so that
-# there are twice as many workers as cores; not more, or their robots and consoles are late. Browsers take what there is:
+# there are half as many workers again as cores; with more, their robots and consoles are late. Browsers take what there is:
 # their tests run after the others, one at a time for each two cores; those that listen to what a browser plays or draw a
 # headset's view have the machine to themselves.
-WORKERS ?= 4
+WORKERS ?= 3
 BROWSERS ?= $(shell [ "$$(nproc)" -ge 4 ] && echo 2 || echo 1)
 PARALLEL := --dist loadfile --no-loadscope-reorder
 # Every process that a test starts would compile all of Lockstep again.
