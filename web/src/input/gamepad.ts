@@ -144,8 +144,9 @@ export class Pad {
       return;
     }
     if (isNew("layer")) this.events.nextLayer();
-    if (isNew("action_1")) this.events.action(0);
-    if (isNew("action_2")) this.events.action(1);
+    const further = pressed.has("slow") ? 2 : 0; // with the left bumper: the third and the fourth
+    if (isNew("action_1")) this.events.action(further);
+    if (isNew("action_2")) this.events.action(further + 1);
   }
 
   private knownOf(gamepad: Gamepad): Known {

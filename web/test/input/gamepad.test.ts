@@ -93,6 +93,9 @@ describe("a gamepad", () => {
     const [A, B, X, Y, LB, START, L3, R3, UP] = [0, 1, 2, 3, 4, 9, 10, 11, 12] as const;
     pad.poll();
     expect(press(A, X, Y, LB, L3, R3, UP)).toEqual(["action 0", "action 1", "layer"]);
+    hold(LB, true);
+    expect(press(A, X)).toEqual(["action 2", "action 3"]);
+    hold(LB, false);
     hold(A, true);
     hold(R3, true);
     expect(told.splice(0)).toEqual(["action 0"]); // held already: not pressed anew

@@ -16,7 +16,7 @@ const SHOWN_MS = 8000;
 const CONFIRM_MS = 5000;
 
 export interface RobotStrip extends Panel {
-  /** Asks for the action at this place, by a pad or a key; of one that is not there nothing happens. */
+  /** Asks for the action of the button at this place, by a pad or a key; of one that is not there nothing happens. */
   press(index: number): void;
 }
 
@@ -32,7 +32,7 @@ export function createRobotStrip(engine: ConsoleEngine): RobotStrip {
   let shownStatus = "";
   return {
     element,
-    press: (index) => actions[index]?.press(true),
+    press: (index) => actions.filter((each) => !each.isByClick)[index]?.press(true),
     update(now) {
       const { state } = engine;
       const wanted = state.robot?.description.actions ?? described ?? [];
@@ -134,7 +134,7 @@ class ActionButton {
   }
 
   /** A click on a picture asks for it, never a button. */
-  private get isByClick(): boolean {
+  get isByClick(): boolean {
     const cameras = this.engine.state.robot?.description.cameras ?? [];
     return cameras.some((camera) => camera.click === this.action.name);
   }
