@@ -17,7 +17,7 @@ from lockstep.server.util.background_tasks import background_tasks
 
 __all__ = ["ProcessFailed", "Running", "Spawn", "running_process", "spawn_here", "started"]
 
-READY_SECONDS = 60.0
+READY_SECONDS = 120.0  # on a busy machine; never waited for in full
 STOP_SECONDS = 15.0
 LOOK_SECONDS = 0.05  # between two tries to connect
 OUTPUT_SECONDS = 5.0  # to read the rest of what an ended process has written
