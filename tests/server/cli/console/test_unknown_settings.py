@@ -25,7 +25,7 @@ def test_a_misspelt_field_of_a_group_is_named_too() -> None:
             "LOCKSTEP_RECORDING__DIRECTORY",
             "LOCKSTEP_SITE",
         ),
-        *("LOCKSTEP_ROBOT_OPTIONS", "LOCKSTEP_ROBOT_CONTAINERS", "LOCKSTEP_CONFIG_DIR"),
+        *("LOCKSTEP_ROBOT_OPTIONS", "LOCKSTEP_ROBOT_CONTAINERS", "LOCKSTEP_ROBOT_CONFIG", "LOCKSTEP_CONFIG_DIR"),
     ],
 )
 def test_a_setting_in_any_case_and_a_variable_of_another_program_are_not_named(name: str) -> None:
