@@ -44,8 +44,8 @@ RUN pip install --no-build-isolation --no-deps ./protocol ./rtc ./robot_bridge .
 USER lockstep
 WORKDIR /home/lockstep
 EXPOSE 8000
+# The robot and all else are settings: of variables, of a file that LOCKSTEP_CONFIG names, or of flags.
 ENTRYPOINT ["lockstep", "serve"]
-CMD ["--robot", "tcp://127.0.0.1:5600"]
 
 FROM ${CADDY_IMAGE} AS proxy
 RUN adduser -D -H -u 10001 lockstep && chown -R lockstep /data /config

@@ -2,12 +2,17 @@
 
 import os
 import re
+import shlex
 import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
 import pytest
 import yaml
+
+from lockstep.server.fleet.robots import robot_settings
+from lockstep.server.settings import Settings
 
 ROOT = Path(__file__).resolve().parents[2]
 PROFILES = ("public", "monitoring", "redis")
@@ -19,6 +24,41 @@ def _services() -> dict[str, dict[str, Any]]:
 
 
 SERVICES = _services()
+
+
+def _short(volume: str | dict[str, Any]) -> str:
+    """A volume in the short form, with the default of a variable in its place."""
+    if isinstance(volume, str):
+        return volume
+    source = re.sub(r"\$\{\w+:-([^}]+)\}", r"\1", volume["source"])
+    return f"{source}:{volume['target']}{':ro' if volume.get('read_only') else ''}"
+
+
+def _resolved(**variables: str) -> dict[str, dict[str, Any]]:
+    """The services as Compose understands them with `variables` in `.env`."""
+    environment = {"PATH": os.environ["PATH"], "HOME": os.environ["HOME"], **variables}
+    done = subprocess.run(
+        ["docker-compose", "config"], cwd=ROOT, env=environment, capture_output=True, text=True, timeout=60
+    )
+    assert done.returncode == 0, done.stderr
+    services: dict[str, dict[str, Any]] = yaml.safe_load(done.stdout)["services"]
+    return services
+
+
+def _console_settings(monkeypatch: pytest.MonkeyPatch, **variables: str) -> Settings:
+    """The settings that the console gets in its container: from its environment and from the file that is mounted."""
+    console = _resolved(**variables)["console"]
+    (mounted,) = (each for each in console["volumes"] if isinstance(each, dict))
+    given = {name: value for name, value in console["environment"].items() if value is not None}
+    given["LOCKSTEP_CONFIG"] = given["LOCKSTEP_CONFIG"].replace(mounted["target"], mounted["source"])
+    for name in ("LOCKSTEP_LINK_SECRET_FILE", "LOCKSTEP_TURN_SECRET_FILE"):  # those are in volumes
+        del given[name]
+    for name in [name for name in os.environ if name.startswith("LOCKSTEP_")]:
+        monkeypatch.delenv(name)
+    for name, value in given.items():
+        monkeypatch.setenv(name, value)
+    assert not console.get("command"), "a flag would go before the file"
+    return Settings()
 
 
 def _users_of_the_images() -> dict[str, str]:
@@ -80,7 +120,7 @@ def test_every_secret_is_seen_by_those_alone_who_need_it() -> None:
         secret: {
             name
             for name, service in SERVICES.items()
-            if any(volume.startswith(f"{secret}:") for volume in service.get("volumes", []))
+            if any(_short(volume).startswith(f"{secret}:") for volume in service.get("volumes", []))
         }
         for secret in ("link-secret", "turn-secret")
     }
@@ -88,7 +128,7 @@ def test_every_secret_is_seen_by_those_alone_who_need_it() -> None:
     writing = [
         (name, volume)
         for name, service in SERVICES.items()
-        for volume in service.get("volumes", [])
+        for volume in map(_short, service.get("volumes", []))
         if "-secret:" in volume and not volume.endswith(":ro")
     ]
     assert {name for name, _ in writing} == {"secrets"}
@@ -96,7 +136,7 @@ def test_every_secret_is_seen_by_those_alone_who_need_it() -> None:
 
 def test_every_file_that_is_mounted_or_copied_exists() -> None:
     volumes = [volume for service in SERVICES.values() for volume in service.get("volumes", [])]
-    mounted = [volume.split(":")[0] for volume in volumes if volume.startswith("./")]
+    mounted = [volume.split(":")[0] for volume in map(_short, volumes) if volume.startswith("./")]
     copied = re.findall(r"^COPY (?!--from)(.+) \S+$", (ROOT / "Dockerfile").read_text(), re.MULTILINE)
     missing = [path for path in [*mounted, *" ".join(copied).split()] if not (ROOT / path).exists()]
     assert mounted
@@ -143,9 +183,77 @@ def test_every_image_of_others_can_be_named_by_its_digest() -> None:
 def test_without_a_key_file_the_console_pairs_a_robot_that_dials_in(given: dict[str, str], used: str) -> None:
     """A console with a key file takes no code."""
     variables = {f"LOCKSTEP_LINK_{name}": value for name, value in given.items()}
-    environment = {"PATH": os.environ["PATH"], "HOME": os.environ["HOME"], **variables}
-    done = subprocess.run(
-        ["docker-compose", "config"], cwd=ROOT, env=environment, capture_output=True, text=True, timeout=60
+    assert _resolved(**variables)["console"]["environment"]["LOCKSTEP_LINK_SECRET_FILE"] == used
+
+
+def test_without_a_file_of_its_own_the_console_has_the_robot_beside_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    found = _console_settings(monkeypatch)
+    assert (found.robot, found.port, found.media_port, found.media_tcp) == ("tcp://127.0.0.1:5600", 8000, 40000, False)
+    assert (found.is_fleet, str(found.state_dir)) == (False, "/var/lib/lockstep")
+
+
+def test_the_image_of_the_console_gives_no_flag_that_would_go_before_a_file_or_a_variable() -> None:
+    _, stage = (ROOT / "Dockerfile").read_text().split(" AS console\n")
+    stage = stage.partition("\nFROM ")[0]
+    assert 'ENTRYPOINT ["lockstep", "serve"]' in stage
+    assert "\nCMD" not in stage
+
+
+@pytest.mark.parametrize(
+    ("robot", "names"), [("dial-in", []), ("tls://10.0.0.5:5600", []), ("left=tcp://127.0.0.1:5600", ["left"])]
+)
+def test_a_variable_names_the_robot(robot: str, names: list[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    found = _console_settings(monkeypatch, LOCKSTEP_ROBOT=robot)
+    assert (list(robot_settings(found)) if found.is_fleet else []) == names
+    assert found.is_fleet or found.robot == robot
+
+
+def test_a_folder_of_settings_has_a_fleet_and_variables_go_before_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    text = """
+        public_url = "https://file.example.org"
+        ice_hosts = ["10.0.0.2"]
+        media_port = 41000
+        media_tcp = true
+        [robots.left]
+        robot = "dial-in"
+        [robots.right]
+        robot = "tls://10.0.0.6:5600"
+    """
+    (tmp_path / "console.toml").write_text(text)
+    found = _console_settings(monkeypatch, LOCKSTEP_CONFIG_DIR=str(tmp_path))
+    assert (found.public_url, found.ice_hosts) == ("https://file.example.org", ("10.0.0.2",))
+    assert (found.media_port, found.media_tcp) == (41000, True)
+    robots = {name: each.robot for name, each in robot_settings(found).items()}
+    assert robots == {"left": "dial-in", "right": "tls://10.0.0.6:5600"}
+    both = {"LOCKSTEP_CONFIG_DIR": str(tmp_path), "LOCKSTEP_PUBLIC_URL": "https://env.example.org"}
+    assert _console_settings(monkeypatch, **both).public_url == "https://env.example.org"
+
+
+def test_the_folder_of_settings_is_mounted_for_reading_alone() -> None:
+    (mounted,) = (each for each in SERVICES["console"]["volumes"] if isinstance(each, dict))
+    assert (mounted["target"], mounted["read_only"]) == ("/etc/lockstep", True)
+
+
+def test_the_robot_can_be_left_out_and_takes_options() -> None:
+    """Compose waits for no service of scale 0."""
+    usual = _resolved()["robot"]
+    assert (usual["scale"], shlex.split(usual["command"])[0]) == (1, "mobile-manipulator")
+    assert _resolved(LOCKSTEP_ROBOT_CONTAINERS="0")["robot"]["scale"] == 0
+    options = "--encode h264 --console wss://203.0.113.7:8000 --pair K7-3F9QW-2MXBD"
+    name, *words = shlex.split(
+        _resolved(LOCKSTEP_ROBOT_NAME="planar", LOCKSTEP_ROBOT_OPTIONS=options)["robot"]["command"]
     )
-    assert done.returncode == 0, done.stderr
-    assert yaml.safe_load(done.stdout)["services"]["console"]["environment"]["LOCKSTEP_LINK_SECRET_FILE"] == used
+    assert (name, words[-6:]) == ("planar", options.split())
+    command = [str(Path(sys.executable).with_name("lockstep")), "robot", "--help"]
+    environment = {"COLUMNS": "200", "PATH": "/usr/bin"}
+    told = subprocess.run(command, capture_output=True, text=True, timeout=60, env=environment).stdout
+    assert [word for word in words if word.startswith("--") and word not in told] == []
+
+
+def test_a_robot_that_dials_out_still_has_the_port_that_its_health_check_asks() -> None:
+    robot = _resolved(LOCKSTEP_ROBOT_OPTIONS="--console wss://203.0.113.7:8000")["robot"]
+    words = shlex.split(robot["command"])
+    assert "--listen" in words
+    assert words[words.index("--port") + 1] in robot["healthcheck"]["test"][-1]

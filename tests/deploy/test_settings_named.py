@@ -17,7 +17,10 @@ OTHERS = {  # not the programs' own
     "LOCKSTEP_TWO",
     "LOCKSTEP_EXTERNAL_IP",  # coturn
     "LOCKSTEP_ROBOT_NAME",
-    "LOCKSTEP_ROBOT_OPTIONS",  # the unit's own
+    "LOCKSTEP_ROBOT_OPTIONS",  # of the robot's unit, and of Compose
+    "LOCKSTEP_ROBOT_CONTAINERS",  # Compose's own
+    "LOCKSTEP_CONFIG_DIR",
+    "LOCKSTEP_ROS_SETUP",  # of the drop-in for ROS 2
     "LOCKSTEP_LINK",  # of `lockstep pair` and `forget`
     "LOCKSTEP_NAME",  # stands for any in a sentence
 }

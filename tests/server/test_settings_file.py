@@ -125,12 +125,14 @@ def test_the_command_says_what_is_wrong_with_the_file(tmp_path: Path, text: str,
 
 
 def test_the_file_in_the_guide_is_a_file_of_settings(tmp_path: Path) -> None:
-    blocks = re.findall(r"```toml\n(.*?)```", DEPLOY.read_text(), re.DOTALL)
-    assert blocks
-    for name in ("link_secret", "left.secret", "right.secret"):
+    blocks = re.findall(r"```toml\n(?!# /etc/lockstep/robot.toml)(.*?)```", DEPLOY.read_text(), re.DOTALL)
+    assert len(blocks) >= 3
+    for name in ("link_secret", "left.secret", "right.secret", "robots_left.secret", "robots_right.secret"):
         (tmp_path / name).write_text(32 * "s")
     for text in blocks:
-        settings = Settings(config=written(tmp_path, text.replace("/etc/lockstep", str(tmp_path))))
+        for folder in ("/etc/lockstep", "/run/credentials/lockstep-console.service"):
+            text = text.replace(folder, str(tmp_path))
+        settings = Settings(config=written(tmp_path, text))
         if settings.is_fleet:
             robot_settings(settings)
 

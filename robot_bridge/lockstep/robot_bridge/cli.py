@@ -43,6 +43,7 @@ from lockstep.robot_bridge.robots.base import Robot
 from lockstep.robot_bridge.robots.registry import create_robot, simulated_names
 from lockstep.robot_bridge.service_manager import ServiceManager
 from lockstep.robot_bridge.settings import BridgeSettings
+from lockstep.robot_bridge.settings_file import read_settings_file
 from lockstep.robot_bridge.stop.mounts import is_in_memory
 from lockstep.robot_bridge.stop.state_directory import default_place, older_places
 from lockstep.robot_bridge.watchdog.liveness import LIMIT, Liveness
@@ -51,6 +52,8 @@ __all__ = ["main", "robot_app", "run"]
 
 SECRET_VARIABLE = "LOCKSTEP_LINK_SECRET"
 LEROBOT = "lerobot"
+# What a file does not set: itself, further words, and what is of one call.
+NOT_IN_A_FILE = frozenset({"config", "words", "wheel", "pair", "as_json"})
 EXIT_FAILED = 1
 EXIT_USAGE = 2
 # A retry does not help against these errors; it may against the others, such as a robot that is not switched on yet.
@@ -74,6 +77,18 @@ _logger = logging.getLogger(__name__)
 robot_app = typer.Typer(pretty_exceptions_enable=False)
 
 
+def _use_file(context: typer.Context, path: Path | None) -> Path | None:
+    """Take the defaults of all options from the file `--config`, which is read before them."""
+    if path is not None:
+        names = {each.name for each in context.command.params if each.name is not None}
+        try:
+            context.default_map = dict(read_settings_file(path, names - NOT_IN_A_FILE))
+        except SettingsError as error:
+            typer.echo(f"lockstep robot: {error.detail}", err=True)
+            raise typer.Exit(EXIT_USAGE) from error
+    return path
+
+
 @robot_app.callback(
     invoke_without_command=True,
     # What follows `lerobot` is for LeRobot; after any other name it is an error.
@@ -95,6 +110,15 @@ def run(
             metavar="[MORE]",
             help="After `new` the name, such as my_arm. After `fetch` so101. "
             "After `lerobot` LeRobot's flags, or module:Class.",
+        ),
+    ] = None,
+    config: Annotated[
+        Path | None,
+        typer.Option(
+            envvar="LOCKSTEP_ROBOT_CONFIG",
+            callback=_use_file,
+            is_eager=True,
+            help="TOML file of settings; flags and the environment override it. docs/deploy.md",
         ),
     ] = None,
     wheel: Annotated[

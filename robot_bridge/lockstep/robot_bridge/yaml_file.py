@@ -1,13 +1,12 @@
 """Reads a YAML file into typed settings, with errors that name the file, the line and the key."""
 
-import os
 import re
-import stat
 from pathlib import Path
 from typing import Any, TypeVar
 
 import msgspec
 
+from lockstep.protocol.files.regular_file import open_regular
 from lockstep.robot_bridge.errors import RobotUnavailable, SettingsError
 
 __all__ = ["SettingsPlace", "YamlFile"]
@@ -45,9 +44,7 @@ class YamlFile:
         self._path = path
         self._lines: dict[tuple[Key, ...], int] = {}
         try:
-            with open(path, "rb", opener=_without_waiting) as file:
-                if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
-                    raise SettingsError(f"{path}: not a regular file")
+            with open_regular(path) as file:
                 text = file.read(MAX_BYTES + 1)
         except OSError as error:
             raise SettingsError(f"{path}: {error.strerror}") from error
@@ -141,11 +138,6 @@ class _Reader:
                 raise SettingsPlace((*keys, key), "given twice")
             data[key] = self.plain(value_node, (*keys, key), depth + 1)
         return data
-
-
-def _without_waiting(path: str, flags: int) -> int:
-    """Open a file; a FIFO would wait for somebody to write to it."""
-    return os.open(path, flags | os.O_NONBLOCK)
 
 
 def _is_number(text: str) -> bool:

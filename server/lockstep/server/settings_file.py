@@ -9,7 +9,7 @@ from pydantic import BaseModel, SecretStr
 from pydantic.fields import FieldInfo
 from pydantic_settings import BaseSettings, PydanticBaseSettingsSource
 
-from lockstep.server.util.toml_file import TomlUnusable, read_toml
+from lockstep.protocol.files.toml_file import TomlUnusable, read_toml
 
 __all__ = ["SettingsFileSource", "SettingsFileUnusable", "exposed_secrets", "read_settings_file"]
 

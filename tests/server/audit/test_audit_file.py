@@ -4,10 +4,10 @@ from pathlib import Path
 import msgspec
 import pytest
 
+from lockstep.protocol.files.regular_file import MAX_LINE
 from lockstep.server.audit.audit_file import AuditFile, chained_lines, last_records, rotated, stored_records
 from lockstep.server.audit.records import AuditRecord
 from lockstep.server.evidence.chain import check_chain, line_hash
-from lockstep.server.util.regular_file import MAX_LINE
 
 
 def _record(n: int, detail: str = "") -> AuditRecord:

@@ -56,3 +56,16 @@ async def test_another_interpreter_finds_the_bridges_code_and_none_of_the_consol
         await bridge.close()
     with pytest.raises(FileNotFoundError):
         os.listdir(folder)
+
+
+async def test_it_does_not_read_the_file_of_a_bridge_that_runs_by_itself(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("LOCKSTEP_ROBOT_CONFIG", "/etc/lockstep/robot.toml")
+    said = tmp_path / "variables"
+    tell = f"import os\nopen({str(said)!r}, 'w').write(' '.join(os.environ))\nprint('{{\"robot\": \"{ADDRESS}\"}}')"
+    bridge = _bridge(tmp_path, tell)
+    await bridge.start()
+    await bridge.close()
+    assert "LOCKSTEP_LINK_SECRET" in said.read_text().split()
+    assert "LOCKSTEP_ROBOT_CONFIG" not in said.read_text().split()

@@ -11,9 +11,9 @@ from pathlib import Path
 
 import msgspec
 
+from lockstep.protocol.files.regular_file import bounded_lines, open_regular
 from lockstep.server.audit.records import AuditRecord
 from lockstep.server.evidence.chain import GENESIS, ChainedLine, Place, line_hash
-from lockstep.server.util.regular_file import bounded_lines, open_regular
 
 __all__ = ["AuditFile", "chained_lines", "chatter_path", "last_records", "rotated", "stored_records"]
 

@@ -10,9 +10,9 @@ from pathlib import Path
 
 import msgspec
 
+from lockstep.protocol.files.regular_file import bounded_lines, open_regular
 from lockstep.server.evidence.chain import ChainReport
 from lockstep.server.evidence.signer import Signer, is_signed
-from lockstep.server.util.regular_file import bounded_lines, open_regular
 
 __all__ = [
     "ANCHORS_NAME",

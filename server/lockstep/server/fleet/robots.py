@@ -5,9 +5,9 @@ from typing import Any
 
 from pydantic import ValidationError
 
+from lockstep.protocol.files.toml_file import TomlUnusable, read_toml
 from lockstep.server.settings import Settings
 from lockstep.server.util.robot_names import BadFleet, check_names, parse_robots
-from lockstep.server.util.toml_file import TomlUnusable, read_toml
 
 __all__ = ["OWN", "robot_settings"]
 

@@ -63,6 +63,7 @@ class BridgeProcess:
         self._python = python or sys.executable
         self._is_foreign = python is not None
         self._environment = {**os.environ, "LOCKSTEP_LINK_SECRET": secret}
+        self._environment.pop("LOCKSTEP_ROBOT_CONFIG", None)  # for a bridge that runs by itself
         self._alone: TemporaryDirectory[str] | None = None  # while it runs: a folder with the bridge's package alone
         self._say = say
         self._process: asyncio.subprocess.Process | None = None

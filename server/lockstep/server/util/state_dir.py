@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from lockstep.server.util.regular_file import open_regular
+from lockstep.protocol.files.regular_file import open_regular
 
 __all__ = ["KEY_FILE", "StateDamaged", "StateDir", "StateDirUnusable", "default_state_dir"]
 

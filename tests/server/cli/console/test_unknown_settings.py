@@ -17,7 +17,16 @@ def test_a_misspelt_field_of_a_group_is_named_too() -> None:
 
 @pytest.mark.parametrize(
     "name",
-    ["LOCKSTEP_PORT", "lockstep_port", "LOCKSTEP_MEDIA__QUALITY", "LOCKSTEP_RECORDING__DIRECTORY", "LOCKSTEP_SITE"],
+    [
+        *(
+            "LOCKSTEP_PORT",
+            "lockstep_port",
+            "LOCKSTEP_MEDIA__QUALITY",
+            "LOCKSTEP_RECORDING__DIRECTORY",
+            "LOCKSTEP_SITE",
+        ),
+        *("LOCKSTEP_ROBOT_OPTIONS", "LOCKSTEP_ROBOT_CONTAINERS", "LOCKSTEP_ROBOT_CONFIG", "LOCKSTEP_CONFIG_DIR"),
+    ],
 )
 def test_a_setting_in_any_case_and_a_variable_of_another_program_are_not_named(name: str) -> None:
     assert unknown_settings([name], Settings) == []

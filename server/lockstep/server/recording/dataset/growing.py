@@ -2,13 +2,13 @@
 
 from pathlib import Path
 
+from lockstep.protocol.files.regular_file import open_regular
 from lockstep.server.recording.errors import RecordingDamaged
 from lockstep.server.recording.format.event_index import EventIndex
 from lockstep.server.recording.format.info import RecordingInfo
 from lockstep.server.recording.reading.raw_records import BROKEN, MAGIC, raw_records
 from lockstep.server.recording.reading.reader import RecordingReader
 from lockstep.server.recording.reading.scan import Scan
-from lockstep.server.util.regular_file import open_regular
 
 __all__ = ["GrowingRecording"]
 

@@ -7,9 +7,9 @@ from mcap.data_stream import ReadDataStream
 from mcap.opcode import Opcode
 from mcap.records import Attachment, AttachmentIndex, Chunk, Footer, Metadata
 
+from lockstep.protocol.files.regular_file import open_regular
 from lockstep.server.recording.errors import RecordingDamaged
 from lockstep.server.recording.reading.raw_records import HEAD, MAGIC, MAX_RECORD
-from lockstep.server.util.regular_file import open_regular
 
 __all__ = ["FOOTER", "RecordFile"]
 

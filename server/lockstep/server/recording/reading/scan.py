@@ -26,6 +26,7 @@ from mcap.records import (
     SummaryOffset,
 )
 
+from lockstep.protocol.files.regular_file import open_regular
 from lockstep.server.recording.errors import DiskTrouble, RecordingDamaged
 from lockstep.server.recording.format.event_index import INDEX_NAME, EventIndex, IndexBuilder, TopicEntry
 from lockstep.server.recording.format.info import METADATA_NAME, RecordingInfo
@@ -41,7 +42,6 @@ from lockstep.server.recording.reading.raw_records import (
     message_indexes,
     raw_records,
 )
-from lockstep.server.util.regular_file import open_regular
 
 __all__ = ["Scan", "complete_file", "scan_file", "statistics_of"]
 

@@ -8,6 +8,7 @@ import struct
 import zlib
 from pathlib import Path
 
+from lockstep.protocol.files.regular_file import open_regular
 from lockstep.server.recording.errors import RecordingError
 from lockstep.server.recording.format.event_index import EventIndex
 from lockstep.server.recording.format.payload import own_record_of
@@ -19,7 +20,6 @@ from lockstep.server.recording.reading.scan import Scan, scan_file
 from lockstep.server.recording.verify.promises import Verdict, Verifier
 from lockstep.server.recording.verify.verify_indexes import IndexChecker
 from lockstep.server.recording.verify.verify_signature import SignatureChecker
-from lockstep.server.util.regular_file import open_regular
 
 __all__ = ["verify_file"]
 

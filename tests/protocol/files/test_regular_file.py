@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from lockstep.server.util.regular_file import MAX_LINE, bounded_lines, open_regular
+from lockstep.protocol.files.regular_file import MAX_LINE, bounded_lines, open_regular
 
 
 def test_what_is_no_file_is_refused_and_not_waited_for(tmp_path: Path) -> None:

@@ -6,7 +6,7 @@ import tomllib
 from pathlib import Path
 from typing import Any
 
-from lockstep.server.util.regular_file import open_regular
+from lockstep.protocol.files.regular_file import open_regular
 
 __all__ = ["MAX_TOML", "TomlUnusable", "read_toml"]
 
