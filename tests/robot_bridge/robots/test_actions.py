@@ -1,5 +1,6 @@
 """The actions of the simulated robots do what their names say."""
 
+import asyncio
 import importlib.util
 import math
 
@@ -29,6 +30,13 @@ def run(robot: Robot, name: str) -> ActionStep:
         robot.apply(rest if step.values is None else [value for value in step.values if value is not None])
         robot.tick()
     raise AssertionError(f"{name} does not end")
+
+
+async def drawn(robot: Micromanipulator, event: int) -> None:
+    """Let the microscope take a picture now."""
+    picture = robot._draw_microscope(robot.state(), event)
+    assert not isinstance(picture, bytes)
+    await picture
 
 
 def test_planar_home_drives_to_the_place_where_the_robot_began() -> None:
@@ -69,14 +77,17 @@ def test_planar_dock_fails_when_there_is_no_way_to_it() -> None:
         run(robot, "dock")
 
 
-def test_autofocus_finds_the_height_of_the_tip_and_a_snapshot_is_kept() -> None:
+def test_autofocus_finds_the_height_of_the_tip_and_a_snapshot_names_its_picture() -> None:
     robot = Micromanipulator()
     try:
         assert "sharp at" in run(robot, "autofocus").text
         state = robot.state()
         assert abs(state.focus - state.tip[2]) < 1e-6
-        assert run(robot, "snapshot").done
-        assert [each.focus for each in robot.snapshots] == [state.focus]
+        snapshot = robot.begin_action("snapshot", {})
+        assert not snapshot.step().done
+        asyncio.run(drawn(robot, 7))
+        assert snapshot.step().text == f"picture of event 7, focus {state.focus * 1e6:.1f} µm; only recordings keep it"
+        assert robot.status()[1].value == 1.0
     finally:
         robot.close()
 
