@@ -39,7 +39,7 @@ FOUND_BY = {
 }
 SAID = {  # of those that another fault could bring to the same end
     Fault.REPEATS_HOLD: "the robot goes on while one command is repeated",
-    Fault.NO_HOLD: "not at rest 1.0 s after the last command",
+    Fault.NO_HOLD: "not at rest 1.",
     Fault.FORGETS_STOP: "a new operator link released the stop",
     Fault.DIES_OF_MALFORMED: "an array: the connection ended",
     Fault.STAMPS_AHEAD: "a medium is stamped",

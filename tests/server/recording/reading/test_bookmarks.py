@@ -41,7 +41,7 @@ def test_stops_of_recordings_without_numbers_are_marked() -> None:
 
 def test_the_end_of_an_action_is_marked_with_its_reason_or_its_result() -> None:
     def marked(state: ActionState, reason: ActionReason = "", text: str = "") -> list[tuple[int, str, str]]:
-        record = ActionRecord(event=5, id="a", name="snapshot", state=state, by="", reason=reason, text=text)
+        record = ActionRecord(epoch="e", event=5, id="a", name="snapshot", state=state, by="", reason=reason, text=text)
         return [(mark.event, mark.kind, mark.text) for mark in BookmarkFinder().find(record, 0)]
 
     assert marked("running", text="waits for the picture") == []

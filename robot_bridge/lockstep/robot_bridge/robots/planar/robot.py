@@ -90,7 +90,7 @@ class PlanarRobot(Robot):
         vx, vy, wz = self._command
         before = self._state
         moving = bool(vx or vy or wz)
-        self._battery.tick(dt, moving=moving, charging=not moving and self._is_docked())
+        self._battery.tick(dt, moving=moving, charging=not moving and is_docked(before))
         if not (vx or vy or wz or before.vx or before.vy or before.wz or before.fx or before.fy):
             return
         yaw = math.remainder(before.yaw + wz * dt, math.tau)
@@ -172,11 +172,6 @@ class PlanarRobot(Robot):
     def _arrived(self) -> None:
         self._going = None
 
-    def _is_docked(self) -> bool:
-        x, y, yaw = self._state[:3]
-        near, straight = DOCKED
-        return math.hypot(x - DOCK[0], y - DOCK[1]) < near and abs(math.remainder(yaw - DOCK[2], math.tau)) < straight
-
     def grid_map(self) -> GridMap | None:
         return self._map
 
@@ -195,6 +190,13 @@ class PlanarRobot(Robot):
     def _hear(self) -> bytes:
         state = self._state
         return self._sound.segment(math.hypot(state.vx, state.vy) + 0.3 * abs(state.wz))
+
+
+def is_docked(state: PlanarState) -> bool:
+    """Return whether the robot is where it charges."""
+    near, straight = DOCKED
+    away, turned = math.hypot(state.x - DOCK[0], state.y - DOCK[1]), math.remainder(state.yaw - DOCK[2], math.tau)
+    return away < near and abs(turned) < straight
 
 
 def number(value: ParameterValue) -> float:
