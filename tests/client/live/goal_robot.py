@@ -4,17 +4,18 @@ It keeps the rules of docs/robot-link.md, "Goal axes", but for acceleration: an 
 """
 
 import math
-import secrets
 import time
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from dataclasses import dataclass, field
 
+import msgspec
+
 from lockstep.protocol.description import Axis, Camera, RobotDescription
-from lockstep.protocol.messages import Command, EventNotice, Feedback, RefusalReason, Rest, Stop
 from lockstep.protocol.neutral import neutral_values
 from lockstep.protocol.serial import event_after, event_gap
 from tests.robot_bridge.conformance.plain_bridge import AGE, TICK, PlainBridge, serving
+from tests.robot_bridge.conformance.plain_messages import Message
 
 __all__ = ["ARM", "HOLD", "SAG", "GoalRobot", "running_goal_robot"]
 
@@ -54,7 +55,7 @@ class GoalRobot(PlainBridge):
     blocked: measured values that something holds where they are, by the number of the axis
     """
 
-    description: RobotDescription = ARM
+    description: Message = field(default_factory=lambda: dict(msgspec.to_builtins(ARM)))
     wanted: list[float | None] = field(default_factory=lambda: neutral_values(ARM.axes))
     speed: float = 1.0
     applied: list[float] = field(default_factory=lambda: [0.0, 0.5, 3.0])
@@ -64,8 +65,8 @@ class GoalRobot(PlainBridge):
 
     def tick(self) -> None:
         if time.monotonic() - self.executed > HOLD - TICK:
-            self.wanted = neutral_values(self.description.axes)
-        for index, axis in enumerate(self.description.axes):
+            self.wanted = neutral_values(ARM.axes)
+        for index, axis in enumerate(ARM.axes):
             wanted = self.wanted[index]
             if axis.kind == "goal" and wanted is not None:
                 step = self.speed * axis.slew * TICK
@@ -75,80 +76,67 @@ class GoalRobot(PlainBridge):
 
     @property
     def goals(self) -> list[float | None]:
-        goals = zip(self.applied, self.description.axes, strict=True)
+        goals = zip(self.applied, ARM.axes, strict=True)
         return [goal if axis.kind == "goal" else None for goal, axis in goals]
 
     @property
-    def measured(self) -> list[float]:
+    def places(self) -> list[float]:
+        """The measured value of each axis."""
         found = [0.0 if goal is None else goal - SAG for goal in self.goals]
         return [self.blocked.get(index, value) for index, value in enumerate(found)]
 
-    def measure(self) -> None:
-        self.issue += 1
-        now = time.monotonic()
-        self.issues[self.issue] = Feedback(
-            event=self.event,
-            issue=self.issue,
-            time=now,
-            axes=self.measured,
-            goals=self.goals,
-            at_rest=self.wanted == neutral_values(self.description.axes),
-            stop=self.stop,
-            nonce=secrets.randbelow(2**53 - 1) + 1,
-            neutral_needed=self.neutral_needed,
-        )
-        self.tell("operator", self.newest)
-        self.tell("events", EventNotice(event=self.event, time=now))
+    def measured(self) -> Message:
+        return {"axes": self.places, "goals": self.goals, "at_rest": self.wanted == neutral_values(ARM.axes)}
 
-    def is_proper(self, command: Command) -> RefusalReason | None:
-        if len(command.values) != len(self.description.axes):
+    def is_proper(self, command: Message) -> str:
+        if len(command["values"]) != len(ARM.axes):
             return "wrong_size"
-        for axis, value in zip(self.description.axes, command.values, strict=True):
+        for axis, value in zip(ARM.axes, command["values"], strict=True):
             if axis.kind == "rate" if value is None else not math.isfinite(value):
                 return "not_a_number"
-        return "stopped" if self.stop.stopped else None
+        return "stopped" if self.stop["stopped"] else ""
 
-    def may_execute(self, command: Command) -> RefusalReason | None:
-        answered = self.issues.get(command.issue)
-        if command.event != event_after(self.event):
+    def may_execute(self, command: Message) -> str:
+        answered = self.issues.get(command["issue"])
+        if command["event"] != event_after(self.event):
             return "out_of_order"
-        if answered is None or time.monotonic() - answered.time > AGE:
+        if answered is None or time.monotonic() - answered["time"] > AGE:
             return "late"
-        if command.nonce != answered.nonce:
+        if command["nonce"] != answered["nonce"]:
             return "unseen"
-        if list(command.values) == neutral_values(self.description.axes):
-            return None
-        if self.voided and event_gap(command.event, self.voided) <= 0:
+        if list(command["values"]) == neutral_values(ARM.axes):
+            return ""
+        if self.voided and event_gap(command["event"], self.voided) <= 0:
             return "rested"
         if self.neutral_needed:
             return "not_neutral"
-        axes = zip(self.description.axes, command.values, self.measured, strict=True)
+        axes = zip(ARM.axes, command["values"], self.places, strict=True)
         far = any(
             axis.kind == "goal" and value is not None and abs(distance(axis, measured, value)) > axis.reach
             for axis, value, measured in axes
         )
-        return "jump" if far else None
+        return "jump" if far else ""
 
-    def execute(self, command: Command) -> None:
-        self.executed_values.append(list(command.values))
-        self.executed, self.speed = time.monotonic(), command.speed
-        self.wanted = list(command.values)
-        if self.wanted == neutral_values(self.description.axes):
+    def execute(self, command: Message) -> None:
+        self.executed_values.append(list(command["values"]))
+        self.executed, self.speed = time.monotonic(), command["speed"]
+        self.wanted = list(command["values"])
+        if self.wanted == neutral_values(ARM.axes):
             self.neutral_needed = False
             self.presses.clear()
-        self.event, self.issue, self.issues = command.event, 0, {}
+        self.event, self.issue, self.issues = command["event"], 0, {}
         self.measure()
 
-    def rest(self, rest: Rest) -> None:
+    def rest(self, rest: Message) -> None:
         following = event_after(self.event)
-        if event_gap(self.event, rest.event) > 0:
+        if event_gap(self.event, rest["event"]) > 0:
             return
         self.rests += 1
-        self.wanted = neutral_values(self.description.axes)
-        self.voided = following if event_gap(rest.event, following) > 0 else rest.event
+        self.wanted = neutral_values(ARM.axes)
+        self.voided = following if event_gap(rest["event"], following) > 0 else rest["event"]
 
-    def press(self, stop: Stop) -> int:
-        self.wanted = neutral_values(self.description.axes)
+    def press(self, stop: Message) -> int:
+        self.wanted = neutral_values(ARM.axes)
         return super().press(stop)
 
 

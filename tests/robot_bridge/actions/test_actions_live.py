@@ -16,10 +16,20 @@ from lockstep.robot_bridge.errors import RobotFailed
 from lockstep.robot_bridge.link.link_client import RobotLink
 from lockstep.robot_bridge.robots.actions import ActionDone, ActionFailed, ActionNotPossible, ActionRun, ActionStep
 from lockstep.robot_bridge.robots.planar.robot import PlanarState
-from tests.robot_bridge.bridge_helpers import NEUTRAL, Operator, RecordingRobot, log_lines, operator, running_bridge
+from lockstep.robot_bridge.robots.planar.room import DOCK
+from tests.robot_bridge.bridge_helpers import (
+    NEUTRAL,
+    PATIENCE,
+    Operator,
+    RecordingRobot,
+    log_lines,
+    operator,
+    running_bridge,
+)
 
 MARGIN = 0.05  # s between the bridge's reading of the clock and the test's, on a busy machine
 AWAY = PlanarState(x=0.5, y=0.2, yaw=0.3)
+BEFORE_DOCK = PlanarState(x=3.1, y=-1.0, yaw=-1.2)
 
 
 class HomingRobot(RecordingRobot):
@@ -110,6 +120,34 @@ async def test_home_drives_the_robot_home_while_armed_events_renew_it() -> None:
         repeated = await ask(driver, "home")
         assert repeated == final, "a repeat is answered from memory"
         await driver.heard(lambda feedback: feedback.at_rest)
+
+
+async def test_dock_drives_the_robot_to_its_charger_while_armed_events_renew_it() -> None:
+    robot = HomingRobot()
+    robot._state = BEFORE_DOCK
+    async with running_bridge(robot) as bridge, operator(bridge) as driver:
+        assert (await ask(driver, "dock")).moves
+        await renew(driver)
+        final = await until_final(driver, renews="id-1")
+        assert (final.state, final.text, final.progress) == ("done", "at the charger", 1.0)
+        await driver.heard(lambda feedback: feedback.at_rest)
+        level = robot.status()[0].value
+        async with asyncio.timeout(PATIENCE):
+            while robot.status()[0].value == level:
+                await driver.drive(list(NEUTRAL))
+        assert float(robot.status()[0].value) > float(level)
+
+
+async def test_dock_ends_where_the_robot_is_when_nothing_renews_it() -> None:
+    robot = HomingRobot()
+    robot._state = BEFORE_DOCK
+    async with running_bridge(robot) as bridge, operator(bridge) as driver:
+        assert (await ask(driver, "dock")).state == "running"
+        final = await until_final(driver)
+        assert (final.state, final.reason) == ("cancelled", "not_renewed")
+        await driver.heard(lambda feedback: feedback.at_rest)
+        assert robot.state.y > DOCK[1] + 0.2
+        assert robot.navigation().goal is None
 
 
 async def test_a_link_that_opens_is_told_how_long_ago_an_action_ended() -> None:

@@ -1,4 +1,9 @@
-"""A bridge of two axes written from docs/robot-link.md with asyncio's streams, which can be given one fault."""
+"""A robot of two axes, written from docs/robot-link.md and from nothing else, which can be given one fault.
+
+It reads and writes plain maps, and imports nothing of Lockstep's (test_plain_bridge.py): a page that says something
+else than Lockstep does makes it fail. It has two actions. It leaves out what the page lets a bridge leave out (goal
+axes, a secret, TLS, a start warning, encoding, a disk), `max_event_rate`, which its clients keep, and the watchdog.
+"""
 
 import asyncio
 import contextlib
@@ -10,57 +15,55 @@ from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from dataclasses import dataclass, field
 from enum import Enum, auto
+from typing import Any
 
-import msgspec
-
-from lockstep.protocol.description import Axis, Camera, RobotDescription
-from lockstep.protocol.errors import MessageError
-from lockstep.protocol.messages import (
-    Command,
-    EventNotice,
-    Feedback,
-    Goodbye,
-    Hello,
-    LinkMessage,
-    LinkRole,
-    Media,
-    Ping,
-    Pong,
-    Refusal,
-    RefusalReason,
-    Reset,
-    Rest,
-    Stop,
-    StopState,
-    StopTaken,
-    decode_message,
-    encode_message,
+from tests.robot_bridge.conformance.plain_actions import PlainActions, RobotNow
+from tests.robot_bridge.conformance.plain_messages import (
+    LARGEST,
+    Malformed,
+    Message,
+    event_after,
+    event_gap,
+    frame,
+    read,
 )
-from lockstep.protocol.serial import event_after, event_gap
 
-__all__ = ["Fault", "PlainBridge", "running_plain_bridge", "serving"]
+__all__ = ["AGE", "NEUTRAL", "TICK", "Fault", "Link", "PlainBridge", "running_plain_bridge", "serving"]
 
 TICK = 0.01  # s
 HOLD = 0.2  # s
 AGE = 0.5  # s
-DESCRIPTION = RobotDescription(
-    name="plain",
-    label="Plain",
-    axes=(
-        Axis(name="x", label="X", unit="m/s", minimum=-1, maximum=1, slew=100, brake=100),
-        Axis(name="y", label="Y", unit="m/s", minimum=-1, maximum=1, slew=100, brake=100),
-    ),
-    cameras=(Camera(name="camera", label="Camera", width=16, height=16, frame_rate=25),),
-    hold=HOLD,
-    max_event_age=AGE,
-    max_event_rate=100,
-)
+GRACE = 10.0  # s for which the robot is reserved for an operator whose link broke
+PRESSES = 256  # that are known
+RATE_AXIS = {"unit": "m/s", "minimum": -1, "maximum": 1, "slew": 100, "brake": 100}
+DESCRIPTION: Message = {
+    "name": "plain",
+    "label": "Plain",
+    "axes": [{"name": "x", "label": "X", **RATE_AXIS}, {"name": "y", "label": "Y", **RATE_AXIS}],
+    "joints": [{"name": "place.x", "unit": "m"}, {"name": "place.y", "unit": "m"}],
+    "cameras": [{"name": "camera", "label": "Camera", "width": 16, "height": 16, "frame_rate": 25}],
+    "actions": [
+        {"name": "home", "label": "Home"},
+        {
+            "name": "light",
+            "label": "Light",
+            "moves": False,
+            "parameters": [{"name": "on", "label": "On", "kind": "switch", "default": True}],
+        },
+    ],
+    "hold": HOLD,
+    "max_event_age": AGE,
+    "max_event_rate": 100,
+}
 NEUTRAL = [0.0, 0.0]
+AWAY = [1.0, 0.0]  # m from home, where it begins: further than any case lets it go
+HOMING_SPEED = 0.1  # m/s
+NEAR = 0.01  # m from home
 PICTURE = bytes(16 * 16 * 3 // 2)
-ALLOWED: dict[LinkRole, tuple[type[LinkMessage], ...]] = {
-    "operator": (Command, Rest, Stop, Reset),
-    "events": (Stop,),
-    "media": (Stop,),
+ALLOWED = {
+    "operator": ("command", "rest", "stop", "reset", "act", "action_cancel"),
+    "events": ("stop",),
+    "media": ("stop",),
 }
 
 
@@ -88,14 +91,20 @@ class Fault(Enum):
     ANY_ROLE = auto()  # takes what the role does not permit, and says nothing
     REFUSES_SILENTLY = auto()
     NO_REFRESH = auto()  # measures only when commanded
+    ACTS_UNRENEWED = auto()  # an action goes on without armed events
+    ACTS_AGAIN = auto()  # a repeat of a request that was cancelled begins it again
+    ACTS_UNARMED = auto()  # an action moves the robot at once on a new link
+    ACTS_DRIVEN = auto()  # an action goes on when a moving command comes
 
 
 @dataclass(eq=False)
 class Link:
     writer: asyncio.StreamWriter
-    role: LinkRole
+    role: str
+    name: str = ""
+    left: bool = False  # said goodbye
 
-    def send(self, message: LinkMessage) -> None:
+    def send(self, message: Message) -> None:
         send(self.writer, message)
 
 
@@ -105,163 +114,235 @@ class PlainBridge:
 
     fault: Fault | None = None
     drawing: float = 0.0  # s from capturing a picture to sending it
-    description: RobotDescription = DESCRIPTION
-    captured: deque[Media] = field(default_factory=deque)  # and not sent yet
+    description: Message = field(default_factory=lambda: DESCRIPTION)
+    captured: deque[Message] = field(default_factory=deque)  # and not sent yet
     address: tuple[str, int] = ("127.0.0.1", 0)
     links: set[Link] = field(default_factory=set)
+    reserved: tuple[str, float] = ("", 0.0)  # for whom, and until when, s
     epoch: str = field(default_factory=lambda: secrets.token_hex(8))
+    place: list[float] = field(default_factory=lambda: list(AWAY))  # m
+    light: bool = False
     values: list[float] = field(default_factory=lambda: list(NEUTRAL))
     executed: float = 0.0  # s, when the command was that is held
     event: int = 1
     issue: int = 0
-    issues: dict[int, Feedback] = field(default_factory=dict)  # of this event
+    issues: dict[int, Message] = field(default_factory=dict)  # of this event
     neutral_needed: bool = True
     voided: int = 0  # the newest event that a rest voids
-    stop: StopState = field(default_factory=lambda: StopState(kept=False))
+    stop: Message = field(default_factory=lambda: {"stopped": False, "number": 0, "press": "", "kept": False})
     presses: dict[str, int] = field(default_factory=dict)
     stopped_at: float = 0.0  # s
     ticks: int = 0
+
+    def __post_init__(self) -> None:
+        self.actions = PlainActions(
+            self.description.get("actions", []),
+            self.description["max_event_age"],
+            lambda state: self.tell("operator", state),
+            begins_anew=self.fault is Fault.ACTS_AGAIN,
+            needs_neutral=self.fault is not Fault.ACTS_UNARMED,
+        )
 
     # The robot
 
     def tick(self) -> None:
         now = time.monotonic()
         self.ticks += 1
-        if now - self.executed > HOLD - TICK and self.fault is not Fault.NO_HOLD:
+        if now - self.executed > HOLD - TICK and self.fault is not Fault.NO_HOLD and not self.actions.moving:
             self.values = list(NEUTRAL)
-        if self.issue == 0 or (now - self.newest.time > 0.5 and self.fault is not Fault.NO_REFRESH):
+        self.act(now)
+        self.place = [place + value * TICK for place, value in zip(self.place, self.values, strict=True)]
+        if self.issue == 0 or (now - self.newest["time"] > 0.5 and self.fault is not Fault.NO_REFRESH):
             self.measure()
         if self.ticks % 20 == 0 and self.fault is not Fault.NO_HEARTBEATS:
-            self.tell("operator", Ping(id=self.ticks))
-            self.tell("events", Ping(id=self.ticks))
-            self.tell("media", Ping(id=self.ticks))
+            for role in ALLOWED:
+                self.tell(role, {"type": "ping", "id": self.ticks})
         if self.ticks % 4 == 0:
-            stamp = event_after(self.event) if self.fault is Fault.STAMPS_AHEAD else self.event
-            self.captured.append(
-                Media(stream="camera", codec="yuv420p", stamp=stamp, time=now, payload=PICTURE, width=16, height=16)
-            )
-        while self.captured and now - self.captured[0].time >= self.drawing:
+            self.captured.append(self.picture(now))
+        while self.captured and now - self.captured[0]["time"] >= self.drawing:
             self.tell("media", self.captured.popleft())
 
+    def act(self, now: float) -> None:
+        """Do the next part of each action that runs."""
+        actions = self.actions
+        if actions.moving and now - actions.renewed > HOLD - TICK and self.fault is not Fault.ACTS_UNRENEWED:
+            self.interrupt("not_renewed")
+        for id, values in list(actions.values.items()):
+            if id != actions.moving:
+                self.light = values["on"]
+                actions.ended(id, "done", self.event, now, text="on" if self.light else "off")
+            elif math.hypot(*self.place) < NEAR:
+                actions.ended(id, "done", self.event, now, text="at home")
+                self.values = list(NEUTRAL)
+            else:
+                self.values = [min(max(-place, -HOMING_SPEED), HOMING_SPEED) for place in self.place]
+
+    def interrupt(self, reason: str) -> None:
+        """End the action that moves the robot, if one does."""
+        if self.actions.moving:
+            self.values = list(NEUTRAL)
+        self.actions.interrupt(reason, self.event, time.monotonic())
+
+    def picture(self, now: float) -> Message:
+        stamp = event_after(self.event) if self.fault is Fault.STAMPS_AHEAD else self.event
+        about = {"type": "media", "stream": "camera", "codec": "yuv420p", "width": 16, "height": 16}
+        return {**about, "stamp": stamp, "time": now, "payload": PICTURE}
+
     @property
-    def newest(self) -> Feedback:
+    def newest(self) -> Message:
         return self.issues[self.issue]
+
+    def measured(self) -> Message:
+        """The fields of a feedback that the robot measures."""
+        return {"axes": self.values, "joints": self.place, "at_rest": self.values == NEUTRAL}
 
     def measure(self) -> None:
         """Issue the current event's feedback, once more."""
         self.issue += 1
         now = time.monotonic()
-        self.issues[self.issue] = Feedback(
-            event=self.event,
-            issue=self.issue,
-            time=now,
-            axes=list(self.values),
-            at_rest=self.values == NEUTRAL,
-            stop=self.stop,
-            nonce=secrets.randbelow(2**53 - 1) + 1,
-            neutral_needed=self.neutral_needed,
-        )
+        nonce = secrets.randbelow(LARGEST) + 1
+        self.issues[self.issue] = {
+            "type": "feedback",
+            "event": self.event,
+            "issue": self.issue,
+            "time": now,
+            **self.measured(),
+            "stop": self.stop,
+            "nonce": nonce,
+            "neutral_needed": self.neutral_needed,
+        }
+        self.actions.issued(nonce, now)
         self.tell("operator", self.newest)
-        self.tell("events", EventNotice(event=self.event, time=now))
+        self.tell("events", {"type": "event", "event": self.event, "time": now})
 
-    def tell(self, role: LinkRole, message: LinkMessage) -> None:
+    def tell(self, role: str, message: Message) -> None:
         for link in self.links:
             if link.role == role:
                 link.send(message)
 
     # What clients say
 
-    def take(self, link: Link, message: LinkMessage) -> None:
-        match message:
-            case Command():
-                self.command(link, message)
-            case Rest():
+    def take(self, link: Link, message: Message) -> None:
+        match message["type"]:
+            case "command":
+                self.commanded(link, message)
+            case "rest":
                 self.rest(message)
-            case Stop():
-                link.send(StopTaken(press=message.press, number=self.press(message), kept=False))
-            case Reset():
-                if (refused := self.reset(message)) is not None:
-                    link.send(Refusal(event=0, reason=refused, current=self.event, stop=message.number))
+            case "stop":
+                number = self.press(message)
+                link.send({"type": "stop_taken", "press": message["press"], "number": number, "kept": False})
+            case "reset":
+                if reason := self.reset(message):
+                    self.refuse(link, reason, stop=message["number"])
+            case "act":
+                now, driven = time.monotonic(), self.values != NEUTRAL
+                robot = RobotNow(now, self.event, self.stop["stopped"], self.neutral_needed, driven)
+                self.actions.request(message, robot)
+            case "action_cancel":
+                if message["id"] in ("", self.actions.moving):
+                    self.interrupt("cancelled")
+                else:
+                    self.actions.cancel(message["id"], self.event, time.monotonic())
 
-    def command(self, link: Link, command: Command) -> None:
-        if command.event == self.event and not self.stop.stopped and self.is_proper(command) is None:
+    def refuse(self, link: Link, reason: str, event: int = 0, **more: Any) -> None:
+        link.send({"type": "refusal", "event": event, "reason": reason, "current": self.event, **more})
+
+    def commanded(self, link: Link, command: Message) -> None:
+        if command["values"] != NEUTRAL and self.fault is not Fault.ACTS_DRIVEN:
+            self.interrupt("driving")
+        before = self.event
+        self.command(link, command)
+        if self.event != before and command["values"] == NEUTRAL:
+            self.actions.renew(command["action"], time.monotonic())
+
+    def command(self, link: Link, command: Message) -> None:
+        reason = self.is_proper(command)
+        if command["event"] == self.event and not reason:
             if self.fault is Fault.REPEATS_COUNT:
-                command = msgspec.structs.replace(command, event=event_after(self.event))
-                self.execute(command)
-            elif self.fault is Fault.REPEATS_HOLD:
-                self.executed, self.values = time.monotonic(), numbers(command)
-                self.tell("operator", self.newest)
-            else:
-                self.tell("operator", self.newest)
+                self.execute({**command, "event": event_after(self.event)})
+                return
+            if self.fault is Fault.REPEATS_HOLD:
+                self.executed, self.values = time.monotonic(), clamped(command)
+            self.tell("operator", self.newest)
             return
-        reason = self.is_proper(command) or self.may_execute(command)
-        if reason is None:
+        reason = reason or self.may_execute(command)
+        if not reason:
             self.execute(command)
             return
         if self.fault is not Fault.REFUSES_SILENTLY:
-            link.send(Refusal(event=command.event, reason=reason, current=self.event))
+            self.refuse(link, reason, command["event"])
         if reason == "late":
             self.measure()
 
-    def is_proper(self, command: Command) -> RefusalReason | None:
-        if len(command.values) != len(NEUTRAL):
+    def is_proper(self, command: Message) -> str:
+        if len(command["values"]) != len(NEUTRAL):
             return "wrong_size"
-        if not all(map(is_number, command.values)) and self.fault is not Fault.NAN_EXECUTES:
+        numbers = [*command["values"], command["speed"]]
+        if not (all(map(is_number, numbers)) and 0 <= command["speed"] <= 1) and self.fault is not Fault.NAN_EXECUTES:
             return "not_a_number"
-        return "stopped" if self.stop.stopped else None
+        return "stopped" if self.stop["stopped"] else ""
 
-    def may_execute(self, command: Command) -> RefusalReason | None:
-        if command.event != event_after(self.event):
+    def may_execute(self, command: Message) -> str:
+        if command["event"] != event_after(self.event):
             return "out_of_order"
-        answered = self.issues.get(command.issue)
-        is_old = answered is not None and time.monotonic() - answered.time > AGE
+        answered = self.issues.get(command["issue"])
+        is_old = answered is not None and time.monotonic() - answered["time"] > AGE
         if answered is None or (is_old and self.fault is not Fault.LATE_EXECUTES):
             return "late"
-        if command.nonce != answered.nonce and self.fault is not Fault.UNSEEN_EXECUTES:
+        if command["nonce"] != answered["nonce"] and self.fault is not Fault.UNSEEN_EXECUTES:
             return "unseen"
-        if command.values == NEUTRAL:
-            return None
-        if self.voided and event_gap(command.event, self.voided) <= 0:
+        if command["values"] == NEUTRAL:
+            return ""
+        if self.voided and event_gap(command["event"], self.voided) <= 0:
             return "rested"
-        return "not_neutral" if self.neutral_needed and self.fault is not Fault.NO_NEUTRAL else None
+        return "not_neutral" if self.neutral_needed and self.fault is not Fault.NO_NEUTRAL else ""
 
-    def execute(self, command: Command) -> None:
-        self.executed, self.values = time.monotonic(), numbers(command)
-        if command.values == NEUTRAL:
+    def execute(self, command: Message) -> None:
+        self.executed = time.monotonic()
+        if not self.actions.moving:
+            self.values = clamped(command)
+        if command["values"] == NEUTRAL:
             self.neutral_needed = False
             self.presses.clear()
-        self.event, self.issue, self.issues = command.event, 0, {}
+        self.event, self.issue, self.issues = command["event"], 0, {}
         self.measure()
 
-    def rest(self, rest: Rest) -> None:
+    def rest(self, rest: Message) -> None:
         following = event_after(self.event)
-        if event_gap(self.event, rest.event) > 0 or self.fault is Fault.NO_REST:
+        if event_gap(self.event, rest["event"]) > 0 or self.fault is Fault.NO_REST:
             return
+        self.interrupt("rested")
         self.values = list(NEUTRAL)
-        self.voided = following if event_gap(rest.event, following) > 0 else rest.event
+        named = following if event_gap(rest["event"], following) > 0 else rest["event"]
+        if not self.voided or event_gap(named, self.voided) > 0:
+            self.voided = named
 
-    def press(self, stop: Stop) -> int:
-        known = self.presses.get(stop.press)
-        if stop.press and known is not None and self.fault is not Fault.NUMBERS_REPEATS:
+    def press(self, stop: Message) -> int:
+        known = self.presses.get(stop["press"])
+        if stop["press"] and known is not None and self.fault is not Fault.NUMBERS_REPEATS:
             return known
-        number = self.stop.number + 1
-        first = self.stop if self.stop.stopped else StopState(by=stop.by, reason=stop.reason)
-        self.stop = StopState(True, first.by, first.reason, number, stop.press, kept=False)
-        self.presses[stop.press] = number
+        number: int = self.stop["number"] + 1
+        first = self.stop if self.stop["stopped"] else stop
+        about = {"by": first["by"], "reason": first["reason"], "press": stop["press"]}
+        self.stop = {"stopped": True, "number": number, "kept": False, **about}
+        self.presses[stop["press"]] = number
+        if len(self.presses) > PRESSES:
+            del self.presses[next(iter(self.presses))]
+        self.interrupt("stopped")
         self.values, self.neutral_needed, self.stopped_at = list(NEUTRAL), True, time.monotonic()
         self.measure()
         return number
 
-    def reset(self, reset: Reset) -> RefusalReason | None:
-        if reset.number != self.stop.number and self.fault is not Fault.RESETS_ANY_STOP:
+    def reset(self, reset: Message) -> str:
+        if reset["number"] != self.stop["number"] and self.fault is not Fault.RESETS_ANY_STOP:
             return "stale_reset"
-        if not self.stop.stopped:
-            return None
+        if not self.stop["stopped"]:
+            return ""
         if time.monotonic() - self.stopped_at < 1.0:
             return "too_soon"
         self.stop = released(self.stop)
         self.measure()
-        return None
+        return ""
 
     # Links
 
@@ -278,82 +359,95 @@ class PlainBridge:
                     if not await self.heard(reader, link):
                         break
         except TimeoutError:
-            send(writer, Goodbye(error="silent"))
+            send(writer, {"type": "goodbye", "error": "silent"})
         except (ConnectionError, asyncio.IncompleteReadError):
             pass
         finally:
             if link is not None:
-                self.links.discard(link)
-                if link.role == "operator":
-                    self.values, self.neutral_needed = list(NEUTRAL), True
+                self.lost(link)
             with contextlib.suppress(ConnectionError):
                 writer.close()
                 await writer.wait_closed()
 
+    def lost(self, link: Link) -> None:
+        self.links.discard(link)
+        if link.role != "operator":
+            return
+        self.interrupt("link_down")
+        self.values, self.neutral_needed = list(NEUTRAL), True
+        if link.name and not link.left:
+            self.reserved = link.name, time.monotonic() + GRACE
+
     async def admitted(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> Link | None:
-        payload = await self.payload(reader, writer, 8 << 10)
+        payload = await self.payload(reader, writer, 8192)
         if payload is None:
             return None
         try:
-            hello = decode_message(payload)
-        except MessageError:
-            hello = Pong(id=0)
-        if not isinstance(hello, Hello):
-            send(writer, Goodbye(error="handshake"))
+            hello = read(payload)
+        except Malformed:
+            hello = {"type": "none"}
+        if error := self.unwelcome(hello):
+            send(writer, {"type": "goodbye", "error": error})
             return None
-        if hello.version != 2 and self.fault is not Fault.ANY_VERSION:
-            send(writer, Goodbye(error="version"))
-            return None
-        if hello.role not in ALLOWED:
-            send(writer, Goodbye(error="role"))
-            return None
-        is_taken = hello.role == "operator" and any(link.role == "operator" for link in self.links)
-        if is_taken and self.fault is not Fault.TWO_OPERATORS:
-            send(writer, Goodbye(error="taken"))
-            return None
-        described = None if hello.role == "events" else self.description
-        send(writer, Hello(role="robot", epoch=self.epoch, description=described))
-        link = Link(writer, hello.role)
-        self.links.add(link)
-        if hello.role == "operator":
-            self.neutral_needed = True
+        link = Link(writer, hello["role"], hello["name"])
+        described = None if link.role == "events" else self.description
+        about = {"version": 2, "role": "robot", "epoch": self.epoch}
+        link.send({"type": "hello", **about, "description": described})
+        if link.role == "operator":
+            self.neutral_needed, self.reserved = True, ("", 0.0)
             if self.fault is Fault.FORGETS_STOP:
                 self.stop = released(self.stop)
+            for state in self.actions.anew(time.monotonic()):
+                link.send(state)
+        self.links.add(link)
         self.measure()
         return link
+
+    def unwelcome(self, hello: Message) -> str:
+        """The error of the goodbye to this hello; "" for none."""
+        if hello["type"] != "hello":
+            return "handshake"
+        if hello["version"] != 2 and self.fault is not Fault.ANY_VERSION:
+            return "version"
+        if hello["role"] not in ALLOWED:
+            return "role"
+        name, until = self.reserved
+        is_taken = any(link.role == "operator" for link in self.links) and self.fault is not Fault.TWO_OPERATORS
+        is_reserved = time.monotonic() < until and hello["name"] != name
+        return "taken" if hello["role"] == "operator" and (is_taken or is_reserved) else ""
 
     async def heard(self, reader: asyncio.StreamReader, link: Link) -> bool:
         """One valid message; False when the link is over."""
         while (payload := await self.payload(reader, link.writer, 1 << 20)) is not None:
             try:
-                message = decode_message(payload)
-            except MessageError:
+                message = read(payload)
+            except Malformed:
                 if self.fault is Fault.DIES_OF_MALFORMED:
                     for each in self.links:
                         each.writer.close()
                     return False
-                link.send(Refusal(event=0, reason="malformed", current=self.event))
+                self.refuse(link, "malformed")
                 continue
-            match message:
-                case Goodbye():
+            match message["type"]:
+                case "goodbye":
+                    link.left = message["error"] == "closing"
                     return False
-                case Ping():
-                    link.send(Pong(id=message.id))
+                case "ping":
+                    link.send({"type": "pong", "id": message["id"]})
                     return True
-                case Pong():
+                case "pong":
                     return True
-            if isinstance(message, ALLOWED[link.role]):
+            if message["type"] in ALLOWED[link.role]:
                 self.take(link, message)
                 return True
             if self.fault is not Fault.ANY_ROLE:
-                event = message.event if isinstance(message, Command) else 0
-                link.send(Refusal(event=event, reason="not_allowed", current=self.event))
+                self.refuse(link, "not_allowed", message["event"] if message["type"] == "command" else 0)
         return False
 
     async def payload(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter, bound: int) -> bytes | None:
         length = int.from_bytes(await reader.readexactly(4), "big")
         if not 0 < length <= bound and self.fault is not Fault.NO_BOUND:
-            send(writer, Goodbye(error="framing"))
+            send(writer, {"type": "goodbye", "error": "framing"})
             return None
         return await reader.readexactly(length)
 
@@ -362,19 +456,18 @@ def is_number(value: float | None) -> bool:
     return value is not None and math.isfinite(value)
 
 
-def numbers(command: Command) -> list[float]:
-    """The values; this robot has no goal axes, for which null would be one."""
-    return [value for value in command.values if value is not None]
+def clamped(command: Message) -> list[float]:
+    """The values within the axes' limits."""
+    return [min(max(value, -1.0), 1.0) for value in command["values"]]
 
 
-def released(stop: StopState) -> StopState:
-    return StopState(number=stop.number, press=stop.press, kept=False)
+def released(stop: Message) -> Message:
+    return {"stopped": False, "number": stop["number"], "press": stop["press"], "kept": False}
 
 
-def send(writer: asyncio.StreamWriter, message: LinkMessage) -> None:
-    payload = encode_message(message)
+def send(writer: asyncio.StreamWriter, message: Message) -> None:
     if not writer.is_closing():
-        writer.write(len(payload).to_bytes(4, "big") + payload)
+        writer.write(frame(message))
 
 
 @asynccontextmanager

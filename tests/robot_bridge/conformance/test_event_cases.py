@@ -2,16 +2,16 @@
 
 import pytest
 
-from lockstep.protocol.messages import Command, RefusalReason
 from lockstep.robot_bridge.conformance import CASES, Outcome, Result, Subject, play
 from lockstep.robot_bridge.conformance.place import Place
 from tests.robot_bridge.conformance.plain_bridge import NEUTRAL, Link, PlainBridge, serving
+from tests.robot_bridge.conformance.plain_messages import Message
 
 
 class MeasuresOften(PlainBridge):
     """Another client comes just before each command, so that the bridge measures once more."""
 
-    def command(self, link: Link, command: Command) -> None:
+    def command(self, link: Link, command: Message) -> None:
         self.measure()
         super().command(link, command)
 
@@ -21,8 +21,8 @@ class HeldUp(PlainBridge):
 
     moving = 0
 
-    def may_execute(self, command: Command) -> RefusalReason | None:
-        if command.values != NEUTRAL and not self.neutral_needed:
+    def may_execute(self, command: Message) -> str:
+        if command["values"] != NEUTRAL and not self.neutral_needed:
             self.moving += 1
             if self.moving % 2 == 1:
                 self.neutral_needed = True
@@ -33,8 +33,8 @@ class HeldUp(PlainBridge):
 class AnswersAnew(PlainBridge):
     """Measures again in answer to a repeat, instead of sending the stored feedback."""
 
-    def command(self, link: Link, command: Command) -> None:
-        if command.event == self.event:
+    def command(self, link: Link, command: Message) -> None:
+        if command["event"] == self.event:
             self.measure()
         else:
             super().command(link, command)

@@ -1,6 +1,8 @@
 """The actions of the simulated robots do what their names say."""
 
+import asyncio
 import importlib.util
+import math
 
 import pytest
 
@@ -8,6 +10,7 @@ from lockstep.robot_bridge.robots.actions import ActionFailed, ActionStep
 from lockstep.robot_bridge.robots.base import Robot
 from lockstep.robot_bridge.robots.micromanipulator.robot import Micromanipulator
 from lockstep.robot_bridge.robots.planar.robot import PlanarRobot, PlanarState
+from lockstep.robot_bridge.robots.planar.room import DOCK, PILLARS
 from lockstep.robot_bridge.robots.simulated_battery import SimulatedBattery
 
 MOST = 30.0  # s of simulated time
@@ -29,6 +32,13 @@ def run(robot: Robot, name: str) -> ActionStep:
     raise AssertionError(f"{name} does not end")
 
 
+async def drawn(robot: Micromanipulator, event: int) -> None:
+    """Let the microscope take a picture now."""
+    picture = robot._draw_microscope(robot.state(), event)
+    assert not isinstance(picture, bytes)
+    await picture
+
+
 def test_planar_home_drives_to_the_place_where_the_robot_began() -> None:
     robot = PlanarRobot()
     robot._state = PlanarState(x=0.6, y=-0.3, yaw=2.0)
@@ -44,14 +54,40 @@ def test_planar_home_gives_up_when_a_pillar_is_in_the_way() -> None:
         run(robot, "home")
 
 
-def test_autofocus_finds_the_height_of_the_tip_and_a_snapshot_is_kept() -> None:
+def test_planar_dock_drives_to_the_charging_corner_and_charges_there() -> None:
+    robot = PlanarRobot()
+    robot._battery = SimulatedBattery(0.1)
+    assert run(robot, "dock").text == "at the charger"
+    assert math.dist(robot.state[:2], DOCK[:2]) < 0.03
+    arrived = robot.status()[0]
+    assert isinstance(arrived.value, float)
+    assert arrived.value < 0.1
+    for _ in range(round(60 / robot.tick_seconds)):
+        robot.apply([0.0, 0.0, 0.0])
+        robot.tick()
+    charged = robot.status()[0]
+    assert charged.value == pytest.approx(arrived.value + 60 / (20 * 60), abs=0.002)
+    assert (charged.level, charged.text) == ("warning", "it is charging")
+
+
+def test_planar_dock_fails_when_there_is_no_way_to_it() -> None:
+    x, y, radius = PILLARS[1].tolist()
+    robot = PlanarRobot(PlanarState(x=x + radius - 0.3, y=y))  # it stands in the pillar
+    with pytest.raises(ActionFailed, match="no way"):
+        run(robot, "dock")
+
+
+def test_autofocus_finds_the_height_of_the_tip_and_a_snapshot_names_its_picture() -> None:
     robot = Micromanipulator()
     try:
         assert "sharp at" in run(robot, "autofocus").text
         state = robot.state()
         assert abs(state.focus - state.tip[2]) < 1e-6
-        assert run(robot, "snapshot").done
-        assert [each.focus for each in robot.snapshots] == [state.focus]
+        snapshot = robot.begin_action("snapshot", {})
+        assert not snapshot.step().done
+        asyncio.run(drawn(robot, 7))
+        assert snapshot.step().text == f"picture of event 7, focus {state.focus * 1e6:.1f} µm; only recordings keep it"
+        assert robot.status()[1].value == 1.0
     finally:
         robot.close()
 
@@ -97,3 +133,14 @@ def test_a_battery_warns_before_it_is_empty() -> None:
     assert battery.item().level == "error"
     battery.tick(3 * 3600 * 0.05, moving=False)
     assert battery.item().value == 1.0
+
+
+def test_a_battery_at_a_charger_fills_up_and_is_never_more_than_full() -> None:
+    battery = SimulatedBattery(0.1)
+    battery.tick(60.0, moving=False, charging=True)
+    assert battery.item().value == pytest.approx(0.15)
+    assert battery.item().text == "it is charging"
+    battery.tick(3600.0, moving=False, charging=True)
+    assert (battery.item().value, battery.item().text) == (1.0, "")
+    battery.tick(3 * 3600 * 0.85, moving=False)
+    assert battery.item().text == "charge it soon"

@@ -8,9 +8,11 @@ import pytest
 from lockstep.protocol.maps import OCCUPIED, UNKNOWN
 from lockstep.robot_bridge.description.check_description import check_description
 from lockstep.robot_bridge.robots.actions import ActionFailed, ActionNotPossible, ActionRun
+from lockstep.robot_bridge.robots.planar import floor_map
 from lockstep.robot_bridge.robots.planar.description import RADIUS
+from lockstep.robot_bridge.robots.planar.floor_map import has_room
 from lockstep.robot_bridge.robots.planar.robot import CLEARANCE, PlanarRobot, PlanarState
-from lockstep.robot_bridge.robots.planar.room import PILLARS
+from lockstep.robot_bridge.robots.planar.room import CHARGER, DOCK, PILLARS
 
 MOST = 60.0  # s of simulated time
 
@@ -47,6 +49,43 @@ def test_it_goes_around_a_pillar_and_arrives_with_the_heading_that_was_asked_for
 def test_a_place_without_room_is_refused(x: float, y: float) -> None:
     with pytest.raises(ActionNotPossible, match="no room"):
         go(PlanarRobot(), x, y)
+
+
+def test_the_dock_has_room_and_is_beside_the_forbidden_zone() -> None:
+    assert has_room(*DOCK[:2], RADIUS + CLEARANCE)
+    left, _, right, high = CHARGER
+    assert left + RADIUS < DOCK[0] < right - RADIUS
+    assert DOCK[1] - RADIUS - high < 0.15  # m
+
+
+def test_the_dock_is_told_as_the_goal_while_it_is_driven_to() -> None:
+    robot = PlanarRobot()
+    run = robot.begin_action("dock", {})
+    assert robot.navigation().goal == DOCK
+    run.cancel()
+    assert robot.navigation().goal is None
+
+
+def test_the_dock_is_refused_where_there_is_no_room_for_the_robot(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(floor_map, "CHARGER", (2.8, -3.1, 4.1, -1.5))
+    with pytest.raises(ActionNotPossible, match="no room"):
+        PlanarRobot().begin_action("dock", {})
+
+
+def test_it_charges_at_the_dock_alone_and_only_while_it_stands() -> None:
+    x, y, yaw = DOCK
+    for state, values, charges in (
+        (PlanarState(x=x, y=y, yaw=yaw), [0.0, 0.0, 0.0], True),
+        (PlanarState(x=x, y=y, yaw=yaw), [0.01, 0.0, 0.0], False),
+        (PlanarState(x=x, y=y, yaw=yaw + 0.3), [0.0, 0.0, 0.0], False),
+        (PlanarState(x=x - 0.3, y=y, yaw=yaw), [0.0, 0.0, 0.0], False),
+    ):
+        robot = PlanarRobot(state)
+        robot.apply(values)
+        robot.tick()
+        before = robot._battery._share
+        robot.tick()
+        assert (robot._battery._share > before) == charges
 
 
 def test_it_leaves_a_place_that_is_narrower_than_it_likes() -> None:

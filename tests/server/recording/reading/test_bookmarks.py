@@ -1,7 +1,8 @@
 """Where a recording is worth looking at."""
 
+from lockstep.protocol.actions import ActionReason, ActionState
 from lockstep.protocol.messages import StopState
-from lockstep.server.recording.format.records import FeedbackRecord
+from lockstep.server.recording.format.records import ActionRecord, FeedbackRecord
 from lockstep.server.recording.reading.bookmarks import STOP_SPACING, BookmarkFinder
 
 
@@ -36,3 +37,15 @@ def test_a_flood_of_stops_is_marked_once_a_second() -> None:
 
 def test_stops_of_recordings_without_numbers_are_marked() -> None:
     assert [kind for _, kind, _ in stops(held(0), StopState(), held(0))] == ["stop", "reset", "stop"]
+
+
+def test_the_end_of_an_action_is_marked_with_its_reason_or_its_result() -> None:
+    def marked(state: ActionState, reason: ActionReason = "", text: str = "") -> list[tuple[int, str, str]]:
+        record = ActionRecord(epoch="e", event=5, id="a", name="snapshot", state=state, by="", reason=reason, text=text)
+        return [(mark.event, mark.kind, mark.text) for mark in BookmarkFinder().find(record, 0)]
+
+    assert marked("running", text="waits for the picture") == []
+    assert marked("done") == [(5, "action", "snapshot done")]
+    assert marked("done", text="picture of event 4") == [(5, "action", "snapshot done: picture of event 4")]
+    assert marked("cancelled", "rested", "1.0 m to go") == [(5, "action", "snapshot cancelled: rested")]
+    assert marked("failed", text="x" * 500) == [(5, "action", ("snapshot failed: " + "x" * 500)[:200])]

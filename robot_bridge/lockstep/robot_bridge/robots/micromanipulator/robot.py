@@ -1,18 +1,18 @@
 """The micromanipulator: stepping drives, a needle that bends, and the microscope's view of them."""
 
 import math
-from collections import deque
 from collections.abc import Awaitable, Mapping, Sequence
 from typing import Final, NamedTuple
 
 from lockstep.protocol.actions import ParameterValue, StatusItem
 from lockstep.protocol.description import RobotDescription
 from lockstep.robot_bridge.control import clock
-from lockstep.robot_bridge.robots.actions import ActionDone, ActionRun
+from lockstep.robot_bridge.robots.actions import ActionRun
 from lockstep.robot_bridge.robots.base import Measurement, MediaSource, Robot
 from lockstep.robot_bridge.robots.camera_source import CameraSource
-from lockstep.robot_bridge.robots.micromanipulator.autofocus import Autofocus
-from lockstep.robot_bridge.robots.micromanipulator.centring import Centring, ShownPictures
+from lockstep.robot_bridge.robots.micromanipulator.actions.autofocus import Autofocus
+from lockstep.robot_bridge.robots.micromanipulator.actions.centring import Centring, ShownPictures
+from lockstep.robot_bridge.robots.micromanipulator.actions.snapshot import Snapshot, TakenPicture
 from lockstep.robot_bridge.robots.micromanipulator.description import (
     DESCRIPTION,
     MICROPHONE,
@@ -31,7 +31,6 @@ from lockstep.robot_bridge.robots.microphone_source import MicrophoneSource
 __all__ = ["MicromanipulatorState", "Micromanipulator"]
 
 LIGHT_RANGE: Final = (20.0, 130.0)  # %
-SNAPSHOTS: Final = 16  # that are kept
 FOCUS: Final = 3  # index of its axis and of its drive
 VIEW: Final = 4  # of the first of two, along x and y
 TOO_MUCH: Final = 300e-6  # N on the needle above which a fault reports it
@@ -65,8 +64,8 @@ class Micromanipulator(Robot):
         self._needle = Needle(self._holder())
         self._light = MicromanipulatorState().light
         self._values: list[float] = [0.0] * len(DESCRIPTION.axes)
-        self._snapshots: deque[MicromanipulatorState] = deque(maxlen=SNAPSHOTS)
-        self._taken = 0  # snapshots since the start
+        self._picture: TakenPicture | None = None  # the microscope's newest
+        self._snapshots = 0  # since the start
         self._stopped = False  # no drive has a command to step
         self._draughtsman = Draughtsman()
         self._shown = ShownPictures()
@@ -134,9 +133,10 @@ class Micromanipulator(Robot):
             return Centring(
                 lambda: self._needle.tip, self._view(), axes=len(DESCRIPTION.axes), first=0, tick=self.tick_seconds
             )
-        self._taken += 1
-        self._snapshots.append(self.state())
-        return ActionDone(f"picture {self._taken}, focus {self._drives[FOCUS].position * 1e6:.1f} µm")
+        return Snapshot(lambda: self._picture, tick=self.tick_seconds, taken=self._count_snapshot)
+
+    def _count_snapshot(self) -> None:
+        self._snapshots += 1
 
     def _centre(self, across: float, down: float, event: float) -> ActionRun:
         """`across`, `down`: shares of the microscope's picture from the left and from the top."""
@@ -155,18 +155,15 @@ class Micromanipulator(Robot):
 
     def _draw_microscope(self, state: MicromanipulatorState, event: int) -> bytes | Awaitable[bytes]:
         self._shown.shown(event, state.view, clock.now())
+        number = 1 if self._picture is None else self._picture.number + 1
+        self._picture = TakenPicture(number, event, state.focus)
         return self._draughtsman.microscope(state, event)
-
-    @property
-    def snapshots(self) -> Sequence[MicromanipulatorState]:
-        """The states of the last snapshots, oldest first."""
-        return tuple(self._snapshots)
 
     def status(self) -> Sequence[StatusItem]:
         lamp = StatusItem(
             name="lamp", label="Lamp", kind="temperature", value=round(24 + 0.15 * self._light, 1), unit="°C"
         )
-        return (lamp, StatusItem(name="snapshots", label="Snapshots", kind="number", value=float(self._taken)))
+        return (lamp, StatusItem(name="snapshots", label="Snapshots", kind="number", value=float(self._snapshots)))
 
     def rest_from_thread(self) -> None:
         self._values = [0.0] * len(DESCRIPTION.axes)

@@ -117,6 +117,7 @@ DESCRIPTION = RobotDescription(
     ),
     actions=(
         Action(name="home", label="Home"),
+        Action(name="dock", label="Dock"),
         Action(
             name="light",
             label="Light",

@@ -1,4 +1,4 @@
-"""The planar robot's action `go_to`: it plans a way around the pillars, and drives along it."""
+"""The planar robot's actions `go_to` and `dock`: it plans a way around the pillars, and drives along it."""
 
 import math
 from collections.abc import Callable
@@ -34,10 +34,11 @@ class Going(ActionRun):
         turn: float,
         tick: float,
         ended: Callable[[], None],
+        result: str = "arrived",
     ) -> None:
         """`speed`, `turn`: the fastest that it drives, m/s and rad/s. `tick`: s between two steps.
 
-        `ended`: called when it is done, has failed or was cancelled.
+        `ended`: called when it is done, has failed or was cancelled. `result`: what it says when it is there.
         """
         self.goal = goal
         self._pose = pose
@@ -45,6 +46,7 @@ class Going(ActionRun):
         self._turn = turn
         self._tick = tick
         self._ended = ended
+        self._result = result
         self._search: RouteSearch | None = RouteSearch(pose()[:2], goal[:2], has_room, cell=CELL, most=MOST_CELLS)
         self._corners: list[tuple[float, float]] = []  # that are still to be passed, the goal last
         self._whole = 0.0  # m, of the whole way
@@ -86,7 +88,7 @@ class Going(ActionRun):
         dyaw = math.remainder(self.goal[2] - yaw, math.tau)
         if left < NEAR and abs(dyaw) < STRAIGHT:
             self._ended()
-            return ActionStep(progress=1.0, text="arrived", done=True)
+            return ActionStep(progress=1.0, text=self._result, done=True)
         self._notice(left + 0.1 * abs(dyaw))
         (next_x, next_y), is_last = self._corners[0], len(self._corners) == 1
         away = math.hypot(next_x - x, next_y - y)

@@ -19,7 +19,7 @@ from lockstep.robot_bridge.robots.planar.drawing import FrontDrawing, OverviewDr
 from lockstep.robot_bridge.robots.planar.floor_map import has_room, make_map
 from lockstep.robot_bridge.robots.planar.going import Going
 from lockstep.robot_bridge.robots.planar.homing import Homing
-from lockstep.robot_bridge.robots.planar.room import contacts, ray_hits
+from lockstep.robot_bridge.robots.planar.room import DOCK, contacts, ray_hits
 from lockstep.robot_bridge.robots.planar.sound import Synthesiser
 from lockstep.robot_bridge.robots.simulated_battery import SimulatedBattery
 
@@ -32,6 +32,7 @@ GOING_SPEED = 0.6  # m/s
 CLEARANCE = 0.1  # m that `go_to` keeps from everything: the geofence's room to brake in, and some
 LEAVING = 0.4  # m from where it begins, within which it may be nearer
 TOUCHING = 0.02  # m
+DOCKED = (0.05, 0.1)  # m and rad from the dock, within which the robot charges
 HERE = (0.0, 0.0, 0.0)  # the measured pose is one on the map
 ANGLES = RANGES.angle_min + RANGES.angle_increment * np.arange(RANGES.count, dtype=np.float64)
 
@@ -48,7 +49,10 @@ class PlanarState(NamedTuple):
 
 
 class PlanarRobot(Robot):
-    """A robot for tests and for machines without GL. It moves exactly as commanded unless something is in the way."""
+    """A robot for tests and for machines without GL. It moves exactly as commanded unless something is in the way.
+
+    Its battery charges while it stands at its dock, however it got there.
+    """
 
     tick_seconds = 0.004
     ticks_on_command = True
@@ -85,7 +89,8 @@ class PlanarRobot(Robot):
         dt = self.tick_seconds
         vx, vy, wz = self._command
         before = self._state
-        self._battery.tick(dt, moving=bool(vx or vy or wz))
+        moving = bool(vx or vy or wz)
+        self._battery.tick(dt, moving=moving, charging=not moving and is_docked(before))
         if not (vx or vy or wz or before.vx or before.vy or before.wz or before.fx or before.fy):
             return
         yaw = math.remainder(before.yaw + wz * dt, math.tau)
@@ -139,9 +144,11 @@ class PlanarRobot(Robot):
             return ActionDone("on" if self._light else "off")
         if name == "go_to":
             return self._go((number(parameters["x"]), number(parameters["y"]), number(parameters["yaw"])))
+        if name == "dock":
+            return self._go(DOCK, "at the charger")
         return Homing(lambda: self._state[:3], self._home, speed=HOMING_SPEED, turn=HOMING_TURN, tick=self.tick_seconds)
 
-    def _go(self, goal: PlanarPose) -> ActionRun:
+    def _go(self, goal: PlanarPose, result: str = "arrived") -> ActionRun:
         if not has_room(goal[0], goal[1], RADIUS + CLEARANCE):
             raise ActionNotPossible("there is no room at that place")
         here = self._state[:2]
@@ -158,6 +165,7 @@ class PlanarRobot(Robot):
             turn=HOMING_TURN,
             tick=self.tick_seconds,
             ended=self._arrived,
+            result=result,
         )
         return self._going
 
@@ -182,6 +190,13 @@ class PlanarRobot(Robot):
     def _hear(self) -> bytes:
         state = self._state
         return self._sound.segment(math.hypot(state.vx, state.vy) + 0.3 * abs(state.wz))
+
+
+def is_docked(state: PlanarState) -> bool:
+    """Return whether the robot is where it charges."""
+    near, straight = DOCKED
+    away, turned = math.hypot(state.x - DOCK[0], state.y - DOCK[1]), math.remainder(state.yaw - DOCK[2], math.tau)
+    return away < near and abs(turned) < straight
 
 
 def number(value: ParameterValue) -> float:

@@ -1,16 +1,17 @@
-"""The planar robot's world: a rectangular room with round pillars. Geometry only."""
+"""The planar robot's world: a rectangular room with round pillars and a charging corner. Geometry only."""
 
 from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-__all__ = ["CHARGER", "HALF_LENGTH", "HALF_WIDTH", "PILLARS", "Contact", "contacts", "ray_hits"]
+__all__ = ["CHARGER", "DOCK", "HALF_LENGTH", "HALF_WIDTH", "PILLARS", "Contact", "contacts", "ray_hits"]
 
 HALF_LENGTH = 4.0  # m, walls at x = ±
 HALF_WIDTH = 3.0  # m, walls at y = ±
 PILLARS = np.array([[2.0, 1.2, 0.35], [-1.8, -1.0, 0.5], [-1.5, 1.8, 0.25]])  # x, y, radius (m)
 CHARGER = (2.8, -3.1, 4.1, -2.0)  # m, left, low, right, high: a zone that is forbidden; reaches into the walls
+DOCK = (3.3, -1.58, -np.pi / 2)  # x, y (m) and yaw (rad): in front of that zone, facing it, where the robot charges
 
 FloatArray = npt.NDArray[np.float64]
 

@@ -59,8 +59,8 @@ class BookmarkFinder:
                 words = f"{record.name or 'free'} ({record.why})"
                 return [Mark(record.event, arrived, "seat", words)] if known else []
             case ActionRecord(state=state) if state not in ("running", "cancel"):
-                words = f"{record.name} {state}{': ' + record.reason if record.reason else ''}"
-                return [Mark(record.event, arrived, "action", words)]
+                words = ": ".join(filter(None, (f"{record.name} {state}", record.reason or record.text)))
+                return [Mark(record.event, arrived, "action", words[:200])]
             case EpisodeRecord():
                 what = record.text if record.kind == "mark" else " ".join(filter(None, (record.kind, record.outcome)))
                 return [Mark(record.event, arrived, "episode", f"{record.number} {what}: {record.task}"[:200])]

@@ -9,7 +9,7 @@ from lockstep.protocol.actions import ParameterValue
 from lockstep.robot_bridge.control import clock
 from lockstep.robot_bridge.description.check_description import check_description
 from lockstep.robot_bridge.robots.actions import ActionNotPossible
-from lockstep.robot_bridge.robots.micromanipulator.centring import KEPT, OLDEST
+from lockstep.robot_bridge.robots.micromanipulator.actions.centring import KEPT, OLDEST
 from lockstep.robot_bridge.robots.micromanipulator.description import WINDOWS
 from lockstep.robot_bridge.robots.micromanipulator.robot import Micromanipulator
 

@@ -1,0 +1,1 @@
+"""What the micromanipulator does by itself when it is asked."""
