@@ -16,6 +16,7 @@ from lockstep.protocol.actions import Act, ActionCancel, ActionReason, ActionUpd
 from lockstep.protocol.console import PEOPLE
 from lockstep.protocol.description import RobotDescription
 from lockstep.rtc.token_bucket import TokenBucket
+from lockstep.server.actions.action_ends import ActionEnds
 from lockstep.server.actions.action_requests import ActionAnswer, ActionRequests, answered
 from lockstep.server.actions.action_states import ActionStates
 from lockstep.server.audit.records import Actor
@@ -52,7 +53,7 @@ class ActionsRobotLink(Protocol):
 
 
 class ActionService:
-    """Run `run` as a task. All other methods but `act_by_http` are called on the loop and return at once."""
+    """Run `run` as a task. All other methods but those by HTTP are called on the loop and return at once."""
 
     def __init__(
         self,
@@ -69,11 +70,13 @@ class ActionService:
         self._may_move = may_move
         self._events = events
         self._asks = RateLimits(ASK_RATE, ASKS)
+        self._cancels = RateLimits(ASK_RATE, ASKS)  # apart: whoever has asked too often can still cancel
         self._progress = TokenBucket(UPDATE_RATE, UPDATES)
         self._states = TokenBucket(STATE_RATE, STATES)
         self._kept = ActionStates()
         self._is_owing = asyncio.Event()
         self._requests = ActionRequests()
+        self._ends = ActionEnds()
 
     def newest(self) -> list[ActionUpdate]:
         """Return how the newest actions do, oldest first, with the age of each that has ended."""
@@ -167,6 +170,26 @@ class ActionService:
         if peer.role == "supervisor" or self._holds_seat(peer):
             self.cancel(cancel.id, peer.actor)
 
+    async def cancel_by_http(self, by: Actor, id: str) -> ActionUpdate:
+        """Cancel an action; return how it ended, also if that was before. The caller has checked the right to.
+
+        Raises:
+            NotFound: no action of this id is known.
+            TooManyRequests: of this link.
+            RobotLinkDown, Unconfirmed: the robot cannot be told, or the action has not ended yet.
+        """
+        if not self._cancels.spend(by.link or by.name, time.monotonic()):
+            raise TooManyRequests("at most five cancellations a second")
+        known = next((each for each in self.newest() if each.id == id), None)
+        if known is None and id not in self._requests:
+            raise NotFound(f"no action {id!r} is known here"[:200])
+        if known is not None and known.state != "running":
+            return known
+        if not self._robot.up:
+            raise RobotLinkDown(self._robot.detail)
+        self.cancel(id, by)
+        return await self._ends.wait(id)
+
     def cancel(self, id: str, by: Actor) -> None:
         """Cancel an action; "" cancels the one that moves the robot. `Actor()`: because the seat changes hands."""
         if any(each.state == "running" and (each.id == id or (not id and each.moves)) for each in self.newest()):
@@ -186,6 +209,7 @@ class ActionService:
         if msgspec.structs.replace(update, age=0.0) == before:
             return
         self._requests.updated(update)
+        self._ends.updated(update)
         if before is not None and before.state == update.state:
             if self._kept.owes(update.id):
                 self._kept.keep(update, now)
@@ -221,4 +245,5 @@ class ActionService:
     def epoch_ends(self) -> None:
         """Forget all actions and requests: the bridge that did them has ended, and the next one knows none of them."""
         self._requests.clear()
+        self._ends.clear()
         self._kept.clear()

@@ -19,6 +19,7 @@ from lockstep.protocol.messages import LinkRole
 from lockstep.server.robot.paired_robot import PairedRobot, forget_paired, load_paired, save_paired
 from lockstep.server.robot.pairing_offer import Exchange, Paired, PairingOffer, Refusal
 from lockstep.server.robot.second_connection import SecondConnection
+from lockstep.server.robot.waiting_robots import WaitingRobot, WaitingRobots, WaitReason
 from lockstep.server.util.state_dir import StateDir, StateDirUnusable
 from lockstep.server.util.uncancelled import in_thread
 
@@ -73,6 +74,7 @@ class DialIn:
         self._arrived: dict[LinkRole, RobotLine] = {}  # that wait for their link
         self._carrying: dict[LinkRole, RobotLine] = {}
         self._second = SecondConnection()
+        self._waiting = WaitingRobots()
         self._news = asyncio.Event()
         self._changing = asyncio.Lock()
         self._by = ""  # who has opened the code
@@ -113,14 +115,29 @@ class DialIn:
 
     def arrived(self, role: LinkRole, line: RobotLine) -> None:
         """Take a connection of the robot. A newer one replaces one that waits: the robot has given that up."""
-        if role == "operator" and self.is_taken(role) and self._second.is_news(self._clock()):
-            text = "another connection with the robot's key waits: a second robot, or a copy of its key, may be running"
-            log.warning(text, waits=line.address, connected=self.address)
+        if role == "operator" and self.is_taken(role):
+            self._second_arrived(line)
         before = self._arrived.get(role)
         if before is not None:
             before.close()
         self._arrived[role] = line
         self._news.set()
+
+    def _second_arrived(self, line: RobotLine) -> None:
+        """Tell people of an operator connection that waits while another one has the place."""
+        if self._second.is_news(self._clock()):
+            text = "another connection with the robot's key waits: a second robot, or a copy of its key, may be running"
+            log.warning(text, waits=line.address, connected=self.address)
+        if self._second.lasts:
+            self.refused(line.address, "taken", "" if self.paired is None else self.paired.robot)
+
+    def refused(self, address: str, why: WaitReason, name: str = "") -> None:
+        """Note a robot that called and was not let in. `name`: as it calls itself; "" if it has not said."""
+        self._waiting.called(address, why, name, self._clock(), time.time())
+
+    def waiting(self) -> list[WaitingRobot]:
+        """Return the robots that called within the last minute and were not let in."""
+        return self._waiting.waiting(self._clock())
 
     def is_taken(self, role: LinkRole) -> bool:
         """Return whether a connection carries this link, so that another one waits for its end."""
@@ -135,6 +152,7 @@ class DialIn:
                 self._carrying[role] = line
                 if role == "operator":
                     self._second = SecondConnection()
+                    self._waiting.admitted(line.address)
                 return line
             self._news.clear()
             await self._news.wait()
