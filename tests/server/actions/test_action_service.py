@@ -3,6 +3,7 @@
 import asyncio
 import json
 import time
+from collections.abc import Awaitable, Callable
 from contextlib import suppress
 from types import SimpleNamespace
 from typing import Any, cast
@@ -470,11 +471,14 @@ async def test_over_http_a_link_that_has_asked_too_often_still_cancels_but_no_fl
     monkeypatch.setattr(action_requests, "ANSWER_SECONDS", 0.0)
     bench = Bench()
     bench.service.updated(update("a", "done"))
-    with pytest.raises(TooManyRequests):
+
+    async def many(ask: Callable[[], Awaitable[ActionUpdate]]) -> None:
         for _ in range(action_service.ASKS + 20):
             with suppress(Unconfirmed):
-                await by_http(bench)
+                await ask()
+
+    with pytest.raises(TooManyRequests):
+        await many(lambda: by_http(bench))
     assert (await bench.service.cancel_by_http(ADA, "a")).state == "done"
     with pytest.raises(TooManyRequests):
-        for _ in range(action_service.ASKS + 20):
-            await bench.service.cancel_by_http(ADA, "a")
+        await many(lambda: bench.service.cancel_by_http(ADA, "a"))

@@ -2,8 +2,8 @@
 
 import pytest
 
-from lockstep.protocol.actions import Act, ActionUpdate
-from lockstep.protocol.console import SeatRequest, SeatTake
+from lockstep.protocol.actions import Act, ActionUpdate, Parameters
+from lockstep.protocol.console import Role, SeatRequest, SeatTake
 from lockstep.protocol.messages import Command
 from lockstep.protocol.serial import event_after
 from tests.robot_bridge.bridge_helpers import DRIVE, NEUTRAL
@@ -69,7 +69,7 @@ async def test_over_http_a_repeated_request_with_an_id_and_an_old_nonce_begins_n
 
 
 async def test_over_http_the_holder_or_a_supervisor_cancels_and_the_audit_says_who() -> None:
-    far = {"x": 1.0, "y": 0.5, "yaw": 0.0}
+    far: Parameters = {"x": 1.0, "y": 0.5, "yaw": 0.0}
     async with running_rig() as rig, rig.peer("operator") as peer:
         await peer.feedback()
         peer.send("session", SeatRequest())
@@ -88,15 +88,17 @@ async def test_over_http_the_holder_or_a_supervisor_cancels_and_the_audit_says_w
         assert [(each["role"], each.get("peer", "")) for each in cancelled] == [("operator", ""), ("supervisor", "")]
 
 
-async def test_over_http_nobody_else_cancels() -> None:
-    async with running_rig() as rig, rig.peer("operator") as peer:
-        await peer.feedback()
-        for role, status, name in (
-            ("observer", 403, "not_allowed"),
-            ("policy", 403, "not_allowed"),
-            ("operator", 403, "no_seat"),
-            ("supervisor", 404, "not_found"),
-        ):
-            answer = await rig.http.delete("/api/actions/made-up", headers=rig.token(role))
-            assert (answer.status_code, answer.json()["error"]) == (status, name), role
+@pytest.mark.parametrize(
+    ("role", "status", "name"),
+    [
+        ("observer", 403, "not_allowed"),
+        ("policy", 403, "not_allowed"),
+        ("operator", 403, "no_seat"),
+        ("supervisor", 404, "not_found"),
+    ],
+)
+async def test_over_http_nobody_else_cancels(role: Role, status: int, name: str) -> None:
+    async with running_rig() as rig:
+        answer = await rig.http.delete("/api/actions/made-up", headers=rig.token(role))
+        assert (answer.status_code, answer.json()["error"]) == (status, name)
         assert (await rig.http.delete("/api/actions/made-up")).status_code == 401
