@@ -23,6 +23,7 @@ from lockstep.robot_bridge.errors import ConsoleRefused, PairingRefused, WrongCo
 from lockstep.robot_bridge.link.link_client import RobotLink
 from lockstep.server.http.transport.tls import own_pin
 from lockstep.server.robot.pairing_offer import MAX_TRIES
+from lockstep.server.robot.waiting_robots import WaitingRobot
 from tests.robot_bridge.bridge_helpers import DRIVE, NEUTRAL, RecordingRobot
 from tests.server.rig import PATIENCE, Rig, eventually, running_rig
 from tests.server.robot.dial_in_rig import (
@@ -322,6 +323,10 @@ async def waits(rig: Rig, role: Role = "supervisor") -> list[tuple[str, str, str
     return [(each["address"], each["name"], each["why"]) for each in info["waits"]]
 
 
+def waits_of(rig: Rig) -> list[WaitingRobot]:
+    return dial_in_of(rig).waits.waiting(time.monotonic())
+
+
 async def test_a_supervisor_alone_is_told_of_robots_that_wait_until_one_is_let_in(tmp_path: Path) -> None:
     async with waiting_console(tmp_path) as rig:
         assert await waits(rig) == []
@@ -364,10 +369,10 @@ async def test_a_second_robot_with_the_key_is_one_that_waits_and_the_first_is_no
         await until_up(rig)
         assert await waits(rig) == []
         async with dialling_bridge(address_of(rig), key):
-            await eventually(lambda: dial_in_of(rig).waiting())
+            await eventually(lambda: waits_of(rig))
             assert await waits(rig) == [("127.0.0.1", "planar", "taken")]
             await first.aclose()
-            await eventually(lambda: not dial_in_of(rig).waiting())
+            await eventually(lambda: not waits_of(rig))
             await until_up(rig)
 
 

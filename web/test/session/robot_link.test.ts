@@ -126,7 +126,9 @@ describe("what people read", () => {
     expect(waitLabel(robot, none)).toBe(
       "A robot waits at 10.0.0.7: it has no key of this console. Make a code and pair it.",
     );
-    expect(waitLabel(robot, link())).toContain("no key of this console. Start it with the code that is open.");
+    expect(waitLabel(robot, link())).toContain(
+      "no key of this console. Start it with the code that is open.",
+    );
     expect(waitLabel(named, none)).toContain(
       "A robot that calls itself “planar” waits at 10.0.0.7: its code",
     );

@@ -134,7 +134,7 @@ class ActionService:
             RobotLinkDown, Unconfirmed: the robot cannot be asked, or has not answered.
         """
         if id in self._requests or self._kept.get(id) is not None:
-            self._spend(by)
+            _spend(self._asks, by, "actions")
             return await self._requests.again(id, name, parameters)
         description, feedback = self._robot.description, self._clock.feedback
         if description is None or feedback is None or not self._robot.up:
@@ -144,7 +144,7 @@ class ActionService:
             raise NotFound(f"the robot has no action {name!r}"[:200])
         if action.moves:
             raise NotRenewable(f"{name} moves the robot: it needs armed events on the control channel")
-        self._spend(by)
+        _spend(self._asks, by, "actions")
         answer: ActionAnswer = asyncio.get_running_loop().create_future()
         act = Act(
             id=id or secrets.token_hex(16),
@@ -156,10 +156,6 @@ class ActionService:
         if not self._send(act, by, answer):
             raise RobotLinkDown(self._robot.detail)
         return await answered(answer)
-
-    def _spend(self, by: Actor) -> None:
-        if not self._asks.spend(by.link or by.name, time.monotonic()):
-            raise TooManyRequests("at most five actions a second")
 
     def act_by_console(self, act: Act) -> bool:
         """Ask for an action that moves nothing, for the console itself. False: there is no link to the robot."""
@@ -178,8 +174,7 @@ class ActionService:
             TooManyRequests: of this link.
             RobotLinkDown, Unconfirmed: the robot cannot be told, or the action has not ended yet.
         """
-        if not self._cancels.spend(by.link or by.name, time.monotonic()):
-            raise TooManyRequests("at most five cancellations a second")
+        _spend(self._cancels, by, "cancellations")
         known = next((each for each in self.newest() if each.id == id), None)
         if known is None and id not in self._requests:
             raise NotFound(f"no action {id!r} is known here"[:200])
@@ -247,3 +242,9 @@ class ActionService:
         self._requests.clear()
         self._ends.clear()
         self._kept.clear()
+
+
+def _spend(limits: RateLimits, by: Actor, what: str) -> None:
+    """Count a request of a link. Raises TooManyRequests."""
+    if not limits.spend(by.link or by.name, time.monotonic()):
+        raise TooManyRequests(f"at most five {what} a second")

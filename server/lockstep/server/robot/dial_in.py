@@ -19,7 +19,7 @@ from lockstep.protocol.messages import LinkRole
 from lockstep.server.robot.paired_robot import PairedRobot, forget_paired, load_paired, save_paired
 from lockstep.server.robot.pairing_offer import Exchange, Paired, PairingOffer, Refusal
 from lockstep.server.robot.second_connection import SecondConnection
-from lockstep.server.robot.waiting_robots import WaitingRobot, WaitingRobots, WaitReason
+from lockstep.server.robot.waiting_robots import WaitingRobots, WaitReason
 from lockstep.server.util.state_dir import StateDir, StateDirUnusable
 from lockstep.server.util.uncancelled import in_thread
 
@@ -53,6 +53,7 @@ class DialIn:
         paired: the robot; None before one was paired, and with a key from the settings
         trouble: why the state cannot be read; then no robot comes in
         exchanges: robots that pair at this moment
+        waits: the robots that called and were not let in
     """
 
     def __init__(
@@ -67,6 +68,7 @@ class DialIn:
         self.paired: PairedRobot | None = None
         self.trouble = ""
         self.exchanges = 0
+        self.waits = WaitingRobots()
         self._directory = directory
         self._given = given
         self._own_pin = own_pin
@@ -74,7 +76,6 @@ class DialIn:
         self._arrived: dict[LinkRole, RobotLine] = {}  # that wait for their link
         self._carrying: dict[LinkRole, RobotLine] = {}
         self._second = SecondConnection()
-        self._waiting = WaitingRobots()
         self._news = asyncio.Event()
         self._changing = asyncio.Lock()
         self._by = ""  # who has opened the code
@@ -133,11 +134,7 @@ class DialIn:
 
     def refused(self, address: str, why: WaitReason, name: str = "") -> None:
         """Note a robot that called and was not let in. `name`: as it calls itself; "" if it has not said."""
-        self._waiting.called(address, why, name, self._clock(), time.time())
-
-    def waiting(self) -> list[WaitingRobot]:
-        """Return the robots that called within the last minute and were not let in."""
-        return self._waiting.waiting(self._clock())
+        self.waits.called(address, why, name, self._clock(), time.time())
 
     def is_taken(self, role: LinkRole) -> bool:
         """Return whether a connection carries this link, so that another one waits for its end."""
@@ -152,7 +149,7 @@ class DialIn:
                 self._carrying[role] = line
                 if role == "operator":
                     self._second = SecondConnection()
-                    self._waiting.admitted(line.address)
+                    self.waits.admitted(line.address)
                 return line
             self._news.clear()
             await self._news.wait()

@@ -178,14 +178,14 @@ def _info(here: Dependencies, caller: Right) -> RobotDialInfo:
         detail="" if robot.up else robot.detail,
         may_pair=supervises and dial_in is not None and not given,
         pairing=_pairing(dial_in, now),
-        waits=_waits(dial_in) if dial_in is not None and supervises else [],
+        waits=_waits(dial_in, now) if dial_in is not None and supervises else [],
     )
 
 
-def _waits(dial_in: DialIn) -> list[WaitingRobotInfo]:
+def _waits(dial_in: DialIn, now: float) -> list[WaitingRobotInfo]:
     return [
         WaitingRobotInfo(address=each.address, since=round(each.since, 3), name=each.name, why=each.why)
-        for each in dial_in.waiting()
+        for each in dial_in.waits.waiting(now)
     ]
 
 
