@@ -44,6 +44,15 @@ async def test_a_supervisor_pairs_a_robot_drives_it_and_forgets_it(
         dialogue = page.get_by_role("dialog")
         await expect(dialogue).to_contain_text("No robot is paired")
         await _photo(page, f"unpaired-{width}")
+        (tmp_path / "key").write_text("k" * 40)
+        (tmp_path / "key").chmod(0o600)
+        dials = ("--console", stack.console.replace("http", "ws", 1), "--console-key-file", str(tmp_path / "key"))
+        async with running_process(LOCKSTEP, "robot", "planar", "--json", *dials):
+            robots = dialogue.get_by_role("list", name="Robots that wait")
+            await expect(robots).to_contain_text(
+                "A robot waits at 127.0.0.1: it has no key of this console. Make a code and pair it."
+            )
+            await _photo(page, f"unknown-{width}")
         await dialogue.get_by_role("button", name="Pair a robot").click()
         await expect(dialogue).to_contain_text("Waits for the robot")
         shown = await dialogue.get_by_label("Command for the robot's computer").input_value()
@@ -59,6 +68,7 @@ async def test_a_supervisor_pairs_a_robot_drives_it_and_forgets_it(
         async with running_process(*_command(shown, tmp_path)):
             await expect(dialogue).to_contain_text("planar is connected")
             await expect(dialogue).to_contain_text("Paired by supervisor")
+            await expect(robots).to_have_count(0)
             await _photo(page, f"connected-{width}")
             await dialogue.get_by_role("button", name="Close").click()
             await console.until("s.connected && s.event !== null")

@@ -3,6 +3,8 @@
 import asyncio
 import json
 import time
+from collections.abc import Awaitable, Callable
+from contextlib import suppress
 from types import SimpleNamespace
 from typing import Any, cast
 
@@ -402,3 +404,81 @@ async def test_over_http_a_flood_is_refused(monkeypatch: pytest.MonkeyPatch) -> 
         except ConsoleError as error:
             raised.append(type(error))
     assert TooManyRequests in raised
+
+
+async def test_over_http_a_cancel_is_answered_with_the_end_of_the_action() -> None:
+    bench = Bench()
+    bench.service.updated(update())
+    waiting = [asyncio.create_task(bench.service.cancel_by_http(ADA, "a")) for _ in range(2)]
+    await asyncio.sleep(0)
+    assert bench.robot.sent == [ActionCancel(id="a")] * 2
+    bench.service.updated(update(progress=0.5))
+    assert not any(each.done() for each in waiting)
+    bench.service.updated(update("b", "done"))
+    bench.service.updated(update("a", "cancelled", reason="cancelled"))
+    assert [(await each).reason for each in waiting] == ["cancelled"] * 2
+    assert [each.by for each in bench.published if isinstance(each, ActionCancelled)] == [ADA, ADA]
+
+
+async def test_over_http_a_cancel_after_the_end_tells_how_it_ended_and_reaches_no_robot() -> None:
+    bench = Bench()
+    bench.service.updated(update("a", "done"))
+    assert (await bench.service.cancel_by_http(ADA, "a")).state == "done"
+    assert (bench.robot.sent, "ActionCancelled" in bench.kinds()) == ([], False)
+
+
+async def test_over_http_an_action_whose_first_news_is_on_the_way_is_cancelled() -> None:
+    bench = Bench()
+    asking = asyncio.create_task(by_http(bench, id="mine"))
+    await asyncio.sleep(0)
+    cancelling = asyncio.create_task(bench.service.cancel_by_http(ADA, "mine"))
+    await asyncio.sleep(0)
+    assert bench.robot.sent[-1] == ActionCancel(id="mine")
+    bench.service.updated(update("mine", moves=False))
+    bench.service.updated(update("mine", "cancelled", moves=False))
+    assert ((await asking).state, (await cancelling).state) == ("running", "cancelled")
+
+
+@pytest.mark.parametrize(("id", "up", "error"), [("b", True, NotFound), ("a", False, RobotLinkDown)])
+async def test_over_http_a_cancel_that_reaches_no_action_is_refused_by_name(
+    id: str, up: bool, error: type[ConsoleError]
+) -> None:
+    bench = Bench()
+    bench.service.updated(update())
+    bench.robot.up = up
+    with pytest.raises(error):
+        await bench.service.cancel_by_http(ADA, id)
+    assert bench.robot.sent == []
+
+
+async def test_over_http_a_cancel_whose_end_does_not_come_is_unconfirmed(monkeypatch: pytest.MonkeyPatch) -> None:
+    bench = Bench()
+    bench.service.updated(update())
+    waiting = asyncio.create_task(bench.service.cancel_by_http(ADA, "a"))
+    await asyncio.sleep(0)
+    bench.service.epoch_ends()
+    with pytest.raises(Unconfirmed, match="bridge ended"):
+        await waiting
+    monkeypatch.setattr(action_requests, "ANSWER_SECONDS", 0.01)
+    bench.service.updated(update())
+    with pytest.raises(Unconfirmed):
+        await bench.service.cancel_by_http(ADA, "a")
+
+
+async def test_over_http_a_link_that_has_asked_too_often_still_cancels_but_no_flood(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(action_requests, "ANSWER_SECONDS", 0.0)
+    bench = Bench()
+    bench.service.updated(update("a", "done"))
+
+    async def many(ask: Callable[[], Awaitable[ActionUpdate]]) -> None:
+        for _ in range(action_service.ASKS + 20):
+            with suppress(Unconfirmed):
+                await ask()
+
+    with pytest.raises(TooManyRequests):
+        await many(lambda: by_http(bench))
+    assert (await bench.service.cancel_by_http(ADA, "a")).state == "done"
+    with pytest.raises(TooManyRequests):
+        await many(lambda: bench.service.cancel_by_http(ADA, "a"))

@@ -2,8 +2,8 @@
 
 import pytest
 
-from lockstep.protocol.actions import Act, ActionUpdate
-from lockstep.protocol.console import SeatRequest, SeatTake
+from lockstep.protocol.actions import Act, ActionUpdate, Parameters
+from lockstep.protocol.console import Role, SeatRequest, SeatTake
 from lockstep.protocol.messages import Command
 from lockstep.protocol.serial import event_after
 from tests.robot_bridge.bridge_helpers import DRIVE, NEUTRAL
@@ -66,3 +66,39 @@ async def test_over_http_a_repeated_request_with_an_id_and_an_old_nonce_begins_n
         assert (other.status_code, other.json()["error"]) == (409, "action_id_used")
         bad = await rig.http.post("/api/actions/light", headers=peer.headers, json={"id": "a b"})
         assert bad.status_code == 400
+
+
+async def test_over_http_the_holder_or_a_supervisor_cancels_and_the_audit_says_who() -> None:
+    far: Parameters = {"x": 1.0, "y": 0.5, "yaw": 0.0}
+    async with running_rig() as rig, rig.peer("operator") as peer:
+        await peer.feedback()
+        peer.send("session", SeatRequest())
+        for role in ("operator", "supervisor"):
+            await peer.drive(NEUTRAL)
+            peer.send("session", Act(id=role, name="go_to", parameters=far, nonce=peer.newest_feedback().nonce))
+            assert (await _answer(peer, role)).state == "running"
+            headers = peer.headers if role == "operator" else rig.token("supervisor")
+            ended = await rig.http.delete(f"/api/actions/{role}", headers=headers)
+            assert (ended.status_code, ended.json()["state"], ended.json()["reason"]) == (200, "cancelled", "cancelled")
+            again = await rig.http.delete(f"/api/actions/{role}", headers=headers)
+            assert again.json() | {"age": 0.0} == ended.json() | {"age": 0.0}
+        rig.dependencies.console.audit.flush(beyond=True)
+        records = (await rig.http.get("/api/audit", headers=rig.token("supervisor"))).json()["records"]
+        cancelled = [each for each in records if (each["kind"], each.get("what")) == ("action", "cancel")]
+        assert [(each["role"], each.get("peer", "")) for each in cancelled] == [("operator", ""), ("supervisor", "")]
+
+
+@pytest.mark.parametrize(
+    ("role", "status", "name"),
+    [
+        ("observer", 403, "not_allowed"),
+        ("policy", 403, "not_allowed"),
+        ("operator", 403, "no_seat"),
+        ("supervisor", 404, "not_found"),
+    ],
+)
+async def test_over_http_nobody_else_cancels(role: Role, status: int, name: str) -> None:
+    async with running_rig() as rig:
+        answer = await rig.http.delete("/api/actions/made-up", headers=rig.token(role))
+        assert (answer.status_code, answer.json()["error"]) == (status, name)
+        assert (await rig.http.delete("/api/actions/made-up")).status_code == 401

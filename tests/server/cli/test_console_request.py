@@ -28,6 +28,7 @@ COMMANDS = (
     ("record", "status", "--json"),
     ("pair",),
     ("pair", "--withdraw"),
+    ("pair", "--status"),
     ("forget",),
 )
 ANSWERS: tuple[Any, ...] = (

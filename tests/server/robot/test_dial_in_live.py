@@ -3,6 +3,7 @@
 import asyncio
 import logging
 import ssl
+import time
 from contextlib import AsyncExitStack
 from pathlib import Path
 from typing import Any
@@ -11,7 +12,7 @@ import pytest
 from starlette.websockets import WebSocket
 
 from lockstep.bench.harness.tcp_path import TcpPath
-from lockstep.protocol.console import SeatRequest
+from lockstep.protocol.console import Role, SeatRequest
 from lockstep.protocol.dial_in import PairingCode, RobotToken
 from lockstep.protocol.errors import LinkRefused
 from lockstep.protocol.link_secret import LinkSecret
@@ -22,6 +23,7 @@ from lockstep.robot_bridge.errors import ConsoleRefused, PairingRefused, WrongCo
 from lockstep.robot_bridge.link.link_client import RobotLink
 from lockstep.server.http.transport.tls import own_pin
 from lockstep.server.robot.pairing_offer import MAX_TRIES
+from lockstep.server.robot.waiting_robots import WaitingRobot
 from tests.robot_bridge.bridge_helpers import DRIVE, NEUTRAL, RecordingRobot
 from tests.server.rig import PATIENCE, Rig, eventually, running_rig
 from tests.server.robot.dial_in_rig import (
@@ -313,6 +315,65 @@ async def test_only_a_supervisor_pairs_forgets_and_sees_addresses(tmp_path: Path
             assert (await rig.http.delete("/api/dial-in/robot", headers=rig.token(role))).status_code == 403
             info = (await rig.http.get("/api/dial-in", headers=rig.token(role))).json()
             assert (info["may_pair"], info["state"], info["address"]) == (False, "unpaired", "")
+
+
+async def waits(rig: Rig, role: Role = "supervisor") -> list[tuple[str, str, str]]:
+    info = (await rig.http.get("/api/dial-in", headers=rig.token(role))).json()
+    assert all(abs(each["since"] - time.time()) < PATIENCE for each in info["waits"])
+    return [(each["address"], each["name"], each["why"]) for each in info["waits"]]
+
+
+def waits_of(rig: Rig) -> list[WaitingRobot]:
+    return dial_in_of(rig).waits.waiting(time.monotonic())
+
+
+async def test_a_supervisor_alone_is_told_of_robots_that_wait_until_one_is_let_in(tmp_path: Path) -> None:
+    async with waiting_console(tmp_path) as rig:
+        assert await waits(rig) == []
+        with pytest.raises(ConsoleRefused, match="not_pairing"):
+            await pair(address_of(rig), PairingCode.draw(), "planar", None)
+        assert await waits(rig) == [("127.0.0.1", "", "not_pairing")]
+        with pytest.raises(ConsoleRefused, match="robot_unknown"):
+            await open_connection(address_of(rig).path("operator"), console_context("any", None))
+        assert await waits(rig) == [("127.0.0.1", "", "robot_unknown")]
+        code = await code_for(rig)
+        with pytest.raises(PairingRefused, match="wrong_code"):
+            await pair(address_of(rig), wrong(code), "pla\n\x1b[2Jnar\u202e", None)
+        assert await waits(rig) == [("127.0.0.1", "pla [2Jnar", "wrong_code")]
+        for role in ("operator", "observer"):
+            assert await waits(rig, role) == []
+        key = await pair(address_of(rig), code, "planar", None)
+        async with dialling_bridge(address_of(rig), key):
+            await until_up(rig)
+            assert await waits(rig) == []
+
+
+async def test_refusals_beyond_an_addresss_rate_are_answered_without_being_noted(tmp_path: Path) -> None:
+    async with waiting_console(tmp_path, max_refused_burst=1) as rig:
+        noted: list[str] = []
+        dial_in_of(rig).refused = lambda address, why, name="": noted.append(why)  # type: ignore[method-assign]
+        for status in (401, 429, 429):
+            with pytest.raises(ConsoleRefused) as refused:
+                await open_connection(address_of(rig).path("operator"), console_context("any", None))
+            assert refused.value.status == status
+        assert noted == ["robot_unknown"]
+
+
+async def test_a_second_robot_with_the_key_is_one_that_waits_and_the_first_is_none(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("lockstep.server.robot.second_connection.OWN_LINK_ENDS", 0.1)
+    async with waiting_console(tmp_path) as rig, AsyncExitStack() as first:
+        key = await paired_key(rig)
+        await first.enter_async_context(dialling_bridge(address_of(rig), key))
+        await until_up(rig)
+        assert await waits(rig) == []
+        async with dialling_bridge(address_of(rig), key):
+            await eventually(lambda: waits_of(rig))
+            assert await waits(rig) == [("127.0.0.1", "planar", "taken")]
+            await first.aclose()
+            await eventually(lambda: not waits_of(rig))
+            await until_up(rig)
 
 
 async def test_a_paired_robot_has_to_be_forgotten_before_another_is_paired(tmp_path: Path) -> None:

@@ -3,6 +3,14 @@ import { isRecord } from "../protocol/schema_check";
 /** What became of the pairing code. */
 export type CodeState = "none" | "waiting" | "paired" | "expired" | "too_many_tries";
 
+/** A robot that called the console and was not let in. */
+export interface WaitingRobot {
+  readonly address: string;
+  readonly since: number; // s since 1970
+  readonly name: string; // as it calls itself, unproven; "" if it has not said
+  readonly why: string; // the name of the refusal, or "taken"
+}
+
 /** How the console and its robot find each other. */
 export interface RobotLink {
   readonly dialsIn: boolean; // false: the console connects to the robot, and nothing is paired
@@ -18,6 +26,7 @@ export interface RobotLink {
   readonly seconds: number; // for which the code is good
   readonly tries: number; // that are left
   readonly refused: string; // why the newest robot was refused; "" if none was
+  readonly waits: readonly WaitingRobot[]; // oldest first; empty for all but supervisors
 }
 
 export interface PairingCode {
@@ -29,6 +38,17 @@ const REFUSED: Readonly<Record<string, string>> = {
   wrong_code: "A robot was refused: its code was not this one.",
   wrong_certificate:
     "A robot was refused: it saw another certificate than this console's. Somebody may be between the two, or a proxy whose CA the robot does not know.",
+};
+
+const OLD_CODE = "its code is no longer good";
+const REASONS: Readonly<Record<string, string>> = {
+  robot_unknown: "it has no key of this console",
+  not_pairing: "no code with which it could pair is open",
+  code_expired: OLD_CODE,
+  code_used: OLD_CODE,
+  too_many_tries: OLD_CODE,
+  wrong_code: "its code was not the right one",
+  wrong_certificate: "it saw another certificate than this console's",
 };
 
 /** The answer of GET /api/dial-in; null when it is none. */
@@ -51,6 +71,7 @@ export function parseRobotLink(answer: unknown): RobotLink | null {
     seconds: number(pairing["seconds"]),
     tries: number(pairing["tries"]),
     refused: text(pairing["refused"]),
+    waits: Array.isArray(answer["waits"]) ? answer["waits"].flatMap(waitingRobots) : [],
   };
 }
 
@@ -104,6 +125,28 @@ export function loopbackWarning(command: string): string {
 /** Why a robot was just refused; "" while none was. */
 export function refusedLabel(link: RobotLink): string {
   return link.code === "waiting" ? (REFUSED[link.refused] ?? "") : "";
+}
+
+/** That a robot waits, why, and what lets it in. */
+export function waitLabel(robot: WaitingRobot, link: RobotLink): string {
+  const who = robot.name === "" ? "A robot" : `A robot that calls itself “${robot.name}”`;
+  if (robot.why === "taken")
+    return `Another robot with this robot's key waits at ${robot.address}: a second robot, or a copy of its state directory, may be running.`;
+  return `${who} waits at ${robot.address}: ${REASONS[robot.why] ?? "it was not let in"}. ${remedy(robot.why, link)}`;
+}
+
+function remedy(why: string, link: RobotLink): string {
+  if (link.key === "settings") return "Only the robot with the key in the console's settings comes in.";
+  if (link.key === "paired")
+    return `${link.robot === "" ? "Another robot" : link.robot} is paired here: to pair this one instead, forget that one first.`;
+  if (why === "wrong_certificate") return "Somebody may be between the two, or a proxy.";
+  return link.code === "waiting" ? "Start it with the code that is open." : "Make a code and pair it.";
+}
+
+function waitingRobots(value: unknown): WaitingRobot[] {
+  if (!isRecord(value) || typeof value["address"] !== "string") return [];
+  const { address, since, name, why } = value;
+  return [{ address, since: number(since), name: text(name), why: text(why) }];
 }
 
 function codeState(value: unknown): CodeState {

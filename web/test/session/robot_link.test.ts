@@ -7,6 +7,7 @@ import {
   refusedLabel,
   robotLinkAbout,
   robotLinkTitle,
+  waitLabel,
   type RobotLink,
 } from "../../src/session/robot_link";
 
@@ -66,6 +67,17 @@ describe("the answer of the console", () => {
     expect(found).toMatchObject({ code: "none", seconds: 0, robot: "", mayPair: false });
   });
 
+  it("has the robots that wait, and none of what is not understood", () => {
+    const robot = { address: "10.0.0.7", since: 5, name: "planar", why: "wrong_code" };
+    const waits = [robot, 7, null, { since: 1 }, { address: "10.0.0.8", name: 3, why: null }];
+    expect(parseRobotLink({ ...ANSWER, waits })?.waits).toEqual([
+      robot,
+      { address: "10.0.0.8", since: 0, name: "", why: "" },
+    ]);
+    expect(parseRobotLink({ ...ANSWER, waits: "all" })?.waits).toEqual([]);
+    expect(link().waits).toEqual([]);
+  });
+
   it("has a code and its command, or none", () => {
     expect(parsePairingCode({ code: "K7", command: "lockstep" })).toEqual({
       code: "K7",
@@ -105,5 +117,35 @@ describe("what people read", () => {
     expect(refusedLabel(link({ refused: "wrong_certificate" }))).toContain("certificate");
     expect(refusedLabel(link({ refused: "code_used" }))).toBe("");
     expect(refusedLabel(link({ code: "expired", refused: "wrong_code" }))).toBe("");
+  });
+
+  it("says which robot waits, why, and what lets it in", () => {
+    const robot = { address: "10.0.0.7", since: 0, name: "", why: "robot_unknown" };
+    const named = { ...robot, name: "planar", why: "wrong_code" };
+    const none = link({ code: "none" });
+    expect(waitLabel(robot, none)).toBe(
+      "A robot waits at 10.0.0.7: it has no key of this console. Make a code and pair it.",
+    );
+    expect(waitLabel(robot, link())).toContain(
+      "no key of this console. Start it with the code that is open.",
+    );
+    expect(waitLabel(named, none)).toContain(
+      "A robot that calls itself “planar” waits at 10.0.0.7: its code",
+    );
+    for (const why of ["not_pairing", "code_expired", "code_used", "too_many_tries"])
+      expect(waitLabel({ ...robot, why }, none)).toMatch(/code.*\. Make a code and pair it\.$/);
+    expect(waitLabel({ ...robot, why: "wrong_certificate" }, none)).toContain("Somebody may be between");
+    expect(waitLabel({ ...robot, why: "of tomorrow" }, none)).toContain("it was not let in");
+  });
+
+  it("says that another robot is paired, or has the key, where one waits", () => {
+    const robot = { address: "10.0.0.7", since: 0, name: "", why: "robot_unknown" };
+    const paired = link({ state: "connected", key: "paired", robot: "planar", code: "none" });
+    expect(waitLabel(robot, paired)).toContain("planar is paired here: to pair this one instead, forget");
+    expect(waitLabel(robot, { ...paired, robot: "" })).toContain("Another robot is paired here");
+    expect(waitLabel(robot, { ...paired, key: "settings" })).toContain("the key in the console's settings");
+    expect(waitLabel({ ...robot, name: "planar", why: "taken" }, paired)).toBe(
+      "Another robot with this robot's key waits at 10.0.0.7: a second robot, or a copy of its state directory, may be running.",
+    );
   });
 });

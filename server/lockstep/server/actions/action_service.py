@@ -16,6 +16,7 @@ from lockstep.protocol.actions import Act, ActionCancel, ActionReason, ActionUpd
 from lockstep.protocol.console import PEOPLE
 from lockstep.protocol.description import RobotDescription
 from lockstep.rtc.token_bucket import TokenBucket
+from lockstep.server.actions.action_ends import ActionEnds
 from lockstep.server.actions.action_requests import ActionAnswer, ActionRequests, answered
 from lockstep.server.actions.action_states import ActionStates
 from lockstep.server.audit.records import Actor
@@ -52,7 +53,7 @@ class ActionsRobotLink(Protocol):
 
 
 class ActionService:
-    """Run `run` as a task. All other methods but `act_by_http` are called on the loop and return at once."""
+    """Run `run` as a task. All other methods but those by HTTP are called on the loop and return at once."""
 
     def __init__(
         self,
@@ -69,11 +70,13 @@ class ActionService:
         self._may_move = may_move
         self._events = events
         self._asks = RateLimits(ASK_RATE, ASKS)
+        self._cancels = RateLimits(ASK_RATE, ASKS)  # apart: whoever has asked too often can still cancel
         self._progress = TokenBucket(UPDATE_RATE, UPDATES)
         self._states = TokenBucket(STATE_RATE, STATES)
         self._kept = ActionStates()
         self._is_owing = asyncio.Event()
         self._requests = ActionRequests()
+        self._ends = ActionEnds()
 
     def newest(self) -> list[ActionUpdate]:
         """Return how the newest actions do, oldest first, with the age of each that has ended."""
@@ -131,7 +134,7 @@ class ActionService:
             RobotLinkDown, Unconfirmed: the robot cannot be asked, or has not answered.
         """
         if id in self._requests or self._kept.get(id) is not None:
-            self._spend(by)
+            _spend(self._asks, by, "actions")
             return await self._requests.again(id, name, parameters)
         description, feedback = self._robot.description, self._clock.feedback
         if description is None or feedback is None or not self._robot.up:
@@ -141,7 +144,7 @@ class ActionService:
             raise NotFound(f"the robot has no action {name!r}"[:200])
         if action.moves:
             raise NotRenewable(f"{name} moves the robot: it needs armed events on the control channel")
-        self._spend(by)
+        _spend(self._asks, by, "actions")
         answer: ActionAnswer = asyncio.get_running_loop().create_future()
         act = Act(
             id=id or secrets.token_hex(16),
@@ -154,10 +157,6 @@ class ActionService:
             raise RobotLinkDown(self._robot.detail)
         return await answered(answer)
 
-    def _spend(self, by: Actor) -> None:
-        if not self._asks.spend(by.link or by.name, time.monotonic()):
-            raise TooManyRequests("at most five actions a second")
-
     def act_by_console(self, act: Act) -> bool:
         """Ask for an action that moves nothing, for the console itself. False: there is no link to the robot."""
         return self._send(act, Actor(name=act.by))
@@ -166,6 +165,25 @@ class ActionService:
         """Pass on what the seat's holder or a supervisor cancels. Others have STOP."""
         if peer.role == "supervisor" or self._holds_seat(peer):
             self.cancel(cancel.id, peer.actor)
+
+    async def cancel_by_http(self, by: Actor, id: str) -> ActionUpdate:
+        """Cancel an action; return how it ended, also if that was before. The caller has checked the right to.
+
+        Raises:
+            NotFound: no action of this id is known.
+            TooManyRequests: of this link.
+            RobotLinkDown, Unconfirmed: the robot cannot be told, or the action has not ended yet.
+        """
+        _spend(self._cancels, by, "cancellations")
+        known = next((each for each in self.newest() if each.id == id), None)
+        if known is None and id not in self._requests:
+            raise NotFound(f"no action {id!r} is known here"[:200])
+        if known is not None and known.state != "running":
+            return known
+        if not self._robot.up:
+            raise RobotLinkDown(self._robot.detail)
+        self.cancel(id, by)
+        return await self._ends.wait(id)
 
     def cancel(self, id: str, by: Actor) -> None:
         """Cancel an action; "" cancels the one that moves the robot. `Actor()`: because the seat changes hands."""
@@ -186,6 +204,7 @@ class ActionService:
         if msgspec.structs.replace(update, age=0.0) == before:
             return
         self._requests.updated(update)
+        self._ends.updated(update)
         if before is not None and before.state == update.state:
             if self._kept.owes(update.id):
                 self._kept.keep(update, now)
@@ -221,4 +240,11 @@ class ActionService:
     def epoch_ends(self) -> None:
         """Forget all actions and requests: the bridge that did them has ended, and the next one knows none of them."""
         self._requests.clear()
+        self._ends.clear()
         self._kept.clear()
+
+
+def _spend(limits: RateLimits, by: Actor, what: str) -> None:
+    """Count a request of a link. Raises TooManyRequests."""
+    if not limits.spend(by.link or by.name, time.monotonic()):
+        raise TooManyRequests(f"at most five {what} a second")

@@ -5,7 +5,7 @@ from typing import assert_never, get_args
 
 from lockstep.protocol.messages import PROTOCOL_VERSION
 from lockstep.server.audit.audit_trail import AuditTrail
-from lockstep.server.audit.records import AuditTrouble
+from lockstep.server.audit.records import Actor, AuditTrouble
 from lockstep.server.http.versions import console_version, description_hash, page_build
 from lockstep.server.session_events import (
     ActionAsked,
@@ -112,7 +112,7 @@ class SessionAudit:
             case ActionAsked():
                 audit.record("action", event.by, "asked", event.act.name)
             case ActionCancelled():
-                audit.again("action", event.by, "cancel" if event.by.peer else "cancel, the seat changes")
+                audit.again("action", event.by, "cancel, the seat changes" if event.by == Actor() else "cancel")
             case ActionRefused():
                 audit.refused(event.by, event.update.reason)
             case ActionUpdated():

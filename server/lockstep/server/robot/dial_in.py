@@ -19,6 +19,7 @@ from lockstep.protocol.messages import LinkRole
 from lockstep.server.robot.paired_robot import PairedRobot, forget_paired, load_paired, save_paired
 from lockstep.server.robot.pairing_offer import Exchange, Paired, PairingOffer, Refusal
 from lockstep.server.robot.second_connection import SecondConnection
+from lockstep.server.robot.waiting_robots import WaitingRobots, WaitReason
 from lockstep.server.util.state_dir import StateDir, StateDirUnusable
 from lockstep.server.util.uncancelled import in_thread
 
@@ -52,6 +53,7 @@ class DialIn:
         paired: the robot; None before one was paired, and with a key from the settings
         trouble: why the state cannot be read; then no robot comes in
         exchanges: robots that pair at this moment
+        waits: the robots that called and were not let in
     """
 
     def __init__(
@@ -66,6 +68,7 @@ class DialIn:
         self.paired: PairedRobot | None = None
         self.trouble = ""
         self.exchanges = 0
+        self.waits = WaitingRobots()
         self._directory = directory
         self._given = given
         self._own_pin = own_pin
@@ -113,14 +116,25 @@ class DialIn:
 
     def arrived(self, role: LinkRole, line: RobotLine) -> None:
         """Take a connection of the robot. A newer one replaces one that waits: the robot has given that up."""
-        if role == "operator" and self.is_taken(role) and self._second.is_news(self._clock()):
-            text = "another connection with the robot's key waits: a second robot, or a copy of its key, may be running"
-            log.warning(text, waits=line.address, connected=self.address)
+        if role == "operator" and self.is_taken(role):
+            self._second_arrived(line)
         before = self._arrived.get(role)
         if before is not None:
             before.close()
         self._arrived[role] = line
         self._news.set()
+
+    def _second_arrived(self, line: RobotLine) -> None:
+        """Tell people of an operator connection that waits while another one has the place."""
+        if self._second.is_news(self._clock()):
+            text = "another connection with the robot's key waits: a second robot, or a copy of its key, may be running"
+            log.warning(text, waits=line.address, connected=self.address)
+        if self._second.lasts:
+            self.refused(line.address, "taken", "" if self.paired is None else self.paired.robot)
+
+    def refused(self, address: str, why: WaitReason, name: str = "") -> None:
+        """Note a robot that called and was not let in. `name`: as it calls itself; "" if it has not said."""
+        self.waits.called(address, why, name, self._clock(), time.time())
 
     def is_taken(self, role: LinkRole) -> bool:
         """Return whether a connection carries this link, so that another one waits for its end."""
@@ -135,6 +149,7 @@ class DialIn:
                 self._carrying[role] = line
                 if role == "operator":
                     self._second = SecondConnection()
+                    self.waits.admitted(line.address)
                 return line
             self._news.clear()
             await self._news.wait()

@@ -11,15 +11,20 @@ class SecondConnection:
     """The tries of a second robot while the first is connected. A robot that waits dials again and again."""
 
     def __init__(self) -> None:
-        self._since = self._newest = float("-inf")  # the first and the newest try of this wait
+        self._since, self._newest = 0.0, float("-inf")  # the first and the newest try of this wait
         self._is_told = False
+
+    @property
+    def lasts(self) -> bool:
+        """Return whether the newest try is of a wait that is none of a robot's own last link."""
+        return self._newest - self._since >= OWN_LINK_ENDS
 
     def is_news(self, now: float) -> bool:
         """Take a try. Return whether people are to be told: once a wait, and never of a robot's own last link."""
         if now - self._newest > WAIT_ENDS:
             self._since, self._is_told = now, False
         self._newest = now
-        if self._is_told or now - self._since < OWN_LINK_ENDS:
+        if self._is_told or not self.lasts:
             return False
         self._is_told = True
         return True

@@ -46,9 +46,9 @@ async def actions(request: Request, caller: Caller) -> Response:
     return json_answer(ActionList(dependencies(request).console.actions.newest()))
 
 
-@router.post("/api/actions/{name}")
-async def act(request: Request, caller: Caller, name: str) -> Response:
-    """The holder of the control seat. The right is looked at again once the body has come."""
+@router.post("/api/actions/{action}")
+async def act(request: Request, caller: Caller, action: str) -> Response:
+    """The holder of the control seat, with the action's name. The right is looked at again once the body has come."""
     wanted = await read_json(request, ActionRequest)
     caller = await authorized(request)
     console = dependencies(request).console
@@ -57,8 +57,19 @@ async def act(request: Request, caller: Caller, name: str) -> Response:
     if not console.seat.is_held_with(caller.identity.token_id):
         raise NoSeat("take the control seat first, with a connection of this link")
     return json_answer(
-        await console.actions.act_by_http(caller.actor, name, wanted.parameters, wanted.id, wanted.nonce)
+        await console.actions.act_by_http(caller.actor, action, wanted.parameters, wanted.id, wanted.nonce)
     )
+
+
+@router.delete("/api/actions/{action}")
+async def cancel(request: Request, caller: Caller, action: str) -> Response:
+    """The holder of the control seat, or a supervisor, with the id of the request that began the action."""
+    console = dependencies(request).console
+    if caller.role not in PEOPLE:
+        raise NotAllowed("only people may cancel actions")
+    if caller.role != "supervisor" and not console.seat.is_held_with(caller.identity.token_id):
+        raise NoSeat("take the control seat first, with a connection of this link")
+    return json_answer(await console.actions.cancel_by_http(caller.actor, action))
 
 
 @router.get("/api/status")

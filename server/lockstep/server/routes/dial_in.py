@@ -36,10 +36,11 @@ from lockstep.server.http.transport.client_address import counted_address
 from lockstep.server.http.transport.uvicorn_websocket_limits import CLOSED_FOR, SOCKET, BoundedWebSocket
 from lockstep.server.robot.dial_in import DialIn
 from lockstep.server.robot.pairing_offer import MAX_TRIES, OFFER_SECONDS, OfferState, Paired, Refusal
+from lockstep.server.robot.waiting_robots import WaitReason
 from lockstep.server.state.dependencies import Dependencies, authorized, dependencies
 from lockstep.server.util.state_dir import StateDirUnusable
 
-__all__ = ["NewPairingCode", "PairingInfo", "RobotDialInfo", "router"]
+__all__ = ["NewPairingCode", "PairingInfo", "RobotDialInfo", "WaitingRobotInfo", "router"]
 
 PAIRING_SECONDS = 10.0  # for a robot's whole exchange
 MAX_PAIRING = 8  # robots that are in it at once
@@ -65,6 +66,15 @@ class PairingInfo(msgspec.Struct, frozen=True, kw_only=True):
     refused: str  # why the newest robot was refused; "" if none was
 
 
+class WaitingRobotInfo(msgspec.Struct, frozen=True, kw_only=True):
+    """A robot that called and was not let in. Nothing of it was checked but its address."""
+
+    address: str
+    since: float  # s since 1970
+    name: str  # as it calls itself; "" if it has not said
+    why: WaitReason
+
+
 class RobotDialInfo(msgspec.Struct, frozen=True, kw_only=True):
     """Answer of GET /api/dial-in."""
 
@@ -78,6 +88,7 @@ class RobotDialInfo(msgspec.Struct, frozen=True, kw_only=True):
     detail: str  # why it is not connected
     may_pair: bool  # the caller may
     pairing: PairingInfo
+    waits: list[WaitingRobotInfo]  # oldest first; empty for all but supervisors
 
 
 class NewPairingCode(msgspec.Struct, frozen=True, kw_only=True):
@@ -167,7 +178,15 @@ def _info(here: Dependencies, caller: Right) -> RobotDialInfo:
         detail="" if robot.up else robot.detail,
         may_pair=supervises and dial_in is not None and not given,
         pairing=_pairing(dial_in, now),
+        waits=_waits(dial_in, now) if dial_in is not None and supervises else [],
     )
+
+
+def _waits(dial_in: DialIn, now: float) -> list[WaitingRobotInfo]:
+    return [
+        WaitingRobotInfo(address=each.address, since=round(each.since, 3), name=each.name, why=each.why)
+        for each in dial_in.waits.waiting(now)
+    ]
 
 
 def _pairing(dial_in: DialIn | None, now: float) -> PairingInfo:
@@ -198,8 +217,11 @@ async def dial(websocket: WebSocket, name: str) -> None:
             await _carry(websocket, here, dial_in, name)
     except ConsoleError as error:
         here.metrics.bad_input.labels("dial", http_error(error).name).inc()
-        if isinstance(error, RobotUnknown) and not here.request_limits.may_fail(websocket.scope):
-            error = TooManyRequests("too many requests without a valid token from this address")
+        if isinstance(error, RobotUnknown):
+            if here.request_limits.may_fail(websocket.scope):
+                dial_in.refused(_address(websocket), "robot_unknown")
+            else:
+                error = TooManyRequests("too many requests without a valid token from this address")
         await _refuse(websocket, error)
     except WebSocketDisconnect as ended:
         if ended.code in CLOSED_FOR:
@@ -262,6 +284,7 @@ class _Line:
 
 async def _pair(websocket: WebSocket, here: Dependencies, dial_in: DialIn) -> None:
     if (ended := dial_in.offer.ended(time.monotonic())) is not None:
+        dial_in.refused(_address(websocket), ended.name)
         raise NotPairing(f"{ended.name}: {ended.detail}" if ended.name != "not_pairing" else NOT_PAIRING)
     if dial_in.exchanges >= MAX_PAIRING or not here.request_limits.may_fail(websocket.scope):
         raise TooManyRequests("too many robots try to pair: wait, and try again")
@@ -289,7 +312,7 @@ async def _exchange(websocket: WebSocket, here: Dependencies, dial_in: DialIn) -
     hello = _hello.decode(await _receive(websocket))
     begun = dial_in.offer.begin(hello, time.monotonic())
     if isinstance(begun, Refusal):
-        return _refused(websocket, here, begun)
+        return _refused(websocket, here, dial_in, hello, begun)
     exchange, challenge = begun
     await websocket.send_bytes(_encode(challenge))
     proof = _proof.decode(await _receive(websocket))
@@ -301,12 +324,16 @@ async def _exchange(websocket: WebSocket, here: Dependencies, dial_in: DialIn) -
         by = Actor(hello.robot, "robot")
         here.console.audit.record("pairing", by, "paired", f"from {_address(websocket)}, pin {hello.pin}")
         return PairingAnswer(proof=outcome.proof)
-    return _refused(websocket, here, outcome)
+    return _refused(websocket, here, dial_in, hello, outcome)
 
 
-def _refused(websocket: WebSocket, here: Dependencies, refusal: Refusal) -> PairingAnswer:
+def _refused(
+    websocket: WebSocket, here: Dependencies, dial_in: DialIn, hello: PairingHello, refusal: Refusal
+) -> PairingAnswer:
     here.metrics.bad_input.labels("dial", refusal.name).inc()
-    here.console.audit.record("pairing", Actor("", "robot"), f"refused: {refusal.name}", f"from {_address(websocket)}")
+    address = _address(websocket)
+    here.console.audit.record("pairing", Actor("", "robot"), f"refused: {refusal.name}", f"from {address}")
+    dial_in.refused(address, refusal.name, hello.robot)
     return PairingAnswer(error=refusal.name, detail=refusal.detail)
 
 

@@ -174,7 +174,7 @@ SKIP = Parameter("skip", "query", {"type": "integer", "minimum": 0, "maximum": 1
 KNOWN = Parameter("known", "query", {"type": "string", "maxLength": 64})
 TICKET = Parameter("ticket", "query", {"type": "string"})
 EPISODE_VERB = Parameter("do", "path", {"enum": list(get_args(EpisodeVerb))}, required=True)
-ACTION = Parameter("name", "path", {"type": "string"}, required=True)
+ACTION = Parameter("action", "path", {"type": "string"}, required=True)
 INVITATION = Parameter("invitation_id", "path", {"type": "string"}, required=True)
 
 OPERATIONS: tuple[Operation, ...] = (
@@ -275,9 +275,14 @@ OPERATIONS: tuple[Operation, ...] = (
     ),
     Operation("get", "/api/actions", "How the newest actions of the robot do.", 200, ActionList),
     Operation(
-        *("post", "/api/actions/{name}", "Ask for an action that moves nothing.", 200, ActionUpdate),
+        *("post", "/api/actions/{action}", "Ask for an action, by name, that moves nothing.", 200, ActionUpdate),
         errors=(NotAllowed, NoSeat, NotFound, NotRenewable, ActionIdUsed, RobotLinkDown, Unconfirmed, *WITH_JSON),
         body=ActionRequest,
+        parameters=(ACTION,),
+    ),
+    Operation(
+        *("delete", "/api/actions/{action}", "Cancel an action, by the id of its request.", 200, ActionUpdate),
+        errors=(NotAllowed, NoSeat, NotFound, RobotLinkDown, Unconfirmed),
         parameters=(ACTION,),
     ),
     Operation("get", "/api/episode", "How the episode does.", 200, EpisodeState),

@@ -4,6 +4,7 @@ import asyncio
 import json
 import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -106,6 +107,35 @@ def test_a_command_that_works_on_this_machine_alone_comes_with_a_warning(
     assert ("warning: " in done.stderr) is warned
     assert json.loads(as_json.stdout)["command"] == command
     assert ("warning: " in as_json.stderr) is warned
+
+
+WAITS = [
+    {"address": "10.0.0.7", "since": 1.0, "name": "", "why": "robot_unknown"},
+    {"address": "10.0.0.8", "since": 2.0, "name": "pla\x1b[2Jnar", "why": "wrong_code"},
+]
+WAIT_LINES = "waits: a robot at 10.0.0.7: robot_unknown\nwaits: pla\\x1b[2Jnar at 10.0.0.8: wrong_code\n"
+
+
+@pytest.mark.parametrize(
+    ("answer", "said"),
+    [
+        ({"state": "unpaired", "key": ""}, "no robot is paired\n"),
+        ({"state": "unpaired", "key": "", "waits": WAITS}, f"no robot is paired\n{WAIT_LINES}"),
+        (
+            {"state": "connected", "key": "paired", "robot": "planar", "address": "10.0.0.9", "waits": WAITS},
+            f"planar is connected from 10.0.0.9\n{WAIT_LINES}",
+        ),
+        ({"state": "away", "key": "settings"}, "the robot is away\n"),
+        ({"state": "connected", "key": "", "dials_in": False}, "the console connects to this robot"),
+    ],
+)
+def test_the_status_names_the_robot_and_those_that_wait(tmp_path: Path, answer: dict[str, Any], said: str) -> None:
+    with answering({"pairing": {"state": "none"}} | answer) as local:
+        done = lockstep(tmp_path, local, "pair", "--status")
+        as_json = lockstep(tmp_path, local, "pair", "--status", "--json")
+    assert (done.exit_code, done.stderr) == (0, "")
+    assert done.stdout.startswith(said)
+    assert json.loads(as_json.stdout)["state"] == answer["state"]
 
 
 async def test_waiting_ends_when_the_code_does(tmp_path: Path) -> None:

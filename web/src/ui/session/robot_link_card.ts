@@ -4,6 +4,7 @@ import {
   refusedLabel,
   robotLinkAbout,
   robotLinkTitle,
+  waitLabel,
   type PairingCode,
   type RobotLink,
 } from "../../session/robot_link";
@@ -23,6 +24,10 @@ export interface RobotLinkCard {
   stop(): void;
 }
 
+function clock(since: number): string {
+  return new Date(since * 1000).toLocaleTimeString([], { timeStyle: "short" });
+}
+
 /** One robot that dials in: whether it is paired and there, its pairing code, and its end. */
 export function createRobotLinkCard(api: RobotLinkApi, name = ""): RobotLinkCard {
   const title = h("h3", "robot-link-title");
@@ -37,11 +42,13 @@ export function createRobotLinkCard(api: RobotLinkApi, name = ""): RobotLinkCard
   const shown = h("div", "pairing-shown", {}, code, steps, copy.element, warning, cancel);
   const words = h("p", "pairing-words", { role: "status" });
   const refused = h("p", "pairing-refused", { role: "alert" });
+  const waits = h("div", "robot-waits", { role: "status" }); // there before what it is to announce
+  let shownWaits = "";
   const trouble = h("p", "form-trouble", { role: "alert" });
   const head = h("div", "robot-link-head", {}, h("div", "", {}, title, about), pair, forget);
   const element = h("section", "robot-link", { "aria-label": name === "" ? "Robot link" : name });
   if (name !== "") element.append(h("h3", "list-head", {}, name));
-  element.append(head, shown, words, refused, trouble);
+  element.append(head, waits, shown, words, refused, trouble);
   let made: PairingCode | null = null; // the code that this page has made
   let timer: ReturnType<typeof setTimeout> | undefined;
   let asking: ReturnType<typeof setTimeout> | undefined;
@@ -74,7 +81,7 @@ export function createRobotLinkCard(api: RobotLinkApi, name = ""): RobotLinkCard
 
   function render(link: RobotLink): void {
     if (link.code !== "waiting") made = null;
-    const waits = link.code === "waiting";
+    const isOpen = link.code === "waiting";
     setData(element, "state", link.state);
     setText(title, link.dialsIn ? robotLinkTitle(link) : "The console connects to this robot");
     const time = new Date(link.at * 1000).toLocaleString([], { dateStyle: "medium", timeStyle: "short" });
@@ -82,7 +89,7 @@ export function createRobotLinkCard(api: RobotLinkApi, name = ""): RobotLinkCard
     setHidden(pair, !link.mayPair || link.state !== "unpaired" || made !== null);
     setText(pair, link.code === "none" ? "Pair a robot" : "New code");
     setHidden(forget, !link.mayPair || link.key !== "paired");
-    setHidden(shown, !waits || !link.mayPair);
+    setHidden(shown, !isOpen || !link.mayPair);
     setHidden(code, made === null);
     setHidden(steps, made === null);
     setHidden(copy.element, made === null);
@@ -91,8 +98,25 @@ export function createRobotLinkCard(api: RobotLinkApi, name = ""): RobotLinkCard
     setHidden(warning, elsewhere === "");
     setText(code, made?.code ?? "");
     setText(words, codeLabel(link));
-    setData(words, "tone", waits ? "waits" : link.code === "paired" ? "good" : "bad");
+    setData(words, "tone", isOpen ? "waits" : link.code === "paired" ? "good" : "bad");
     setText(refused, refusedLabel(link));
+    renderWaits(link);
+  }
+
+  /** Writes only what changed, so that each robot is read out once. */
+  function renderWaits(link: RobotLink): void {
+    const rows = link.waits.map((each) => [waitLabel(each, link), clock(each.since)] as const);
+    const now = JSON.stringify(rows);
+    if (now === shownWaits) return;
+    shownWaits = now;
+    const items = rows.map(([label, since]) =>
+      h("li", "", {}, label, " ", h("span", "muted", {}, `Since ${since}.`)),
+    );
+    waits.replaceChildren(
+      ...(items.length === 0
+        ? []
+        : [h("ul", "", { role: "list", "aria-label": "Robots that wait" }, ...items)]),
+    );
   }
 
   async function openCode(): Promise<void> {

@@ -55,12 +55,22 @@ class _Pairing(msgspec.Struct):
     refused: str = ""
 
 
+class _Waiting(msgspec.Struct):
+    address: str
+    name: str
+    why: str
+
+
 class _DialIn(msgspec.Struct):
     """The answer of GET /api/dial-in, and of what changes it."""
 
     key: str
     pairing: _Pairing
     robot: str = ""
+    dials_in: bool = True
+    state: str = ""
+    address: str = ""
+    waits: list[_Waiting] = []
 
 
 def add_pairing_commands(app: typer.Typer, make_settings: MakeSettings) -> None:
@@ -78,6 +88,9 @@ def add_pairing_commands(app: typer.Typer, make_settings: MakeSettings) -> None:
             bool, typer.Option("--wait", help="Wait until a robot is paired; exit code 1 if none.")
         ] = False,
         withdraw: Annotated[bool, typer.Option("--withdraw", help="Withdraw the open code instead.")] = False,
+        status: Annotated[
+            bool, typer.Option("--status", help="Print instead which robot is paired, and which robots wait.")
+        ] = False,
         robot: RobotOption = "",
         link: Link = "",
         tls_ca: TlsCa = None,
@@ -86,6 +99,10 @@ def add_pairing_commands(app: typer.Typer, make_settings: MakeSettings) -> None:
     ) -> None:
         """Open a code by which one robot pairs with the console, and print the command for the robot's computer."""
         ask = asking(link, tls_ca, robot, state_dir)
+        if status:
+            found = ask("GET", "/api/dial-in")
+            _print(found, as_json, _status(read_answer(_DialIn, found)))
+            return
         if withdraw:
             found = ask("DELETE", "/api/dial-in/code")
             read_answer(_DialIn, found)
@@ -112,6 +129,18 @@ def add_pairing_commands(app: typer.Typer, make_settings: MakeSettings) -> None:
         found = asking(link, tls_ca, robot, state_dir)("DELETE", "/api/dial-in/robot")
         read_answer(_DialIn, found)
         _print(found, as_json, "the robot is forgotten")
+
+
+def _status(found: _DialIn) -> str:
+    if not found.dials_in:
+        return "the console connects to this robot, so nothing is paired"
+    name = escaped(found.robot) or "the robot"
+    lines = [f"{name} is {escaped(found.state)}" if found.key else "no robot is paired"]
+    if found.address:
+        lines[0] += f" from {escaped(found.address)}"
+    for each in found.waits:
+        lines.append(f"waits: {escaped(each.name) or 'a robot'} at {escaped(each.address)}: {escaped(each.why)}")
+    return "\n".join(lines)
 
 
 def _loopback_host(command: str) -> str:
