@@ -134,6 +134,9 @@ def add_recording_commands(app: typer.Typer, make_settings: MakeSettings) -> Non
         port: Annotated[int, typer.Option(min=0, max=65535, help="Port; 0: any free port.")] = 0,
         to: Annotated[str, typer.Option(help="Drive the robot behind this operator's link along it instead.")] = "",
         episode: Annotated[int, typer.Option(min=0, help="--to: the kept episode, counted from 0.")] = 0,
+        whole: Annotated[
+            bool, typer.Option("--whole", help="--to: take a file without episodes as one in any case.")
+        ] = False,
         pace: Annotated[float, typer.Option(min=0.05, max=1.0, help="--to: 1 is as it was recorded.")] = 1.0,
         from_anywhere: Annotated[
             bool, typer.Option("--from-anywhere", help="--to: go to the beginning, however far it is.")
@@ -150,7 +153,16 @@ def add_recording_commands(app: typer.Typer, make_settings: MakeSettings) -> Non
         if to:
             from lockstep.server.cli.recordings.replay_to import replay_to
 
-            replay_to(path, to, episode, pace, from_anywhere=from_anywhere, tls_ca=tls_ca, as_json=as_json)
+            replay_to(
+                path,
+                to,
+                episode,
+                pace,
+                whole=whole,
+                from_anywhere=from_anywhere,
+                tls_ca=tls_ca,
+                as_json=as_json,
+            )
             return
         if is_dataset:
             raise usage_error("the player takes recordings alone; --to LINK drives a robot along a dataset")
