@@ -78,7 +78,7 @@ def appended(paths: list[Path], root: Path, said: list[str] | None = None) -> li
 
 def replayed(path: Path) -> list[tuple[int, int]]:
     """The events of each episode that a robot would be driven along: its actions say those that follow them."""
-    found = []
+    found: list[tuple[int, int]] = []
     for number in count():
         try:
             events = [round(1000 * values[0]) - 1 for values in episode_of_recording(path, number).actions]

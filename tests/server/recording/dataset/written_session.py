@@ -53,7 +53,7 @@ class WrittenSession:
         for _ in range(events):
             self._event += 1
             event, epoch = self._event, str(self._epoch)
-            values = [event / 1000, 0.0]
+            values: list[float | None] = [event / 1000, 0.0]
             command = CommandRecord(
                 epoch=epoch, event=event, issue=1, values=values, peer="p1", name="Ada", outcome="forwarded"
             )

@@ -152,8 +152,8 @@ def test_an_episode_whose_end_the_disk_does_not_take_is_not_kept_nor_in_the_file
 
 def heads(directory: Path) -> list[tuple[str, str, str]]:
     """Of each part: whether episodes were begun before it, the episode that was open, and how the file ended."""
-    found = []
-    for path in sorted(directory.glob("*.mcap"), key=lambda each: len(each.name)):
+    found: list[tuple[str, str, str]] = []
+    for path in sorted(directory.glob("*.mcap"), key=lambda each: (len(each.name), each.name)):
         with RecordingReader(path) as reader:
             found.append((reader.info.episodes, reader.info.cut, reader.index.ending))
     return found
@@ -173,6 +173,7 @@ def test_each_part_says_whether_an_episode_was_begun_before_it_and_which_is_open
     assert heads(tmp_path) == [
         ("none", "", "continued"),
         ("none", "", "continued"),
+        ("begun", "a", "continued"),
         ("begun", "a", "continued"),
         ("begun", "a", "continued"),
         ("begun", "", "episodes"),

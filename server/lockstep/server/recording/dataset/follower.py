@@ -12,7 +12,7 @@ from lockstep.server.recording.dataset.appending import append, is_dataset, note
 from lockstep.server.recording.dataset.commit import recover
 from lockstep.server.recording.dataset.growing import GrowingRecording
 from lockstep.server.recording.episodes.edit_rules import apply_edits
-from lockstep.server.recording.episodes.edits import read_edits
+from lockstep.server.recording.episodes.edits import edits_version, read_edits
 from lockstep.server.recording.errors import DatasetRefused, RecordingError
 from lockstep.server.recording.export.export_lerobot import (
     DatasetOptions,
@@ -34,6 +34,7 @@ from lockstep.server.recording.export.lerobot_rows import (
     stretches_of,
     whole_stretch,
 )
+from lockstep.server.recording.format.episodes import EpisodeEntry
 from lockstep.server.recording.reading.reader import RecordingReader
 
 __all__ = ["DatasetFollower"]
@@ -67,7 +68,9 @@ class DatasetFollower:
         self._robot: RobotDescription | None = None
         self._files: dict[Path, GrowingRecording] = {}
         self._passed: set[tuple[Path, str, int, int]] = set()  # stretches that have been said not to fit
+        self._discarded: set[tuple[Path, str, int, int]] = set()  # that have been said to stay in the dataset
         self._without_rows: list[EpisodeRows] = []  # that the dataset is to note when it begins
+        self._edits: dict[Path, tuple[int, int, int]] = {}  # versions of the changes that were taken into account
         self._again: set[Path] = set()  # recordings with an episode that could not be written
 
     def look(self, paths: Sequence[Path], since: int = 0) -> int:
@@ -84,8 +87,10 @@ class DatasetFollower:
         for path in sorted(paths, key=_age):
             growing = self._files.setdefault(path, GrowingRecording(path))
             try:
-                if growing.advance() or path in self._again:
+                edits = edits_version(path)
+                if growing.advance() or path in self._again or edits != self._edits.get(path):
                     self._again.discard(path)
+                    self._edits[path] = edits
                     count += self._take(growing, since)
                 if why := self._why_not_whole(growing):
                     self._pass_over((path, "", 0, 0), not_as_a_whole(path, why))
@@ -104,6 +109,7 @@ class DatasetFollower:
     def _take(self, growing: GrowingRecording, since: int) -> int:
         recorded = growing.index.episodes
         episodes = apply_edits(recorded, read_edits(growing.path)).episodes
+        self._name_discarded(growing, [each.entry for each in episodes if each.entry.state == "discarded"])
         kept = [each for each in episodes if each.entry.state == "kept" and each.entry.ended >= since]
         is_whole = not recorded and self._wholes.get(growing.path) == ""
         if not kept and not is_whole:
@@ -111,6 +117,17 @@ class DatasetFollower:
         with growing.reader() as reader:
             stretches = [whole_stretch(reader, self._options.task)] if is_whole else stretches_of(reader, kept)
             return sum(self._append(reader, each, growing) for each in stretches if self._is_new(each))
+
+    def _name_discarded(self, growing: GrowingRecording, discarded: Sequence[EpisodeEntry]) -> None:
+        """Say once of each episode that was discarded after it was appended that the dataset has it."""
+        noted = [] if self._state is None else self._state.notes.episodes
+        part = growing.index.recording, growing.index.part, growing.index.epoch
+        names = {each.episode for each in noted if (each.recording, each.part, each.epoch) == part}
+        for each in discarded:
+            key = (growing.path, each.id, each.first_event, each.last_event)
+            if each.id in names and key not in self._discarded:
+                self._discarded.add(key)
+                self._say(f"episode {each.id} of {growing.path.name} was discarded, and stays in {self._root.name}")
 
     def _is_new(self, stretch: Stretch) -> bool:
         found = None if self._state is None else present(self._state.notes, stretch)
