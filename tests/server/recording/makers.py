@@ -27,6 +27,7 @@ from lockstep.server.recording.format.foxglove import camera_message, command_me
 from lockstep.server.recording.format.info import RecordingInfo
 from lockstep.server.recording.format.records import (
     CommandRecord,
+    EpisodeRecord,
     FeedbackRecord,
     OwnRecord,
     ReportRecord,
@@ -42,7 +43,9 @@ __all__ = ["CODECS", "DESCRIPTION", "EPOCH", "INFO", "SECOND", "START", "Story",
 EPOCH = "epoch-1"
 SECOND = 1_000_000_000  # ns
 START = 1_800_000_000 * SECOND
-INFO = RecordingInfo(recording="20270115-planar-ab12", epoch=EPOCH, robot="Planar robot", name="first", by="Ada")
+INFO = RecordingInfo(
+    recording="20270115-planar-ab12", epoch=EPOCH, robot="Planar robot", name="first", by="Ada", episodes="none"
+)
 CODECS = {"front": "H264", "ear": "opus"}
 DESCRIPTION = RobotDescription(
     name="planar",
@@ -196,7 +199,7 @@ def _write(
         writer.flush_if_due(entry.arrived)
         writer.write(entry)
     if close:
-        writer.close()
+        writer.close("episodes" if any(isinstance(each.record, EpisodeRecord) for each in entries) else "no_episodes")
     return writer
 
 

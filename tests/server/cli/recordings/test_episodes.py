@@ -7,6 +7,7 @@ import pytest
 from typer.testing import CliRunner, Result
 
 from lockstep.server.cli.main import app
+from tests.server.recording.makers import INFO
 from tests.server.recording.test_episode_export import KEPT_AND_NOT, episode, recording
 
 
@@ -105,6 +106,41 @@ def test_a_kept_episode_that_has_no_row_is_said_by_name(directory: Path, tmp_pat
     first, last = done.stdout.splitlines()
     assert first.startswith("episode x of three.mcap is left out: no event has ")
     assert last == str(tmp_path / "dataset")
+
+
+def test_a_file_without_episodes_beside_others_is_left_out_by_name_and_whole_takes_it(
+    directory: Path, tmp_path: Path
+) -> None:
+    recording(directory / "three.mcap")
+    command = ("export", "three", "one", "--to", "lerobot", "--out")
+    done = _lockstep(directory, *command, str(tmp_path / "dataset"))
+    assert done.exit_code == 0, done.output
+    first, last = done.stdout.splitlines()
+    assert first.startswith("three.mcap is left out: it has no episodes, and its recording was made by episodes, as ")
+    assert last == str(tmp_path / "dataset")
+    alone = _lockstep(directory, "export", "three", "--to", "lerobot", "--out", str(tmp_path / "none"))
+    assert (alone.exit_code, "--whole takes it" in alone.stderr) == (2, True), alone.output
+    appended = _lockstep(
+        directory, "export", "three", "--to", "lerobot", "--append", "--out", str(tmp_path / "dataset")
+    )
+    assert appended.stdout.splitlines()[1:] == ["0 appended, 1 left out", str(tmp_path / "dataset")]
+    whole = _lockstep(directory, *command, str(tmp_path / "whole"), "--whole")
+    assert whole.stdout.startswith("three.mcap has no episodes and is one as a whole, with the task ")
+    follow = _lockstep(directory, "export", "--to", "lerobot", "--follow", "--whole", "--out", str(tmp_path / "x"))
+    assert (follow.exit_code, "kept episodes alone" in follow.stderr) == (2, True)
+
+
+def test_verify_names_the_episodes_of_a_dataset_that_were_discarded_since(directory: Path, tmp_path: Path) -> None:
+    (directory / "two.mcap").unlink()  # a copy
+    done = _lockstep(directory, "export", "one", "--to", "lerobot", "--out", str(tmp_path / "dataset"))
+    assert done.exit_code == 0, done.output
+    command = ("verify", str(tmp_path / "dataset"), "--recordings", str(directory))
+    assert "ok    current (2 looked at)" in _lockstep(directory, *command).stdout
+    assert _lockstep(directory, "episodes", "one", "--edit", "a", "--drop").exit_code == 0
+    verdict = _lockstep(directory, *command)
+    assert verdict.exit_code == 1
+    assert f"FAIL  current (2 looked at)\n        episode a of {INFO.recording} is discarded\n" in verdict.stdout
+    assert "current (not looked at: --recordings FOLDER)" in _lockstep(directory, *command[:2]).stdout
 
 
 def test_recordings_of_the_same_events_become_one_dataset_and_the_check_says_that_they_are(

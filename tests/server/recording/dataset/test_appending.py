@@ -95,6 +95,16 @@ def test_a_change_before_the_append_counts_and_a_later_one_does_not(tmp_path: Pa
     following = follower(tmp_path / "dataset")
     assert following.look([path]) == 1
     assert events_of(tmp_path / "dataset") == [[*range(12, 20)]]
+    changed(path, "a", first_event=10)
+    changed(path, "a", task="pull")
+    said: list[str] = []
+    assert append_once([path], tmp_path / "dataset", DatasetOptions(), said.append) == 0
+    assert events_of(tmp_path / "dataset") == [[*range(12, 20)]]
+    assert read_state(tmp_path / "dataset").tasks == ["push"]
+    assert said == [
+        "episode a of a.mcap is left out: the dataset has 8 of its 10 events already, as a, from before a change",
+        "0 appended, 1 left out",
+    ]
 
 
 def test_a_kept_episode_without_a_row_is_noted_in_the_dataset_also_before_it_begins(tmp_path: Path) -> None:

@@ -26,7 +26,7 @@ EVENTS = 150
 @pytest.fixture(scope="module")
 def whole(tmp_path_factory: pytest.TempPathFactory) -> bytes:
     path = tmp_path_factory.mktemp("recordings") / "a.mcap"
-    Story(events=EVENTS).write(path)
+    Story(events=EVENTS).write(path, close=False).close()  # how it ended is not said, as in a completed file
     return path.read_bytes()
 
 

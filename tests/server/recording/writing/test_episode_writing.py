@@ -148,3 +148,50 @@ def test_an_episode_whose_end_the_disk_does_not_take_is_not_kept_nor_in_the_file
     assert ("a", True) not in made.said
     left = [each.state for path in tmp_path.glob("*.mcap") for each in found(path)]
     assert "kept" not in left
+
+
+def heads(directory: Path) -> list[tuple[str, str, str]]:
+    """Of each part: whether episodes were begun before it, the episode that was open, and how the file ended."""
+    found: list[tuple[str, str, str]] = []
+    for path in sorted(directory.glob("*.mcap"), key=lambda each: (len(each.name), each.name)):
+        with RecordingReader(path) as reader:
+            found.append((reader.info.episodes, reader.info.cut, reader.index.ending))
+    return found
+
+
+def test_each_part_says_whether_an_episode_was_begun_before_it_and_which_is_open(tmp_path: Path) -> None:
+    made = Made(tmp_path, file_bytes=1_000_000)
+    made.event(1, 1_100_000)
+    made.episode("a", "start", 1)
+    for event in range(2, 5):
+        made.event(event, 1_100_000)
+    made.episode("a", "mark", 5)
+    made.event(6, 1_100_000)
+    made.episode("a", "discarded", 6)
+    made.event(7, 1_100_000)
+    made.run()
+    assert heads(tmp_path) == [
+        ("none", "", "continued"),
+        ("none", "", "continued"),
+        ("begun", "a", "continued"),
+        ("begun", "a", "continued"),
+        ("begun", "a", "continued"),
+        ("begun", "", "episodes"),
+    ]
+
+
+def test_a_new_epoch_ends_an_episode_also_when_its_end_is_in_no_file(tmp_path: Path) -> None:
+    made = Made(tmp_path)
+    made.episode("a", "start", 1)
+    made.robot("epoch-2")
+    made.episode("a", "cut", 1)
+    made.robot("epoch-3")
+    made.run()
+    assert heads(tmp_path) == [("none", "", "continued"), ("begun", "a", "continued"), ("begun", "", "episodes")]
+
+
+def test_a_recording_in_which_nobody_began_an_episode_says_so_at_its_end(tmp_path: Path) -> None:
+    made = Made(tmp_path)
+    made.event(1)
+    made.run()
+    assert heads(tmp_path) == [("none", "", "no_episodes")]

@@ -55,6 +55,10 @@ def add_export_command(app: typer.Typer, make_settings: MakeSettings) -> None:
         extra: Annotated[
             list[str] | None, typer.Option("--with", help=DATASET + "wrench or ranges, as a column of its own.")
         ] = None,
+        whole: Annotated[
+            bool,
+            typer.Option("--whole", help=DATASET + "take each file without episodes as one in any case."),
+        ] = False,
         append: Annotated[bool, typer.Option("--append", help=DATASET + "append what the dataset has not.")] = False,
         follow: Annotated[
             bool,
@@ -71,6 +75,7 @@ def add_export_command(app: typer.Typer, make_settings: MakeSettings) -> None:
             store = recording_store(settings, robot, directory)
             options = _options(
                 task=task,
+                whole=whole,
                 tolerance=tolerance,
                 fps=fps,
                 cameras=_words(cameras),
@@ -98,6 +103,8 @@ def _export_dataset(
     exporter: Any = load_extra("lockstep.server.recording.export.export_lerobot", "export")
     if (append or follow) and out is None:
         raise usage_error("--append and --follow need --out")
+    if follow and options.whole:
+        raise usage_error("--follow takes kept episodes alone; take --append for --whole")
     if follow:
         begun = f"{escaped(out)} follows {escaped(', '.join(map(str, paths)) or 'the recordings')}"
         wanted = (lambda: paths) if paths else files

@@ -9,9 +9,10 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from types import FrameType
 
-from lockstep.server.recording.dataset.appending import alone_with
+from lockstep.server.recording.dataset.appending import alone_with, is_dataset, read_state
 from lockstep.server.recording.dataset.follower import DatasetFollower
 from lockstep.server.recording.export.export_lerobot import DatasetOptions, Say
+from lockstep.server.recording.reading.whole_recordings import whole_recordings
 
 __all__ = ["append_once", "follow"]
 
@@ -20,9 +21,18 @@ EARLIER = 1.0  # s that the time of a file's change may be wrong
 
 
 def append_once(paths: Sequence[Path], root: Path, options: DatasetOptions, say: Say) -> int:
-    """Append all kept episodes that the dataset has not; return their number. Raises RecordingError, OSError."""
+    """Append all kept episodes that the dataset has not; return their number. Raises RecordingError, OSError.
+
+    A recording that was not made by episodes is one as a whole, as in an export of all; `say` is told what was left out
+    by name, and at the end how many that were.
+    """
     with alone_with(root):
-        return DatasetFollower(root, options, say).look(paths)
+        has_episodes = is_dataset(root) and any(each.episode for each in read_state(root).notes.episodes)
+        wholes = whole_recordings(paths, wanted=options.whole, beside=root.name if has_episodes else "")
+        follower = DatasetFollower(root, options, say, wholes)
+        count = follower.look(paths)
+        say(f"{count} appended, {follower.left_out} left out")
+        return count
 
 
 def follow(

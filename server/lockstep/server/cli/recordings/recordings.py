@@ -45,6 +45,7 @@ __all__ = [
 EXIT_BROKEN = 1  # a promise is not kept
 EXIT_USAGE = 2
 NO_PIXELS = "not looked at: --pixels"
+NO_RECORDINGS = "not looked at: --recordings FOLDER"
 NO_STRIP = "not looked at: no event is drawn into the pictures"
 
 Json = Annotated[bool, typer.Option("--json", help="Print JSON.")]
@@ -134,6 +135,9 @@ def add_recording_commands(app: typer.Typer, make_settings: MakeSettings) -> Non
         port: Annotated[int, typer.Option(min=0, max=65535, help="Port; 0: any free port.")] = 0,
         to: Annotated[str, typer.Option(help="Drive the robot behind this operator's link along it instead.")] = "",
         episode: Annotated[int, typer.Option(min=0, help="--to: the kept episode, counted from 0.")] = 0,
+        whole: Annotated[
+            bool, typer.Option("--whole", help="--to: take a file without episodes as one in any case.")
+        ] = False,
         pace: Annotated[float, typer.Option(min=0.05, max=1.0, help="--to: 1 is as it was recorded.")] = 1.0,
         from_anywhere: Annotated[
             bool, typer.Option("--from-anywhere", help="--to: go to the beginning, however far it is.")
@@ -150,7 +154,16 @@ def add_recording_commands(app: typer.Typer, make_settings: MakeSettings) -> Non
         if to:
             from lockstep.server.cli.recordings.replay_to import replay_to
 
-            replay_to(path, to, episode, pace, from_anywhere=from_anywhere, tls_ca=tls_ca, as_json=as_json)
+            replay_to(
+                path,
+                to,
+                episode,
+                pace,
+                whole=whole,
+                from_anywhere=from_anywhere,
+                tls_ca=tls_ca,
+                as_json=as_json,
+            )
             return
         if is_dataset:
             raise usage_error("the player takes recordings alone; --to LINK drives a robot along a dataset")
@@ -166,6 +179,10 @@ def add_recording_commands(app: typer.Typer, make_settings: MakeSettings) -> Non
             typer.Option(help="The public key that must have signed the recording. Unset: any key, or no signature."),
         ] = "",
         pixels: Annotated[bool, typer.Option(help="Datasets: read the events that --event-strip has drawn.")] = False,
+        recordings: Annotated[
+            Path | None,
+            typer.Option(help="Datasets: the folder of their recordings, to find episodes that have changed since."),
+        ] = None,
         directory: DirectoryOption = None,
         robot: RobotOption = "",
         state_dir: StateDirOption = None,
@@ -177,7 +194,7 @@ def add_recording_commands(app: typer.Typer, make_settings: MakeSettings) -> Non
 
         def is_kept(file: Path) -> bool:
             if (file / "meta" / "info.json").is_file():
-                return _verify_dataset(file, as_json, pixels)
+                return _verify_dataset(file, as_json, pixels, recordings)
             return _verify_file(
                 recording_file(file, make_settings(state_dir=state_dir), robot, directory), key, as_json
             )
@@ -225,9 +242,9 @@ def _verify_file(path: Path, key: str, as_json: bool) -> bool:
     return bool(verdict.ok)
 
 
-def _verify_dataset(root: Path, as_json: bool, pixels: bool) -> bool:
+def _verify_dataset(root: Path, as_json: bool, pixels: bool, recordings: Path | None) -> bool:
     verifier: Any = load_extra("lockstep.server.recording.verify.verify_dataset", "export")  # needs pyarrow
-    verdict = or_usage(lambda: verifier.verify_dataset(root, pixels=pixels))
+    verdict = or_usage(lambda: verifier.verify_dataset(root, pixels=pixels, recordings=recordings))
     if as_json:
         sys.stdout.write(msgspec.json.encode(verdict).decode() + "\n")
     else:
@@ -236,10 +253,18 @@ def _verify_dataset(root: Path, as_json: bool, pixels: bool) -> bool:
             if name == "shown" and not check.looked:
                 lines.append(f"--    shown ({NO_STRIP if pixels else NO_PIXELS})")
                 continue
+            if name == "current" and recordings is None:
+                lines.append(f"--    current ({NO_RECORDINGS})")
+                continue
             lines.append(f"{'ok  ' if check.ok else 'FAIL'}  {name} ({check.looked} looked at)")
-            lines += [f"        row {each.row}: {printable(each.text)}" for each in check.violations[:5]]
+            named = check.violations if name == "current" else check.violations[:5]  # each episode is to be named
+            lines += [f"        {_row(each.row)}{printable(each.text)}" for each in named]
         sys.stdout.write("\n".join(lines) + "\n")
     return bool(verdict.ok)
+
+
+def _row(number: int) -> str:
+    return f"row {number}: " if number >= 0 else ""
 
 
 def _say_state(answer: dict[str, Any], as_json: bool) -> None:

@@ -28,7 +28,15 @@ EXIT_USAGE = 2
 
 
 def replay_to(
-    path: Path, link: str, episode: int, pace: float, *, from_anywhere: bool, tls_ca: Path | None, as_json: bool
+    path: Path,
+    link: str,
+    episode: int,
+    pace: float,
+    *,
+    from_anywhere: bool,
+    tls_ca: Path | None,
+    as_json: bool,
+    whole: bool = False,
 ) -> None:
     """Drive the robot behind `link` along an episode, and say how well it followed.
 
@@ -40,7 +48,8 @@ def replay_to(
     if path.is_dir():
         load_extra("pyarrow.parquet", "export")
     try:
-        found = episode_of_dataset(path, episode) if path.is_dir() else episode_of_recording(path, episode)
+        is_dataset = path.is_dir()
+        found = episode_of_dataset(path, episode) if is_dataset else episode_of_recording(path, episode, whole=whole)
     except (RecordingError, OSError, ImportError) as error:
         raise _failed(str(error), EXIT_USAGE) from error
     errors: Any = import_module(f"{CLIENT}.errors")

@@ -7,11 +7,13 @@ from typing import Any, NamedTuple
 
 import msgspec
 
-from lockstep.server.recording.episodes.edits import edited, read_edits
+from lockstep.server.recording.episodes.edit_rules import apply_edits
+from lockstep.server.recording.episodes.edits import read_edits
 from lockstep.server.recording.errors import DatasetRefused, RecordingDamaged
 from lockstep.server.recording.export.lerobot_layout import layout_of
-from lockstep.server.recording.export.lerobot_rows import episodes_of, rows_of, stretches_of
+from lockstep.server.recording.export.lerobot_rows import episodes_of, rows_of, stretches_of, whole_stretch
 from lockstep.server.recording.reading.reader import RecordingReader
+from lockstep.server.recording.reading.whole_recordings import whole_recordings
 
 __all__ = ["RecordedEpisode", "episode_of_dataset", "episode_of_recording"]
 
@@ -66,8 +68,11 @@ def episode_of_dataset(root: Path, number: int) -> RecordedEpisode:
     )
 
 
-def episode_of_recording(path: Path, number: int) -> RecordedEpisode:
-    """Read a kept episode of a recording, counted from 0; one without episodes is one as a whole.
+def episode_of_recording(path: Path, number: int, *, whole: bool = False) -> RecordedEpisode:
+    """Read a kept episode of a recording, counted from 0; one that was not made by episodes is one as a whole.
+
+    Args:
+        whole: a file without episodes is one as a whole, also where that is not certain
 
     Raises:
         DatasetRefused: there is no such episode.
@@ -75,7 +80,12 @@ def episode_of_recording(path: Path, number: int) -> RecordedEpisode:
     """
     with RecordingReader(path) as reader:
         layout = layout_of(reader.description())
-        stretches = stretches_of(reader, edited(episodes_of(reader), read_edits(path)), "")
+        recorded = episodes_of(reader)
+        stretches = stretches_of(reader, apply_edits(recorded, read_edits(path)).episodes)
+        if not recorded:
+            if why := whole_recordings([path], wanted=whole)[path]:
+                raise DatasetRefused(f"{path.name} has no episodes, and {why}; --whole takes it as one all the same")
+            stretches = [whole_stretch(reader, "")]
         if not 0 <= number < len(stretches):
             raise DatasetRefused(f"there is no kept episode {number}; the recording has {len(stretches)}")
         (rows,) = rows_of(reader, layout, [stretches[number]], [], 0)

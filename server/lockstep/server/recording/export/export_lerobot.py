@@ -1,7 +1,7 @@
 """`lockstep export --to lerobot`: a LeRobot dataset, version 3. Needs pyarrow.
 
-The kept episodes of one or several recordings are its episodes; a recording in which no episode was ever begun is one
-as a whole. `lerobot_rows` says what a row is, `lerobot_layout` what is in it.
+The kept episodes of one or several recordings are its episodes; a recording that was not made by episodes is one as a
+whole (`whole_recordings`). `lerobot_rows` says what a row is, `lerobot_layout` what is in it.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -12,7 +12,8 @@ import msgspec
 import numpy as np
 
 from lockstep.protocol.description import RobotDescription
-from lockstep.server.recording.episodes.edits import edited, read_edits
+from lockstep.server.recording.episodes.edit_rules import apply_edits
+from lockstep.server.recording.episodes.edits import read_edits
 from lockstep.server.recording.errors import DatasetRefused, RecordingDamaged
 from lockstep.server.recording.export.lerobot_batch import DatasetState, noted_without_rows, write_batch
 from lockstep.server.recording.export.lerobot_layout import DatasetLayout, LayoutChoice, layout_of
@@ -23,22 +24,26 @@ from lockstep.server.recording.export.lerobot_rows import (
     episodes_of,
     rows_of,
     stretches_of,
+    whole_stretch,
 )
 from lockstep.server.recording.export.lerobot_video import camera_key
 from lockstep.server.recording.export.unfinished import unfinished
 from lockstep.server.recording.format.topics import CAMERA
 from lockstep.server.recording.reading.reader import RecordingReader
+from lockstep.server.recording.reading.whole_recordings import whole_recordings
 
 __all__ = [
     "TOLERANCE",
     "DatasetOptions",
     "Say",
+    "as_a_whole",
     "cameras_of",
     "export",
     "export_all",
     "left_out",
     "new_state",
     "no_rows",
+    "not_as_a_whole",
     "options_of",
 ]
 
@@ -51,6 +56,7 @@ class DatasetOptions(msgspec.Struct, frozen=True, kw_only=True):
     """What is chosen for a dataset."""
 
     task: str = ""  # of recordings without episodes, in words
+    whole: bool = False  # each file without episodes is one as a whole, also where that is not certain
     tolerance: int = TOLERANCE  # events by which a picture may be older than its row
     fps: int | None = None  # Hz, of the rows; None: each event is a row
     cameras: list[str] = []  # names; empty: all that the first recording has pictures of
@@ -80,7 +86,7 @@ def export_all(
         out: a new directory; None: one beside the first recording
         options: or the task alone
         tolerance: instead of that in the options
-        say: is told each kept episode that has no row
+        say: is told each kept episode that has no row, and of each file without episodes what becomes of it
 
     Raises:
         RecordingError: a recording cannot be read, none has a row, they are of different robots, or the options do not
@@ -93,7 +99,7 @@ def export_all(
     chosen = options if isinstance(options, DatasetOptions) else DatasetOptions(task=options)
     if tolerance is not None:
         chosen = msgspec.structs.replace(chosen, tolerance=tolerance)
-    description, layout, topics, read = _read(paths, chosen)
+    description, layout, topics, read = _read(paths, chosen, say)
     without = [each for each in read if not each.frames]
     for each in without:
         say(left_out(each.stretch.path, each.stretch.episode, no_rows(chosen.tolerance)))
@@ -142,6 +148,16 @@ def left_out(path: Path, episode: str, why: str) -> str:
     return f"{f'episode {episode} of ' if episode else ''}{path.name} is left out: {why}"
 
 
+def as_a_whole(path: Path, task: str) -> str:
+    """Return in words that a recording is one episode."""
+    return f"{path.name} has no episodes and is one as a whole, with the task {task!r}"
+
+
+def not_as_a_whole(path: Path, why: str) -> str:
+    """Return in words that a recording without episodes is in no dataset, and how it gets into one."""
+    return left_out(path, "", f"it has no episodes, and {why}; --whole takes it as one episode all the same")
+
+
 def cameras_of(reader: RecordingReader, names: Sequence[str]) -> list[str]:
     """Return the topics of these cameras; without names, of all that have pictures. Raises DatasetRefused."""
     found = [each.topic for each in reader.index.topics if reader.index.keyframes.get(each.topic)]
@@ -152,25 +168,35 @@ def cameras_of(reader: RecordingReader, names: Sequence[str]) -> list[str]:
 
 
 def _read(
-    paths: Sequence[Path], options: DatasetOptions
+    paths: Sequence[Path], options: DatasetOptions, say: Say
 ) -> tuple[RobotDescription, DatasetLayout, list[str], list[EpisodeRows]]:
     """Return the robot, its cameras' topics, and the rows of all kept episodes, which may have none."""
+    wholes = whole_recordings(paths, wanted=options.whole)
+    left: list[str] = []
     description: RobotDescription | None = None
     layout: DatasetLayout | None = None
     cameras: list[str] = []
     episodes: list[EpisodeRows] = []
     for path in paths:
         with RecordingReader(path) as reader:
+            recorded = episodes_of(reader)
+            if not recorded and (why := wholes[path]):
+                left.append(not_as_a_whole(path, why))
+                say(left[-1])
+                continue
             robot, topics = reader.description(), cameras_of(reader, options.cameras)
             if description is None or layout is None:
                 description, cameras, layout = robot, topics, layout_of(robot, options.layout)
             check_same_robot(description, robot)
             if sorted(topics) != sorted(cameras):
                 raise RecordingDamaged(f"{path.name} has other cameras than {paths[0].name}")
-            stretches = stretches_of(reader, edited(episodes_of(reader), read_edits(path)), options.task)
+            stretches = stretches_of(reader, apply_edits(recorded, read_edits(path)).episodes)
+            if not recorded:
+                stretches = [whole_stretch(reader, options.task)]
+                say(as_a_whole(path, stretches[0].task))
             episodes += rows_of(reader, layout, stretches, cameras, options.tolerance, options.fps)
     if description is None or layout is None or not episodes:
-        raise RecordingDamaged("there is no kept episode")
+        raise RecordingDamaged("; ".join(["there is no kept episode", *left]))
     return description, layout, cameras, episodes
 
 

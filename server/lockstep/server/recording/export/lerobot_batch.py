@@ -110,9 +110,15 @@ def write_notes(stage: Path, notes: DatasetNotes) -> str:
 
 
 def _others(noted: Sequence[DatasetEpisode], episodes: Sequence[EpisodeRows]) -> list[DatasetEpisode]:
-    """Return those that are none of the episodes, trimmed or not."""
-    own = {(each.recording, each.part, each.episode) for each in map(_noted, episodes)}
-    return [each for each in noted if (each.recording, each.part, each.episode) not in own]
+    """Return those that are none of the episodes, trimmed or not, and share no event with one."""
+    own = list(map(_noted, episodes))
+    ids = {(each.recording, each.part, each.episode) for each in own}
+    return [
+        each
+        for each in noted
+        if (each.recording, each.part, each.episode) not in ids
+        and not any(each.shared(new.recording, new.epoch, new.first_event, new.last_event) for new in own)
+    ]
 
 
 def _write_videos(
@@ -211,6 +217,7 @@ def _noted(rows: EpisodeRows) -> DatasetEpisode:
         rows=len(rows.frames),
         left_out=rows.left_out,
         rate=round(rows.rate, 3),
+        recorded=stretch.recorded,
     )
 
 

@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 import pyarrow as pa
 
+from lockstep.protocol.serial import event_gap
 from lockstep.server.recording.export.lerobot_layout import LayoutChoice
 
 __all__ = [
@@ -59,6 +60,15 @@ class DatasetEpisode(msgspec.Struct, frozen=True, kw_only=True):
     rows: int
     left_out: int  # events that are in no row because a picture was too old
     rate: float = 0.0  # Hz, by the median interval of its events; 0: not known
+    recorded: tuple[str, ...] = ()  # ids of the recorded episodes that it was made of; empty: an earlier version, whole
+
+    def shared(self, recording: str, epoch: str, first_event: int, last_event: int) -> int:
+        """Return how many of these events are among its own, its last one not counted: that makes no row."""
+        if (self.recording, self.epoch) != (recording, epoch):
+            return 0
+        first = self.first_event if event_gap(self.first_event, first_event) > 0 else first_event
+        last = self.last_event if event_gap(last_event, self.last_event) > 0 else last_event
+        return max(0, event_gap(last, first))
 
 
 class DatasetNotes(msgspec.Struct, frozen=True, kw_only=True):

@@ -15,6 +15,7 @@ from typing import NamedTuple
 from lockstep.protocol.description import RobotDescription
 from lockstep.protocol.episodes import EpisodeOutcome
 from lockstep.protocol.serial import event_after, event_gap, is_newer
+from lockstep.server.recording.episodes.edit_rules import EditedEpisode
 from lockstep.server.recording.errors import RecordingDamaged
 from lockstep.server.recording.export.lerobot_layout import DatasetLayout
 from lockstep.server.recording.export.lerobot_sampling import sampled
@@ -38,6 +39,7 @@ __all__ = [
     "rate_of",
     "rows_of",
     "stretches_of",
+    "whole_stretch",
 ]
 
 DEGRADED = OWN_TOPICS[Degraded]
@@ -64,6 +66,7 @@ class Stretch(NamedTuple):
     task: str
     outcome: EpisodeOutcome
     ended: int  # µs since 1970; pictures that came later are not of it, so that nobody has to wait for them
+    recorded: tuple[str, ...] = ()  # ids of the recorded episodes that it was made of
 
 
 class EpisodeRows(NamedTuple):
@@ -95,19 +98,31 @@ def episodes_of(reader: RecordingReader) -> list[EpisodeEntry]:
     return book.entries()
 
 
-def stretches_of(reader: RecordingReader, episodes: list[EpisodeEntry], task: str) -> list[Stretch]:
-    """Return what becomes an episode: the kept ones; the whole of a recording in which none was ever begun."""
-    if not episodes:
-        task = task or reader.info.name or "teleoperation"
-        first, last = reader.index.first_event, reader.index.last_event
-        return [Stretch(reader.path, reader.info, "", first, last, task, "", reader.index.ended)]
-    return [
-        Stretch(
-            reader.path, reader.info, each.id, each.first_event, each.last_event, each.task, each.outcome, each.ended
-        )
-        for each in episodes
-        if each.state == "kept"
-    ]
+def stretches_of(reader: RecordingReader, episodes: Iterable[EditedEpisode]) -> list[Stretch]:
+    """Return what becomes an episode of the dataset: the kept ones."""
+    return [_stretch(reader, each) for each in episodes if each.entry.state == "kept"]
+
+
+def _stretch(reader: RecordingReader, episode: EditedEpisode) -> Stretch:
+    entry = episode.entry
+    return Stretch(
+        reader.path,
+        reader.info,
+        entry.id,
+        entry.first_event,
+        entry.last_event,
+        entry.task,
+        entry.outcome,
+        entry.ended,
+        episode.recorded,
+    )
+
+
+def whole_stretch(reader: RecordingReader, task: str) -> Stretch:
+    """Return the file as one episode. `whole_recordings` says which files may be one."""
+    task = task or reader.info.name or "teleoperation"
+    first, last = reader.index.first_event, reader.index.last_event
+    return Stretch(reader.path, reader.info, "", first, last, task, "", reader.index.ended)
 
 
 def rows_of(

@@ -14,6 +14,7 @@ from lockstep.server.recording.reading.bookmarks import Mark
 __all__ = [
     "INDEX_NAME",
     "ChunkEntry",
+    "Ending",
     "EventEntry",
     "EventIndex",
     "IndexBuilder",
@@ -27,6 +28,10 @@ EVENT_SPACING = 100_000  # µs between two events of the index
 MAX_MARKS = 20_000
 MAX_TOPICS = 128  # the streams of a robot, and Lockstep's own
 MAX_TOPIC = 1000  # characters
+
+# How a file has ended: not known (interrupted, or by an earlier version), another part follows, or the recording has
+# ended, in which no episode was begun in any part, or one was.
+Ending = Literal["", "continued", "no_episodes", "episodes"]
 
 
 class TopicEntry(msgspec.Struct, frozen=True):
@@ -69,6 +74,7 @@ class EventIndex(msgspec.Struct, kw_only=True):
     episodes: list[EpisodeEntry] = []
     counts: dict[str, Whole] = {}
     lost: Whole = 0
+    ending: Ending = ""
 
     def chunks_with(self, first_event: int, last_event: int) -> Iterator[int]:
         """Yield the numbers of the chunks that can hold records of these events."""

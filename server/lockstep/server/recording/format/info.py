@@ -1,7 +1,7 @@
 """The MCAP metadata at the beginning of a recording. No I/O."""
 
 from collections.abc import Mapping
-from typing import Annotated
+from typing import Annotated, Literal
 
 import msgspec
 
@@ -16,7 +16,7 @@ Text = Annotated[str, msgspec.Meta(max_length=1000)]  # bounded: everybody's lis
 
 
 class RecordingInfo(msgspec.Struct, frozen=True, kw_only=True):
-    """The metadata of a recording, the same in all its parts but for part and epoch."""
+    """The metadata of a recording, the same in all its parts but for part, epoch, episodes and cut."""
 
     recording: Text  # common to all parts
     part: int = 1
@@ -24,9 +24,13 @@ class RecordingInfo(msgspec.Struct, frozen=True, kw_only=True):
     robot: Text = ""  # the description's label
     name: Text = ""  # given by a person
     by: Text = ""  # person who started it; "" when it was the command line
+    episodes: Literal["", "none", "begun"] = ""  # in the parts before this one; "": an earlier version, not known
+    cut: Text = ""  # id of the episode that was open when the part began, and so is whole in no file
 
     def metadata(self) -> dict[str, str]:
-        return {name: str(value) for name, value in msgspec.structs.asdict(self).items()}
+        """Return the metadata, without the last two where they are empty: files of earlier versions are signed so."""
+        fields = msgspec.structs.asdict(self)
+        return {name: str(value) for name, value in fields.items() if value or name not in ("episodes", "cut")}
 
     @classmethod
     def parse(cls, metadata: Mapping[str, str]) -> "RecordingInfo":

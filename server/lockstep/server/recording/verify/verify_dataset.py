@@ -15,6 +15,7 @@ from lockstep.server.recording.dataset.commit import is_interrupted
 from lockstep.server.recording.errors import RecordingDamaged
 from lockstep.server.recording.export.lerobot_meta import DatasetEpisode, DatasetNotes, file_of
 from lockstep.server.recording.export.lerobot_sampling import LONGEST
+from lockstep.server.recording.verify.verify_origins import outdated, recorded_now
 
 __all__ = ["DatasetCheck", "DatasetVerdict", "verify_dataset"]
 
@@ -24,9 +25,10 @@ DatasetCheckName = Literal[
     "ordered",  # the events of an episode go up, and none is in two rows but where it stood longer than a row
     "timed",  # the rows of an episode are as far apart as the dataset says
     "counted",  # rows, episodes and the pictures in the videos are as many as the dataset says, and no append is open
+    "current",  # each episode is kept in its recording, as the dataset has it; with `recordings` alone
     "shown",  # the event that is drawn into a picture is the one that the dataset says; with `pixels` alone
 ]
-CHECKS: tuple[DatasetCheckName, ...] = ("aligned", "within", "ordered", "timed", "counted", "shown")
+CHECKS: tuple[DatasetCheckName, ...] = ("aligned", "within", "ordered", "timed", "counted", "current", "shown")
 _notes_decoder = msgspec.json.Decoder(DatasetNotes)
 _info_decoder = msgspec.json.Decoder(dict[str, Any])
 MOST = 50  # violations of a check that are listed
@@ -64,15 +66,16 @@ class DatasetVerdict(msgspec.Struct, kw_only=True):
     checks: dict[DatasetCheckName, DatasetCheck]
 
 
-def verify_dataset(root: Path, *, pixels: bool = False) -> DatasetVerdict:
+def verify_dataset(root: Path, *, pixels: bool = False, recordings: Path | None = None) -> DatasetVerdict:
     """Check a dataset.
 
     Args:
         pixels: also decode all pictures and read the events in them, where the robot has drawn some (--event-strip)
+        recordings: a folder with the recordings that it was made of; None: they are not looked at
 
     Raises:
         RecordingDamaged: Lockstep has not exported it, or it cannot be read.
-        OSError: a file is missing.
+        OSError: a file or the folder is missing.
     """
     try:
         notes = _notes_decoder.decode((root / "meta" / "lockstep.json").read_bytes())
@@ -93,6 +96,11 @@ def verify_dataset(root: Path, *, pixels: bool = False) -> DatasetVerdict:
                 _check_video(
                     checks, camera, video, [(row["index"], _stamps(row, notes)[place]) for row in part], pixels
                 )
+        if recordings is not None:
+            recorded = recorded_now(recordings, notes.episodes)
+            for each in notes.episodes:
+                differs = outdated(each, recorded)
+                checks["current"].look(not differs, -1, differs)
     except (msgspec.DecodeError, pa.ArrowException, KeyError, TypeError, IndexError, av.FFmpegError) as error:
         raise RecordingDamaged(f"{root.name}: {error}") from error
     ok = all(check.ok for check in checks.values())

@@ -17,7 +17,8 @@ from lockstep.server.recording.reading.scan import Scan, statistics_of
 
 __all__ = ["IndexChecker"]
 
-NOT_COMPARED = ("version", "chunks", "lost")  # chunks are compared apart; only the index counts records left out
+# Chunks are compared apart; only the index counts records left out, and says how the file ended.
+NOT_COMPARED = ("version", "chunks", "lost", "ending")
 
 
 class IndexChecker:

@@ -9,7 +9,7 @@ import structlog
 
 from lockstep.protocol.description import RobotDescription
 from lockstep.server.recording.errors import DiskTrouble, RecordingError
-from lockstep.server.recording.format.event_index import EventIndex
+from lockstep.server.recording.format.event_index import Ending, EventIndex
 from lockstep.server.recording.format.info import RecordingInfo
 from lockstep.server.recording.format.records import Degraded, EpisodeRecord, OwnRecord, ParticipantsRecord, SeatRecord
 from lockstep.server.recording.format.signature import RecordingSigning
@@ -124,13 +124,16 @@ class RecordingParts:
             self._look_at_disk()
 
     def close(self) -> None:
-        """End the file."""
+        """End the recording."""
+        self._end_file("episodes" if self._episodes.begun else "no_episodes")
+
+    def _end_file(self, ending: Ending) -> None:
         cut = self._episodes.file_ends()
         if cut:
             self._on_episode(cut, False)
         writer = self._writer
         if writer is not None:
-            writer.close()
+            writer.close(ending)
             self._writer = None  # not before: `fail` cuts a file that fails here to its whole records
             self._bytes_before += writer.bytes_written
             self._head = writer.head
@@ -155,7 +158,9 @@ class RecordingParts:
     def _take_episode(self, item: OwnItem, record: EpisodeRecord, is_open: bool) -> None:
         """Write a record of an episode; say of `kept` that it is on the disk, only when it is."""
         kept = False
-        if self._writer is not None and self._robot is not None and is_open and self._episodes.takes(record):
+        if not is_open:
+            self._episodes.leaves_out(record)
+        elif self._episodes.takes(record) and self._writer is not None and self._robot is not None:
             self._write(self._writer, item, self._robot.record.description)
             if record.kind == "kept":
                 self._is_keeping = True
@@ -175,7 +180,7 @@ class RecordingParts:
         if same_file and self._writer is not None:
             self._write(self._writer, item, item.record.description)
             return
-        self.close()
+        self._end_file("continued")
         self._begin(item)
 
     def _begin(self, robot: RobotItem) -> None:
@@ -183,7 +188,12 @@ class RecordingParts:
         self._look_at_disk()  # else automatic recording, which tries again and again, fills the disk with beginnings
         self._part += 1
         info = msgspec.structs.replace(
-            self._info, part=self._part, epoch=robot.record.epoch, robot=robot.record.description.label
+            self._info,
+            part=self._part,
+            epoch=robot.record.epoch,
+            robot=robot.record.description.label,
+            episodes="begun" if self._episodes.begun else "none",
+            cut=self._episodes.cut,
         )
         suffix = f"-p{self._part}" if self._part > 1 else ""
         writer = RecordingWriter(
@@ -213,7 +223,7 @@ class RecordingParts:
         # A file is as long as two, rather than cut an episode.
         most = self._settings.file_bytes * (2 if self._episodes.open else 1)
         if writer.bytes_written >= most and self._robot is not None:
-            self.close()
+            self._end_file("continued")
             self._begin(self._robot)
 
     def _look_at_disk(self) -> None:

@@ -12,7 +12,7 @@ from mcap.writer import CompressionType, Writer
 
 from lockstep.protocol.description import RobotDescription
 from lockstep.server.recording.errors import DiskTrouble
-from lockstep.server.recording.format.event_index import INDEX_NAME, EventIndex, IndexBuilder, TopicEntry
+from lockstep.server.recording.format.event_index import INDEX_NAME, Ending, EventIndex, IndexBuilder, TopicEntry
 from lockstep.server.recording.format.info import METADATA_NAME, RecordingInfo
 from lockstep.server.recording.format.records import EpisodeRecord, FeedbackRecord, OwnRecord
 from lockstep.server.recording.format.signature import RecordingSigning, Signatures, TopicText
@@ -177,12 +177,13 @@ class RecordingWriter:
         os.fdatasync(self._file.fileno())
         self._whole = self._file.tell()
 
-    def close(self) -> EventIndex:
+    def close(self, ending: Ending = "") -> EventIndex:
         """Write the last chunk, the index and the summary. Idempotent."""
         if self._file.closed:
             return self._builder.index
         self.flush(final=True)
         index = self._builder.index
+        index.ending = ending
         try:
             self._writer.add_attachment(
                 0, index.ended * 1000, INDEX_NAME, "application/json", msgspec.json.encode(index)

@@ -1,0 +1,100 @@
+"""Which files become one episode as a whole: those of a recording that was certainly not made by episodes. Blocks.
+
+A file without a record of an episode may still show parts of one: of a take that outgrew the file before it and was
+discarded then, or of what lies between two. So what counts is the recording, not the file: each part says at its head
+whether an episode was begun before it, and the last one at its end whether one was begun at all.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Literal, NamedTuple
+
+from lockstep.server.recording.errors import RecordingError
+from lockstep.server.recording.format.event_index import Ending, EventIndex
+from lockstep.server.recording.format.records import EpisodeRecord
+from lockstep.server.recording.format.topics import OWN_TOPICS
+from lockstep.server.recording.reading.reader import RecordingReader
+
+__all__ = ["EpisodeUse", "whole_recordings", "why_not_whole"]
+
+EPISODE = OWN_TOPICS[EpisodeRecord]
+
+
+class EpisodeUse(NamedTuple):
+    """What a file says of the episodes of its recording."""
+
+    path: Path
+    recording: str
+    before: Literal["", "none", "begun"]  # as in RecordingInfo
+    cut: str
+    has_records: bool  # of an episode
+    ending: Ending
+
+    @property
+    def by_episodes(self) -> bool:
+        return self.has_records or self.before == "begun" or self.ending == "episodes"
+
+
+def why_not_whole(file: EpisodeUse, seen: Sequence[EpisodeUse], beside: str = "") -> str:
+    """Return why a file is not one episode as a whole; "" if it is. No I/O.
+
+    Args:
+        seen: all that become one dataset, and the other parts of the same recording that are there
+        beside: what else is in that dataset and has episodes; "": nothing
+    """
+    own = [each for each in seen if each.recording == file.recording]
+    if file.cut:
+        return f"it begins within episode {file.cut}, which is whole in no file and so was not kept"
+    if told := next((each for each in own if each.by_episodes), None):
+        return f"its recording was made by episodes, as {told.path.name} says"
+    if file.before == "":
+        return "an earlier version made it, and it does not say whether its recording was made by episodes"
+    if not any(each.ending == "no_episodes" for each in own):
+        return "no file here says that its recording has ended without an episode"
+    other = next((each.path.name for each in seen if each.by_episodes), beside)
+    return f"{other} has episodes, and this one has none" if other else ""
+
+
+def whole_recordings(paths: Sequence[Path], *, wanted: bool, beside: str = "") -> Mapping[Path, str]:
+    """Return of each file, if it has no episodes, why it is not one as a whole; "" if it is.
+
+    Args:
+        paths: all that become one dataset
+        wanted: somebody has asked for it: each is one
+        beside: as of `why_not_whole`
+    """
+    if wanted:
+        return dict.fromkeys(paths, "")
+    given = [use for path in paths if (use := _use(path)) is not None]
+    seen = [*given, *_other_parts(given)]
+    found = {use.path: why_not_whole(use, seen, beside) for use in given}
+    return {path: found.get(path, "it cannot be read") for path in paths}
+
+
+def _other_parts(given: Sequence[EpisodeUse]) -> Iterator[EpisodeUse]:
+    """Yield the other parts of recordings of which no given part has a record of an episode."""
+    unclear = {use.recording for use in given} - {use.recording for use in given if use.by_episodes}
+    known = {use.path.resolve() for use in given}
+    for folder in {path.parent for path in known} if unclear else ():
+        for path in sorted(folder.glob("*.mcap")):
+            if path not in known and _recording(path) in unclear and (use := _use(path)) is not None:
+                yield use
+
+
+def _recording(path: Path) -> str:
+    try:
+        with RecordingReader(path, EventIndex()) as reader:  # its head alone is read
+            return reader.info.recording
+    except (RecordingError, OSError):
+        return ""
+
+
+def _use(path: Path) -> EpisodeUse | None:
+    try:
+        with RecordingReader(path) as reader:
+            # Nothing checks an index: that it counts none is not enough.
+            has_records = bool(reader.index.counts.get(EPISODE)) or any(reader.records(topics={EPISODE}))
+            info = reader.info
+            return EpisodeUse(path, info.recording, info.episodes, info.cut, has_records, reader.index.ending)
+    except (RecordingError, OSError):
+        return None

@@ -1,0 +1,83 @@
+"""Which files are one episode as a whole: only where it is certain that nobody recorded by episodes."""
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from lockstep.server.recording.format.info import RecordingInfo
+from lockstep.server.recording.reading.whole_recordings import EpisodeUse, whole_recordings, why_not_whole
+from lockstep.server.recording.writing.writer import RecordingWriter
+from tests.server.recording.makers import CODECS, DESCRIPTION, EPOCH, Story
+from tests.server.recording.test_episode_export import KEPT_AND_NOT, recording
+
+PLAIN = EpisodeUse(Path("a.mcap"), "a", "none", "", False, "no_episodes")
+
+
+@pytest.mark.parametrize(
+    ("change", "named"),
+    [
+        ({}, ""),
+        ({"cut": "e1", "before": "begun"}, "it begins within episode e1"),
+        ({"before": "begun"}, "made by episodes, as a.mcap says"),
+        ({"has_records": True}, "made by episodes, as a.mcap says"),
+        ({"ending": "episodes"}, "made by episodes, as a.mcap says"),
+        ({"before": ""}, "an earlier version made it"),
+        ({"ending": ""}, "no file here says that its recording has ended"),
+        ({"ending": "continued"}, "no file here says that its recording has ended"),
+    ],
+)
+def test_a_file_alone_is_whole_only_if_it_says_so_itself(change: dict[str, Any], named: str) -> None:
+    file = PLAIN._replace(**change)
+    found = why_not_whole(file, [file])
+    assert named in found
+    assert bool(found) == bool(change)
+
+
+def test_the_parts_of_a_recording_speak_for_each_other() -> None:
+    first = PLAIN._replace(ending="continued")
+    last = PLAIN._replace(path=Path("b.mcap"))
+    assert why_not_whole(first, [first, last]) == why_not_whole(last, [first, last]) == ""
+    used = last._replace(ending="episodes")
+    assert why_not_whole(first, [first, used]) == "its recording was made by episodes, as b.mcap says"
+
+
+def test_beside_episodes_of_another_recording_or_of_the_dataset_no_file_is_whole() -> None:
+    other = PLAIN._replace(path=Path("b.mcap"), recording="b", has_records=True)
+    assert why_not_whole(PLAIN, [PLAIN, other]) == "b.mcap has episodes, and this one has none"
+    assert why_not_whole(PLAIN, [PLAIN], "blocks") == "blocks has episodes, and this one has none"
+
+
+def test_other_parts_are_found_beside_the_file_by_what_they_say_and_not_by_their_names(tmp_path: Path) -> None:
+    path = tmp_path / "a.mcap"
+    Story(events=10).write(path)
+    (tmp_path / "broken.mcap").write_bytes(b"no recording")
+    assert whole_recordings([path], wanted=False) == {path: ""}
+    recording(tmp_path / "z.mcap", *KEPT_AND_NOT)  # of the same recording
+    assert "z.mcap says" in whole_recordings([path], wanted=False)[path]
+    assert whole_recordings([path], wanted=True) == {path: ""}
+
+
+def test_a_file_of_an_earlier_version_and_an_interrupted_one_are_not_whole(tmp_path: Path) -> None:
+    writer = Story(events=10).write(tmp_path / "interrupted.mcap", close=False)
+    writer.flush()
+    writer.abandon()
+    old = tmp_path / "old" / "old.mcap"
+    old.parent.mkdir()
+    of_earlier_version(old)
+    missing = tmp_path / "missing.mcap"
+    found = whole_recordings([tmp_path / "interrupted.mcap", old, missing], wanted=False)
+    assert [why.partition(",")[0] for why in found.values()] == [
+        "no file here says that its recording has ended without an episode",
+        "an earlier version made it",
+        "it cannot be read",
+    ]
+
+
+def of_earlier_version(path: Path) -> None:
+    info = RecordingInfo(recording="old", epoch=EPOCH)
+    assert {"episodes", "cut"}.isdisjoint(info.metadata())  # else its signature would no longer fit
+    writer = RecordingWriter(path, info, DESCRIPTION, CODECS)
+    for entry in Story(events=10).entries():
+        writer.write(entry)
+    writer.close()

@@ -1,0 +1,63 @@
+"""Datasets beside their recordings: episodes that were discarded or changed since are named."""
+
+from pathlib import Path
+
+from lockstep.server.recording.export import export_lerobot
+from lockstep.server.recording.export.export_lerobot import DatasetOptions
+from lockstep.server.recording.verify.verify_dataset import verify_dataset
+from tests.server.recording.dataset.test_appending import events_of, follower
+from tests.server.recording.episodes.test_edited_datasets import NEXT, change
+from tests.server.recording.makers import INFO
+from tests.server.recording.test_episode_export import KEPT_AND_NOT, recording
+
+ID = INFO.recording
+
+
+def differences(root: Path, folder: Path) -> list[str]:
+    verdict = verify_dataset(root, recordings=folder)
+    broken = {name for name, check in verdict.checks.items() if not check.ok}
+    assert broken == ({"current"} if not verdict.ok else set())
+    return [each.text for each in verdict.checks["current"].violations]
+
+
+def test_episodes_that_were_discarded_changed_or_split_after_the_export_are_named(tmp_path: Path) -> None:
+    folder = tmp_path / "recordings"
+    folder.mkdir()
+    path = recording(folder / "a.mcap", *KEPT_AND_NOT[:6], *NEXT)
+    (folder / "broken.mcap").write_bytes(b"no recording")
+    (root,) = export_lerobot.export(path, tmp_path / "dataset", "")
+    assert differences(root, folder) == []
+    assert not verify_dataset(root).checks["current"].looked
+    change(path, {"episode": "a", "dropped": True}, {"episode": "c", "first_event": 50}, {"episode": "f", "split": 80})
+    change(path, {"episode": "c", "outcome": "success"})
+    assert differences(root, folder) == [
+        f"episode a of {ID} is discarded",
+        f"episode c of {ID} was changed: first event 45 is 50, outcome failure is success",
+        f"episode f of {ID} was split, merged, or put together again",
+    ]
+    path.unlink()
+    assert differences(root, folder)[0] == f"episode a of {ID}: the recording is not there, or cannot be read"
+
+
+def test_a_whole_recording_that_turns_out_to_have_episodes_is_named(tmp_path: Path) -> None:
+    folder = tmp_path / "recordings"
+    folder.mkdir()
+    path = recording(folder / "a.mcap", events=70)
+    (root,) = export_lerobot.export_all([path], tmp_path / "dataset", DatasetOptions(whole=True))
+    assert differences(root, folder) == []
+    path.unlink()
+    recording(path, *KEPT_AND_NOT[:6], events=70)
+    assert differences(root, folder) == [f"all of {ID}: the recording has episodes"]
+
+
+def test_a_follower_says_once_that_a_discarded_episode_stays_in_the_dataset(tmp_path: Path) -> None:
+    """Also when the recording does not grow any more."""
+    path, root = recording(tmp_path / "a.mcap", *KEPT_AND_NOT[:6]), tmp_path / "dataset"
+    said: list[str] = []
+    following = follower(root, said)
+    assert following.look([path]) == 2
+    said.clear()
+    change(path, {"episode": "a", "dropped": True})
+    assert [following.look([path]), following.look([path])] == [0, 0]
+    assert said == ["episode a of a.mcap was discarded, and stays in dataset"]
+    assert events_of(root) == [[*range(10, 20)], [*range(45, 60)]]
