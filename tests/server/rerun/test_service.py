@@ -19,6 +19,7 @@ from tests.server.recording.rrd import entities, recording_ids
 from tests.server.rig import PATIENCE, Rig, TestPeer, eventually, running_rig
 
 VIEWER = Path(sys.executable).with_name("rerun")  # Rerun's own program, which the wheel brings
+END_SECONDS = 10.0  # for the viewer
 
 
 async def process_of(rig: Rig) -> int:
@@ -85,7 +86,12 @@ async def viewer(port: int, path: Path) -> AsyncIterator[None]:
         yield
     finally:
         process.send_signal(signal.SIGINT)
-        await process.wait()
+        try:
+            async with asyncio.timeout(END_SECONDS):
+                await process.wait()
+        except TimeoutError:
+            process.kill()  # all that is asserted of its file was read before
+            await process.wait()
 
 
 def seen_so_far(path: Path) -> list[Any]:
