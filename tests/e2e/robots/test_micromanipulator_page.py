@@ -26,18 +26,6 @@ MARGIN = 1e-6  # m: the view stays that far from its limits
 VIEW = 4  # of the joints, the first of two
 
 
-async def _armed(console: ConsolePage) -> None:
-    await console.until_live()
-    await console.pad.let_go()
-    for _ in range(TRIES):
-        if not (await console.stats())["armed"]:
-            await console.arm()
-        await console.until("s.at_rest === true")
-        if (await console.stats())["armed"]:
-            return
-    raise AssertionError("it does not stay armed")
-
-
 async def _click(picture: Locator) -> None:
     box = await picture.bounding_box()
     assert box is not None
@@ -61,7 +49,7 @@ async def _done(
 ) -> tuple[list[float], list[float]]:
     """The joints before and after the action; asked for again when a busy machine has cancelled it."""
     for _ in range(TRIES):
-        await _armed(console)
+        await console.arm_at_rest()
         before, since = await _joints(console), (await stack.records())[-1]["time"]
         await ask()
         await console.until(

@@ -73,6 +73,7 @@ async def viewer(port: int, path: Path) -> AsyncIterator[None]:
         stdout=asyncio.subprocess.DEVNULL,
         stderr=asyncio.subprocess.DEVNULL,
         env={**os.environ, "HOME": str(path.parent)},
+        start_new_session=True,  # it is a script that starts the viewer: both get the signals
     )
     try:
         async with asyncio.timeout(PATIENCE):
@@ -85,12 +86,12 @@ async def viewer(port: int, path: Path) -> AsyncIterator[None]:
                     await asyncio.sleep(0.05)
         yield
     finally:
-        process.send_signal(signal.SIGINT)
+        os.killpg(process.pid, signal.SIGINT)
         try:
             async with asyncio.timeout(END_SECONDS):
                 await process.wait()
         except TimeoutError:
-            process.kill()  # all that is asserted of its file was read before
+            os.killpg(process.pid, signal.SIGKILL)  # all that is asserted of its file was read before
             await process.wait()
 
 
