@@ -19,6 +19,7 @@ from lockstep.robot_bridge.control.limits.motion_limits import MotionLimits
 from lockstep.robot_bridge.control.tick_alarm import TickAlarm
 from lockstep.robot_bridge.control.tick_loop import TickLoop
 from lockstep.robot_bridge.counters import BridgeCounters
+from lockstep.robot_bridge.description.check_axes import check_braking
 from lockstep.robot_bridge.description.check_description import check_description
 from lockstep.robot_bridge.dial.console_access import ConsoleAccess
 from lockstep.robot_bridge.encoding.media_encoding import MediaEncoding
@@ -67,6 +68,7 @@ class Bridge:
         check_link(settings)
         self.description = robot.describe()
         check_description(self.description)
+        check_braking(self.description, robot.tick_seconds)
         self.epoch = secrets.token_hex(8)
         self.address = (settings.host, settings.port)
         self.counters = BridgeCounters()

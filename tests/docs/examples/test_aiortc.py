@@ -26,7 +26,7 @@ async def test_plain_aiortc_drives_and_decodes_pictures() -> None:
                 await script.wait()
         assert script.returncode == 0
         found = json.loads(printed.splitlines()[-1])
-        assert found["event"] > 5
+        assert found["event"] > 5  # a busy machine executes and decodes few in these seconds
         assert found["pictures"] > 5
         assert rig.dependencies.console.clock.event == found["event"]
         axes = [json.loads(axes + b"]") for axes in re.findall(rb"axes (.*?)\]", printed)]

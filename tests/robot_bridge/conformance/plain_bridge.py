@@ -95,6 +95,7 @@ class Fault(Enum):
     ACTS_AGAIN = auto()  # a repeat of a request that was cancelled begins it again
     ACTS_UNARMED = auto()  # an action moves the robot at once on a new link
     ACTS_DRIVEN = auto()  # an action goes on when a moving command comes
+    ACTS_DRIVEN_ON = auto()  # and one that is not renewed ends late
 
 
 @dataclass(eq=False)
@@ -165,7 +166,8 @@ class PlainBridge:
     def act(self, now: float) -> None:
         """Do the next part of each action that runs."""
         actions = self.actions
-        if actions.moving and now - actions.renewed > HOLD - TICK and self.fault is not Fault.ACTS_UNRENEWED:
+        hold = 1.7 * HOLD if self.fault is Fault.ACTS_DRIVEN_ON else HOLD
+        if actions.moving and now - actions.renewed > hold - TICK and self.fault is not Fault.ACTS_UNRENEWED:
             self.interrupt("not_renewed")
         for id, values in list(actions.values.items()):
             if id != actions.moving:
@@ -248,7 +250,7 @@ class PlainBridge:
         link.send({"type": "refusal", "event": event, "reason": reason, "current": self.event, **more})
 
     def commanded(self, link: Link, command: Message) -> None:
-        if command["values"] != NEUTRAL and self.fault is not Fault.ACTS_DRIVEN:
+        if command["values"] != NEUTRAL and self.fault not in (Fault.ACTS_DRIVEN, Fault.ACTS_DRIVEN_ON):
             self.interrupt("driving")
         before = self.event
         self.command(link, command)

@@ -7,6 +7,7 @@ import msgspec
 import pytest
 
 from lockstep.protocol.description import BodyTwist, PlanarBase, Pose, RobotDescription, StartWarning
+from lockstep.robot_bridge.description.check_axes import check_braking
 from lockstep.robot_bridge.description.check_description import check_description
 from lockstep.robot_bridge.errors import DescriptionError
 from tests.robot_bridge.control.goals.goal_helpers import ARM_AXES, SHOULDER, TURN, HangingArm
@@ -54,6 +55,34 @@ def twice(**fields: Any) -> RobotDescription:
 )
 def test_it_makes_sense(description: RobotDescription) -> None:
     check_description(description)
+
+
+@pytest.mark.parametrize(
+    ("brake", "settling", "tick", "fits"),
+    [
+        (5.0, 0.0, 0.01, True),
+        (5.0, 0.0, 0.1, True),
+        (5.0, 0.0, 0.11, False),
+        (15.0, 0.2, 0.01, False),
+        (1e6, 0, 0.3, False),
+    ],
+)
+def test_each_axis_has_to_be_at_rest_by_the_last_tick_within_hold(
+    brake: float, settling: float, tick: float, fits: bool
+) -> None:
+    """With a brake of 5, the full speed takes 0.2 s to brake; that of the tool takes 0.1 s. `hold` is 0.3 s."""
+    axes = tuple(msgspec.structs.replace(axis, brake=max(brake, axis.brake)) for axis in ARM_AXES[2:])
+    shoulder = msgspec.structs.replace(SHOULDER, slew=1.0, brake=brake)
+    description = changed(
+        axes=(msgspec.structs.replace(ARM_AXES[0], brake=1e6), shoulder, *axes),
+        poses=(msgspec.structs.replace(TOOL, settling=settling),),
+    )
+    assert description.hold == 0.3
+    if fits:
+        check_braking(description, tick)
+    else:
+        with pytest.raises(DescriptionError, match="longer than hold"):
+            check_braking(description, tick)
 
 
 @pytest.mark.parametrize(

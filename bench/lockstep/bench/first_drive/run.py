@@ -1,10 +1,11 @@
 """Types the commands of docs/tutorials/own-robot.md and ros2.md, from the first one to a robot that moves."""
 
+import asyncio
 import re
 import sys
 import time
 from collections.abc import AsyncIterator, Callable, Sequence
-from contextlib import asynccontextmanager
+from contextlib import asynccontextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +15,7 @@ from lockstep.bench.harness.stack import LOCKSTEP
 
 __all__ = ["drive_discovered", "drive_template"]
 
-SECONDS = 300.0  # for each of the commands
+SECONDS = 120.0  # for each of the commands
 LINK = r"To drive, open: +(\S+)"
 DRIVER = "lockstep.bench.first_drive.driver"
 
@@ -34,10 +35,14 @@ class _Terminal:
         """Run a command to its end.
 
         Raises:
-            ProcessFailed: it failed.
+            ProcessFailed: it failed, or took too long.
         """
         async with self.running(*command) as running:
-            if await running.wait() != 0:
+            status: int | None = None
+            with suppress(TimeoutError):
+                async with asyncio.timeout(SECONDS):
+                    status = await running.wait()
+            if status != 0:
                 raise ProcessFailed(command, running.output.lines)
 
     @asynccontextmanager

@@ -1,11 +1,13 @@
-"""The crowd, in a separate process: `python -m lockstep.bench.hostile.crowd LINK OPERATOR BRIDGE COUNT SEED [KIND]`.
+"""The crowd: `python -m lockstep.bench.hostile.crowd [--idle] LINK OPERATOR BRIDGE COUNT SEED [KIND]`.
 
 LINK is an observer's, OPERATOR the link of a peer that publishes a camera and speaks, BRIDGE is tls://host:port.
-It prints a JSON line when it has begun, answers each line on standard input with its counts, and ends at the end of
-its input.
+With `--idle` it runs with the processor time that no other process wants (SCHED_IDLE): attackers have their own
+machines. It prints a JSON line when it has begun, answers each line on standard input with its counts, and ends at the
+end of its input.
 """
 
 import asyncio
+import os
 import sys
 from collections import Counter
 from random import Random
@@ -103,7 +105,11 @@ async def _run(link: str, operator: str, bridge: str, count: int, seed: int, onl
 
 
 def main() -> None:
-    link, operator, bridge, count, seed, *kind = sys.argv[1:]
+    arguments = sys.argv[1:]
+    if arguments[0] == "--idle":
+        os.sched_setscheduler(0, os.SCHED_IDLE, os.sched_param(0))  # before there are threads, which inherit it
+        del arguments[0]
+    link, operator, bridge, count, seed, *kind = arguments
     uvloop.run(_run(link, operator, bridge, int(count), int(seed), *kind[:1]))
 
 

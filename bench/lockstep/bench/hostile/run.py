@@ -4,7 +4,6 @@ The crowd comes directly, with TLS, or through a real Caddy with deploy/Caddyfil
 """
 
 import asyncio
-import os
 import sys
 import time
 from collections.abc import AsyncIterator, Callable
@@ -55,13 +54,12 @@ async def hostile(
                 sys.executable,
                 "-m",
                 "lockstep.bench.hostile.crowd",
+                "--idle",
                 link,
                 stack.operator,
                 *(stack.bridge.address, str(peers), str(seed), kind),
             )
             async with running_process(*command) as (crowd, _):
-                # It takes only the processor time that no other process wants: attackers have their own machines.
-                os.sched_setscheduler(crowd.pid, os.SCHED_IDLE, os.sched_param(0))
                 say(f"{peers} misbehaving peers ({kind or 'all kinds'}, {front}) for {seconds:g} s")
                 used = stack.console.usage.cpu_seconds()
                 disturbed = await _drive(console, seconds)

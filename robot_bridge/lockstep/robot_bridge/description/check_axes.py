@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from lockstep.protocol.description import Axis, Pose, RobotDescription
 from lockstep.robot_bridge.errors import DescriptionError
 
-__all__ = ["check_axes"]
+__all__ = ["check_axes", "check_braking"]
 
 POSITION_UNIT = "m"
 ROTATION_UNIT = "rad"
@@ -31,6 +31,23 @@ def check_axes(description: RobotDescription) -> None:
         for name in names:
             if name in goals:
                 raise DescriptionError(f"{where} names the axis {name!r}, which is a goal axis: it needs a rate axis")
+
+
+def check_braking(description: RobotDescription, tick_seconds: float) -> None:
+    """Check that each axis can keep its full speed: it has to be at rest by the last control tick within `hold`.
+
+    Raises:
+        DescriptionError: names the first axis that cannot.
+    """
+    settling = {name: pose.settling for pose in description.poses for name in (*pose.position, *pose.rotation)}
+    for axis in description.axes:
+        fastest = axis.slew if axis.kind == "goal" else max(axis.maximum - axis.rest, axis.rest - axis.minimum)
+        taken = fastest / axis.brake + settling.get(axis.name, 0.0)
+        if tick_seconds >= description.hold or taken + tick_seconds > description.hold + ROUNDING:
+            raise DescriptionError(
+                f"axis {axis.name}: coming to rest takes {taken:.3f} s, and a control tick {tick_seconds:g} s: together"
+                f" longer than hold ({description.hold:g} s); raise brake or lower the limits"
+            )
 
 
 def _check_rate_axis(axis: Axis, hold: float) -> None:

@@ -4,6 +4,7 @@ import time
 from collections.abc import Callable
 
 from lockstep.protocol.carriers import Carrier
+from lockstep.protocol.serial import event_gap
 from lockstep.server.media.codecs.h264 import Profile
 from lockstep.server.media.encoding.frame_queue import FrameQueue
 from lockstep.server.media.metrics import MediaMetrics
@@ -36,7 +37,7 @@ class Subscription:
         self.h264: Profile | None = None  # negotiated profile; None for another codec
         self.tier: PictureTier = "operator"  # of the console's encoding that it gets, or would get
         self.held_back = False  # from the camera's own encoding, because its path has no room
-        self.newest = float("-inf")  # s, capture of the newest frame that it got, on the source's clock
+        self.last_stamp: int | None = None  # event of the frame that it got last; None before the first
         self.sends = False  # True from the connection's begin to the peer's end
         self.sender = sender
         self.traced = SentPictures(stream)
@@ -57,9 +58,12 @@ class Subscription:
         """True while part of the last frame has not left yet."""
         return self.sends and self.sender.paced
 
+    def is_ahead_of(self, stamp: int) -> bool:
+        """Return whether the last frame is of a later event than this: events never go back."""
+        return self.last_stamp is not None and event_gap(self.last_stamp, stamp) > 0
+
     def put(self, frame: EncodedFrame) -> None:
-        if frame.time > self.newest:
-            self.newest = frame.time
+        self.last_stamp = frame.stamp
         before = self._queue.dropped
         complete = self._queue.put(frame)
         if self._queue.dropped != before:

@@ -101,10 +101,10 @@ class Passthrough(FrameStage):
     def _pass(self, frame: SourceFrame) -> None:
         media = frame.media
         if media.keyframe:
-            all_begin = self._begin(media)
+            ahead = self._begin(media)
             self.keyframes.came(frame.arrived_at)
-            if not all_begin:
-                self._passed.keyframes.join()
+            if ahead:
+                self._passed.keyframes.join(other=all(map(self._encodings.is_other, ahead)))
         self._group.add(media)
         self._measure(media)
         if not self._passed.needed:
@@ -137,12 +137,12 @@ class Passthrough(FrameStage):
             self._encodings.return_to_own(target)
         target.held_back = wanted
 
-    def _begin(self, keyframe: Media) -> bool:
+    def _begin(self, keyframe: Media) -> list[Subscription]:
         """Take a keyframe of the camera: targets that can decode it move here, those that no longer can move back.
 
-        Return False if one has had a later picture, of a second encoding that came sooner: events never go back.
+        Return those that wait for the next, because they have had a later picture of a second encoding.
         """
-        all_begin = True
+        ahead = []
         access = inspect(keyframe.payload)
         if access.profile is not None:
             self._profile = access.profile
@@ -153,13 +153,13 @@ class Passthrough(FrameStage):
         for encoding in [each for each in self._encodings.own if each.codec == "H264"]:
             for target in [*encoding.targets, *encoding.arriving]:
                 if self._may_pass_to(target):
-                    if target.newest > keyframe.time:
-                        all_begin = False
+                    if target.is_ahead_of(keyframe.stamp):
+                        ahead.append(target)
                         continue
                     for each in self._encodings:
                         each.leave(target)
                     self._passed.targets[target] = None
-        return all_begin
+        return ahead
 
     def _end(self) -> None:
         """Move all targets to the console's encoding, from a keyframe on: the camera gives other pictures now."""

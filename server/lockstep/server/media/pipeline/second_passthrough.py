@@ -96,8 +96,8 @@ class SecondPassthrough(FrameStage):
             takes = profile is not None and target.h264 is not None and accepts(target.h264, profile)
             if not takes or not self._takes(target) or target in self._second.targets:
                 continue
-            if target.newest > keyframe.time:
-                self._second.keyframes.join()  # it has had a later picture, and events never go back
+            if target.is_ahead_of(keyframe.stamp):
+                self._second.keyframes.join()
                 continue
             for encoding in self._encodings:
                 encoding.leave(target)
