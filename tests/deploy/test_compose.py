@@ -35,7 +35,7 @@ def _short(volume: str | dict[str, Any]) -> str:
     return f"{source}:{volume['target']}{':ro' if volume.get('read_only') else ''}"
 
 
-def _resolved(folder: Path = ROOT, **variables: str) -> dict[str, dict[str, Any]]:
+def _resolved(folder: Path = ROOT, /, **variables: str) -> dict[str, dict[str, Any]]:
     """The services as Compose understands them with `variables` in the environment; with `.env` if `folder` has one."""
     environment = {"PATH": os.environ["PATH"], "HOME": os.environ["HOME"], **variables}
     done = subprocess.run(
