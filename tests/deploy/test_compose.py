@@ -3,6 +3,7 @@
 import os
 import re
 import shlex
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -34,11 +35,11 @@ def _short(volume: str | dict[str, Any]) -> str:
     return f"{source}:{volume['target']}{':ro' if volume.get('read_only') else ''}"
 
 
-def _resolved(**variables: str) -> dict[str, dict[str, Any]]:
-    """The services as Compose understands them with `variables` in `.env`."""
+def _resolved(folder: Path = ROOT, /, **variables: str) -> dict[str, dict[str, Any]]:
+    """The services as Compose understands them with `variables` in the environment; with `.env` if `folder` has one."""
     environment = {"PATH": os.environ["PATH"], "HOME": os.environ["HOME"], **variables}
     done = subprocess.run(
-        ["docker-compose", "config"], cwd=ROOT, env=environment, capture_output=True, text=True, timeout=60
+        ["docker-compose", "config"], cwd=folder, env=environment, capture_output=True, text=True, timeout=60
     )
     assert done.returncode == 0, done.stderr
     services: dict[str, dict[str, Any]] = yaml.safe_load(done.stdout)["services"]
@@ -177,6 +178,38 @@ def test_every_image_of_others_can_be_named_by_its_digest() -> None:
     assert {each["image"] for each in services.values() if "build" not in each} == {digest}
     built = {name: each["build"]["args"] for name, each in services.items() if "build" in each}
     assert all(set(given.values()) == {digest} for given in built.values()), built
+
+
+def _copied(folder: Path, **variables: str) -> Path:
+    """A folder with the file and with `variables` in `.env`."""
+    shutil.copy(ROOT / "docker-compose.yml", folder)
+    (folder / ".env").write_text("".join(f"{name}={value}\n" for name, value in variables.items()))
+    return folder
+
+
+def _passed_on() -> list[str]:
+    """The console's variables that have no value in the file."""
+    return [name for name, value in SERVICES["console"]["environment"].items() if value is None]
+
+
+def test_a_variable_without_a_value_is_given_if_the_file_of_variables_has_it(tmp_path: Path) -> None:
+    wanted = {name: f"value-{number}" for number, name in enumerate(_passed_on())}
+    assert len(wanted) >= 10
+    found = _resolved(_copied(tmp_path, **wanted))["console"]["environment"]
+    assert {name: found[name] for name in wanted} == wanted
+
+
+def test_a_variable_without_a_value_is_not_given_if_nothing_has_it_and_may_be_empty(tmp_path: Path) -> None:
+    first, *others = _passed_on()
+    found = _resolved(_copied(tmp_path, **{first: ""}))["console"]["environment"]
+    assert (found[first], {found.get(name) for name in others}) == ("", {None})
+
+
+def test_a_variable_of_the_shell_goes_before_the_file_of_variables(tmp_path: Path) -> None:
+    folder = _copied(tmp_path, LOCKSTEP_ROBOT="dial-in", LOCKSTEP_PORT="8001", LOCKSTEP_LINK_SECRET_FILE="")
+    found = _resolved(folder, LOCKSTEP_ROBOT="tcp://10.0.0.5:5600")["console"]["environment"]
+    names = ("LOCKSTEP_ROBOT", "LOCKSTEP_PORT", "LOCKSTEP_LINK_SECRET_FILE")
+    assert [found[name] for name in names] == ["tcp://10.0.0.5:5600", "8001", ""]
 
 
 @pytest.mark.parametrize(("given", "used"), [({}, "/run/lockstep/link/link_secret"), ({"SECRET_FILE": ""}, "")])

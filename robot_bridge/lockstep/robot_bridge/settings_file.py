@@ -1,9 +1,9 @@
 """The settings of `lockstep robot` in a TOML file. Flags and environment variables override it."""
 
 from collections.abc import Iterable
-from difflib import get_close_matches
 from pathlib import Path
 
+from lockstep.protocol.files.setting_names import not_a_setting
 from lockstep.protocol.files.toml_file import TomlUnusable, read_toml
 from lockstep.robot_bridge.errors import SettingsError
 
@@ -24,11 +24,10 @@ def read_settings_file(path: Path, names: Iterable[str]) -> dict[str, str]:
         content, _ = read_toml(path)
     except TomlUnusable as error:
         raise SettingsError(str(error)) from error
-    known = sorted(names)
+    known = set(names)
     for name, value in content.items():
         if name not in known:
-            near = get_close_matches(name, known, 1)
-            raise SettingsError(f"{path}: {name} is not a setting{f'; did you mean {near[0]}?' if near else ''}")
+            raise SettingsError(f"{path}: {not_a_setting(name, known)}")
         if not isinstance(value, bool | int | float | str):
             raise SettingsError(f"{path}: {name} has to be a text, a number, true or false")
     return {name: str(value).lower() if isinstance(value, bool) else str(value) for name, value in content.items()}

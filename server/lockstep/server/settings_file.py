@@ -1,7 +1,6 @@
 """Reads settings from a TOML file. Flags and environment variables override it."""
 
 from collections.abc import Iterator, Mapping
-from difflib import get_close_matches
 from pathlib import Path
 from typing import Any, get_args
 
@@ -9,6 +8,7 @@ from pydantic import BaseModel, SecretStr
 from pydantic.fields import FieldInfo
 from pydantic_settings import BaseSettings, PydanticBaseSettingsSource
 
+from lockstep.protocol.files.setting_names import not_a_setting
 from lockstep.protocol.files.toml_file import TomlUnusable, read_toml
 
 __all__ = ["SettingsFileSource", "SettingsFileUnusable", "exposed_secrets", "read_settings_file"]
@@ -104,8 +104,7 @@ def _unknown(content: Mapping[str, Any], settings: type[BaseModel], within: str)
     names = settings.model_fields.keys() - ELSEWHERE
     for name, value in content.items():
         if name not in names:
-            near = get_close_matches(name, names, 1)
-            yield f"{within}{name} is not a setting{f'; did you mean {within}{near[0]}?' if near else ''}"
+            yield not_a_setting(name, names, within=within)
         elif isinstance(value, dict):
             inner = _nested(settings.model_fields[name])
             if inner is not None:

@@ -4,20 +4,32 @@ from pathlib import Path
 
 import pytest
 
-from lockstep.bench.first_drive.run import drive_discovered, drive_template
+from lockstep.bench.first_drive.run import drive_discovered, driven_template
+from lockstep.client import Console
 from tests.support.ros2 import have_ros, ros_environment, ros_python
 
 NODE = Path(__file__).parents[3] / "docs" / "examples" / "ros2" / "turtlebot.py"
 STEPS = ["written", "links", "driven"]
+DRIVES = 20
 
 
 @pytest.mark.timeout(300)
-async def test_a_robot_from_the_template_is_driven(tmp_path: Path) -> None:
-    said: list[str] = []
-    found = await drive_template(tmp_path, said.append)
-    assert list(found) == STEPS
-    assert list(found.values()) == sorted(found.values())
-    assert (tmp_path / "my_arm" / "my_arm" / "robot.py").is_file()
+async def test_a_robot_from_the_template_is_driven_and_shows_its_picture(tmp_path: Path) -> None:
+    async with driven_template(tmp_path, lambda _: None) as driven:
+        assert list(driven.seconds) == STEPS
+        assert list(driven.seconds.values()) == sorted(driven.seconds.values())
+        assert (tmp_path / "my_arm" / "my_arm" / "robot.py").is_file()
+        async with Console(driven.link) as console:
+            assert console.description.label == "My arm"
+            await console.take_seat()
+            before = (await console.drive({})).joints[0]
+            for _ in range(DRIVES):
+                feedback = await console.drive({"shoulder": 0.5})
+            assert feedback.joints[0] > max(before, 0.0)
+            async for picture in console.pictures():
+                assert (picture.frame.width, picture.frame.height) == (320, 320)
+                break
+            await console.rest()
 
 
 @pytest.mark.skipif(not have_ros(), reason="there are no wheels of ROS 2 for this machine")

@@ -1,4 +1,7 @@
-"""`lockstep robot new`: the folder that it writes holds a robot that works as it is."""
+"""`lockstep robot new`: the folder that it writes holds a robot that works as it is.
+
+`tests/bench/first_drive/` starts a console with it, and drives it.
+"""
 
 import os
 import subprocess
@@ -9,7 +12,6 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from lockstep.client import Console
 from lockstep.robot_bridge.bridge import Bridge
 from lockstep.robot_bridge.cli import robot_app
 from lockstep.robot_bridge.conformance import CASES, Outcome, Subject, play_all
@@ -17,10 +19,8 @@ from lockstep.robot_bridge.conformance.place import Place
 from lockstep.robot_bridge.new_robot import class_name
 from lockstep.robot_bridge.robots.registry import create_robot
 from lockstep.robot_bridge.settings import BridgeSettings
-from tests.support.stack import running_stack
 
 ROOT = Path(__file__).resolve().parents[3]
-DRIVES = 20
 
 
 @pytest.fixture(autouse=True)
@@ -75,25 +75,6 @@ def test_what_it_writes_passes_mypy(tmp_path: Path, monkeypatch: pytest.MonkeyPa
         str(tmp_path / "mypy"),
         MYPYPATH=os.pathsep.join(str(ROOT / part) for part in ("protocol", "robot_bridge")),
     )
-
-
-async def test_a_console_starts_it_by_its_class_and_a_client_drives_it(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    folder = written(tmp_path, monkeypatch)
-    async with (
-        running_stack(tmp_path, robot="my_arm:MyArm", settings={"PYTHONPATH": str(folder)}) as stack,
-        Console(stack.operator) as console,
-    ):
-        assert console.description.label == "My arm"
-        await console.take_seat()
-        for _ in range(DRIVES):
-            feedback = await console.drive({"shoulder": 0.5})
-        assert feedback.joints[0] > 0
-        async for picture in console.pictures():
-            assert (picture.frame.width, picture.frame.height) == (320, 320)
-            break
-        await console.rest()
 
 
 async def test_it_passes_the_conformance_check(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -427,6 +427,29 @@ async def test_over_http_a_cancel_after_the_end_tells_how_it_ended_and_reaches_n
     assert (bench.robot.sent, "ActionCancelled" in bench.kinds()) == ([], False)
 
 
+async def test_over_http_a_cancel_long_after_the_end_tells_it_with_its_age_and_reaches_no_robot(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    bench, now = Bench(), [100.0]
+    monkeypatch.setattr(action_service, "time", SimpleNamespace(monotonic=lambda: now[0]))
+    asking = asyncio.create_task(by_http(bench, id="mine"))
+    await asyncio.sleep(0)
+    bench.service.updated(update("mine", moves=False))
+    await asking
+    now[0] = 110.0
+    bench.service.updated(msgspec.structs.replace(update("mine", "done", moves=False), age=3.0))
+    now[0] = 115.0
+    for number in range(2 * KEPT):
+        bench.service.updated(update(f"n{number}", "done"))
+    assert "mine" not in {each.id for each in bench.service.newest()}
+    bench.robot.sent.clear()
+    bench.robot.up = False
+    ended = await bench.service.cancel_by_http(ADA, "mine")
+    assert (ended.state, ended.age) == ("done", 8.0)
+    assert await by_http(bench, id="mine") == ended, "a repeat of the request is told the same"
+    assert (bench.robot.sent, "ActionCancelled" in bench.kinds()) == ([], False)
+
+
 async def test_over_http_an_action_whose_first_news_is_on_the_way_is_cancelled() -> None:
     bench = Bench()
     asking = asyncio.create_task(by_http(bench, id="mine"))

@@ -340,6 +340,11 @@ async def test_a_supervisor_alone_is_told_of_robots_that_wait_until_one_is_let_i
         with pytest.raises(PairingRefused, match="wrong_code"):
             await pair(address_of(rig), wrong(code), "pla\n\x1b[2Jnar\u202e", None)
         assert await waits(rig) == [("127.0.0.1", "pla [2Jnar", "wrong_code")]
+        assert (await rig.http.delete("/api/dial-in/code", headers=rig.token("supervisor"))).status_code == 200
+        with pytest.raises(ConsoleRefused, match="not_pairing"):
+            await pair(address_of(rig), code, "planar", None)
+        assert await waits(rig) == [("127.0.0.1", "pla [2Jnar", "not_pairing")]
+        code = await code_for(rig)
         for role in ("operator", "observer"):
             assert await waits(rig, role) == []
         key = await pair(address_of(rig), code, "planar", None)
@@ -359,6 +364,17 @@ async def test_refusals_beyond_an_addresss_rate_are_answered_without_being_noted
         assert noted == ["robot_unknown"]
 
 
+async def test_tries_to_pair_beyond_an_addresss_rate_are_answered_without_being_noted(tmp_path: Path) -> None:
+    async with waiting_console(tmp_path, max_refused_burst=1) as rig:
+        noted: list[str] = []
+        dial_in_of(rig).refused = lambda address, why, name="": noted.append(why)  # type: ignore[method-assign]
+        for status in (409, 429, 429):
+            with pytest.raises(ConsoleRefused) as refused:
+                await pair(address_of(rig), PairingCode.draw(), "planar", None)
+            assert refused.value.status == status
+        assert noted == ["not_pairing"]
+
+
 async def test_a_second_robot_with_the_key_is_one_that_waits_and_the_first_is_none(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -370,7 +386,7 @@ async def test_a_second_robot_with_the_key_is_one_that_waits_and_the_first_is_no
         assert await waits(rig) == []
         async with dialling_bridge(address_of(rig), key):
             await eventually(lambda: waits_of(rig))
-            assert await waits(rig) == [("127.0.0.1", "planar", "taken")]
+            assert await waits(rig) == [("127.0.0.1", "", "taken")], "it has not said its name"
             await first.aclose()
             await eventually(lambda: not waits_of(rig))
             await until_up(rig)

@@ -43,11 +43,18 @@ def test_a_name_that_a_stranger_gives_is_short_and_has_no_control_characters(nam
     assert found.name.isprintable()
 
 
-def test_a_robot_keeps_its_first_time_and_has_the_reason_of_its_newest_try() -> None:
+def test_a_robot_keeps_its_first_time_and_its_name_and_has_the_reason_of_its_newest_try() -> None:
     robots = WaitingRobots()
     robots.called("10.0.0.7", "wrong_code", "planar\n\x1b[2J", 0.0, WALL)
     robots.called("10.0.0.7", "robot_unknown", "", 5.0, WALL + 5.0)
-    assert robots.waiting(6.0) == [WaitingRobot("10.0.0.7", WALL, "", "robot_unknown")]
+    assert robots.waiting(6.0) == [WaitingRobot("10.0.0.7", WALL, "planar [2J", "robot_unknown")]
+    robots.called("10.0.0.7", "wrong_code", "dual-arm", 7.0, WALL + 7.0)
+    assert robots.waiting(8.0) == [WaitingRobot("10.0.0.7", WALL, "dual-arm", "wrong_code")]
+    robots.called("10.0.0.7", "not_pairing", "\n", 9.0, WALL + 9.0)
+    assert robots.waiting(9.0) == [WaitingRobot("10.0.0.7", WALL, "dual-arm", "not_pairing")]
+    later = 10.0 + FORGOTTEN_AFTER
+    robots.called("10.0.0.7", "not_pairing", "", later, WALL + later)
+    assert [each.name for each in robots.waiting(later)] == [""], "a name is forgotten with its robot"
 
 
 def test_a_robot_that_is_let_in_waits_no_more() -> None:

@@ -7,19 +7,26 @@ import time
 from collections.abc import AsyncIterator, Callable, Sequence
 from contextlib import asynccontextmanager, suppress
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from lockstep.bench.harness.free_port import free_port
 from lockstep.bench.harness.processes import ProcessFailed, Running, spawn_here, started
 from lockstep.bench.harness.stack import LOCKSTEP
 
-__all__ = ["drive_discovered", "drive_template"]
+__all__ = ["Driven", "drive_discovered", "drive_template", "driven_template"]
 
 SECONDS = 120.0  # for each of the commands
 LINK = r"To drive, open: +(\S+)"
 DRIVER = "lockstep.bench.first_drive.driver"
 
 Say = Callable[[str], None]
+
+
+class Driven(NamedTuple):
+    """A robot that was driven, and whose console still runs."""
+
+    link: str  # the operator's
+    seconds: dict[str, float]  # from the first command until each step was done
 
 
 class _Terminal:
@@ -61,7 +68,7 @@ class _Terminal:
         self.seconds[what] = round(time.monotonic() - self._began, 1)
         self._say(f"{what} after {self.seconds[what]} s")
 
-    async def drive(self, console: Running) -> None:
+    async def drive(self, console: Running) -> Driven:
         """Take the link that `lockstep up` prints, and drive by it."""
         found = re.search(LINK, await console.line(LINK, SECONDS))
         self.note("links")
@@ -69,10 +76,22 @@ class _Terminal:
         async with self.running(sys.executable, "-m", DRIVER, found[1]) as driver:
             await driver.read(SECONDS)
         self.note("driven")
+        return Driven(found[1], self.seconds)
 
 
 async def drive_template(folder: Path, say: Say) -> dict[str, float]:
     """Write a robot from the template, start it and drive it; return the seconds until each step was done.
+
+    Raises:
+        ProcessFailed: a command failed.
+    """
+    async with driven_template(folder, say) as driven:
+        return driven.seconds
+
+
+@asynccontextmanager
+async def driven_template(folder: Path, say: Say) -> AsyncIterator[Driven]:
+    """Write a robot from the template, start it and drive it; end its console on leaving.
 
     Raises:
         ProcessFailed: a command failed.
@@ -82,8 +101,7 @@ async def drive_template(folder: Path, say: Say) -> dict[str, float]:
     terminal.note("written")
     up = (LOCKSTEP, "up", "--robot", "my_arm:MyArm", *_own(folder))
     async with terminal.running(*up, folder=folder / "my_arm") as console:
-        await terminal.drive(console)
-    return terminal.seconds
+        yield await terminal.drive(console)
 
 
 async def drive_discovered(folder: Path, python: str, node: Path, say: Say) -> dict[str, float]:

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from lockstep.protocol.actions import Act, ActionUpdate, ParameterValue
+from lockstep.server.actions.action_states import aged
 from lockstep.server.errors import ActionIdUsed, Unconfirmed
 
 __all__ = ["ActionAnswer", "ActionRequests", "answered"]
@@ -22,10 +23,11 @@ class _Asked:
     parameters: Mapping[str, ParameterValue]
     answer: ActionAnswer | None  # None: it came on a data channel
     newest: ActionUpdate | None = None
+    since: float = 0.0  # monotonic, s, when the action came to the state of `newest`
 
 
 class ActionRequests:
-    """The newest requests, by id."""
+    """The newest requests, by id. `now` is s on a monotonic clock."""
 
     def __init__(self) -> None:
         self._asked: OrderedDict[str, _Asked] = OrderedDict()  # oldest first
@@ -40,15 +42,22 @@ class ActionRequests:
             if len(self._asked) > REMEMBERED:
                 self._asked.popitem(last=False)
 
-    def updated(self, update: ActionUpdate) -> None:
+    def updated(self, update: ActionUpdate, now: float) -> None:
         """Take the robot's news of an action."""
         asked = self._asked.get(update.id)
         if asked is not None:
+            if asked.newest is None or asked.newest.state != update.state:
+                asked.since = now - update.age
             asked.newest = update
             if asked.answer is not None and not asked.answer.done():
                 asked.answer.set_result(update)
 
-    async def again(self, id: str, name: str, parameters: Mapping[str, ParameterValue]) -> ActionUpdate:
+    def newest(self, id: str, now: float) -> ActionUpdate | None:
+        """Return the newest update of a request, with its age; None: there is none, or the request is unknown."""
+        asked = self._asked.get(id)
+        return None if asked is None or asked.newest is None else aged(asked.newest, asked.since, now)
+
+    async def again(self, id: str, name: str, parameters: Mapping[str, ParameterValue], now: float) -> ActionUpdate:
         """Answer a repeated request from memory.
 
         Raises:
@@ -58,7 +67,7 @@ class ActionRequests:
         asked = self._asked.get(id)
         if asked is None or asked.answer is None or (asked.name, asked.parameters) != (name, parameters):
             raise ActionIdUsed("an earlier request with this id asked for something else, or on another way")
-        return await answered(asked.answer) if asked.newest is None else asked.newest
+        return self.newest(id, now) or await answered(asked.answer)
 
     def clear(self) -> None:
         """Forget all, and tell everyone who waits that no answer comes."""

@@ -135,7 +135,7 @@ class ActionService:
         """
         if id in self._requests or self._kept.get(id) is not None:
             _spend(self._asks, by, "actions")
-            return await self._requests.again(id, name, parameters)
+            return await self._requests.again(id, name, parameters, time.monotonic())
         description, feedback = self._robot.description, self._clock.feedback
         if description is None or feedback is None or not self._robot.up:
             raise RobotLinkDown(self._robot.detail)
@@ -175,7 +175,8 @@ class ActionService:
             RobotLinkDown, Unconfirmed: the robot cannot be told, or the action has not ended yet.
         """
         _spend(self._cancels, by, "cancellations")
-        known = next((each for each in self.newest() if each.id == id), None)
+        kept = next((each for each in self.newest() if each.id == id), None)
+        known = kept or self._requests.newest(id, time.monotonic())  # those are remembered longer
         if known is None and id not in self._requests:
             raise NotFound(f"no action {id!r} is known here"[:200])
         if known is not None and known.state != "running":
@@ -203,7 +204,7 @@ class ActionService:
         now, before = time.monotonic(), self._kept.get(update.id)
         if msgspec.structs.replace(update, age=0.0) == before:
             return
-        self._requests.updated(update)
+        self._requests.updated(update, now)
         self._ends.updated(update)
         if before is not None and before.state == update.state:
             if self._kept.owes(update.id):

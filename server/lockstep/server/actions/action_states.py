@@ -6,7 +6,7 @@ import msgspec
 
 from lockstep.protocol.actions import ActionUpdate
 
-__all__ = ["KEPT", "ActionStates"]
+__all__ = ["KEPT", "ActionStates", "aged"]
 
 KEPT = 32  # newest actions whose state newcomers are told
 
@@ -26,7 +26,7 @@ class ActionStates:
 
     def newest(self, now: float) -> list[ActionUpdate]:
         """Return how the actions do, oldest first, with the age of each that has ended."""
-        return [_aged(update, since, now) for since, update in self._updates.values()]
+        return [aged(update, since, now) for since, update in self._updates.values()]
 
     def keep(self, update: ActionUpdate, now: float) -> None:
         """Keep an update, and forget the oldest beyond a bound: those that have ended and were told first."""
@@ -57,15 +57,15 @@ class ActionStates:
         id = next(iter(self._owed))
         del self._owed[id]
         since, update = self._updates[id]
-        return _aged(update, since, now)
+        return aged(update, since, now)
 
     def clear(self) -> None:
         self._updates.clear()
         self._owed.clear()
 
 
-def _aged(update: ActionUpdate, since: float, now: float) -> ActionUpdate:
-    """Return an update that was kept with its age as of now."""
+def aged(update: ActionUpdate, since: float, now: float) -> ActionUpdate:
+    """Return an update with its age as of now. `since`: when the action came to its state, in s."""
     if update.state == "running":
         return update
     return msgspec.structs.replace(update, age=max(0.0, now - since))

@@ -130,10 +130,10 @@ class DialIn:
             text = "another connection with the robot's key waits: a second robot, or a copy of its key, may be running"
             log.warning(text, waits=line.address, connected=self.address)
         if self._second.lasts:
-            self.refused(line.address, "taken", "" if self.paired is None else self.paired.robot)
+            self.refused(line.address, "taken")
 
     def refused(self, address: str, why: WaitReason, name: str = "") -> None:
-        """Note a robot that called and was not let in. `name`: as it calls itself; "" if it has not said."""
+        """Note a robot that called and was not let in. `name`: as it calls itself; "" if this try does not say."""
         self.waits.called(address, why, name, self._clock(), time.time())
 
     def is_taken(self, role: LinkRole) -> bool:

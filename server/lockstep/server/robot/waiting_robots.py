@@ -22,7 +22,7 @@ WaitReason = RefusalName | Literal["robot_unknown", "taken"]
 class WaitingRobot(NamedTuple):
     address: str
     since: float  # s since 1970, of its first try
-    name: str  # what it calls itself; "" if it has not said
+    name: str  # what it called itself in the newest try that said so; "" if none has
     why: WaitReason  # of its newest try
 
 
@@ -38,11 +38,19 @@ class WaitingRobots:
         self._waits: OrderedDict[str, _Wait] = OrderedDict()  # by address, in the order of their newest tries
 
     def called(self, address: str, why: WaitReason, name: str, now: float, wall: float) -> None:
-        """Take a try that was refused, or that has to wait. `now`: monotonic, s; `wall`: s since 1970, for people."""
+        """Take a try that was refused, or that has to wait.
+
+        Args:
+            address: where it called from
+            why: it was refused
+            name: as it calls itself; "" if this try does not say, which leaves the name that is known
+            now: monotonic, s
+            wall: s since 1970, for people
+        """
         self._forget(now)
         before = self._waits.pop(address, None)
-        since = wall if before is None else before.robot.since
-        self._waits[address] = _Wait(now, WaitingRobot(address, since, clean_name(name, ""), why))
+        since, known = (wall, "") if before is None else (before.robot.since, before.robot.name)
+        self._waits[address] = _Wait(now, WaitingRobot(address, since, clean_name(name, known), why))
         if len(self._waits) > MAX_WAITING:
             self._waits.popitem(last=False)
 

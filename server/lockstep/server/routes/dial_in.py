@@ -47,6 +47,7 @@ MAX_PAIRING = 8  # robots that are in it at once
 PAIRING_MESSAGES = 2  # of a robot: its hello and its proof
 ROLES: dict[str, LinkRole] = {"operator": "operator", "media": "media"}
 NOT_PAIRING = "no pairing code is open here: a supervisor presses “Pair a robot” on the page"
+TOO_MANY_PAIR = "too many robots try to pair: wait, and try again"
 GOING_AWAY, POLICY_VIOLATION = 1001, 1008  # RFC 6455 7.4.1
 
 router = APIRouter()
@@ -283,11 +284,13 @@ class _Line:
 
 
 async def _pair(websocket: WebSocket, here: Dependencies, dial_in: DialIn) -> None:
+    if not here.request_limits.may_fail(websocket.scope):
+        raise TooManyRequests(TOO_MANY_PAIR)
     if (ended := dial_in.offer.ended(time.monotonic())) is not None:
         dial_in.refused(_address(websocket), ended.name)
         raise NotPairing(f"{ended.name}: {ended.detail}" if ended.name != "not_pairing" else NOT_PAIRING)
-    if dial_in.exchanges >= MAX_PAIRING or not here.request_limits.may_fail(websocket.scope):
-        raise TooManyRequests("too many robots try to pair: wait, and try again")
+    if dial_in.exchanges >= MAX_PAIRING:
+        raise TooManyRequests(TOO_MANY_PAIR)
     _socket(websocket).expect(messages=PAIRING_MESSAGES, size=MAX_PAIRING_MESSAGE)
     dial_in.exchanges += 1
     try:

@@ -1,10 +1,11 @@
 """Finds environment variables that look like settings but are not. No I/O."""
 
 from collections.abc import Iterable
-from difflib import get_close_matches
 from typing import get_args
 
 from pydantic import BaseModel
+
+from lockstep.protocol.files.setting_names import not_a_setting
 
 __all__ = ["unknown_settings"]
 
@@ -38,7 +39,7 @@ def unknown_settings(environment: Iterable[str], settings: type[BaseModel], more
     """
     known = {*_names(settings, PREFIX), *OTHERS, *more}
     found = [name for name in sorted(environment) if name.upper().startswith(PREFIX) and name.upper() not in known]
-    return [_sentence(name, known) for name in found]
+    return [not_a_setting(name, known, further=" and has no effect") for name in found]
 
 
 def _names(settings: type[BaseModel], prefix: str) -> Iterable[str]:
@@ -48,8 +49,3 @@ def _names(settings: type[BaseModel], prefix: str) -> Iterable[str]:
         for kind in (field.annotation, *get_args(field.annotation)):
             if isinstance(kind, type) and issubclass(kind, BaseModel):
                 yield from _names(kind, f"{prefix}{name.upper()}__")
-
-
-def _sentence(name: str, known: Iterable[str]) -> str:
-    near = get_close_matches(name.upper(), known, 1)
-    return f"{name} is not a setting and has no effect{f'; did you mean {near[0]}?' if near else ''}"
