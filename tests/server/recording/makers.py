@@ -180,9 +180,10 @@ def rewritten(
     entries: list[Entry],
     change: Callable[[Entry], list[Entry]],
     description: RobotDescription = DESCRIPTION,
+    info: RecordingInfo = INFO,
 ) -> Path:
     """A file with other records: `change` says what becomes of each. Its checksums and its index fit."""
-    _write(path, [each for entry in entries for each in change(entry)], description=description)
+    _write(path, [each for entry in entries for each in change(entry)], description=description, info=info)
     return path
 
 
@@ -193,8 +194,9 @@ def _write(
     close: bool = True,
     signing: RecordingSigning | None = None,
     description: RobotDescription = DESCRIPTION,
+    info: RecordingInfo = INFO,
 ) -> RecordingWriter:
-    writer = RecordingWriter(path, INFO, description, CODECS, signing)
+    writer = RecordingWriter(path, info, description, CODECS, signing)
     for entry in entries:
         writer.flush_if_due(entry.arrived)
         writer.write(entry)

@@ -2,6 +2,7 @@
 
 import csv
 import json
+import shutil
 from pathlib import Path
 from typing import Any
 
@@ -17,15 +18,17 @@ from lockstep.server.recording.errors import RecordingDamaged
 from lockstep.server.recording.export import export_csv, export_lerobot, export_mp4, export_parquet
 from lockstep.server.recording.export.lerobot_rows import aligned_stamps, episodes_of
 from lockstep.server.recording.format.episodes import EpisodeEntry
+from lockstep.server.recording.format.info import RecordingInfo
 from lockstep.server.recording.format.records import Degraded, EpisodeRecord
 from lockstep.server.recording.format.topics import CAMERA
 from lockstep.server.recording.reading.reader import RecordingReader
 from lockstep.server.recording.verify.verify_dataset import verify_dataset
 from lockstep.server.recording.writing.writer import Entry
 from tests.server.recording.graders import doctor_counts, graded_defects
-from tests.server.recording.makers import EPOCH, INTERVAL, START, Story, own_entry, rewritten
+from tests.server.recording.makers import EPOCH, INFO, INTERVAL, START, Story, own_entry, rewritten
 
 DATA = Path("data/chunk-000/file-000.parquet")
+OTHER = msgspec.structs.replace(INFO, recording="20270115-planar-cd34")
 VIDEO = Path("videos/observation.images.front/chunk-000/file-000.mp4")
 
 
@@ -45,14 +48,20 @@ def episode(id: str, kind: str, first: int, last: int, **more: object) -> Entry:
     return own_entry(record, START + (last - 1) * INTERVAL + 30_000_000)
 
 
-def recording(path: Path, *records: Entry, events: int = 100, stamps: dict[int, int] | None = None) -> Path:
+def recording(
+    path: Path,
+    *records: Entry,
+    events: int = 100,
+    stamps: dict[int, int] | None = None,
+    info: RecordingInfo = INFO,
+) -> Path:
     """`stamps`: of pictures, where it is not their own event."""
     story = [
         each._replace(event=(stamps or {}).get(each.event, each.event)) if each.topic.startswith(CAMERA) else each
         for each in Story(events=events, real=True).entries()
     ]
     entries = [*story, *records]
-    return rewritten(path, sorted(entries, key=lambda entry: entry.arrived), lambda each: [each])
+    return rewritten(path, sorted(entries, key=lambda entry: entry.arrived), lambda each: [each], info=info)
 
 
 def shown(root: Path) -> list[float]:
@@ -107,7 +116,7 @@ def test_a_checker_that_others_wrote_takes_a_dataset_of_several_episodes(tmp_pat
 
 
 def test_a_grader_that_others_wrote_finds_no_defect_but_the_one_that_was_planted(tmp_path: Path) -> None:
-    """What is planted are the same episodes twice."""
+    """What is planted are the same episodes twice, as of two recordings: of one recording they come in once."""
     path = recording(tmp_path / "a.mcap", *KEPT_AND_NOT)
     (root,) = export_lerobot.export(path, tmp_path / "dataset", "")
     assert graded_defects(root) == {
@@ -115,7 +124,7 @@ def test_a_grader_that_others_wrote_finds_no_defect_but_the_one_that_was_planted
         "hygiene.topic_frequency": (2, 0),
         "cross.duplicates": (2, 0),
     }
-    again = recording(tmp_path / "b.mcap", *KEPT_AND_NOT)
+    again = recording(tmp_path / "b.mcap", *KEPT_AND_NOT, info=OTHER)
     (root,) = export_lerobot.export_all([path, again], tmp_path / "twice", "")
     looked, found = graded_defects(root)["cross.duplicates"]
     assert (looked, found) == (4, 4)
@@ -123,12 +132,41 @@ def test_a_grader_that_others_wrote_finds_no_defect_but_the_one_that_was_planted
 
 def test_several_recordings_become_one_dataset(tmp_path: Path) -> None:
     kept = (episode("a", "start", 10, 10), episode("a", "kept", 10, 20))
-    paths = [recording(tmp_path / f"{name}.mcap", *kept, events=30) for name in "ab"]
+    paths = [
+        recording(tmp_path / f"{info.recording}.mcap", *kept, events=30, info=info) for info in (INFO, OTHER)
+    ]  # of one recording, the second file would be a copy
     (root,) = export_lerobot.export_all(paths, tmp_path / "dataset", "")
     info = json.loads((root / "meta" / "info.json").read_text())
     assert (info["total_episodes"], info["total_frames"], info["total_tasks"]) == (2, 20, 1)
     assert [row["index"] for row in rows(root)] == list(range(20))
     assert shown(root) == pytest.approx([2 * event for event in [*range(10, 20)] * 2], abs=6)
+
+
+def test_a_copy_of_a_recording_in_an_export_is_left_out_by_name(tmp_path: Path) -> None:
+    path = recording(tmp_path / "a.mcap", *KEPT_AND_NOT)
+    (whole,) = export_lerobot.export(path, tmp_path / "whole", "")
+    copy = Path(shutil.copy(path, tmp_path / "copy.mcap"))
+    changed(copy, "c", first_event=50)
+    said: list[str] = []
+    (root,) = export_lerobot.export_all([path, copy], tmp_path / "dataset", say=said.append)
+    assert rows(root) == rows(whole)
+    assert said == [
+        "episode a of copy.mcap is left out: the dataset has it already",
+        "episode c of copy.mcap is left out: the dataset has 10 of its 10 events already, as c",
+    ]
+    assert verify_dataset(root).ok
+
+
+def test_a_copy_of_a_whole_recording_in_an_export_is_left_out_by_name(tmp_path: Path) -> None:
+    path = recording(tmp_path / "a.mcap", events=30)
+    copy = Path(shutil.copy(path, tmp_path / "copy.mcap"))
+    said: list[str] = []
+    (root,) = export_lerobot.export_all([path, copy], tmp_path / "dataset", "push", say=said.append)
+    assert said == [
+        "a.mcap has no episodes and is one as a whole, with the task 'push'",
+        "copy.mcap is left out: the dataset has it already",
+    ]
+    assert verify_dataset(root).ok
 
 
 def test_a_recording_whose_episodes_were_all_discarded_gives_no_dataset_and_leaves_nothing(tmp_path: Path) -> None:

@@ -25,6 +25,7 @@ from lockstep.server.recording.reading.raw_records import HEAD, MAGIC, MAX_UNPAC
 from lockstep.server.recording.reading.reader import RecordingReader
 from lockstep.server.recording.reading.record_file import FOOTER
 from lockstep.server.recording.reading.scan import scan_file
+from lockstep.server.recording.reading.whole_recordings import whole_recordings
 from lockstep.server.recording.verify.verify_file import verify_file
 from lockstep.server.recording.writing.writer import Entry, RecordingWriter
 from tests.server.recording.makers import CODECS, DESCRIPTION, EPOCH, INFO, Story, own_entry, rewritten
@@ -236,3 +237,69 @@ def test_what_a_recording_says_of_itself_is_short(field: str, tmp_path: Path) ->
     RecordingWriter(tmp_path / "a.mcap", info, DESCRIPTION, CODECS).close()
     with pytest.raises(RecordingDamaged, match="not a recording of Lockstep"):
         RecordingReader(tmp_path / "a.mcap")
+
+
+HUGE_TEXT = "x" * 100_000
+
+
+@pytest.mark.parametrize(
+    "said",
+    [
+        {"episodes": "maybe"},
+        {"episodes": HUGE_TEXT},
+        {"episodes": ESCAPE},
+        {"cut": HUGE_TEXT},
+        {"part": "-1"},
+        {"part": "9" * 30},
+        {"part": HUGE_TEXT},
+        {"part": "1" * 100_000},
+    ],
+)
+def test_impossible_words_of_a_recording_about_its_parts_and_episodes_are_damage_in_short_words(
+    said: dict[str, str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(RecordingInfo, "metadata", lambda info: {"recording": "r", "epoch": EPOCH} | said)
+    path = tmp_path / "a.mcap"
+    Story(events=10).write(path)
+    monkeypatch.undo()
+    assert_is_damaged(path, f"not a recording of Lockstep: .*{next(iter(said))}" if len(str(said)) < 1000 else "not a")
+
+
+@pytest.mark.parametrize("ending", [5, None, ["continued"], {"a": 1}, 10**30, "maybe", HUGE_TEXT, ESCAPE])
+def test_an_impossible_ending_in_an_index_is_damage_in_short_words(
+    ending: object, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "a.mcap"
+    writer = Story(events=10).write(path, close=False)
+    writer.close(ending)  # type: ignore[arg-type]  # it is written as it is
+    assert_is_damaged(path, "the index cannot be read: ")
+
+
+def assert_is_damaged(path: Path, words: str) -> None:
+    """Whatever reads it says so in one line."""
+    with pytest.raises(RecordingDamaged, match=words) as raised:
+        RecordingReader(path)
+    assert len(str(raised.value)) < 1000
+    assert whole_recordings([path], wanted=False) == {path: "it cannot be read"}
+    out = str(path.with_name("dataset"))
+    environment = {"LOCKSTEP_STATE_DIR": str(path.with_name("state"))}
+    for more in ([], ["--append"], ["--whole"]):
+        result = CliRunner().invoke(app, ["export", "--to", "lerobot", "--out", out, *more, str(path)], env=environment)
+        assert result.exit_code == (0 if more == ["--append"] else 2), result.output
+        assert isinstance(result.exception, SystemExit | None), result.output
+        assert len(result.output) < 2000
+        assert "\x1b" not in result.output
+
+
+def test_an_episode_that_was_cut_is_named_without_what_it_would_write_to_the_terminal(tmp_path: Path) -> None:
+    path = tmp_path / "a.mcap"
+    info = msgspec.structs.replace(INFO, episodes="begun", cut=ESCAPE)
+    writer = RecordingWriter(path, info, DESCRIPTION, CODECS)
+    for entry in Story(events=10).entries():
+        writer.write(entry)
+    writer.close("no_episodes")
+    arguments = ["export", "--to", "lerobot", "--out", str(tmp_path / "dataset"), str(path)]
+    result = CliRunner().invoke(app, arguments, env={"LOCKSTEP_STATE_DIR": str(tmp_path / "state")})
+    assert result.exit_code == 2
+    assert "it begins within episode" in result.output
+    assert "\x1b" not in result.output

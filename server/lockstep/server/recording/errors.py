@@ -7,7 +7,9 @@ RecordingError
 └── DiskTrouble         it cannot be written
 """
 
-__all__ = ["DatasetRefused", "DiskTrouble", "RecordingDamaged", "RecordingError", "RecordingTampered"]
+__all__ = ["DatasetRefused", "DiskTrouble", "RecordingDamaged", "RecordingError", "RecordingTampered", "shortened"]
+
+LONGEST = 300  # characters of what a file's reader says, which may have any value of the file in it
 
 
 class RecordingError(Exception):
@@ -39,3 +41,9 @@ class DatasetRefused(RecordingError):
 
 class DiskTrouble(RecordingError):
     pass
+
+
+def shortened(error: Exception) -> str:
+    """Return the words of an error that may name a value of a file, as long as a line of a log at most."""
+    text = str(error)
+    return text if len(text) <= LONGEST else f"{text[:LONGEST]}…"

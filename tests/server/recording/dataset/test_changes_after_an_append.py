@@ -6,12 +6,15 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import msgspec
 import pytest
 
 from lockstep.server.cli.recordings.follow import append_once
 from lockstep.server.recording.dataset.appending import read_state
+from lockstep.server.recording.dataset.commit import commit, stage_of
 from lockstep.server.recording.episodes.edits import EpisodeEditRefused
 from lockstep.server.recording.export.export_lerobot import DatasetOptions
+from lockstep.server.recording.export.lerobot_batch import write_notes
 from lockstep.server.recording.verify.verify_dataset import verify_dataset
 from tests.server.recording.dataset.growing_file import GrowingFile
 from tests.server.recording.dataset.test_appending import events_of, follower
@@ -118,6 +121,38 @@ def test_a_dataset_notes_which_recorded_episodes_its_own_were_made_of(tmp_path: 
     appended(path, root)
     (noted,) = read_state(root).notes.episodes
     assert (noted.episode, noted.recorded) == ("edit-1", ("c", "f"))
+
+
+def test_a_dataset_that_has_an_episode_twice_has_it_already(tmp_path: Path) -> None:
+    """An earlier version wrote the episodes of a copy again."""
+    path, root = recording(tmp_path / "a.mcap", *C, *NEXT), tmp_path / "dataset"
+    appended(path, root)
+    state = read_state(root)
+    notes = msgspec.structs.replace(state.notes, episodes=[*state.notes.episodes, *state.notes.episodes])
+    commit(root, [write_notes(stage_of(root), notes)])
+    said: list[str] = []
+    append_once([path], root, DatasetOptions(), said.append)
+    assert said == ["0 appended, 0 left out"]
+    change(path, {"episode": "c", "first_event": 50})
+    append_once([path], root, DatasetOptions(), said.append)
+    assert said[1:] == [
+        "episode c of a.mcap is left out: the dataset has 10 of its 10 events already, as c, from before a change",
+        "0 appended, 1 left out",
+    ]
+
+
+def test_a_whole_recording_is_in_the_dataset_whatever_the_task_that_is_chosen_later(tmp_path: Path) -> None:
+    path, root = recording(tmp_path / "a.mcap", events=30), tmp_path / "dataset"
+    said: list[str] = []
+    for task in ("push", "push", "pull"):
+        append_once([path], root, DatasetOptions(task=task), said.append)
+    assert said[2:] == [
+        "1 appended, 0 left out",
+        "0 appended, 0 left out",
+        "a.mcap is left out: the dataset has it already, with the task 'push'",
+        "0 appended, 1 left out",
+    ]
+    assert read_state(root).tasks == ["push"]
 
 
 def random_change(chance: random.Random, path: Path, number: int) -> None:

@@ -173,4 +173,43 @@ def test_a_follower_says_that_a_recording_without_episodes_is_left_out(tmp_path:
     follower = DatasetFollower(tmp_path / "dataset", DatasetOptions(), said.append)
     assert [follower.look(session.paths), follower.look(session.paths)] == [0, 0]
     (line,) = said
-    assert line.startswith("r.mcap is left out: it has no episodes, and what is followed are kept episodes alone")
+    assert line == (
+        "r.mcap is left out: it has no episodes, and what is followed are kept episodes alone; "
+        "--append takes it, or says why not"
+    )
+
+
+def test_a_follower_forgets_a_recording_that_was_deleted(tmp_path: Path) -> None:
+    """Seen from outside: of a file of that name that comes later everything is said again."""
+    session = written(tmp_path / "r", "drive")
+    (path,) = session.paths
+    other = written(tmp_path / "other", "drive", recording="other").paths
+    said: list[str] = []
+    follower = DatasetFollower(tmp_path / "dataset", DatasetOptions(), said.append)
+    follower.look([path, *other])
+    follower.look(other)
+    follower.look([path, *other])
+    assert len(said) == 2, "it was there all the time"
+    content = path.read_bytes()
+    for named in ([path, *other], other):  # the process was told the file's name, or a folder
+        path.unlink()
+        follower.look(named)
+        path.write_bytes(content)
+        said.clear()
+        follower.look([path, *other])
+        assert [line.partition(" ")[0] for line in said] == ["r.mcap"]
+
+
+def test_an_append_reads_what_the_dataset_has_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    session = written(tmp_path / "r", "start", "keep")
+    appended(session.paths, tmp_path / "dataset")
+    read: list[str] = []
+    read_bytes = Path.read_bytes
+
+    def counted(path: Path) -> bytes:
+        read.append(path.name)
+        return read_bytes(path)
+
+    monkeypatch.setattr(Path, "read_bytes", counted)
+    append_once(session.paths, tmp_path / "dataset", DatasetOptions(), lambda text: None)
+    assert read.count("lockstep.json") == 1

@@ -1,14 +1,18 @@
 """Which files are one episode as a whole: only where it is certain that nobody recorded by episodes."""
 
+from collections.abc import Collection, Iterator
 from pathlib import Path
 from typing import Any
 
+import msgspec
 import pytest
 
+from lockstep.server.recording.format.event_index import Ending
 from lockstep.server.recording.format.info import RecordingInfo
+from lockstep.server.recording.reading.reader import Record, RecordingReader
 from lockstep.server.recording.reading.whole_recordings import EpisodeUse, whole_recordings, why_not_whole
 from lockstep.server.recording.writing.writer import RecordingWriter
-from tests.server.recording.makers import CODECS, DESCRIPTION, EPOCH, Story
+from tests.server.recording.makers import CODECS, DESCRIPTION, EPOCH, INFO, Story
 from tests.server.recording.test_episode_export import KEPT_AND_NOT, recording
 
 PLAIN = EpisodeUse(Path("a.mcap"), "a", "none", "", False, "no_episodes")
@@ -21,6 +25,7 @@ PLAIN = EpisodeUse(Path("a.mcap"), "a", "none", "", False, "no_episodes")
         ({"cut": "e1", "before": "begun"}, "it begins within episode e1"),
         ({"before": "begun"}, "made by episodes, as a.mcap says"),
         ({"has_records": True}, "made by episodes, as a.mcap says"),
+        ({"cut": "e1"}, "it begins within episode e1"),
         ({"ending": "episodes"}, "made by episodes, as a.mcap says"),
         ({"before": ""}, "an earlier version made it"),
         ({"ending": ""}, "no file here says that its recording has ended"),
@@ -72,6 +77,54 @@ def test_a_file_of_an_earlier_version_and_an_interrupted_one_are_not_whole(tmp_p
         "an earlier version made it",
         "it cannot be read",
     ]
+
+
+@pytest.mark.parametrize(
+    ("change", "ending", "reads"),
+    [
+        ({"episodes": "begun"}, "no_episodes", False),
+        ({"episodes": "none", "cut": "e1"}, "no_episodes", False),
+        ({"episodes": ""}, "no_episodes", False),
+        ({"episodes": "none"}, "episodes", False),
+        ({"episodes": "none"}, "continued", True),
+        ({"episodes": "none"}, "no_episodes", True),
+    ],
+)
+def test_records_are_read_only_where_head_and_end_do_not_decide(
+    change: dict[str, Any], ending: Ending, reads: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    info = msgspec.structs.replace(INFO, **change)
+    writer = RecordingWriter(tmp_path / "a.mcap", info, DESCRIPTION, CODECS)
+    for entry in Story(events=10).entries():
+        writer.write(entry)
+    writer.close(ending)
+    read: list[int] = []
+    chunk = RecordingReader.chunk
+
+    def counted(reader: RecordingReader, number: int, topics: Collection[str] | None = None) -> Iterator[Record]:
+        read.append(number)
+        return chunk(reader, number, topics)
+
+    monkeypatch.setattr(RecordingReader, "chunk", counted)
+    (why,) = whole_recordings([tmp_path / "a.mcap"], wanted=False).values()
+    assert bool(read) == reads
+    assert (why == "") == (reads and ending == "no_episodes")
+
+
+def test_the_records_of_a_file_of_an_earlier_version_count_for_the_others(tmp_path: Path) -> None:
+    """Its index says that it has no episode."""
+    Story(events=10).write(tmp_path / "a.mcap")
+    info = RecordingInfo(recording="old", epoch=EPOCH)
+    writer = RecordingWriter(tmp_path / "old.mcap", info, DESCRIPTION, CODECS)
+    entries = [*Story(events=60, real=False).entries(), *KEPT_AND_NOT[:2]]
+    for entry in sorted(entries, key=lambda each: each.arrived):
+        writer.write(entry)
+    writer.flush()
+    writer._builder.index.counts.clear()
+    writer._builder.index.episodes.clear()
+    writer.close()
+    found = whole_recordings([tmp_path / "a.mcap", tmp_path / "old.mcap"], wanted=False)
+    assert found[tmp_path / "a.mcap"] == "old.mcap has episodes, and this one has none"
 
 
 def of_earlier_version(path: Path) -> None:

@@ -2,13 +2,16 @@
 
 from pathlib import Path
 
+from typer.testing import CliRunner
+
+from lockstep.server.cli.main import app
 from lockstep.server.recording.export import export_lerobot
 from lockstep.server.recording.export.export_lerobot import DatasetOptions
 from lockstep.server.recording.verify.verify_dataset import verify_dataset
 from tests.server.recording.dataset.test_appending import events_of, follower
 from tests.server.recording.episodes.test_edited_datasets import NEXT, change
 from tests.server.recording.makers import INFO
-from tests.server.recording.test_episode_export import KEPT_AND_NOT, recording
+from tests.server.recording.test_episode_export import KEPT_AND_NOT, episode, recording
 
 ID = INFO.recording
 
@@ -37,6 +40,31 @@ def test_episodes_that_were_discarded_changed_or_split_after_the_export_are_name
     ]
     path.unlink()
     assert differences(root, folder)[0] == f"episode a of {ID}: the recording is not there, or cannot be read"
+
+
+def test_each_of_many_episodes_is_named_and_of_other_checks_how_many_more_there_are(tmp_path: Path) -> None:
+    count = 60
+    kept = [
+        each
+        for number in range(count)
+        for each in (
+            episode(f"e{number}", "start", 5 + 2 * number, 5 + 2 * number),
+            episode(f"e{number}", "kept", 5 + 2 * number, 7 + 2 * number),
+        )
+    ]
+    folder = tmp_path / "recordings"
+    folder.mkdir()
+    path = recording(folder / "a.mcap", *kept, events=130)
+    (root,) = export_lerobot.export(path, tmp_path / "dataset", "")
+    path.unlink()
+    assert len(differences(root, folder)) == count
+    notes = root / "meta" / "lockstep.json"
+    notes.write_text(notes.read_text().replace('"tolerance": 4', '"tolerance": -1'))
+    arguments = ["verify", str(root), "--recordings", str(folder)]
+    output = CliRunner().invoke(app, arguments, env={"LOCKSTEP_STATE_DIR": str(tmp_path / "state")}).output
+    assert output.count("the recording is not there") == count
+    assert output.count("\n        and ") == 1, "of `aligned`"
+    assert f"\n        and {2 * count - 5} more\n" in output
 
 
 def test_a_whole_recording_that_turns_out_to_have_episodes_is_named(tmp_path: Path) -> None:

@@ -9,10 +9,9 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from types import FrameType
 
-from lockstep.server.recording.dataset.appending import alone_with, is_dataset, read_state
+from lockstep.server.recording.dataset.appending import alone_with
 from lockstep.server.recording.dataset.follower import DatasetFollower
 from lockstep.server.recording.export.export_lerobot import DatasetOptions, Say
-from lockstep.server.recording.reading.whole_recordings import whole_recordings
 
 __all__ = ["append_once", "follow"]
 
@@ -27,9 +26,8 @@ def append_once(paths: Sequence[Path], root: Path, options: DatasetOptions, say:
     by name, and at the end how many that were.
     """
     with alone_with(root):
-        has_episodes = is_dataset(root) and any(each.episode for each in read_state(root).notes.episodes)
-        wholes = whole_recordings(paths, wanted=options.whole, beside=root.name if has_episodes else "")
-        follower = DatasetFollower(root, options, say, wholes)
+        follower = DatasetFollower(root, options, say)
+        follower.take_wholes(paths)
         count = follower.look(paths)
         say(f"{count} appended, {follower.left_out} left out")
         return count

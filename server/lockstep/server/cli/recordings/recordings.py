@@ -259,6 +259,8 @@ def _verify_dataset(root: Path, as_json: bool, pixels: bool, recordings: Path | 
             lines.append(f"{'ok  ' if check.ok else 'FAIL'}  {name} ({check.looked} looked at)")
             named = check.violations if name == "current" else check.violations[:5]  # each episode is to be named
             lines += [f"        {_row(each.row)}{printable(each.text)}" for each in named]
+            if check.count > len(named):
+                lines.append(f"        and {check.count - len(named)} more")
         sys.stdout.write("\n".join(lines) + "\n")
     return bool(verdict.ok)
 

@@ -5,7 +5,7 @@ import os
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import msgspec
 import pyarrow as pa
@@ -15,10 +15,10 @@ from lockstep.server.recording.dataset.commit import commit, recover, stage_of
 from lockstep.server.recording.errors import DatasetRefused, RecordingDamaged
 from lockstep.server.recording.export.lerobot_batch import DatasetState, noted_without_rows, write_batch, write_notes
 from lockstep.server.recording.export.lerobot_layout import DatasetLayout
-from lockstep.server.recording.export.lerobot_meta import DatasetEpisode, DatasetNotes
-from lockstep.server.recording.export.lerobot_rows import EpisodeRows, Stretch
+from lockstep.server.recording.export.lerobot_meta import DatasetNotes
+from lockstep.server.recording.export.lerobot_rows import EpisodeRows
 
-__all__ = ["Present", "alone_with", "append", "is_dataset", "note_without_rows", "present", "read_state"]
+__all__ = ["alone_with", "append", "is_dataset", "note_without_rows", "read_state"]
 
 _notes_decoder = msgspec.json.Decoder(DatasetNotes)
 _json_decoder = msgspec.json.Decoder(dict[str, Any])
@@ -91,35 +91,3 @@ def note_without_rows(root: Path, state: DatasetState, episode: EpisodeRows) -> 
     if notes != state.notes:
         commit(root, [write_notes(stage_of(root), notes)])
         state.notes = notes
-
-
-class Present(NamedTuple):
-    """What a dataset has of a stretch.
-
-    Attributes:
-        episodes: of the dataset: those with its id, or with one of its events
-        events: how many of its events they have
-        is_same: it is in the dataset as it is
-    """
-
-    episodes: list[DatasetEpisode]
-    events: int
-    is_same: bool
-
-
-def present(notes: DatasetNotes, stretch: Stretch) -> Present | None:
-    """Return what the dataset has of the stretch, under whatever id; None: nothing, so that it may be appended."""
-    info, range_ = stretch.info, (stretch.first_event, stretch.last_event)
-    own = info.recording, info.part, stretch.episode
-    found: list[DatasetEpisode] = []
-    events = 0
-    for each in notes.episodes:
-        shared = each.shared(info.recording, info.epoch, *range_)
-        events += shared
-        if shared or (each.recording, each.part, each.episode) == own:
-            found.append(each)
-    if not found:
-        return None
-    said = (stretch.episode, *range_, stretch.task, stretch.outcome)
-    is_same = [(each.episode, each.first_event, each.last_event, each.task, each.outcome) for each in found] == [said]
-    return Present(found, events, is_same)

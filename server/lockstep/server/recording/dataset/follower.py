@@ -4,11 +4,11 @@ It belongs into a process of its own, with a low priority: the console writes th
 """
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from lockstep.protocol.description import RobotDescription
-from lockstep.protocol.serial import event_gap
-from lockstep.server.recording.dataset.appending import append, is_dataset, note_without_rows, present, read_state
+from lockstep.server.recording.dataset.appending import append, is_dataset, note_without_rows, read_state
 from lockstep.server.recording.dataset.commit import recover
 from lockstep.server.recording.dataset.growing import GrowingRecording
 from lockstep.server.recording.episodes.edit_rules import apply_edits
@@ -26,20 +26,41 @@ from lockstep.server.recording.export.export_lerobot import (
 )
 from lockstep.server.recording.export.lerobot_batch import DatasetState
 from lockstep.server.recording.export.lerobot_layout import layout_of
+from lockstep.server.recording.export.lerobot_present import present
 from lockstep.server.recording.export.lerobot_rows import (
     EpisodeRows,
     Stretch,
     check_same_robot,
     rows_of,
     stretches_of,
-    whole_stretch,
 )
 from lockstep.server.recording.format.episodes import EpisodeEntry
 from lockstep.server.recording.reading.reader import RecordingReader
+from lockstep.server.recording.reading.whole_recordings import whole_recordings
 
 __all__ = ["DatasetFollower"]
 
-NOT_LOOKED_AT = "what is followed are kept episodes alone; --append may take it"
+NOT_FOLLOWED = "it has no episodes, and what is followed are kept episodes alone; --append takes it, or says why not"
+Key = tuple[str, int, int]  # of a stretch: its episode and its first and last event
+FILE: Key = ("", 0, 0)  # the file itself
+
+
+@dataclass
+class _File:
+    """What is known of a recording, as long as it is there.
+
+    Attributes:
+        edits: version of the changes that were taken into account
+        again: it has an episode that could not be written
+        passed: stretches that have been said not to fit
+        discarded: episodes that have been said to stay in the dataset
+    """
+
+    growing: GrowingRecording
+    edits: tuple[int, int, int] | None = None
+    again: bool = False
+    passed: set[Key] = field(default_factory=set)
+    discarded: set[Key] = field(default_factory=set)
 
 
 class DatasetFollower:
@@ -49,7 +70,6 @@ class DatasetFollower:
         root: the dataset; it begins with the first kept episode
         options: of a new dataset; one that is there already keeps its own
         say: is told each episode that was appended, and what was left out, and why
-        wholes: of files without episodes, why each is not one as a whole, "" if it is; of others none is
 
     Attributes:
         left_out: number of episodes and files that were left out, besides those that the dataset has unchanged
@@ -58,20 +78,22 @@ class DatasetFollower:
         RecordingError, OSError: there is a dataset that cannot be appended to.
     """
 
-    def __init__(self, root: Path, options: DatasetOptions, say: Say, wholes: Mapping[Path, str] | None = None) -> None:
+    def __init__(self, root: Path, options: DatasetOptions, say: Say) -> None:
         self.left_out = 0
         self._root = root
         self._options = options
         self._say = say
-        self._wholes = wholes or {}
+        self._wholes: Mapping[Path, str] | None = None  # None: files without episodes are left out
         self._state: DatasetState | None = read_state(root) if is_dataset(root) else None
         self._robot: RobotDescription | None = None
-        self._files: dict[Path, GrowingRecording] = {}
-        self._passed: set[tuple[Path, str, int, int]] = set()  # stretches that have been said not to fit
-        self._discarded: set[tuple[Path, str, int, int]] = set()  # that have been said to stay in the dataset
+        self._files: dict[Path, _File] = {}  # those that were there at the last look
         self._without_rows: list[EpisodeRows] = []  # that the dataset is to note when it begins
-        self._edits: dict[Path, tuple[int, int, int]] = {}  # versions of the changes that were taken into account
-        self._again: set[Path] = set()  # recordings with an episode that could not be written
+
+    def take_wholes(self, paths: Sequence[Path]) -> None:
+        """Append those of these files that have no episodes too, each as one, where `whole_recordings` allows it."""
+        has_episodes = self._state is not None and any(each.episode for each in self._state.notes.episodes)
+        beside = self._root.name if has_episodes else ""
+        self._wholes = whole_recordings(paths, wanted=self._options.whole, beside=beside)
 
     def look(self, paths: Sequence[Path], since: int = 0) -> int:
         """Append what is new, oldest first; return the number of episodes.
@@ -85,69 +107,75 @@ class DatasetFollower:
         """
         count = 0
         for path in sorted(paths, key=_age):
-            growing = self._files.setdefault(path, GrowingRecording(path))
+            file = self._files.setdefault(path, _File(GrowingRecording(path)))
             try:
                 edits = edits_version(path)
-                if growing.advance() or path in self._again or edits != self._edits.get(path):
-                    self._again.discard(path)
-                    self._edits[path] = edits
-                    count += self._take(growing, since)
-                if why := self._why_not_whole(growing):
-                    self._pass_over((path, "", 0, 0), not_as_a_whole(path, why))
+                if file.growing.advance() or file.again or edits != file.edits:
+                    file.again = False
+                    file.edits = edits
+                    count += self._take(file, since)
+                if said := self._not_taken(file.growing):
+                    self._pass_over(file, FILE, said)
             except RecordingError as error:
-                self._pass_over((path, "", 0, 0), left_out(path, "", str(error)))
+                self._pass_over(file, FILE, left_out(path, "", str(error)))
             except FileNotFoundError:
                 del self._files[path]  # recordings have a bound, and the oldest are deleted
+        for path in self._files.keys() - set(paths):
+            if not path.exists():
+                del self._files[path]
         return count
 
-    def _why_not_whole(self, growing: GrowingRecording) -> str:
-        """Return why a file without episodes is left out; "" if it is not, or is still written."""
+    def _not_taken(self, growing: GrowingRecording) -> str:
+        """Return in words that a file without episodes is left out; "" if it is not, or is still written."""
         if growing.index.episodes:
             return ""
-        return self._wholes.get(growing.path, NOT_LOOKED_AT if growing.ended else "")
+        if self._wholes is None:
+            return left_out(growing.path, "", NOT_FOLLOWED) if growing.ended else ""
+        why = self._wholes.get(growing.path, "")
+        return not_as_a_whole(growing.path, why) if why else ""
 
-    def _take(self, growing: GrowingRecording, since: int) -> int:
+    def _take(self, file: _File, since: int) -> int:
+        growing = file.growing
         recorded = growing.index.episodes
         episodes = apply_edits(recorded, read_edits(growing.path)).episodes
-        self._name_discarded(growing, [each.entry for each in episodes if each.entry.state == "discarded"])
-        kept = [each for each in episodes if each.entry.state == "kept" and each.entry.ended >= since]
-        is_whole = not recorded and self._wholes.get(growing.path) == ""
-        if not kept and not is_whole:
+        self._name_discarded(file, [each.entry for each in episodes if each.entry.state == "discarded"])
+        is_whole = not recorded and self._wholes is not None and self._wholes.get(growing.path) == ""
+        if not is_whole and not any(each.entry.state == "kept" and each.entry.ended >= since for each in episodes):
             return 0
         with growing.reader() as reader:
-            stretches = [whole_stretch(reader, self._options.task)] if is_whole else stretches_of(reader, kept)
-            return sum(self._append(reader, each, growing) for each in stretches if self._is_new(each))
+            stretches = stretches_of(reader, episodes, self._options.task if is_whole else None)
+            new = (each for each in stretches if each.ended >= since and self._is_new(file, each))
+            return sum(self._append(reader, each, file) for each in new)
 
-    def _name_discarded(self, growing: GrowingRecording, discarded: Sequence[EpisodeEntry]) -> None:
+    def _name_discarded(self, file: _File, discarded: Sequence[EpisodeEntry]) -> None:
         """Say once of each episode that was discarded after it was appended that the dataset has it."""
+        growing = file.growing
         noted = [] if self._state is None else self._state.notes.episodes
         part = growing.index.recording, growing.index.part, growing.index.epoch
         names = {each.episode for each in noted if (each.recording, each.part, each.epoch) == part}
         for each in discarded:
-            key = (growing.path, each.id, each.first_event, each.last_event)
-            if each.id in names and key not in self._discarded:
-                self._discarded.add(key)
+            key = (each.id, each.first_event, each.last_event)
+            if each.id in names and key not in file.discarded:
+                file.discarded.add(key)
                 self._say(f"episode {each.id} of {growing.path.name} was discarded, and stays in {self._root.name}")
 
-    def _is_new(self, stretch: Stretch) -> bool:
-        found = None if self._state is None else present(self._state.notes, stretch)
+    def _is_new(self, file: _File, stretch: Stretch) -> bool:
+        found = None if self._state is None else present(self._state.notes.episodes, stretch)
         if found is None:
-            return _key(stretch) not in self._passed
-        if not found.is_same:
-            names = ", ".join(each.episode or "a whole recording" for each in found.episodes)
-            count = event_gap(stretch.last_event, stretch.first_event)
-            why = f"the dataset has {found.events} of its {count} events already, as {names}, from before a change"
-            self._pass_over(_key(stretch), left_out(stretch.path, stretch.episode, why))
+            return _key(stretch) not in file.passed
+        if not found.is_same or found.other_task:
+            why = found.in_words() + ("" if found.is_same else ", from before a change")
+            self._pass_over(file, _key(stretch), left_out(stretch.path, stretch.episode, why))
         return False
 
-    def _append(self, reader: RecordingReader, stretch: Stretch, growing: GrowingRecording) -> bool:
+    def _append(self, reader: RecordingReader, stretch: Stretch, file: _File) -> bool:
         try:
-            rows = self._written(reader, stretch, growing)
+            rows = self._written(reader, stretch)
         except (RecordingError, OSError) as error:
             if isinstance(error, RecordingError):
-                self._pass_over(_key(stretch), left_out(stretch.path, stretch.episode, str(error)))
+                self._pass_over(file, _key(stretch), left_out(stretch.path, stretch.episode, str(error)))
             else:
-                self._again.add(growing.path)
+                file.again = True
                 self._say(f"{self._root.name} cannot be written, and is tried again: {error}")
             if self._state is not None:
                 recover(self._root)
@@ -160,7 +188,7 @@ class DatasetFollower:
         self._say(f"{name}: {len(rows.frames)} rows{out}")
         return True
 
-    def _written(self, reader: RecordingReader, stretch: Stretch, growing: GrowingRecording) -> EpisodeRows:
+    def _written(self, reader: RecordingReader, stretch: Stretch) -> EpisodeRows:
         robot, state = reader.description(), self._state
         if self._robot is not None:
             check_same_robot(self._robot, robot)
@@ -182,9 +210,9 @@ class DatasetFollower:
         self._state, self._robot = state, robot
         return rows
 
-    def _pass_over(self, key: tuple[Path, str, int, int], said: str) -> None:
-        if key not in self._passed:
-            self._passed.add(key)
+    def _pass_over(self, file: _File, key: Key, said: str) -> None:
+        if key not in file.passed:
+            file.passed.add(key)
             self.left_out += 1
             self._say(said)
 
@@ -195,5 +223,5 @@ def _age(path: Path) -> tuple[str, int]:
     return (name, int(part)) if name and part.isdecimal() and part.isascii() else (path.stem, 1)
 
 
-def _key(stretch: Stretch) -> tuple[Path, str, int, int]:
-    return stretch.path, stretch.episode, stretch.first_event, stretch.last_event
+def _key(stretch: Stretch) -> Key:
+    return stretch.episode, stretch.first_event, stretch.last_event

@@ -7,11 +7,9 @@ from typing import Any, NamedTuple
 
 import msgspec
 
-from lockstep.server.recording.episodes.edit_rules import apply_edits
-from lockstep.server.recording.episodes.edits import read_edits
 from lockstep.server.recording.errors import DatasetRefused, RecordingDamaged
 from lockstep.server.recording.export.lerobot_layout import layout_of
-from lockstep.server.recording.export.lerobot_rows import episodes_of, rows_of, stretches_of, whole_stretch
+from lockstep.server.recording.export.lerobot_rows import episodes_now, rows_of, stretches_of
 from lockstep.server.recording.reading.reader import RecordingReader
 from lockstep.server.recording.reading.whole_recordings import whole_recordings
 
@@ -80,12 +78,10 @@ def episode_of_recording(path: Path, number: int, *, whole: bool = False) -> Rec
     """
     with RecordingReader(path) as reader:
         layout = layout_of(reader.description())
-        recorded = episodes_of(reader)
-        stretches = stretches_of(reader, apply_edits(recorded, read_edits(path)).episodes)
-        if not recorded:
-            if why := whole_recordings([path], wanted=whole)[path]:
-                raise DatasetRefused(f"{path.name} has no episodes, and {why}; --whole takes it as one all the same")
-            stretches = [whole_stretch(reader, "")]
+        episodes = episodes_now(reader)
+        if not episodes and (why := whole_recordings([path], wanted=whole)[path]):
+            raise DatasetRefused(f"{path.name} has no episodes, and {why}; --whole takes it as one all the same")
+        stretches = stretches_of(reader, episodes, "")
         if not 0 <= number < len(stretches):
             raise DatasetRefused(f"there is no kept episode {number}; the recording has {len(stretches)}")
         (rows,) = rows_of(reader, layout, [stretches[number]], [], 0)

@@ -12,19 +12,17 @@ import msgspec
 import numpy as np
 
 from lockstep.protocol.description import RobotDescription
-from lockstep.server.recording.episodes.edit_rules import apply_edits
-from lockstep.server.recording.episodes.edits import read_edits
 from lockstep.server.recording.errors import DatasetRefused, RecordingDamaged
-from lockstep.server.recording.export.lerobot_batch import DatasetState, noted_without_rows, write_batch
+from lockstep.server.recording.export.lerobot_batch import DatasetState, noted, noted_without_rows, write_batch
 from lockstep.server.recording.export.lerobot_layout import DatasetLayout, LayoutChoice, layout_of
 from lockstep.server.recording.export.lerobot_meta import EVENTS, RATE, DatasetNotes
+from lockstep.server.recording.export.lerobot_present import present
 from lockstep.server.recording.export.lerobot_rows import (
     EpisodeRows,
     check_same_robot,
-    episodes_of,
+    episodes_now,
     rows_of,
     stretches_of,
-    whole_stretch,
 )
 from lockstep.server.recording.export.lerobot_video import camera_key
 from lockstep.server.recording.export.unfinished import unfinished
@@ -86,7 +84,8 @@ def export_all(
         out: a new directory; None: one beside the first recording
         options: or the task alone
         tolerance: instead of that in the options
-        say: is told each kept episode that has no row, and of each file without episodes what becomes of it
+        say: is told each kept episode that has no row, or whose events another file has given already, and of each
+            file without episodes what becomes of it
 
     Raises:
         RecordingError: a recording cannot be read, none has a row, they are of different robots, or the options do not
@@ -179,8 +178,8 @@ def _read(
     episodes: list[EpisodeRows] = []
     for path in paths:
         with RecordingReader(path) as reader:
-            recorded = episodes_of(reader)
-            if not recorded and (why := wholes[path]):
+            now = episodes_now(reader)
+            if not now and (why := wholes[path]):
                 left.append(not_as_a_whole(path, why))
                 say(left[-1])
                 continue
@@ -190,11 +189,13 @@ def _read(
             check_same_robot(description, robot)
             if sorted(topics) != sorted(cameras):
                 raise RecordingDamaged(f"{path.name} has other cameras than {paths[0].name}")
-            stretches = stretches_of(reader, apply_edits(recorded, read_edits(path)).episodes)
-            if not recorded:
-                stretches = [whole_stretch(reader, options.task)]
-                say(as_a_whole(path, stretches[0].task))
-            episodes += rows_of(reader, layout, stretches, cameras, options.tolerance, options.fps)
+            for stretch in stretches_of(reader, now, options.task):
+                if found := present([noted(each) for each in episodes if each.frames], stretch):
+                    say(left_out(path, stretch.episode, found.in_words()))
+                    continue
+                if not stretch.episode:
+                    say(as_a_whole(path, stretch.task))
+                episodes += rows_of(reader, layout, [stretch], cameras, options.tolerance, options.fps)
     if description is None or layout is None or not episodes:
         raise RecordingDamaged("; ".join(["there is no kept episode", *left]))
     return description, layout, cameras, episodes

@@ -29,7 +29,7 @@ from lockstep.server.recording.export.lerobot_meta import (
 from lockstep.server.recording.export.lerobot_rows import EpisodeRows
 from lockstep.server.recording.export.lerobot_video import ExportedCamera, write_video
 
-__all__ = ["DatasetState", "noted_without_rows", "write_batch", "write_notes"]
+__all__ = ["DatasetState", "noted", "noted_without_rows", "write_batch", "write_notes"]
 
 Array = npt.NDArray[Any]
 SUCCESS = {"success": 1, "failure": 0, "": -1}
@@ -84,7 +84,7 @@ def write_batch(stage: Path, state: DatasetState, layout: DatasetLayout, episode
         state.notes,
         batches=batch + 1,
         drivers=list(dict.fromkeys([*state.notes.drivers, *drivers])),
-        episodes=[*state.notes.episodes, *map(_noted, episodes)],
+        episodes=[*state.notes.episodes, *map(noted, episodes)],
         without_rows=_others(state.notes.without_rows, episodes),
     )
     _write_json(stage / "meta/stats.json", state.statistics)
@@ -97,7 +97,7 @@ def write_batch(stage: Path, state: DatasetState, layout: DatasetLayout, episode
 
 def noted_without_rows(notes: DatasetNotes, episodes: Sequence[EpisodeRows]) -> DatasetNotes:
     """Return the notes with these kept episodes, which have no row."""
-    found = [*_others(notes.without_rows, episodes), *map(_noted, episodes)]
+    found = [*_others(notes.without_rows, episodes), *map(noted, episodes)]
     return msgspec.structs.replace(notes, without_rows=found)
 
 
@@ -109,13 +109,13 @@ def write_notes(stage: Path, notes: DatasetNotes) -> str:
     return "meta/lockstep.json"
 
 
-def _others(noted: Sequence[DatasetEpisode], episodes: Sequence[EpisodeRows]) -> list[DatasetEpisode]:
+def _others(before: Sequence[DatasetEpisode], episodes: Sequence[EpisodeRows]) -> list[DatasetEpisode]:
     """Return those that are none of the episodes, trimmed or not, and share no event with one."""
-    own = list(map(_noted, episodes))
+    own = list(map(noted, episodes))
     ids = {(each.recording, each.part, each.episode) for each in own}
     return [
         each
-        for each in noted
+        for each in before
         if (each.recording, each.part, each.episode) not in ids
         and not any(each.shared(new.recording, new.epoch, new.first_event, new.last_event) for new in own)
     ]
@@ -203,7 +203,8 @@ def _all_statistics(state: DatasetState, places: list[EpisodePlace]) -> dict[str
     return {name: merged_statistics([part[name] for part in parts]) for name in parts[0]}
 
 
-def _noted(rows: EpisodeRows) -> DatasetEpisode:
+def noted(rows: EpisodeRows) -> DatasetEpisode:
+    """Return what the dataset notes of an episode."""
     stretch = rows.stretch
     return DatasetEpisode(
         recording=stretch.info.recording,

@@ -62,13 +62,15 @@ class DatasetEpisode(msgspec.Struct, frozen=True, kw_only=True):
     rate: float = 0.0  # Hz, by the median interval of its events; 0: not known
     recorded: tuple[str, ...] = ()  # ids of the recorded episodes that it was made of; empty: an earlier version, whole
 
-    def shared(self, recording: str, epoch: str, first_event: int, last_event: int) -> int:
-        """Return how many of these events are among its own, its last one not counted: that makes no row."""
+    def shared(self, recording: str, epoch: str, first_event: int, last_event: int) -> range:
+        """Return which of these events are among its own, by their distance from the first one.
+
+        Last events do not count: they make no row.
+        """
         if (self.recording, self.epoch) != (recording, epoch):
-            return 0
-        first = self.first_event if event_gap(self.first_event, first_event) > 0 else first_event
-        last = self.last_event if event_gap(last_event, self.last_event) > 0 else last_event
-        return max(0, event_gap(last, first))
+            return range(0)
+        first = max(0, event_gap(self.first_event, first_event))
+        return range(first, min(event_gap(last_event, first_event), event_gap(self.last_event, first_event)))
 
 
 class DatasetNotes(msgspec.Struct, frozen=True, kw_only=True):

@@ -15,7 +15,8 @@ from typing import NamedTuple
 from lockstep.protocol.description import RobotDescription
 from lockstep.protocol.episodes import EpisodeOutcome
 from lockstep.protocol.serial import event_after, event_gap, is_newer
-from lockstep.server.recording.episodes.edit_rules import EditedEpisode
+from lockstep.server.recording.episodes.edit_rules import EditedEpisode, apply_edits
+from lockstep.server.recording.episodes.edits import read_edits
 from lockstep.server.recording.errors import RecordingDamaged
 from lockstep.server.recording.export.lerobot_layout import DatasetLayout
 from lockstep.server.recording.export.lerobot_sampling import sampled
@@ -34,12 +35,12 @@ __all__ = [
     "Stretch",
     "aligned_stamps",
     "check_same_robot",
+    "episodes_now",
     "episodes_of",
     "picture_records",
     "rate_of",
     "rows_of",
     "stretches_of",
-    "whole_stretch",
 ]
 
 DEGRADED = OWN_TOPICS[Degraded]
@@ -98,8 +99,21 @@ def episodes_of(reader: RecordingReader) -> list[EpisodeEntry]:
     return book.entries()
 
 
-def stretches_of(reader: RecordingReader, episodes: Iterable[EditedEpisode]) -> list[Stretch]:
-    """Return what becomes an episode of the dataset: the kept ones."""
+def episodes_now(reader: RecordingReader) -> list[EditedEpisode]:
+    """Return the episodes of a recording with all changes to them. Raises RecordingError."""
+    return apply_edits(episodes_of(reader), read_edits(reader.path)).episodes
+
+
+def stretches_of(reader: RecordingReader, episodes: Sequence[EditedEpisode], whole: str | None) -> list[Stretch]:
+    """Return what becomes an episode of the dataset: the kept ones, or the file as a whole.
+
+    Args:
+        episodes: of the recording, with all changes
+        whole: the task, if the file is to be one episode where it has none; "": named after the recording; None: it is
+            not to be. `whole_recordings` says which files may be one.
+    """
+    if not episodes and whole is not None:
+        return [_whole_stretch(reader, whole)]
     return [_stretch(reader, each) for each in episodes if each.entry.state == "kept"]
 
 
@@ -118,8 +132,7 @@ def _stretch(reader: RecordingReader, episode: EditedEpisode) -> Stretch:
     )
 
 
-def whole_stretch(reader: RecordingReader, task: str) -> Stretch:
-    """Return the file as one episode. `whole_recordings` says which files may be one."""
+def _whole_stretch(reader: RecordingReader, task: str) -> Stretch:
     task = task or reader.info.name or "teleoperation"
     first, last = reader.index.first_event, reader.index.last_event
     return Stretch(reader.path, reader.info, "", first, last, task, "", reader.index.ended)

@@ -6,7 +6,7 @@ from typing import Literal
 import msgspec
 
 from lockstep.protocol.serial import event_gap, is_newer
-from lockstep.server.recording.errors import RecordingDamaged
+from lockstep.server.recording.errors import RecordingDamaged, shortened
 from lockstep.server.recording.format.episodes import EpisodeBook, EpisodeEntry
 from lockstep.server.recording.format.records import EpisodeRecord, Whole
 from lockstep.server.recording.reading.bookmarks import Mark
@@ -157,7 +157,7 @@ def decode_index(data: bytes) -> EventIndex:
     try:
         return _decoder.decode(data)
     except (msgspec.DecodeError, UnicodeError, RecursionError) as error:
-        raise RecordingDamaged(f"the index cannot be read: {error}") from error
+        raise RecordingDamaged(f"the index cannot be read: {shortened(error)}") from error
 
 
 class IndexBuilder:

@@ -5,7 +5,8 @@ from typing import Annotated, Literal
 
 import msgspec
 
-from lockstep.server.recording.errors import RecordingDamaged
+from lockstep.server.recording.errors import RecordingDamaged, shortened
+from lockstep.server.recording.format.records import Whole
 
 __all__ = ["METADATA_NAME", "RecordingInfo"]
 
@@ -19,7 +20,7 @@ class RecordingInfo(msgspec.Struct, frozen=True, kw_only=True):
     """The metadata of a recording, the same in all its parts but for part, epoch, episodes and cut."""
 
     recording: Text  # common to all parts
-    part: int = 1
+    part: Whole = 1
     epoch: Text = ""
     robot: Text = ""  # the description's label
     name: Text = ""  # given by a person
@@ -38,7 +39,7 @@ class RecordingInfo(msgspec.Struct, frozen=True, kw_only=True):
         try:
             return _decoder.decode(msgspec.json.encode(metadata))
         except msgspec.ValidationError as error:
-            raise RecordingDamaged(f"not a recording of Lockstep: {error}") from error
+            raise RecordingDamaged(f"not a recording of Lockstep: {shortened(error)}") from error
 
 
 _decoder = msgspec.json.Decoder(RecordingInfo, strict=False)  # recordings are read on threads

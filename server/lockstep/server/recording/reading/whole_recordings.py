@@ -27,12 +27,17 @@ class EpisodeUse(NamedTuple):
     recording: str
     before: Literal["", "none", "begun"]  # as in RecordingInfo
     cut: str
-    has_records: bool  # of an episode
+    has_records: bool  # of an episode, as far as it is known
     ending: Ending
 
     @property
     def by_episodes(self) -> bool:
-        return self.has_records or self.before == "begun" or self.ending == "episodes"
+        return self.has_records or self.before == "begun" or bool(self.cut) or self.ending == "episodes"
+
+    @property
+    def may_be_whole(self) -> bool:
+        """False if the file says itself that it is not one episode as a whole."""
+        return self.before == "none" and not self.by_episodes
 
 
 def why_not_whole(file: EpisodeUse, seen: Sequence[EpisodeUse], beside: str = "") -> str:
@@ -65,8 +70,12 @@ def whole_recordings(paths: Sequence[Path], *, wanted: bool, beside: str = "") -
     """
     if wanted:
         return dict.fromkeys(paths, "")
-    given = [use for path in paths if (use := _use(path)) is not None]
-    seen = [*given, *_other_parts(given)]
+    given = [use for path in paths if (use := _said(path)) is not None]
+    if any(use.may_be_whole for use in given):  # else all is said: reading records takes as long as an export
+        given = [use for said in given if (use := _with_records(said)) is not None]
+        seen = [*given, *_other_parts(given)]
+    else:
+        seen = given
     found = {use.path: why_not_whole(use, seen, beside) for use in given}
     return {path: found.get(path, "it cannot be read") for path in paths}
 
@@ -77,7 +86,11 @@ def _other_parts(given: Sequence[EpisodeUse]) -> Iterator[EpisodeUse]:
     known = {use.path.resolve() for use in given}
     for folder in {path.parent for path in known} if unclear else ():
         for path in sorted(folder.glob("*.mcap")):
-            if path not in known and _recording(path) in unclear and (use := _use(path)) is not None:
+            if path in known or _recording(path) not in unclear:
+                continue
+            said = _said(path)
+            use = None if said is None else _with_records(said)
+            if use is not None:
                 yield use
 
 
@@ -89,12 +102,24 @@ def _recording(path: Path) -> str:
         return ""
 
 
-def _use(path: Path) -> EpisodeUse | None:
+def _said(path: Path) -> EpisodeUse | None:
+    """Return what the file says at its head and at its end; None: it cannot be read."""
     try:
         with RecordingReader(path) as reader:
+            info, index = reader.info, reader.index
+            has_records = bool(index.counts.get(EPISODE))
+            return EpisodeUse(path, info.recording, info.episodes, info.cut, has_records, index.ending)
+    except (RecordingError, OSError):
+        return None
+
+
+def _with_records(said: EpisodeUse) -> EpisodeUse | None:
+    """Return what the file says with its records too, unless it is decided; None: it cannot be read."""
+    if said.by_episodes:
+        return said
+    try:
+        with RecordingReader(said.path) as reader:
             # Nothing checks an index: that it counts none is not enough.
-            has_records = bool(reader.index.counts.get(EPISODE)) or any(reader.records(topics={EPISODE}))
-            info = reader.info
-            return EpisodeUse(path, info.recording, info.episodes, info.cut, has_records, reader.index.ending)
+            return said._replace(has_records=any(reader.records(topics={EPISODE})))
     except (RecordingError, OSError):
         return None

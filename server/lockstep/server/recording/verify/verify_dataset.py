@@ -31,7 +31,7 @@ DatasetCheckName = Literal[
 CHECKS: tuple[DatasetCheckName, ...] = ("aligned", "within", "ordered", "timed", "counted", "current", "shown")
 _notes_decoder = msgspec.json.Decoder(DatasetNotes)
 _info_decoder = msgspec.json.Decoder(dict[str, Any])
-MOST = 50  # violations of a check that are listed
+MOST = 50  # violations of a check that are listed; of `current` all are, since each episode is to be named
 STEP = 0.01  # of an interval, by which the moment of a row may be wrong
 READABLE = 0.5  # of the pictures of a camera show an event: then all of them have to
 
@@ -44,17 +44,18 @@ class DatasetViolation(msgspec.Struct, frozen=True):
 class DatasetCheck(msgspec.Struct):
     looked: int = 0  # number of cases that were checked
     count: int = 0  # of violations
-    violations: list[DatasetViolation] = []  # the first ones
+    violations: list[DatasetViolation] = []  # the first ones; of `current` all
 
     @property
     def ok(self) -> bool:
         return self.count == 0
 
-    def look(self, good: bool, row: int, text: str) -> None:
+    def look(self, good: bool, row: int, text: str, most: int | None = MOST) -> None:
+        """Count a case. `most`: violations that are listed; None: all."""
         self.looked += 1
         if not good:
             self.count += 1
-            if len(self.violations) < MOST:
+            if most is None or len(self.violations) < most:
                 self.violations.append(DatasetViolation(row, text))
 
 
@@ -100,7 +101,7 @@ def verify_dataset(root: Path, *, pixels: bool = False, recordings: Path | None 
             recorded = recorded_now(recordings, notes.episodes)
             for each in notes.episodes:
                 differs = outdated(each, recorded)
-                checks["current"].look(not differs, -1, differs)
+                checks["current"].look(not differs, -1, differs, most=None)
     except (msgspec.DecodeError, pa.ArrowException, KeyError, TypeError, IndexError, av.FFmpegError) as error:
         raise RecordingDamaged(f"{root.name}: {error}") from error
     ok = all(check.ok for check in checks.values())

@@ -3,11 +3,9 @@
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
-from lockstep.server.recording.episodes.edit_rules import apply_edits
-from lockstep.server.recording.episodes.edits import read_edits
 from lockstep.server.recording.errors import RecordingError
 from lockstep.server.recording.export.lerobot_meta import DatasetEpisode
-from lockstep.server.recording.export.lerobot_rows import episodes_of
+from lockstep.server.recording.export.lerobot_rows import episodes_now
 from lockstep.server.recording.format.episodes import EpisodeEntry
 from lockstep.server.recording.format.event_index import EventIndex
 from lockstep.server.recording.reading.reader import RecordingReader
@@ -54,7 +52,7 @@ def _read(path: Path, wanted: set[str]) -> Iterator[tuple[Part, Sequence[Episode
             if head.info.recording not in wanted:
                 return
         with RecordingReader(path) as reader:
-            found = apply_edits(episodes_of(reader), read_edits(path)).episodes
-            yield (reader.info.recording, reader.info.part, reader.info.epoch), [each.entry for each in found]
+            entries = [each.entry for each in episodes_now(reader)]
+            yield (reader.info.recording, reader.info.part, reader.info.epoch), entries
     except (RecordingError, OSError):
         return  # whoever asks for its episodes says that it cannot be read

@@ -158,9 +158,9 @@ class RecordingParts:
     def _take_episode(self, item: OwnItem, record: EpisodeRecord, is_open: bool) -> None:
         """Write a record of an episode; say of `kept` that it is on the disk, only when it is."""
         kept = False
-        if not is_open:
+        if not is_open or self._writer is None or self._robot is None:
             self._episodes.leaves_out(record)
-        elif self._episodes.takes(record) and self._writer is not None and self._robot is not None:
+        elif self._episodes.takes(record):
             self._write(self._writer, item, self._robot.record.description)
             if record.kind == "kept":
                 self._is_keeping = True
