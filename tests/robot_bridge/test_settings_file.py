@@ -9,6 +9,7 @@ from typing import Any
 import pytest
 from typer.testing import CliRunner, Result
 
+from lockstep.protocol.link_secret import LinkSecret
 from lockstep.robot_bridge import cli
 from lockstep.robot_bridge.errors import SettingsError
 from lockstep.robot_bridge.settings import BridgeSettings
@@ -110,3 +111,29 @@ def test_the_file_in_the_guide_is_one_of_a_robot(start: Start, tmp_path: Path) -
     result, found = start(text.replace("/etc/lockstep", str(tmp_path)))
     assert result.exit_code == 0, result.output
     assert found["settings"].console is not None
+
+
+@pytest.mark.parametrize("number", ["1" + "0" * 5000, "0x1" + "0" * 5000, "0x1" + "0" * 20])
+def test_a_number_of_too_many_digits_is_a_usage_error(start: Start, number: str) -> None:
+    result, found = start(f"port = {number}\n", "planar")
+    assert result.exit_code == 2
+    assert not found
+    assert len(result.output.splitlines()) == 1
+
+
+def test_an_unknown_name_makes_no_line_of_its_own(start: Start) -> None:
+    result, _ = start('"a\\nall is well" = 1\n', "planar")
+    assert result.exit_code == 2
+    assert len(result.output.splitlines()) == 1
+
+
+@pytest.mark.parametrize("name", ["LOCKSTEP_LINK_SECRET", "LOCKSTEP_LINK_SECRET_FILE"])
+def test_a_secret_of_the_environment_goes_before_that_of_the_file(start: Start, tmp_path: Path, name: str) -> None:
+    (tmp_path / "secret").write_text(32 * "s")
+    (tmp_path / "other").write_text(32 * "o")
+    given = 32 * "o" if name == "LOCKSTEP_LINK_SECRET" else str(tmp_path / "other")
+    result, found = start(f'link_secret_file = "{tmp_path / "secret"}"\n', "planar", **{name: given})
+    assert result.exit_code == 0, result.output
+    assert found["settings"].secret.reveal() == LinkSecret(32 * "o").reveal()
+    result, found = start(f'link_secret_file = "{tmp_path / "secret"}"\n', "planar", **{name: ""})
+    assert found["settings"].secret is None

@@ -82,7 +82,10 @@ def _use_file(context: typer.Context, path: Path | None) -> Path | None:
     if path is not None:
         names = {each.name for each in context.command.params if each.name is not None}
         try:
-            context.default_map = dict(read_settings_file(path, names - NOT_IN_A_FILE))
+            settings = read_settings_file(path, names - NOT_IN_A_FILE)
+            if SECRET_VARIABLE in os.environ or f"{SECRET_VARIABLE}_FILE" in os.environ:
+                settings.pop("link_secret_file", None)  # the environment gives another secret, or none
+            context.default_map = dict(settings)
         except SettingsError as error:
             typer.echo(f"lockstep robot: {error.detail}", err=True)
             raise typer.Exit(EXIT_USAGE) from error

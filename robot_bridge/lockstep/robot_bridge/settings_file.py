@@ -9,6 +9,8 @@ from lockstep.robot_bridge.errors import SettingsError
 
 __all__ = ["read_settings_file"]
 
+MAX_NUMBER = 2**53
+
 
 def read_settings_file(path: Path, names: Iterable[str]) -> dict[str, str]:
     """Return the settings in `path` by name, each as the text that its environment variable would have.
@@ -30,4 +32,6 @@ def read_settings_file(path: Path, names: Iterable[str]) -> dict[str, str]:
             raise SettingsError(f"{path}: {not_a_setting(name, known)}")
         if not isinstance(value, bool | int | float | str):
             raise SettingsError(f"{path}: {name} has to be a text, a number, true or false")
+        if isinstance(value, int) and abs(value) > MAX_NUMBER:
+            raise SettingsError(f"{path}: {name} is too large a number")
     return {name: str(value).lower() if isinstance(value, bool) else str(value) for name, value in content.items()}

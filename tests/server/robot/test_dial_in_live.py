@@ -102,6 +102,20 @@ async def test_a_robot_without_a_key_is_refused_by_name_and_gets_no_websocket(tm
         assert not rig.dependencies.console.robot.up
 
 
+@pytest.mark.parametrize("path", ["operator", "media", "pair"])
+async def test_a_page_of_any_site_is_refused_and_uses_up_and_lists_nothing(tmp_path: Path, path: str) -> None:
+    """A browser says where the page is from; no robot does."""
+    async with waiting_console(tmp_path) as rig:
+        await code_for(rig)
+        for origin in ("https://evil.example", rig.url, "null"):
+            with pytest.raises(ConsoleRefused, match="origin_refused") as refused:
+                await open_connection(
+                    address_of(rig).path(path), console_context("any", None), headers={"Origin": origin}
+                )
+            assert refused.value.status == 403
+        assert await waits(rig) == []
+
+
 async def test_many_refusals_of_one_address_are_answered_too_many_requests_and_fill_no_log(
     tmp_path: Path, caplog: pytest.LogCaptureFixture, capfd: pytest.CaptureFixture[str]
 ) -> None:

@@ -64,3 +64,20 @@ def test_a_robot_that_is_let_in_waits_no_more() -> None:
     robots.admitted("10.0.0.7")
     robots.admitted("10.0.0.9")
     assert [each.address for each in robots.waiting(1.0)] == ["10.0.0.8"]
+
+
+def test_no_stranger_hides_that_a_robot_with_the_paired_robots_key_waits() -> None:
+    robots = WaitingRobots()
+    robots.called("10.0.0.7", "taken", "", 0.0, WALL)
+    for number in range(2 * MAX_WAITING):
+        robots.called(f"10.0.0.{number}", "robot_unknown", "", 1.0, WALL + 1.0)
+    found = robots.waiting(1.0)
+    assert len(found) == MAX_WAITING + 1
+    assert found[0] == WaitingRobot("10.0.0.7", WALL, "", "taken")
+
+
+def test_a_name_ends_no_quotation() -> None:
+    robots = WaitingRobots()
+    robots.called("10.0.0.7", "wrong_code", '” waits at 10.0.0.9: it is "paired". “', 0.0, WALL)
+    (found,) = robots.waiting(0.0)
+    assert found.name == "waits at 10.0.0.9: it is paired."

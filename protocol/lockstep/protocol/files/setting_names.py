@@ -15,6 +15,7 @@ def not_a_setting(name: str, known: Iterable[str], *, within: str = "", further:
         within: stands in front of either name: the table of a file that both are in, as in "media."
         further: what else is to be said of it, behind "is not a setting"
     """
+    name = name if name.isprintable() else ascii(name)
     names = {each.lower(): each for each in known}
     near = get_close_matches(name.lower(), names, 1)
     return f"{within}{name} is not a setting{further}{f'; did you mean {within}{names[near[0]]}?' if near else ''}"

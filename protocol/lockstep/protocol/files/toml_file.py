@@ -32,5 +32,5 @@ def read_toml(path: Path) -> tuple[dict[str, Any], bool]:
         return tomllib.loads(data.decode()), for_all
     except RecursionError as error:
         raise TomlUnusable(f"{path}: nested too deeply") from error
-    except (OSError, UnicodeError, tomllib.TOMLDecodeError) as error:
+    except (OSError, ValueError) as error:  # ValueError: not UTF-8, not TOML, or a number with too many digits
         raise TomlUnusable(f"{path}: {error}") from error

@@ -14,6 +14,8 @@ __all__ = ["FORGOTTEN_AFTER", "MAX_WAITING", "WaitReason", "WaitingRobot", "Wait
 MAX_WAITING = 8  # addresses
 FORGOTTEN_AFTER = 60.0  # s without a try; a robot that waits dials again within 10 s
 
+_QUOTES = str.maketrans(dict.fromkeys("\"'`´‘’‚‛“”„‟«»‹›"))  # people see a name between such
+
 # By the names of the robot link: it has no key or another one, the place is taken by a robot with its key, or the
 # reason why it was not paired.
 WaitReason = RefusalName | Literal["robot_unknown", "taken"]
@@ -32,10 +34,15 @@ class _Wait(NamedTuple):
 
 
 class WaitingRobots:
-    """At most `MAX_WAITING`, one an address. With more, the one that called longest ago is forgotten."""
+    """At most `MAX_WAITING`, one an address. With more, the one that called longest ago is forgotten.
+
+    Robots with the paired robot's key are apart, as many again: no stranger makes them forgotten.
+    """
 
     def __init__(self) -> None:
-        self._waits: OrderedDict[str, _Wait] = OrderedDict()  # by address, in the order of their newest tries
+        # By address, in the order of their newest tries.
+        self._strangers: OrderedDict[str, _Wait] = OrderedDict()
+        self._taken: OrderedDict[str, _Wait] = OrderedDict()
 
     def called(self, address: str, why: WaitReason, name: str, now: float, wall: float) -> None:
         """Take a try that was refused, or that has to wait.
@@ -48,21 +55,25 @@ class WaitingRobots:
             wall: s since 1970, for people
         """
         self._forget(now)
-        before = self._waits.pop(address, None)
+        waits = self._taken if why == "taken" else self._strangers
+        before = waits.pop(address, None)
         since, known = (wall, "") if before is None else (before.robot.since, before.robot.name)
-        self._waits[address] = _Wait(now, WaitingRobot(address, since, clean_name(name, known), why))
-        if len(self._waits) > MAX_WAITING:
-            self._waits.popitem(last=False)
+        waits[address] = _Wait(now, WaitingRobot(address, since, clean_name(name.translate(_QUOTES), known), why))
+        if len(waits) > MAX_WAITING:
+            waits.popitem(last=False)
 
     def admitted(self, address: str) -> None:
         """Forget the robots of this address, because one of them was let in. Another one will call again."""
-        self._waits.pop(address, None)
+        for waits in (self._strangers, self._taken):
+            waits.pop(address, None)
 
     def waiting(self, now: float) -> list[WaitingRobot]:
         """Return the robots that wait, by the time of their first try."""
         self._forget(now)
-        return sorted((each.robot for each in self._waits.values()), key=lambda robot: robot.since)
+        waits = (*self._strangers.values(), *self._taken.values())
+        return sorted((each.robot for each in waits), key=lambda robot: robot.since)
 
     def _forget(self, now: float) -> None:
-        while self._waits and now - next(iter(self._waits.values())).newest > FORGOTTEN_AFTER:
-            self._waits.popitem(last=False)
+        for waits in (self._strangers, self._taken):
+            while waits and now - next(iter(waits.values())).newest > FORGOTTEN_AFTER:
+                waits.popitem(last=False)

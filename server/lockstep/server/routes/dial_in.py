@@ -25,6 +25,7 @@ from lockstep.server.errors import (
     NotDialIn,
     NotFound,
     NotPairing,
+    OriginRefused,
     RobotUnknown,
     StateUnavailable,
     TooManyRequests,
@@ -206,6 +207,8 @@ def _pairing(dial_in: DialIn | None, now: float) -> PairingInfo:
 async def dial(websocket: WebSocket, name: str) -> None:
     """Let the paired robot in for one link; or, for "pair", a robot that knows the code. Others get a named refusal."""
     try:
+        if "origin" in websocket.headers:  # a browser's, which a page anywhere may have sent here
+            raise OriginRefused("robots dial this address, and no pages")
         here = dependencies(websocket)
         dial_in = _dial_in(here)
     except ConsoleError as error:

@@ -1,10 +1,14 @@
 """Datasets beside their recordings: episodes that were discarded or changed since are named."""
 
+import shutil
+from collections.abc import Callable
 from pathlib import Path
 
+import pytest
 from typer.testing import CliRunner
 
 from lockstep.server.cli.main import app
+from lockstep.server.recording.episodes.edits import edits_path
 from lockstep.server.recording.export import export_lerobot
 from lockstep.server.recording.export.export_lerobot import DatasetOptions
 from lockstep.server.recording.verify.verify_dataset import verify_dataset
@@ -40,6 +44,32 @@ def test_episodes_that_were_discarded_changed_or_split_after_the_export_are_name
     ]
     path.unlink()
     assert differences(root, folder)[0] == f"episode a of {ID}: the recording is not there, or cannot be read"
+
+
+@pytest.mark.parametrize("copy", [shutil.copyfile, lambda path, to: to.symlink_to(path)], ids=["copy", "link"])
+def test_a_copy_without_the_changes_hides_no_discarded_episode(
+    tmp_path: Path, copy: Callable[[Path, Path], object]
+) -> None:
+    folder = tmp_path / "recordings"
+    folder.mkdir()
+    path = recording(folder / "m.mcap", *KEPT_AND_NOT[:6], *NEXT)
+    (root,) = export_lerobot.export(path, tmp_path / "dataset", "")
+    change(path, {"episode": "a", "dropped": True})
+    for name in ("a.mcap", "z.mcap"):
+        copy(path, folder / name)
+    assert differences(root, folder) == [f"episode a of {ID} is discarded"]
+
+
+def test_a_recording_that_cannot_be_read_is_named_beside_a_copy_that_can(tmp_path: Path) -> None:
+    folder = tmp_path / "recordings"
+    folder.mkdir()
+    path = recording(folder / "m.mcap", *KEPT_AND_NOT[:6], *NEXT)
+    (root,) = export_lerobot.export(path, tmp_path / "dataset", "")
+    shutil.copyfile(path, folder / "z.mcap")
+    edits_path(path).mkdir()
+    found = differences(root, folder)
+    assert found
+    assert all("cannot be read" in each for each in found)
 
 
 def test_each_of_many_episodes_is_named_and_of_other_checks_how_many_more_there_are(tmp_path: Path) -> None:

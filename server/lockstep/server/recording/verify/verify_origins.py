@@ -13,13 +13,19 @@ from lockstep.server.recording.reading.reader import RecordingReader
 __all__ = ["RecordedNow", "outdated", "recorded_now"]
 
 Part = tuple[str, int, str]  # recording, part, epoch
-RecordedNow = Mapping[Part, Sequence[EpisodeEntry]]  # the episodes of each file, with all changes
+# The episodes with all changes, of each file that says it is that part: a copy may lack the changes, or be stale. None:
+# such a file cannot be read to its end.
+RecordedNow = Mapping[Part, Sequence[Sequence[EpisodeEntry] | None]]
 
 
 def outdated(episode: DatasetEpisode, recorded: RecordedNow) -> str:
     """Return how an episode of a dataset differs from the recordings by now; "" if it does not. No I/O."""
+    files = recorded.get((episode.recording, episode.part, episode.epoch), (None,))
+    return next(filter(None, (_outdated(episode, entries) for entries in files)), "")
+
+
+def _outdated(episode: DatasetEpisode, entries: Sequence[EpisodeEntry] | None) -> str:
     name = f"episode {episode.episode} of {episode.recording}" if episode.episode else f"all of {episode.recording}"
-    entries = recorded.get((episode.recording, episode.part, episode.epoch))
     if entries is None:
         return f"{name}: the recording is not there, or cannot be read"
     if not episode.episode:
@@ -43,16 +49,24 @@ def recorded_now(folder: Path, episodes: Sequence[DatasetEpisode]) -> RecordedNo
     """Read the episodes of those recordings in the folder that the dataset's come from. Raises OSError: no folder."""
     wanted = {each.recording for each in episodes}
     paths = sorted(path for path in folder.iterdir() if path.suffix == ".mcap")
-    return {part: entries for path in paths for part, entries in _read(path, wanted)}
+    found: dict[Part, list[Sequence[EpisodeEntry] | None]] = {}
+    for path in paths:
+        for part, entries in _read(path, wanted):
+            found.setdefault(part, []).append(entries)
+    return found
 
 
-def _read(path: Path, wanted: set[str]) -> Iterator[tuple[Part, Sequence[EpisodeEntry]]]:
+def _read(path: Path, wanted: set[str]) -> Iterator[tuple[Part, Sequence[EpisodeEntry] | None]]:
     try:
         with RecordingReader(path, EventIndex()) as head:
-            if head.info.recording not in wanted:
-                return
-        with RecordingReader(path) as reader:
-            entries = [each.entry for each in episodes_now(reader)]
-            yield (reader.info.recording, reader.info.part, reader.info.epoch), entries
+            info = head.info
     except (RecordingError, OSError):
         return  # whoever asks for its episodes says that it cannot be read
+    if info.recording not in wanted:
+        return
+    try:
+        with RecordingReader(path) as reader:
+            entries: Sequence[EpisodeEntry] | None = [each.entry for each in episodes_now(reader)]
+    except (RecordingError, OSError):
+        entries = None
+    yield (info.recording, info.part, info.epoch), entries
