@@ -13,6 +13,7 @@ from playwright.async_api import Browser, Locator
 from lockstep.bench.browsers.console_page import ConsolePage, open_console
 from lockstep.robot_bridge.robots.micromanipulator.description import DESCRIPTION, WINDOWS
 from tests.client.live.truth import until_logged
+from tests.e2e.armed import arm_at_rest
 from tests.support.stack import Stack, running_stack
 
 pytestmark = pytest.mark.browser
@@ -49,7 +50,7 @@ async def _done(
 ) -> tuple[list[float], list[float]]:
     """The joints before and after the action; asked for again when a busy machine has cancelled it."""
     for _ in range(TRIES):
-        await console.arm_at_rest()
+        await arm_at_rest(console)
         before, since = await _joints(console), (await stack.records())[-1]["time"]
         await ask()
         await console.until(

@@ -14,6 +14,7 @@ from lockstep.bench.browsers.console_page import ConsolePage, open_console
 from lockstep.bench.browsers.pad import RB
 from tests.client.live.truth import until_logged
 from tests.e2e.accessibility import findings
+from tests.e2e.armed import arm_at_rest
 from tests.support.stack import Stack
 
 pytestmark = pytest.mark.browser
@@ -64,7 +65,7 @@ async def test_a_click_is_a_goal_with_the_heading_of_the_drag_and_the_robot_arri
         open_console(chromium, stack.observer, pad=False) as observer,
     ):
         for _ in range(TRIES):
-            await console.arm_at_rest()
+            await arm_at_rest(console)
             if await console.page.locator(".map-canvas").count() == 0:
                 canvas = await _open_map(console)
             x, y = await _place(canvas, 1.2, -0.8)
@@ -101,7 +102,7 @@ async def test_a_place_without_room_is_refused_by_name_and_without_arming_nothin
         await canvas.click(position={"x": 200, "y": 200})
         await expect(console.page.get_by_text("Go to: Arm first: this moves the robot").first).to_be_attached()
         assert not await stack.events("action")
-        await console.arm_at_rest()
+        await arm_at_rest(console)
         x, y = await _place(canvas, -1.8, -1.0)  # a pillar
         await console.page.mouse.click(x, y)
         await expect(_words(console)).to_contain_text("refused · not possible now · there is no room at that place")
@@ -113,7 +114,7 @@ async def test_a_goal_ends_with_everything_that_ends_driving(stack: Stack, chrom
     reasons = {"cancel": "cancelled", "stick": "driving", "stop": "stopped, rested", "close": "rested, link_down"}
     async with open_console(chromium, stack.operator, width=1366, height=768) as console:
         for _ in range(TRIES):
-            await console.arm_at_rest()
+            await arm_at_rest(console)
             if await console.page.locator(".map-canvas").count() == 0:
                 canvas = await _open_map(console)
             since = (await stack.records())[-1]["time"]
@@ -158,7 +159,7 @@ async def test_a_finger_that_rests_sets_a_goal_and_one_that_moves_moves_the_map(
     async with open_console(chromium, stack.operator, width=390, height=844, touch=True) as console:
         await console.until_live()
         canvas = await _open_map(console)  # in the details, which disarm
-        await console.arm_at_rest()
+        await arm_at_rest(console)
         await _picture(console, "map-phone")
         assert await findings(console.page) == []
         client = await console.page.context.new_cdp_session(console.page)

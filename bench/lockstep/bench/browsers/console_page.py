@@ -93,18 +93,6 @@ class ConsolePage:
         await self.until("s.armed", 20)
         await self.pad.press(START, False)
 
-    async def arm_at_rest(self) -> None:
-        """Let go of everything and arm, with the robot at rest; again if a busy machine ended that."""
-        await self.until_live()
-        await self.pad.let_go()
-        for _ in range(ARM_TRIES):
-            if not (await self.stats())["armed"]:
-                await self.arm()
-            await self.until("s.at_rest === true")
-            if (await self.stats())["armed"]:
-                return
-        raise AssertionError("it does not stay armed")
-
     async def arm_by_key(self) -> None:
         """Press Enter where the keyboard is the robot's; again if nothing happens."""
         await self.until("s.seat && s.seat.mine")

@@ -8,7 +8,7 @@ from typer.testing import CliRunner, Result
 
 from lockstep.server.cli.main import app
 from tests.server.recording.makers import INFO
-from tests.server.recording.test_episode_export import KEPT_AND_NOT, episode, recording
+from tests.server.recording.test_episode_export import KEPT_AND_NOT, OTHER, episode, recording
 
 
 @pytest.fixture
@@ -143,11 +143,21 @@ def test_verify_names_the_episodes_of_a_dataset_that_were_discarded_since(direct
     assert "current (not looked at: --recordings FOLDER)" in _lockstep(directory, *command[:2]).stdout
 
 
-def test_a_copy_of_a_recording_comes_into_a_dataset_once_and_is_left_out_by_name(
-    directory: Path, tmp_path: Path
-) -> None:
+def test_a_copy_of_a_recording_comes_into_a_dataset_once(directory: Path, tmp_path: Path) -> None:
+    """No event of a recording comes into a dataset twice: what the copy has is left out by name."""
     done = _lockstep(directory, "export", "one", "two", "--to", "lerobot", "--out", str(tmp_path / "dataset"))
     assert done.exit_code == 0, done.output
-    assert "two" in done.stderr + done.stdout
+    assert done.stdout.count("of two.mcap is left out: the dataset has it already\n") == 2
     verdict = json.loads(_lockstep(directory, "verify", str(tmp_path / "dataset"), "--json").stdout)
     assert (verdict["ok"], verdict["episodes"], verdict["rows"]) == (True, 2, 25)
+
+
+def test_the_check_says_that_two_recordings_are_of_the_same_events(directory: Path, tmp_path: Path) -> None:
+    """As when somebody has written a copy under another id."""
+    (directory / "two.mcap").unlink()
+    recording(directory / "two.mcap", *KEPT_AND_NOT, info=OTHER)
+    done = _lockstep(directory, "export", "one", "two", "--to", "lerobot", "--out", str(tmp_path / "dataset"))
+    assert done.exit_code == 0, done.output
+    verdict = json.loads(_lockstep(directory, "verify", str(tmp_path / "dataset"), "--json").stdout)
+    assert (verdict["ok"], verdict["episodes"], verdict["rows"]) == (False, 4, 50)
+    assert {name for name, check in verdict["checks"].items() if check["count"]} == {"ordered"}
