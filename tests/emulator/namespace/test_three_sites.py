@@ -17,6 +17,11 @@ def packet(source: str, to: str, ports: tuple[int, int], protocol: int = socket.
     return header + struct.pack("!HHHH", *ports, 8, 0)
 
 
+def ports(data: bytes) -> tuple[int, int]:
+    source, destination = struct.unpack_from("!HH", data, 20)
+    return source, destination
+
+
 def ends(data: bytes) -> tuple[str, str]:
     return socket.inet_ntoa(data[12:16]), socket.inet_ntoa(data[16:20])
 
@@ -29,9 +34,11 @@ def test_the_open_port_is_reached_and_its_answers_find_the_way_back(site: Site, 
     passed = router.passes(site, packet(inside, CONSOLE, (5000, PORT)))
     assert passed is not None
     assert (passed[0], ends(passed[1])) == ("console", (outside, CONSOLE_INSIDE))
-    back = router.passes("console", packet(CONSOLE_INSIDE, outside, (PORT, 5000)))
+    seen, _ = ports(passed[1])
+    assert seen != 5000, "the router gives out ports of its own"
+    back = router.passes("console", packet(CONSOLE_INSIDE, outside, (PORT, seen)))
     assert back is not None
-    assert (back[0], ends(back[1])) == (site, (CONSOLE, inside))
+    assert (back[0], ends(back[1]), ports(back[1])) == (site, (CONSOLE, inside), (PORT, 5000))
 
 
 def test_no_other_port_is_reached_nor_a_site_that_did_not_ask() -> None:

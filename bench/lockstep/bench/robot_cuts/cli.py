@@ -26,17 +26,26 @@ def robot_cuts(
     cuts: Annotated[int, typer.Option(min=1, help="How often the network is cut.")] = 20,
     seconds: Annotated[float, typer.Option(min=0.5, help="How long, each time.")] = 10.0,
     way: Annotated[
-        Literal["reached", "dial-in"], typer.Option(help="The console connects to the robot, or the robot dials in.")
+        Literal["reached", "dial-in", "behind-nat"],
+        typer.Option(
+            help="The console connects to the robot, the robot dials in, or it does so and all are behind routers."
+        ),
     ] = "reached",
+    network: Annotated[str, typer.Option(help="The robot's, for behind-nat.")] = "robot-lte",
     seed: Annotated[int, typer.Option(help="Of the network.")] = 1,
 ) -> None:
     """Cut the network, and tell by the bridge's log whether the robot rested, came back, and did nothing late."""
     busy = asyncio.run(busy_percent(LOOK_SECONDS))
     print(f"others use {busy:.0f} % of this machine", file=sys.stderr, flush=True)
-    found = figures(
-        asyncio.run(run_cuts(way, cuts, seconds, seed, lambda text: print(text, file=sys.stderr, flush=True)))
+
+    def say(text: str) -> None:
+        print(text, file=sys.stderr, flush=True)
+
+    found = figures(asyncio.run(run_cuts(way, cuts, seconds, seed, say, network=network)))
+    network = network if way == "behind-nat" else "40 ms of round trip"
+    print(
+        json.dumps({"way": way, "network": network, "seconds": seconds, "busy_percent": round(busy), **found}, indent=1)
     )
-    print(json.dumps({"way": way, "seconds": seconds, "busy_percent": round(busy), **found}, indent=1))
     held = (found["rested_within_hold"], found["back_within_2_s"], found["nothing_late"])
     if held != (cuts, cuts, cuts):
         raise typer.Exit(1)

@@ -1,6 +1,6 @@
 """One robot in a network namespace of its own, which is cut in mid-drive: the console and the operator are outside.
 
-Linux and root only. The cut loses every packet between the two sides. What happened is told by the bridge's own log.
+Linux and root only. The cut loses every packet of the robot. What happened is told by the bridge's own log.
 """
 
 import asyncio
@@ -17,21 +17,26 @@ from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, Literal
+from urllib.parse import urlsplit
 
 from lockstep.bench.experiment.judge.outage_judge import Cut, Finding, judge_outage
 from lockstep.bench.harness.event_log import Record, records
 from lockstep.bench.harness.processes import started
 from lockstep.bench.harness.stack import LOCKSTEP
+from lockstep.emulator import load_profile
 from lockstep.emulator.impairment.delay import Constant
 from lockstep.emulator.impairment.impairment import Impairment
 from lockstep.emulator.impairment.profile import even_profile
-from lockstep.emulator.namespace.namespaces import OPERATOR_ADDRESS, ROBOT_ADDRESS, Namespaces, Side
+from lockstep.emulator.namespace.namespaces import OPERATOR_ADDRESS, ROBOT_ADDRESS, Namespaces
+from lockstep.emulator.namespace.three_sites import CONSOLE, SITES, ThreeSites
 from lockstep.robot_bridge.robots.planar.description import DESCRIPTION
 from lockstep.server.http.transport.tls import self_signed
 
 __all__ = ["RETURN_SECONDS", "Way", "figures", "run_cuts"]
 
-Way = Literal["reached", "dial-in"]  # the console connects to the robot, or the robot to the console
+# The console connects to the robot, the robot to the console, or that with each of robot, console and operator behind a
+# router of its own.
+Way = Literal["reached", "dial-in", "behind-nat"]
 
 HTTP_PORT, ROBOT_PORT = 8000, 5600
 ONE_WAY = 0.02  # s
@@ -45,8 +50,18 @@ RETURN_SECONDS = 2.0
 
 @dataclass(frozen=True)
 class _Place:
+    """Where the processes run, and how the robot is cut off.
+
+    `host` is where the console listens, `address` where the robot and the operator find it.
+    """
+
     folder: Path
-    spaces: Namespaces
+    robot: Any  # starts a process there, as `create_subprocess_exec` does
+    console: Any
+    operator: Any
+    host: str
+    address: str
+    cut: Callable[[float], None]  # for seconds
 
     @property
     def log(self) -> Path:
@@ -57,20 +72,47 @@ class _Place:
         return self.folder / "intentions.jsonl"
 
 
-async def run_cuts(way: Way, cuts: int, seconds: float, seed: int, say: Callable[[str], None]) -> list[Finding]:
+@asynccontextmanager
+async def _on_one_path(folder: Path, seed: int) -> AsyncIterator[_Place]:
+    """Console and operator on one side, the robot on the other, 40 ms of round trip between them."""
+    profile = even_profile("robot-cut", Impairment(delay=Constant(ONE_WAY)))
+    async with Namespaces(profile, seed=seed) as spaces:
+
+        def cut(seconds: float) -> None:
+            for robot_link in (True, False):  # the packets of the robot link, and those that open its connections
+                spaces.outage(seconds, robot=robot_link)
+
+        robot, outside = partial(spaces.start, "robot"), partial(spaces.start, "operator")
+        yield _Place(folder, robot, outside, outside, OPERATOR_ADDRESS, OPERATOR_ADDRESS, cut)
+
+
+@asynccontextmanager
+async def _behind_routers(folder: Path, network: str, seed: int) -> AsyncIterator[_Place]:
+    """Each behind a router of its own; the robot's path to the console is that of a profile's robot link."""
+    async with ThreeSites(load_profile(network), load_profile("perfect"), HTTP_PORT, seed=seed) as sites:
+        robot, console, page = (partial(sites.start, site) for site in SITES)
+        yield _Place(folder, robot, console, page, "0.0.0.0", CONSOLE, partial(sites.outage, "robot"))
+
+
+async def run_cuts(
+    way: Way, cuts: int, seconds: float, seed: int, say: Callable[[str], None], *, network: str = "robot-lte"
+) -> list[Finding]:
     """Cut the robot's network `cuts` times for `seconds` each; return what the bridge's log tells of each.
+
+    `network`: the profile of the robot's path, for `behind-nat`.
 
     Raises:
         NamespacesUnavailable: this machine or user cannot have network namespaces.
         ProcessFailed: something did not start.
         TimeoutError: the robot was not driven, or not driven again within a minute.
     """
-    profile = even_profile("robot-cut", Impairment(delay=Constant(ONE_WAY)))
-    with TemporaryDirectory(prefix="lockstep-robot-cuts-") as folder:
-        async with Namespaces(profile, seed=seed) as spaces:
-            place = _Place(Path(folder), spaces)
-            async with _driven(place, way):
-                made = [await _cut(place, seconds, number, say) for number in range(cuts)]
+    with TemporaryDirectory(prefix="lockstep-robot-cuts-") as name:
+        folder = Path(name)
+        async with (
+            _behind_routers(folder, network, seed) if way == "behind-nat" else _on_one_path(folder, seed) as place,
+            _driven(place, way),
+        ):
+            made = [await _cut(place, seconds, number, say) for number in range(cuts)]
         intentions = [tuple(json.loads(line)) for line in place.intentions.read_text().splitlines()]
         log = list(records(place.log))
     return [_judged(log, cut, intentions) for cut in made]
@@ -106,7 +148,7 @@ def _ms(seconds: float | None) -> float | None:
 async def _driven(place: _Place, way: Way) -> AsyncIterator[None]:
     """Robot, console and operator; yields when the robot is driven."""
     folder = place.folder
-    made = self_signed(folder, {OPERATOR_ADDRESS}, datetime.datetime.now(datetime.UTC))
+    made = self_signed(folder, {place.address}, datetime.datetime.now(datetime.UTC))
     key = folder / "robot.key"
     key.touch(mode=0o600)
     key.write_text(secrets.token_urlsafe(32))
@@ -114,30 +156,32 @@ async def _driven(place: _Place, way: Way) -> AsyncIterator[None]:
         *(sys.executable, "-m", "lockstep.robot_bridge", "planar", "--json"),
         *("--event-log", str(place.log), "--state-dir", str(folder / "bridge")),
     ]
-    if way == "dial-in":
-        robot += ["--console", f"wss://{OPERATOR_ADDRESS}:{HTTP_PORT}", "--console-ca", str(made.chain)]
+    dials = way != "reached"
+    if dials:
+        robot += ["--console", f"wss://{place.address}:{HTTP_PORT}", "--console-ca", str(made.chain)]
         robot += ["--console-key-file", str(key)]
     else:
         robot += ["--host", ROBOT_ADDRESS, "--port", str(ROBOT_PORT), "--link-secret-file", str(key)]
-    address = "dial-in" if way == "dial-in" else f"tcp://{ROBOT_ADDRESS}:{ROBOT_PORT}"
+    if way == "behind-nat":
+        robot += ["--encode", "h264"]  # raw pictures do not fit such a path
+    address = "dial-in" if dials else f"tcp://{ROBOT_ADDRESS}:{ROBOT_PORT}"
     console = [
         *(LOCKSTEP, "serve", "--json", "--quiet", "--robot", address, "--link-secret-file", str(key)),
-        *("--host", OPERATOR_ADDRESS, "--port", str(HTTP_PORT)),
+        *("--host", place.host, "--port", str(HTTP_PORT), "--media-port", str(HTTP_PORT)),
+        *("--advertise", place.address, "--public-url", f"https://{place.address}:{HTTP_PORT}"),
         *("--tls-cert", str(made.chain), "--tls-key", str(made.key)),
     ]
     settings = {"LOCKSTEP_STATE_DIR": str(folder / "state"), "LOCKSTEP_SCENE": "false"}
 
-    def spawned(side: Side) -> Any:
-        return partial(place.spaces.start, side)
-
     async with (
-        started(robot, spawn=spawned("robot")),
-        started(console, environment=settings, spawn=spawned("operator")) as serving,
+        started(robot, spawn=place.robot),
+        started(console, environment=settings, spawn=place.console) as serving,
     ):
-        link = json.loads(await serving.line(r'^\{"console"'))["operator"]
+        link = urlsplit(json.loads(await serving.line(r'^\{"console"'))["operator"])
+        outside = link._replace(scheme="https", netloc=f"{place.address}:{HTTP_PORT}").geturl()
         operator = [sys.executable, "-m", "lockstep.bench.robot_cuts.operator"]
-        operator += [link, str(made.chain), str(place.intentions)]
-        async with started(operator, spawn=spawned("operator")):
+        operator += [outside, str(made.chain), str(place.intentions)]
+        async with started(operator, spawn=place.operator):
             await _until_driven(place.log, time.monotonic())
             yield
 
@@ -145,8 +189,7 @@ async def _driven(place: _Place, way: Way) -> AsyncIterator[None]:
 async def _cut(place: _Place, seconds: float, number: int, say: Callable[[str], None]) -> Cut:
     await asyncio.sleep(BEFORE)
     began = time.monotonic()
-    for robot_link in (True, False):  # the packets of the robot link, and those that open its connections
-        place.spaces.outage(seconds, robot=robot_link)
+    place.cut(seconds)
     ended = began + seconds
     await asyncio.sleep(seconds)
     driven = await _until_driven(place.log, ended)

@@ -1,8 +1,9 @@
 """Three namespaces, each behind a router of its own: a robot, a console with one open port, and a page.
 
-Linux and root only. Each router translates its machine's inner address into an outer one and lets in answers alone
-(RFC 4787 5), but for the console's open port. The robot's path to the console is one profile's robot link, the page's
-is another's network of a client; between robot and page there is no path.
+Linux and root only. The routers of robot and page give each way out a port of their own and let in its answers alone
+(RFC 4787: address and port-dependent), as the routers of homes and of mobile networks that are hardest to pass. The
+console's keeps ports, and forwards its open one. The robot's path to the console is one profile's robot link, the
+page's is another's network of a client; between robot and page there is no path.
 """
 
 import socket
@@ -17,7 +18,7 @@ from lockstep.emulator.impairment.outages import Outages
 from lockstep.emulator.impairment.path import ImpairedPath
 from lockstep.emulator.impairment.profile import DIRECTIONS, Direction, Profile
 from lockstep.emulator.namespace.tun_sites import TunSites
-from lockstep.emulator.transport.address_translation import Firewall, OneToOneNat
+from lockstep.emulator.transport.address_translation import Firewall, OneToOneNat, PortNat
 
 __all__ = ["CONSOLE", "SITES", "Router", "Site", "ThreeSites"]
 
@@ -39,8 +40,12 @@ class Router:
         """`open_port`: of the console, for TCP and UDP."""
         self.refused: Counter[Site] = Counter()
         self._open_port = open_port
-        self._nats = {site: OneToOneNat(INNER[site], OUTER[site]) for site in SITES}
-        self._firewalls = {site: Firewall() for site in SITES}
+        self._nats: dict[Site, OneToOneNat | PortNat] = {
+            "robot": PortNat(INNER["robot"], OUTER["robot"]),
+            "console": OneToOneNat(INNER["console"], CONSOLE),
+            "page": PortNat(INNER["page"], OUTER["page"]),
+        }
+        self._firewall = Firewall()  # the console's
         self._by_address = {socket.inet_aton(address): site for site, address in OUTER.items()}
 
     def passes(self, site: Site, packet: bytes) -> tuple[Site, bytes] | None:
@@ -51,12 +56,14 @@ class Router:
         other = self._by_address.get(packet[16:20])
         if outer is None or other is None or other == site or "console" not in (site, other):
             return None
-        self._firewalls[site].leaving(outer)
-        if not (self._firewalls[other].admits(outer) or (other == "console" and self._is_for_open_port(outer))):
+        if site == "console":
+            self._firewall.leaving(outer)
+        admitted = other != "console" or self._firewall.admits(outer) or self._is_for_open_port(outer)
+        inner = self._nats[other].inward(outer) if admitted else None
+        if inner is None:
             self.refused[other] += 1
             return None
-        inner = self._nats[other].inward(outer)
-        return None if inner is None else (other, inner)
+        return other, inner
 
     def _is_for_open_port(self, packet: bytes) -> bool:
         port: int = struct.unpack_from("!H", packet, (packet[0] & 15) * 4 + 2)[0]
@@ -83,6 +90,10 @@ class ThreeSites(TunSites[Site]):
         super().__init__(INNER)
         self.router = Router(open_port)
         self._legs: dict[Site, _Leg] = {"robot": _robot_leg(robot, seed), "page": _page_leg(page, seed)}
+
+    def outage(self, site: Literal["robot", "page"], seconds: float) -> None:
+        """Lose every packet between a site and the console from now on, for `seconds`."""
+        self._legs[site].outages.demand(time.monotonic(), seconds)
 
     def sent_bytes(self, site: Site, direction: Direction) -> int:
         """Return the bytes that a site's path to the console has taken in one direction."""
