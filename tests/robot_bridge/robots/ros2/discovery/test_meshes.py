@@ -3,7 +3,9 @@
 import math
 import os
 import struct
+import sys
 import tracemalloc
+import zipfile
 from pathlib import Path
 
 import numpy as np
@@ -26,13 +28,84 @@ def text() -> bytes:
     return f"solid x\nfacet normal 0 0 1\nouter loop\n{corners}endloop\nendfacet\nendsolid x\n".encode()
 
 
-@pytest.mark.parametrize("data", [binary(), text()])
-def test_a_mesh_in_a_file_has_its_triangles(data: bytes, tmp_path: Path) -> None:
-    file = tmp_path / "link.STL"
+def wavefront() -> bytes:
+    corners = "".join(f"v {x} {y} {z}\n" for x, y, z in CORNERS)
+    return f"mtllib none.mtl\no link\n{corners}vn 0 0 1\nusemtl red\nf 1//1 2//1 -1//1\n".encode()
+
+
+def collada(unit: float = 1.0, shape: str = "triangles", move: str = "", up: str = "Z_UP") -> bytes:
+    """A scene of one node, with a texture that is nowhere."""
+    numbers = " ".join(str(value / unit) for corner in CORNERS for value in corner)
+    count = "<vcount>3</vcount>" if shape == "polylist" else ""
+    return f"""<?xml version="1.0" encoding="utf-8"?>
+<COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema" version="1.4.1">
+<asset><unit name="some" meter="{unit}"/><up_axis>{up}</up_axis></asset>
+<library_images><image id="i"><init_from>../../nowhere.png</init_from></image></library_images>
+<library_effects><effect id="e"><profile_COMMON>
+<newparam sid="s"><surface type="2D"><init_from>i</init_from></surface></newparam>
+<newparam sid="t"><sampler2D><source>s</source></sampler2D></newparam>
+<technique sid="c"><phong><diffuse><texture texture="t" texcoord="UV"/></diffuse></phong></technique>
+</profile_COMMON></effect></library_effects>
+<library_materials><material id="m"><instance_effect url="#e"/></material></library_materials>
+<library_geometries><geometry id="g"><mesh>
+<source id="p"><float_array id="a" count="9">{numbers}</float_array><technique_common>
+<accessor source="#a" count="3" stride="3"><param name="X" type="float"/><param name="Y" type="float"/>
+<param name="Z" type="float"/></accessor></technique_common></source>
+<vertices id="v"><input semantic="POSITION" source="#p"/></vertices>
+<{shape} count="1" material="red"><input semantic="VERTEX" source="#v" offset="0"/>{count}<p>0 1 2</p></{shape}>
+</mesh></geometry></library_geometries>
+<library_visual_scenes><visual_scene id="w"><node id="n">{move}<instance_geometry url="#g"><bind_material>
+<technique_common><instance_material symbol="red" target="#m"/></technique_common>
+</bind_material></instance_geometry></node></visual_scene></library_visual_scenes>
+<scene><instance_visual_scene url="#w"/></scene>
+</COLLADA>""".encode()
+
+
+@pytest.mark.parametrize(
+    ("name", "data"),
+    [
+        ("link.STL", binary()),
+        ("link.stl", text()),
+        ("link.obj", wavefront()),
+        ("link.dae", collada()),
+        ("link.DAE", collada(unit=0.001, shape="polylist")),
+        ("link.dae", collada(up="Y_UP")),  # as RViz reads it
+    ],
+)
+def test_a_mesh_in_a_file_has_its_triangles_in_meters(name: str, data: bytes, tmp_path: Path) -> None:
+    file = tmp_path / name
     file.write_bytes(data)
     mesh = read_mesh(f"file://{file}", 8)
     assert mesh is not None
-    assert [[mesh.vertices[number] for number in triangle] for triangle in mesh.triangles] == [list(CORNERS)]
+    found = [mesh.vertices[number] for triangle in mesh.triangles for number in triangle]
+    assert np.array(found) == pytest.approx(np.array(CORNERS), abs=1e-6)
+
+
+def test_a_face_of_many_corners_is_a_fan(tmp_path: Path) -> None:
+    file = tmp_path / "link.obj"
+    file.write_bytes(b"v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1/1 2/2 3/3 4/4\nl 1 2\n")
+    mesh = read_mesh(f"file://{file}", 8)
+    assert mesh is not None
+    assert (len(mesh.vertices), len(mesh.triangles)) == (4, 2)
+
+
+def test_the_nodes_of_a_scene_are_where_it_places_them(tmp_path: Path) -> None:
+    file = tmp_path / "link.dae"
+    file.write_bytes(collada(unit=0.01, move="<translate>100 0 0</translate>"))
+    mesh = read_mesh(f"file://{file}", 8)
+    assert mesh is not None
+    assert sorted(round(x, 6) for x, _, _ in mesh.vertices) == [1.0, 1.0, 3.0]
+
+
+def test_a_mesh_cannot_define_entities_nor_come_in_an_archive(tmp_path: Path) -> None:
+    body = collada().partition(b"?>")[2]
+    entities = b'<!DOCTYPE c [<!ENTITY a "' + b"x" * 1000 + b'">'
+    entities += b"".join(b'<!ENTITY %c "%s">' % (97 + i, b"&%c;" % (96 + i) * 100) for i in range(1, 6)) + b"]>"
+    (tmp_path / "bomb.dae").write_bytes(entities + body.replace(b"<asset>", b"<asset><title>&f;</title>"))
+    with zipfile.ZipFile(tmp_path / "packed.dae", "w") as archive:
+        archive.writestr("link.dae", collada())
+    for name in ("bomb.dae", "packed.dae"):
+        assert read_mesh(f"file://{tmp_path}/{name}", 8) is None
 
 
 def ball(rings: int) -> list[list[float]]:
@@ -89,10 +162,17 @@ def test_a_mesh_of_a_package_is_looked_for_where_packages_are(tmp_path: Path) ->
 
 
 @pytest.mark.parametrize(
-    "data", [b"", b"no mesh", binary()[:-1], binary(((float("nan"),) * 3,) * 3), b"solid\nvertex a b c\n"]
+    ("kind", "data"),
+    [
+        *(("stl", data) for data in (b"", b"no mesh", binary()[:-1], binary(((float("nan"),) * 3,) * 3))),
+        ("stl", b"solid\nvertex a b c\n"),
+        *(("obj", data) for data in (b"", b"no mesh", b"v 1 2\nf 1 1 1\n", b"f\n", b"\xff\xfe")),
+        *(("obj", b"v 0 0 0\nf " + face) for face in (b"1 2 3\n", b"-9 1 1\n", b"a b c\n")),
+        *(("dae", data) for data in (b"", b"<a/>", collada()[:-20], collada().replace(b"0 1 2", b"0 1 9"))),
+    ],
 )
-def test_what_is_no_mesh_is_not_drawn(data: bytes, tmp_path: Path) -> None:
-    file = tmp_path / "link.stl"
+def test_what_is_no_mesh_is_not_drawn(kind: str, data: bytes, tmp_path: Path) -> None:
+    file = tmp_path / f"link.{kind}"
     file.write_bytes(data)
     assert read_mesh(f"file://{file}", 8) is None
 
@@ -129,9 +209,19 @@ def test_a_large_mesh_needs_memory_for_few_copies_of_its_file(tmp_path: Path) ->
     assert peak < 6 * len(data)
 
 
+def test_a_mesh_that_needs_a_reader_which_is_not_installed_is_named(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "collada", None)
+    (tmp_path / "link.dae").write_bytes(collada())
+    read = MeshReader()
+    assert read(f"file://{tmp_path}/link.dae", 8) is None
+    assert "python3-collada" in read.left_out[0]
+
+
 def test_meshes_above_the_bounds_are_not_read_but_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     size = len(binary())
-    monkeypatch.setattr(meshes, "MAX_BYTES", size)
+    monkeypatch.setattr(meshes, "MAX_BYTES", {".stl": size})
     monkeypatch.setattr(meshes, "MAX_ALL_BYTES", 2 * size)
     for name in ("a", "b", "c"):
         (tmp_path / f"{name}.stl").write_bytes(binary())

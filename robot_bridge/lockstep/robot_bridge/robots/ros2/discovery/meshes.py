@@ -1,12 +1,15 @@
-"""Reads a mesh of a URDF as few triangles, where its file is on this machine: STL, binary or text.
+"""Reads a mesh of a URDF as few triangles, where its file is on this machine: STL, COLLADA (.dae) or OBJ.
 
 The name comes from a topic. So only a regular file with the ending of a mesh is read, up to a bound for each and for
-all, and nothing of it is kept but the numbers of some vertices.
+all, no file that it names is opened, and nothing of it is kept but the numbers of some vertices.
 """
 
 import io
 import os
+import warnings
+from array import array
 from collections.abc import Iterator, Mapping
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 from urllib.parse import unquote, urlsplit
@@ -18,14 +21,15 @@ from lockstep.robot_bridge.robots.ros2.discovery.urdf import Mesh
 
 __all__ = ["MeshReader", "mesh_file", "read_mesh", "simplified"]
 
-MAX_BYTES = 64 << 20  # of a file
+MAX_BYTES = {".stl": 64 << 20, ".dae": 16 << 20, ".obj": 64 << 20}  # of a file
+MOST_CORNERS = 4_000_000  # that an OBJ file's faces may have
 MAX_ALL_BYTES = 512 << 20  # of all meshes of a URDF
 MOST_EXTENT = 1e6  # in the mesh's units
+HEAD, TRIANGLE = 84, 50  # bytes of a binary STL: head with the count, each triangle
+_TRIANGLE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 CELLS = (4096, 64, 48, 36, 27, 20, 15, 12, 10, 8, 7, 6, 5, 4, 3, 2)  # along the longest side, first all but exact
 EXACT_CORNERS = 30_000  # a mesh with more of them has no room for all its vertices: the first grid is left out
 DENSE_CELLS = 65**3  # a grid with more of them is numbered by its cells in use
-HEAD, TRIANGLE = 84, 50  # bytes of a binary STL: head with the count, each triangle
-_TRIANGLE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 
 Points = npt.NDArray[Any]  # n x 3, floats of either size
 Numbers = npt.NDArray[np.int64]
@@ -35,7 +39,7 @@ def mesh_file(uri: str, environment: Mapping[str, str] = os.environ) -> Path | N
     """Return the file of "package://NAME/path" or "file:///path"; None if it is not on this machine."""
     parts = urlsplit(uri)
     path = unquote(parts.path)
-    if ".." in Path(path).parts or not path.lower().endswith(".stl"):
+    if ".." in Path(path).parts or Path(path).suffix.lower() not in MAX_BYTES:
         return None
     if parts.scheme == "file":
         places = [Path(path)]
@@ -51,7 +55,7 @@ class MeshReader:
     """Reads the meshes of one URDF. A mesh that several links have is read once.
 
     Attributes:
-        left_out: the names of those that are too large, with the bound
+        left_out: the names of those that are too large, or that nothing here reads, with the reason
     """
 
     def __init__(self) -> None:
@@ -71,23 +75,30 @@ class MeshReader:
             size = 0 if file is None else file.stat().st_size
         except (OSError, ValueError):
             return None
-        if size > MAX_BYTES:
-            self.left_out.append(f"{uri}: it has more than {MAX_BYTES >> 20} MiB")
+        if file is not None and size > (most_bytes := _most_bytes(file)):
+            self.left_out.append(f"{uri}: it has more than {most_bytes >> 20} MiB")
         elif size > self._left:
             self.left_out.append(f"{uri}: the meshes have more than {MAX_ALL_BYTES >> 20} MiB together")
         else:
             self._left -= size
-            return read_mesh(uri, most)
+            try:
+                return read_mesh(uri, most)
+            except ImportError:
+                self.left_out.append(f"{uri}: install pycollada (Debian: python3-collada) beside ROS to have it drawn")
         return None
 
 
 def read_mesh(uri: str, most: int) -> Mesh | None:
-    """Return a mesh as at most so many vertices; None if it cannot be read."""
+    """Return a mesh as at most so many vertices; None if it cannot be read.
+
+    Raises:
+        ImportError: it is COLLADA, and pycollada is not installed.
+    """
     try:
         file = mesh_file(uri)
-        if file is None or file.stat().st_size > MAX_BYTES:
+        if file is None or file.stat().st_size > _most_bytes(file):
             return None
-        points = _points(file.read_bytes())
+        points = READERS[file.suffix.lower()](file.read_bytes())
     except (OSError, ValueError):
         return None
     if points.size == 0 or len(points) % 3 or not np.isfinite(points).all():
@@ -147,7 +158,11 @@ def _merged(corners: Points, numbers: Numbers, most: int) -> Mesh | None:
     return Mesh(vertices, [(int(a), int(b), int(c)) for a, b, c in renumbered[np.sort(first)]])
 
 
-def _points(data: bytes) -> Points:
+def _most_bytes(file: Path) -> int:
+    return MAX_BYTES[file.suffix.lower()]
+
+
+def _stl(data: bytes) -> Points:
     """Return the corners of all triangles.
 
     Raises:
@@ -166,3 +181,66 @@ def _text_coordinates(data: bytes) -> Iterator[float]:
         if words[:1] == [b"vertex"]:
             x, y, z = map(float, words[1:4])
             yield from (x, y, z)
+
+
+def _obj(data: bytes) -> Points:
+    """Return the corners of all faces, each as a fan of triangles.
+
+    Raises:
+        ValueError: the data is no OBJ, or has too many faces.
+    """
+    places, corners = array("d"), array("q")
+    for line in io.BytesIO(data):
+        words = line.split()
+        if words[:1] == [b"v"]:
+            x, y, z = map(float, words[1:4])
+            places.extend((x, y, z))
+        elif words[:1] == [b"f"]:
+            # "7/1/3": corner, texture and normal; from 1 on, or back from the last corner so far
+            numbers = [int(word.partition(b"/")[0]) for word in words[1:]]
+            first, *others = [number - 1 if number > 0 else len(places) // 3 + number for number in numbers]
+            for second, third in pairwise(others):
+                corners.extend((first, second, third))
+        if len(corners) > MOST_CORNERS:
+            raise ValueError("too many faces")
+    points, used = np.array(places).reshape(-1, 3), np.array(corners, np.int64)
+    if not ((used >= 0) & (used < len(points))).all():
+        raise ValueError("a face names a corner that does not exist")
+    return points[used]
+
+
+def _dae(data: bytes) -> Points:
+    """Return the corners of all triangles of a COLLADA scene, in meters.
+
+    Its nodes are where it places them. The direction that it calls "up" is left alone, as RViz does.
+
+    Raises:
+        ValueError: the data is no COLLADA.
+        ImportError: pycollada is not installed.
+    """
+    import collada
+
+    if not data.lstrip(b"\xef\xbb\xbf \t\r\n").startswith(b"<"):
+        raise ValueError("no XML")  # pycollada would unpack an archive
+    try:
+        with warnings.catch_warnings(action="ignore"):  # it uses numpy's matrices, which numpy is going to drop
+            document = collada.Collada(io.BytesIO(data), ignore=[collada.common.DaeError])
+            unit = document.assetInfo.unitmeter or 1.0
+            found = [_triangles(part) for each in document.scene.objects("geometry") for part in each.primitives()]
+    except Exception as error:  # pycollada tells malformed data by errors of many kinds
+        raise ValueError("no COLLADA") from error
+    return np.concatenate([np.empty((0, 3)), *found]) * unit
+
+
+def _triangles(part: Any) -> Points:
+    """Return the corners of a part of a COLLADA geometry; none of lines."""
+    if hasattr(part, "triangleset"):
+        part = part.triangleset()
+    numbers = part.vertex_index
+    if part.vertex is None or numbers is None or np.ndim(numbers) != 2 or np.shape(numbers)[1] != 3:
+        return np.empty((0, 3))
+    points: Points = np.asarray(part.vertex)[numbers].reshape(-1, 3)
+    return points
+
+
+READERS = {".stl": _stl, ".obj": _obj, ".dae": _dae}
