@@ -48,6 +48,17 @@ def test_a_run_names_its_day_its_machine_and_only_sections_that_exist(name: str)
     assert all(result.value is None or result.value >= 0 for result in results(name))
 
 
+@pytest.mark.parametrize("path", sorted((HISTORY / "robot_networks").iterdir()), ids=lambda path: path.stem)
+def test_a_run_beside_the_benchmark_names_its_day_its_command_and_its_machine(path: Path) -> None:
+    kept = json.loads(path.read_text())
+    assert re.fullmatch(r"20\d\d-\d\d-\d\d-[0-9a-f]{7,}-[\w-]+\.json", path.name)
+    assert kept["at"][:10] == path.name[:10]
+    assert kept["command"].startswith("python -m lockstep.bench.")
+    assert kept["machine"].keys() >= MACHINE_KEYS
+    assert kept["busy_percent"] <= 8, "too much else went on to keep the figures"
+    assert kept["runs"]
+
+
 @pytest.mark.parametrize(("section", "row"), SHOWN, ids=lambda part: part if isinstance(part, str) else part[0])
 def test_a_figure_of_the_page_is_that_of_its_run(section: str, row: list[str]) -> None:
     *shown, _ratio, name = row

@@ -15,36 +15,17 @@ from lockstep.bench.browsers.pad import RB
 from tests.client.live.truth import until_logged
 from tests.e2e.accessibility import findings
 from tests.e2e.armed import arm_at_rest
+from tests.e2e.map_page import open_map, place_on_map
 from tests.support.stack import Stack
 
 pytestmark = pytest.mark.browser
 
 TRIES = 3  # a busy machine may hold the page up, which disarms it and so cancels the goal
-COVERED, COVERED_ON_A_PHONE = (0, 64), (104, 44)  # pixels at the upper and the lower edge
-WIDTH, HEIGHT = 8.4, 6.4  # m, of the planar robot's map
-
-
-async def _open_map(console: ConsolePage) -> Locator:
-    """Open the map by its button; on a small screen that is in the details."""
-    buttons = console.page.get_by_role("button", name="Map", exact=True)
-    shown = buttons.locator("visible=true")
-    if await shown.count() == 0:
-        await console.page.locator(".bar").get_by_role("button", name=re.compile("Details|More", re.I)).first.click()
-    await shown.first.click()
-    canvas = console.page.locator(".map-canvas")
-    await expect(canvas).to_be_visible()
-    await expect(console.page.locator(".map-facts")).to_contain_text("Map ")
-    return canvas
+SIZE = (8.4, 6.4)  # m, of the planar robot's map
 
 
 async def _place(canvas: Locator, x: float, y: float) -> tuple[float, float]:
-    """Return where a place on the map is on the page, while the whole map is seen."""
-    box = await canvas.bounding_box()
-    assert box is not None
-    above, below = COVERED_ON_A_PHONE if box["width"] < 600 else COVERED
-    height = box["height"] - above - below
-    scale = 0.94 * min(box["width"] / WIDTH, height / HEIGHT)
-    return box["x"] + box["width"] / 2 + x * scale, box["y"] + above + height / 2 - y * scale
+    return await place_on_map(canvas, x, y, SIZE)
 
 
 def _words(console: ConsolePage) -> Locator:
@@ -67,7 +48,7 @@ async def test_a_click_is_a_goal_with_the_heading_of_the_drag_and_the_robot_arri
         for _ in range(TRIES):
             await arm_at_rest(console)
             if await console.page.locator(".map-canvas").count() == 0:
-                canvas = await _open_map(console)
+                canvas = await open_map(console)
             x, y = await _place(canvas, 1.2, -0.8)
             await console.page.mouse.move(x, y)
             await console.page.mouse.down()
@@ -86,7 +67,7 @@ async def test_a_click_is_a_goal_with_the_heading_of_the_drag_and_the_robot_arri
         joints = await console.page.evaluate("lockstep.stats().joints")
         assert math.hypot(joints[0] - 1.2, joints[1] + 0.8) < 0.1
         assert abs(joints[2] - math.pi / 2) < 0.1
-        await _open_map(observer)
+        await open_map(observer)
         await expect(observer.page.locator(".map-hint")).to_be_hidden()
     done = await until_logged(stack, "action", lambda record: record["state"] == "done")
     assert done["name"] == "go_to"
@@ -97,7 +78,7 @@ async def test_a_place_without_room_is_refused_by_name_and_without_arming_nothin
 ) -> None:
     async with open_console(chromium, stack.operator, width=1366, height=768) as console:
         await console.until_live()
-        canvas = await _open_map(console)
+        canvas = await open_map(console)
         assert await findings(console.page) == []
         await canvas.click(position={"x": 200, "y": 200})
         await expect(console.page.get_by_text("Go to: Arm first: this moves the robot").first).to_be_attached()
@@ -116,7 +97,7 @@ async def test_a_goal_ends_with_everything_that_ends_driving(stack: Stack, chrom
         for _ in range(TRIES):
             await arm_at_rest(console)
             if await console.page.locator(".map-canvas").count() == 0:
-                canvas = await _open_map(console)
+                canvas = await open_map(console)
             since = (await stack.records())[-1]["time"]
             await console.page.mouse.click(*await _place(canvas, -3.0, 2.0))
             await expect(_words(console)).to_contain_text(re.compile("to go|planning|Arm first|cancelled"))
@@ -158,7 +139,7 @@ async def test_a_finger_that_rests_sets_a_goal_and_one_that_moves_moves_the_map(
 ) -> None:
     async with open_console(chromium, stack.operator, width=390, height=844, touch=True) as console:
         await console.until_live()
-        canvas = await _open_map(console)  # in the details, which disarm
+        canvas = await open_map(console)  # in the details, which disarm
         await arm_at_rest(console)
         await _picture(console, "map-phone")
         assert await findings(console.page) == []

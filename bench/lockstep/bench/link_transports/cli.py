@@ -11,6 +11,8 @@ from typing import Annotated
 
 import typer
 
+from lockstep.bench.figures.kept_run import kept_run
+from lockstep.bench.figures.machine import busy_percent
 from lockstep.bench.figures.samples import median, quantile
 from lockstep.bench.link_transports.ends import CHAIN, KEY
 from lockstep.bench.link_transports.transports import KINDS, Kind
@@ -26,6 +28,7 @@ __all__ = ["main"]
 PORT = 9000
 ROUND_TRIPS = (0.02, 0.1)  # s
 LOSSES = (0.0, 0.02)
+LOOK_SECONDS = 1.5
 PATIENCE = 60.0  # s on top of the measurement itself
 
 Times = dict[str, list[float]]
@@ -59,6 +62,7 @@ def run(
     json_to: Annotated[Path | None, typer.Option("--json", help="Write the figures there.")] = None,
 ) -> None:
     """Measure command to feedback and the delay of pictures, on each path and by each transport in turns."""
+    busy = asyncio.run(busy_percent(LOOK_SECONDS))
     rows = []
     for round_trip in ROUND_TRIPS:
         for loss in LOSSES:
@@ -72,7 +76,7 @@ def run(
             for row in rows[-len(KINDS) :]:
                 print(json.dumps(row), flush=True)
     if json_to is not None:
-        json_to.write_text(json.dumps(rows, indent=2) + "\n")
+        json_to.write_text(json.dumps(kept_run(busy, rows), indent=1) + "\n")
 
 
 def _row(kind: Kind, round_trip: float, loss: float, times: Times) -> dict[str, float | str]:

@@ -10,6 +10,7 @@ from typing import Annotated, Literal
 
 import typer
 
+from lockstep.bench.figures.kept_run import kept_run
 from lockstep.bench.figures.machine import busy_percent
 from lockstep.bench.robot_cuts.run import figures, run_cuts
 
@@ -43,9 +44,8 @@ def robot_cuts(
 
     found = figures(asyncio.run(run_cuts(way, cuts, seconds, seed, say, network=network)))
     network = network if way == "behind-nat" else "40 ms of round trip"
-    print(
-        json.dumps({"way": way, "network": network, "seconds": seconds, "busy_percent": round(busy), **found}, indent=1)
-    )
+    run = {"way": way, "network": network, "seconds": seconds, **found}
+    print(json.dumps(kept_run(busy, [run]), indent=1))
     held = (found["rested_within_hold"], found["back_within_2_s"], found["nothing_late"])
     if held != (cuts, cuts, cuts):
         raise typer.Exit(1)

@@ -10,6 +10,7 @@ from typing import Annotated, Any
 
 import typer
 
+from lockstep.bench.figures.kept_run import kept_run
 from lockstep.bench.figures.machine import busy_percent
 from lockstep.bench.second_encoding.run import run
 
@@ -41,4 +42,4 @@ def second_encoding(
                 found = asyncio.run(run(network, robot, operator_kbps * 1000, seconds, seed=seed + turn, second=second))
                 results.append({"network": network, "second": second, **found})
                 print(json.dumps(results[-1]), file=sys.stderr, flush=True)
-    sys.stdout.write(json.dumps(results, indent=1) + "\n")
+    sys.stdout.write(json.dumps(kept_run(busy, results), indent=1) + "\n")

@@ -10,6 +10,7 @@ from typing import Annotated
 
 import typer
 
+from lockstep.bench.figures.kept_run import kept_run
 from lockstep.bench.figures.machine import busy_percent
 from lockstep.bench.three_networks.run import run
 
@@ -35,5 +36,5 @@ def three_networks(
     results = []
     for robot in robots or ["robot-512k", "robot-lte"]:
         found = asyncio.run(run(robot, page, seconds, seed, lambda text: print(text, file=sys.stderr, flush=True)))
-        results.append({"robot": robot, "page": page, "busy_percent": round(busy), **found})
-    sys.stdout.write(json.dumps(results, indent=1) + "\n")
+        results.append({"robot": robot, "page": page, **found})
+    sys.stdout.write(json.dumps(kept_run(busy, results), indent=1) + "\n")

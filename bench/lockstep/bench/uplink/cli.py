@@ -7,6 +7,7 @@ from typing import Annotated, Any
 
 import typer
 
+from lockstep.bench.figures.kept_run import kept_run
 from lockstep.bench.figures.machine import busy_percent
 from lockstep.bench.uplink.measurement import measure
 from lockstep.client import ConsoleError
@@ -49,4 +50,4 @@ def uplink(
                     found = {"not_drivable": ", ".join(map(str, errors.exceptions)) or "the robot was not reached"}
                 results.append({"network": name, "way": way, **found})
                 print(", ".join(f"{key} {value}" for key, value in results[-1].items()), file=sys.stderr, flush=True)
-    sys.stdout.write(json.dumps(results, indent=1) + "\n")
+    sys.stdout.write(json.dumps(kept_run(busy, results), indent=1) + "\n")
