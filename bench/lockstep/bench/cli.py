@@ -36,6 +36,7 @@ SECTIONS = (
     "scene",
     "memory",
     "recording",
+    "episodes_cost",
     "datagrams",
     "live_tools",
 )

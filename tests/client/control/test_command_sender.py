@@ -5,9 +5,9 @@ from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, 
 
 from lockstep.client.control.command_gate import CommandGate
 from lockstep.client.control.command_sender import IDLE, TURN, CommandSender
-from lockstep.client.control.repeat_timer import INITIAL
 from lockstep.client.control.resting import SETTLE
 from lockstep.protocol.messages import Command, Feedback, Rest, StopState
+from lockstep.protocol.pacing.repeat_timer import INITIAL
 from lockstep.protocol.serial import MAX_EVENT, event_after
 from tests.client.control.senders import FAST, NEUTRAL, commands, flying, new_sender, rests
 from tests.makers import feedback, refusal

@@ -1,7 +1,7 @@
 """When the command in flight is repeated, and what is learnt from its answer."""
 
-from lockstep.client.control.repeat_timer import FLOOR, INITIAL
 from lockstep.client.control.retransmission import ECHO, ECHOES, LOSSY_SPELL, SALVO, SALVO_SPACING
+from lockstep.protocol.pacing.repeat_timer import FLOOR, INITIAL
 from tests.client.control.senders import FAST, commands, flying, new_sender
 from tests.makers import feedback
 

@@ -8,18 +8,22 @@ import pytest
 import uvloop
 
 from lockstep.protocol.errors import HandshakeError, LinkError, LinkLost, LinkRefused
-from lockstep.protocol.framing import frame
+from lockstep.protocol.framing import MAX_CONTROL_FRAME, FrameReader, frame
 from lockstep.protocol.messages import (
+    Command,
     EventNotice,
     Feedback,
     Goodbye,
     Hello,
     LinkMessage,
     Media,
+    Ping,
     Refusal,
     Rest,
+    decode_message,
     encode_message,
 )
+from lockstep.robot_bridge.link import heartbeats
 from lockstep.robot_bridge.link.link_client import RobotLink
 from lockstep.robot_bridge.link.link_inbox import MAX_INBOX
 from lockstep.robot_bridge.robots.planar.description import DESCRIPTION
@@ -370,3 +374,25 @@ async def test_a_close_that_is_cancelled_leaves_no_connection_to_a_bridge_that_g
         with pytest.raises(asyncio.CancelledError):
             await closing
         await gone.wait()
+
+
+async def test_a_command_without_feedback_is_asked_for_by_pings(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(heartbeats, "PING_INTERVAL", 1e9)  # only those that ask are left
+    pinged = asyncio.Event()
+
+    async def serve(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        frames = FrameReader(MAX_CONTROL_FRAME)
+        writer.write(wire(HELLO))
+        while data := await reader.read(4096):
+            frames.feed(data)
+            for payload in frames.frames():
+                if isinstance(decode_message(payload), Ping):
+                    pinged.set()
+        writer.close()
+
+    server = await asyncio.start_server(serve, "127.0.0.1", 0)
+    async with server, RobotLink("127.0.0.1", server.sockets[0].getsockname()[1], "operator") as link:
+        assert not pinged.is_set()
+        link.send(Command(event=2, issue=1, nonce=0, values=[0.0, 0.0, 0.0]))
+        async with asyncio.timeout(20):
+            await pinged.wait()

@@ -371,3 +371,18 @@ def test_a_console_takes_no_status_that_no_peer_could_take() -> None:
     large, small = Status(event=1, items=[item] * MAX_STATUS_ITEMS), Status(event=1, items=[item] * 30)
     found = client.receive(wire(large, small), 0.0)
     assert found == [BadInput("malformed", f"a status of more than {MAX_STATUS_BYTES} bytes"), small]
+
+
+def test_a_client_pings_early_for_the_feedback_of_its_command_and_the_next_ping_is_later_by_as_much() -> None:
+    _, client = open_pair()
+    client.take_outgoing()
+    client.sent(Command(event=2, issue=1, nonce=0, values=[0.0, 0.0, 0.0]), 0.0)
+    at = client.asks_at
+    assert at is not None
+    client.tick(at - 0.001)
+    assert not client.take_outgoing()
+    client.tick(at)
+    (ping,) = client.take_outgoing()
+    assert isinstance(ping, Ping)
+    client.end("closing")
+    assert client.asks_at is None

@@ -28,6 +28,8 @@ __all__ = ["ConsoleEnd", "RobotEnd", "run_console", "run_robot"]
 
 CHAIN, KEY = "chain.pem", "key.pem"
 FLOOR, CAP = 0.02, 0.5  # s, of the time until a command is repeated
+PING, PING_BYTES = 0xFFFFFFFF, 40
+REPEATING: tuple[Kind, ...] = ("tls-asked", "quic-datagrams")
 WARM_UP = 3.0  # s that are not counted
 
 
@@ -39,7 +41,7 @@ class RobotEnd:
 
     def control(self, message: Message) -> None:
         if self.link is not None:
-            self.link.send_control(framed(message.number, FEEDBACK_BYTES))
+            self.link.send_control(framed(message.number, PING_BYTES if message.number == PING else FEEDBACK_BYTES))
 
     def picture(self, message: Message) -> None: ...
 
@@ -110,13 +112,14 @@ async def run_console(
             end.answered.clear()
             link.send_control(framed(end.waits_for, COMMAND_BYTES))
             repeats = 0
+            repeat = (PING, PING_BYTES) if kind == "tls-asked" else (end.waits_for, COMMAND_BYTES)
             while not end.answered.is_set():
                 with suppress(TimeoutError):
-                    wait = min(CAP, timer.seconds * 2**repeats) if kind == "quic-datagrams" else 30.0
+                    wait = min(CAP, timer.seconds * 2**repeats) if kind in REPEATING else 30.0
                     await asyncio.wait_for(end.answered.wait(), wait)
                     break
                 repeats += 1
-                link.send_control(framed(end.waits_for, COMMAND_BYTES))
+                link.send_control(framed(*repeat))
             trip = time.monotonic() - sent
             if not repeats:
                 timer.observe(trip)

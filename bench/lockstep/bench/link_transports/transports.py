@@ -17,9 +17,10 @@ from lockstep.bench.link_transports.messages import Message, take_frames
 
 __all__ = ["KINDS", "Ends", "Kind", "Link", "console_link", "robot_link"]
 
-Kind = Literal["tls", "quic-streams", "quic-datagrams"]
+Kind = Literal["tls", "tls-asked", "quic-streams", "quic-datagrams"]
 Pair = tuple[asyncio.StreamReader, asyncio.StreamWriter]
-KINDS: tuple[Kind, ...] = ("tls", "quic-streams", "quic-datagrams")
+KINDS: tuple[Kind, ...] = ("tls", "tls-asked", "quic-streams", "quic-datagrams")
+OVER_TCP: tuple[Kind, ...] = ("tls", "tls-asked")
 ALPN = ["lockstep-bench"]
 LARGE = 1 << 26  # bytes: flow control is never what bounds
 READ = 1 << 16
@@ -122,7 +123,7 @@ async def console_link(
 ) -> AsyncIterator[Link]:
     """Listen, call `listening`, and yield the link once the robot has connected."""
     loop = asyncio.get_running_loop()
-    if kind != "tls":
+    if kind not in OVER_TCP:
         made: asyncio.Future[QuicLink] = loop.create_future()
         configuration = _configuration(is_client=False)
         configuration.load_cert_chain(chain, key)
@@ -160,7 +161,7 @@ def _taker(queue: asyncio.Queue[Pair]) -> Callable[[asyncio.StreamReader, asynci
 @asynccontextmanager
 async def robot_link(kind: Kind, host: str, port: int, chain: Path, ends: Ends) -> AsyncIterator[Link]:
     """Connect to the console."""
-    if kind != "tls":
+    if kind not in OVER_TCP:
         made: asyncio.Future[QuicLink] = asyncio.get_running_loop().create_future()
         configuration = _configuration(is_client=True)
         configuration.load_verify_locations(str(chain))

@@ -21,7 +21,7 @@ from urllib.parse import urlsplit
 
 from lockstep.bench.experiment.judge.outage_judge import Cut, Finding, judge_outage
 from lockstep.bench.harness.event_log import Record, records
-from lockstep.bench.harness.processes import started
+from lockstep.bench.harness.processes import Spawn, started
 from lockstep.bench.harness.stack import LOCKSTEP
 from lockstep.emulator import load_profile
 from lockstep.emulator.impairment.delay import Constant
@@ -56,9 +56,9 @@ class _Place:
     """
 
     folder: Path
-    robot: Any  # starts a process there, as `create_subprocess_exec` does
-    console: Any
-    operator: Any
+    robot: Spawn
+    console: Spawn
+    operator: Spawn
     host: str
     address: str
     cut: Callable[[float], None]  # for seconds

@@ -1,7 +1,7 @@
 """A rest that is repeated until the robot is proven to be at rest. No I/O."""
 
-from lockstep.client.control.repeat_timer import RepeatTimer
 from lockstep.protocol.messages import Feedback, Rest
+from lockstep.protocol.pacing.repeat_timer import RepeatTimer
 from lockstep.protocol.serial import event_gap
 
 __all__ = ["RestCall"]

@@ -10,7 +10,7 @@
 
 from collections import deque
 
-from lockstep.client.control.repeat_timer import INITIAL, RepeatTimer
+from lockstep.protocol.pacing.repeat_timer import INITIAL, RepeatTimer
 
 __all__ = ["Retransmission"]
 

@@ -33,8 +33,10 @@ class Heartbeats:
 
     def ping(self, now: float) -> Ping | None:
         """Return the ping to send now; None while none is due."""
-        if now - self._last_ping < PING_INTERVAL:
-            return None
+        return None if now - self._last_ping < PING_INTERVAL else self.ping_early(now)
+
+    def ping_early(self, now: float) -> Ping:
+        """Return a ping that is sent before one is due; the next is due later by as much."""
         self._last_ping = now
         self._ping_id += 1
         self._pings[self._ping_id] = now

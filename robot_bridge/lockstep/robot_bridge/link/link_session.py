@@ -48,6 +48,7 @@ from lockstep.protocol.messages import (
 from lockstep.robot_bridge.control.feedback_fit import misfit
 from lockstep.robot_bridge.description.check_description import check_description
 from lockstep.robot_bridge.errors import DescriptionError
+from lockstep.robot_bridge.link.asking import Asking
 from lockstep.robot_bridge.link.heartbeats import Heartbeats
 from lockstep.robot_bridge.link.message_rate import MessageRate
 
@@ -197,8 +198,11 @@ class LinkSession:
                 self.end("silent", f"no hello within {HELLO_TIMEOUT:g} s")
         elif now - self._last_valid > self.patience:
             self.end("silent", f"nothing valid received for {self.patience:.1f} s")
-        elif (ping := self._heartbeats.ping(now)) is not None:
+        elif (ping := self._due_ping(now)) is not None:
             self._outgoing.append(ping)
+
+    def _due_ping(self, now: float) -> Ping | None:
+        return self._heartbeats.ping(now)
 
     def end(self, error: str, detail: str = "") -> None:
         """Say goodbye; nothing is received afterwards."""
@@ -303,6 +307,22 @@ class ClientSession(LinkSession):
         self._bridge_nonce: bytes | None = None  # None before a challenge
         self._said = Hello(role=role, name=name, nonce=b"" if secret is None else draw_nonce())
         self._outgoing.append(self._said)
+        self._asking = Asking()
+
+    @property
+    def asks_at(self) -> float | None:
+        """When `tick` is to be called next to ask for an answer that is due, s; None: for none."""
+        return None if self.ended is not None else self._asking.at
+
+    def sent(self, message: LinkMessage, now: float) -> None:
+        """Take note of a message that was sent: an answer to it may be due."""
+        self._asking.sent(message, now)
+
+    def _due_ping(self, now: float) -> Ping | None:
+        if self._asking.at is None or now < self._asking.at:
+            return super()._due_ping(now)
+        self._asking.asked(now)
+        return self._heartbeats.ping_early(now)
 
     def _shake_hands(self, message: LinkMessage, now: float) -> LinkMessage | BadInput | None:
         if isinstance(message, Goodbye):
@@ -346,6 +366,8 @@ class ClientSession(LinkSession):
             wrong = misfit(message, described)
             if wrong:
                 return BadInput("malformed", wrong)
+        if isinstance(message, self._allowed):
+            self._asking.received(message, now)
         return super()._receive_open(message, now)
 
     def _answer(self, challenge: Challenge) -> BadInput | None:

@@ -40,7 +40,10 @@ export function createParameterForm(action: Action): ParameterForm {
 function createField(parameter: ActionParameter): Field {
   if (parameter.kind === "number") return numberField(parameter);
   const choices = parameter.kind === "switch" ? ["on", "off"] : parameter.choices;
-  const control = h("select", "action-field", { "aria-label": parameter.label });
+  const control = h("select", "action-field", {
+    "aria-label": parameter.label,
+    title: parameter.label,
+  });
   control.append(...choices.map((choice) => h("option", "", { value: choice }, choice)));
   const { default: preset } = parameter;
   if (preset !== null) control.value = preset === true ? "on" : preset === false ? "off" : String(preset);
@@ -56,6 +59,8 @@ function numberField(parameter: ActionParameter): Field {
     type: "number",
     step: "any",
     "aria-label": label,
+    placeholder: label,
+    title: label,
   });
   if (minimum !== null) control.min = String(minimum);
   if (maximum !== null) control.max = String(maximum);

@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lockstep.client.control.repeat_timer import CAP, FLOOR, RepeatTimer
+from lockstep.protocol.pacing.repeat_timer import CAP, FLOOR, RepeatTimer
 from tests.client.control.vectors import load_vectors
 
 TABLE: dict[str, Any] = load_vectors("repeat.json")
