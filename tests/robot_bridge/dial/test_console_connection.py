@@ -1,14 +1,19 @@
 """The robot's WebSocket to its console, with a socket of the test."""
 
 import asyncio
+from collections.abc import AsyncIterator
+from contextlib import suppress
 
 import pytest
+from websockets.asyncio.server import serve
 from websockets.client import ClientProtocol
 from websockets.protocol import State
 from websockets.uri import parse_uri
 
 from lockstep.protocol.pacing.paced_reader import PIECE
-from lockstep.robot_bridge.dial.console_connection import MAX_PINGS, ConsoleConnection
+from lockstep.robot_bridge.dial.console_connection import MAX_PINGS, ConsoleConnection, open_connection
+from lockstep.robot_bridge.dial.opening_race import LATE, MOST
+from lockstep.robot_bridge.errors import ConsoleUnreachable
 
 EMPTY = b"\x82\x00"  # a binary frame without data, as a console sends it
 PING = b"\x89\x00"
@@ -80,3 +85,64 @@ async def test_a_console_that_pings_and_takes_no_answers_loses_the_link_and_one_
     connection.data_received(PING)
     assert (before, socket.aborted) == (False, True)
     connection.connection_lost(None)
+
+
+@pytest.fixture
+async def console() -> AsyncIterator[tuple[str, list[asyncio.StreamWriter]]]:
+    """Never answers on the first TCP connection, as where its answer got lost, and takes the others."""
+    silent: list[asyncio.StreamWriter] = []
+    async with serve(lambda websocket: websocket.wait_closed(), "127.0.0.1", 0) as answering:
+        port = answering.sockets[0].getsockname()[1]
+
+        async def take(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+            if not silent:
+                silent.append(writer)
+                with suppress(ConnectionError):
+                    await reader.read(-1)
+                writer.close()
+                return
+            inner_reader, inner_writer = await asyncio.open_connection("127.0.0.1", port)
+            await asyncio.gather(_pass_on(reader, inner_writer), _pass_on(inner_reader, writer))
+
+        server = await asyncio.start_server(take, "127.0.0.1", 0)
+        async with server:
+            yield f"ws://127.0.0.1:{server.sockets[0].getsockname()[1]}/dial/operator", silent
+
+
+async def _pass_on(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+    with suppress(ConnectionError):
+        while data := await reader.read(4096):
+            writer.write(data)
+    writer.close()
+
+
+async def test_a_handshake_that_hangs_is_overtaken_by_another_and_given_up(
+    console: tuple[str, list[asyncio.StreamWriter]],
+) -> None:
+    url, silent = console
+    opened = await open_connection(url, None, seconds=20.0)
+    assert len(silent) == 1
+    async with asyncio.timeout(20):
+        await silent[0].wait_closed()  # the robot has closed it
+    await opened.close()
+
+
+async def test_a_console_that_never_answers_is_unreachable_and_nothing_stays_open() -> None:
+    left: list[asyncio.Task[None]] = []
+
+    async def take(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        task = asyncio.current_task()
+        assert task is not None
+        left.append(task)
+        with suppress(ConnectionError):
+            await reader.read(-1)
+        writer.close()
+
+    server = await asyncio.start_server(take, "127.0.0.1", 0)
+    async with server:
+        url = f"ws://127.0.0.1:{server.sockets[0].getsockname()[1]}/dial/operator"
+        with pytest.raises(ConsoleUnreachable):
+            await open_connection(url, None, seconds=4 * LATE)
+        async with asyncio.timeout(20):
+            await asyncio.gather(*left)
+    assert 1 < len(left) <= MOST

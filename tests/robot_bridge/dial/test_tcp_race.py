@@ -52,9 +52,9 @@ async def test_a_new_connection_finds_a_path_that_is_back_while_the_first_still_
     path.is_back = True
     async with asyncio.timeout(10):
         opened = await race
-    assert [opened] == path.made
+    assert [opened.socket] == path.made
     assert path.pending == 0
-    opened.close()
+    opened.socket.close()
 
 
 async def test_few_connections_wait_at_once_and_the_first_is_never_given_up() -> None:
@@ -82,5 +82,5 @@ async def test_a_connection_over_tcp_is_the_one_that_was_asked_for() -> None:
     async with server:
         host, port = server.sockets[0].getsockname()
         opened = await connect_first(host, port)
-        assert opened.getpeername() == (host, port)
-        opened.close()
+        assert opened.socket.getpeername() == (host, port)
+        opened.socket.close()

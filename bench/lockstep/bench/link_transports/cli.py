@@ -27,7 +27,6 @@ __all__ = ["main"]
 
 PORT = 9000
 ROUND_TRIPS = (0.02, 0.1)  # s
-LOSSES = (0.0, 0.02)
 LOOK_SECONDS = 1.5
 PATIENCE = 60.0  # s on top of the measurement itself
 
@@ -59,21 +58,24 @@ async def measure(kind: Kind, round_trip: float, loss: float, seconds: float, se
 def run(
     seconds: Annotated[float, typer.Option(help="Of each turn.")] = 30.0,
     turns: Annotated[int, typer.Option(help="Of each transport on each path.")] = 3,
+    losses: Annotated[str, typer.Option(help="Of the paths, in %, after commas.")] = "0,2",
+    transports: Annotated[str, typer.Option(help="After commas.")] = ",".join(KINDS),
     json_to: Annotated[Path | None, typer.Option("--json", help="Write the figures there.")] = None,
 ) -> None:
     """Measure command to feedback and the delay of pictures, on each path and by each transport in turns."""
+    kinds = [kind for kind in KINDS if kind in transports.split(",")]
     busy = asyncio.run(busy_percent(LOOK_SECONDS))
     rows = []
     for round_trip in ROUND_TRIPS:
-        for loss in LOSSES:
-            found: dict[Kind, Times] = {kind: {"trips": [], "pictures": []} for kind in KINDS}
+        for loss in (float(percent) / 100 for percent in losses.split(",")):
+            found: dict[Kind, Times] = {kind: {"trips": [], "pictures": []} for kind in kinds}
             for turn in range(turns):
-                for kind in KINDS:
+                for kind in kinds:
                     times = asyncio.run(measure(kind, round_trip, loss, seconds, turn + 1))
                     for name, values in times.items():
                         found[kind][name] += values
             rows += [_row(kind, round_trip, loss, times) for kind, times in found.items()]
-            for row in rows[-len(KINDS) :]:
+            for row in rows[-len(kinds) :]:
                 print(json.dumps(row), flush=True)
     if json_to is not None:
         json_to.write_text(json.dumps(kept_run(busy, rows), indent=1) + "\n")
@@ -84,6 +86,7 @@ def _row(kind: Kind, round_trip: float, loss: float, times: Times) -> dict[str, 
     for name, values in times.items():
         row |= {
             f"{name}_p50_ms": round(median(values), 1),
+            f"{name}_p95_ms": round(quantile(values, 0.95), 1),
             f"{name}_p99_ms": round(quantile(values, 0.99), 1),
             f"{name}_count": len(values),
         }

@@ -1,9 +1,8 @@
 """One WebSocket from the robot to its console: through TLS, and through the HTTP proxy that the environment names."""
 
 import asyncio
-import socket
 import ssl
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import cast
 
@@ -20,7 +19,8 @@ from lockstep.protocol.dial_in import TRUSTED, certificate_pin
 from lockstep.protocol.errors import SecretError
 from lockstep.protocol.pacing.paced_reader import PacedReader
 from lockstep.protocol.pacing.paced_socket import PacedSocket
-from lockstep.robot_bridge.dial.tcp_race import connect_first
+from lockstep.robot_bridge.dial.opening_race import late_after, open_first
+from lockstep.robot_bridge.dial.tcp_race import TcpConnection, connect_first
 from lockstep.robot_bridge.errors import ConsoleRefused, ConsoleUnreachable, WrongConsole
 from lockstep.robot_bridge.link.websocket_transport import WebSocketTransport
 
@@ -167,17 +167,21 @@ async def open_connection(
     """
     made: list[ConsoleConnection] = []
 
-    def create(protocol: ClientProtocol, **options: object) -> ConsoleConnection:
-        made.append(ConsoleConnection(protocol, expected=expected, for_link=for_link, **options))
-        return made[-1]
+    async def open_one(on_its_way: Callable[[float], None]) -> ClientConnection:
+        mine: list[ConsoleConnection] = []
 
-    direct: socket.socket | None = None
-    try:
-        async with asyncio.timeout(seconds):
-            direct = await _direct(url)
-            opened = await connect(
+        def create(protocol: ClientProtocol, **options: object) -> ConsoleConnection:
+            mine.append(ConsoleConnection(protocol, expected=expected, for_link=for_link, **options))
+            made.extend(mine)
+            return mine[0]
+
+        tcp = await _direct(url)
+        if tcp is not None:
+            on_its_way(late_after(tcp.seconds))
+        try:
+            return await connect(
                 url,
-                sock=direct,
+                sock=None if tcp is None else tcp.socket,
                 ssl=context,
                 additional_headers=dict(headers or {}),
                 compression=None,  # media are compressed already
@@ -187,23 +191,28 @@ async def open_connection(
                 max_size=MAX_MESSAGE,
                 create_connection=cast(type[ClientConnection], create),
             )
+        finally:
+            if tcp is not None and not mine:
+                tcp.socket.close()
+
+    try:
+        async with asyncio.timeout(seconds):
+            opened = await open_first(open_one, lambda other: other.transport.abort())
     except InvalidStatus as error:
         raise _refusal(error) from error
     except ssl.SSLCertVerificationError as error:
         raise WrongConsole(f"the console's certificate is not trusted ({error.verify_message})") from error
     except (OSError, TimeoutError, InvalidHandshake, WebSocketException, EOFError, ValueError) as error:
-        if made and expected is not None and made[-1].pin not in ("", expected):
+        wrong = [each.pin for each in made if expected is not None and each.pin not in ("", expected)]
+        if wrong:
             raise WrongConsole(
-                f"another console answers at {url}: its key is {made[-1].pin}, the robot's console has {expected}"
+                f"another console answers at {url}: its key is {wrong[-1]}, the robot's console has {expected}"
             ) from error
         raise ConsoleUnreachable(f"{url}: {str(error) or 'no answer'}") from error
-    finally:
-        if direct is not None and not made:
-            direct.close()
     return cast(ConsoleConnection, opened)
 
 
-async def _direct(url: str) -> socket.socket | None:
+async def _direct(url: str) -> TcpConnection | None:
     """Return a TCP connection to the console; None if the environment names a proxy for it."""
     where = parse_uri(url)
     return None if get_proxy(where) is not None else await connect_first(where.host, where.port)

@@ -5,9 +5,11 @@ The kernel repeats a lost SYN after 1, 3 and 7 s. A new connection beside it fin
 
 import asyncio
 import socket
+import time
 from collections.abc import Awaitable, Callable
+from typing import NamedTuple
 
-__all__ = ["INTERVAL", "MOST", "connect_first"]
+__all__ = ["INTERVAL", "MOST", "TcpConnection", "connect_first"]
 
 INTERVAL = 0.5  # s until the next connection is tried beside those that have no answer yet
 MOST = 4  # at once. The first has time for the longest path; of the others the oldest gives way to a new one
@@ -15,9 +17,14 @@ MOST = 4  # at once. The first has time for the longest path; of the others the 
 Connect = Callable[[], Awaitable[socket.socket]]
 
 
+class TcpConnection(NamedTuple):
+    socket: socket.socket
+    seconds: float  # that its own opening took: a round trip, unless its first packet was lost
+
+
 async def connect_first(
     host: str, port: int, *, interval: float = INTERVAL, connect: Connect | None = None
-) -> socket.socket:
+) -> TcpConnection:
     """Return the first of several connections to `host` that is open. Wait for ever; the caller bounds the time.
 
     Args:
@@ -26,11 +33,13 @@ async def connect_first(
     Raises:
         OSError: a connection was refused, or there is no way or no such host.
     """
-    outcomes: asyncio.Queue[socket.socket | OSError] = asyncio.Queue()
+    outcomes: asyncio.Queue[TcpConnection | OSError] = asyncio.Queue()
 
     async def open_one() -> None:
+        began = time.monotonic()
         try:
-            outcomes.put_nowait(await (_connect(host, port) if connect is None else connect()))
+            made = await (_connect(host, port) if connect is None else connect())
+            outcomes.put_nowait(TcpConnection(made, time.monotonic() - began))
         except OSError as error:
             outcomes.put_nowait(error)
 
@@ -47,8 +56,8 @@ async def connect_first(
         first = outcomes.get_nowait()
     finally:
         while not outcomes.empty():  # others were open in the same moment, or nobody waits any more
-            if isinstance(other := outcomes.get_nowait(), socket.socket):
-                other.close()
+            if isinstance(other := outcomes.get_nowait(), TcpConnection):
+                other.socket.close()
     if isinstance(first, OSError):
         raise first
     return first
