@@ -1,6 +1,5 @@
 """Which files are one episode as a whole: only where it is certain that nobody recorded by episodes."""
 
-from collections.abc import Collection, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -9,7 +8,7 @@ import pytest
 
 from lockstep.server.recording.format.event_index import Ending
 from lockstep.server.recording.format.info import RecordingInfo
-from lockstep.server.recording.reading.reader import Record, RecordingReader
+from lockstep.server.recording.reading.scan import Scan, scan_file
 from lockstep.server.recording.reading.whole_recordings import EpisodeUse, whole_recordings, why_not_whole
 from lockstep.server.recording.writing.writer import RecordingWriter
 from tests.server.recording.makers import CODECS, DESCRIPTION, EPOCH, INFO, Story
@@ -98,14 +97,13 @@ def test_records_are_read_only_where_head_and_end_do_not_decide(
     for entry in Story(events=10).entries():
         writer.write(entry)
     writer.close(ending)
-    read: list[int] = []
-    chunk = RecordingReader.chunk
+    read: list[Path] = []
 
-    def counted(reader: RecordingReader, number: int, topics: Collection[str] | None = None) -> Iterator[Record]:
-        read.append(number)
-        return chunk(reader, number, topics)
+    def counted(path: Path, info: RecordingInfo) -> Scan:
+        read.append(path)
+        return scan_file(path, info)
 
-    monkeypatch.setattr(RecordingReader, "chunk", counted)
+    monkeypatch.setattr("lockstep.server.recording.reading.whole_recordings.scan_file", counted)
     (why,) = whole_recordings([tmp_path / "a.mcap"], wanted=False).values()
     assert bool(read) == reads
     assert (why == "") == (reads and ending == "no_episodes")
@@ -125,6 +123,26 @@ def test_the_records_of_a_file_of_an_earlier_version_count_for_the_others(tmp_pa
     writer.close()
     found = whole_recordings([tmp_path / "a.mcap", tmp_path / "old.mcap"], wanted=False)
     assert found[tmp_path / "a.mcap"] == "old.mcap has episodes, and this one has none"
+
+
+@pytest.mark.parametrize("part", ["", "counts", "topics", "chunks"])
+def test_an_index_cannot_hide_an_episode(tmp_path: Path, part: str) -> None:
+    """As one that somebody has edited."""
+    writer = RecordingWriter(
+        tmp_path / "a.mcap", RecordingInfo(recording="r", epoch=EPOCH, episodes="none"), DESCRIPTION, CODECS
+    )
+    for entry in sorted([*Story(events=60, real=False).entries(), *KEPT_AND_NOT[:2]], key=lambda each: each.arrived):
+        writer.write(entry)
+    writer.flush()
+    index = writer._builder.index
+    if part:
+        index.counts.clear()
+        index.episodes.clear()
+    if part in ("topics", "chunks"):
+        getattr(index, part).clear()
+    writer.close("no_episodes")
+    (why,) = whole_recordings([tmp_path / "a.mcap"], wanted=False).values()
+    assert why == "its recording was made by episodes, as a.mcap says"
 
 
 def of_earlier_version(path: Path) -> None:

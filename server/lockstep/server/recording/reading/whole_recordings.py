@@ -14,6 +14,7 @@ from lockstep.server.recording.format.event_index import Ending, EventIndex
 from lockstep.server.recording.format.records import EpisodeRecord
 from lockstep.server.recording.format.topics import OWN_TOPICS
 from lockstep.server.recording.reading.reader import RecordingReader
+from lockstep.server.recording.reading.scan import scan_file
 
 __all__ = ["EpisodeUse", "whole_recordings", "why_not_whole"]
 
@@ -118,8 +119,10 @@ def _with_records(said: EpisodeUse) -> EpisodeUse | None:
     if said.by_episodes:
         return said
     try:
-        with RecordingReader(said.path) as reader:
-            # Nothing checks an index: that it counts none is not enough.
-            return said._replace(has_records=any(reader.records(topics={EPISODE})))
+        with RecordingReader(said.path, EventIndex()) as reader:
+            info = reader.info
+        # Nothing checks an index, of what is where nor of how many: only the records themselves count.
+        found = scan_file(said.path, info).index
+        return said._replace(has_records=bool(found.counts.get(EPISODE)))
     except (RecordingError, OSError):
         return None
