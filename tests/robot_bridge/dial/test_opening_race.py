@@ -95,4 +95,4 @@ async def test_a_refusal_ends_the_race() -> None:
 
 def test_a_handshake_is_late_after_more_round_trips_than_it_takes() -> None:
     assert late_after(0.001) == LATE
-    assert late_after(0.6) == pytest.approx(2.4)
+    assert late_after(0.6) == pytest.approx(1.8)

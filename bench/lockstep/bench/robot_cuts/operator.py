@@ -13,8 +13,7 @@ import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
-from lockstep.bench.harness.driving import drive_on
-from lockstep.client import CommandRefused, Console, ConsoleError
+from lockstep.client import CommandRefused, Console, ConsoleError, NotArmed
 
 __all__ = ["hold"]
 
@@ -44,9 +43,12 @@ async def _drive(console: Console, write: Callable[[str], int], marks: Iterator[
         write(json.dumps([formed, value]) + "\n")
         try:
             async with asyncio.timeout(STEP):
-                await drive_on(console, [value, *turns, 0.8])
+                await console.drive([value, *turns, 0.8])
         except TimeoutError:
             continue  # in flight; the next intention takes its place
+        except NotArmed:
+            with contextlib.suppress(CommandRefused):
+                await console.arm()
         except CommandRefused as refused:
             if refused.reason == "no_seat":
                 await console.take_seat()

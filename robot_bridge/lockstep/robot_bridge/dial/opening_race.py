@@ -10,7 +10,7 @@ from typing import TypeVar
 __all__ = ["MOST", "late_after", "open_first"]
 
 MOST = 3  # at once
-LATE, LATE_TRIPS = 0.4, 4.0  # s, and round trips: TLS and the WebSocket take two, and the console's own time
+LATE, LATE_TRIPS = 0.4, 3.0  # s, and round trips: TLS and the WebSocket take two, and the console's own time
 
 Opened = TypeVar("Opened")
 OnItsWay = Callable[[float], None]

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 __all__ = ["INTERVAL", "MOST", "TcpConnection", "connect_first"]
 
-INTERVAL = 0.5  # s until the next connection is tried beside those that have no answer yet
+INTERVAL = 0.25  # s until the next connection is tried beside those that have no answer yet
 MOST = 4  # at once. The first has time for the longest path; of the others the oldest gives way to a new one
 
 Connect = Callable[[], Awaitable[socket.socket]]
