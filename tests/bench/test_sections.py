@@ -10,7 +10,7 @@ from lockstep.bench.context import Context
 from lockstep.bench.harness.driving import console_trips, link_trips
 from lockstep.bench.harness.event_log import robot_times
 from lockstep.bench.harness.stack import running_bridge, running_stack
-from lockstep.bench.sections import command_to_feedback, datagrams, goals, scene
+from lockstep.bench.sections import command_to_feedback, datagrams, episodes_cost, goals, scene
 from lockstep.client import Console
 from lockstep.robot_bridge.link.link_client import RobotLink
 from tests.e2e.so101 import SO101, needs_so101
@@ -46,6 +46,21 @@ async def test_command_to_feedback_reports_each_figure_with_its_baseline(monkeyp
     assert own.value is not None
     assert total.value is not None
     assert own.value < total.value
+
+
+@needs_so101
+async def test_the_cost_of_episodes_is_told_beside_driving_without_them(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name, value in SO101.items():
+        monkeypatch.setenv(name, value)
+    for name in ("SECONDS", "WARM"):
+        monkeypatch.setattr(episodes_cost, name, 1.0)
+    results = await episodes_cost.run(Context(quick=True, robots=[], say=lambda _: None))
+    assert [result.name for result in results] == [
+        f"so101: command → feedback, {kind}, {name}"
+        for kind in ("recording", "recording and appending")
+        for name in ("median", "p95", "p99")
+    ]
+    assert all(result.value and result.baseline and result.samples for result in results)
 
 
 @needs_so101
