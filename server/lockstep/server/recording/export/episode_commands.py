@@ -45,7 +45,7 @@ class DriverCommands(msgspec.Struct, frozen=True, kw_only=True):
     kind: DriverKind
     median_ms: float | None = None  # None: no command had a feedback
     p95_ms: float | None = None
-    delays: dict[float, Count] = {}  # number of commands by delay, in two digits; to add up several episodes
+    delays: dict[float, Count] = {}  # number of commands by delay in two digits, 0.1 ms at least; to add up episodes
     refused: dict[str, Count] = {}  # number of commands that were refused, by reason
 
 
@@ -122,7 +122,7 @@ class CommandTally:
             key = OTHERS, "none"
         delays = self._delays.setdefault(key, _Delays())
         delays.exact.add(delay)
-        delays.counts[float(f"{delay:.2g}")] += 1
+        delays.counts[round(float(f"{delay:.2g}"), 1)] += 1
 
     def _refusal(self, record: RefusalRecord) -> None:
         counts = self._refused_last if record.event == self._last else self._refused

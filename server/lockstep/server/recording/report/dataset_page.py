@@ -48,8 +48,8 @@ DRIVERS = (
     f"they drove, {LONGEST:.0f} s of a pause at most. Command to feedback is measured at the console, in two digits."
 )
 CAMERAS = (
-    f"New pictures: rows with another picture than the row before, in the time of the rows, {LONGEST:.0f} s of a pause "
-    "at most."
+    "New pictures: rows whose picture is of another event than that of the row before, in the time of the rows, "
+    f"{LONGEST:.0f} s of a pause at most."
 )
 
 _notes = msgspec.json.Decoder(DatasetNotes)
