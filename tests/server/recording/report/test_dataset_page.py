@@ -64,3 +64,11 @@ def test_events_that_are_in_no_row_of_a_dataset_with_a_rate_count_all_the_same(t
     path = driven(tmp_path / "a.mcap", kept=(("a", 2, 15),))
     (root,) = export_all([path], tmp_path / "dataset", DatasetOptions(fps=5))
     assert "Ada human 4 1 0 1 0 100 % 25.0 10.0 10.0 0 " in plain(dataset_page(root))
+
+
+def test_a_kept_episode_without_a_row_tells_its_refused_commands(tmp_path: Path) -> None:
+    path = driven(tmp_path / "a.mcap", refusal(2), kept=(("a", 1, 2), ("b", 10, 20)))
+    (root,) = export_lerobot.export(path, tmp_path / "dataset", "")
+    assert re.search(
+        r"without a row .* a push success 20270115-planar-ab12 part 1 1 late 1 ", plain(dataset_page(root))
+    )

@@ -264,11 +264,12 @@ def _episodes(rows: list[Row], notes: DatasetNotes) -> str:
 def _without_rows(notes: DatasetNotes) -> str:
     if not notes.without_rows:
         return ""
-    table = [
-        (f"{each.episode} {each.task}".strip(), each.outcome, f"{each.recording} part {each.part}", each.left_out)
-        for each in notes.without_rows[:MAX_EPISODES]
-    ]
-    head = ("Episode", "Outcome", "Recording", "Events left out")
+    table: list[tuple[parts.Cell, ...]] = []
+    for each in notes.without_rows[:MAX_EPISODES]:
+        name, origin = f"{each.episode} {each.task}".strip(), f"{each.recording} part {each.part}"
+        refused = _refused(None if each.commands is None else each.commands.refused)
+        table.append((name, each.outcome, origin, each.left_out, refused))
+    head = ("Episode", "Outcome", "Recording", "Events left out", "Refused commands")
     return parts.section("without-rows", "Kept episodes without a row", parts.table(head, table, left=3))
 
 
