@@ -219,6 +219,7 @@ def noted(rows: EpisodeRows) -> DatasetEpisode:
         left_out=rows.left_out,
         rate=round(rows.rate, 3),
         recorded=stretch.recorded,
+        commands=rows.commands,
     )
 
 

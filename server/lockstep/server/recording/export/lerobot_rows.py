@@ -18,15 +18,16 @@ from lockstep.protocol.serial import event_after, event_gap, is_newer
 from lockstep.server.recording.episodes.edit_rules import EditedEpisode, apply_edits
 from lockstep.server.recording.episodes.edits import read_edits
 from lockstep.server.recording.errors import RecordingDamaged
+from lockstep.server.recording.export.episode_commands import COMMAND_TOPICS, CommandTally, EpisodeCommands
 from lockstep.server.recording.export.lerobot_layout import DatasetLayout
 from lockstep.server.recording.export.lerobot_sampling import sampled
-from lockstep.server.recording.format.drivers import EventDriver
+from lockstep.server.recording.format.drivers import NOBODY, EventDriver
 from lockstep.server.recording.format.episodes import EpisodeBook, EpisodeEntry
 from lockstep.server.recording.format.info import RecordingInfo
 from lockstep.server.recording.format.payload import own_record_of
 from lockstep.server.recording.format.records import CommandRecord, Degraded, EpisodeRecord, FeedbackRecord
 from lockstep.server.recording.format.topics import OWN_TOPICS
-from lockstep.server.recording.reading.drivers import DRIVER_TOPICS, RecordedDrivers
+from lockstep.server.recording.reading.drivers import RecordedDrivers
 from lockstep.server.recording.reading.reader import Record, RecordingReader
 
 __all__ = [
@@ -79,6 +80,7 @@ class EpisodeRows(NamedTuple):
         ages: s, of the row's event at the row's moment; 0 where each event is a row
         left_out: events that are in no row because a picture was too old
         rate: Hz, by the median interval of the events
+        commands: of the episode's events, also of those that are in no row
     """
 
     stretch: Stretch
@@ -87,6 +89,7 @@ class EpisodeRows(NamedTuple):
     ages: list[float]
     left_out: int
     rate: float
+    commands: EpisodeCommands
 
 
 def episodes_of(reader: RecordingReader) -> list[EpisodeEntry]:
@@ -162,7 +165,8 @@ def _episode(
     tolerance: int,
     rate: int | None,
 ) -> EpisodeRows:
-    mine = [frame for frame in _frames(reader, layout, stretch) if _is_within(frame.event, stretch)]
+    tally = CommandTally(stretch.first_event, stretch.last_event, stretch.recorded)
+    mine = [frame for frame in _frames(reader, layout, stretch, tally) if _is_within(frame.event, stretch)]
     events = [frame.event for frame in mine]
     stamps = {topic: dict(_stamps(reader, topic, stretch, events)) for topic in cameras}
     kept = [
@@ -178,7 +182,7 @@ def _episode(
         samples = sampled([frame.time for frame in kept], rate)
         kept, ages = [kept[sample.place] for sample in samples], [sample.age for sample in samples]
     of_kept = {topic: [stamps[topic][frame.event] for frame in kept] for topic in cameras}
-    return EpisodeRows(stretch, kept, of_kept, ages, left_out, own_rate)
+    return EpisodeRows(stretch, kept, of_kept, ages, left_out, own_rate, tally.result())
 
 
 def rate_of(times: Sequence[float]) -> float:
@@ -237,9 +241,9 @@ def _stamps(reader: RecordingReader, topic: str, stretch: Stretch, events: list[
             yield event, stamp
 
 
-def _frames(reader: RecordingReader, layout: DatasetLayout, stretch: Stretch) -> Iterator[Frame]:
+def _frames(reader: RecordingReader, layout: DatasetLayout, stretch: Stretch, tally: CommandTally) -> Iterator[Frame]:
     """Yield a frame for each event, but for those without an answer, as the last one, or with an incomplete state."""
-    events = list(_events(reader, stretch))
+    events = list(_events(reader, stretch, tally))
     for place, (answer, command, driver) in enumerate(events[1:], 1):
         feedback = events[place - 1].feedback
         if command is None or answer.event != event_after(feedback.event):
@@ -258,21 +262,24 @@ class _Event(NamedTuple):
     driver: EventDriver
 
 
-def _events(reader: RecordingReader, stretch: Stretch) -> Iterator[_Event]:
-    """Yield the events of the stretch."""
+def _events(reader: RecordingReader, stretch: Stretch, tally: CommandTally) -> Iterator[_Event]:
+    """Yield the events of the stretch, and show their records to the tally."""
     event = 0
     command: CommandRecord | None = None
-    drivers = RecordedDrivers()
-    for record in reader.records(stretch.first_event, stretch.last_event, DRIVER_TOPICS):
+    drivers, driver = RecordedDrivers(), NOBODY
+    for record in reader.records(stretch.first_event, stretch.last_event, COMMAND_TOPICS):
         own = own_record_of(record.schema, record.data)
         drivers.take(own)
+        if isinstance(own, FeedbackRecord):
+            driver = drivers.of(own)
+        tally.take(own, record.arrived, driver)
         match own:
             case CommandRecord(outcome="forwarded") as forwarded:
                 command = forwarded
             case FeedbackRecord() as feedback if feedback.event != event:
                 event = feedback.event
                 became = command if command is not None and command.event == event else None
-                yield _Event(feedback, became, drivers.of(feedback))
+                yield _Event(feedback, became, driver)
 
 
 def check_same_robot(first: RobotDescription, other: RobotDescription) -> None:

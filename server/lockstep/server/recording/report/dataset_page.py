@@ -1,7 +1,8 @@
 """The report of a LeRobot dataset that Lockstep has exported, as one HTML page. Needs pyarrow."""
 
-from collections import defaultdict
-from collections.abc import Sequence
+from collections import Counter, defaultdict
+from collections.abc import Mapping, Sequence
+from functools import partial
 from itertools import accumulate, groupby, pairwise
 from pathlib import Path
 from typing import Any, cast, get_args
@@ -11,7 +12,6 @@ import msgspec
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from lockstep.protocol.console import DriverKind
 from lockstep.protocol.episodes import EpisodeOutcome
 from lockstep.protocol.serial import event_gap, is_event
 from lockstep.server.recording.errors import RecordingDamaged
@@ -19,7 +19,16 @@ from lockstep.server.recording.export.lerobot_meta import DatasetNotes, file_of
 from lockstep.server.recording.format.records import EpisodeRecord, FeedbackRecord
 from lockstep.server.recording.reading.picture_at import jpeg_of
 from lockstep.server.recording.report import page_parts as parts
-from lockstep.server.recording.report.driver_figures import DriverTally
+from lockstep.server.recording.report.dataset_figures import (
+    Driver,
+    Rate,
+    Row,
+    commands_by_driver,
+    driver_of,
+    event_rates,
+    picture_rate,
+)
+from lockstep.server.recording.report.driver_figures import LONGEST, DriverTally
 from lockstep.server.recording.report.policies import policies_section
 from lockstep.server.recording.verify.verify_dataset import DatasetCheck, DatasetVerdict, verify_dataset
 
@@ -34,7 +43,15 @@ COLUMNS = ("index", "episode_index", "timestamp", "lockstep.event", "lockstep.st
 DRIVEN = ("lockstep.age", "lockstep.driver", "lockstep.driver_kind", "lockstep.intervention")
 OUTCOMES = get_args(EpisodeOutcome)
 
-Row = dict[str, Any]
+DRIVERS = (
+    "Episodes and their outcomes: those in which they drove, also for a part. Events a second: of the time in which "
+    f"they drove, {LONGEST:.0f} s of a pause at most. Command to feedback is measured at the console, in two digits."
+)
+CAMERAS = (
+    "New pictures: rows whose picture is of another event than that of the row before, in the time of the rows, "
+    f"{LONGEST:.0f} s of a pause at most."
+)
+
 _notes = msgspec.json.Decoder(DatasetNotes)
 _info = msgspec.json.Decoder(dict[str, Any])
 
@@ -92,6 +109,10 @@ def _rows(root: Path, batch: int, notes: DatasetNotes) -> list[Row]:
 def _stamps(row: Row) -> list[int]:
     found = row.get("lockstep.stamp", [])
     return [found] if isinstance(found, int) else list(found)
+
+
+def _stamp(at: int, row: Row) -> int:
+    return _stamps(row)[at]
 
 
 def _result(check: DatasetCheck) -> str:
@@ -159,39 +180,65 @@ def _driven(row: Row, epoch: str) -> FeedbackRecord:
 
 
 def _drivers(rows: list[Row], notes: DatasetNotes, tally: DriverTally) -> str:
-    counts: dict[tuple[str, DriverKind], int] = defaultdict(int)
-    episodes: dict[tuple[str, DriverKind], set[int]] = defaultdict(set)
-    for row in rows:
-        driver = row["lockstep.driver"], row["lockstep.driver_kind"]
-        counts[driver] += 1
-        episodes[driver].add(row["episode_index"])
+    counts = Counter(driver_of(row) for row in rows)
+    driven = {(row["episode_index"], driver_of(row)) for row in rows}
+    episodes: dict[Driver, list[int]] = defaultdict(list)
+    for index, driver in driven:
+        episodes[driver].append(index)
+    rates = event_rates(rows, driver_of)
+    commands = commands_by_driver(notes.episodes, driven)
     table: list[tuple[parts.Cell, ...]] = []
-    for (name, kind), count in sorted(counts.items()):
-        outcomes = [notes.episodes[each].outcome for each in episodes[name, kind]]
+    for name, kind in sorted({*counts, *commands}):
+        driver = name, kind
+        outcomes = [notes.episodes[each].outcome for each in episodes[driver]]
         success, failure = outcomes.count("success"), outcomes.count("failure")
-        driven = tally.drivers.get((name, kind))
-        interventions = None if driven is None else driven.interventions
+        drove = tally.drivers.get(driver)
+        interventions = None if drove is None else drove.interventions
         shared = parts.share(success, success + failure)
-        table.append((name or "nobody", kind, count, len(outcomes), interventions, success, failure, shared))
+        own = (name or "nobody", kind, counts[driver], len(outcomes), interventions, success, failure, shared)
+        known = commands.get(driver)
+        delays = (None, None) if known is None else (known.delay(0.5), known.delay(0.95))
+        refused = _refused(None if known is None else known.refused)
+        table.append((*own, _hertz(rates.get(driver)), *map(parts.number, delays), refused))
     head = ("Driver", "Kind", "Rows", "Episodes", "Interventions", "Success", "Failure", "Success of those that say")
-    return parts.table(head, table, "Of the episodes in which they drove, also for a part.", left=2)
+    more = ("Events a second", "Command → feedback, ms", "95 %", "Refused commands")
+    return parts.table((*head, *more), table, f"{DRIVERS} {_known(notes)}".strip(), left=2)
+
+
+def _known(notes: DatasetNotes) -> str:
+    """Return in words of which episodes delays and refusals are known, unless of all."""
+    known = sum(each.commands is not None for each in notes.episodes)
+    if known == len(notes.episodes):
+        return ""
+    return f"Delays and refused commands are known of {known} of {len(notes.episodes)} episodes."
+
+
+def _hertz(rate: Rate | None) -> str:
+    return parts.number(None if rate is None else rate.hertz)
+
+
+def _refused(counts: Mapping[str, int] | None) -> str:
+    """Return the number of refused commands by reason; None: not known."""
+    if counts is None:
+        return "–"
+    return ", ".join(f"{reason} {count}" for reason, count in sorted(counts.items())) or "0"
 
 
 def _cameras(rows: list[Row], notes: DatasetNotes) -> str:
     table: list[tuple[parts.Cell, ...]] = []
     for at, camera in enumerate(notes.cameras):
-        stamps = [
-            (row["episode_index"], row["lockstep.event"], _stamps(row)[at]) for row in rows if len(_stamps(row)) > at
-        ]
+        mine = [row for row in rows if len(_stamps(row)) > at]
+        stamps = [(row["episode_index"], row["lockstep.event"], _stamps(row)[at]) for row in mine]
         gaps = sorted(event_gap(event, stamp) for _, event, stamp in stamps if is_event(stamp))
         if not gaps:
-            table.append((camera, 0, None, None, None))
+            table.append((camera, 0, None, None, None, None))
             continue
         repeated = sum(one[::2] == other[::2] for one, other in pairwise(stamps))
         exact = parts.share(sum(gap == 0 for gap in gaps), len(gaps))
-        table.append((camera, len(gaps), exact, gaps[-1], repeated))
+        rate = picture_rate(mine, partial(_stamp, at))
+        table.append((camera, len(gaps), exact, gaps[-1], repeated, _hertz(rate)))
     head = ("Camera", "Rows", "Of their own event", "Largest gap, events", "Same picture as the row before")
-    return parts.table(head, table)
+    return parts.table((*head, "New pictures a second"), table, CAMERAS)
 
 
 def _episodes(rows: list[Row], notes: DatasetNotes) -> str:
@@ -199,31 +246,30 @@ def _episodes(rows: list[Row], notes: DatasetNotes) -> str:
     for row in rows:
         at = row["lockstep.time"] + row.get("lockstep.age", 0.0)
         lengths[row["episode_index"]] = max(lengths[row["episode_index"]], at)
-    table = [
-        (
-            f"{at} {each.task}",
-            each.outcome,
-            f"{each.recording} part {each.part}",
-            f"{each.first_event} – {each.last_event}",
-            each.rows,
-            each.left_out,
-            parts.number(lengths[at]),
-        )
-        for at, each in enumerate(notes.episodes[:MAX_EPISODES])
-    ]
+    rates = event_rates(rows, lambda row: int(row["episode_index"]))
+    table: list[tuple[parts.Cell, ...]] = []
+    for at, each in enumerate(notes.episodes[:MAX_EPISODES]):
+        origin = f"{each.recording} part {each.part}", f"{each.first_event} – {each.last_event}"
+        known = each.commands
+        delays = (None, None) if known is None else (known.median_ms, known.p95_ms)
+        refused = _refused(None if known is None else known.refused)
+        own = (f"{at} {each.task}", each.outcome, *origin, each.rows, each.left_out, parts.number(lengths[at]))
+        table.append((*own, _hertz(rates.get(at)), *map(parts.number, delays), refused))
     head = ("Episode", "Outcome", "Recording", "Events", "Rows", "Left out", "Length, s")
+    more = ("Events a second", "Command → feedback, ms", "95 %", "Refused commands")
     words = "Left out: events without a picture within the tolerance. Length: from the first row to the last."
-    return parts.table(head, table, words, left=3)
+    return parts.table((*head, *more), table, words, left=3)
 
 
 def _without_rows(notes: DatasetNotes) -> str:
     if not notes.without_rows:
         return ""
-    table = [
-        (f"{each.episode} {each.task}".strip(), each.outcome, f"{each.recording} part {each.part}", each.left_out)
-        for each in notes.without_rows[:MAX_EPISODES]
-    ]
-    head = ("Episode", "Outcome", "Recording", "Events left out")
+    table: list[tuple[parts.Cell, ...]] = []
+    for each in notes.without_rows[:MAX_EPISODES]:
+        name, origin = f"{each.episode} {each.task}".strip(), f"{each.recording} part {each.part}"
+        refused = _refused(None if each.commands is None else each.commands.refused)
+        table.append((name, each.outcome, origin, each.left_out, refused))
+    head = ("Episode", "Outcome", "Recording", "Events left out", "Refused commands")
     return parts.section("without-rows", "Kept episodes without a row", parts.table(head, table, left=3))
 
 

@@ -15,7 +15,7 @@ from lockstep.server.recording.format.drivers import NOBODY, EventDriver
 from lockstep.server.recording.format.records import EpisodeRecord, FeedbackRecord, OwnRecord, ShadowRecord
 from lockstep.server.recording.reading.drivers import RecordedDrivers
 
-__all__ = ["AGREES", "DriverTally", "Driven", "Outcomes", "Shadowed"]
+__all__ = ["AGREES", "LONGEST", "DriverTally", "Driven", "Outcomes", "Shadowed"]
 
 LONGEST = 2.0  # s: after a pause nobody has driven all the time
 AGREES = 0.05  # of an axis' range

@@ -7,9 +7,10 @@ from pathlib import Path
 from lockstep.protocol.description import Axis, RobotDescription
 from lockstep.server.recording.format.info import RecordingInfo
 from lockstep.server.recording.format.payload import own_record_of
-from lockstep.server.recording.format.records import CommandRecord, FeedbackRecord, ReportRecord, TraceRecord
+from lockstep.server.recording.format.records import ReportRecord, TraceRecord
 from lockstep.server.recording.format.topics import stream_of
 from lockstep.server.recording.reading.bookmarks import Mark
+from lockstep.server.recording.reading.command_delays import CommandDelays
 from lockstep.server.recording.reading.event_rows import EventRow, event_rows
 from lockstep.server.recording.reading.reader import RecordingReader
 from lockstep.server.recording.report.traced_events import MOST_STREAMS, TracedEvents
@@ -80,7 +81,7 @@ def read_session(path: Path) -> Session:
         )
         for row in event_rows(reader):
             _take_row(session, row, (row.captured - origin) / SECOND)
-        sent: dict[int, int] = {}
+        delays = CommandDelays()
         for record in reader.records():
             stream = stream_of(record.topic)
             if stream:
@@ -89,11 +90,9 @@ def read_session(path: Path) -> Session:
                 continue
             at = (record.arrived - origin) / SECOND
             own = own_record_of(record.schema, record.data)
+            if (delay := delays.take(own, record.arrived)) is not None:
+                session.answered.add(at, delay)
             match own:
-                case CommandRecord(outcome="forwarded", event=event):
-                    sent = {event: record.arrived}  # never more than one is on its way
-                case FeedbackRecord(event=event) if event in sent:
-                    session.answered.add(at, (record.arrived - sent.pop(event)) / 1e6)
                 case TraceRecord() as trace:
                     session.traced.add(trace, at)
                 case ReportRecord() as report:

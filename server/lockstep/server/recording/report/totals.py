@@ -18,6 +18,8 @@ from lockstep.server.recording.format.records import (
     SeatRecord,
     StopRecord,
 )
+from lockstep.server.recording.reading.command_delays import CommandDelays
+from lockstep.server.recording.reading.samples import Samples
 
 __all__ = ["CameraTotals", "DriverTotals", "Moment", "Totals"]
 
@@ -27,33 +29,6 @@ SPACING = SECOND  # between two moments of the same kind
 MAX_MOMENTS = 400
 MAX_DRIVERS = 50
 MAX_CAMERAS = 16
-MAX_VALUES = 100_000  # of a series; then every other one is left out
-
-
-class Samples:
-    """Values of which percentiles are asked for; thinned out when there are too many."""
-
-    def __init__(self) -> None:
-        self._values: list[float] = []
-        self._every = 1
-        self._skipped = 0
-
-    def add(self, value: float) -> None:
-        self._skipped += 1
-        if self._skipped < self._every:
-            return
-        self._skipped = 0
-        self._values.append(value)
-        if len(self._values) >= MAX_VALUES:
-            self._values = self._values[::2]
-            self._every *= 2
-
-    def percentile(self, share: float) -> float | None:
-        """Return the value that `share` (0 to 1) of them do not exceed; None without any."""
-        if not self._values:
-            return None
-        ordered = sorted(self._values)
-        return ordered[min(len(ordered) - 1, int(share * len(ordered)))]
 
 
 @dataclass
@@ -112,7 +87,7 @@ class Totals:
         self._since = 0
         self._event = 0
         self._time = 0.0
-        self._sent: tuple[int, int] = (0, 0)  # event and time of the newest command
+        self._delays = CommandDelays()
         self._stopped = False
         self._faults: set[str] = set()
         self._link = ""
@@ -138,13 +113,13 @@ class Totals:
 
     def own(self, record: OwnRecord, arrived: int) -> None:
         """Take one of Lockstep's own records, which arrived at `arrived` (µs)."""
+        delay = self._delays.take(record, arrived * 1000)
         match record:
             case FeedbackRecord():
-                self._feedback(record, arrived)
+                self._feedback(record, arrived, delay)
             case CommandRecord(outcome="forwarded"):
                 self.commands += 1
                 self._driver(record.name).commands += 1
-                self._sent = record.event, arrived
             case RefusalRecord():
                 driver = self._driver(record.name or self._holder)
                 driver.refusals[record.reason] = driver.refusals.get(record.reason, 0) + 1
@@ -167,15 +142,15 @@ class Totals:
         """The session ends at `at`, in µs."""
         self._leave(at)
 
-    def _feedback(self, record: FeedbackRecord, arrived: int) -> None:
+    def _feedback(self, record: FeedbackRecord, arrived: int, delay: float | None) -> None:
         if record.event != self._event:
             driver = self._driver(self._holder)
             driver.events += 1
             self.events += 1
             if self._event and record.time > self._time:
                 self.intervals.add(record.time - self._time)
-            if self._sent[0] == record.event:
-                driver.answered.add((arrived - self._sent[1]) / 1000)
+            if delay is not None:
+                driver.answered.add(delay)
             self._event, self._time = record.event, record.time
         if record.stop.stopped and not self._stopped:
             self._moment(record.event, arrived, "stop", f"{record.stop.by}: {record.stop.reason}".strip(": "))
