@@ -11,6 +11,7 @@ from typing import Self
 from lockstep.protocol.errors import HandshakeError, LinkError, LinkLost, LinkRefused
 from lockstep.protocol.link_secret import LinkSecret
 from lockstep.protocol.messages import Goodbye, Hello, LinkMessage, LinkRole
+from lockstep.robot_bridge.link.ask_timer import AskTimer
 from lockstep.robot_bridge.link.link_inbox import LinkInbox
 from lockstep.robot_bridge.link.link_session import BadInput, ClientSession
 from lockstep.robot_bridge.link.link_transport import TICK_INTERVAL
@@ -19,7 +20,6 @@ from lockstep.robot_bridge.link.pacing.paced_transport import PacedTransport
 __all__ = ["RobotLink"]
 
 CONNECT_TIMEOUT = 5.0  # s
-MIN_ASK = 0.001  # s; a timer may come a little early
 
 
 class RobotLink:
@@ -60,7 +60,7 @@ class RobotLink:
         self.bad_input: Counter[str] = self._transport.bad_input  # by name, {"malformed": 1}
         self.drops: Counter[str] = self._inbox.drops  # by message kind, {"feedback": 2}; media are in `media_drops`
         self._ticker: asyncio.TimerHandle | None = None
-        self._asker: asyncio.TimerHandle | None = None
+        self._asker = AskTimer(self._session, self._transport.tick)
         self._closed = False
 
     @property
@@ -129,9 +129,7 @@ class RobotLink:
         if not self.connected:
             raise error_of(self._session)
         self._transport.send(message)
-        self._session.sent(message, time.monotonic())
-        if self._asker is None:
-            self._ask_later()
+        self._asker.sent(message)
 
     def fileno(self) -> int:
         """Return the socket's descriptor, to see whether data has come (select(2)); -1 without a socket."""
@@ -174,10 +172,10 @@ class RobotLink:
     async def close(self) -> None:
         """Say goodbye and close, in a second at most. May be called again."""
         self._closed = True
-        for timer in (self._ticker, self._asker):
-            if timer is not None:
-                timer.cancel()
-        self._ticker = self._asker = None
+        self._asker.cancel()
+        if self._ticker is not None:
+            self._ticker.cancel()
+            self._ticker = None
         self._transport.say_goodbye()
         try:
             async with asyncio.timeout(1.0):
@@ -201,19 +199,6 @@ class RobotLink:
         self._transport.tick()
         if self._session.ended is None:
             self._ticker = asyncio.get_running_loop().call_later(TICK_INTERVAL, self._tick)
-
-    def _ask_later(self) -> None:
-        """Tick when an answer is to be asked for. One timer: it may find that the time has moved on."""
-        at = self._session.asks_at
-        if at is None or self._closed:
-            self._asker = None
-            return
-        self._asker = asyncio.get_running_loop().call_later(max(MIN_ASK, at - time.monotonic()), self._ask)
-
-    def _ask(self) -> None:
-        if self._session.asks_at is not None and time.monotonic() >= self._session.asks_at:
-            self._transport.tick()
-        self._ask_later()
 
 
 class _ClientTransport(PacedTransport):

@@ -198,11 +198,8 @@ class LinkSession:
                 self.end("silent", f"no hello within {HELLO_TIMEOUT:g} s")
         elif now - self._last_valid > self.patience:
             self.end("silent", f"nothing valid received for {self.patience:.1f} s")
-        elif (ping := self._due_ping(now)) is not None:
+        elif (ping := self._heartbeats.ping(now)) is not None:
             self._outgoing.append(ping)
-
-    def _due_ping(self, now: float) -> Ping | None:
-        return self._heartbeats.ping(now)
 
     def end(self, error: str, detail: str = "") -> None:
         """Say goodbye; nothing is received afterwards."""
@@ -318,11 +315,11 @@ class ClientSession(LinkSession):
         """Take note of a message that was sent: an answer to it may be due."""
         self._asking.sent(message, now)
 
-    def _due_ping(self, now: float) -> Ping | None:
-        if self._asking.at is None or now < self._asking.at:
-            return super()._due_ping(now)
-        self._asking.asked(now)
-        return self._heartbeats.ping_early(now)
+    def tick(self, now: float) -> None:
+        super().tick(now)
+        if self.asks_at is not None and now >= self.asks_at:
+            self._asking.asked(now)
+            self._outgoing.append(self._heartbeats.ping_early(now))
 
     def _shake_hands(self, message: LinkMessage, now: float) -> LinkMessage | BadInput | None:
         if isinstance(message, Goodbye):
